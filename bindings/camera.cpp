@@ -70,10 +70,11 @@ std::vector<Affine> motion_of(nb::handle value) {
   try {
     const nb::object array =
         nb::module_::import_("numpy").attr("ascontiguousarray")(value, "float64");
-    const auto places =
+    const auto transforms =
         nb::cast<nb::ndarray<const double, nb::shape<-1, 4, 4>, nb::c_contig, nb::device::cpu>>(
             array);
-    for (size_t k = 0; k < places.shape(0); ++k) steps.push_back(affine(places.data() + 16 * k));
+    for (size_t k = 0; k < transforms.shape(0); ++k)
+      steps.push_back(affine(transforms.data() + 16 * k));
   } catch (const std::exception&) {
     fail("motion", "4 x 4 numbers for each step");
   }

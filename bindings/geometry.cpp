@@ -116,9 +116,9 @@ template <typename T>
 nb::object array_of(std::vector<T>&& values, size_t columns) {
   auto* held = new std::vector<T>(std::move(values));
   const nb::capsule owner(held, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
-  using Made = nb::ndarray<nb::numpy, T>;
-  if (columns == 0) return nb::cast(Made(held->data(), {held->size()}, owner));
-  return nb::cast(Made(held->data(), {held->size() / columns, columns}, owner));
+  using NumpyArray = nb::ndarray<nb::numpy, T>;
+  if (columns == 0) return nb::cast(NumpyArray(held->data(), {held->size()}, owner));
+  return nb::cast(NumpyArray(held->data(), {held->size() / columns, columns}, owner));
 }
 
 }  // namespace
@@ -212,7 +212,7 @@ nb::object quads(const Array<float>& points, const Array<int32_t>& indices,
 }
 
 /// Number of values from which it is worthwhile to release the GIL.
-constexpr size_t kMuch = 1 << 15;
+constexpr size_t kMinParallelSize = 1 << 15;
 
 /// Returns bounds as an array of shape (2, 3).
 nb::object box_of(const PointBounds& bounds) {
@@ -229,7 +229,7 @@ nb::object plain_mesh(const Array<float>& points, const Array<int32_t>& counts,
   if (points.ndim() != 2 || points.shape(1) != 3) throw Error("points must have the shape (n, 3)");
   if (matrix && matrix->size() != 16) throw Error("a matrix must have the shape (4, 4)");
   const std::span<const int32_t> corners{indices.data(), indices.size()};
-  std::span<const float> there{points.data(), points.size()};
+  std::span<const float> input{points.data(), points.size()};
   std::vector<float> baked;
   std::optional<PointBounds> bounds;
   uint32_t size = 0;
@@ -237,20 +237,20 @@ nb::object plain_mesh(const Array<float>& points, const Array<int32_t>& counts,
   std::vector<uint32_t> triangles;
   {
     std::optional<nb::gil_scoped_release> release;
-    if (points.size() >= kMuch) release.emplace();
+    if (points.size() >= kMinParallelSize) release.emplace();
     size = corners_of_faces({counts.data(), counts.size()}, corners, points.shape(0));
     if (size == 4) {
-      split = split_quads(there, corners, {});
+      split = split_quads(input, corners, {});
       triangles.reserve(split.size());
       for (const int64_t corner : split)
         triangles.push_back(static_cast<uint32_t>(corners[static_cast<size_t>(corner)]));
     }
     if (size != 0 && matrix) {
       baked.resize(points.size());
-      bake_points(there, std::span<const double, 16>(matrix->data(), 16), baked);
-      there = baked;
+      bake_points(input, std::span<const double, 16>(matrix->data(), 16), baked);
+      input = baked;
     }
-    if (size != 0) bounds = bounds_of(there, limit);
+    if (size != 0) bounds = bounds_of(input, limit);
   }
   if (!bounds) return nb::none();
   nb::object positions = matrix ? array_of(std::move(baked), 3) : nb::none();
@@ -261,20 +261,21 @@ nb::object plain_mesh(const Array<float>& points, const Array<int32_t>& counts,
 
 /// Returns transformed points, normals and bounds of a shape, or None if a point is not finite or
 /// too far away.
-nb::object place_shape(const Array<float>& points, const Array<float>& normals,
-                       const Array<double>& matrix, const Array<double>& inverse, double limit) {
+nb::object transform_shape(const Array<float>& points, const Array<float>& normals,
+                           const Array<double>& matrix, const Array<double>& inverse,
+                           double limit) {
   if (points.ndim() != 2 || points.shape(1) != 3 || normals.size() != points.size())
     throw Error("points and normals must have the shape (n, 3)");
   if (matrix.size() != 16 || inverse.size() != 16)
     throw Error("a matrix must have the shape (4, 4)");
-  std::vector<float> placed(points.size()), turned(points.size());
+  std::vector<float> transformed(points.size()), turned(points.size());
   bake_points({points.data(), points.size()}, std::span<const double, 16>(matrix.data(), 16),
-              placed);
+              transformed);
   bake_normals({normals.data(), normals.size()}, std::span<const double, 16>(inverse.data(), 16),
                turned);
-  const std::optional<PointBounds> bounds = bounds_of(placed, limit);
+  const std::optional<PointBounds> bounds = bounds_of(transformed, limit);
   if (!bounds) return nb::none();
-  return nb::make_tuple(array_of(std::move(placed), 3), array_of(std::move(turned), 3),
+  return nb::make_tuple(array_of(std::move(transformed), 3), array_of(std::move(turned), 3),
                         box_of(*bounds));
 }
 
@@ -284,7 +285,7 @@ nb::object used_points(const Array<uint32_t>& triangles, size_t point_count) {
   size_t found = 0;
   {
     std::optional<nb::gil_scoped_release> release;
-    if (triangles.size() >= kMuch) release.emplace();
+    if (triangles.size() >= kMinParallelSize) release.emplace();
     for (size_t i = 0; i < triangles.size(); ++i) {
       const uint32_t point = triangles.data()[i];
       if (point >= point_count) throw Error("a triangle has a point that is not there");
@@ -296,19 +297,19 @@ nb::object used_points(const Array<uint32_t>& triangles, size_t point_count) {
   auto* held = new std::vector<uint8_t>(std::move(used));
   const nb::capsule owner(held,
                           [](void* p) noexcept { delete static_cast<std::vector<uint8_t>*>(p); });
-  using Made = nb::ndarray<nb::numpy, bool>;
-  return nb::cast(Made(reinterpret_cast<bool*>(held->data()), {held->size()}, owner));
+  using NumpyArray = nb::ndarray<nb::numpy, bool>;
+  return nb::cast(NumpyArray(reinterpret_cast<bool*>(held->data()), {held->size()}, owner));
 }
 
-nb::tuple ears(const Array<double>& corners, uint64_t most_steps) {
+nb::tuple triangulate_polygon(const Array<double>& corners, uint64_t max_steps) {
   if (corners.ndim() != 2 || corners.shape(1) != 2)
     throw Error("corners must have the shape (k, 2)");
-  Ears found;
+  PolygonTriangulation found;
   {
     const nb::gil_scoped_release release;
-    found = clip_ears({corners.data(), corners.size()}, most_steps);
+    found = clip_ears({corners.data(), corners.size()}, max_steps);
   }
-  return nb::make_tuple(array_of(std::move(found.corners), 3), found.hurried);
+  return nb::make_tuple(array_of(std::move(found.corners), 3), found.untested);
 }
 
 nb::tuple weld(const Array<int32_t>& corners, uint32_t point_count, const Array<float>& values) {
@@ -333,9 +334,9 @@ void bind_geometry(nb::module_& m) {
   m.def("split_quads", &quads, "points"_a, "indices"_a, "starts"_a = nb::none());
   m.def("plain_mesh", &plain_mesh, "points"_a, "counts"_a, "indices"_a, "matrix"_a = nb::none(),
         nb::kw_only(), "limit"_a);
-  m.def("place_shape", &place_shape, "points"_a, "normals"_a, "matrix"_a, "inverse"_a,
+  m.def("place_shape", &transform_shape, "points"_a, "normals"_a, "matrix"_a, "inverse"_a,
         nb::kw_only(), "limit"_a);
   m.def("used_points", &used_points, "triangles"_a, "point_count"_a);
-  m.def("clip_ears", &ears, "corners"_a, "most_steps"_a = kEarSteps);
+  m.def("clip_ears", &triangulate_polygon, "corners"_a, "most_steps"_a = kMaxClippingSteps);
   m.def("weld_corners", &weld, "corners"_a, "point_count"_a, "values"_a);
 }

@@ -117,7 +117,8 @@ void take(Light& light, SceneBuilder& builder, const nb::kwargs& values) {
   // Lights with a transform accept the shared parameters of all kinds, for callers that pass the
   // same set to each, but not the parameters specific to another kind.
   const auto is_known = [&](const LightParameter& p) {
-    return p.kind != LightValueKind::kChoice && ((!of_mesh && !p.is_own) || p.is_of(light.kind));
+    return p.kind != LightValueKind::kChoice &&
+           ((!of_mesh && !p.is_specific) || p.is_of(light.kind));
   };
   if (values.contains("name") && !nb::try_cast(values["name"], light.name))
     throw Error("the name of a light must be a text");
@@ -148,7 +149,7 @@ nb::dict row_dict(const LightParameter& p) {
   d["refers"] = light_refers_name(p.refers);
   d["least"] = std::isfinite(p.least) ? nb::cast(p.least) : nb::none();
   d["most"] = std::isfinite(p.most) ? nb::cast(p.most) : nb::none();
-  d["usual"] = p.usual;
+  d["usual"] = p.slider_max;
   d["choices"] = nb::tuple(choices);
   d["kinds"] = nb::tuple(kinds);
   d["default"] =
@@ -214,8 +215,8 @@ nb::dict light_dict(const Scene& scene, uint32_t light) {
     else if (p.refers == LightRefers::kTexture)
       d[p.name] =
           l.texture == kNoTexture ? nb::none() : nb::cast(scene.textures()[l.texture]->name());
-    else if (p.is_own ? p.is_of(l.kind) && p.can_change()
-                      : p.can_change() || p.refers == LightRefers::kProfile)
+    else if (p.is_specific ? p.is_of(l.kind) && p.can_change()
+                           : p.can_change() || p.refers == LightRefers::kProfile)
       d[p.name] = to_python(p, p.read(l));
   }
   return d;
@@ -225,7 +226,7 @@ Light edited_light(const Scene& scene, uint32_t light, const nb::dict& values) {
   check_index("light", light, scene.lights().size());
   Light changed = scene.lights()[light];
   const auto can_change = [&](const LightParameter& p) {
-    return p.can_change() && (!p.is_own || p.is_of(changed.kind));
+    return p.can_change() && (!p.is_specific || p.is_of(changed.kind));
   };
   for (const auto& [key, value] : values) {
     const auto name = nb::cast<std::string>(nb::str(key));

@@ -108,7 +108,7 @@ uint32_t add_material(SceneBuilder& builder, const std::string& program_name,
   Material m;
   m.name = name;
   m.program = named<ProgramId>("program", kProgramNames, program_name);
-  take_parameters(m, values);
+  read_parameters(m, values);
   m.openpbr = openpbr_of(name, openpbr);
   m.graph = graph.value_or(kNoGraph);
   m.opacity_graph = opacity_graph.value_or(kNoGraph);

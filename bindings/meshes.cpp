@@ -27,7 +27,7 @@ namespace {
 constexpr uint32_t kNoGroup = 0xffffffffu;
 
 /// Returns an owner that keeps arrays alive from C++. It acquires the GIL to release them.
-std::shared_ptr<const void> hold(nb::list arrays) {
+std::shared_ptr<const void> own_arrays(nb::list arrays) {
   return {new nb::list(std::move(arrays)), [](const void* p) {
             const nb::gil_scoped_acquire gil;
             delete static_cast<const nb::list*>(p);
@@ -107,7 +107,7 @@ Mesh make_mesh(SceneBuilder& builder, const Array<float>& positions,
   }
   mesh.attributes = attributes_of(builder, attributes, owners);
   mesh.material = material;
-  mesh.owner = hold(std::move(owners));
+  mesh.owner = own_arrays(std::move(owners));
   return mesh;
 }
 
@@ -149,7 +149,7 @@ uint32_t add_meshes(SceneBuilder& builder, const Array<float>& positions,
   nb::list owners;
   owners.append(nb::cast(positions));
   owners.append(nb::cast(indices));
-  const std::shared_ptr<const void> owner = hold(std::move(owners));
+  const std::shared_ptr<const void> owner = own_arrays(std::move(owners));
   const float* position = positions.data();
   const uint32_t* index = indices.data();
   uint32_t first = 0;
@@ -234,7 +234,7 @@ uint32_t add_curves(SceneBuilder& builder, const std::string& kind, const Array<
     mesh.normals = {normals->data(), normals->size()};
     owners.append(nb::cast(*normals));
   }
-  mesh.owner = hold(std::move(owners));
+  mesh.owner = own_arrays(std::move(owners));
   return builder.add_mesh(std::move(mesh));
 }
 
@@ -247,27 +247,27 @@ uint32_t add_points(SceneBuilder& builder, const Array<float>& positions, const 
   Mesh mesh = curved_mesh(builder, positions, radii, uvs, face_materials, material, attributes,
                           name, light_group, asset_length, owners);
   mesh.primitive = Primitive::kSphere;
-  mesh.owner = hold(std::move(owners));
+  mesh.owner = own_arrays(std::move(owners));
   return builder.add_mesh(std::move(mesh));
 }
 
 /// Rows and bounding radii of Gaussian splats.
-struct SplatArrays {
-  std::vector<SplatRow> rows;
+struct GaussianSplatArrays {
+  std::vector<GaussianSplatRow> rows;
   std::vector<float> radii;
 };
 
-uint32_t add_splats(SceneBuilder& builder, const Array<float>& positions,
-                    const Array<float>& scales, const Array<float>& orientations,
-                    const Array<float>& opacities, const Array<float>& harmonics, uint32_t material,
-                    const std::string& name, const std::string& light_group,
-                    uint32_t asset_length) {
+uint32_t add_gaussian_splats(SceneBuilder& builder, const Array<float>& positions,
+                             const Array<float>& scales, const Array<float>& orientations,
+                             const Array<float>& opacities, const Array<float>& harmonics,
+                             uint32_t material, const std::string& name,
+                             const std::string& light_group, uint32_t asset_length) {
   const std::string what = "mesh '" + name + "'";
-  auto arrays = std::make_unique<SplatArrays>();
-  arrays->rows =
-      splat_rows({scales.data(), scales.size()}, {orientations.data(), orientations.size()},
-                 {opacities.data(), opacities.size()}, what);
-  arrays->radii = splat_radii(arrays->rows);
+  auto arrays = std::make_unique<GaussianSplatArrays>();
+  arrays->rows = make_gaussian_splat_rows({scales.data(), scales.size()},
+                                          {orientations.data(), orientations.size()},
+                                          {opacities.data(), opacities.size()}, what);
+  arrays->radii = gaussian_splat_radii(arrays->rows);
   size_t degree = 0;
   while (degree < 3 && harmonics.ndim() == 3 && harmonics.shape(1) > (degree + 1) * (degree + 1))
     ++degree;
@@ -276,7 +276,7 @@ uint32_t add_splats(SceneBuilder& builder, const Array<float>& positions,
     throw Error(what + " needs harmonics of shape (n, 1, 3), (n, 4, 3), (n, 9, 3) or (n, 16, 3)");
   Mesh mesh;
   mesh.name = name;
-  mesh.primitive = Primitive::kSplat;
+  mesh.primitive = Primitive::kGaussianSplat;
   mesh.light_group = builder.light_group(light_group);
   mesh.asset_length = asset_length;
   mesh.material = material;
@@ -288,9 +288,9 @@ uint32_t add_splats(SceneBuilder& builder, const Array<float>& positions,
   nb::list owners;
   owners.append(nb::cast(positions));
   owners.append(nb::cast(harmonics));
-  owners.append(
-      nb::capsule(arrays.release(), [](void* p) noexcept { delete static_cast<SplatArrays*>(p); }));
-  mesh.owner = hold(std::move(owners));
+  owners.append(nb::capsule(arrays.release(),
+                            [](void* p) noexcept { delete static_cast<GaussianSplatArrays*>(p); }));
+  mesh.owner = own_arrays(std::move(owners));
   return builder.add_mesh(std::move(mesh));
 }
 
@@ -356,9 +356,9 @@ void def_meshes(nb::class_<SceneBuilder>& builder) {
       .def("add_points", &add_points, "positions"_a, "radii"_a, nb::kw_only(), "uvs"_a = nb::none(),
            "face_materials"_a = nb::none(), "material"_a = kInheritMaterial,
            "attributes"_a = nb::dict(), "name"_a = "", "light_group"_a = "", "asset_length"_a = 0)
-      .def("add_splats", &add_splats, "positions"_a, "scales"_a, "orientations"_a, "opacities"_a,
-           "harmonics"_a, nb::kw_only(), "material"_a, "name"_a = "", "light_group"_a = "",
-           "asset_length"_a = 0)
+      .def("add_splats", &add_gaussian_splats, "positions"_a, "scales"_a, "orientations"_a,
+           "opacities"_a, "harmonics"_a, nb::kw_only(), "material"_a, "name"_a = "",
+           "light_group"_a = "", "asset_length"_a = 0)
       .def("add_instances", &add_instances, "parent"_a, "child"_a, "transforms"_a,
            "materials"_a = nb::none(), nb::kw_only(), "names"_a = nb::none(),
            "numbers"_a = nb::none(), "asset_lengths"_a = nb::none(), "motion"_a = nb::none());

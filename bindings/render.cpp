@@ -149,21 +149,22 @@ nb::dict from_profile(const CostProfile& profile) {
 }
 
 template <typename T>
-auto image(nb::handle owner, const std::vector<T>& values, const Picture& p, size_t channels) {
+auto image(nb::handle owner, const std::vector<T>& values, const RenderedImage& p,
+           size_t channels) {
   const size_t shape[3] = {p.height, p.width, channels};
   return nb::ndarray<nb::numpy, const T>(values.data(), channels == 1 ? 2 : 3, shape, owner);
 }
 
 /// Returns a layer of the image, or None if it was not requested.
 template <typename T>
-nb::object layer(nb::handle owner, std::vector<T> Picture::* values, size_t channels) {
-  const Picture& p = nb::cast<const Result&>(owner).picture;
+nb::object layer(nb::handle owner, std::vector<T> RenderedImage::* values, size_t channels) {
+  const RenderedImage& p = nb::cast<const Result&>(owner).image;
   if ((p.*values).empty()) return nb::none();
   return nb::cast(image(owner, p.*values, p, channels));
 }
 
 nb::dict aovs_dict(nb::handle owner) {
-  const Picture& p = nb::cast<const Result&>(owner).picture;
+  const RenderedImage& p = nb::cast<const Result&>(owner).image;
   nb::dict d;
   for (const AovLayer& one : p.aovs)
     d[one.name.c_str()] = nb::cast(image(owner, one.values, p, one.channels));
@@ -172,7 +173,7 @@ nb::dict aovs_dict(nb::handle owner) {
 
 /// Returns sample counts (h, w) and samples (n, 6), or None without a deep image.
 nb::object deep_pair(nb::handle owner) {
-  const Picture& p = nb::cast<const Result&>(owner).picture;
+  const RenderedImage& p = nb::cast<const Result&>(owner).image;
   if (p.deep.empty()) return nb::none();
   const size_t shape[2] = {p.deep.values.size() / DeepLayer::kChannels, DeepLayer::kChannels};
   return nb::make_tuple(image(owner, p.deep.counts, p, 1),
@@ -206,7 +207,7 @@ nb::list aov_table() {
 
 nb::dict manifests_dict(const Result& r) {
   nb::dict d;
-  for (const CryptoManifest& manifest : r.picture.manifests) {
+  for (const CryptoManifest& manifest : r.image.manifests) {
     nb::dict names;
     for (const auto& [name, id] : manifest.names) names[name.c_str()] = id;
     d[manifest.level.c_str()] = names;
@@ -214,7 +215,7 @@ nb::dict manifests_dict(const Result& r) {
   return d;
 }
 
-size_t picture_bytes(const Picture& p) {
+size_t image_bytes(const RenderedImage& p) {
   const auto bytes = [](const auto&... v) { return ((v.size() * sizeof(v[0])) + ...); };
   size_t sum = bytes(p.beauty, p.albedo, p.normal, p.depth, p.samples, p.error, p.variance);
   for (const AovLayer& layer : p.aovs) sum += bytes(layer.values);
@@ -242,16 +243,16 @@ Result run_render(const std::function<WavefrontRenderer&(const Settings&)>& rend
   const Settings settings = nb::cast<Settings>(a.settings);
   Result result;
   result.settings = settings_dict(settings);
-  std::unique_ptr<PythonPolicy> own_policy;
+  std::unique_ptr<PythonPolicy> python_policy;
   if (!a.policy.is_none()) {
-    own_policy = std::make_unique<PythonPolicy>(a.policy, scene);
-    result.settings["policy"] = std::string(own_policy->name());
+    python_policy = std::make_unique<PythonPolicy>(a.policy, scene);
+    result.settings["policy"] = std::string(python_policy->name());
   }
   if (!(a.interval > 0) || !std::isfinite(a.interval))
     throw Error("interval, in seconds between snapshots, must be finite and above 0");
   RenderOptions options = watched_by(a.progress, a.watcher, result.settings);
   options.recorder = a.recorder;
-  options.policy = own_policy.get();
+  options.policy = python_policy.get();
   options.interval_s = a.interval;
   options.wants_picture = a.wants_picture;
   CostProfile profile;
@@ -265,15 +266,15 @@ Result run_render(const std::function<WavefrontRenderer&(const Settings&)>& rend
     options.resume = resumed_from(resumed);
   }
   if (!a.learned.is_none()) {
-    const auto given = nb::cast<nb::bytes>(a.learned);
-    const auto* first = reinterpret_cast<const std::byte*>(given.c_str());
-    options.learned.assign(first, first + given.size());
+    const auto learned_bytes = nb::cast<nb::bytes>(a.learned);
+    const auto* first = reinterpret_cast<const std::byte*>(learned_bytes.c_str());
+    options.learned.assign(first, first + learned_bytes.size());
   }
   {
     const nb::gil_scoped_release release;
     settings.check();
     WavefrontRenderer& ready = renderer(settings);
-    result.picture = ready.render(settings, options);
+    result.image = ready.render(settings, options);
     result.statistics = ready.statistics();
     result.profile = ready.cost_profile();
     if (result.statistics.guiding.paths > 0) result.learned = ready.packed_learned();
@@ -284,19 +285,21 @@ Result run_render(const std::function<WavefrontRenderer&(const Settings&)>& rend
 void bind_render(nb::module_& m) {
   nb::class_<Result>(m, "Result")
       .def_prop_ro("beauty",
-                   [](nb::handle_t<Result> self) { return layer(self, &Picture::beauty, 3); })
+                   [](nb::handle_t<Result> self) { return layer(self, &RenderedImage::beauty, 3); })
       .def_prop_ro("albedo",
-                   [](nb::handle_t<Result> self) { return layer(self, &Picture::albedo, 3); })
+                   [](nb::handle_t<Result> self) { return layer(self, &RenderedImage::albedo, 3); })
       .def_prop_ro("normal",
-                   [](nb::handle_t<Result> self) { return layer(self, &Picture::normal, 3); })
+                   [](nb::handle_t<Result> self) { return layer(self, &RenderedImage::normal, 3); })
       .def_prop_ro("depth",
-                   [](nb::handle_t<Result> self) { return layer(self, &Picture::depth, 1); })
-      .def_prop_ro("samples",
-                   [](nb::handle_t<Result> self) { return layer(self, &Picture::samples, 1); })
+                   [](nb::handle_t<Result> self) { return layer(self, &RenderedImage::depth, 1); })
+      .def_prop_ro(
+          "samples",
+          [](nb::handle_t<Result> self) { return layer(self, &RenderedImage::samples, 1); })
       .def_prop_ro("error",
-                   [](nb::handle_t<Result> self) { return layer(self, &Picture::error, 1); })
-      .def_prop_ro("variance",
-                   [](nb::handle_t<Result> self) { return layer(self, &Picture::variance, 3); })
+                   [](nb::handle_t<Result> self) { return layer(self, &RenderedImage::error, 1); })
+      .def_prop_ro(
+          "variance",
+          [](nb::handle_t<Result> self) { return layer(self, &RenderedImage::variance, 3); })
       .def_prop_ro("aovs", [](nb::handle_t<Result> self) { return aovs_dict(self); })
       .def_prop_ro("manifests", &manifests_dict)
       .def_prop_ro("deep", [](nb::handle_t<Result> self) { return deep_pair(self); })
@@ -305,7 +308,7 @@ void bind_render(nb::module_& m) {
                    [](const Result& r) { return nb::bytes(r.learned.data(), r.learned.size()); })
       .def_prop_ro("costs", [](const Result& r) { return from_profile(r.profile); })
       .def_prop_ro("stats", [](const Result& r) {
-        return statistics_dict(r.statistics, r.settings, picture_bytes(r.picture));
+        return statistics_dict(r.statistics, r.settings, image_bytes(r.image));
       });
 
   m.def("render", &render, "scene"_a, "settings"_a, "progress"_a = nb::none(),
@@ -317,7 +320,7 @@ void bind_render(nb::module_& m) {
   m.def("lane_widths", &lane_widths);
   m.def("policies", &policy_names);
   m.def("peak_rss_bytes", &peak_rss_bytes);
-  m.def("give_back_memory", &give_back_memory);
+  m.def("give_back_memory", &release_memory);
   m.def("build_info", [] {
     nb::dict d;
     d["version"] = WAVECOMB_VERSION;

@@ -27,10 +27,10 @@ namespace {
 
 Result render(WavefrontRenderer& renderer, nb::handle settings, const nb::object& progress,
               const nb::object& policy, const nb::object& costs, const nb::object& watcher,
-              const nb::object& state, double interval, bool picture, const nb::object& learned) {
+              const nb::object& state, double interval, bool image, const nb::object& learned) {
   return run_render(
       [&](const Settings&) -> WavefrontRenderer& { return renderer; }, *renderer.scene(),
-      {settings, progress, policy, costs, nullptr, watcher, state, interval, picture, learned});
+      {settings, progress, policy, costs, nullptr, watcher, state, interval, image, learned});
 }
 
 void edit(WavefrontRenderer& renderer, const nb::object& camera, const nb::dict& materials,
@@ -42,14 +42,14 @@ void edit(WavefrontRenderer& renderer, const nb::object& camera, const nb::dict&
 
 /// Calls `work` without the GIL and returns its result.
 template <typename Work>
-auto released(const Work& work) {
+auto without_gil(const Work& work) {
   const nb::gil_scoped_release release;
   return work();
 }
 
 nb::object pick_at(const WavefrontRenderer& renderer, float x, float y, uint32_t width,
                    uint32_t height) {
-  const std::optional<Pick> found = released([&] { return renderer.pick(x, y, width, height); });
+  const std::optional<Pick> found = without_gil([&] { return renderer.pick(x, y, width, height); });
   if (!found) return nb::none();
   const auto triple = [](const Vec3<float>& v) { return nb::make_tuple(v.x, v.y, v.z); };
   nb::dict d;
@@ -72,10 +72,10 @@ nb::object pick_at(const WavefrontRenderer& renderer, float x, float y, uint32_t
 
 nb::object learned_at(const WavefrontRenderer& renderer, float x, float y, uint32_t width,
                       uint32_t height) {
-  std::optional<LearnedPlace> found =
-      released([&] { return renderer.learned(x, y, width, height); });
+  std::optional<LearnedData> found =
+      without_gil([&] { return renderer.learned(x, y, width, height); });
   if (!found) return nb::none();
-  static constexpr const char* kAxes[kGuideAxes] = {"+x", "-x", "+y", "-y", "+z", "-z"};
+  static constexpr const char* kAxes[kGuidingAxes] = {"+x", "-x", "+y", "-y", "+z", "-z"};
   nb::dict d;
   d["axis"] = kAxes[found->axis];
   d["density"] = nb::none();
@@ -83,7 +83,7 @@ nb::object learned_at(const WavefrontRenderer& renderer, float x, float y, uint3
     auto* own = new std::vector<float>(std::move(found->density));
     const nb::capsule owner(own,
                             [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
-    const size_t shape[2] = {kGuideSide, kGuideSide};
+    const size_t shape[2] = {kGuidingSide, kGuidingSide};
     d["density"] = nb::cast(nb::ndarray<nb::numpy, float>(own->data(), 2, shape, owner));
     d["guided_share"] = found->guided_share;
     d["survival"] = found->survival;
@@ -108,7 +108,7 @@ void bind_renderer(nb::module_& m) {
            "costs"_a = nb::none(), "watcher"_a = nb::none(), "state"_a = nb::none(),
            "interval"_a = 0.1, "picture"_a = true, "learned"_a = nb::none())
       .def("stop", &WavefrontRenderer::stop)
-      .def("twin", &WavefrontRenderer::twin)
+      .def("twin", &WavefrontRenderer::clone)
       .def("pick", &pick_at, "x"_a, "y"_a, "width"_a, "height"_a)
       .def("learned", &learned_at, "x"_a, "y"_a, "width"_a, "height"_a);
 }

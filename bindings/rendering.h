@@ -17,7 +17,7 @@
 
 /// Image and statistics of a render.
 struct Result {
-  wavecomb::Picture picture;
+  wavecomb::RenderedImage image;
   wavecomb::RenderStatistics statistics;
   wavecomb::CostProfile profile;
   nanobind::dict settings;

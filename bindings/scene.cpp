@@ -46,11 +46,11 @@ void add_visibility(SceneBuilder& builder, const std::string& path,
   VisibilityRule rule{path};
   for (const auto& [name, value] : rays) {
     const uint32_t bit = choose<uint32_t>("kind of rays", name,
-                                          {{"camera", kSeenByCamera},
-                                           {"shadow", kSeenByShadowRays},
-                                           {"bounces", kSeenByBounces},
-                                           {"holdout", kHeldOut}});
-    rule.said |= bit;
+                                          {{"camera", kVisibleToCamera},
+                                           {"shadow", kVisibleToShadowRays},
+                                           {"bounces", kVisibleToBounces},
+                                           {"holdout", kHoldout}});
+    rule.specified |= bit;
     if (value) rule.bits |= bit;
   }
   builder.add_visibility(std::move(rule));
@@ -78,7 +78,7 @@ void bind_scene(nb::module_& m) {
 
   nb::class_<TileStore>(m, "TextureStore")
       .def(nb::init<uint64_t, std::string>(), "limit_bytes"_a, "folder"_a)
-      .def_static("obstacle", &UserFaults::obstacle)
+      .def_static("obstacle", &UserFaults::unsupported_reason)
       .def_prop_ro("limit_bytes", &TileStore::limit_bytes)
       .def("set_waiting", &TileStore::set_waiting, "bytes"_a)
       .def_prop_ro("statistics",

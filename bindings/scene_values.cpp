@@ -78,7 +78,7 @@ class Reader {
   /// Throws Error if the dict has unknown keys; the message appends `which`, such as " that can be
   /// changed".
   void end(const char* which = "") const {
-    if (nb::len(values_) == taken_) return;
+    if (nb::len(values_) == used_count_) return;
     for (const auto& [key, value] : values_) {
       const std::string name = nb::cast<std::string>(nb::str(key));
       if (known_.find("'" + name + "'") == std::string::npos)
@@ -90,7 +90,7 @@ class Reader {
   nb::object next(const char* name) {
     known_ += std::string(known_.empty() ? "" : ", ") + "'" + name + "'";
     if (!values_.contains(name)) return {};
-    ++taken_;
+    ++used_count_;
     return values_[name];
   }
   [[noreturn]] void fail(const char* name, const char* wanted) const {
@@ -111,7 +111,7 @@ class Reader {
   std::string what_;
   nb::dict values_;
   std::string known_;
-  size_t taken_ = 0;
+  size_t used_count_ = 0;
 };
 
 /// Calls visit<Value>() for colours, numbers and flags, in display order.
@@ -122,14 +122,14 @@ void for_each_kind(const Visit& visit) {
   visit.template operator()<bool>();
 }
 
-void take_material(Reader& reader, Material& to) {
+void read_material(Reader& reader, Material& to) {
   for_each_kind([&]<typename Value>() {
     for_each_parameter<Value>(
         to, [&](const MaterialParameter& p, Value& value) { reader.take(p.name, value); });
   });
 }
 
-void take_openpbr(Reader& reader, OpenPbr& to) {
+void read_openpbr(Reader& reader, OpenPbr& to) {
   reader.take(to, kOpenPbrColors);
   reader.take(to, kOpenPbrNumbers);
   reader.take(to, kOpenPbrSwitches);
@@ -218,7 +218,7 @@ Affine matrix_of(const std::string& what, nb::handle value) {
 OpenPbr openpbr_of(const std::string& material, const nb::dict& values) {
   OpenPbr to;
   Reader reader("openpbr of material '" + material + "'", values);
-  take_openpbr(reader, to);
+  read_openpbr(reader, to);
   reader.end();
   return to;
 }
@@ -230,9 +230,9 @@ Affine affine(const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& m) {
   throw Error("a transform must be of float32 or float64");
 }
 
-void take_parameters(Material& material, const nb::kwargs& values) {
+void read_parameters(Material& material, const nb::kwargs& values) {
   Reader reader("material '" + material.name + "'", values);
-  take_material(reader, material);
+  read_material(reader, material);
   reader.end();
 }
 
@@ -242,7 +242,7 @@ nb::list material_rows() {
   for (const MaterialParameter& p : material_table()) {
     nb::dict d;
     d["name"] = p.name;
-    if (const OwnParameter* own = p.own()) {
+    if (const SpecificParameter* own = p.own()) {
       const ProgramParameter& info = own->info();
       d["kind"] = "number";
       d["default"] = info.standard;
@@ -251,7 +251,7 @@ nb::list material_rows() {
       d["most"] = info.most;
     }
     for_each_kind([&]<typename Value>() {
-      if (const auto* member = std::get_if<Value Material::*>(&p.place)) {
+      if (const auto* member = std::get_if<Value Material::*>(&p.accessor)) {
         d["kind"] = std::is_same_v<Value, float>  ? "number"
                     : std::is_same_v<Value, bool> ? "flag"
                                                   : "colour";
@@ -313,8 +313,8 @@ SceneEdit scene_edit(const Scene& scene, const nb::object& camera, const nb::dic
     check_index("material", id, scene.materials().size());
     Material changed = scene.materials()[id];
     Reader reader("material '" + changed.name + "'", values);
-    take_material(reader, changed);
-    if (changed.program == ProgramId::kOpenPbr) take_openpbr(reader, changed.openpbr);
+    read_material(reader, changed);
+    if (changed.program == ProgramId::kOpenPbr) read_openpbr(reader, changed.openpbr);
     reader.end(" that can be changed");
     edit.materials[id] = std::move(changed);
   });

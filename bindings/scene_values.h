@@ -43,7 +43,7 @@ wavecomb::Affine matrix_of(const std::string& what, nanobind::handle value);
 
 /// Sets parameters of material_table() by name in a material, whose name must be set. Throws Error
 /// for unknown names and values of a wrong type.
-void take_parameters(wavecomb::Material& material, const nanobind::kwargs& values);
+void read_parameters(wavecomb::Material& material, const nanobind::kwargs& values);
 /// Returns material_table() as a list of dicts.
 nanobind::list material_rows();
 /// Returns which inputs each program reads, as a list of dicts.

@@ -140,7 +140,7 @@ nb::dict row_dict(const SettingInfo& setting) {
   d["steps"] = nb::tuple(nb::cast(setting.steps));
   d["choices"] = choices;
   d["group"] = kGroups[static_cast<size_t>(setting.group)];
-  d["changes_picture"] = setting.changes_picture;
+  d["changes_picture"] = setting.changes_image;
   d["changes_bits"] = setting.changes_bits;
   d["changes_expectation"] = setting.changes_expectation;
   return d;

@@ -65,17 +65,17 @@ nb::dict programs_dict(const RenderStatistics& s) {
   return out;
 }
 
-nb::dict sharing_dict(const Sharing& s) {
+nb::dict sharing_dict(const WorkDistribution& s) {
   nb::dict d, passes;
   d["groups"] = s.groups();
   d["longest_s"] = s.longest_s();
-  for (size_t i = 0; i < kSharedBy.size(); ++i)
-    passes[std::to_string(kSharedBy[i]).c_str()] = s.passes_s(i);
+  for (size_t i = 0; i < kThreadCounts.size(); ++i)
+    passes[std::to_string(kThreadCounts[i]).c_str()] = s.passes_s(i);
   d["passes_s"] = passes;
   return d;
 }
 
-nb::object allotment_dict(const AllotmentFacts& s) {
+nb::object allotment_dict(const AllocationStatistics& s) {
   if (s.pilot == 0) return nb::none();
   nb::dict d;
   d["pilot"] = s.pilot;
@@ -85,7 +85,7 @@ nb::object allotment_dict(const AllotmentFacts& s) {
   return d;
 }
 
-nb::object guiding_dict(const GuideStatistics& s) {
+nb::object guiding_dict(const GuidingStatistics& s) {
   if (s.paths == 0) return nb::none();
   nb::dict d;
   d["seconds"] = s.seconds;
@@ -101,7 +101,7 @@ nb::object guiding_dict(const GuideStatistics& s) {
   d["gain"] = s.gain > 0 ? nb::cast(s.gain) : nb::none();
   d["survival"] = s.survival;
   d["used"] = s.used;
-  d["kept"] = s.is_kept;
+  d["kept"] = s.is_reused;
   return d;
 }
 
@@ -160,8 +160,7 @@ nb::dict texture_store_dict(const StoreStatistics& s) {
   return d;
 }
 
-nb::dict statistics_dict(const RenderStatistics& s, const nb::dict& settings,
-                         size_t picture_bytes) {
+nb::dict statistics_dict(const RenderStatistics& s, const nb::dict& settings, size_t image_bytes) {
   nb::dict d, seconds, phases, counts, memory;
   d["settings"] = settings;
   seconds["build"] = s.build_s;
@@ -222,7 +221,7 @@ nb::dict statistics_dict(const RenderStatistics& s, const nb::dict& settings,
   memory["accelerator"] = s.accelerator_bytes;
   memory["waves"] = s.wave_bytes;
   memory["film"] = s.film_bytes;
-  memory["picture"] = picture_bytes;
+  memory["picture"] = image_bytes;
   memory["meshes"] = s.scene_bytes.meshes;
   memory["textures"] = s.scene_bytes.textures;
   memory["records"] = s.scene_bytes.records;

@@ -9,7 +9,7 @@
 /// Returns the `texture_store` entry of docs/statistics.md.
 nanobind::dict texture_store_dict(const wavecomb::StoreStatistics& statistics);
 
-/// Returns the keys of docs/statistics.md that the core provides. `picture_bytes`: memory of the
+/// Returns the keys of docs/statistics.md that the core provides. `image_bytes`: memory of the
 /// image, or 0 if there is none yet.
 nanobind::dict statistics_dict(const wavecomb::RenderStatistics& statistics,
-                               const nanobind::dict& settings, size_t picture_bytes);
+                               const nanobind::dict& settings, size_t image_bytes);

@@ -22,13 +22,13 @@ namespace {
 using AnyArray = nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>;
 
 /// Grid with its transform to the object space of the volume.
-struct PlacedVoxels {
+struct TransformedVoxels {
   VolumeField field;
 };
 
-PlacedVoxels make_grid(const Array<int32_t>& origins, const AnyArray& values,
-                       const AnyArray& index_to_object, float background, const std::string& name,
-                       bool is_signed) {
+TransformedVoxels make_grid(const Array<int32_t>& origins, const AnyArray& values,
+                            const AnyArray& index_to_object, float background,
+                            const std::string& name, bool is_signed) {
   const size_t n = values.ndim() > 0 ? values.shape(0) : 0;
   const bool is_single = values.ndim() == 4, is_colour = values.ndim() == 5 && values.shape(4) == 3;
   bool fits = origins.ndim() == 2 && origins.shape(1) == 3 && origins.shape(0) == n &&
@@ -54,7 +54,7 @@ PlacedVoxels make_grid(const Array<int32_t>& origins, const AnyArray& values,
     throw Error("grid '" + name + "' needs values of float16 or float32");
   const Affine map = affine(index_to_object);
   const nb::gil_scoped_release release;
-  PlacedVoxels grid;
+  TransformedVoxels grid;
   with_threads(0, [&] { grid.field.grid = std::make_shared<const VolumeGrid>(bricks); });
   grid.field.index_to_object = map;
   return grid;
@@ -63,10 +63,10 @@ PlacedVoxels make_grid(const Array<int32_t>& origins, const AnyArray& values,
 using Corners = std::tuple<Color3, Color3>;
 
 uint32_t add_volume(SceneBuilder& builder, const AnyArray& to_world,
-                    const std::optional<PlacedVoxels>& density,
-                    const std::optional<PlacedVoxels>& color,
-                    const std::optional<PlacedVoxels>& emission_grid,
-                    const std::optional<PlacedVoxels>& velocity,
+                    const std::optional<TransformedVoxels>& density,
+                    const std::optional<TransformedVoxels>& color,
+                    const std::optional<TransformedVoxels>& emission_grid,
+                    const std::optional<TransformedVoxels>& velocity,
                     const std::array<float, 2>& seconds, const std::optional<Corners>& bounds,
                     const Color3& extinction, const Color3& albedo, const Color3& emission,
                     float anisotropy, const std::string& name) {
@@ -94,11 +94,11 @@ uint32_t add_volume(SceneBuilder& builder, const AnyArray& to_world,
 
 void bind_volumes(nb::module_& m) {
   using namespace nb::literals;
-  nb::class_<PlacedVoxels>(m, "VolumeGrid")
+  nb::class_<TransformedVoxels>(m, "VolumeGrid")
       .def(nb::new_(&make_grid), "origins"_a, "values"_a, "index_to_object"_a, "background"_a = 0.f,
            "name"_a = "", "is_signed"_a = false)
-      .def_prop_ro("bricks", [](const PlacedVoxels& g) { return g.field.grid->brick_count(); })
-      .def_prop_ro("bytes", [](const PlacedVoxels& g) { return g.field.grid->bytes(); });
+      .def_prop_ro("bricks", [](const TransformedVoxels& g) { return g.field.grid->brick_count(); })
+      .def_prop_ro("bytes", [](const TransformedVoxels& g) { return g.field.grid->bytes(); });
   m.def("walk_albedo", &single_albedo, "color"_a, "anisotropy"_a);
 }
 

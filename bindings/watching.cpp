@@ -115,7 +115,7 @@ nb::object layer(const LiveSnapshot& live, const std::string& name) {
 }
 
 Request request_of(const nb::object& answer) {
-  if (answer.is_none()) return Request::kGoOn;
+  if (answer.is_none()) return Request::kContinue;
   const auto text = nb::cast<std::string>(answer);
   if (text == "snapshot") return Request::kSnapshot;
   if (text == "stop") return Request::kStop;
@@ -147,10 +147,10 @@ RenderOptions watched_by(const nb::object& progress, const nb::object& watcher,
     const nb::gil_scoped_acquire gil;
     if (PyErr_CheckSignals() != 0) throw nb::python_error();
     if (!progress.is_none()) {
-      const nb::object go_on = progress(s.samples_done, s.samples_total);
-      if (!go_on.is_none() && !nb::cast<bool>(go_on)) return Request::kStop;
+      const nb::object should_continue = progress(s.samples_done, s.samples_total);
+      if (!should_continue.is_none() && !nb::cast<bool>(should_continue)) return Request::kStop;
     }
-    if (watcher.is_none()) return Request::kGoOn;
+    if (watcher.is_none()) return Request::kContinue;
     return request_of(watcher.attr("progress")(status_dict(s)));
   };
   if (!watcher.is_none())

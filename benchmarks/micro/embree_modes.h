@@ -11,7 +11,7 @@
 
 namespace wavecomb::micro {
 
-inline constexpr float kForever = std::numeric_limits<float>::infinity();
+inline constexpr float kUnbounded = std::numeric_limits<float>::infinity();
 
 /// Triangle soup of several meshes.
 struct Soup {
@@ -122,7 +122,7 @@ class Built {
       float* to[6] = {rh.ray.org_x, rh.ray.org_y, rh.ray.org_z,
                       rh.ray.dir_x, rh.ray.dir_y, rh.ray.dir_z};
       for (int k = 0; k < 6; ++k) std::memcpy(to[k], from[k] + base, 4 * n);
-      std::fill_n(rh.ray.tfar, W, kForever);
+      std::fill_n(rh.ray.tfar, W, kUnbounded);
       if (rays.tfar) std::memcpy(rh.ray.tfar, rays.tfar + base, 4 * n);
       if (shadow) {
         occluded(valid, top_, reinterpret_cast<decltype(RayHit::ray)*>(&rh.ray), &any);
@@ -131,7 +131,7 @@ class Built {
       }
       std::fill_n(rh.hit.geomID, W, RTC_INVALID_GEOMETRY_ID);
       std::fill_n(rh.hit.instID[0], W, RTC_INVALID_GEOMETRY_ID);
-      std::fill_n(context.t, 16, kForever);
+      std::fill_n(context.t, 16, kUnbounded);
       intersect(valid, top_, &rh, &closest);
       for (uint32_t i = 0; i < n; ++i) hits += rh.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
     }
@@ -156,14 +156,14 @@ class Built {
       rh.ray.dir_x = rays.dx[i];
       rh.ray.dir_y = rays.dy[i];
       rh.ray.dir_z = rays.dz[i];
-      rh.ray.tfar = rays.tfar ? rays.tfar[i] : kForever;
+      rh.ray.tfar = rays.tfar ? rays.tfar[i] : kUnbounded;
       if (shadow) {
         rtcOccluded1(top_, &rh.ray, &any);
         hits += rh.ray.tfar < 0.f;
         continue;
       }
       rh.hit.geomID = rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-      context.t[0] = kForever;
+      context.t[0] = kUnbounded;
       rtcIntersect1(top_, &rh, &closest);
       hits += rh.hit.geomID != RTC_INVALID_GEOMETRY_ID;
     }

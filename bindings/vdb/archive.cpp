@@ -62,7 +62,7 @@ class Archive final : public GridFile, private vio::Archive {
   }
   Bricks read(size_t number, const BrickOptions& options, GridFacts& facts) override {
     const Entry& entry = entries_.at(number);
-    const auto grid = read_part(entry, Part::kWhole, options.most_bytes);
+    const auto grid = read_part(entry, Part::kWhole, options.max_bytes);
     if (grid == nullptr)
       throw BrokenFile("it is of type " + entry.descriptor.gridType() + ", which is not known");
     facts = facts_of(*grid);
@@ -92,7 +92,7 @@ class Archive final : public GridFile, private vio::Archive {
   const Entry& instance_parent(const Entry& entry) const;
   /// Reads a grid; returns null if OpenVDB does not know its type. Throws TooLarge after reading
   /// its topology, before memory for its values is allocated.
-  openvdb::GridBase::Ptr read_part(const Entry& entry, Part part, uint64_t most_bytes);
+  openvdb::GridBase::Ptr read_part(const Entry& entry, Part part, uint64_t max_bytes);
 
   std::ifstream stream_;
   /// The stream holds the address of this object.
@@ -172,13 +172,13 @@ openvdb::GridBase::Ptr Archive::begin(const Entry& entry) {
   return grid;
 }
 
-openvdb::GridBase::Ptr Archive::read_part(const Entry& entry, Part part, uint64_t most_bytes) {
+openvdb::GridBase::Ptr Archive::read_part(const Entry& entry, Part part, uint64_t max_bytes) {
   return guarded([&] {
     openvdb::GridBase::Ptr grid = begin(entry);
     if (grid == nullptr) return grid;
     if (part == Part::kWhole) check_type_of(*grid);
     if (entry.descriptor.isInstance()) {
-      const openvdb::GridBase::Ptr parent = read_part(instance_parent(entry), part, most_bytes);
+      const openvdb::GridBase::Ptr parent = read_part(instance_parent(entry), part, max_bytes);
       if (parent == nullptr || parent->type() != grid->type())
         throw BrokenFile("a grid shares the voxels of a grid of another type");
       grid->setTree(parent->baseTreePtr());
@@ -186,7 +186,7 @@ openvdb::GridBase::Ptr Archive::read_part(const Entry& entry, Part part, uint64_
     }
     grid->readTopology(stream_);
     if (part == Part::kTopology) return grid;
-    check_size_of(*grid, most_bytes);
+    check_size_of(*grid, max_bytes);
     grid->readBuffers(stream_);
     return grid;
   });

@@ -6,27 +6,27 @@
 
 namespace vdb {
 
-std::string room_text(const std::string& what, uint64_t bytes, uint64_t most_bytes) {
+std::string limit_message(const std::string& what, uint64_t bytes, uint64_t max_bytes) {
   char text[160];
   std::snprintf(text, sizeof(text), "%s takes %.1f GB; there is room for %.1f GB", what.c_str(),
-                1e-9 * static_cast<double>(bytes), 1e-9 * static_cast<double>(most_bytes));
+                1e-9 * static_cast<double>(bytes), 1e-9 * static_cast<double>(max_bytes));
   return text;
 }
 
-void check_size(uint64_t bricks, const BrickFormat& format, uint64_t most_bytes) {
-  if (bricks <= most_bytes / format.brick_bytes()) return;
+void check_size(uint64_t bricks, const BrickFormat& format, uint64_t max_bytes) {
+  if (bricks <= max_bytes / format.brick_bytes()) return;
   const double gigabytes =
       1e-9 * static_cast<double>(bricks) * static_cast<double>(format.brick_bytes());
   char text[160];
   std::snprintf(text, sizeof(text), "%llu million voxels take %.1f GB; there is room for %.1f GB",
                 static_cast<unsigned long long>(bricks * kBrickVoxels / 1000000), gigabytes,
-                1e-9 * static_cast<double>(most_bytes));
+                1e-9 * static_cast<double>(max_bytes));
   throw TooLarge(text);
 }
 
 BrickWriter::BrickWriter(uint64_t most, const BrickFormat& format, const BrickOptions& options)
     : most_(most), drops_empty_(options.drops_empty) {
-  check_size(most, format, options.most_bytes);
+  check_size(most, format, options.max_bytes);
   bricks_.format = format;
   bricks_.origins = std::make_unique_for_overwrite<int32_t[]>(3 * most);
   bricks_.values =

@@ -59,7 +59,7 @@ struct Bricks {
 /// Options for making bricks.
 struct BrickOptions {
   /// Upper limit of the memory of the bricks.
-  uint64_t most_bytes = 0;
+  uint64_t max_bytes = 0;
   /// Inactive voxels that hold the background value become 0.
   bool background_is_zero = false;
   /// Bricks that hold only zeros are left out.
@@ -73,10 +73,10 @@ inline uint64_t bricks_of_tile(uint64_t edge) {
 }
 
 /// Returns one line that says that `what` needs more memory than allowed.
-std::string room_text(const std::string& what, uint64_t bytes, uint64_t most_bytes);
+std::string limit_message(const std::string& what, uint64_t bytes, uint64_t max_bytes);
 
-/// Throws TooLarge if this many bricks take more than `most_bytes`.
-void check_size(uint64_t bricks, const BrickFormat& format, uint64_t most_bytes);
+/// Throws TooLarge if this many bricks take more than `max_bytes`.
+void check_size(uint64_t bricks, const BrickFormat& format, uint64_t max_bytes);
 
 /// Converts floats that are exactly representable in 16 bits.
 void to_halves(const float* values, size_t count, uint16_t* halves);

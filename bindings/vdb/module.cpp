@@ -87,13 +87,13 @@ nb::object array_of(std::unique_ptr<T[]>&& values, std::initializer_list<size_t>
   return nb::cast(nb::ndarray<nb::numpy>(data, shape.size(), shape.begin(), owner, nullptr, dtype));
 }
 
-nb::dict bricks(const std::string& path, size_t number, uint64_t most_bytes,
-                bool background_is_zero, bool drops_empty) {
+nb::dict bricks(const std::string& path, size_t number, uint64_t max_bytes, bool background_is_zero,
+                bool drops_empty) {
   vdb::Bricks made;
   vdb::GridFacts facts;
   {
     const nb::gil_scoped_release release;
-    made = vdb::open_file(path)->read(number, {most_bytes, background_is_zero, drops_empty}, facts);
+    made = vdb::open_file(path)->read(number, {max_bytes, background_is_zero, drops_empty}, facts);
   }
   nb::dict d;
   add_facts(d, facts);

@@ -47,7 +47,7 @@ constexpr char kMagicOfOthers[] = "BDVonaN";
 /// Unpacked size of the chunks in which Blosc compresses a grid.
 constexpr uint64_t kNanoChunk = uint64_t{1} << 30;
 /// Upper bound of the compression ratios of zlib and Blosc.
-constexpr uint64_t kMostPacked = 1100;
+constexpr uint64_t kMaxPacked = 1100;
 constexpr uint32_t kLongestName = 1 << 16;
 
 std::string version_text(uint32_t version) {
@@ -113,7 +113,7 @@ class NanoFile final : public GridFile {
     const NanoEntry& entry = entries_.at(number);
     if (!is_nano_type_read(entry.type))
       throw BrokenFile("it is of type " + type_name(entry) + ", which is not read");
-    const AlignedBytes bytes = load(entry, options.most_bytes);
+    const AlignedBytes bytes = load(entry, options.max_bytes);
     facts = nano_facts(bytes_of(bytes), entry.size, entry.type);
     return nano_bricks(bytes_of(bytes), entry.size, entry.type, options);
   }
@@ -129,7 +129,7 @@ class NanoFile final : public GridFile {
   template <typename T>
   T take();
   void find_grids(uint64_t file_bytes);
-  AlignedBytes load(const NanoEntry& entry, uint64_t most_bytes);
+  AlignedBytes load(const NanoEntry& entry, uint64_t max_bytes);
   void unpack(const NanoEntry& entry, char* to);
 
   std::ifstream stream_;
@@ -203,10 +203,10 @@ void NanoFile::unpack(const NanoEntry& entry, char* to) {
   }
 }
 
-AlignedBytes NanoFile::load(const NanoEntry& entry, uint64_t most_bytes) {
-  if (entry.codec == 0 ? entry.size != entry.file_size : entry.size / kMostPacked > entry.file_size)
+AlignedBytes NanoFile::load(const NanoEntry& entry, uint64_t max_bytes) {
+  if (entry.codec == 0 ? entry.size != entry.file_size : entry.size / kMaxPacked > entry.file_size)
     throw BrokenFile("the sizes of a grid are inconsistent");
-  if (entry.size > most_bytes) throw TooLarge(room_text("the grid", entry.size, most_bytes));
+  if (entry.size > max_bytes) throw TooLarge(limit_message("the grid", entry.size, max_bytes));
   AlignedBytes bytes(static_cast<char*>(::operator new[](entry.size, kAligned)));
   try {
     unpack(entry, bytes.get());

@@ -16,7 +16,7 @@ namespace vdb {
 bool is_nano_file(const std::string& path);
 
 /// Opens a .nvdb file and reads its table of grids. Reading a grid throws TooLarge also if its
-/// unpacked size exceeds `most_bytes`.
+/// unpacked size exceeds `max_bytes`.
 std::unique_ptr<GridFile> open_nano_file(const std::string& path);
 
 }  // namespace vdb

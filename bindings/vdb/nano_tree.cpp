@@ -72,14 +72,14 @@ const auto* leaf_at(const Buffer& buffer, uint64_t at) {
 /// quantisation of leaves, so it is instantiated once for both. The number of visited nodes is
 /// limited to those that fit in the buffer, which bounds the cost of a cycle of offsets.
 template <typename Value>
-class NanoWalk {
+class NanoTreeTraversal {
  public:
   using Lower = typename nanovdb::NanoLower<Value>::DataType;
   using Upper = typename nanovdb::NanoUpper<Value>::DataType;
   using Root = typename nanovdb::NanoRoot<Value>::DataType;
 
-  NanoWalk(const Buffer& buffer, uint64_t leaf_bytes)
-      : buffer_(buffer), most_nodes_(buffer.size() / leaf_bytes) {
+  NanoTreeTraversal(const Buffer& buffer, uint64_t leaf_bytes)
+      : buffer_(buffer), max_nodes_(buffer.size() / leaf_bytes) {
     constexpr uint64_t kTree = sizeof(nanovdb::GridData);
     const uint64_t to_root = buffer.at<nanovdb::TreeData<3>>(kTree)->mNodeOffset[3];
     if (to_root > buffer.size()) throw BrokenFile("a grid without a root");
@@ -95,7 +95,7 @@ class NanoWalk {
   void walk(OnTile&& on_tile, OnLeaf&& on_leaf) const {
     uint64_t nodes = 0;
     const auto count_node = [&] {
-      if (++nodes > most_nodes_) throw BrokenFile("a cycle of nodes");
+      if (++nodes > max_nodes_) throw BrokenFile("a cycle of nodes");
     };
     for (const auto& [origin, tile] : root_tiles()) {
       if (tile->child == 0) {
@@ -103,15 +103,15 @@ class NanoWalk {
         continue;
       }
       count_node();
-      walk_inner<Upper, 5>(at_root_ + static_cast<uint64_t>(tile->child), origin, 128, on_tile,
-                           [&](uint64_t at_lower, const Origin& lower) {
-                             count_node();
-                             walk_inner<Lower, 4>(at_lower, lower, 8, on_tile,
-                                                  [&](uint64_t at_leaf, const Origin& xyz) {
-                                                    count_node();
-                                                    on_leaf(xyz, at_leaf);
-                                                  });
-                           });
+      visit_inner<Upper, 5>(at_root_ + static_cast<uint64_t>(tile->child), origin, 128, on_tile,
+                            [&](uint64_t at_lower, const Origin& lower) {
+                              count_node();
+                              visit_inner<Lower, 4>(at_lower, lower, 8, on_tile,
+                                                    [&](uint64_t at_leaf, const Origin& xyz) {
+                                                      count_node();
+                                                      on_leaf(xyz, at_leaf);
+                                                    });
+                            });
     }
   }
 
@@ -137,8 +137,8 @@ class NanoWalk {
   /// Visits children and active tiles of an inner node with 2^Log2 entries per edge, each of `edge`
   /// voxels per side.
   template <typename Node, int Log2, typename OnTile, typename OnChild>
-  void walk_inner(uint64_t at, const Origin& origin, int32_t edge, OnTile&& on_tile,
-                  OnChild&& on_child) const {
+  void visit_inner(uint64_t at, const Origin& origin, int32_t edge, OnTile&& on_tile,
+                   OnChild&& on_child) const {
     const Node* node = buffer_.at<Node>(at);
     constexpr uint32_t kMask = (1u << Log2) - 1;
     for (uint32_t n = 0; n < 1u << (3 * Log2); ++n) {
@@ -156,7 +156,7 @@ class NanoWalk {
   }
 
   Buffer buffer_;
-  uint64_t most_nodes_;
+  uint64_t max_nodes_;
   uint64_t at_root_ = 0;
   const Root* root_ = nullptr;
 };
@@ -177,11 +177,12 @@ class NanoGrid {
   template <typename Build>
   static LeafKind kind_of() {
     using Nodes = nanovdb::NanoUpper<Build>;
-    static_assert(sizeof(typename Nodes::DataType) == sizeof(typename NanoWalk<Value>::Upper));
+    static_assert(sizeof(typename Nodes::DataType) ==
+                  sizeof(typename NanoTreeTraversal<Value>::Upper));
     static_assert(sizeof(typename nanovdb::NanoLower<Build>::DataType) ==
-                  sizeof(typename NanoWalk<Value>::Lower));
+                  sizeof(typename NanoTreeTraversal<Value>::Lower));
     static_assert(sizeof(typename nanovdb::NanoRoot<Build>::DataType) ==
-                  sizeof(typename NanoWalk<Value>::Root));
+                  sizeof(typename NanoTreeTraversal<Value>::Root));
     return {sizeof(typename nanovdb::NanoLeaf<Build>::DataType), &read_leaf<Build>};
   }
 
@@ -255,7 +256,7 @@ class NanoGrid {
 
   Buffer buffer_;
   LeafKind kind_;
-  NanoWalk<Value> tree_;
+  NanoTreeTraversal<Value> tree_;
 };
 
 void set_transform(const nanovdb::GridData& data, GridFacts& facts) {

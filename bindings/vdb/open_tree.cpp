@@ -45,7 +45,7 @@ bool with_grid(const openvdb::GridBase& grid, Use&& use) {
 /// Calls `on_tile(origin, edge, value)` for the active tiles of an inner node and
 /// `on_child(node)` for its children, in the order of their positions.
 template <typename Node, typename OnTile, typename OnChild>
-void walk_node(const Node& node, OnTile&& on_tile, OnChild&& on_child) {
+void visit_node(const Node& node, OnTile&& on_tile, OnChild&& on_child) {
   auto child = node.cbeginChildOn();
   auto tile = node.cbeginValueOn();
   while (child || tile) {
@@ -66,7 +66,7 @@ void walk(const Tree& tree, OnTile&& on_tile, OnLeaf&& on_leaf) {
   for (auto tile = tree.root().cbeginValueOn(); tile; ++tile)
     on_tile(origin_of(tile.getCoord()), static_cast<int32_t>(Upper::DIM), *tile);
   for (auto upper = tree.root().cbeginChildOn(); upper; ++upper)
-    walk_node(*upper, on_tile, [&](const auto& lower) { walk_node(lower, on_tile, on_leaf); });
+    visit_node(*upper, on_tile, [&](const auto& lower) { visit_node(lower, on_tile, on_leaf); });
 }
 
 template <typename Grid>
@@ -143,9 +143,9 @@ void check_type_of(const openvdb::GridBase& grid) {
     throw BrokenFile("it is of type " + grid.valueType() + ", which is not read");
 }
 
-void check_size_of(const openvdb::GridBase& grid, uint64_t most_bytes) {
+void check_size_of(const openvdb::GridBase& grid, uint64_t max_bytes) {
   with_grid(grid, [&](const auto& typed) {
-    check_size(count_bricks(typed.tree()), format_of(typed), most_bytes);
+    check_size(count_bricks(typed.tree()), format_of(typed), max_bytes);
   });
 }
 

@@ -15,8 +15,8 @@ GridFacts facts_of(const openvdb::GridBase& grid);
 /// Throws BrokenFile that names the type if bricks are not supported for it.
 void check_type_of(const openvdb::GridBase& grid);
 
-/// Throws TooLarge if the bricks of a grid need more than `most_bytes`.
-void check_size_of(const openvdb::GridBase& grid, uint64_t most_bytes);
+/// Throws TooLarge if the bricks of a grid need more than `max_bytes`.
+void check_size_of(const openvdb::GridBase& grid, uint64_t max_bytes);
 
 /// Makes bricks of a grid. Throws TooLarge, std::bad_alloc, and the errors of check_type_of().
 Bricks bricks_of(const openvdb::GridBase& grid, const BrickOptions& options);

@@ -63,12 +63,11 @@ int main() try {
   wc::Settings settings;
   settings.width = settings.height = 256;
   settings.spp = 64;
-  const wc::Picture picture = renderer.render(settings);
+  const wc::RenderedImage image = renderer.render(settings);
   std::FILE* file = std::fopen("sphere.ppm", "wb");
   if (!file) throw wc::Error("sphere.ppm cannot be written here; try another folder");
   std::fprintf(file, "P6 256 256 255\n");
-  for (float x : picture.beauty)
-    std::fputc(int(255.f * std::pow(std::min(x, 1.f), 1 / 2.2f)), file);
+  for (float x : image.beauty) std::fputc(int(255.f * std::pow(std::min(x, 1.f), 1 / 2.2f)), file);
   std::fclose(file);
   std::printf("sphere.ppm: %.1f million samples/s\n",
               1e-6 * double(renderer.statistics().samples) / renderer.statistics().render_s);

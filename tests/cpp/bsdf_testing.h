@@ -97,10 +97,10 @@ inline OpenPbrParams<float> plain_params() {
 template <typename Bsdf, typename F>
 ParamsOf<Bsdf, F> params_for(const OpenPbrParams<F>& p, float own = 0.5f) {
   constexpr const ProgramInfo& kInfo = info_of(Bsdf::kProgram);
-  if constexpr (kInfo.own_count() == 0) {
+  if constexpr (kInfo.specific_count() == 0) {
     return p;
   } else {
-    OwnShadingParams<F> more;
+    SpecificShadingParams<F> more;
     static_cast<ShadingParams<F>&>(more) = p;
     for (size_t i = 0; i < kInfo.own.size(); ++i)
       more.own[i] = F(kInfo.own[i].least + own * (kInfo.own[i].most - kInfo.own[i].least));

@@ -26,7 +26,7 @@ constexpr size_t kShortSamples = 20000;
 constexpr size_t kLongSamples = 1000000;
 
 constexpr size_t kFineSamples = 800;  ///< minimum expected count of a fine cell
-constexpr size_t kMostFine = 1024, kLeastFine = 16, kCoarse = 32;
+constexpr size_t kMaxFine = 1024, kMinFine = 16, kCoarse = 32;
 /// Leaves per cell for many samples and for few.
 constexpr size_t kManyLeaves = 8, kFewLeaves = 3;
 /// Number of batteries in the whole program, for Sidak's correction.
@@ -170,7 +170,7 @@ std::string Result::fault(const Case& c, double level) const {
 Result compare(const Case& c, uint32_t seed, size_t samples) {
   Random random(seed);
   Result result;
-  const size_t fine = std::clamp(samples / kFineSamples, kLeastFine, kMostFine);
+  const size_t fine = std::clamp(samples / kFineSamples, kMinFine, kMaxFine);
   std::vector<Place> pilot;
   for (size_t i = 0; i < samples / 8; ++i) {
     const Draw d = c.draw(random, false);

@@ -105,8 +105,8 @@ class Integral {
   /// rule over the entire box. A lobe between the nodes may hide from both rules or look equally
   /// small to both, but hardly from a third rule and the pilot samples as well. A box is also
   /// accepted if it is so small that even the highest density in the chart would contribute little.
-  bool is_good(const Box& box, double whole, double sum, Points first, Points last,
-               double tolerance) const {
+  bool is_symbol(const Box& box, double whole, double sum, Points first, Points last,
+                 double tolerance) const {
     const double area = box.extent(0) * box.extent(1), change = std::abs(sum - whole);
     if (highest_ * area < tolerance) return true;
     if (change > tolerance || (case_.is_smooth && change > 0.1 * sum)) return false;
@@ -137,7 +137,8 @@ class Integral {
     low.high[axis] = high.low[axis] = middle;
     const Estimate a = gauss(low), b = gauss(high);
     const double sum = a.sum + b.sum;
-    if (depth == 0 || (!jumps && !is_wide && is_good(box, whole.sum, sum, first, last, tolerance)))
+    if (depth == 0 ||
+        (!jumps && !is_wide && is_symbol(box, whole.sum, sum, first, last, tolerance)))
       return sum;
     const Points border =
         std::partition(first, last, [&](const Point& p) { return p[axis] < middle; });

@@ -71,8 +71,8 @@ inline CurveData strands(Primitive primitive, uint32_t n, uint32_t segments, flo
     }
     if (primitive == Primitive::kSphere) continue;
     for (uint32_t k = 0; k < segments; ++k)
-      data.segments.push_back((first + step * k) | (k > 0 ? kCurveGoesOnBefore : 0u) |
-                              (k + 1 < segments ? kCurveGoesOnAfter : 0u));
+      data.segments.push_back((first + step * k) | (k > 0 ? kCurveContinuesBefore : 0u) |
+                              (k + 1 < segments ? kCurveContinuesAfter : 0u));
   }
   return data;
 }
@@ -85,20 +85,21 @@ inline const std::vector<Primitive>& curved_primitives() {
 }
 
 /// Arrays of Gaussian splats.
-struct SplatData {
+struct GaussianSplatData {
   std::vector<float> positions, scales, orientations, opacities, harmonics, radii;
-  std::vector<SplatRow> rows;
+  std::vector<GaussianSplatRow> rows;
   uint32_t degree = 0;
 };
 
 /// Makes a mesh that owns the arrays, including the packed splat rows.
-inline Mesh make_splats(SplatData data, uint32_t material, std::string name = "/World/splats") {
-  data.rows = splat_rows(data.scales, data.orientations, data.opacities, "splats");
-  data.radii = splat_radii(data.rows);
-  const auto owner = std::make_shared<const SplatData>(std::move(data));
+inline Mesh make_gaussian_splats(GaussianSplatData data, uint32_t material,
+                                 std::string name = "/World/splats") {
+  data.rows = make_gaussian_splat_rows(data.scales, data.orientations, data.opacities, "splats");
+  data.radii = gaussian_splat_radii(data.rows);
+  const auto owner = std::make_shared<const GaussianSplatData>(std::move(data));
   Mesh mesh;
   mesh.name = std::move(name);
-  mesh.primitive = Primitive::kSplat;
+  mesh.primitive = Primitive::kGaussianSplat;
   mesh.positions = owner->positions;
   mesh.radii = owner->radii;
   mesh.splats = owner->rows;
@@ -110,9 +111,9 @@ inline Mesh make_splats(SplatData data, uint32_t material, std::string name = "/
 }
 
 /// Makes `n` random splats in a ball of radius `size`, with scales up to `scale`.
-inline SplatData random_splats(uint32_t n, float size, float scale, uint32_t degree,
-                               uint32_t seed) {
-  SplatData data;
+inline GaussianSplatData random_gaussian_splats(uint32_t n, float size, float scale,
+                                                uint32_t degree, uint32_t seed) {
+  GaussianSplatData data;
   data.degree = degree;
   std::mt19937 rng(seed);
   std::uniform_real_distribution<float> uniform(-1, 1);
@@ -133,12 +134,12 @@ inline SplatData random_splats(uint32_t n, float size, float scale, uint32_t deg
 /// instances (mirrored, stretched), and triangles.
 inline ScenePtr hairy() {
   SceneBuilder b;
-  const uint32_t picture = add_texture(b, 16, 8, 3, random_texels(16 * 8 * 3, 0.1f, 0.9f, 1));
+  const uint32_t image = add_texture(b, 16, 8, 3, random_texels(16 * 8 * 3, 0.1f, 0.9f, 1));
   const uint32_t mask = add_texture(b, 8, 8, 1, random_texels(64, -0.2f, 1.2f, 6));
   std::vector<uint32_t> materials;
   Material m = make_material(ProgramId::kDiffuse, {0.6f, 0.5f, 0.4f});
   materials.push_back(b.add_material(m));
-  m.textures[static_cast<size_t>(Input::kBaseColor)] = use(picture);
+  m.textures[static_cast<size_t>(Input::kBaseColor)] = use(image);
   materials.push_back(b.add_material(m));
   materials.push_back(b.add_material(make_material(ProgramId::kDielectric, {1, 1, 1}, 0)));
   materials.push_back(b.add_material(make_material(ProgramId::kMetal, {0.9f, 0.7f, 0.3f}, 0.3f)));
@@ -164,8 +165,10 @@ inline ScenePtr hairy() {
     b.add_to_group(0, b.add_mesh(make_curves(std::move(data))));
     b.add_to_group(group, b.add_mesh(make_curves(strands(primitive, 6, 3, 0.5f, 0.04f, seed++))));
   }
-  b.add_to_group(0, b.add_mesh(make_splats(random_splats(40, 1.2f, 0.3f, 3, 70), materials[6])));
-  b.add_to_group(group, b.add_mesh(make_splats(random_splats(9, 0.5f, 0.2f, 1, 71), materials[6])));
+  b.add_to_group(0, b.add_mesh(make_gaussian_splats(random_gaussian_splats(40, 1.2f, 0.3f, 3, 70),
+                                                    materials[6])));
+  b.add_to_group(group, b.add_mesh(make_gaussian_splats(
+                            random_gaussian_splats(9, 0.5f, 0.2f, 1, 71), materials[6])));
   for (uint32_t i = 0; i < materials.size(); ++i) {
     const float x = -1.8f + 0.6f * static_cast<float>(i);
     b.add_instance(0, group,

@@ -68,7 +68,7 @@ inline LightReceiver<float> random_receiver(Numbers& number) {
   return LightReceiver<float>(p, any_side ? 0u : pack_normal<float>(number.direction()));
 }
 
-inline float pick_pdf(const LightView& view, uint32_t light, const LightReceiver<float>& to) {
+inline float selection_pdf(const LightView& view, uint32_t light, const LightReceiver<float>& to) {
   return light < view.infinite_count ? view.tree.infinite_pdf[light]
                                      : detail::tree_pdf<float>(view, light, to, true);
 }

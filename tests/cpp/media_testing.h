@@ -43,7 +43,7 @@ class FogPhase : public BsdfTraits {
     Vec3<F> p;
 
     Frame<F> frame(const Vertex<F>& v) const { return make_frame<F>(-v.path.dir); }
-    void note(const Vertex<F>& v, const Frame<F>& /*frame*/) const {
+    void record_aovs(const Vertex<F>& v, const Frame<F>& /*frame*/) const {
       if (!v.aovs) return;
       v.aovs->albedo = bsdf.albedo();
       v.aovs->normal = -v.path.dir;
@@ -67,7 +67,7 @@ class FogPhase : public BsdfTraits {
 
 /// Medium interface as path/media.h requires it.
 struct Fog {
-  static constexpr bool kAny = true, kShines = false, kStreams = false;
+  static constexpr bool kAny = true, kHasEmission = false, kStreams = false;
   template <typename F>
   using Programs = ProgramList<DiffuseBsdf<F>, EmissiveBsdf<F>, FogPhase<F>>;
 
@@ -80,8 +80,8 @@ struct Fog {
   ///    stopped at x:  sigma exp(-sigma x) / mean_c(sigma_c exp(-sigma_c x))
   ///    not before t:  exp(-sigma t) / mean_c(exp(-sigma_c t))
   template <typename F>
-  Flight<F> fly(const Passage<F>& p, const Color<F>& /*throughput*/,
-                const Mask<F>& /*active*/) const {
+  Flight<F> sample_flight(const MediumQuery<F>& p, const Color<F>& /*throughput*/,
+                          const Mask<F>& /*active*/) const {
     const Sample4<F> r = sample_4d<F>(p.sampler, p.key, vertex_set(VertexSet::kFlight, p.depth));
     const F sigma = select(r.x < 1.f / 3, F(extinction.x),
                            select(r.x < 2.f / 3, F(extinction.y), F(extinction.z)));
@@ -96,7 +96,7 @@ struct Fog {
   }
 
   template <typename F>
-  Color<F> transmittance(const Passage<F>& p, const Mask<F>& active) const {
+  Color<F> transmittance(const MediumQuery<F>& p, const Mask<F>& active) const {
     if (!tracks_ratio) return exp_of<F>(p.t);
     // Ratio tracking (Novak et al., "Residual Ratio Tracking", 2014, eq. 9) with a majorant of 2
     // max sigma.

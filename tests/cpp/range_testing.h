@@ -28,8 +28,8 @@ inline TextureUse scaled_use(uint32_t texture, uint32_t channel, float scale, fl
 }
 inline std::string variant_of(const Material& m, std::span<const TexturePtr> textures,
                               const GraphSet& graphs = {}) {
-  const Material shaded = settled(m, graphs, textures);
-  return kVariants[least_variant(m.program, parts_of(shaded, graphs, textures))].name;
+  const Material shaded = simplified(m, graphs, textures);
+  return kVariants[cheapest_variant(m.program, parts_of(shaded, graphs, textures))].name;
 }
 
 /// Makes textures with these values: 0: constant 0. 1: constant 1. 2: 0 to 1. 3: -1 to -0.5. 4: 2

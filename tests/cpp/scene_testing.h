@@ -295,7 +295,7 @@ inline ScenePtr cornell() {
 /// of light.
 inline ScenePtr mixed() {
   SceneBuilder b;
-  const uint32_t picture = add_texture(b, 16, 8, 3, random_texels(16 * 8 * 3, 0.1f, 0.9f, 1));
+  const uint32_t image = add_texture(b, 16, 8, 3, random_texels(16 * 8 * 3, 0.1f, 0.9f, 1));
   const uint32_t grey = add_texture(b, 8, 8, 1, random_texels(64, 0.05f, 0.8f, 2));
   const uint32_t bumps = add_texture(b, 8, 8, 3, random_texels(64 * 3, 0.3f, 0.7f, 3));
   const uint32_t sky = add_texture(b, 16, 8, 3, random_texels(16 * 8 * 3, 0.f, 1.5f, 4));
@@ -306,7 +306,7 @@ inline ScenePtr mixed() {
   };
 
   Material m = make_material(ProgramId::kDiffuse, {0.6f, 0.5f, 0.4f});
-  at(m, Input::kBaseColor) = use(picture);
+  at(m, Input::kBaseColor) = use(image);
   add(m);
   m = make_material(ProgramId::kMetal, {0.9f, 0.7f, 0.3f}, 0.3f);
   at(m, Input::kRoughness) = use(grey, 0);
@@ -329,7 +329,7 @@ inline ScenePtr mixed() {
   m.metallic = 0.4f;
   m.clearcoat = 0.7f;
   m.clearcoat_roughness = 0.1f;
-  at(m, Input::kBaseColor) = use(picture);
+  at(m, Input::kBaseColor) = use(image);
   at(m, Input::kBaseColor).uv = {3, 1, 0.2f, -1, 2, 0.1f};
   at(m, Input::kMetallic) = use(grey, 0);
   add(m);
@@ -337,7 +337,7 @@ inline ScenePtr mixed() {
   m.opacity = 0.4f;
   add(m);
   m = make_material(ProgramId::kPrincipled, {0.1f, 0.1f, 0.1f}, 0.6f);
-  at(m, Input::kEmission) = use(picture);
+  at(m, Input::kEmission) = use(image);
   add(m);
 
   b.add_to_group(0, b.add_mesh(make_mesh(ground(6, -1), materials[0])));
@@ -365,7 +365,7 @@ inline ScenePtr mixed() {
   dome.texture = sky;
   b.add_light(dome);
   Light rect = make_light(LightKind::kRect, {8, 8, 6}, translate(0, 3.5f, 1) * rotate(0, -80));
-  rect.texture = picture;
+  rect.texture = image;
   rect.width = 1.5f;
   b.add_light(rect);
   Light disk = make_light(LightKind::kDisk, {4, 6, 8}, translate(3, 2, 1) * rotate(1, 60));
@@ -391,12 +391,12 @@ inline ScenePtr mixed() {
 /// A scene lit only by emissive meshes: constant, textured and instanced.
 inline ScenePtr emissive_meshes() {
   SceneBuilder b;
-  const uint32_t picture = add_texture(b, 4, 4, 3, random_texels(48, 0.f, 8.f, 5));
+  const uint32_t image = add_texture(b, 4, 4, 3, random_texels(48, 0.f, 8.f, 5));
   const uint32_t floor = b.add_material(make_material(ProgramId::kDiffuse, {0.6f, 0.6f, 0.6f}));
   Material lamp = make_material(ProgramId::kEmissive);
   lamp.emission = {5, 4, 3};
   const uint32_t constant = b.add_material(lamp);
-  lamp.textures[static_cast<size_t>(Input::kEmission)] = use(picture);
+  lamp.textures[static_cast<size_t>(Input::kEmission)] = use(image);
   const uint32_t textured = b.add_material(lamp);
   Material both = make_material(ProgramId::kPrincipled, {0.3f, 0.5f, 0.7f}, 0.4f);
   both.emission = {0.4f, 0.1f, 0.1f};
@@ -471,7 +471,8 @@ inline void expect_same_bits(const std::vector<float>& a, const std::vector<floa
   ADD_FAILURE() << what << ": " << differing << " of " << a.size() << " values differ, first "
                 << first << ": " << a[first] << " and " << b[first];
 }
-inline void expect_same_picture(const Picture& a, const Picture& b, const std::string& what) {
+inline void expect_same_image(const RenderedImage& a, const RenderedImage& b,
+                              const std::string& what) {
   expect_same_bits(a.beauty, b.beauty, what + ", beauty");
   expect_same_bits(a.albedo, b.albedo, what + ", albedo");
   expect_same_bits(a.normal, b.normal, what + ", normal");
@@ -486,10 +487,10 @@ inline void expect_same_picture(const Picture& a, const Picture& b, const std::s
 }
 
 /// Returns the AOV layer of that name, which must exist.
-inline const AovLayer& layer(const Picture& picture, const std::string& name) {
-  const auto at = std::find_if(picture.aovs.begin(), picture.aovs.end(),
+inline const AovLayer& layer(const RenderedImage& image, const std::string& name) {
+  const auto at = std::find_if(image.aovs.begin(), image.aovs.end(),
                                [&](const AovLayer& one) { return one.name == name; });
-  if (at == picture.aovs.end()) throw std::runtime_error("no layer " + name);
+  if (at == image.aovs.end()) throw std::runtime_error("no layer " + name);
   return *at;
 }
 
@@ -506,13 +507,13 @@ inline Mean mean_of(const std::vector<double>& values) {
   m.error = values.size() > 1 ? std::sqrt(sum / (n - 1) / n) : kInf;
   return m;
 }
-inline Mean mean_of(const Picture& picture, size_t channel = 0) {
+inline Mean mean_of(const RenderedImage& image, size_t channel = 0) {
   std::vector<double> values;
-  for (size_t i = channel; i < picture.beauty.size(); i += 3) values.push_back(picture.beauty[i]);
+  for (size_t i = channel; i < image.beauty.size(); i += 3) values.push_back(image.beauty[i]);
   return mean_of(values);
 }
 /// Mean of the pixel differences of two images.
-inline Mean mean_difference(const Picture& a, const Picture& b, size_t channel = 0) {
+inline Mean mean_difference(const RenderedImage& a, const RenderedImage& b, size_t channel = 0) {
   std::vector<double> values;
   for (size_t i = channel; i < a.beauty.size(); i += 3)
     values.push_back(static_cast<double>(a.beauty[i]) - b.beauty[i]);

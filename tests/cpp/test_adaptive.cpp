@@ -228,15 +228,15 @@ TEST(ErrorMap, SeesTheNoiseOfSplats) {
   double told = 0, known = 0;
   for (int round = 0; round < 4; ++round) {
     Film film(kSize, kSize, {AovSet{0}}, true);
-    film.keep_splats({-20}, kPaths);
+    film.allocate_light_splats({-20}, kPaths);
     for (uint32_t i = 0; i < kPaths; ++i)
       add_samples(film, i % kSize, i / kSize, 16, [](float* rgb) { rgb[0] = rgb[1] = rgb[2] = 1; });
-    SplatList list(1);
+    LightSplatList list(1);
     for (uint32_t sample = 0; sample < kSamples; ++sample)
       for (uint32_t path = 0; path < kPaths; ++path) {
         const float c = 2 * brightness(rng);
         ASSERT_TRUE(list.add(
-            {static_cast<uint32_t>(rng() % kPaths), c, c, c, SplatLayer::is_in_half(sample)}));
+            {static_cast<uint32_t>(rng() % kPaths), c, c, c, LightSplatLayer::is_in_half(sample)}));
         film.splats().add(list);
         list.clear();
       }

@@ -11,20 +11,21 @@
 namespace wavecomb {
 namespace {
 
-/// Adds `count` random positions around (x, 0, 0), each with contribution `worth`.
-void add_places(std::vector<AimLesson>& lessons, int count, float x, float spread, float worth) {
-  std::mt19937 random(static_cast<uint32_t>(lessons.size()) + 1);
+/// Adds `count` random positions around (x, 0, 0), each with contribution `contribution`.
+void add_places(std::vector<AimSample>& aim_samples, int count, float x, float spread,
+                float contribution) {
+  std::mt19937 random(static_cast<uint32_t>(aim_samples.size()) + 1);
   std::uniform_real_distribution<float> off(-spread, spread);
   for (int i = 0; i < count; ++i)
-    lessons.push_back({x + off(random), off(random), off(random), worth});
+    aim_samples.push_back({x + off(random), off(random), off(random), contribution});
 }
 
 TEST(AimTargets, AreSmallWhereTheLightComesFrom) {
-  std::vector<AimLesson> lessons;
-  add_places(lessons, 300, -20, 0.05f, 1);
-  add_places(lessons, 300, 40, 3, 1);
-  add_places(lessons, 2000, 0, 90, 0);
-  const LightAim aim = aim_targets(lessons, 100);
+  std::vector<AimSample> aim_samples;
+  add_places(aim_samples, 300, -20, 0.05f, 1);
+  add_places(aim_samples, 300, 40, 3, 1);
+  add_places(aim_samples, 2000, 0, 90, 0);
+  const LightAim aim = aim_targets(aim_samples, 100);
   ASSERT_GE(aim.count, 2u);
   double small = 0, all = aim.even;
   for (uint32_t k = 0; k < aim.count; ++k) {
@@ -39,8 +40,8 @@ TEST(AimTargets, AreSmallWhereTheLightComesFrom) {
   }
   EXPECT_NEAR(all, 1, 1e-6);
   EXPECT_NEAR(small, 0.5 * (1 - aim.even), 1e-5);
-  for (const AimLesson& l : lessons) {
-    bool within = l.worth == 0;
+  for (const AimSample& l : aim_samples) {
+    bool within = l.contribution == 0;
     for (uint32_t k = 0; k < aim.count; ++k)
       within |= std::hypot(l.x - aim.x[k], l.y - aim.y[k], l.z - aim.z[k]) <= aim.radius[k];
     EXPECT_TRUE(within);
@@ -48,12 +49,12 @@ TEST(AimTargets, AreSmallWhereTheLightComesFrom) {
 }
 
 TEST(AimTargets, DoNotDependOnHowBrightTheLightIs) {
-  std::vector<AimLesson> lessons;
-  add_places(lessons, 500, 3, 1, 0.3f);
-  add_places(lessons, 50, 9, 0.2f, 2);
-  const LightAim dark = aim_targets(lessons, 20);
-  for (AimLesson& l : lessons) l.worth *= 0x1p20f;
-  const LightAim bright = aim_targets(lessons, 20);
+  std::vector<AimSample> aim_samples;
+  add_places(aim_samples, 500, 3, 1, 0.3f);
+  add_places(aim_samples, 50, 9, 0.2f, 2);
+  const LightAim dark = aim_targets(aim_samples, 20);
+  for (AimSample& l : aim_samples) l.contribution *= 0x1p20f;
+  const LightAim bright = aim_targets(aim_samples, 20);
   ASSERT_EQ(dark.count, bright.count);
   for (uint32_t k = 0; k < dark.count; ++k) {
     EXPECT_EQ(dark.x[k], bright.x[k]);
@@ -64,15 +65,15 @@ TEST(AimTargets, DoNotDependOnHowBrightTheLightIs) {
 
 TEST(AimTargets, AreNoneWhereNothingWasFound) {
   EXPECT_EQ(aim_targets({}, 1).count, 0u);
-  std::vector<AimLesson> lessons;
-  add_places(lessons, 100, 0, 1, 0);
-  lessons.push_back({0, 0, 0, std::numeric_limits<float>::infinity()});
-  EXPECT_EQ(aim_targets(lessons, 1).count, 0u);
+  std::vector<AimSample> aim_samples;
+  add_places(aim_samples, 100, 0, 1, 0);
+  aim_samples.push_back({0, 0, 0, std::numeric_limits<float>::infinity()});
+  EXPECT_EQ(aim_targets(aim_samples, 1).count, 0u);
 }
 
 TEST(AimTargets, AreOneSphereWhereAllIsOnePlace) {
-  const std::vector<AimLesson> lessons(64, AimLesson{1, 2, 3, 1});
-  const LightAim aim = aim_targets(lessons, 10);
+  const std::vector<AimSample> aim_samples(64, AimSample{1, 2, 3, 1});
+  const LightAim aim = aim_targets(aim_samples, 10);
   ASSERT_EQ(aim.count, 1u);
   EXPECT_GT(aim.radius[0], 0);
   EXPECT_FLOAT_EQ(aim.y[0], 2);

@@ -11,7 +11,7 @@
 namespace wavecomb {
 namespace {
 
-Settings allotted(uint32_t size, uint32_t spp, Allocate how = Allocate::kError) {
+Settings allocated(uint32_t size, uint32_t spp, Allocate how = Allocate::kError) {
   Settings s;
   s.width = s.height = size;
   s.spp = spp;
@@ -39,22 +39,22 @@ Film film_of(const Settings& s) {
   return Film(s.width, s.height, {AovSet{set}}, true);
 }
 
-uint64_t total(const Allotment& a) {
+uint64_t total(const SampleAllocation& a) {
   return std::accumulate(a.counts.begin(), a.counts.end(), uint64_t{0});
 }
 
-TEST(Allotment, GivesOutTheBudgetExactly) {
+TEST(SampleAllocation, GivesOutTheBudgetExactly) {
   for (const uint32_t spp : {16u, 17u, 50u, 64u, 100u, 1000u, 1u << 20}) {
     for (const uint32_t size : {1u, 2u, 13u, 32u}) {
-      const Settings s = allotted(size, spp);
+      const Settings s = allocated(size, spp);
       Film film = film_of(s);
       std::mt19937 rng(spp + size);
       std::exponential_distribution<float> light;
       for (uint32_t y = 0; y < size; ++y)
         for (uint32_t x = 0; x < size; ++x)
           add(film, x, y, pilot_samples(s), 1, [&] { return x < size / 2 ? 1.f : light(rng); });
-      AllotmentFacts facts;
-      const Allotment a = allot(film, s, facts);
+      AllocationStatistics facts;
+      const SampleAllocation a = allocate_samples(film, s, facts);
       EXPECT_EQ(total(a), uint64_t{spp} * size * size) << spp << " " << size;
       EXPECT_GE(facts.least, facts.pilot);
       EXPECT_EQ(facts.most, *std::max_element(a.counts.begin(), a.counts.end()));
@@ -68,10 +68,10 @@ TEST(Allotment, GivesOutTheBudgetExactly) {
   }
 }
 
-TEST(Allotment, FollowsErrorAndCost) {
+TEST(SampleAllocation, FollowsErrorAndCost) {
   // Bands of 16 columns: quiet, noisy, noisy and 16 times as expensive, quiet.
   const auto counts = [](Allocate how) {
-    const Settings s = allotted(64, 256, how);
+    const Settings s = allocated(64, 256, how);
     Film film = film_of(s);
     std::mt19937 rng(5);
     std::gamma_distribution<float> quiet(100.f, 0.01f), noisy(1.f, 1.f);
@@ -81,8 +81,8 @@ TEST(Allotment, FollowsErrorAndCost) {
         add(film, x, y, pilot_samples(s), x >= 32 && x < 48 ? 16.f : 1.f,
             [&] { return is_noisy ? noisy(rng) : quiet(rng); });
       }
-    AllotmentFacts facts;
-    const Allotment a = allot(film, s, facts);
+    AllocationStatistics facts;
+    const SampleAllocation a = allocate_samples(film, s, facts);
     EXPECT_GT(facts.gain, 1.2);
     std::array<double, 4> mean{};
     for (uint32_t y = 0; y < 64; ++y)
@@ -96,14 +96,14 @@ TEST(Allotment, FollowsErrorAndCost) {
   EXPECT_NEAR(efficiency[1] / efficiency[2], 4, 0.6);
 }
 
-TEST(Allotment, BlackAndBrokenPixelsAreAsOthers) {
-  const Settings s = allotted(16, 64);
+TEST(SampleAllocation, BlackAndBrokenPixelsAreAsOthers) {
+  const Settings s = allocated(16, 64);
   Film film = film_of(s);
   for (uint32_t y = 0; y < 16; ++y)
     for (uint32_t x = 0; x < 16; ++x)
       add(film, x, y, pilot_samples(s), 1, [&] { return y < 8 ? 0.f : std::nanf(""); });
-  AllotmentFacts facts;
-  const Allotment a = allot(film, s, facts);
+  AllocationStatistics facts;
+  const SampleAllocation a = allocate_samples(film, s, facts);
   EXPECT_EQ(total(a), 64u * 256u);
   EXPECT_GE(facts.least, 32u);
 }
@@ -117,7 +117,7 @@ double bias_z(const auto& counts) {
   const auto sample = [&] { return shines(rng) ? 20.f : 0.f; };
   double sum = 0, squares = 0;
   for (uint32_t round = 0; round < kRounds; ++round) {
-    const Settings s = allotted(kSize, 32);
+    const Settings s = allocated(kSize, 32);
     Film film = film_of(s);
     for (uint32_t y = 0; y < kSize; ++y)
       for (uint32_t x = 0; x < kSize; ++x) add(film, x, y, pilot_samples(s), 1, sample);
@@ -135,10 +135,10 @@ double bias_z(const auto& counts) {
   return (mean - 1) / std::sqrt(variance / kRounds);
 }
 
-TEST(Allotment, IsUnbiasedWhereSamplesAreSkewed) {
+TEST(SampleAllocation, IsUnbiasedWhereSamplesAreSkewed) {
   EXPECT_LT(std::abs(bias_z([](Film& film, const Settings& s) {
-              AllotmentFacts facts;
-              return allot(film, s, facts).counts;
+              AllocationStatistics facts;
+              return allocate_samples(film, s, facts).counts;
             })),
             3.5);
   // The test detects bias: counts that follow a pixel's own samples fail it.
@@ -150,16 +150,16 @@ TEST(Allotment, IsUnbiasedWhereSamplesAreSkewed) {
             -10);
 }
 
-TEST(Allotment, SettingsThatCannotBe) {
-  Settings s = allotted(16, 64);
+TEST(SampleAllocation, SettingsThatCannotBe) {
+  Settings s = allocated(16, 64);
   s.check();
   s.noise = 0.1f;
   EXPECT_ANY_THROW(s.check());
-  s = allotted(16, 64);
+  s = allocated(16, 64);
   s.region = Region{0, 0, 8, 8};
   EXPECT_ANY_THROW(s.check());
-  EXPECT_EQ(pilot_samples(allotted(16, 15)), 0u);
-  EXPECT_EQ(pilot_samples(allotted(16, 64, Allocate::kEven)), 0u);
+  EXPECT_EQ(pilot_samples(allocated(16, 15)), 0u);
+  EXPECT_EQ(pilot_samples(allocated(16, 64, Allocate::kEven)), 0u);
 }
 
 }  // namespace

@@ -99,7 +99,7 @@ TEST(AovFilm, MemoryOfEveryAov) {
                                8 + 2 * 8 + 16 + 24 + 88));
   const auto bytes = [](uint32_t bits) { return Film(8, 8, {AovSet{bits}}).bytes() / 64; };
   EXPECT_EQ(bytes(0), 32u);
-  EXPECT_EQ(bytes(AovSet::kUsual), 92u);
+  EXPECT_EQ(bytes(AovSet::kStoredByDefault), 92u);
   EXPECT_EQ(bytes(static_cast<uint32_t>(Aov::kGuideNormal)), 56u);
   EXPECT_EQ(bytes(static_cast<uint32_t>(Aov::kUv)), 44u);
   EXPECT_EQ(bytes(static_cast<uint32_t>(Aov::kCryptoAsset)), 96u);
@@ -111,13 +111,13 @@ TEST(AovFilm, NearestSampleWinsAndTheFirstOfEquals) {
   const auto add = [&](float centre2, uint32_t material, float x) {
     if (!aovs.is_nearest(0, centre2)) return;
     const float position[3] = {x, 0, 0}, uv[2] = {0.25f, 0.5f};
-    const float id = id_value(material), none = id_value(kNothingHit);
+    const float id = id_value(material), none = id_value(kNoHitId);
     aovs.put(Aov::kPosition, 0, position);
     aovs.put(Aov::kUv, 0, uv);
     aovs.put(Aov::kMaterialId, 0, &id);
     aovs.put(Aov::kInstanceId, 0, &none);
   };
-  add(0.5f, kNothingHit, 0);
+  add(0.5f, kNoHitId, 0);
   add(0.2f, 4, 7);
   add(0.2f, 5, 8);
   add(0.3f, 6, 9);

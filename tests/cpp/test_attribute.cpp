@@ -93,7 +93,7 @@ TEST(Attribute, LanesAreScalars) {
       u[i] = static_cast<float>(rng() % 1000) * 0.001f;
       v[i] = (1.f - u[i]) * 0.7f;
     }
-    const MeshPlace<F> place{load<UInt<F>>(mesh), load<UInt<F>>(prim), load<F>(u), load<F>(v)};
+    const MeshPosition<F> place{load<UInt<F>>(mesh), load<UInt<F>>(prim), load<F>(u), load<F>(v)};
     for (const uint32_t id : {kTint, kDepth, kOther}) {
       const uint32_t width = id == kTint ? 3 : 1;
       F out[4] = {F(-99.f), F(-99.f), F(-99.f), F(-99.f)};

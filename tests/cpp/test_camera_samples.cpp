@@ -222,7 +222,7 @@ TEST(CameraConnections, GoRoundAPictureOfAllDirections) {
   made.window[3] = 0.5f * static_cast<float>(kPiD);
   const CameraSetup setup(made, kAcross, kDown, table);
   const Region all{0, 0, kAcross, kDown};
-  const SplatFilter filter = splat_filter_of(setup, table, all);
+  const LightSplatFilter filter = make_light_splat_filter(setup, table, all);
   const Film film(all, {}, false);
   Random random(5);
   for (int i = 0; i < 300; ++i) {
@@ -253,7 +253,7 @@ TEST(CameraConnections, GoRoundAPictureOfAllDirections) {
   made.window[0] = -0.5f * static_cast<float>(kPiD);
   made.window[1] = 0.5f * static_cast<float>(kPiD);
   const CameraSetup front(made, kAcross, kDown, table);
-  const SplatFilter half = splat_filter_of(front, table, all);
+  const LightSplatFilter half = make_light_splat_filter(front, table, all);
   const auto behind = connect_to_camera<float>(front, front.to_world.t + Vec3<float>{0.1f, 0, 1},
                                                0.f, 0.f, 0.f, true);
   EXPECT_FALSE(half.reaches<float>(behind.x, behind.y));

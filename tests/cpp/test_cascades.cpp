@@ -14,7 +14,7 @@ constexpr uint32_t kSide = 5, kMiddle = 12;
 /// Makes a film of kSide x kSide pixels, each with `n` samples of brightness `y`.
 Film even_film(uint32_t n, float y) {
   Film film(kSide, kSide, {AovSet{0}});
-  film.keep_cascades(1 / 64.f);
+  film.allocate_cascades(1 / 64.f);
   const float rgb[3] = {y, y, y};
   for (uint32_t i = 0; i < kSide * kSide; ++i) {
     for (uint32_t s = 0; s < n; ++s) film.cascades().add(i, rgb);
@@ -82,7 +82,7 @@ TEST(Cascades, AreWithoutBiasInTheLimit) {
 TEST(Cascades, ScaleWithTheLight) {
   for (const float scale : {0x1p-20f, 0x1p20f}) {
     Film one = even_film(7, 0.5f), other(kSide, kSide, {AovSet{0}});
-    other.keep_cascades(scale / 64.f);
+    other.allocate_cascades(scale / 64.f);
     add_sample(one, kMiddle, 700, 30, 2);
     for (uint32_t i = 0; i < kSide * kSide; ++i)
       for (uint32_t s = 0; s < 7; ++s)

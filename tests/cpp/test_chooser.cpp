@@ -75,19 +75,19 @@ TEST(Chooser, TriesEachArmThenTakesTheLeast) {
 TEST(Chooser, WeighsRunningAgainstPreparing) {
   // Sorting costs 10 ns per record. With 1600 records it halves 100 packets of 200 ns: it saves 10
   // us and costs 16, a loss. At 2000 ns per packet it saves 100 us.
-  Game cheap(2, fixed({200, 200}), {0, 10});
-  cheap.work = {{100, 1600}, {50, 1600}};
-  Game dear(2, fixed({2000, 2000}), {0, 10});
-  dear.work = {{100, 1600}, {50, 1600}};
+  Game inexpensive(2, fixed({200, 200}), {0, 10});
+  inexpensive.work = {{100, 1600}, {50, 1600}};
+  Game expensive(2, fixed({2000, 2000}), {0, 10});
+  expensive.work = {{100, 1600}, {50, 1600}};
   for (int i = 0; i < 20; ++i) {
-    cheap.play();
-    dear.play();
+    inexpensive.play();
+    expensive.play();
   }
-  EXPECT_EQ(cheap.play(), 0u);
-  EXPECT_EQ(dear.play(), 1u);
+  EXPECT_EQ(inexpensive.play(), 0u);
+  EXPECT_EQ(expensive.play(), 1u);
   // The same chooser with a queue that arrives grouped: there are no packets to save.
-  dear.work = {{50, 1600}, {50, 1600}};
-  EXPECT_EQ(dear.play(), 0u);
+  expensive.work = {{50, 1600}, {50, 1600}};
+  EXPECT_EQ(expensive.play(), 0u);
 }
 
 TEST(Chooser, LearnsEachDepthForItself) {

@@ -30,10 +30,10 @@ Settings settings(uint32_t side = 16, uint32_t spp = 256) {
 
 /// Expects the mean of the image to be `expected`. `within` is the relative error that the test
 /// must be able to detect, `bias` the error of the scene itself (tessellation).
-void expect_radiance(const Picture& picture, double expected, const std::string& what,
+void expect_radiance(const RenderedImage& image, double expected, const std::string& what,
                      double within = 0.005, double bias = 5e-5) {
   for (size_t c = 0; c < 3; ++c) {
-    const Mean m = mean_of(picture, c);
+    const Mean m = mean_of(image, c);
     EXPECT_NEAR(m.mean, expected, kSigmas * m.error + bias * expected) << what << ", channel " << c;
     if (!kSanitized) {
       EXPECT_LT(kSigmas * m.error + bias * expected, within * expected)
@@ -42,7 +42,7 @@ void expect_radiance(const Picture& picture, double expected, const std::string&
   }
 }
 /// Expects two images of one scene to have the same mean.
-void expect_equal_means(const Picture& a, const Picture& b, const std::string& what,
+void expect_equal_means(const RenderedImage& a, const RenderedImage& b, const std::string& what,
                         double within = 0.02) {
   for (size_t c = 0; c < 3; ++c) {
     const Mean d = mean_difference(a, b, c);
@@ -55,7 +55,7 @@ void expect_equal_means(const Picture& a, const Picture& b, const std::string& w
 
 constexpr float kAlbedo = 0.6f;
 /// Renders a floor at the origin under one light.
-Picture floor_under(const Light& light, const Settings& s = settings()) {
+RenderedImage floor_under(const Light& light, const Settings& s = settings()) {
   SceneBuilder b;
   const uint32_t grey = b.add_material(make_material(ProgramId::kDiffuse, Vec3<float>(kAlbedo)));
   b.add_to_group(0, b.add_mesh(make_mesh(ground(20), grey)));
@@ -390,7 +390,7 @@ TEST(ClosedForm, RouletteKeepsTheMean) {
   WavefrontRenderer renderer(cornell());
   Settings s = settings(32, 128);
   s.max_depth = 30;
-  const Picture off = renderer.render(s);
+  const RenderedImage off = renderer.render(s);
   s.seed = 1;
   s.roulette = RouletteKind::kThroughput;
   for (const uint32_t depth : {1u, 3u}) {
@@ -403,15 +403,15 @@ TEST(ClosedForm, RouletteKeepsTheMean) {
 TEST(ClosedForm, ClampingTouchesIndirectLightOnly) {
   WavefrontRenderer renderer(cornell());
   Settings s = settings(16, 32);
-  const Picture off = renderer.render(s);
+  const RenderedImage off = renderer.render(s);
   s.clamp_indirect = 1e30f;
-  expect_same_picture(off, renderer.render(s), "a limit that nothing reaches");
+  expect_same_image(off, renderer.render(s), "a limit that nothing reaches");
   s.clamp_indirect = 0.01f;
   EXPECT_LT(mean_of(renderer.render(s)).mean, 0.95 * mean_of(off).mean);
   s.max_depth = 1;
-  const Picture clamped = renderer.render(s);
+  const RenderedImage clamped = renderer.render(s);
   s.clamp_indirect = 0;
-  expect_same_picture(renderer.render(s), clamped, "direct light");
+  expect_same_image(renderer.render(s), clamped, "direct light");
 }
 
 /// A glossy scene without caustics.
@@ -440,7 +440,7 @@ std::shared_ptr<const Scene> glossy_scene() {
 TEST(ClosedForm, CosineSamplingKeepsTheMean) {
   WavefrontRenderer renderer(glossy_scene());
   Settings s = settings(32, 128);
-  const Picture by_bsdf = renderer.render(s);
+  const RenderedImage by_bsdf = renderer.render(s);
   s.seed = 1;
   s.cosine_sampling = true;
   expect_equal_means(by_bsdf, renderer.render(s), "sampled by cosine");
@@ -449,7 +449,7 @@ TEST(ClosedForm, CosineSamplingKeepsTheMean) {
 TEST(ClosedForm, SamplersKeepTheMean) {
   WavefrontRenderer renderer(glossy_scene());
   Settings s = settings(32, 128);
-  const Picture sobol = renderer.render(s);
+  const RenderedImage sobol = renderer.render(s);
   s.sampler = SamplerKind::kIndependent;
   expect_equal_means(sobol, renderer.render(s), "independent samples");
 }

@@ -26,10 +26,10 @@ TEST(CostTracker, ChargesABatchToItsRecordsAlike) {
   EXPECT_EQ(tracker.timed()[0], 3u);
   EXPECT_EQ(tracker.timed()[1], 2u);
   EXPECT_EQ(tracker.timed()[2], 0u);
-  EXPECT_EQ(tracker.seen()[0], 0u) << "timing does not count";
+  EXPECT_EQ(tracker.record_counts()[0], 0u) << "timing does not count";
   tracker.count(Ids{2, 2, 0});
-  EXPECT_EQ(tracker.seen()[2], 2u);
-  EXPECT_EQ(tracker.seen()[0], 1u);
+  EXPECT_EQ(tracker.record_counts()[2], 2u);
+  EXPECT_EQ(tracker.record_counts()[0], 1u);
 }
 
 TEST(CostTracker, TakeMovesMeasurementsAndLeavesCounts) {
@@ -43,8 +43,8 @@ TEST(CostTracker, TakeMovesMeasurementsAndLeavesCounts) {
   EXPECT_EQ(sum.timed()[0], 2u);
   EXPECT_DOUBLE_EQ(worker.ns()[0], 0);
   EXPECT_EQ(worker.timed()[1], 0u);
-  EXPECT_EQ(worker.seen()[1], 2u);
-  EXPECT_EQ(sum.seen()[1], 0u);
+  EXPECT_EQ(worker.record_counts()[1], 2u);
+  EXPECT_EQ(sum.record_counts()[1], 0u);
   sum.take(worker);
   EXPECT_DOUBLE_EQ(sum.ns()[0], 30) << "nothing is taken twice";
 }
@@ -52,8 +52,8 @@ TEST(CostTracker, TakeMovesMeasurementsAndLeavesCounts) {
 TEST(CostTracker, WhatIsBesideIsAShareOfEachTimedRecord) {
   CostTracker sum(2), worker(2);
   worker.count(Ids{0, 0, 0, 0, 1});
-  worker.charge(Ids{0, 0}, 40);  // two of four
-  worker.charge_beside(0, 100);  // shared by all four
+  worker.charge(Ids{0, 0}, 40);   // two of four
+  worker.charge_untimed(0, 100);  // shared by all four
   sum.take(worker);
   EXPECT_DOUBLE_EQ(sum.ns()[0], 40 + 2 * 25);
   worker.count(Ids{0, 0});

@@ -51,16 +51,16 @@ bool enters(const Bounds& box, const TestRay& ray) {
 /// Calls look(prim, may_hit, hits) for all segments. may_hit: the ray enters the box of the
 /// segment's BVH node.
 template <typename Look>
-void compare(const Mesh& mesh, const CurveClumps& clumps, const TestRay& ray, float tfar,
+void compare(const Mesh& mesh, const CurveBvhNodes& nodes, const TestRay& ray, float tfar,
              const Look& look) {
   std::vector<uint8_t> may(mesh.primitive_count(), 0);
-  for (uint32_t c = 0; c < clumps.count(); ++c) {
-    if (!enters(clumps.bounds(c), ray)) continue;
-    const uint32_t bits = clumps.may_meet(c, CurveRay(ray.o, ray.d), tfar);
-    for (uint32_t k = 0; k < CurveClumps::kPieces; ++k) {
+  for (uint32_t c = 0; c < nodes.count(); ++c) {
+    if (!enters(nodes.bounds(c), ray)) continue;
+    const uint32_t bits = nodes.may_hit(c, CurveRay(ray.o, ray.d), tfar);
+    for (uint32_t k = 0; k < CurveBvhNodes::kMaxSubSegments; ++k) {
       if ((bits >> k & 1u) == 0) continue;
-      ASSERT_LT(clumps.piece(c, k).prim, mesh.primitive_count());
-      may[clumps.piece(c, k).prim] = 1;
+      ASSERT_LT(nodes.sub_segment(c, k).prim, mesh.primitive_count());
+      may[nodes.sub_segment(c, k).prim] = 1;
     }
   }
   for (uint32_t prim = 0; prim < mesh.primitive_count(); ++prim) {
@@ -70,25 +70,26 @@ void compare(const Mesh& mesh, const CurveClumps& clumps, const TestRay& ray, fl
   }
 }
 
-TEST(CurveClumps, HoldAllPiecesOfEachSegment) {
+TEST(CurveBvhNodes, HoldAllPiecesOfEachSegment) {
   for (const Primitive primitive : kStrands)
     for (const float radius : {0.2f, 0.001f}) {
       const Mesh mesh = make_curves(strands(primitive, 27, 3, 1.f, radius, 5));
-      const CurveClumps clumps(mesh);
+      const CurveBvhNodes nodes(mesh);
       std::map<uint32_t, std::pair<uint32_t, Bounds>> found;
-      for (uint32_t c = 0; c < clumps.count(); ++c)
-        for (uint32_t k = 0; k < CurveClumps::kPieces; ++k) {
-          const uint32_t prim = clumps.piece(c, k).prim;
+      for (uint32_t c = 0; c < nodes.count(); ++c)
+        for (uint32_t k = 0; k < CurveBvhNodes::kMaxSubSegments; ++k) {
+          const uint32_t prim = nodes.sub_segment(c, k).prim;
           if (prim >= mesh.primitive_count()) continue;
           auto& [count, box] = found[prim];
           ++count;
-          box.add(clumps.bounds(c));
+          box.add(nodes.bounds(c));
         }
       EXPECT_EQ(found.size(), mesh.primitive_count());
-      for (const auto& [prim, pieces] : found) {
-        EXPECT_EQ(pieces.first, radius < 0.1f ? 4u : 1u);
-        if (pieces.first > 1) continue;  // hulls of sub-segments lie within that of the segment
-        const Bounds& all = pieces.second;
+      for (const auto& [prim, sub_segments] : found) {
+        EXPECT_EQ(sub_segments.first, radius < 0.1f ? 4u : 1u);
+        if (sub_segments.first > 1)
+          continue;  // hulls of sub-segments lie within that of the segment
+        const Bounds& all = sub_segments.second;
         const Bounds one = curve_bounds(mesh, prim);
         EXPECT_TRUE(all.lo.x <= one.lo.x && all.lo.y <= one.lo.y && all.lo.z <= one.lo.z);
         EXPECT_TRUE(all.hi.x >= one.hi.x && all.hi.y >= one.hi.y && all.hi.z >= one.hi.z);
@@ -96,7 +97,7 @@ TEST(CurveClumps, HoldAllPiecesOfEachSegment) {
     }
 }
 
-TEST(CurveClumps, LetThroughAllThatIsMet) {
+TEST(CurveBvhNodes, LetThroughAllThatIsMet) {
   std::mt19937 rng(7);
   for (const Primitive primitive : kStrands)
     for (const float radius : {1e-5f, 1e-3f, 0.1f})
@@ -104,12 +105,12 @@ TEST(CurveClumps, LetThroughAllThatIsMet) {
         CurveData made = strands(primitive, 30, 2, 1.f, radius, 3);
         for (float& x : made.positions) x += away;
         const Mesh mesh = make_curves(made);
-        const CurveClumps clumps(mesh);
+        const CurveBvhNodes nodes(mesh);
         size_t met = 0;
         for (uint32_t i = 0; i < 300; ++i) {
           const TestRay ray = aimed(mesh, rng, i % 2 == 0 ? 1.05f : 0.f);
           const float tfar = i % 3 == 0 ? 0.7f : kInf;
-          compare(mesh, clumps, ray, tfar, [&](uint32_t prim, bool may, bool is) {
+          compare(mesh, nodes, ray, tfar, [&](uint32_t prim, bool may, bool is) {
             met += is;
             EXPECT_TRUE(may || !is) << "segment " << prim << ", radius " << radius << ", " << away;
           });
@@ -118,7 +119,7 @@ TEST(CurveClumps, LetThroughAllThatIsMet) {
       }
 }
 
-TEST(CurveClumps, PiecesHaveTheHitsOfTheirSegment) {
+TEST(CurveBvhNodes, PiecesHaveTheHitsOfTheirSegment) {
   std::mt19937 rng(11);
   for (const Primitive primitive : kStrands)
     for (const float radius : {1e-4f, 1e-2f, 0.1f}) {
@@ -150,13 +151,13 @@ TEST(CurveClumps, PiecesHaveTheHitsOfTheirSegment) {
     }
 }
 
-TEST(CurveClumps, LetThroughLittleElseOfHair) {
+TEST(CurveBvhNodes, LetThroughLittleElseOfHair) {
   std::mt19937 rng(9);
   const Mesh mesh = make_curves(strands(Primitive::kCubicTube, 200, 2, 1.f, 1e-3f, 3));
-  const CurveClumps clumps(mesh);
+  const CurveBvhNodes nodes(mesh);
   size_t may = 0, is = 0, all = 0;
   for (uint32_t i = 0; i < 200; ++i)
-    compare(mesh, clumps, aimed(mesh, rng, 0.5f), kInf, [&](uint32_t, bool let, bool met) {
+    compare(mesh, nodes, aimed(mesh, rng, 0.5f), kInf, [&](uint32_t, bool let, bool met) {
       ++all;
       may += let;
       is += met;

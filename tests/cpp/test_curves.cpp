@@ -221,12 +221,12 @@ TEST(Curves, HitsEqualBruteForceInDoublePrecision) {
 }
 
 /// First hit of a single ray.
-struct OneHit {
+struct SingleRayHit {
   float t, u, v;
   uint32_t prim, geom, inst;
 };
-OneHit trace_one(const EmbreeAccelerator& accel, const Vec3<float>& o, const Vec3<float>& d) {
-  OneHit h{};
+SingleRayHit trace_one(const EmbreeAccelerator& accel, const Vec3<float>& o, const Vec3<float>& d) {
+  SingleRayHit h{};
   accel.intersect({&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, nullptr, nullptr, 1},
                   {&h.t, &h.u, &h.v, &h.prim, &h.geom, &h.inst}, 1, false, {});
   return h;
@@ -264,7 +264,7 @@ TEST(Curves, RaysThatLeaveDoNotHitWhatTheyLeave) {
         const V3 apart = sub(from, {away, -away, away});
         if (dot(apart, apart) < 2.25) continue;  // the point may be inside
         const V3 d = unit(sub(to, from));
-        const OneHit h = trace_one(accel, narrow(from), narrow(d));
+        const SingleRayHit h = trace_one(accel, narrow(from), narrow(d));
         if (h.inst == kNoHit) continue;
         ++hits;
         const Surface<float> s = setup_surface<float>(scene->view(), {h.inst, 0, h.prim, h.u, h.v},
@@ -277,7 +277,7 @@ TEST(Curves, RaysThatLeaveDoNotHitWhatTheyLeave) {
         const Vec3<float> out = narrow(unit(along(side, n, flat)));
         EXPECT_EQ(trace_one(accel, spawn_origin<float>(s, out), out).inst, kNoHit) << flat;
         const Vec3<float> in = narrow(unit(along(side, n, -std::max(flat, 0.05))));
-        const OneHit back = trace_one(accel, spawn_origin<float>(s, in), in);
+        const SingleRayHit back = trace_one(accel, spawn_origin<float>(s, in), in);
         EXPECT_EQ(back.inst, 1u) << "no way out";
       }
       EXPECT_GT(hits, size_for_build(20000) / 10);
@@ -305,7 +305,7 @@ TEST(Curves, TubesHaveNoSeams) {
   ring.point(corner[0], r);
   ring.point(control(0, k), r);
   for (uint32_t q = 0; q < 4; ++q)
-    ring.segments.push_back((1 + 3 * q) | kCurveGoesOnBefore | kCurveGoesOnAfter);
+    ring.segments.push_back((1 + 3 * q) | kCurveContinuesBefore | kCurveContinuesAfter);
   b.add_to_group(0, b.add_mesh(make_curves(ring)));
   const auto scene = b.build();
   const EmbreeAccelerator accel(scene, 1);
@@ -316,7 +316,7 @@ TEST(Curves, TubesHaveNoSeams) {
     const V3 middle{std::cos(phi), std::sin(phi), 0};
     const V3 d = unit({uniform(rng), uniform(rng), uniform(rng)});
     // Exit point of a torus of the same radii, which the ring matches within 1e-3.
-    const OneHit h = trace_one(accel, narrow(middle), narrow(d));
+    const SingleRayHit h = trace_one(accel, narrow(middle), narrow(d));
     ASSERT_EQ(h.inst, 0u) << "a hole";
     const V3 p = along(middle, d, h.t);
     const double tube = std::hypot(std::hypot(p[0], p[1]) - 1, p[2]);
@@ -325,7 +325,7 @@ TEST(Curves, TubesHaveNoSeams) {
     const V3 seam = widen(corner[i % 4]),
              at{seam[0] * (1 + r * std::cos(a)), seam[1] * (1 + r * std::cos(a)), r * std::sin(a)};
     const V3 out = along(at, unit(sub(at, seam)), 0.5);
-    const OneHit seen = trace_one(accel, narrow(out), narrow(unit(sub(at, out))));
+    const SingleRayHit seen = trace_one(accel, narrow(out), narrow(unit(sub(at, out))));
     ASSERT_EQ(seen.inst, 0u);
     EXPECT_NEAR(seen.t, 0.5, 1e-3) << "a gap at a seam";
   }
@@ -394,8 +394,9 @@ TEST(Curves, BadArraysAreRefusedByName) {
   refused([](CurveData& d) { d.uvs = {1, 2}; }, "texture coordinates");
   refused([](CurveData& d) { d.materials = {0}; }, "materials");
   refused([](CurveData& d) { d.segments.push_back(11); }, "control point 11");
-  refused([](CurveData& d) { d.segments.push_back(0 | kCurveGoesOnBefore); }, "control point 0");
-  refused([](CurveData& d) { d.segments.push_back(10 | kCurveGoesOnAfter); }, "control point 10");
+  refused([](CurveData& d) { d.segments.push_back(0 | kCurveContinuesBefore); }, "control point 0");
+  refused([](CurveData& d) { d.segments.push_back(10 | kCurveContinuesAfter); },
+          "control point 10");
 }
 
 TEST(Curves, MemoryAndNumbersAreCounted) {

@@ -179,14 +179,14 @@ Settings small() {
 TEST(Edits, AnEditedSceneIsTheSceneBuiltAnew) {
   Values v = values();
   WavefrontRenderer renderer(build(v));
-  Picture before = renderer.render(small());
+  RenderedImage before = renderer.render(small());
   uint64_t version = 0;
   for (const Change& change : changes()) {
     change.apply(v);
     renderer.edit(edit_for(change, *renderer.scene(), v));
     EXPECT_EQ(renderer.version(), ++version);
-    const Picture edited = renderer.render(small());
-    expect_same_picture(edited, WavefrontRenderer(build(v)).render(small()), change.what);
+    const RenderedImage edited = renderer.render(small());
+    expect_same_image(edited, WavefrontRenderer(build(v)).render(small()), change.what);
     EXPECT_NE(edited.beauty, before.beauty) << change.what << ": or it would show nothing";
     before = edited;
   }
@@ -247,32 +247,32 @@ TEST(Twins, RenderAtOnceEachItsOwnMaterials) {
   Values v = values();
   v.materials[kLeaf].opacity = 0.5f;
   WavefrontRenderer renderer(build(v));
-  const auto twin = renderer.twin();
+  const auto clone = renderer.clone();
   Values other = v;
   other.materials[kLeaf].opacity = 0.2f;  // same BVH, different results of its filters
   other.materials[kFloor].base_color = {0, 1, 0};
   const Change change{"twin", {}, {kLeaf, kFloor}};
-  twin->edit(edit_for(change, *twin->scene(), other));
+  clone->edit(edit_for(change, *clone->scene(), other));
   EXPECT_EQ(renderer.version(), 0u);
   Settings s = small();
   s.threads = 2;
-  Picture ours, theirs;
+  RenderedImage ours, theirs;
   std::thread thread([&] {
-    for (int i = 0; i < 3; ++i) theirs = twin->render(s);
+    for (int i = 0; i < 3; ++i) theirs = clone->render(s);
   });
   for (int i = 0; i < 3; ++i) ours = renderer.render(s);
   thread.join();
-  expect_same_picture(ours, WavefrontRenderer(build(v)).render(s), "origin");
-  expect_same_picture(theirs, WavefrontRenderer(build(other)).render(s), "twin");
+  expect_same_image(ours, WavefrontRenderer(build(v)).render(s), "origin");
+  expect_same_image(theirs, WavefrontRenderer(build(other)).render(s), "twin");
   EXPECT_NE(ours.beauty, theirs.beauty);
 }
 
 TEST(Twins, OutliveTheirOrigin) {
   auto renderer = std::make_unique<WavefrontRenderer>(build(values()));
-  const Picture before = renderer->render(small());
-  const auto twin = renderer->twin();
+  const RenderedImage before = renderer->render(small());
+  const auto clone = renderer->clone();
   renderer.reset();
-  expect_same_picture(twin->render(small()), before, "twin");
+  expect_same_image(clone->render(small()), before, "twin");
 }
 
 TEST(Stop, EndsARenderFromAnotherThread) {
@@ -295,12 +295,12 @@ TEST(Stop, EndsARenderFromAnotherThread) {
     asked = Clock::now();
     renderer.stop();
   });
-  const Picture p = renderer.render(s, {.progress =
-                                            [&](const RenderStatus&) {
-                                              looked = true;
-                                              return Request::kGoOn;
-                                            },
-                                        .interval_s = 0.01});
+  const RenderedImage p = renderer.render(s, {.progress =
+                                                  [&](const RenderStatus&) {
+                                                    looked = true;
+                                                    return Request::kContinue;
+                                                  },
+                                              .interval_s = 0.01});
   const double took = std::chrono::duration<double>(Clock::now() - asked).count();
   other.join();
   EXPECT_LT(took, kSanitized ? 20 : 1) << "seconds";
@@ -340,30 +340,30 @@ TEST(Progressive, IsTheSamePictureInShortPasses) {
   WavefrontRenderer renderer(cornell());
   Settings s = small();
   s.spp = 24;
-  const Picture plain = renderer.render(s);
+  const RenderedImage plain = renderer.render(s);
   EXPECT_EQ(renderer.statistics().passes, 2u);
   s.progressive = true;
-  expect_same_picture(renderer.render(s), plain, "progressive");
+  expect_same_image(renderer.render(s), plain, "progressive");
   EXPECT_EQ(renderer.statistics().passes, 6u) << "1, 1, 2, 4, 8, 8";
   s.noise = 0.05f;
   s.spp = 128;
-  const Picture adaptive = renderer.render(s);
+  const RenderedImage adaptive = renderer.render(s);
   s.progressive = false;
-  expect_same_picture(renderer.render(s), adaptive, "adaptive");
+  expect_same_image(renderer.render(s), adaptive, "adaptive");
 }
 
 TEST(RegionSetting, HasThePixelsOfTheWholePicture) {
   WavefrontRenderer renderer(mixed());
   Settings s = small();
-  const Picture whole = renderer.render(s);
+  const RenderedImage whole = renderer.render(s);
   s.region = Region{5, 3, 41, 19};
   uint64_t total = 0;
   const auto look = [&](const RenderStatus& status) {
     total = status.samples_total;
     EXPECT_EQ(status.active_pixels, 36u * 16);
-    return Request::kGoOn;
+    return Request::kContinue;
   };
-  const Picture part = renderer.render(s, {.progress = look});
+  const RenderedImage part = renderer.render(s, {.progress = look});
   EXPECT_EQ(total, uint64_t{36} * 16 * s.spp);
   EXPECT_EQ(renderer.statistics().samples, total);
   const AovLayer &direct = layer(part, "direct"), &all = layer(whole, "direct");
@@ -385,7 +385,7 @@ TEST(RegionSetting, AdaptiveRendersStayWithin) {
   s.region = Region{8, 8, 40, 24};
   s.noise = 0.05f;
   s.spp = 256;
-  const Picture part = renderer.render(s);
+  const RenderedImage part = renderer.render(s);
   EXPECT_LE(renderer.statistics().error, 0.05);
   uint32_t most = 0;
   for (uint32_t i = 0; i < part.samples.size(); ++i) {
@@ -428,7 +428,7 @@ TEST(Snapshots, HaveEveryLayerOfThePicture) {
     seen.push_back(shot.layer("light_sun").value());
     samples = shot.statistics().samples;
   };
-  const Picture p = renderer.render(s, {.snapshot = snapshot});
+  const RenderedImage p = renderer.render(s, {.snapshot = snapshot});
   EXPECT_EQ(samples, renderer.statistics().samples);
   ASSERT_GT(seen.size(), 15u);
   for (const AovLayer& one : seen) {
@@ -452,7 +452,7 @@ TEST(Picks, AgreeWithWhatThePictureShows) {
   s.filter = FilterKind::kBox;
   s.filter_width = 0.01f;  // rays through pixel centres
   s.aovs = AovSet{AovSet::kAll};
-  const Picture p = renderer.render(s);
+  const RenderedImage p = renderer.render(s);
   const AovLayer &material = layer(p, "material_id"), &instance = layer(p, "instance_id");
   const AovLayer &position = layer(p, "position"), &uv = layer(p, "uv");
   std::map<std::string, int> objects;

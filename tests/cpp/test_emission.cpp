@@ -152,7 +152,8 @@ TEST(Emission, IsAsDenseAsWhoMeetsItIsTold) {
       const Vec3<float> p = fma(e.d, t, e.o);
       const float met = emission_density<float>(view, e.light, p, -e.d, t, true);
       EXPECT_NEAR(met, e.density, 2e-3f * e.density) << kind.name;
-      const auto reach = light_reach<float>(view, e.light, LightReceiver<float>(p), -e.d, t, true);
+      const auto reach =
+          camera_path_density<float>(view, e.light, LightReceiver<float>(p), -e.d, t, true);
       EXPECT_GT(reach.density, 0) << kind.name;
     }
   }
@@ -190,7 +191,7 @@ TEST(Emission, IsEvenOverLightsAndByCosine) {
         count(places, side < 0 ? 0.25 : 0.75, 0.5);
       } else if (name.ends_with("rect")) {
         const detail::LightReader<float> reader(record, true);
-        const Vec2<float> at = detail::place_on_rect<float>(reader, e.o);
+        const Vec2<float> at = detail::rect_uv<float>(reader, e.o);
         count(places, double{at.x}, double{at.y});
       } else if (name == "disk") {
         const double a = dot(h, u) / dot(u, u), b = dot(h, v) / dot(v, v);

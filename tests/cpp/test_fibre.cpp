@@ -35,7 +35,7 @@ struct Look {
 };
 
 Hair hair(const Look& look) {
-  OwnShadingParams<float> p{};
+  SpecificShadingParams<float> p{};
   static_cast<ShadingParams<float>&>(p) = bsdf_testing::plain_params();
   p.base_color = look.color;
   p.roughness = look.along;
@@ -180,7 +180,7 @@ TEST(Fibre, LobesAreThoseOfThePaper) {
         const double m = std::exp(-std::sin(a) * std::sin(b) / v) *
                          bessel(std::cos(a) * std::cos(b) / v) / (2 * v * std::sinh(1 / v));
         const auto f = [](double x) { return static_cast<float>(x); };
-        const double ours = static_cast<double>(AlongFibre<float>(f(v)).density(
+        const double ours = static_cast<double>(LongitudinalLobe<float>(f(v)).density(
             f(std::sin(a)), f(std::cos(a)), f(std::sin(b)), f(std::cos(b))));
         EXPECT_NEAR(ours, m, 2e-4 * m + 1e-12) << v << " " << a << " " << b;
       }
@@ -304,7 +304,7 @@ constexpr size_t kGiven = 19, kFound = 12;
 
 template <typename F>
 std::array<F, kFound> found(const std::array<F, kGiven>& g) {
-  OwnShadingParams<F> p{};
+  SpecificShadingParams<F> p{};
   p.base_color = {g[0], g[1], g[2]};
   p.roughness = g[3];
   p.ior = F(1.f) + g[4];

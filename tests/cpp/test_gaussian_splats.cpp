@@ -19,7 +19,7 @@ using namespace curve_testing;
 using Double3 = std::array<double, 3>;
 
 /// Squared deviation (Mahalanobis distance) of a point from the centre of splat i.
-double deviations(const SplatData& data, size_t i, const Double3& p) {
+double deviations(const GaussianSplatData& data, size_t i, const Double3& p) {
   const float* q = &data.orientations[4 * i];
   const double norm =
       double{q[0]} * q[0] + double{q[1]} * q[1] + double{q[2]} * q[2] + double{q[3]} * q[3];
@@ -39,12 +39,12 @@ double deviations(const SplatData& data, size_t i, const Double3& p) {
 }
 
 TEST(GaussianSplats, AreMetWhereTheirResponseIsGreatest) {
-  const SplatData data = random_splats(60, 1, 0.4f, 0, 3);
-  const Mesh mesh = make_splats(data, 0);
+  const GaussianSplatData data = random_gaussian_splats(60, 1, 0.4f, 0, 3);
+  const Mesh mesh = make_gaussian_splats(data, 0);
   const auto scene = [&] {
     SceneBuilder b;
-    b.add_to_group(
-        0, b.add_mesh(make_splats(data, b.add_material(make_material(ProgramId::kEmissive)))));
+    b.add_to_group(0, b.add_mesh(make_gaussian_splats(
+                          data, b.add_material(make_material(ProgramId::kEmissive)))));
     return b.build();
   }();
   std::mt19937 rng(4);
@@ -77,7 +77,7 @@ TEST(GaussianSplats, AreMetWhereTheirResponseIsGreatest) {
       const CurveHit& hit = *hits.begin();
       EXPECT_NEAR(hit.t, t, 1e-5);
       EXPECT_NEAR(hit.u * hit.u + hit.v * hit.v, least, 1e-4);
-      EXPECT_NEAR(splat_alpha(mesh.splats[i], hit.u, hit.v), alpha, 1e-4);
+      EXPECT_NEAR(gaussian_splat_alpha(mesh.splats[i], hit.u, hit.v), alpha, 1e-4);
       const Bounds box = curve_bounds(mesh, i);
       const Double3 p = at(t);
       EXPECT_TRUE(p[0] > box.lo.x && p[1] > box.lo.y && p[2] > box.lo.z && p[0] < box.hi.x &&
@@ -101,7 +101,7 @@ TEST(GaussianSplats, HarmonicsAreOrthonormal) {
                                0.9602898564975363};
   constexpr double kWeight[4] = {0.3626837833783620, 0.3137066458778873, 0.2223810344533745,
                                  0.1012285362903763};
-  double product[kMostHarmonics][kMostHarmonics] = {};
+  double product[kMaxHarmonics][kMaxHarmonics] = {};
   for (int i = 0; i < 8; ++i)
     for (int j = 0; j < 16; ++j) {
       const double z = i < 4 ? kNode[i] : -kNode[i - 4], s = std::sqrt(1 - z * z);
@@ -110,11 +110,11 @@ TEST(GaussianSplats, HarmonicsAreOrthonormal) {
           harmonics<float>({static_cast<float>(s * std::cos(phi)),
                             static_cast<float>(s * std::sin(phi)), static_cast<float>(z)});
       const double weight = kWeight[i % 4] * 2 * std::numbers::pi / 16;
-      for (size_t a = 0; a < kMostHarmonics; ++a)
-        for (size_t b = 0; b < kMostHarmonics; ++b) product[a][b] += weight * y[a] * y[b];
+      for (size_t a = 0; a < kMaxHarmonics; ++a)
+        for (size_t b = 0; b < kMaxHarmonics; ++b) product[a][b] += weight * y[a] * y[b];
     }
-  for (size_t a = 0; a < kMostHarmonics; ++a)
-    for (size_t b = 0; b < kMostHarmonics; ++b)
+  for (size_t a = 0; a < kMaxHarmonics; ++a)
+    for (size_t b = 0; b < kMaxHarmonics; ++b)
       EXPECT_NEAR(product[a][b], a == b ? 1 : 0, 1e-6) << a << " and " << b;
 }
 
@@ -122,33 +122,35 @@ TEST(GaussianSplats, BadArraysAreRefused) {
   const auto refused = [](const auto& spoil, const std::string& what) {
     SceneBuilder b;
     const uint32_t material = b.add_material(make_material(ProgramId::kEmissive));
-    SplatData data = random_splats(5, 1, 0.3f, 1, 3);
+    GaussianSplatData data = random_gaussian_splats(5, 1, 0.3f, 1, 3);
     spoil(data);
     try {
-      b.add_mesh(make_splats(data, material));
+      b.add_mesh(make_gaussian_splats(data, material));
       ADD_FAILURE() << "taken: " << what;
     } catch (const Error& error) {
       EXPECT_NE(std::string(error.what()).find(what), std::string::npos) << error.what();
     }
   };
-  refused([](SplatData& d) { d.scales.pop_back(); }, "scales");
-  refused([](SplatData& d) { d.scales[1] = 0; }, "a scale that is not");
-  refused([](SplatData& d) { d.scales[2] = std::nanf(""); }, "a scale that is not");
-  refused([](SplatData& d) { d.orientations.pop_back(); }, "orientations");
-  refused([](SplatData& d) { std::fill_n(d.orientations.begin(), 4, 0.f); }, "an orientation that");
-  refused([](SplatData& d) { d.opacities[3] = -0.1f; }, "an opacity that");
-  refused([](SplatData& d) { d.opacities[3] = 1.1f; }, "an opacity that");
-  refused([](SplatData& d) { d.positions.resize(12); }, "rows of splats");
-  refused([](SplatData& d) { d.positions[0] = INFINITY; }, "not finite");
-  refused([](SplatData& d) { d.harmonics.pop_back(); }, "harmonics");
-  refused([](SplatData& d) { d.harmonics[7] = INFINITY; }, "harmonics that are not finite");
-  refused([](SplatData& d) { d.degree = 4; }, "degree above 3");
+  refused([](GaussianSplatData& d) { d.scales.pop_back(); }, "scales");
+  refused([](GaussianSplatData& d) { d.scales[1] = 0; }, "a scale that is not");
+  refused([](GaussianSplatData& d) { d.scales[2] = std::nanf(""); }, "a scale that is not");
+  refused([](GaussianSplatData& d) { d.orientations.pop_back(); }, "orientations");
+  refused([](GaussianSplatData& d) { std::fill_n(d.orientations.begin(), 4, 0.f); },
+          "an orientation that");
+  refused([](GaussianSplatData& d) { d.opacities[3] = -0.1f; }, "an opacity that");
+  refused([](GaussianSplatData& d) { d.opacities[3] = 1.1f; }, "an opacity that");
+  refused([](GaussianSplatData& d) { d.positions.resize(12); }, "rows of splats");
+  refused([](GaussianSplatData& d) { d.positions[0] = INFINITY; }, "not finite");
+  refused([](GaussianSplatData& d) { d.harmonics.pop_back(); }, "harmonics");
+  refused([](GaussianSplatData& d) { d.harmonics[7] = INFINITY; }, "harmonics that are not finite");
+  refused([](GaussianSplatData& d) { d.degree = 4; }, "degree above 3");
 }
 
 TEST(GaussianSplats, AreCounted) {
   SceneBuilder b;
   const uint32_t material = b.add_material(make_material(ProgramId::kEmissive));
-  b.add_to_group(0, b.add_mesh(make_splats(random_splats(11, 1, 0.3f, 2, 3), material)));
+  b.add_to_group(
+      0, b.add_mesh(make_gaussian_splats(random_gaussian_splats(11, 1, 0.3f, 2, 3), material)));
   const auto scene = b.build();
   EXPECT_EQ(scene->splats(), 11u);
   EXPECT_EQ(scene->points(), 0u);

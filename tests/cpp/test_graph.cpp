@@ -103,7 +103,7 @@ std::vector<F> parameters(const MaterialView& view, const UInt<F>& material, con
   };
   auto p = OpenPbrParams<F>::template fetch<kAllInputs>(view, material, uv, width, point, active);
   std::vector<F> all;
-  for (const F* place : parameter_places(p)) all.push_back(*place);
+  for (const F* place : parameter_pointers(p)) all.push_back(*place);
   const Color<F> emission = fetch_emission<F>(view, material, uv, width, active);
   all.insert(all.end(), {emission.x, emission.y, emission.z,
                          fetch_opacity<F>(view, material, uv, width, active)});

@@ -117,7 +117,7 @@ TEST(GraphRanges, NoResultLeavesThem) {
       point.uv = {uniform(rng), uniform(rng)};
       point.footprint = k % 2 == 0 ? 0.f : std::abs(uniform(rng)) * 0.3f;
       run_graph<float>(view, view.programs[0], views.data(), point, true, registers);
-      const float value = sane_output<float>(
+      const float value = valid_output<float>(
           parameter, graph_output<float>(view, view.programs[0], view.outputs[0], registers));
       ASSERT_GE(value, range.low) << round;
       ASSERT_LE(value, range.high) << round;

@@ -20,7 +20,7 @@ using chi_square::Draw;
 using chi_square::Place;
 using chi_square::Random;
 
-const GuideGrid kUnitGrid({0.f, 0.f, 0.f}, {1.f, 1.f, 1.f});
+const GuidingGrid kUnitGrid({0.f, 0.f, 0.f}, {1.f, 1.f, 1.f});
 
 /// Makes a training bounce at (x, y, z) on a surface that faces `axis`, along w.
 TrainingRecord bounce(float x, float y, float z, uint8_t axis, const Vec3<float>& w,
@@ -34,7 +34,7 @@ std::vector<TrainingRecord> many_bounces(uint32_t count, uint32_t seed) {
   Random random(seed);
   std::vector<TrainingRecord> records;
   for (uint32_t i = 0; i < count; ++i) {
-    const auto axis = static_cast<uint8_t>(random.bits() % kGuideAxes);
+    const auto axis = static_cast<uint8_t>(random.bits() % kGuidingAxes);
     float w[3] = {random() - 0.5f, random() - 0.5f, random() - 0.5f};
     const float x = random();
     w[axis / 2] += (axis % 2 == 0 ? 1.f : -1.f) * (x < 0.5f ? 0.6f : 3.f);
@@ -76,30 +76,30 @@ TEST(Guide, SphereMovesDirections) {
   chi_square::Battery battery("sphere");
   for (int round = 0; round < 8; ++round) {
     const float far = round == 0 ? 0.f : 2 * random();
-    const Vec3<float> middle{random(), random(), random()},
-        p = middle + octahedral_direction<float>(random(), random()) * far;
-    const Vec3<float> offset = sphere_offset<float>(p, middle, 0.5f);
-    EXPECT_NEAR(length(offset), std::min(0.5f * far, kMostOffset), 1e-6);
+    const Vec3<float> centre{random(), random(), random()},
+        p = centre + octahedral_direction<float>(random(), random()) * far;
+    const Vec3<float> offset = sphere_offset<float>(p, centre, 0.5f);
+    EXPECT_NEAR(length(offset), std::min(0.5f * far, kMaxOffset), 1e-6);
     for (int i = 0; i < 2000; ++i) {
       const Vec3<float> w = octahedral_direction<float>(random(), random());
-      const FromMiddle<float> seen = seen_from_middle<float>(offset, w);
+      const CentreDirection<float> seen = direction_from_centre<float>(offset, w);
       ASSERT_NEAR(length(seen.w), 1, 1e-5);
       // The point on the sphere lies along w from the shading point.
       ASSERT_NEAR(length(cross(seen.w - offset, w)), 0, 1e-5);
       ASSERT_GT(dot(seen.w - offset, w), 0);
-      ASSERT_NEAR(length(seen_from_place<float>(offset, seen.w) - w), 0, 1e-5);
+      ASSERT_NEAR(length(direction_from_point<float>(offset, seen.w) - w), 0, 1e-5);
     }
     chi_square::Case c{"offset " + std::to_string(length(offset)),
                        bsdf_testing::direction_charts(),
                        [=](const Place& at) {
                          const auto w = bsdf_testing::direction_at(at);
-                         return double{seen_from_middle<float>(offset, w).factor} / (4 * kPiD);
+                         return double{direction_from_centre<float>(offset, w).factor} / (4 * kPiD);
                        },
                        {}};
     c.draw = [=](Random& source, bool) {
       const float u = source(), v = source();
       return Draw::at(bsdf_testing::place_of(
-          seen_from_place<float>(offset, octahedral_direction<float>(u, v))));
+          direction_from_point<float>(offset, octahedral_direction<float>(u, v))));
     };
     battery.run(c);
   }
@@ -117,28 +117,28 @@ TEST(Guide, SpheresKnowHowFarLightIs) {
   Random random(13);
   const Vec3<float> lamp{0.5f, 0.5f, 0.5f};
   std::vector<TrainingRecord> records;
-  const auto place = [&] { return Vec3<float>{0.25f + 0.5f * random(), 0.f, 0.5f}; };
+  const auto guiding = [&] { return Vec3<float>{0.25f + 0.5f * random(), 0.f, 0.5f}; };
   for (int i = 0; i < 2000; ++i) {
-    const Vec3<float> p = place(), d = lamp - p;
+    const Vec3<float> p = guiding(), d = lamp - p;
     records.push_back(bounce(p.x, p.y, p.z, 2, normalize(d)));
     // Half the distance: the light comes through a hole at the lamp's position.
-    records.back().nearness = 0.5f / length(d);
+    records.back().inverse_distance = 0.5f / length(d);
   }
-  const GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
+  const GuidingField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
   ASSERT_EQ(field.facts().regions, 1u);
-  const GuideSphere& sphere = field.parts().spheres[0];
-  EXPECT_NEAR(sphere.middle[0], 0.5f, 0.02f);
-  EXPECT_NEAR(1 / sphere.nearness, 0.5f, 0.2f);
-  for (TrainingRecord& r : records) r.nearness = 0;
-  const GuideField blind(kUnitGrid, records, 1, true, true, size_t{64} << 20);
-  EXPECT_EQ(blind.parts().spheres[0].nearness, 0);
+  const ParallaxSphere& sphere = field.parts().spheres[0];
+  EXPECT_NEAR(sphere.centre[0], 0.5f, 0.02f);
+  EXPECT_NEAR(1 / sphere.inverse_distance, 0.5f, 0.2f);
+  for (TrainingRecord& r : records) r.inverse_distance = 0;
+  const GuidingField blind(kUnitGrid, records, 1, true, true, size_t{64} << 20);
+  EXPECT_EQ(blind.parts().spheres[0].inverse_distance, 0);
   double known = 0, taken_for_far = 0;
   for (int i = 0; i < 200; ++i) {
-    const Vec3<float> p = place(), w = normalize(lamp - p);
-    const auto log_pdf = [&](const GuideField& f) {
-      const GuideView view = f.view();
-      const auto found = find_guide<float>(view, p, 2u, 0u, true);
-      return std::log(double{guide_pdf<float>(view, found, w, true)}) / 200;
+    const Vec3<float> p = guiding(), w = normalize(lamp - p);
+    const auto log_pdf = [&](const GuidingField& f) {
+      const GuidingView view = f.view();
+      const auto found = look_up_guiding<float>(view, p, 2u, 0u, true);
+      return std::log(double{guiding_pdf<float>(view, found, w, true)}) / 200;
     };
     known += log_pdf(field);
     taken_for_far += log_pdf(blind);
@@ -151,11 +151,11 @@ TEST(Guide, DirectionsAreBlurred) {
   Random random(14);
   for (int round = 0; round < 50; ++round) {
     DirectionBins bins{};
-    const auto seen = static_cast<uint32_t>(random() * kGuideBins);
+    const auto seen = static_cast<uint32_t>(random() * kGuidingBins);
     bins[seen] = 3;
     const DirectionBins blurred = smoothed(bins);
     double sum = 0;
-    for (uint32_t b = 0; b < kGuideBins; ++b) {
+    for (uint32_t b = 0; b < kGuidingBins; ++b) {
       sum += blurred[b];
       const float cosine = dot(bin_direction(b), bin_direction(seen));
       if (cosine > std::cos(0.15f)) {
@@ -173,26 +173,26 @@ TEST(Guide, DirectionsAreBlurred) {
 TEST(Guide, TablesHoldWhatTheyAreGiven) {
   Random random(5);
   for (int round = 0; round < 20; ++round) {
-    std::array<double, kGuideBins> weights{};
+    std::array<double, kGuidingBins> weights{};
     double sum = 0;
     for (double& w : weights) {
       w = round % 4 == 0 || random() < 0.3f ? 0 : std::pow(double{random()}, round);
       sum += w;
     }
-    std::array<uint32_t, kGuideWords> table;
-    write_guide_table(weights, table);
+    std::array<uint32_t, kGuidingWords> table;
+    write_guiding_table(weights, table);
     uint64_t all = 0;
-    for (uint32_t row = 0; row < kGuideSide; ++row) {
+    for (uint32_t row = 0; row < kGuidingSide; ++row) {
       uint32_t start = 0;
-      for (uint32_t column = 0; column < kGuideSide; ++column) {
-        const uint32_t word = table[kGuideSide + row * kGuideSide + column];
+      for (uint32_t column = 0; column < kGuidingSide; ++column) {
+        const uint32_t word = table[kGuidingSide + row * kGuidingSide + column];
         EXPECT_EQ(word & 0xffffu, start);
         EXPECT_GE(word >> 16, 1u);
         start += word >> 16;
         const double p = double(table[row] >> 16) * double(word >> 16) * 0x1p-32;
         all += uint64_t{table[row] >> 16} * (word >> 16);
         if (sum > 0) {
-          EXPECT_NEAR(p, weights[row * kGuideSide + column] / sum, 1e-3) << round;
+          EXPECT_NEAR(p, weights[row * kGuidingSide + column] / sum, 1e-3) << round;
         }
       }
       EXPECT_EQ(start, 1u << 16);
@@ -203,26 +203,26 @@ TEST(Guide, TablesHoldWhatTheyAreGiven) {
 
 TEST(Guide, SamplesFollowTheirDensity) {
   const auto records = many_bounces(60000, 1);
-  const GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
-  const GuideView view = field.view();
+  const GuidingField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
+  const GuidingView view = field.view();
   chi_square::Battery battery("guide");
   for (const float x : {0.2f, 0.9f})
-    for (uint32_t axis = 0; axis < kGuideAxes; ++axis) {
-      const auto place = find_guide<float>(view, {x, 0.3f, 0.6f}, axis, 0, true);
-      ASSERT_TRUE(place.guided);
+    for (uint32_t axis = 0; axis < kGuidingAxes; ++axis) {
+      const auto guiding = look_up_guiding<float>(view, {x, 0.3f, 0.6f}, axis, 0, true);
+      ASSERT_TRUE(guiding.guided);
       // Over the equal-area square, where the density is constant per bin.
       chi_square::Case c{"axis " + std::to_string(axis),
-                         {{0, 1, 0, 1, kGuideSide, kGuideSide}},
+                         {{0, 1, 0, 1, kGuidingSide, kGuidingSide}},
                          [=](const Place& p) {
                            const Vec3<float> w = octahedral_direction(static_cast<float>(p.x),
                                                                       static_cast<float>(p.y));
-                           return 4 * kPiD * double{guide_pdf<float>(view, place, w, true)};
+                           return 4 * kPiD * double{guiding_pdf<float>(view, guiding, w, true)};
                          },
                          {}};
       c.is_smooth = false;
       c.draw = [=](Random& random, bool) {
         const float u = random(), v = random();
-        const Vec2<float> at = octahedral_point(sample_guide<float>(view, place, u, v, true));
+        const Vec2<float> at = octahedral_point(sample_guiding<float>(view, guiding, u, v, true));
         return Draw::at({0, at.x, at.y});
       };
       battery.run(c);
@@ -233,13 +233,13 @@ TEST(Guide, SamplesFollowTheirDensity) {
 /// The field reproduces the distribution of light: cells on the right have narrower lobes.
 TEST(Guide, CellsKnowTheirOwnLight) {
   const auto records = many_bounces(200000, 2);
-  const GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
+  const GuidingField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
   EXPECT_EQ(field.facts().records, records.size());
   EXPECT_GT(field.facts().cells, 64u);
   EXPECT_GT(field.facts().guided_regions, 300u);
   const auto pdf = [&](float x, uint32_t axis, const Vec3<float>& w) {
-    const auto place = find_guide<float>(field.view(), {x, 0.4f, 0.7f}, axis, 0, true);
-    return guide_pdf<float>(field.view(), place, w, true);
+    const auto guiding = look_up_guiding<float>(field.view(), {x, 0.4f, 0.7f}, axis, 0, true);
+    return guiding_pdf<float>(field.view(), guiding, w, true);
   };
   const Vec3<float> right = normalize(Vec3<float>{1.f, 0.1f, 0.1f}), left = -right;
   EXPECT_GT(pdf(0.9f, 0, right), 2 * pdf(0.1f, 0, right));
@@ -253,39 +253,40 @@ TEST(Guide, FewBouncesLeanOnWhatIsAround) {
   std::erase_if(records, [](const TrainingRecord& r) {
     return r.p[0] < 0.25f && r.p[1] < 0.25f && r.p[2] < 0.25f;
   });
-  const GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
-  const auto place = find_guide<float>(field.view(), {0.1f, 0.1f, 0.1f}, 0, 0, true);
-  EXPECT_TRUE(place.guided);
+  const GuidingField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
+  const auto guiding = look_up_guiding<float>(field.view(), {0.1f, 0.1f, 0.1f}, 0, 0, true);
+  EXPECT_TRUE(guiding.guided);
   // Positions outside of the bounds, and NaN.
   for (const float x : {-5.f, 9.f, kNan, kInf})
-    find_guide<float>(field.view(), {x, x, x}, 3, 0, true);
-  const GuideField empty(kUnitGrid, {}, 1, true, true, size_t{64} << 20);
+    look_up_guiding<float>(field.view(), {x, x, x}, 3, 0, true);
+  const GuidingField empty(kUnitGrid, {}, 1, true, true, size_t{64} << 20);
   EXPECT_EQ(empty.view().grid, nullptr);
-  EXPECT_FALSE(find_guide<float>(empty.view(), {0.5f, 0.5f, 0.5f}, 0, 0, true).guided);
+  EXPECT_FALSE(look_up_guiding<float>(empty.view(), {0.5f, 0.5f, 0.5f}, 0, 0, true).guided);
 }
 
 /// The survival factor of a region by its formula, including bounces without contribution.
 TEST(Guide, BouncesAreWeighed) {
   std::vector<TrainingRecord> records;
   for (int i = 0; i < 1000; ++i) records.push_back(bounce(0.5f, 0.5f, 0.5f, 2, {0.f, 1.f, 0.f}, 4));
-  GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
-  const uint64_t at = bounce_place(kUnitGrid, {0.5f, 0.5f, 0.5f}, 2);
-  std::vector<BounceLesson> lessons(3000, {at, 0.f, 0.f, 2.f});
-  lessons.insert(lessons.end(), 1000, {at, 4.f, 16.f, 6.f});
+  GuidingField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
+  const uint64_t at = bounce_position_key(kUnitGrid, {0.5f, 0.5f, 0.5f}, 2);
+  std::vector<BounceSample> training_samples(3000, {at, 0.f, 0.f, 2.f});
+  training_samples.insert(training_samples.end(), 1000, {at, 4.f, 16.f, 6.f});
   // No training samples of surfaces that face another axis.
-  lessons.insert(lessons.end(), 10, {bounce_place(kUnitGrid, {0.1f, 0.1f, 0.9f}, 3), 9.f, 81.f, 1});
-  field.weigh_bounces(lessons, {27, 0.5});
+  training_samples.insert(training_samples.end(), 10,
+                          {bounce_position_key(kUnitGrid, {0.1f, 0.1f, 0.9f}, 3), 9.f, 81.f, 1});
+  field.compute_survival(training_samples, {27, 0.5});
   // X = 16 / 4, c = 12 / 4.
-  const auto place = find_guide<float>(field.view(), {0.5f, 0.5f, 0.5f}, 2, 0, true);
-  EXPECT_NEAR(place.survival, std::sqrt(4. / 3 * 27 / 0.5), 1e-4);
-  EXPECT_EQ(worthwhile_survival<float>(place, 0.f), kLeastSurvival);
-  EXPECT_FLOAT_EQ(worthwhile_survival<float>(place, 0.05f), 0.05f * place.survival);
-  EXPECT_EQ(worthwhile_survival<float>(place, 9.f), 1.f);
+  const auto guiding = look_up_guiding<float>(field.view(), {0.5f, 0.5f, 0.5f}, 2, 0, true);
+  EXPECT_NEAR(guiding.survival, std::sqrt(4. / 3 * 27 / 0.5), 1e-4);
+  EXPECT_EQ(efficient_survival<float>(guiding, 0.f), kMinSurvival);
+  EXPECT_FLOAT_EQ(efficient_survival<float>(guiding, 0.05f), 0.05f * guiding.survival);
+  EXPECT_EQ(efficient_survival<float>(guiding, 9.f), 1.f);
 }
 
 TEST(Guide, MemoryIsBounded) {
   const auto records = many_bounces(100000, 4);
-  const GuideField large(kUnitGrid, records, 1, true, true, size_t{64} << 20),
+  const GuidingField large(kUnitGrid, records, 1, true, true, size_t{64} << 20),
       small(kUnitGrid, records, 1, true, true, 200 << 10);
   EXPECT_LE(small.bytes(), size_t{200} << 10);
   EXPECT_GT(large.bytes(), 2 * small.bytes());
@@ -294,32 +295,32 @@ TEST(Guide, MemoryIsBounded) {
 
 /// The chosen fraction has the smallest second moment.
 TEST(Guide, SharesFollowMoments) {
-  ShareMoments bad, good, none;
+  ShareMoments bad, valid, none;
   Random random(8);
   for (int i = 0; i < 4000; ++i) {
     TrainingRecord r{};
     r.pdf = r.bsdf_pdf = 0.3f;
-    r.guide_pdf = 3.f * random() + 2.f;
-    good.add(share_ratios(r), 1);  // where the light is, the field samples ten times as often
-    r.guide_pdf = 0.01f;
+    r.guiding_pdf = 3.f * random() + 2.f;
+    valid.add(share_ratios(r), 1);  // where the light is, the field samples ten times as often
+    r.guiding_pdf = 0.01f;
     bad.add(share_ratios(r), 1);
-    r.guide_pdf = 0;
+    r.guiding_pdf = 0;
     none.add(share_ratios(r), 1);
   }
-  EXPECT_EQ(kBsdfShares[good.best()], kBsdfShares[0]);
+  EXPECT_EQ(kBsdfShares[valid.best()], kBsdfShares[0]);
   EXPECT_EQ(kBsdfShares[bad.best()], 1.f);
   EXPECT_EQ(none.count, 0);
   EXPECT_EQ(kBsdfShares[none.best()], 1.f);
   // Where the field does not help, nothing is guided.
   std::vector<TrainingRecord> records = many_bounces(50000, 9);
-  for (TrainingRecord& r : records) r.guide_pdf = 1e-3f;
-  const GuideField field(kUnitGrid, records, 1, false, true, size_t{64} << 20);
+  for (TrainingRecord& r : records) r.guiding_pdf = 1e-3f;
+  const GuidingField field(kUnitGrid, records, 1, false, true, size_t{64} << 20);
   EXPECT_EQ(field.facts().guided_regions, 0u);
   EXPECT_EQ(field.facts().moment_ratio, 1);
-  for (TrainingRecord& r : records) r.guide_pdf = 10.f;
-  const GuideField better(kUnitGrid, records, 1, false, true, size_t{64} << 20);
+  for (TrainingRecord& r : records) r.guiding_pdf = 10.f;
+  const GuidingField better(kUnitGrid, records, 1, false, true, size_t{64} << 20);
   // With `guides` false, the field only stores the survival factors.
-  const GuideField told(kUnitGrid, records, 1, false, false, size_t{64} << 20);
+  const GuidingField told(kUnitGrid, records, 1, false, false, size_t{64} << 20);
   EXPECT_EQ(told.facts().guided_regions, 0u);
   EXPECT_EQ(told.facts().regions, better.facts().regions);
   EXPECT_EQ(better.facts().guided_regions, better.facts().regions);
@@ -332,58 +333,58 @@ TEST(Guide, SharesFollowMoments) {
 TEST(Guide, IsMadeOfItsPartsAgain) {
   const auto records = many_bounces(80000, 11);
   // The grid is so large that all samples fall into few top-level entries, which are divided.
-  const GuideGrid wide({0.f, 0.f, 0.f}, {20.f, 20.f, 20.f});
-  const GuideField field(wide, records, 3, true, true, size_t{64} << 20);
-  const GuideParts& parts = field.parts();
-  const GuideField again(wide, parts, field.facts(), 3);
+  const GuidingGrid wide({0.f, 0.f, 0.f}, {20.f, 20.f, 20.f});
+  const GuidingField field(wide, records, 3, true, true, size_t{64} << 20);
+  const GuidingFieldArrays& parts = field.parts();
+  const GuidingField again(wide, parts, field.facts(), 3);
   EXPECT_EQ(again.bytes(), field.bytes());
-  ASSERT_GT(parts.entries.size(), kGuideTopCells);
+  ASSERT_GT(parts.entries.size(), kGuidingTopCells);
   const Vec3<float> p{0.7f, 0.2f, 0.4f}, w = normalize(Vec3<float>{0.3f, 0.9f, 0.1f});
-  const auto density = [&](const GuideField& f) {
-    const GuideView view = f.view();
-    return guide_pdf<float>(view, find_guide<float>(view, p, 2u, 0u, true), w, true);
+  const auto density = [&](const GuidingField& f) {
+    const GuidingView view = f.view();
+    return guiding_pdf<float>(view, look_up_guiding<float>(view, p, 2u, 0u, true), w, true);
   };
   EXPECT_EQ(density(again), density(field));
   const auto expect_refused = [&](const char* what, const auto& damage, size_t materials = 3) {
-    GuideParts bad = parts;
+    GuidingFieldArrays bad = parts;
     damage(bad);
-    EXPECT_THROW(GuideField(wide, bad, {}, materials), Error) << what;
+    EXPECT_THROW(GuidingField(wide, bad, {}, materials), Error) << what;
   };
   const auto entry = [&](uint32_t value) {
-    return [=](GuideParts& bad) { bad.entries[kGuideTopCells] = value; };
+    return [=](GuidingFieldArrays& bad) { bad.entries[kGuidingTopCells] = value; };
   };
-  expect_refused("materials", [](GuideParts&) {}, 4);
-  expect_refused("a cell", entry(kGuideCell | static_cast<uint32_t>(parts.cells.size())));
+  expect_refused("materials", [](GuidingFieldArrays&) {}, 4);
+  expect_refused("a cell", entry(kGuidingCell | static_cast<uint32_t>(parts.cells.size())));
   expect_refused("a brick beyond", entry(static_cast<uint32_t>(parts.entries.size())));
-  expect_refused("a brick of its own", entry(kGuideTopCells));
-  expect_refused("no brick", entry(kGuideTopCells + 1));
-  expect_refused("cut", [](GuideParts& bad) { bad.entries.pop_back(); });
-  expect_refused("none", [](GuideParts& bad) { bad = {}; });
-  expect_refused("a region", [](GuideParts& bad) { bad.cells[0] = 1u << 30; });
-  expect_refused("a table", [](GuideParts& bad) { bad.tables.resize(kGuideWords); });
-  expect_refused("numbers", [](GuideParts& bad) { bad.tables[5] ^= 1u; });
-  expect_refused("a share", [](GuideParts& bad) { bad.bsdf_share[0] = 0; });
-  expect_refused("no number", [](GuideParts& bad) { bad.material_share[0] = NAN; });
-  expect_refused("spheres", [](GuideParts& bad) { bad.spheres.pop_back(); });
-  expect_refused("a place", [](GuideParts& bad) { bad.spheres[0].middle[1] = NAN; });
-  expect_refused("a radius", [](GuideParts& bad) { bad.spheres[0].nearness = -1; });
-  expect_refused("survival", [](GuideParts& bad) { bad.survival.pop_back(); });
+  expect_refused("a brick of its own", entry(kGuidingTopCells));
+  expect_refused("no brick", entry(kGuidingTopCells + 1));
+  expect_refused("cut", [](GuidingFieldArrays& bad) { bad.entries.pop_back(); });
+  expect_refused("none", [](GuidingFieldArrays& bad) { bad = {}; });
+  expect_refused("a region", [](GuidingFieldArrays& bad) { bad.cells[0] = 1u << 30; });
+  expect_refused("a table", [](GuidingFieldArrays& bad) { bad.tables.resize(kGuidingWords); });
+  expect_refused("numbers", [](GuidingFieldArrays& bad) { bad.tables[5] ^= 1u; });
+  expect_refused("a share", [](GuidingFieldArrays& bad) { bad.bsdf_share[0] = 0; });
+  expect_refused("no number", [](GuidingFieldArrays& bad) { bad.material_share[0] = NAN; });
+  expect_refused("spheres", [](GuidingFieldArrays& bad) { bad.spheres.pop_back(); });
+  expect_refused("a place", [](GuidingFieldArrays& bad) { bad.spheres[0].centre[1] = NAN; });
+  expect_refused("a radius", [](GuidingFieldArrays& bad) { bad.spheres[0].inverse_distance = -1; });
+  expect_refused("survival", [](GuidingFieldArrays& bad) { bad.survival.pop_back(); });
 }
 
 TEST(Guide, FacesTheirLargestComponent) {
-  EXPECT_EQ(guide_axis<float>({0.9f, 0.1f, -0.2f}), 0u);
-  EXPECT_EQ(guide_axis<float>({-0.9f, 0.1f, -0.2f}), 1u);
-  EXPECT_EQ(guide_axis<float>({0.1f, 0.8f, -0.2f}), 2u);
-  EXPECT_EQ(guide_axis<float>({0.1f, -0.8f, -0.2f}), 3u);
-  EXPECT_EQ(guide_axis<float>({0.1f, 0.2f, 0.3f}), 4u);
-  EXPECT_EQ(guide_axis<float>({0.1f, 0.2f, -0.3f}), 5u);
+  EXPECT_EQ(guiding_axis<float>({0.9f, 0.1f, -0.2f}), 0u);
+  EXPECT_EQ(guiding_axis<float>({-0.9f, 0.1f, -0.2f}), 1u);
+  EXPECT_EQ(guiding_axis<float>({0.1f, 0.8f, -0.2f}), 2u);
+  EXPECT_EQ(guiding_axis<float>({0.1f, -0.8f, -0.2f}), 3u);
+  EXPECT_EQ(guiding_axis<float>({0.1f, 0.2f, 0.3f}), 4u);
+  EXPECT_EQ(guiding_axis<float>({0.1f, 0.2f, -0.3f}), 5u);
 }
 
 TEST(Guide, Lanes) {
   auto records = many_bounces(60000, 6);
-  for (TrainingRecord& r : records) r.nearness = 3.f * r.value;
-  const GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
-  const GuideView view = field.view();
+  for (TrainingRecord& r : records) r.inverse_distance = 3.f * r.value;
+  const GuidingField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
+  const GuidingView view = field.view();
   const auto u = padded({0.f, 0.5f, kOneMinusEpsilon, 0x1p-24f}, 2000, 0.f, kOneMinusEpsilon, 1);
   const auto v = padded({0.5f, 0.f, kOneMinusEpsilon, 0.25f}, 2000, 0.f, kOneMinusEpsilon, 2);
   const auto each = [&](auto component, const char* what) {
@@ -392,21 +393,21 @@ TEST(Guide, Lanes) {
         [&]<typename F>(const F& a, const F& b) {
           const Vec3<F> p{a, b, F(a * b)};
           const Vec3<F> w = octahedral_direction<F>(b, a);
-          const GuidePlace<F> place =
-              find_guide<F>(view, p, guide_axis<F>(w), UInt<F>(0u), Mask<F>(true));
-          return component.template operator()<F>(place, w, a, b);
+          const GuidingLookup<F> guiding =
+              look_up_guiding<F>(view, p, guiding_axis<F>(w), UInt<F>(0u), Mask<F>(true));
+          return component.template operator()<F>(guiding, w, a, b);
         },
         what);
   };
-  each([&]<typename F>(const GuidePlace<F>& place, const Vec3<F>&, const F&,
-                       const F&) { return F(Int<F>(place.region)); },
+  each([&]<typename F>(const GuidingLookup<F>& guiding, const Vec3<F>&, const F&,
+                       const F&) { return F(Int<F>(guiding.region)); },
        "region");
-  each([&]<typename F>(const GuidePlace<F>& place, const Vec3<F>& w, const F&,
-                       const F&) { return guide_pdf<F>(view, place, w, place.guided); },
+  each([&]<typename F>(const GuidingLookup<F>& guiding, const Vec3<F>& w, const F&,
+                       const F&) { return guiding_pdf<F>(view, guiding, w, guiding.guided); },
        "pdf");
   each(
-      [&]<typename F>(const GuidePlace<F>& place, const Vec3<F>&, const F& a, const F& b) {
-        const Vec3<F> w = sample_guide<F>(view, place, a, b, place.guided);
+      [&]<typename F>(const GuidingLookup<F>& guiding, const Vec3<F>&, const F& a, const F& b) {
+        const Vec3<F> w = sample_guiding<F>(view, guiding, a, b, guiding.guided);
         return F(w.x + 2.f * w.y + 4.f * w.z);
       },
       "sample");

@@ -36,7 +36,7 @@ TEST(LightBuilder, RectInItsOwnSpace) {
   expect_vec(r.n, 0, 0, -1);
   EXPECT_FLOAT_EQ(r.area, 8);
   expect_vec(r.radiance, 2, 3, 4);
-  EXPECT_FLOAT_EQ(r.pick_pdf, 1);
+  EXPECT_FLOAT_EQ(r.selection_pdf, 1);
 }
 
 TEST(LightBuilder, FlatLightsShineToTheImageOfMinusZ) {
@@ -137,7 +137,7 @@ TEST(LightBuilder, InfiniteLightsFirstThenTrianglesLast) {
   }
   expect_vec(lights.set.triangles[0].m, 0, 0, 1);
   double sum = 0;
-  for (size_t i = 0; i < lights.set.size(); ++i) sum += double{lights.set.pick_pdf(i)};
+  for (size_t i = 0; i < lights.set.size(); ++i) sum += double{lights.set.selection_pdf(i)};
   EXPECT_EQ(sum, 1);  // multiples of 2^-24
 }
 
@@ -147,14 +147,14 @@ TEST(LightBuilder, ProbabilitiesFollowPower) {
   black.color = {0, 0, 0};
   bright.width = 3;
   const Lights lights({black, dim, bright, make_light(LightKind::kRect)});
-  EXPECT_EQ(lights.set.records[0].pick_pdf, 0);
-  EXPECT_GT(lights.set.records[1].pick_pdf, 1e-3f);  // minimum probability
-  EXPECT_NEAR(lights.set.records[2].pick_pdf, 0.75, 0.01);
-  EXPECT_NEAR(lights.set.records[3].pick_pdf, 0.25, 0.01);
+  EXPECT_EQ(lights.set.records[0].selection_pdf, 0);
+  EXPECT_GT(lights.set.records[1].selection_pdf, 1e-3f);  // minimum probability
+  EXPECT_NEAR(lights.set.records[2].selection_pdf, 0.75, 0.01);
+  EXPECT_NEAR(lights.set.records[3].selection_pdf, 0.25, 0.01);
 }
 
 TEST(LightBuilder, PickPdfIsExact) {
-  // Counts every possible value of u_pick, with no other light, a weak one and a strong one.
+  // Counts every possible value of u_light, with no other light, a weak one and a strong one.
   for (const auto& [n, records, color] : {std::tuple{1u, 0u, 1.f},
                                           {2u, 0u, 1.f},
                                           {3u, 1u, 1e-9f},
@@ -179,14 +179,14 @@ TEST(LightBuilder, PickPdfIsExact) {
     for (uint32_t k = 0; k < 1u << 24; k += 16) {
       const F u = F(Int<F>(UInt<F>(k) + lane_index<F>())) * 0x1p-24f;
       uint32_t out[16];
-      store(out, detail::pick_light<F>(view, u, Mask<F>(true)));
+      store(out, detail::light_by_power<F>(view, u, Mask<F>(true)));
       for (const uint32_t i : out) {
         ASSERT_LT(i, view.count);
         ++hits[i];
       }
     }
     for (uint32_t i = 0; i < view.count; ++i) {
-      ASSERT_EQ(static_cast<float>(hits[i]) * 0x1p-24f, lights.set.pick_pdf(i))
+      ASSERT_EQ(static_cast<float>(hits[i]) * 0x1p-24f, lights.set.selection_pdf(i))
           << i << " of " << n << " triangles and " << records;
       const bool lit = i < records ? others[i].color.x > 0 : triangles[i - records].mean_scale > 0;
       ASSERT_EQ(hits[i] > 0, lit);
@@ -195,14 +195,14 @@ TEST(LightBuilder, PickPdfIsExact) {
 }
 
 TEST(LightBuilder, PickTableOfMillions) {
-  for (const size_t n : {size_t{1500000}, size_t{kMaxPicked}}) {
+  for (const size_t n : {size_t{1500000}, size_t{kMaxPowerLights}}) {
     std::vector<double> weights(n, 1);
     weights[7] = 1e12;
     weights[8] = 0;
     weights[9] = 1e-300;
     for (const size_t first_triangle : {size_t{0}, size_t{8}, n}) {
       std::vector<uint32_t> bins, numbers;
-      build_pick_table(weights, first_triangle, bins, numbers);
+      build_power_table(weights, first_triangle, bins, numbers);
       EXPECT_EQ(numbers[8], 0u);
       EXPECT_GT(numbers[9], 0u);
       if (n < 1u << 21) {
@@ -222,7 +222,7 @@ TEST(LightBuilder, FewStrongLightsHaveASmallTable) {
   std::vector<double> weights(1000001, 1);
   weights[0] = 1e6;
   std::vector<uint32_t> bins, numbers;
-  const PickTable table = build_pick_table(weights, 1, bins, numbers);
+  const PowerTable table = build_power_table(weights, 1, bins, numbers);
   // Half of the power; 1 % of it is distributed equally among lights. Tolerance: one unit of the
   // bins.
   EXPECT_NEAR(numbers[0], 0.99 * 0x1p24 / 2, 1 << 14);
@@ -403,7 +403,7 @@ TEST(DomeDistribution, MeanAndBlack) {
   Light light = make_light(LightKind::kDome);
   light.texture = black;
   lights.build({light});
-  EXPECT_EQ(lights.set.records[0].pick_pdf, 0);
+  EXPECT_EQ(lights.set.records[0].selection_pdf, 0);
   EXPECT_EQ(lights.set.records[0].texture, kNoTexture);
   EXPECT_EQ(lights.set.records[0].radiance[0], 0);
 }
@@ -421,12 +421,12 @@ TEST(LightBuilder, DegenerateLightsHaveNoProbability) {
   const Lights set(lights, {make_triangle({0, 0, 0}, {0, 0, 0}, {0, 0, 0}),
                             make_triangle({0, 0, 0}, {1, 1, 1}, {2, 2, 2})});
   for (const LightRecord& r : set.set.records) {
-    for (const float x : {r.radiance[0], r.area, r.radius, r.pick_pdf, r.n[0], r.n[1], r.n[2]})
+    for (const float x : {r.radiance[0], r.area, r.radius, r.selection_pdf, r.n[0], r.n[1], r.n[2]})
       EXPECT_TRUE(std::isfinite(x));
   }
   for (const TriangleLight& t : set.set.triangles) {
     for (const float x : {t.radiance[0], t.m[0], t.m[1], t.m[2]}) EXPECT_TRUE(std::isfinite(x));
-    EXPECT_EQ(t.pick_pdf, 0);
+    EXPECT_EQ(t.selection_pdf, 0);
   }
 }
 

@@ -126,9 +126,9 @@ TEST(LightCalibration, APartIsThatOfTheWholePicture) {
   WavefrontRenderer renderer(stage().build(), 1);
   Settings s = small();
   s.spp = 4;
-  const Picture whole = renderer.render(s);
+  const RenderedImage whole = renderer.render(s);
   s.region = Region{8, 6, 20, 15};
-  const Picture part = renderer.render(s);
+  const RenderedImage part = renderer.render(s);
   for (uint32_t y = 6; y < 15; ++y)
     for (uint32_t i = 3 * (y * s.width + 8); i < 3 * (y * s.width + 20); ++i)
       ASSERT_EQ(part.beauty[i], whole.beauty[i]);
@@ -189,8 +189,8 @@ TEST(LightCalibration, StandsWhatStagesBring) {
       Settings settings = s;
       settings.light_selection = selection;
       WavefrontRenderer renderer(scene, 1);
-      const Picture picture = renderer.render(settings);
-      for (const float value : picture.beauty) ASSERT_TRUE(std::isfinite(value)) << what;
+      const RenderedImage image = renderer.render(settings);
+      for (const float value : image.beauty) ASSERT_TRUE(std::isfinite(value)) << what;
       const LightShares shares = renderer.statistics().light_calibration;
       EXPECT_GT(shares.paths, 0u) << what;
       EXPECT_NEAR(sum_of(shares), 1, 1e-5) << what;
@@ -219,7 +219,7 @@ TEST(LightCalibration, StandsWhatStagesBring) {
   Settings s = small();
   s.light_selection = LightSelection::kPower;
   const LightShares shares = shares_of(crowd, s);
-  EXPECT_EQ(shares.parts.size(), LightParts::kMost);
+  EXPECT_EQ(shares.parts.size(), LightParts::kMax);
   EXPECT_NE(shares.parts.back().name.find("others"), std::string::npos);
 }
 
@@ -235,23 +235,24 @@ TEST(LightParts, AreAllLightsThatShine) {
   for (uint32_t i = 0; i < set.size(); ++i) {
     const uint32_t part = parts.of(i);
     if (part == kNoPart)
-      EXPECT_EQ(set.pick_pdf(i), 0.f);
+      EXPECT_EQ(set.selection_pdf(i), 0.f);
     else
-      sums[part] += static_cast<double>(set.pick_pdf(i));
+      sums[part] += static_cast<double>(set.selection_pdf(i));
   }
   for (size_t i = 0; i < parts.size(); ++i) EXPECT_NEAR(sums[i], parts.power[i], 1e-6);
   EXPECT_EQ(parts.of(kNoLight), kNoPart);
 
   const std::vector<double> wanted{0.1, 0.2, 0.3, 0.05, 0.35};
-  const WeighedLights weighed = LightWeigher(set, set.tree, parts).weigh(wanted, {});
+  const CalibratedLights tables = LightTableBuilder(set, set.tree, parts).build_tables(wanted, {});
   double sum = 0;
   for (size_t i = 0; i < parts.size(); ++i) {
-    EXPECT_NEAR(weighed.shares[i], wanted[i], 0.01) << parts.names[i];
-    sum += weighed.shares[i];
+    EXPECT_NEAR(tables.shares[i], wanted[i], 0.01) << parts.names[i];
+    sum += tables.shares[i];
   }
   EXPECT_NEAR(sum, 1, 1e-12) << "in integers";
-  ASSERT_EQ(weighed.pick_pdf.size(), set.size());
-  for (uint32_t i = 0; i < set.size(); ++i) EXPECT_EQ(weighed.pick_pdf[i] > 0, set.pick_pdf(i) > 0);
+  ASSERT_EQ(tables.selection_pdf.size(), set.size());
+  for (uint32_t i = 0; i < set.size(); ++i)
+    EXPECT_EQ(tables.selection_pdf[i] > 0, set.selection_pdf(i) > 0);
 }
 
 TEST(LightParts, TheTreeIsOne) {
@@ -264,13 +265,13 @@ TEST(LightParts, TheTreeIsOne) {
   EXPECT_EQ(parts.of(0), 0u);
   for (uint32_t i = 1; i < set.size(); ++i) EXPECT_EQ(parts.of(i), 1u);
   const NodeTilt tilt{0, 4};
-  const WeighedLights weighed = LightWeigher(set, scene->light_tree(1), parts)
-                                    .weigh(std::vector<double>{0.25, 0.75}, {&tilt, 1});
+  const CalibratedLights tables = LightTableBuilder(set, scene->light_tree(1), parts)
+                                      .build_tables(std::vector<double>{0.25, 0.75}, {&tilt, 1});
   LightView view = scene->view().lights;
   view.tree = scene->light_tree(1).view();
   const LightTreeNode before = view.tree.nodes[0];
-  weighed.apply(view);
-  EXPECT_NEAR(weighed.shares[1], 0.75, 1e-6);
+  tables.apply(view);
+  EXPECT_NEAR(tables.shares[1], 0.75, 1e-6);
   EXPECT_EQ(view.tree.infinite_ends[0], 1u << 24);
   EXPECT_EQ(view.tree.infinite_pdf[0],
             static_cast<float>((1u << 24) - view.tree.numbers) * 0x1p-24f);

@@ -19,10 +19,10 @@ using namespace light_testing;
 using chi_square::Battery;
 
 float stated(const LightView& view, uint32_t light, const LightReceiver<float>& to) {
-  if (view.by_tree) return pick_pdf(view, light, to);
-  if (view.pick_pdf) return view.pick_pdf[light];
-  return light < view.first_triangle ? view.lights[light].pick_pdf
-                                     : view.triangles[light - view.first_triangle].pick_pdf;
+  if (view.by_tree) return selection_pdf(view, light, to);
+  if (view.selection_pdf) return view.selection_pdf[light];
+  return light < view.first_triangle ? view.lights[light].selection_pdf
+                                     : view.triangles[light - view.first_triangle].selection_pdf;
 }
 
 /// Counts selections for receiver `to`. The last cell counts no selection; lights that cannot be
@@ -40,7 +40,7 @@ void count(Battery& battery, const std::string& name, const LightView& view,
   for (size_t i = 0; i < samples; ++i) {
     const float u = random();
     to.seed = random.bits();
-    uint32_t light = chosen_light<float>(view, to, u, true);
+    uint32_t light = select_light_index<float>(view, to, u, true);
     if (light == kNoLight) light = view.count;
     observed[light] += 1;
   }
@@ -58,7 +58,7 @@ LightParts parts_of(const LightSet& set, bool by_tree) {
   parts.of_record.assign(set.record_count, kNoPart);
   double sum = 0;
   for (uint32_t i = 0; i < (by_tree ? set.infinite_count : set.record_count); ++i) {
-    const double pdf = double{by_tree ? set.tree.infinite_pdf[i] : set.records[i].pick_pdf};
+    const double pdf = double{by_tree ? set.tree.infinite_pdf[i] : set.records[i].selection_pdf};
     if (!(pdf > 0)) continue;
     parts.of_record[i] = static_cast<uint32_t>(parts.size());
     parts.power.push_back(pdf);
@@ -85,13 +85,13 @@ TEST(LightChoice, IsAsOftenAsStated) {
     const LightView power = lights.view(), tree = by_tree(lights);
     const LightParts table_parts = parts_of(lights.set, false),
                      tree_parts = parts_of(lights.set, true);
-    const WeighedLights table = LightWeigher(lights.set, lights.set.tree, table_parts)
-                                    .weigh(odd_shares(table_parts.size()), {});
+    const CalibratedLights table = LightTableBuilder(lights.set, lights.set.tree, table_parts)
+                                       .build_tables(odd_shares(table_parts.size()), {});
     std::vector<NodeTilt> tilts;
     for (uint32_t i = 0; i < std::min<size_t>(lights.set.tree.nodes.size(), 40); i += 3)
       tilts.push_back({i, i % 2 ? 6.f : 0.2f});
-    const WeighedLights tilted = LightWeigher(lights.set, lights.set.tree, tree_parts)
-                                     .weigh(odd_shares(tree_parts.size()), tilts);
+    const CalibratedLights tilted = LightTableBuilder(lights.set, lights.set.tree, tree_parts)
+                                        .build_tables(odd_shares(tree_parts.size()), tilts);
     LightView calibrated = power, calibrated_tree = tree;
     table.apply(calibrated);
     tilted.apply(calibrated_tree);
@@ -119,7 +119,7 @@ TEST(LightChoice, GivesTheProbabilityThatItWasMadeWith) {
     to.seed = static_cast<uint32_t>(number.rng());
     const LightChoice<float> c = detail::choose_by_tree<float>(view, to, number(), true);
     if (c.light != kNoLight) {
-      ASSERT_EQ(c.pdf, pick_pdf(view, c.light, to));
+      ASSERT_EQ(c.pdf, selection_pdf(view, c.light, to));
     }
   }
 }

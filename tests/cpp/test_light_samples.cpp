@@ -166,7 +166,7 @@ TEST(LightSamples, OfTrianglesFollowTheirDensity) {
   Light lamp = make_light(LightKind::kTriangle);
   lamp.shaping.focus = 2;
   lamp.shaping.focus_tint = {0.2f, 0.1f, 0.3f};
-  const PlacedMeshLight placed{&lamp, rotate(30, 0), 2, true};
+  const MeshLightInstance placed{&lamp, rotate(30, 0), 2, true};
   std::vector<EmissiveTriangle> mesh = {wide, other};
   for (EmissiveTriangle& t : mesh) t.mesh_light = 0;
   Lights lit;

@@ -116,14 +116,14 @@ TEST(LightTable, EveryRowIsCheckedAndKept) {
   for (const LightKind kind : {LightKind::kRect, LightKind::kTriangle}) {
     const uint64_t plain = hash_of(a_light(kind));
     for (const LightParameter& p : light_table()) {
-      if (p.is_own && !p.is_of(kind)) continue;
+      if (p.is_specific && !p.is_of(kind)) continue;
       Light light = a_light(kind);
       p.write(light, another(p));
       EXPECT_NE(hash_of(light), plain) << p.name;
     }
   }
   for (const LightParameter& p : light_table()) {
-    if (p.is_own && !p.is_of(LightKind::kRect)) continue;
+    if (p.is_specific && !p.is_of(LightKind::kRect)) continue;
     const auto message = [&](const LightValue& value, const LightReferences& there = kThere) {
       return said([&](Light& light) { p.write(light, value); }, there);
     };

@@ -26,7 +26,7 @@ TEST(LightTree, ProbabilitiesAddUpToOne) {
       for (int k = 0; k < 200; ++k) {
         const LightReceiver<float> to = random_receiver(number);
         double sum = 0;
-        for (uint32_t i = 0; i < view.count; ++i) sum += double{pick_pdf(view, i, to)};
+        for (uint32_t i = 0; i < view.count; ++i) sum += double{selection_pdf(view, i, to)};
         // Bounds shrink on the way down, so some sample values end at nodes where no light
         // contributes; then none is selected.
         double none = 0;
@@ -52,7 +52,7 @@ TEST(LightTree, ProbabilitiesAddUpToOne) {
   for (int k = 0; k < 100; ++k) {
     double sum = 0;
     const LightReceiver<float> to(number.point(20));
-    for (uint32_t i = 0; i < 500; ++i) sum += double{pick_pdf(by_tree(all), i, to)};
+    for (uint32_t i = 0; i < 500; ++i) sum += double{selection_pdf(by_tree(all), i, to)};
     ASSERT_NEAR(sum, 1, 1e-5);
   }
 }
@@ -78,9 +78,10 @@ TEST(LightTree, WhatShinesCanBeChosen) {
     const float u = again(), a = again(), b = again();
     const auto s = sample_light<float>(power, p, u, a, b, true);
     if (!s.valid || !(dot(s.wi, n) > 0)) continue;
-    const uint32_t light = detail::pick_light<float>(power, u, true);
-    ASSERT_GT(pick_pdf(view, light, LightReceiver<float>(p)), 0.f) << light;
-    ASSERT_GT(pick_pdf(view, light, LightReceiver<float>(p, pack_normal<float>(n))), 0.f) << light;
+    const uint32_t light = detail::light_by_power<float>(power, u, true);
+    ASSERT_GT(selection_pdf(view, light, LightReceiver<float>(p)), 0.f) << light;
+    ASSERT_GT(selection_pdf(view, light, LightReceiver<float>(p, pack_normal<float>(n))), 0.f)
+        << light;
   }
 }
 
@@ -96,7 +97,7 @@ TEST(LightTree, BothHalvesOfMisAgree) {
     to.seed = static_cast<uint32_t>(number.rng());
     const float u = number();
     const auto s = sample_light<float>(view, to, u, number(), number(), true);
-    const uint32_t light = chosen_light<float>(view, to, u, true);
+    const uint32_t light = select_light_index<float>(view, to, u, true);
     if (!s.valid || s.is_delta || light < view.infinite_count) continue;
     ++finite;
     const float pdf = light < view.first_triangle
@@ -209,7 +210,7 @@ TEST(LightTree, LightsAtOnePlaceAndBlackOnes) {
   EXPECT_FLOAT_EQ(view.tree.effective_lights, 3000);
   double sum = 0;
   for (uint32_t i = 0; i < view.count; ++i)
-    sum += double{pick_pdf(view, i, LightReceiver<float>(Vec3<float>{0, 0, 0}))};
+    sum += double{selection_pdf(view, i, LightReceiver<float>(Vec3<float>{0, 0, 0}))};
   EXPECT_NEAR(sum, 1, 1e-5);
 
   Light black = make_light(LightKind::kRect);
@@ -221,7 +222,7 @@ TEST(LightTree, LightsAtOnePlaceAndBlackOnes) {
   EXPECT_TRUE(chooses_by_tree(LightSelection::kTree, one.view()));
   EXPECT_FALSE(chooses_by_tree(LightSelection::kAuto, one.view()));
   EXPECT_FALSE(chooses_by_tree(LightSelection::kPower, view));
-  EXPECT_EQ(pick_pdf(by_tree(one), 1, LightReceiver<float>(Vec3<float>{0, 0, -3})), 1.f);
+  EXPECT_EQ(selection_pdf(by_tree(one), 1, LightReceiver<float>(Vec3<float>{0, 0, -3})), 1.f);
 }
 
 /// A weak light nearby is preferred to a strong one far away.
@@ -232,8 +233,8 @@ TEST(LightTree, NearLightsAreChosenMostly) {
   far.color = near.color * 100.f;
   const Lights lights({near, far});
   const LightView view = by_tree(lights);
-  EXPECT_GT(pick_pdf(view, 0, LightReceiver<float>(Vec3<float>{0, 0, 0})), 0.98f);
-  EXPECT_GT(pick_pdf(view, 1, LightReceiver<float>(Vec3<float>{0, 0, 90})), 0.98f);
+  EXPECT_GT(selection_pdf(view, 0, LightReceiver<float>(Vec3<float>{0, 0, 0})), 0.98f);
+  EXPECT_GT(selection_pdf(view, 1, LightReceiver<float>(Vec3<float>{0, 0, 90})), 0.98f);
 }
 
 TEST(LightTree, HundredThousandTrianglesAreQuick) {

@@ -26,9 +26,10 @@ float density(const Lights& lights, const Vec3<float>& from, const Vec3<float>& 
   const LightRecord& r = view.lights[0];
   switch (static_cast<LightKind>(r.kind)) {
     case LightKind::kDistant:
-      return detail::hit_distant<float>(detail::LightReader<float>(r, true), dir).pdf * r.pick_pdf;
+      return detail::hit_distant<float>(detail::LightReader<float>(r, true), dir).pdf *
+             r.selection_pdf;
     case LightKind::kDome:
-      return detail::hit_dome_from<float>(view, r, from, dir, true).pdf * r.pick_pdf;
+      return detail::hit_dome_from<float>(view, r, from, dir, true).pdf * r.selection_pdf;
     default: {
       const auto t = trace(view, from, dir);
       return t ? light_hit<float>(view, 0u, from, dir, *t, true).pdf : 0.f;

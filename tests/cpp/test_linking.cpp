@@ -55,17 +55,17 @@ Material grey() {
 }
 
 /// Renders by waves and expects the image of the reference integrator.
-Picture checked(const ScenePtr& scene, const Settings& s) {
+RenderedImage checked(const ScenePtr& scene, const Settings& s) {
   WavefrontRenderer renderer(scene);
-  Picture waves = renderer.render(s);
+  RenderedImage waves = renderer.render(s);
   Settings scalar = s;
   scalar.integrator = IntegratorKind::kReference;
-  expect_same_picture(renderer.render(scalar), waves, "waves and reference");
+  expect_same_image(renderer.render(scalar), waves, "waves and reference");
   return waves;
 }
 
-void expect_mean(const Picture& picture, double expected, const char* what) {
-  const Mean m = mean_of(picture, 1);
+void expect_mean(const RenderedImage& image, double expected, const char* what) {
+  const Mean m = mean_of(image, 1);
   EXPECT_NEAR(m.mean, expected, kSigmas * m.error + 5e-4 * expected + 1e-9) << what;
 }
 
@@ -169,7 +169,7 @@ TEST(LightLinks, MirrorsShowWhatTheyAreLinkedTo) {
 
 TEST(LightLinks, BothTechniquesKeepTheMean) {
   // A light that is linked to everything through a set contributes like an unlinked one.
-  Picture pictures[2];
+  RenderedImage pictures[2];
   for (const bool linked : {false, true}) {
     Stage stage(make_material(ProgramId::kPrincipled, {0.5f, 0.5f, 0.5f}, 0.4f));
     Light light = disk();
@@ -177,7 +177,7 @@ TEST(LightLinks, BothTechniquesKeepTheMean) {
     stage.b.add_light(light);
     pictures[linked] = checked(stage.b.build(), settings());
   }
-  expect_same_picture(pictures[0], pictures[1], "linked to all");
+  expect_same_image(pictures[0], pictures[1], "linked to all");
 }
 
 TEST(ShadowLinks, OnlyLinkedGeometryCastsShadows) {

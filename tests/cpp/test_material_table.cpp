@@ -24,7 +24,7 @@ TEST(ProgramList, ModelCostsAreThoseOfBeforeThereWasAList) {
     EXPECT_STREQ(kProgramNames[i], names[i]);
     EXPECT_EQ(kPrograms[i].model_ns, ns[i]);
     EXPECT_EQ(can_emit(static_cast<ProgramId>(i)), i >= 4);
-    EXPECT_EQ(kPrograms[i].own_count(), 0u);
+    EXPECT_EQ(kPrograms[i].specific_count(), 0u);
   }
   for (uint32_t i = 0; i < kProgramCount; ++i)
     EXPECT_EQ(program_of(i), static_cast<ProgramId>(i)) << kVariants[i].name;
@@ -45,15 +45,15 @@ TEST(MaterialTable, WhatProgramsHaveToThemselvesIsInTheTable) {
     const auto value = [&](float given) {
       material.own[p.own()->index] = given;
       check_material(material, 0, 0);
-      return material.own_value(p.own()->index);
+      return material.specific_value(p.own()->index);
     };
-    EXPECT_EQ(material.own_value(p.own()->index), value(info.standard)) << p.name;
+    EXPECT_EQ(material.specific_value(p.own()->index), value(info.standard)) << p.name;
     EXPECT_EQ(value(info.most), info.most) << p.name;
     EXPECT_THROW(value(info.most + 1), Error) << p.name;
     EXPECT_THROW(value(std::nanf("")), Error) << p.name;
   }
   size_t expected = 0;
-  for (const ProgramInfo& program : kPrograms) expected += program.own_count();
+  for (const ProgramInfo& program : kPrograms) expected += program.specific_count();
   EXPECT_EQ(own, expected);
 }
 

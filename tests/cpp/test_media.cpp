@@ -54,22 +54,22 @@ Settings foggy_settings(uint32_t side, uint32_t spp, uint32_t depth) {
 }
 
 template <typename F>
-Picture foggy_waves(const FoggyScene& f, const WaveCase& c, uint32_t wave_size,
-                    std::shared_ptr<const EmbreeAccelerator> accel = nullptr) {
+RenderedImage foggy_waves(const FoggyScene& f, const WaveCase& c, uint32_t wave_size,
+                          std::shared_ptr<const EmbreeAccelerator> accel = nullptr) {
   WaveRun run(f.scene, c, std::move(accel));
   Wave& wave = run.reserve(wave_size);
   run.each_task(wave_size, 16, [&](const WaveTask& task) {
     run_wave_through<F>(wave, run.context(), task, f.fog);
   });
-  return run.picture();
+  return run.image();
 }
 
-Picture foggy_reference(const FoggyScene& f, const Settings& s) {
+RenderedImage foggy_reference(const FoggyScene& f, const Settings& s) {
   WaveRun run(f.scene, {s});
   ReferenceWorker worker(run.context());
   run.each_task(64, 16,
                 [&](const WaveTask& task) { trace_task(run.context(), worker, task, f.fog); });
-  return run.picture();
+  return run.image();
 }
 
 /// Fog records have no triangle, are sorted among surface records, and are shaded by a non-surface
@@ -83,18 +83,18 @@ TEST(Media, FogIsOnePicture) {
     s.roulette = tracks_ratio ? RouletteKind::kCostAware : RouletteKind::kThroughput;
     s.roulette_depth = 1;
     s.aovs.bits |= static_cast<uint32_t>(Aov::kDirect) | static_cast<uint32_t>(Aov::kIndirect);
-    const Picture expected = foggy_reference(f, s);
+    const RenderedImage expected = foggy_reference(f, s);
     EXPECT_GT(mean_of(expected).mean, 0.01);
     for (const uint32_t wave_size : {48u, kWave, 4096u})
       for (const std::string& policy : policy_names()) {
         s.policy = policy;
         const std::string what = "waves of " + std::to_string(wave_size) + ", policy " + policy;
-        expect_same_picture(expected, foggy_waves<float>(f, {s, 1, 1}, wave_size, accel),
-                            "1 lane, " + what);
+        expect_same_image(expected, foggy_waves<float>(f, {s, 1, 1}, wave_size, accel),
+                          "1 lane, " + what);
 #ifdef WAVECOMB_HAS_LANES_16
         for (const Materialize materialize : {Materialize::kOff, Materialize::kOn}) {
           s.materialize = materialize;
-          expect_same_picture(
+          expect_same_image(
               expected, foggy_waves<Lanes<16>>(f, {s, 16, accel->native_width()}, wave_size, accel),
               "16 lanes, " + what);
         }
@@ -145,12 +145,12 @@ TEST(Media, SingleScatteringIsTheIntegral) {
       f.fog.tracks_ratio = tracks_ratio;
       const Settings s = foggy_settings(size_for_build(32), 512, 1);
 #ifdef WAVECOMB_HAS_LANES_16
-      const Picture picture = foggy_waves<Lanes<16>>(f, {s, 16, 1}, 4096);
+      const RenderedImage image = foggy_waves<Lanes<16>>(f, {s, 16, 1}, 4096);
 #else
-      const Picture picture = foggy_waves<float>(f, {s, 1, 1}, 4096);
+      const RenderedImage image = foggy_waves<float>(f, {s, 1, 1}, 4096);
 #endif
       for (size_t c = 0; c < 3; ++c) {
-        const Mean m = mean_of(picture, c);
+        const Mean m = mean_of(image, c);
         const double expected =
             single_scattering(double{extinction[c]}, albedo[c], floor[c], on_floor);
         EXPECT_NEAR(m.mean, expected, 4.2 * m.error + 1e-4 * expected)
@@ -174,9 +174,9 @@ TEST(Media, FurnaceOfWhiteFog) {
   b.set_camera(make_camera({0, 0, 1}, {0, 0, 0}));
   const FoggyScene f{b.build(), {{0.2f, 0.4f, 0.6f}, fog}};
   const Settings s = foggy_settings(16, size_for_build(256, 16), 200);
-  const Picture picture = foggy_waves<float>(f, {s, 1, 1}, 4096);
+  const RenderedImage image = foggy_waves<float>(f, {s, 1, 1}, 4096);
   for (size_t c = 0; c < 3; ++c) {
-    const Mean m = mean_of(picture, c);
+    const Mean m = mean_of(image, c);
     EXPECT_NEAR(m.mean, 1, 4.2 * m.error + 1e-4);
     EXPECT_LT(4.2 * m.error, kSanitized ? 0.5 : 0.03) << "too noisy to tell";
   }

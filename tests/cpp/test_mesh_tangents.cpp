@@ -87,9 +87,9 @@ TEST(Tangents, OnlyMeshesWhoseMaterialAsksHaveThem) {
   EXPECT_EQ(one_mesh(without, brushed())->view().tangents, nullptr);
 
   SceneBuilder b;
-  const uint32_t picture = add_texture(b, 2, 2, 3, std::vector<float>(12, 0.5f));
+  const uint32_t image = add_texture(b, 2, 2, 3, std::vector<float>(12, 0.5f));
   Material mapped = make_material(ProgramId::kPlastic);
-  mapped.textures[static_cast<size_t>(Input::kNormal)] = use(picture);
+  mapped.textures[static_cast<size_t>(Input::kNormal)] = use(image);
   const uint32_t grey = b.add_material(plain), metal = b.add_material(mapped);
   MeshData by_face = sphere(4, true);
   by_face.face_materials.assign(by_face.indices.size() / 3, grey);

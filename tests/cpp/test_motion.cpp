@@ -62,7 +62,7 @@ Settings one_pixel(uint32_t spp) {
 double mean(const ScenePtr& scene, uint32_t spp) {
   WaveRun run(scene, {one_pixel(spp), kReferenceLanes, 1});
   run.all(64);
-  return run.picture().beauty[0];
+  return run.image().beauty[0];
 }
 
 Camera camera_before_the_plane() {
@@ -249,16 +249,16 @@ TEST(Motion, OnePictureForEverySchedule) {
     s.max_depth = 5;
     WaveRun reference(scene, {s, kReferenceLanes, 1}, accel);
     reference.all(64);
-    const Picture expected = reference.picture();
+    const RenderedImage expected = reference.image();
     for (const uint32_t lanes : lane_widths())
       for (const uint32_t traversal : {1u, std::min(16u, accel->native_width())})
         for (const uint32_t wave_size : {64u, 1500u}) {
           WaveRun run(scene, {s, lanes, traversal}, accel);
           run.all(wave_size, wave_size == 64 ? 3 : 16);
-          expect_same_picture(expected, run.picture(),
-                              std::to_string(lanes) + " lanes, packets of " +
-                                  std::to_string(traversal) + ", waves of " +
-                                  std::to_string(wave_size));
+          expect_same_image(expected, run.image(),
+                            std::to_string(lanes) + " lanes, packets of " +
+                                std::to_string(traversal) + ", waves of " +
+                                std::to_string(wave_size));
           if (HasFailure()) return;
         }
     for (const std::string& policy : policy_names())
@@ -267,7 +267,7 @@ TEST(Motion, OnePictureForEverySchedule) {
         s.ray_order = s.shadow_order = order;
         WaveRun run(scene, {s, lane_widths().back(), accel->native_width()}, accel);
         run.all(700);
-        expect_same_picture(expected, run.picture(), "policy " + policy);
+        expect_same_image(expected, run.image(), "policy " + policy);
       }
   }
 }

@@ -18,9 +18,9 @@ using namespace light_testing;
 /// Transform of a light that moves and rotates between the shutter ends, at `time`.
 Affine place_at(float time, float size) {
   const auto angle = static_cast<double>(time);
-  Affine place = rotate(20 + 8 * angle, -30 + 6 * angle) * scale(size, size, size);
-  place.t = {1 + 2 * time, 2 - time, 3 + 0.5f * time};
-  return place;
+  Affine light_pose = rotate(20 + 8 * angle, -30 + 6 * angle) * scale(size, size, size);
+  light_pose.t = {1 + 2 * time, 2 - time, 3 + 0.5f * time};
+  return light_pose;
 }
 
 /// Makes one light of each kind, at its transform at `time`; with `moves`, it moves over the
@@ -58,7 +58,7 @@ TEST(MovingLights, AreAtEachTimeAsIfTheyStoodThere) {
       const float pick = number(), u = number(), v = number();
       // Round lights are sampled around an arbitrary axis.
       const auto kind = LightKind{
-          static_cast<uint8_t>(view.lights[chosen_light<float>(view, to, pick, true)].kind)};
+          static_cast<uint8_t>(view.lights[select_light_index<float>(view, to, pick, true)].kind)};
       if (kind != LightKind::kRect && kind != LightKind::kDisk && kind != LightKind::kDome)
         continue;
       const auto a = sample_light<float>(view, to, pick, u, v, true);
@@ -82,7 +82,7 @@ TEST(MovingLights, BothHalvesOfMisAgree) {
     LightReceiver<float> to(number.point(4));
     to.time = number();
     const float pick = number();
-    const uint32_t light = chosen_light<float>(view, to, pick, true);
+    const uint32_t light = select_light_index<float>(view, to, pick, true);
     const auto s = sample_light<float>(view, to, pick, number(), number(), true);
     if (!s.valid) continue;
     const float radiance = s.weight.y * s.pdf;
@@ -105,12 +105,12 @@ TEST(MovingLights, BoundsHoldTheWholeWay) {
   for (uint32_t light = view.infinite_count; light < view.count; ++light) {
     const LightMotion& motion = lights.set.motions[light];
     const LightCluster way =
-        along_way(motion, lights.set.motion_steps, bound_light(lights.set.records[light], 1.0));
+        swept_bounds(motion, lights.set.motion_steps, bound_light(lights.set.records[light], 1.0));
     for (int i = 0; i < 2000; ++i) {
       LightReceiver<float> to(number.point(6));
       to.time = number();
       const float pick = number();
-      if (chosen_light<float>(view, to, pick, true) != light) continue;
+      if (select_light_index<float>(view, to, pick, true) != light) continue;
       const auto there = sample_light<float>(view, to, pick, number(), number(), true);
       if (!there.valid) continue;
       const Vec3<float> p = to.p + there.wi * there.distance;
@@ -129,7 +129,7 @@ TEST(MovingLights, BoundsHoldTheWholeWay) {
     for (uint32_t light = view.infinite_count; light < view.count; ++light)
       ASSERT_GE(detail::tree_pdf<float>(tree, light, to, true), 0.f);
     const float pick = number();
-    const uint32_t light = chosen_light<float>(view, to, pick, true);
+    const uint32_t light = select_light_index<float>(view, to, pick, true);
     const auto s = sample_light<float>(view, to, pick, number(), number(), true);
     if (!s.valid || light < view.infinite_count) continue;
     ASSERT_GT(detail::tree_pdf<float>(tree, light, to, true), 0.f) << light;
@@ -155,7 +155,7 @@ TEST(MovingLights, PacketsGiveTheBitsOfScalars) {
       const Mask<F> active = at(7) < 0.9f;
       const auto s = sample_light<F>(view, to, at(3), at(4), at(5), active);
       for (const F& x : {s.wi.x, s.wi.y, s.distance, s.weight.x, s.pdf}) put(x);
-      const UInt<F> light = chosen_light<F>(view, to, at(3), active);
+      const UInt<F> light = select_light_index<F>(view, to, at(3), active);
       const auto hit = light_hit<F>(view, light, to, s.wi, s.distance, active);
       for (const F& x : {hit.radiance.x, hit.radiance.z, hit.pdf}) put(x);
       const auto escaped = escaped_radiance<F>(view,
@@ -186,9 +186,10 @@ TEST(MovingLights, PlacesInDoubleAreThoseOfKernels) {
     const float time = number();
     const Vec3<float> p = number.point(5);
     const LightPose<float> pose = light_pose<float>(view, light, time, true);
-    const LightPlace place(lights.set.motions[light], lights.set.motion_steps, double{time});
+    const PreciseLightPose light_pose(lights.set.motions[light], lights.set.motion_steps,
+                                      double{time});
     double at_rest[3];
-    place.point_to_rest({double{p.x}, double{p.y}, double{p.z}}, at_rest);
+    light_pose.point_to_rest({double{p.x}, double{p.y}, double{p.z}}, at_rest);
     const Vec3<float> q = pose.point_to_rest(p);
     ASSERT_NEAR(q.x, at_rest[0], 1e-5);
     ASSERT_NEAR(q.y, at_rest[1], 1e-5);

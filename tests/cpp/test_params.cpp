@@ -167,7 +167,7 @@ void expect_own_by_material(const MaterialView& view) {
     for (uint32_t& m : material) m = round % 2 ? one : rng() % 3;
     const uint32_t off = rng();  // some lanes are inactive
     const Mask<F> active = Mask<F>((lane_index<F>() & UInt<F>(off)) == UInt<F>(0u));
-    const auto own = detail::own_values<3, F>(view, wavecomb::load<UInt<F>>(material), active);
+    const auto own = detail::specific_values<3, F>(view, wavecomb::load<UInt<F>>(material), active);
     for (size_t k = 0; k < own.size(); ++k) {
       float value[W];
       wavecomb::store(value, own[k]);
@@ -183,7 +183,7 @@ TEST_F(ParamsTest, WhatAProgramHasToItselfIsItsMaterials) {
   const ProgramParameterRecord own[3] = {{{1, 2, 3, 4}}, {{5, 6, 7, 8}}, {{9, 10, 11, 12}}};
   view_.own = own;
   lane_testing::for_each_packet([&]<typename F>() { expect_own_by_material<kWidth<F>>(view_); });
-  const auto scalar = detail::own_values<4, float>(view_, 1u, true);
+  const auto scalar = detail::specific_values<4, float>(view_, 1u, true);
   EXPECT_EQ(scalar[3], 8.f);
 }
 

@@ -54,7 +54,7 @@ TEST(PassPlan, TargetsAreWhereTheTableSays) {
   timed.timed = true;
   PassRules both = adaptive_rules(16, 1024);
   both.timed = true;
-  constexpr double kForever = std::numeric_limits<double>::infinity();
+  constexpr double kUnbounded = std::numeric_limits<double>::infinity();
   const struct {
     const char* what;
     PassRules rules;
@@ -70,12 +70,12 @@ TEST(PassPlan, TargetsAreWhereTheTableSays) {
       {"a pilot, for the speed is not known", timed, 0, {10, 0}, 1000, 1},
       {"doubling", timed, 1, {10, 1e6}, 1000, 2},
       {"doubling", timed, 8, {10, 1e6}, 1000, 16},
-      {"no more than a step", timed, 64, {kForever, 1e6}, 1000, 80},
+      {"no more than a step", timed, 64, {kUnbounded, 1e6}, 1000, 80},
       {"time for 12 at three quarters: 8", timed, 64, {0.016, 1e6}, 1000, 72},
       {"time for less than one", timed, 64, {1e-4, 1e6}, 1000, 65},
       {"no time", timed, 64, {-1, 1e6}, 1000, 65},
       {"fewer pixels, more samples", timed, 64, {0.016, 1e6}, 100, 80},
-      {"timed and adaptive stops at checks", both, 24, {kForever, 1e6}, 10, 32},
+      {"timed and adaptive stops at checks", both, 24, {kUnbounded, 1e6}, 10, 32},
       {"timed and adaptive", both, 512, {0.016, 1e6}, 1000, 520},
   };
   for (const auto& c : cases)

@@ -108,7 +108,7 @@ TEST(PathHistory, ChangesNoPicture) {
     WaveRun plain(scene, {s, lanes, 1}, accel), keeping(scene, {s, lanes, 1}, accel, &field);
     plain.all(512);
     keeping.all(512);
-    expect_same_picture(plain.picture(), keeping.picture(), std::to_string(lanes) + " lanes");
+    expect_same_image(plain.image(), keeping.image(), std::to_string(lanes) + " lanes");
     if (lanes == kReferenceLanes) continue;
     EXPECT_EQ(plain.wave().history.bytes(), 0u);
     EXPECT_EQ(keeping.wave().history.most(), 8u);
@@ -119,12 +119,12 @@ TEST(PathHistory, ChangesNoPicture) {
 /// Checks each vertex.
 class Furnace final : public HistoryReader {
  public:
-  static constexpr uint32_t kMost = 3;
-  uint32_t most() const override { return kMost; }
+  static constexpr uint32_t kMax = 3;
+  uint32_t most() const override { return kMax; }
   void ended(const PathHistory& history, const float* radiance, const WaveTask& task) override {
     for (uint32_t slot = 0; slot < task.path_count(); ++slot) {
       const float end = load_row<RadianceRow, float>(radiance, slot, true).sum.y;
-      EXPECT_EQ(history.count(slot), kMost) << "walls are closed, and roulette is off";
+      EXPECT_EQ(history.count(slot), kMax) << "walls are closed, and roulette is off";
       for (uint32_t i = 0; i < history.count(slot); ++i) {
         const HistoryRow<float> v = history.vertex(slot, i);
         light[i].push_back(double{(end - v.radiance.y) / v.throughput.y});
@@ -135,7 +135,7 @@ class Furnace final : public HistoryReader {
       }
     }
   }
-  std::vector<double> light[kMost];
+  std::vector<double> light[kMax];
 };
 
 /// A point light at the centre of a sphere of reflectance 1/2: the radiance returned along a bounce

@@ -97,10 +97,10 @@ TEST(PicturedRect, PointsFollowTheDensityAndItsMassIs1) {
   const std::vector<float> pictures[] = {spots(), half_dark(), noise()};
   chi_square::Battery battery("pictured rects");
   for (const Place& place : kPlaces)
-    for (size_t picture = 0; picture < std::size(pictures); ++picture) {
-      const Lights lights = make_rect(place, pictures[picture]);
+    for (size_t image = 0; image < std::size(pictures); ++image) {
+      const Lights lights = make_rect(place, pictures[image]);
       ASSERT_NE(lights.view().lights[0].distribution, kNoDistribution);
-      battery.run(light_case(std::string(place.name) + ", picture " + std::to_string(picture),
+      battery.run(light_case(std::string(place.name) + ", picture " + std::to_string(image),
                              lights.view(), place.from));
     }
   battery.judge();
@@ -183,11 +183,11 @@ TEST(PicturedRect, IrradianceIsThatOfItsPicture) {
 TEST(PicturedRect, ThePictureTakesNoiseAway) {
   for (const Place& place : kPlaces)
     for (const bool bright : {true, false}) {
-      Lights by_picture = make_rect(place, bright ? spots() : noise());
+      Lights by_texture = make_rect(place, bright ? spots() : noise());
       Lights evenly = make_rect(place, bright ? spots() : noise());
       evenly.set.records[0].distribution = kNoDistribution;
       const double gain = estimate(evenly, place.from, 100000).variance /
-                          estimate(by_picture, place.from, 100000).variance;
+                          estimate(by_texture, place.from, 100000).variance;
       RecordProperty((std::string(bright ? "spots " : "noise ") + place.name).c_str(),
                      std::to_string(gain));
       std::printf("%s, %s: %.2f times less variance\n", bright ? "spots" : "noise", place.name,
@@ -213,7 +213,7 @@ TEST(PicturedRect, EvenAndBlackPictures) {
   const Lights black =
       make_rect(kPlaces[1], std::vector<float>(size_t{kTexelsX} * kTexelsY * 3, -1.f));
   EXPECT_EQ(black.set.records[0].texture, kNoTexture);
-  EXPECT_EQ(black.set.records[0].pick_pdf, 0);
+  EXPECT_EQ(black.set.records[0].selection_pdf, 0);
   EXPECT_FALSE(sample_light<float>(black.view(), kPlaces[1].from, 0.5f, 0.5f, 0.5f, true).valid);
 }
 

@@ -268,7 +268,7 @@ Inputs random_inputs(std::mt19937& rng) {
   p.film_thickness = 2000 * edgy();
   p.film_ior = 1 + edgy();
   p.thin_walled = static_cast<float>(rng() % 2);
-  p.walks = p.thin_walled > 0 ? 0.f : static_cast<float>(rng() % 3);
+  p.subsurface = p.thin_walled > 0 ? 0.f : static_cast<float>(rng() % 3);
   const auto any_direction = [&] {
     const double grazing[] = {0, 1e-7, -1e-7, 1e-3, -1e-3, 1, -1};
     const double z = rng() % 4 == 0 ? grazing[rng() % 7] : 2.0 * unit(rng) - 1;
@@ -382,18 +382,18 @@ TEST(Programs, PacketEqualsScalarBitForBit) {
 /// Returns `p` with only these features.
 P with_parts(P p, ProgramId program, uint32_t parts) {
   const auto lacks = [parts](Part part) { return (parts & part) == 0; };
-  if (lacks(kMetals)) {
+  if (lacks(kMetalPart)) {
     p.metallic = 0;
     p.flags &= ~uint32_t{kSpecularWorkflow};
   }
-  if (lacks(kCoats)) p.clearcoat = 0;
-  if (lacks(kPasses)) p.transmission_weight = 0;
-  if (lacks(kPasses) && program == ProgramId::kPrincipled) p.opacity = 1;
-  if (lacks(kBacks)) (p.metallic > 0.5f ? p.thin_walled : p.subsurface_weight) = 0;
-  if (lacks(kBacks)) p.walks = 0;
-  if (lacks(kFuzzes)) p.fuzz_weight = 0;
-  if (lacks(kFilms)) p.film_weight = 0;
-  if (lacks(kBrushes)) p.anisotropy = p.rotation = 0;
+  if (lacks(kCoatPart)) p.clearcoat = 0;
+  if (lacks(kTransmissionPart)) p.transmission_weight = 0;
+  if (lacks(kTransmissionPart) && program == ProgramId::kPrincipled) p.opacity = 1;
+  if (lacks(kBackDiffusePart)) (p.metallic > 0.5f ? p.thin_walled : p.subsurface_weight) = 0;
+  if (lacks(kBackDiffusePart)) p.subsurface = 0;
+  if (lacks(kFuzzPart)) p.fuzz_weight = 0;
+  if (lacks(kFilmPart)) p.film_weight = 0;
+  if (lacks(kAnisotropyPart)) p.anisotropy = p.rotation = 0;
   return p;
 }
 

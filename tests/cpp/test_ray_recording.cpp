@@ -24,10 +24,10 @@ TEST(RayRecording, KeepsEveryRayAndChangesNothing) {
   const ScenePtr scene = mixed();
   WavefrontRenderer renderer(scene, 2);
   const Settings settings = small_settings();
-  const Picture plain = renderer.render(settings);
+  const RenderedImage plain = renderer.render(settings);
   RayRecording recording(scene, kPlenty);
-  const Picture recorded = renderer.render(settings, {.recorder = &recording});
-  expect_same_picture(plain, recorded, "with a recorder");
+  const RenderedImage recorded = renderer.render(settings, {.recorder = &recording});
+  expect_same_image(plain, recorded, "with a recorder");
 
   const RenderStatistics& s = renderer.statistics();
   ASSERT_GT(s.rays_at.size(), 3u);

@@ -95,13 +95,13 @@ TEST(Pilots, FindWhatARenderNeedsAndKeepIt) {
   ASSERT_TRUE(first.lights && first.training);
   EXPECT_FALSE(first.aiming) << "no paths start at lights";
   EXPECT_GT(first.training->statistics.paths, 0u);
-  EXPECT_FALSE(first.training->statistics.is_kept);
-  EXPECT_EQ(first.lights->weighed.shares.size(), first.lights->parts.size());
+  EXPECT_FALSE(first.training->statistics.is_reused);
+  EXPECT_EQ(first.lights->tables.shares.size(), first.lights->parts.size());
   s.seed = 5;
   const PilotResults again = pilots_of(s);
-  EXPECT_TRUE(again.training->statistics.is_kept) << "the seed changes nothing that is learned";
+  EXPECT_TRUE(again.training->statistics.is_reused) << "the seed changes nothing that is learned";
   EXPECT_EQ(again.training->field, first.training->field);
-  EXPECT_EQ(again.lights->weighed.shares, first.lights->weighed.shares);
+  EXPECT_EQ(again.lights->tables.shares, first.lights->tables.shares);
   s.guiding = Guiding::kOff;
   s.roulette = RouletteKind::kThroughput;
   EXPECT_EQ(pilots_of(s).training->statistics.paths, 0u);

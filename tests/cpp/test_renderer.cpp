@@ -51,13 +51,13 @@ TEST(Renderer, RefusesWhatCannotBe) {
 TEST(Renderer, RendersAgainAndAgain) {
   WavefrontRenderer renderer(mixed());
   Settings s = tiny();
-  const Picture first = renderer.render(s);
+  const RenderedImage first = renderer.render(s);
   s.width = 7;
   renderer.render(s);
   s.spp = 1;
   s.wave_size = 64;
   renderer.render(s);
-  expect_same_picture(first, renderer.render(tiny()), "third time");
+  expect_same_image(first, renderer.render(tiny()), "third time");
   s = tiny();
   s.seed = 1;
   EXPECT_NE(first.beauty, renderer.render(s).beauty);
@@ -68,10 +68,10 @@ TEST(Renderer, MoreSamplesContainFewer) {
   WavefrontRenderer renderer(cornell());
   Settings s = tiny();
   s.spp = 16;
-  const Picture a = renderer.render(s);
+  const RenderedImage a = renderer.render(s);
   s.wave_size = 64;
   s.threads = 2;
-  expect_same_picture(a, renderer.render(s), "other passes");
+  expect_same_image(a, renderer.render(s), "other passes");
   EXPECT_EQ(a.samples, std::vector<uint32_t>(24 * 16, 16));
 }
 
@@ -119,7 +119,7 @@ TEST(Renderer, ProgressEndsAtTheTotal) {
                     EXPECT_GE(status.samples_done, last);
                     last = status.samples_done;
                     ++calls;
-                    return Request::kGoOn;
+                    return Request::kContinue;
                   }});
   EXPECT_EQ(last, 24u * 16 * 4);
   EXPECT_GE(calls, 1u);
@@ -135,10 +135,10 @@ TEST(Renderer, CancelKeepsWhatIsDone) {
     s.threads = 2;
     const auto start = Clock::now();
     auto asked = start;
-    const Picture p =
+    const RenderedImage p =
         renderer.render(s, {.progress = [&](const RenderStatus& status) {
                           asked = Clock::now();
-                          return status.samples_done > 0 ? Request::kStop : Request::kGoOn;
+                          return status.samples_done > 0 ? Request::kStop : Request::kContinue;
                         }});
     const double took = std::chrono::duration<double>(Clock::now() - asked).count();
     EXPECT_LT(took, kSanitized ? 20 : 2) << "seconds after the callback said stop";

@@ -472,8 +472,9 @@ TEST(SceneBuilder, EmissiveFacesBecomeLights) {
     const LightSet& set = scene->light_set();
     return set.triangles[light_of(inst, geom) + face - set.first_triangle()];
   };
-  EXPECT_EQ(record(1, 1, 0).pick_pdf, 0);  // the non-emissive face exists but is never selected
-  EXPECT_GT(record(1, 1, 1).pick_pdf, 0);
+  EXPECT_EQ(record(1, 1, 0).selection_pdf,
+            0);  // the non-emissive face exists but is never selected
+  EXPECT_GT(record(1, 1, 1).selection_pdf, 0);
   EXPECT_FLOAT_EQ(std::fabs(record(1, 1, 1).m[2]), 0.5f);
   EXPECT_FLOAT_EQ(std::fabs(record(2, 1, 1).m[2]), 2.f);
   EXPECT_FLOAT_EQ(record(1, 2, 0).p[2], 5);

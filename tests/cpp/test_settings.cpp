@@ -42,8 +42,8 @@ TEST(Settings, RegionsAreWithinThePicture) {
   Settings s;
   s.width = 20;
   s.height = 10;
-  for (const Region good : {Region{0, 0, 20, 10}, Region{19, 9, 20, 10}, Region{3, 2, 7, 9}}) {
-    s.region = good;
+  for (const Region valid : {Region{0, 0, 20, 10}, Region{19, 9, 20, 10}, Region{3, 2, 7, 9}}) {
+    s.region = valid;
     EXPECT_EQ(complaint(s), "");
   }
   for (const Region empty : {Region{5, 2, 5, 8}, Region{6, 2, 5, 8}, Region{1, 8, 2, 8}}) {

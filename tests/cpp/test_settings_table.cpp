@@ -41,7 +41,7 @@ TEST(SettingsTable, SettingsThatChangeTheExpectationAreMarked) {
   for (const SettingInfo& setting : setting_table())
     if (setting.changes_expectation) {
       marked.insert(setting.name);
-      EXPECT_TRUE(setting.changes_picture && setting.changes_bits) << setting.name;
+      EXPECT_TRUE(setting.changes_image && setting.changes_bits) << setting.name;
     }
   // A new setting that changes the expectation of the image must be listed here.
   const std::set<std::string> known = {

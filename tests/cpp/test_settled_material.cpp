@@ -23,7 +23,7 @@ TEST(SettledMaterial, WhatIsTheSameAllOverIsAConstant) {
   at(m, Input::kSpecularColor) = use(5, 1);                   // green for all
   at(m, Input::kEmission) = scaled_use(5, 4, 1e25f, -1e24f);  // exceeds the limit of emission
   at(m, Input::kNormal) = use(1);
-  const Material s = settled(m, {}, textures);
+  const Material s = simplified(m, {}, textures);
   EXPECT_EQ(s.metallic, 0.f);
   EXPECT_EQ(s.roughness, 1.f);
   EXPECT_EQ(s.clearcoat_roughness, 0.f);
@@ -47,10 +47,10 @@ TEST(SettledMaterial, ASingleTexelIsEnoughToStay) {
   Material m = make_material(ProgramId::kPrincipled);
   at(m, Input::kOpacity) = use(6);
   at(m, Input::kMetallic) = use(4);  // NaN counts as 0
-  Material s = settled(m, {}, textures);
+  Material s = simplified(m, {}, textures);
   EXPECT_TRUE(s.has_texture(Input::kOpacity) && s.has_texture(Input::kMetallic));
   at(m, Input::kOpacity) = scaled_use(6, 0, 1.f, 1.f);
-  s = settled(m, {}, textures);
+  s = simplified(m, {}, textures);
   EXPECT_FALSE(s.has_texture(Input::kOpacity));
   EXPECT_EQ(s.opacity, 1.f);
 }
@@ -58,9 +58,9 @@ TEST(SettledMaterial, ASingleTexelIsEnoughToStay) {
 TEST(SettledMaterial, GetsTheLesserVariant) {
   const auto textures = make_textures();
   const auto variant = [&](ProgramId program, Input input, const TextureUse& use_,
-                           bool picture = true) {
+                           bool image = true) {
     Material m = make_material(program, {0.5f, 0.5f, 0.5f});
-    if (picture) at(m, Input::kBaseColor) = use(2);
+    if (image) at(m, Input::kBaseColor) = use(2);
     at(m, input) = use_;
     return variant_of(m, textures);
   };
@@ -110,7 +110,7 @@ TEST(SettledMaterial, OpacityAndEmissionOfGraphsToo) {
     at(m, Input::kOpacity) = at(m, Input::kEmission) = use(2);
     if (output(parameter) != kOpacityOutput) at(m, Input::kOpacity) = TextureUse{};
     if (output(parameter) != kEmissionOutput) at(m, Input::kEmission) = TextureUse{};
-    return std::pair(settled(m, graphs, textures), variant_of(m, textures, graphs));
+    return std::pair(simplified(m, graphs, textures), variant_of(m, textures, graphs));
   };
   for (const uint32_t one : {1u, 4u}) {
     const auto [m, variant] = with_graph("opacity", one);
@@ -160,7 +160,7 @@ ScenePtr scene_of(const Material& m, const Graph* graph = nullptr) {
   b.set_camera(make_camera({0, 0, 4}, {0, 0, 0}));
   return b.build();
 }
-void expect_same_pictures(const ScenePtr& first, const ScenePtr& second, const std::string& what) {
+void expect_same_images(const ScenePtr& first, const ScenePtr& second, const std::string& what) {
   Settings s;
   s.width = s.height = size_for_build(24, 4);
   s.spp = 4;
@@ -171,12 +171,12 @@ void expect_same_pictures(const ScenePtr& first, const ScenePtr& second, const s
   for (const uint32_t lanes : lane_widths()) {
     WaveRun run(second, {s, lanes, 1});
     run.all(1024);
-    expect_same_picture(expected.picture(), run.picture(), what + std::to_string(lanes));
+    expect_same_image(expected.image(), run.image(), what + std::to_string(lanes));
   }
 }
 
-void expect_same_pictures(const Material& a, const Material& b, const std::string& what) {
-  expect_same_pictures(scene_of(a), scene_of(b), what);
+void expect_same_images(const Material& a, const Material& b, const std::string& what) {
+  expect_same_images(scene_of(a), scene_of(b), what);
 }
 
 /// A texture use that reads only the lower left corner of its texture, without filtering.
@@ -222,8 +222,8 @@ TEST(SettledMaterial, PicturesAreThoseOfTheTextureAndOfTheConstant) {
       if (c.input == Input::kBaseColor) constant.base_color = value;
       const std::string what = std::string(kProgramNames[static_cast<size_t>(program)]) + " " +
                                kInputNames[static_cast<size_t>(c.input)] + " ";
-      expect_same_pictures(other, same, what + "texture, lanes ");
-      expect_same_pictures(constant, same, what + "constant, lanes ");
+      expect_same_images(other, same, what + "texture, lanes ");
+      expect_same_images(constant, same, what + "constant, lanes ");
     }
 }
 
@@ -237,8 +237,8 @@ TEST(SettledMaterial, CutOutsThatAreWholeAreNone) {
     at(same, Input::kOpacity) = corner_of(5);
     at(other, Input::kOpacity) = corner_of(6);
     ASSERT_TRUE(scene_of(other)->view().has_presence);
-    expect_same_pictures(other, same, "texture, lanes ");
-    expect_same_pictures(m, same, "constant, lanes ");
+    expect_same_images(other, same, "texture, lanes ");
+    expect_same_images(m, same, "constant, lanes ");
   }
 }
 
@@ -268,9 +268,9 @@ TEST(SettledMaterial, PicturesOfGraphsAreTheSame) {
         at(m, Input::kBaseColor) = use(2);
         return scene_of(m, &g);
       };
-      expect_same_pictures(scene(c.varies), scene(c.constant),
-                           std::string(kProgramNames[static_cast<size_t>(program)]) + " " +
-                               c.parameter + ", lanes ");
+      expect_same_images(scene(c.varies), scene(c.constant),
+                         std::string(kProgramNames[static_cast<size_t>(program)]) + " " +
+                             c.parameter + ", lanes ");
     }
 }
 

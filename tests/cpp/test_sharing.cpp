@@ -10,8 +10,8 @@
 namespace wavecomb {
 namespace {
 
-TEST(Sharing, EachThreadTakesTheNextGroup) {
-  Sharing sharing;
+TEST(WorkDistribution, EachThreadTakesTheNextGroup) {
+  WorkDistribution sharing;
   // Two threads: 3 | 1 2, then 2 | 2. The second pass starts when the first has ended.
   sharing.add_pass(std::array{3.0f, 1.0f, 2.0f, 2.0f});
   sharing.add_pass(std::array{0.5f});
@@ -22,20 +22,20 @@ TEST(Sharing, EachThreadTakesTheNextGroup) {
   EXPECT_EQ(sharing.passes_s(2), 3.0 + 0.5);
 }
 
-TEST(Sharing, LiesWithinGrahamsBounds) {
+TEST(WorkDistribution, LiesWithinGrahamsBounds) {
   std::vector<float> group_s;
   for (uint32_t i = 0; i < 1000; ++i) group_s.push_back(static_cast<float>((i * 7919) % 101 + 1));
   const double sum = std::accumulate(group_s.begin(), group_s.end(), 0.0);
-  Sharing sharing;
+  WorkDistribution sharing;
   sharing.add_pass(group_s);
-  for (size_t i = 0; i < kSharedBy.size(); ++i) {
-    EXPECT_GE(sharing.passes_s(i), sum / kSharedBy[i]);
-    EXPECT_LE(sharing.passes_s(i), sum / kSharedBy[i] + sharing.longest_s());
+  for (size_t i = 0; i < kThreadCounts.size(); ++i) {
+    EXPECT_GE(sharing.passes_s(i), sum / kThreadCounts[i]);
+    EXPECT_LE(sharing.passes_s(i), sum / kThreadCounts[i] + sharing.longest_s());
   }
 }
 
-TEST(Sharing, NothingTakesNoTime) {
-  Sharing sharing;
+TEST(WorkDistribution, NothingTakesNoTime) {
+  WorkDistribution sharing;
   sharing.add_pass({});
   EXPECT_EQ(sharing.groups(), 0u);
   EXPECT_EQ(sharing.passes_s(1), 0.0);

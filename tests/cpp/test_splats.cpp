@@ -24,17 +24,17 @@ TEST(FixedPoint, RoundsCutsAndForgivesNan) {
   EXPECT_EQ(unit.from(0.5f / 16), 0) << "ties go to even";
   EXPECT_EQ(unit.from(1.5f / 16), 2);
   EXPECT_EQ(unit.from(kNan), 0);
-  EXPECT_EQ(unit.from(kInf), FixedPoint::kMost);
-  EXPECT_EQ(unit.from(-kInf), -FixedPoint::kMost);
-  EXPECT_EQ(unit.from(3e38f), FixedPoint::kMost);
+  EXPECT_EQ(unit.from(kInf), FixedPoint::kMax);
+  EXPECT_EQ(unit.from(-kInf), -FixedPoint::kMax);
+  EXPECT_EQ(unit.from(3e38f), FixedPoint::kMax);
   EXPECT_EQ(unit.to_double(24), 1.5);
   EXPECT_EQ(FixedPoint{3}.from(20.f), 2) << "2.5, and ties go to even";
   // The sum of as many maximum values as FixedPoint guarantees does not overflow.
-  EXPECT_GE(std::numeric_limits<int64_t>::max() / FixedPoint::kMost, int64_t{1} << 21);
+  EXPECT_GE(std::numeric_limits<int64_t>::max() / FixedPoint::kMax, int64_t{1} << 21);
 }
 
-TEST(SplatList, IsAsLongAsItWasMade) {
-  SplatList list(2);
+TEST(LightSplatList, IsAsLongAsItWasMade) {
+  LightSplatList list(2);
   EXPECT_TRUE(list.add({0, 1, 1, 1}));
   EXPECT_TRUE(list.add({1, 1, 1, 1}));
   EXPECT_FALSE(list.add({2, 1, 1, 1}));
@@ -44,12 +44,12 @@ TEST(SplatList, IsAsLongAsItWasMade) {
 }
 
 /// Floating-point sums would depend on the order; these do not.
-TEST(SplatLayer, OrderAndThreadsDoNotShow) {
+TEST(LightSplatLayer, OrderAndThreadsDoNotShow) {
   constexpr uint32_t kPixels = 64, kLists = 40;
   std::mt19937 rng(3);
-  std::vector<SplatList> lists;
+  std::vector<LightSplatList> lists;
   for (uint32_t i = 0; i < kLists; ++i) {
-    SplatList& list = lists.emplace_back(500);
+    LightSplatList& list = lists.emplace_back(500);
     for (int k = 0; k < 500; ++k) {
       const auto x = [&] {
         return std::ldexp(static_cast<float>(rng() % 4096), int(rng() % 24) - 24);
@@ -57,7 +57,7 @@ TEST(SplatLayer, OrderAndThreadsDoNotShow) {
       EXPECT_TRUE(list.add({static_cast<uint32_t>(rng() % kPixels), x(), x(), x()}));
     }
   }
-  SplatLayer in_order(kPixels, {-30}), reversed(kPixels, {-30}), at_once(kPixels, {-30});
+  LightSplatLayer in_order(kPixels, {-30}), reversed(kPixels, {-30}), at_once(kPixels, {-30});
   for (uint32_t i = 0; i < kLists; ++i) {
     in_order.add(lists[i], i);
     reversed.add(lists[kLists - 1 - i], kLists - 1 - i);
@@ -104,7 +104,7 @@ class LightTracer final : public Integrator {
   }
 
   void run(size_t worker, const WaveTask& task) override {
-    SplatList& list = lists_[worker];
+    LightSplatList& list = lists_[worker];
     list.clear();
     for (uint32_t p = 0; p < task.pixel_count; ++p)
       for (uint32_t s = 0; s < task.samples; ++s) {
@@ -117,7 +117,7 @@ class LightTracer final : public Integrator {
   uint32_t lanes() const override { return 1; }
 
  private:
-  void trace(const Sample4<float>& r, SplatList& list) const {
+  void trace(const Sample4<float>& r, LightSplatList& list) const {
     const Vec3<float> o{kPlace[0], kPlace[1], kPlace[2]}, d = square_to_sphere(r.x, r.y);
     float t, u, v;
     uint32_t prim, geom, inst;
@@ -147,12 +147,12 @@ class LightTracer final : public Integrator {
   const CameraSetup& camera_;
   Affine to_world_;
   Film& film_;
-  std::vector<SplatList> lists_;
+  std::vector<LightSplatList> lists_;
 };
 
 struct Traced {
-  Picture picture;
-  std::vector<SplatLayer::Sum> sums;
+  RenderedImage image;
+  std::vector<LightSplatLayer::Sum> sums;
 };
 
 /// Renders by light tracing, in tasks of `pixels` pixels on `workers` threads.
@@ -162,7 +162,7 @@ Traced light_traced(const ScenePtr& scene, const Settings& s, uint32_t workers, 
   const FilterTable table(s.filter, s.used_filter_width());
   const CameraSetup camera(scene->camera(), s.width, s.height, table);
   Film film(s.width, s.height, {AovSet{0}});
-  film.keep_splats({-20});
+  film.allocate_light_splats({-20});
   std::vector<uint32_t> all;
   for (uint32_t y = 0; y < s.height; ++y)
     for (uint32_t x = 0; x < s.width; ++x) all.push_back(x | y << 16);
@@ -182,9 +182,9 @@ Traced light_traced(const ScenePtr& scene, const Settings& s, uint32_t workers, 
   Traced out;
   out.sums = film.splats().sums();
   Film::Layers layers = std::move(film).finish({});
-  out.picture.width = s.width;
-  out.picture.height = s.height;
-  out.picture.beauty = std::move(layers.beauty);
+  out.image.width = s.width;
+  out.image.height = s.height;
+  out.image.beauty = std::move(layers.beauty);
   return out;
 }
 
@@ -204,13 +204,13 @@ TEST(Splats, LightTracingIsOnePictureForAllSchedules) {
   Settings s = light_settings();
   s.spp = 64;
   const Traced expected = light_traced(scene, s, 1, 64, false);
-  EXPECT_GT(mean_of(expected.picture).mean, 0);
+  EXPECT_GT(mean_of(expected.image).mean, 0);
   for (const uint32_t workers : {1u, 2u, 5u})
     for (const uint32_t pixels : {1u, 7u, 64u})
       for (const bool backwards : {false, true}) {
         const Traced t = light_traced(scene, s, workers, pixels, backwards);
         EXPECT_EQ(t.sums, expected.sums) << workers << " workers, " << pixels << " pixels";
-        expect_same_bits(t.picture.beauty, expected.picture.beauty, "beauty");
+        expect_same_bits(t.image.beauty, expected.image.beauty, "beauty");
       }
 }
 
@@ -222,18 +222,18 @@ TEST(Splats, LightTracingAgreesWithPathTracing) {
   const Traced light = light_traced(scene, s, 2, 16, false);
   Settings from_camera = s;
   from_camera.spp = size_for_build(1024, 16);
-  const Picture path = WavefrontRenderer(scene).render(from_camera);
+  const RenderedImage path = WavefrontRenderer(scene).render(from_camera);
   const double paths = 1.0 * s.spp * s.width * s.height;
   for (size_t i = 0; i < path.beauty.size(); i += 3) {
     const double expected = double{path.beauty[i]};
     // Light splats of a pixel are nearly equal, so their number determines the error of the sum.
     const double one = double{4 * kPi * kIntensity * kAlbedo * kInvPi} / (3 * 3 * 0.15 * 0.15);
     const double count = std::max(1.0, expected * paths / one);
-    EXPECT_NEAR(light.picture.beauty[i], expected,
+    EXPECT_NEAR(light.image.beauty[i], expected,
                 4.6 * expected / std::sqrt(count) + 0.003 * expected)
         << "pixel " << i / 3;
   }
-  EXPECT_NEAR(mean_of(light.picture).mean, mean_of(path).mean, kSanitized ? 0.02 : 0.004);
+  EXPECT_NEAR(mean_of(light.image).mean, mean_of(path).mean, kSanitized ? 0.02 : 0.004);
 }
 
 /// Light splats are stored in the blocks that checkpoints save, and count as memory of the film.
@@ -241,14 +241,14 @@ TEST(Splats, GoWithTheFilm) {
   Film film(2, 1, {AovSet{0}});
   const size_t plain = film.bytes(), blocks = film.blocks().size();
   film.pixel(0, 0) = {3, 0, 0, 2};
-  film.keep_splats({-10});
-  EXPECT_EQ(film.bytes() - plain, 2 * sizeof(SplatLayer::Sum));
+  film.allocate_light_splats({-10});
+  EXPECT_EQ(film.bytes() - plain, 2 * sizeof(LightSplatLayer::Sum));
   EXPECT_EQ(film.blocks().size(), blocks + 2);
-  SplatList list(1);
+  LightSplatList list(1);
   ASSERT_TRUE(list.add({0, 1, 2, 4}));
   film.splats().add(list, 4);
   Film copy(2, 1, {AovSet{0}});
-  copy.keep_splats({-10});
+  copy.allocate_light_splats({-10});
   auto from = film.blocks();
   auto to = copy.blocks();
   for (size_t i = 0; i < from.size(); ++i) {

@@ -219,12 +219,12 @@ TEST(Surface, DegenerateTrianglesStayFinite) {
 
 // ---- spawned rays -------------------------------------------------------------------------------
 
-struct OneHit {
+struct SingleRayHit {
   float t, u, v;
   uint32_t prim, geom, inst;
 };
-OneHit trace_one(const EmbreeAccelerator& accel, const Vec3<float>& o, const Vec3<float>& d) {
-  OneHit h{};
+SingleRayHit trace_one(const EmbreeAccelerator& accel, const Vec3<float>& o, const Vec3<float>& d) {
+  SingleRayHit h{};
   accel.intersect({&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, nullptr, nullptr, 1},
                   {&h.t, &h.u, &h.v, &h.prim, &h.geom, &h.inst}, 1, false, {});
   return h;
@@ -257,7 +257,7 @@ SpawnCounts spawn_around(const Scene& scene, const EmbreeAccelerator& accel, uin
     const V3 from = centre + 3 * size * around;
     const V3 at = centre + size * V3{uniform(rng), uniform(rng), uniform(rng)};
     const Vec3<float> d = narrow(unit(at - from));
-    const OneHit h = trace_one(accel, narrow(from), d);
+    const SingleRayHit h = trace_one(accel, narrow(from), d);
     if (h.inst != inst) continue;
     const Surface<float> s =
         setup_surface<float>(scene.view(), {h.inst, mesh, h.prim, h.u, h.v}, d, false, true, true);
@@ -269,7 +269,7 @@ SpawnCounts spawn_around(const Scene& scene, const EmbreeAccelerator& accel, uin
       const Vec3<float> leave = narrow(out), enter = narrow(-1.0 * out);
       ++counts.rays;
       counts.self_hits += trace_one(accel, spawn_origin<float>(s, leave), leave).inst == inst;
-      const OneHit inside = trace_one(accel, spawn_origin<float>(s, enter), enter);
+      const SingleRayHit inside = trace_one(accel, spawn_origin<float>(s, enter), enter);
       if (inside.inst == kNoHit)
         ++counts.leaks;
       else if (inside.inst == inst &&
@@ -354,7 +354,7 @@ TEST(Surface, HugeGroundNextToSmallObjects) {
     const V3 from =
         i % 2 ? at + V3{0, 0.2, 0} : at + V3{far * uniform(rng), 0.01 * far, far * uniform(rng)};
     const Vec3<float> d = narrow(unit(at - from));
-    const OneHit h = trace_one(accel, narrow(from), d);
+    const SingleRayHit h = trace_one(accel, narrow(from), d);
     if (h.inst != 0) continue;
     const Surface<float> s = setup_surface<float>(scene->view(), {0, ground_mesh, h.prim, h.u, h.v},
                                                   d, false, true, true);
@@ -362,11 +362,11 @@ TEST(Surface, HugeGroundNextToSmallObjects) {
     EXPECT_LT(std::abs(s.p.y), s.offset);
     const V3 out = direction({0, 1, 0}, rng);
     const Vec3<float> leave = narrow(out);
-    const OneHit next = trace_one(accel, spawn_origin<float>(s, leave), leave);
+    const SingleRayHit next = trace_one(accel, spawn_origin<float>(s, leave), leave);
     EXPECT_NE(next.inst, 0u) << "hit the ground again";
     // A ray straight up hits the underside of the box.
     const Vec3<float> up{0, 1, 0};
-    const OneHit above = trace_one(accel, spawn_origin<float>(s, up), up);
+    const SingleRayHit above = trace_one(accel, spawn_origin<float>(s, up), up);
     if (i % 2 && std::hypot(s.p.x - 12, s.p.z + 7) < 0.45) {
       EXPECT_EQ(above.inst, 1u) << "light leaks under the box";
       ++covered;
@@ -476,8 +476,9 @@ TEST(Facing, BentNormalsAreSeenAndMirrorWhatIsAboveTheSurface) {
             dir - ng * (dot(dir, ng) * (1 - std::pow(10.f, -0.001f * static_cast<float>(i)))));
       if (std::abs(dot(dir, ng)) < 1e-6f || dot(n, ng) < 0.05f) continue;
       const Vec3<F> facing = facing_normal<F>(all(dir), all(ng), all(n));
-      const Vec3<F> bent = reflecting_normal<F>(all(dir), all(ng), facing);
-      const V3 w = -1.0 * wide(dir), b{lane(bent.x, 0), lane(bent.y, 0), lane(bent.z, 0)};
+      const Vec3<F> adjusted = reflecting_normal<F>(all(dir), all(ng), facing);
+      const V3 w = -1.0 * wide(dir),
+               b{lane(adjusted.x, 0), lane(adjusted.y, 0), lane(adjusted.z, 0)};
       const double side = dot3(w, wide(ng)) > 0 ? 1 : -1, c = side * dot3(w, wide(ng));
       const V3 mirrored = 2 * dot3(w, b) * b - w;
       EXPECT_NEAR(dot3(b, b), 1, 1e-5);

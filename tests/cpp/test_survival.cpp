@@ -18,7 +18,7 @@ class AbsurdField {
  public:
   AbsurdField(const Scene& scene, uint32_t seed) : random_(seed) {
     const Bounds& b = scene.bounds();
-    const GuideGrid grid({b.lo.x, b.lo.y, b.lo.z}, {b.hi.x, b.hi.y, b.hi.z});
+    const GuidingGrid grid({b.lo.x, b.lo.y, b.lo.z}, {b.hi.x, b.hi.y, b.hi.z});
     std::vector<TrainingRecord> records;
     const auto between = [&](float lo, float hi) { return lo + (hi - lo) * random_(); };
     for (int i = 0; i < 20000; ++i) {
@@ -26,16 +26,16 @@ class AbsurdField {
       r.p[0] = between(b.lo.x, b.hi.x);
       r.p[1] = between(b.lo.y, b.hi.y);
       r.p[2] = between(b.lo.z, b.hi.z);
-      r.axis = static_cast<uint8_t>(random_.bits() % kGuideAxes);
+      r.axis = static_cast<uint8_t>(random_.bits() % kGuidingAxes);
       const Vec3<float> w = octahedral_direction<float>(0.2f * random_(), 0.1f);
       r.wi[0] = w.x, r.wi[1] = w.y, r.wi[2] = w.z;
-      r.nearness = random_();
+      r.inverse_distance = random_();
       r.value = random_() * random_() * random_();
       r.pdf = r.bsdf_pdf = 1;
       records.push_back(r);
     }
-    field_ = std::make_unique<GuideField>(grid, records, scene.materials().size(), true, true,
-                                          size_t{64} << 20);
+    field_ = std::make_unique<GuidingField>(grid, records, scene.materials().size(), true, true,
+                                            size_t{64} << 20);
     view_ = field_->view();
     const auto absurd = [&] { return std::exp(between(-4.f, 4.f)); };
     for (uint32_t i = 0; i < field_->facts().regions; ++i) survival_.push_back(absurd());
@@ -45,13 +45,13 @@ class AbsurdField {
     view_.tile_rows = 16;
     view_.tiles_of_x = view_.tiles_of_y = 0.3f;
   }
-  const GuideView& view() const { return view_; }
+  const GuidingView& view() const { return view_; }
 
  private:
   Random random_;
-  std::unique_ptr<GuideField> field_;
+  std::unique_ptr<GuidingField> field_;
   std::vector<float> survival_, tiles_;
-  GuideView view_;
+  GuidingView view_;
 };
 
 Settings small_settings() {
@@ -73,7 +73,7 @@ TEST(Survival, IsOnePictureForAllSchedules) {
     WaveRun reference(scene, {s, kReferenceLanes, 1}, accel);
     reference.guide(absurd.view());
     reference.all(64);
-    const Picture expected = reference.picture();
+    const RenderedImage expected = reference.image();
     const Counts& counts = reference.reference_counts();
     for (const uint32_t lanes : lane_widths())
       for (const uint32_t wave_size : {64u, 1000u})
@@ -84,9 +84,9 @@ TEST(Survival, IsOnePictureForAllSchedules) {
           WaveRun run(scene, {s, lanes, traversal}, accel);
           run.guide(absurd.view());
           run.all(wave_size);
-          expect_same_picture(expected, run.picture(),
-                              std::to_string(lanes) + " lanes, waves of " +
-                                  std::to_string(wave_size) + ", policy " + policy);
+          expect_same_image(expected, run.image(),
+                            std::to_string(lanes) + " lanes, waves of " +
+                                std::to_string(wave_size) + ", policy " + policy);
           EXPECT_EQ(run.wave().counts.rays, counts.rays);
           if (testing::Test::HasFailure()) return;
         }
@@ -114,7 +114,7 @@ TEST(Survival, HasTheSameMeanForAbsurdCostsAndFields) {
         WaveRun run(scene, {own, lane_widths().back(), accel->native_width()}, accel);
         if (believes) run.guide(absurd.view());
         run.all(1024);
-        return mean_of(run.picture(), 1).mean;
+        return mean_of(run.image(), 1).mean;
       };
       plain.push_back(mean(false));
       believed.push_back(mean(true));
@@ -136,12 +136,12 @@ TEST(Survival, PathsWithoutRouletteTellOfItsMoments) {
     for (const double x : {0.0, 6.0}) {
       const PathStep path[] = {{1, 0.5, 0.5 * (2 + x / 3), 1, vertex},
                                {0.5, 1.0 / 6, x / 6, q, vertex}};
-      BounceWorth worth[2];
-      weigh_path(path, ray, 0, worth);
-      squared += worth[0].squared / 2;
-      cost += worth[0].cost / 2;
-      EXPECT_DOUBLE_EQ(worth[1].cost, ray);
-      EXPECT_DOUBLE_EQ(worth[1].squared, x * x / 9);
+      BounceMoments moments[2];
+      compute_path_moments(path, ray, 0, moments);
+      squared += moments[0].squared / 2;
+      cost += moments[0].cost / 2;
+      EXPECT_DOUBLE_EQ(moments[1].cost, ray);
+      EXPECT_DOUBLE_EQ(moments[1].squared, x * x / 9);
     }
     Random random(5);
     const int rounds = 400000;
@@ -159,14 +159,14 @@ TEST(Survival, PathsWithoutRouletteTellOfItsMoments) {
 
 /// A path that ends has no further cost; a truncated path has the given cost of its tail.
 TEST(Survival, EndsOfPathsHaveTheirCosts) {
-  BounceWorth worth[2];
+  BounceMoments moments[2];
   const PathStep ended[] = {{1, 0.5, 1, 1, 2}, {0.5, 0, 0, 0.5, 2}};
-  weigh_path(ended, 1, 7, worth);
-  EXPECT_DOUBLE_EQ(worth[1].cost, 0);
-  EXPECT_DOUBLE_EQ(worth[0].cost, 3);
+  compute_path_moments(ended, 1, 7, moments);
+  EXPECT_DOUBLE_EQ(moments[1].cost, 0);
+  EXPECT_DOUBLE_EQ(moments[0].cost, 3);
   const PathStep cut[] = {{1, 0.5, 1, 1, 2}};
-  weigh_path(cut, 1, 7, worth);
-  EXPECT_DOUBLE_EQ(worth[0].cost, 8);
+  compute_path_moments(cut, 1, 7, moments);
+  EXPECT_DOUBLE_EQ(moments[0].cost, 8);
 }
 
 }  // namespace

@@ -201,7 +201,7 @@ TEST(Texture, EveryTexelHasAPlaceInItsTile) {
           ASSERT_LT(at, taken.size());
           ASSERT_EQ(taken[at]++, 0) << x << ", " << y;
           const detail::LevelLanes<float> lanes = detail::broadcast_level<float>(level);
-          ASSERT_EQ(detail::texel_place<float>(lanes, x, y), at);
+          ASSERT_EQ(detail::texel_offset<float>(lanes, x, y), at);
           ASSERT_EQ(at / 64, texel_index(level, x / 8 * 8, y / 8 * 8) / 64);  // one tile
         }
     }

@@ -33,12 +33,12 @@ constexpr size_t kSize = 700'001;  ///< size of a texture; not a multiple of the
 using State = TileQueue::State;
 
 /// Loads an absent tile, as the store does.
-void load(TileQueue& queue, uint32_t tile, size_t room) {
+void load(TileQueue& queue, uint32_t tile, size_t tile_limit) {
   queue.begin(tile);
   EXPECT_EQ(queue.state(tile), State::kLoading);
   uint32_t gone;
-  while (queue.resident() > room && queue.release(gone)) EXPECT_NE(gone, tile);
-  queue.end(tile, room);
+  while (queue.resident() > tile_limit && queue.release(gone)) EXPECT_NE(gone, tile);
+  queue.end(tile, tile_limit);
 }
 
 TEST(TileQueue, WhatCameFirstGoesFirst) {
@@ -116,7 +116,7 @@ size_t resident(const std::byte* at, size_t bytes) {
 class TileStoreTest : public testing::Test {
  protected:
   void SetUp() override {
-    WAVECOMB_NEEDS("userfaultfd", UserFaults::obstacle());
+    WAVECOMB_NEEDS("userfaultfd", UserFaults::unsupported_reason());
     store = std::make_unique<TileStore>(kLimit, testing::TempDir());
   }
   const std::byte* add(uint32_t seed) {
@@ -190,8 +190,8 @@ TEST_F(TileStoreTest, ManyReadersSeeAllOfItWithinTheLimit) {
 TEST_F(TileStoreTest, GridsLeaveLessForTextures) {
   constexpr size_t kGrid = 900'000;
   const int grid = 0, other = 0;
-  store->keep_grid(&grid, kGrid);
-  store->keep_grid(&grid, kGrid);
+  store->register_grid(&grid, kGrid);
+  store->register_grid(&grid, kGrid);
   add(0);
   EXPECT_EQ(store->statistics().file_bytes, 0u);
   add(1);  // fits into the limit, except for the grid
@@ -203,13 +203,13 @@ TEST_F(TileStoreTest, GridsLeaveLessForTextures) {
   EXPECT_EQ(store->statistics().grid_bytes, kGrid);
   EXPECT_LE(all_resident() + kGrid, kLimit);
   // A later grid makes room for itself, down to a few tiles if it is larger than the limit.
-  store->keep_grid(&other, 10 * kLimit);
+  store->register_grid(&other, 10 * kLimit);
   EXPECT_LE(all_resident(), 32 * TileStore::kTileBytes);
   read_all();
-  store->drop_grid(&other);
-  store->drop_grid(&grid);
+  store->unregister_grid(&other);
+  store->unregister_grid(&grid);
   EXPECT_EQ(store->statistics().grid_bytes, kGrid);
-  store->drop_grid(&grid);
+  store->unregister_grid(&grid);
   EXPECT_EQ(store->statistics().grid_bytes, 0u);
   read_all();
   EXPECT_GT(all_resident(), kLimit / 2);

@@ -23,11 +23,11 @@ constexpr uint64_t kRays = 100'000, kRecords = 50'000;
 
 /// Makes a pilot render of brightness 1 plus `light` found by light paths, with the given standard
 /// deviations of noise. Light paths cost the same as camera paths.
-TransportTrial trial(uint32_t seed, LightPathShare share, float camera_noise, float light_noise,
+TransportPilot pilot(uint32_t seed, LightPathShare share, float camera_noise, float light_noise,
                      float light) {
   std::mt19937 rng(seed);
   std::normal_distribution<float> noise;
-  TransportTrial out;
+  TransportPilot out;
   out.rays = static_cast<uint64_t>(kRays * (1 + share.paths()));
   out.records = static_cast<uint64_t>(kRecords * (1 + share.paths()));
   for (uint32_t i = 0; i < kSide * kSide; ++i) {
@@ -43,15 +43,15 @@ TransportTrial trial(uint32_t seed, LightPathShare share, float camera_noise, fl
 
 /// Makes pilots for all ratios. `left` is the standard deviation over eight samples of a pixel of
 /// the light that light paths find.
-TransportTrials trials_of(float left, float camera_noise, float light_noise, float light) {
-  TransportTrials trials;
-  for (size_t k = 0; k < kTriedShares.size(); ++k)
+TransportPilots trials_of(float left, float camera_noise, float light_noise, float light) {
+  TransportPilots pilots;
+  for (size_t k = 0; k < kCandidateShares.size(); ++k)
     for (uint32_t seed = 0; seed < 2; ++seed)
-      trials.with[k][seed] = trial(2 * static_cast<uint32_t>(k) + seed, kTriedShares[k],
+      pilots.with[k][seed] = pilot(2 * static_cast<uint32_t>(k) + seed, kCandidateShares[k],
                                    camera_noise, light_noise, light);
-  trials.variance.assign(kSide * kSide, 8.0 * left * left);
-  trials.width = kSide;
-  return trials;
+  pilots.variance.assign(kSide * kSide, 8.0 * left * left);
+  pilots.width = kSide;
+  return pilots;
 }
 
 TransportGain gain_of(float left, float camera_noise, float light_noise, float light = 1,
@@ -75,10 +75,10 @@ TEST(TransportGain, IsTheRatioOfVariancesByCosts) {
 }
 
 TEST(TransportGain, CountsWhatMergingCosts) {
-  TransportTrials trials = trials_of(0.1f, 0.1f, 0.1f, 1);
-  const double gain = transport_gain(trials, 8).gain;
-  trials.merges = true;
-  EXPECT_LT(transport_gain(trials, 8).gain, 0.97 * gain);
+  TransportPilots pilots = trials_of(0.1f, 0.1f, 0.1f, 1);
+  const double gain = transport_gain(pilots, 8).gain;
+  pilots.merges = true;
+  EXPECT_LT(transport_gain(pilots, 8).gain, 0.97 * gain);
 }
 
 TEST(TransportGain, TakesManyLightPathsWhereTheyAreTheNoise) {
@@ -88,11 +88,11 @@ TEST(TransportGain, TakesManyLightPathsWhereTheyAreTheNoise) {
 
 TEST(TransportGain, LooksPastTheNoisiestPixels) {
   const auto with_dots = [](uint32_t dots) {
-    TransportTrials trials = trials_of(0.3f, 0.05f, 0.05f, 0.5f);
-    for (auto& with : trials.with)
+    TransportPilots pilots = trials_of(0.3f, 0.05f, 0.05f, 0.5f);
+    for (auto& with : pilots.with)
       for (uint32_t seed = 0; seed < 2; ++seed)
         for (uint32_t i = 0; i < dots; ++i) with[seed].beauty[3 * (i * 97 + seed)] += 500;
-    return transport_gain(trials, 8).gain;
+    return transport_gain(pilots, 8).gain;
   };
   EXPECT_GT(with_dots(0), 3);
   EXPECT_NEAR(with_dots(3), with_dots(0), 0.3 * with_dots(0)) << "six of 1,024 pixels";
@@ -129,7 +129,7 @@ TEST(CameraSquares, AreTheVarianceOfCameraPaths) {
   s.sampler = SamplerKind::kIndependent;
   s.spp = kSanitized ? 2048 : 32'768;
   s.error = true;
-  const Picture path = renderer.render(s);
+  const RenderedImage path = renderer.render(s);
   double known = 0;
   for (size_t i = 0; i < path.beauty.size(); ++i)
     known += double{path.variance[i]} * s.spp + double{path.beauty[i]} * double{path.beauty[i]};
@@ -139,7 +139,7 @@ TEST(CameraSquares, AreTheVarianceOfCameraPaths) {
   s.spp = 1024;
   RenderOptions options;
   options.wants_camera_squares = true;
-  const Picture told = renderer.render(s, options);
+  const RenderedImage told = renderer.render(s, options);
   double sum = 0;
   for (const float v : layer(told, "by_light_paths").values) sum += double{v};
   sum *= double{scene_brightness(*scene)};

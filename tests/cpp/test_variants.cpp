@@ -16,7 +16,7 @@ using namespace scene_testing;
 using namespace wave_testing;
 
 std::string variant_of(const Material& m, const GraphSet& graphs = {}) {
-  return kVariants[least_variant(m.program, parts_of(m, graphs, {}))].name;
+  return kVariants[cheapest_variant(m.program, parts_of(m, graphs, {}))].name;
 }
 
 /// Makes a material of a program, modified by `edit`.
@@ -74,7 +74,7 @@ TEST(Variants, MaterialsGetTheLeastThatShowsAll) {
   full([](Material& m) { m.openpbr.thin_walled = true, m.openpbr.subsurface_weight = 0.5f; });
 
   for (uint32_t p = 0; p < kProgramCount; ++p) {
-    EXPECT_EQ(least_variant(static_cast<ProgramId>(p), kAllParts), p);
+    EXPECT_EQ(cheapest_variant(static_cast<ProgramId>(p), kAllParts), p);
     EXPECT_STREQ(kVariants[p].name, kProgramNames[p]);
   }
 }
@@ -103,18 +103,18 @@ TEST(Variants, WhatAGraphDrivesMayBeAnything) {
 /// Spheres with all variants, two materials each, in front of a wall.
 ScenePtr all_variants() {
   SceneBuilder b;
-  const uint32_t picture = add_texture(b, 8, 8, 3, random_texels(64 * 3, 0.1f, 0.9f, 1));
+  const uint32_t image = add_texture(b, 8, 8, 3, random_texels(64 * 3, 0.1f, 0.9f, 1));
   std::vector<uint32_t> ids;
   for (uint32_t v = 0; v < kVariantCount; ++v) {
     if (static_cast<uint32_t>(program_of(v)) >= kSurfaceProgramCount) continue;
     for (const float roughness : {0.f, 0.4f}) {
       Material m = make_material(program_of(v), {0.7f, 0.5f, 0.4f}, roughness);
       const uint32_t parts = kVariants[v].parts;
-      if ((parts & kVaries) != 0) at(m, Input::kBaseColor) = use(picture);
-      if ((parts & kMetals) != 0) m.metallic = 0.4f;
-      if ((parts & kCoats) != 0) m.clearcoat = 0.5f;
-      if ((parts & kGlows) != 0) m.emission = {0.1f, 0.2f, 0.1f};
-      if ((parts & kPasses) != 0) m.opacity = 0.6f, m.openpbr.transmission_weight = 0.4f;
+      if ((parts & kTexturePart) != 0) at(m, Input::kBaseColor) = use(image);
+      if ((parts & kMetalPart) != 0) m.metallic = 0.4f;
+      if ((parts & kCoatPart) != 0) m.clearcoat = 0.5f;
+      if ((parts & kEmissionPart) != 0) m.emission = {0.1f, 0.2f, 0.1f};
+      if ((parts & kTransmissionPart) != 0) m.opacity = 0.6f, m.openpbr.transmission_weight = 0.4f;
       ids.push_back(b.add_material(m));
     }
   }
@@ -150,7 +150,7 @@ TEST(Variants, NoVariantShowsInThePicture) {
   for (const uint32_t lanes : lane_widths()) {
     WaveRun run(scene, {s, lanes, 1}, accel);
     run.all(4096);
-    expect_same_picture(reference.picture(), run.picture(), std::to_string(lanes) + " lanes");
+    expect_same_image(reference.image(), run.image(), std::to_string(lanes) + " lanes");
   }
 }
 
@@ -165,7 +165,7 @@ TEST(Variants, NoneShowsWhereLightIsJoined) {
   for (const Transport transport : {Transport::kLight, Transport::kBdpt}) {
     s.transport = transport;
     s.integrator = IntegratorKind::kReference;
-    const Picture reference = renderer.render(s);
+    const RenderedImage reference = renderer.render(s);
     s.integrator = IntegratorKind::kWavefront;
     for (const char* policy : {"program", "none"}) {
       s.policy = policy;

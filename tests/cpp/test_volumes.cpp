@@ -76,7 +76,7 @@ TEST_P(OnePicture, WhateverRendersIt) {
                  Aov::kCryptoObject | Aov::kMaterialId;
   WaveRun reference(scene, {s}, accel);
   reference.all(64);
-  const Picture expected = reference.picture();
+  const RenderedImage expected = reference.image();
   EXPECT_GT(mean_of(expected).mean, 0.01);
   for (const uint32_t lanes : lane_widths())
     for (const uint32_t wave_size : {48u, 4096u})
@@ -85,9 +85,9 @@ TEST_P(OnePicture, WhateverRendersIt) {
         s.materialize = wave_size == 48 ? Materialize::kOff : Materialize::kOn;
         WaveRun run(scene, {s, lanes, accel->native_width()}, accel);
         run.all(wave_size);
-        expect_same_picture(expected, run.picture(),
-                            std::to_string(lanes) + " lanes, waves of " +
-                                std::to_string(wave_size) + ", policy " + policy);
+        expect_same_image(expected, run.image(),
+                          std::to_string(lanes) + " lanes, waves of " + std::to_string(wave_size) +
+                              ", policy " + policy);
       }
 }
 
@@ -120,7 +120,7 @@ TEST(Volumes, FurnaceGainsAndLosesNothing) {
     WaveRun run(b.build(), {s, lane_widths().back(), 1});
     run.all(4096);
     for (size_t c = 0; c < 3; ++c) {
-      const Mean m = mean_of(run.picture(), c);
+      const Mean m = mean_of(run.image(), c);
       EXPECT_NEAR(m.mean, 1, 4.2 * m.error + 1e-4) << anisotropy;
       EXPECT_LT(4.2 * m.error, kSanitized ? 0.5 : 0.03) << "too noisy to tell";
     }

@@ -17,7 +17,7 @@ TEST(Watch, WorkThatIsQuickIsNotLookedAt) {
   int looks = 0;
   bool done = false;
   Watch watch;
-  watch.run([&] { done = true; }, [&] { return ++looks, Request::kGoOn; }, {});
+  watch.run([&] { done = true; }, [&] { return ++looks, Request::kContinue; }, {});
   EXPECT_TRUE(done);
   EXPECT_EQ(looks, 0);
   EXPECT_FALSE(watch.stopped());
@@ -44,7 +44,7 @@ TEST(Watch, AnotherThreadStopsWorkWithoutWaitingForALook) {
       [&] {
         while (!watch.halted()) std::this_thread::sleep_for(1ms);
       },
-      [] { return Request::kGoOn; }, {});
+      [] { return Request::kContinue; }, {});
   other.join();
   EXPECT_TRUE(watch.stopped());
 }
@@ -84,7 +84,7 @@ TEST(Watch, SnapshotsAreTakenWhileWorkStandsStill) {
           EXPECT_FALSE(watch.halted());  // requests take effect at the next step
         }
       },
-      [&] { return told > last ? Request::kSnapshot : Request::kGoOn; },
+      [&] { return told > last ? Request::kSnapshot : Request::kContinue; },
       [&] {
         const uint64_t before = steps;
         std::this_thread::sleep_for(10ms);
@@ -98,7 +98,7 @@ TEST(Watch, SnapshotsAreTakenWhileWorkStandsStill) {
 
 TEST(Watch, RestReturnsWhereNothingIsWanted) {
   Watch watch;
-  watch.run([&] { watch.rest(); }, [] { return Request::kGoOn; }, {});
+  watch.run([&] { watch.rest(); }, [] { return Request::kContinue; }, {});
 }
 
 TEST(Watch, WhatIsThrownComesOut) {
@@ -107,11 +107,11 @@ TEST(Watch, WhatIsThrownComesOut) {
     watch.rest();
     while (!watch.stopped()) std::this_thread::sleep_for(1ms);
   };
-  Watch work, look, snapshot;
+  Watch work, poll, snapshot;
   EXPECT_THROW(
-      work.run([] { throw std::runtime_error("work"); }, [] { return Request::kGoOn; }, {}),
+      work.run([] { throw std::runtime_error("work"); }, [] { return Request::kContinue; }, {}),
       std::runtime_error);
-  EXPECT_THROW(look.run([&] { until_halted(look); },
+  EXPECT_THROW(poll.run([&] { until_halted(poll); },
                         []() -> Request { throw std::logic_error("look"); }, {}),
                std::logic_error);
   EXPECT_THROW(snapshot.run([&] { until_halted(snapshot); }, [] { return Request::kSnapshot; },

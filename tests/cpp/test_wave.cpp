@@ -12,17 +12,17 @@ namespace {
 using namespace scene_testing;
 using namespace wave_testing;
 
-Picture reference(const ScenePtr& scene, const Settings& settings,
-                  const std::shared_ptr<const EmbreeAccelerator>& accel) {
+RenderedImage reference(const ScenePtr& scene, const Settings& settings,
+                        const std::shared_ptr<const EmbreeAccelerator>& accel) {
   WaveRun run(scene, {settings, kReferenceLanes, 1}, accel);
   run.all(64);
-  return run.picture();
+  return run.image();
 }
 
 /// Expects all schedules to give the image of the reference integrator.
-void expect_one_picture(const ScenePtr& scene, Settings settings) {
+void expect_one_image(const ScenePtr& scene, Settings settings) {
   const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 2u);
-  const Picture expected = reference(scene, settings, accel);
+  const RenderedImage expected = reference(scene, settings, accel);
   double light = 0;
   for (const float x : expected.beauty) {
     ASSERT_TRUE(std::isfinite(x));
@@ -39,10 +39,10 @@ void expect_one_picture(const ScenePtr& scene, Settings settings) {
           const uint32_t traversal = lanes == 1 ? 1 : std::min(lanes, accel->native_width());
           WaveRun run(scene, {settings, lanes, traversal}, accel);
           run.all(wave_size, wave_size == 256 ? 3 : 16);
-          expect_same_picture(expected, run.picture(),
-                              std::to_string(lanes) + " lanes, waves of " +
-                                  std::to_string(wave_size) + ", policy " + policy +
-                                  (materialize == Materialize::kOn ? ", materialized" : ""));
+          expect_same_image(expected, run.image(),
+                            std::to_string(lanes) + " lanes, waves of " +
+                                std::to_string(wave_size) + ", policy " + policy +
+                                (materialize == Materialize::kOn ? ", materialized" : ""));
           if (testing::Test::HasFailure()) return;
         }
 }
@@ -57,34 +57,33 @@ Settings small_settings() {
 }
 
 TEST(Wave, DiffuseBoxIsOnePicture) {
-  expect_one_picture(cornell(), small_settings());
+  expect_one_image(cornell(), small_settings());
 }
 TEST(Wave, AllProgramsAreOnePicture) {
-  expect_one_picture(mixed(), small_settings());
+  expect_one_image(mixed(), small_settings());
 }
 TEST(Wave, EmissiveMeshesAreOnePicture) {
-  expect_one_picture(emissive_meshes(), small_settings());
+  expect_one_image(emissive_meshes(), small_settings());
 }
 TEST(Wave, LightsByTreeAreOnePicture) {
   Settings s = small_settings();
   s.light_selection = LightSelection::kTree;
   s.width = s.height = 19;
-  for (const ScenePtr& scene : {cornell(), mixed(), emissive_meshes()})
-    expect_one_picture(scene, s);
+  for (const ScenePtr& scene : {cornell(), mixed(), emissive_meshes()}) expect_one_image(scene, s);
 }
 TEST(Wave, PresenceIsOnePicture) {
-  expect_one_picture(presence(), small_settings());
+  expect_one_image(presence(), small_settings());
 }
 
 TEST(Wave, CurvesAndPointsAreOnePicture) {
-  expect_one_picture(curve_testing::hairy(), small_settings());
+  expect_one_image(curve_testing::hairy(), small_settings());
 }
 
 TEST(Wave, EverySettingIsOnePicture) {
   Settings s = small_settings();
   s.width = s.height = 13;
   s.cosine_sampling = true;
-  expect_one_picture(mixed(), s);
+  expect_one_image(mixed(), s);
   s = small_settings();
   s.width = s.height = 13;
   s.sampler = SamplerKind::kIndependent;
@@ -94,14 +93,14 @@ TEST(Wave, EverySettingIsOnePicture) {
   s.schlick_fresnel = true;
   s.clamp_indirect = 0.3f;
   s.seed = 99;
-  expect_one_picture(mixed(), s);
+  expect_one_image(mixed(), s);
 }
 
 TEST(Wave, EveryPolicyIsOnePicture) {
   for (const ScenePtr& scene : {mixed(), presence()}) {
     const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 2u);
     Settings s = small_settings();
-    const Picture expected = reference(scene, s, accel);
+    const RenderedImage expected = reference(scene, s, accel);
     for (const std::string& policy : policy_names())
       for (const uint32_t wave_size : {64u, 1500u})
         for (const Materialize materialize : {Materialize::kOff, Materialize::kOn}) {
@@ -109,7 +108,7 @@ TEST(Wave, EveryPolicyIsOnePicture) {
           s.materialize = materialize;
           WaveRun run(scene, {s, lane_widths().back(), accel->native_width()}, accel);
           run.all(wave_size);
-          expect_same_picture(expected, run.picture(), "policy " + policy);
+          expect_same_image(expected, run.image(), "policy " + policy);
         }
   }
 }
@@ -118,7 +117,7 @@ TEST(Wave, RayOrdersDoNotShow) {
   for (const ScenePtr& scene : {mixed(), presence()}) {
     const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 2u);
     Settings s = small_settings();
-    const Picture expected = reference(scene, s, accel);
+    const RenderedImage expected = reference(scene, s, accel);
     for (const uint32_t lanes : lane_widths())
       for (const RayOrder bounce : {RayOrder::kSlot, RayOrder::kMorton, RayOrder::kMortonOctant,
                                     RayOrder::kDirection, RayOrder::kAuto})
@@ -128,9 +127,9 @@ TEST(Wave, RayOrdersDoNotShow) {
           s.shadow_order = shadow;
           WaveRun run(scene, {s, lanes, lanes == 1 ? 1 : accel->native_width()}, accel);
           run.all(700);
-          expect_same_picture(expected, run.picture(),
-                              "ray orders " + std::to_string(static_cast<int>(bounce)) + ", " +
-                                  std::to_string(static_cast<int>(shadow)));
+          expect_same_image(expected, run.image(),
+                            "ray orders " + std::to_string(static_cast<int>(bounce)) + ", " +
+                                std::to_string(static_cast<int>(shadow)));
         }
   }
 }
@@ -139,11 +138,11 @@ TEST(Wave, PacketsOfRaysDoNotShow) {
   const ScenePtr scene = mixed();
   const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 2u);
   const Settings s = small_settings();
-  const Picture expected = reference(scene, s, accel);
+  const RenderedImage expected = reference(scene, s, accel);
   for (const uint32_t traversal : {1u, 4u, 8u, 16u}) {
     WaveRun run(scene, {s, lane_widths().back(), traversal}, accel);
     run.all(1000);
-    expect_same_picture(expected, run.picture(), "packets of " + std::to_string(traversal));
+    expect_same_image(expected, run.image(), "packets of " + std::to_string(traversal));
   }
 }
 
@@ -157,12 +156,12 @@ TEST(Wave, LargeWaves) {
   s.height = 65;
   s.spp = 16;
   s.max_depth = 3;
-  const Picture expected = reference(scene, s, accel);
+  const RenderedImage expected = reference(scene, s, accel);
   for (const char* policy : {"none", "program"}) {
     s.policy = policy;
     WaveRun run(scene, {s, lane_widths().back(), accel->native_width()}, accel);
     run.all(65536);
-    expect_same_picture(expected, run.picture(), std::string("65536 paths, policy ") + policy);
+    expect_same_image(expected, run.image(), std::string("65536 paths, policy ") + policy);
   }
 }
 
@@ -176,17 +175,17 @@ TEST(Wave, ThreadsDoNotShow) {
       s.threads = 1;
       s.integrator = IntegratorKind::kReference;
       // Without a renderer, lights have their shares by power.
-      const Picture expected =
+      const RenderedImage expected =
           weights == LightWeights::kPower ? reference(scene, s, accel) : renderer.render(s);
       for (const uint32_t threads : {1u, 2u, 3u}) {
         s.threads = threads;
         s.integrator = IntegratorKind::kWavefront;
         for (const uint32_t wave_size : {0u, 64u, 4096u}) {
           s.wave_size = wave_size;
-          expect_same_picture(expected, renderer.render(s), std::to_string(threads) + " threads");
+          expect_same_image(expected, renderer.render(s), std::to_string(threads) + " threads");
         }
         s.integrator = IntegratorKind::kReference;
-        expect_same_picture(expected, renderer.render(s), "reference, threads");
+        expect_same_image(expected, renderer.render(s), "reference, threads");
       }
     }
   }
@@ -220,12 +219,12 @@ TEST(Wave, EdgeCases) {
     s.height = c.height;
     s.spp = c.spp;
     s.max_depth = c.max_depth;
-    const Picture expected = reference(c.scene, s, accel);
+    const RenderedImage expected = reference(c.scene, s, accel);
     for (const uint32_t lanes : lane_widths())
       for (const uint32_t wave_size : {64u, 1000u}) {
         WaveRun run(c.scene, {s, lanes, lanes == 1 ? 1 : accel->native_width()}, accel);
         run.all(wave_size);
-        expect_same_picture(expected, run.picture(), std::to_string(lanes) + " lanes");
+        expect_same_image(expected, run.image(), std::to_string(lanes) + " lanes");
       }
     EXPECT_EQ(expected.samples, std::vector<uint32_t>(size_t{c.width} * c.height, c.spp));
     for (size_t i = 0; i < expected.beauty.size(); ++i) {
@@ -246,18 +245,18 @@ TEST(Wave, EdgeCases) {
 TEST(Wave, DepthZeroSeesEmittersOnly) {
   Settings s = small_settings();
   s.max_depth = 0;
-  const Picture picture = WavefrontRenderer(cornell()).render(s);
+  const RenderedImage image = WavefrontRenderer(cornell()).render(s);
   size_t lit = 0;
-  for (size_t i = 0; i < picture.depth.size(); ++i) {
+  for (size_t i = 0; i < image.depth.size(); ++i) {
     // The light's red is 12; some of a pixel's five samples see it.
-    const double seen = picture.beauty[3 * i] / 12.0 * s.spp;
+    const double seen = image.beauty[3 * i] / 12.0 * s.spp;
     EXPECT_NEAR(seen, std::round(seen), 1e-4);
     lit += seen > 0;
   }
   EXPECT_GT(lit, 0u);
-  EXPECT_LT(lit, picture.depth.size() / 4);
-  const Picture lamps = WavefrontRenderer(emissive_meshes()).render(s);
-  EXPECT_GT(*std::max_element(lamps.beauty.begin(), lamps.beauty.end()), 1);
+  EXPECT_LT(lit, image.depth.size() / 4);
+  const RenderedImage distance_lights = WavefrontRenderer(emissive_meshes()).render(s);
+  EXPECT_GT(*std::max_element(distance_lights.beauty.begin(), distance_lights.beauty.end()), 1);
 }
 
 Settings with_all_aovs() {
@@ -269,12 +268,12 @@ Settings with_all_aovs() {
 
 TEST(Wave, AllAovsAreOnePicture) {
   Settings s = with_all_aovs();
-  expect_one_picture(mixed(), s);
-  expect_one_picture(emissive_meshes(), s);
+  expect_one_image(mixed(), s);
+  expect_one_image(emissive_meshes(), s);
   s.clamp_indirect = 0.05f;
   s.roulette = RouletteKind::kCostAware;
   s.roulette_depth = 0;
-  expect_one_picture(mixed(), s);
+  expect_one_image(mixed(), s);
 }
 
 TEST(Wave, PartsAndLightGroupsAddUp) {
@@ -282,7 +281,7 @@ TEST(Wave, PartsAndLightGroupsAddUp) {
     for (const float clamp : {0.f, 0.05f}) {
       Settings s = with_all_aovs();
       s.clamp_indirect = clamp;
-      const Picture p = WavefrontRenderer(scene).render(s);
+      const RenderedImage p = WavefrontRenderer(scene).render(s);
       std::vector<double> groups(p.beauty.size());
       std::vector<double> lit(scene->light_groups().size());
       for (size_t g = 0; g < lit.size(); ++g) {
@@ -314,10 +313,10 @@ TEST(Wave, PartsAndLightGroupsAddUp) {
 TEST(Wave, OneLightGroupByName) {
   Settings s = small_settings();
   s.aovs.bits = static_cast<uint32_t>(Aov::kLightGroups);
-  const Picture all = WavefrontRenderer(mixed()).render(s);
+  const RenderedImage all = WavefrontRenderer(mixed()).render(s);
   EXPECT_TRUE(all.albedo.empty());
   s.light_groups = {"sun"};
-  const Picture one = WavefrontRenderer(mixed()).render(s);
+  const RenderedImage one = WavefrontRenderer(mixed()).render(s);
   ASSERT_EQ(one.aovs.size(), 1u);
   expect_same_bits(one.aovs[0].values, layer(all, "light_sun").values, "sun");
   s.light_groups = {"moon"};
@@ -339,7 +338,7 @@ TEST(Wave, IdsAndPlacesOfASimpleScene) {
   b.set_camera(make_camera({0, 0, 2}, {0, 0, 0}));
   const Settings s = with_all_aovs();
   const ScenePtr scene = b.build();
-  const Picture p = WavefrontRenderer(scene).render(s);
+  const RenderedImage p = WavefrontRenderer(scene).render(s);
   const std::vector<float>&position = layer(p, "position").values, &uv = layer(p, "uv").values;
   const std::vector<float>& pairs = layer(p, "crypto_material").values;
   for (size_t i = 0; i < p.depth.size(); ++i) {
@@ -364,7 +363,7 @@ TEST(Wave, AovsOfASimpleScene) {
   const uint32_t red = b.add_material(make_material(ProgramId::kDiffuse, {0.8f, 0.2f, 0.1f}));
   b.add_to_group(0, b.add_mesh(make_mesh(quad({-9, -9, -3}, {18, 0, 0}, {0, 18, 0}), red)));
   b.set_camera(make_camera({0, 0, 2}, {0, 0, 0}));
-  const Picture p = WavefrontRenderer(b.build()).render(small_settings());
+  const RenderedImage p = WavefrontRenderer(b.build()).render(small_settings());
   for (size_t i = 0; i < p.depth.size(); ++i) {
     EXPECT_NEAR(p.depth[i], 5, 1e-5);  // along the camera's axis, at every pixel
     EXPECT_FLOAT_EQ(p.albedo[3 * i], 0.8f);

@@ -99,18 +99,18 @@ class WaveRun {
     return wavecomb::time_material<W>(*wave_, context_, hits);
   }
 
-  Picture picture() const {
-    Film::Layers layers = Film(film_).finish(aovs_.kept_names);
-    Picture picture;
-    picture.width = case_.settings.width;
-    picture.height = case_.settings.height;
-    picture.beauty = std::move(layers.beauty);
-    picture.albedo = std::move(layers.albedo);
-    picture.normal = std::move(layers.normal);
-    picture.depth = std::move(layers.depth);
-    picture.samples = std::move(layers.samples);
-    picture.aovs = std::move(layers.aovs);
-    return picture;
+  RenderedImage image() const {
+    Film::Layers layers = Film(film_).finish(aovs_.layer_names);
+    RenderedImage image;
+    image.width = case_.settings.width;
+    image.height = case_.settings.height;
+    image.beauty = std::move(layers.beauty);
+    image.albedo = std::move(layers.albedo);
+    image.normal = std::move(layers.normal);
+    image.depth = std::move(layers.depth);
+    image.samples = std::move(layers.samples);
+    image.aovs = std::move(layers.aovs);
+    return image;
   }
   const Wave& wave() const { return *wave_; }
   /// Allocates buffers for waves of `size` paths.
@@ -123,7 +123,7 @@ class WaveRun {
   }
   const WaveContext& context() const { return context_; }
   /// Enables guiding. Contract: call before reserve; the field must outlive the run.
-  void guide(const GuideView& view) { context_.guide = &view; }
+  void guide(const GuidingView& view) { context_.guide = &view; }
   Film& film() { return film_; }
   const Counts& reference_counts() const { return *reference_->worker(0).counts; }
 

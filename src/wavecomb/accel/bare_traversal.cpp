@@ -10,7 +10,7 @@
 namespace wavecomb {
 namespace {
 
-constexpr float kForever = std::numeric_limits<float>::infinity();
+constexpr float kUnbounded = std::numeric_limits<float>::infinity();
 
 /// Embree types and functions for packets of W rays.
 template <uint32_t W>
@@ -80,11 +80,11 @@ void load(Ray& ray, const RaySpan& rays, size_t base) {
   if (rays.tfar)
     std::memcpy(first(ray.tfar), rays.tfar + base, 4 * W);
   else
-    std::fill_n(first(ray.tfar), W, kForever);
+    std::fill_n(first(ray.tfar), W, kUnbounded);
 }
 
 template <typename Arguments>
-void ask(Arguments& args, bool coherent) {
+void query(Arguments& args, bool coherent) {
   args.flags = coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
 }
 
@@ -107,7 +107,7 @@ template <uint32_t W>
 size_t intersect_all(RTCScene scene, const RaySpan& rays, bool coherent) {
   RTCIntersectArguments args;
   rtcInitIntersectArguments(&args);
-  ask(args, coherent);
+  query(args, coherent);
   alignas(64) typename Packet<W>::RayHit rh{};
   prepare<W>(rh.ray);
   return for_each_packet<W>(rays.size, [&](size_t base, uint32_t n, const int* valid) {
@@ -125,7 +125,7 @@ template <uint32_t W>
 size_t occluded_all(RTCScene scene, const RaySpan& rays, bool coherent) {
   RTCOccludedArguments args;
   rtcInitOccludedArguments(&args);
-  ask(args, coherent);
+  query(args, coherent);
   alignas(64) decltype(Packet<W>::RayHit::ray) ray{};
   prepare<W>(ray);
   return for_each_packet<W>(rays.size, [&](size_t base, uint32_t n, const int* valid) {

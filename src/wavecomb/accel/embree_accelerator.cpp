@@ -63,7 +63,7 @@ bool is_mostly_hair(const Scene& scene) {
   size_t segments = 0, all = 0;
   for (const Mesh& mesh : scene.meshes()) {
     all += mesh.primitive_count();
-    if (CurveClumps::serve(mesh)) segments += mesh.primitive_count();
+    if (CurveBvhNodes::supports(mesh)) segments += mesh.primitive_count();
   }
   return 2 * segments > all;
 }

@@ -50,7 +50,7 @@ struct PresenceKeys {
   /// for all geometry. Null without light linking.
   const uint32_t* shadow_set = nullptr;
   uint32_t shadow_stride = 0;
-  uint32_t ray_kind = kSeenByCamera;  ///< a RayVisibility flag
+  uint32_t ray_kind = kVisibleToCamera;  ///< a RayVisibility flag
   /// object_of() of the only object that each ray can hit, with the stride of the hashes. Such rays
   /// hit no lights. Null: rays hit all objects.
   const uint32_t* object = nullptr;

@@ -19,7 +19,7 @@ struct CurveGeometry {
   bool is_fibre;     ///< rays hit it from outside only
   /// Curve BVH nodes that are Embree's primitives. Null for points and deforming curves, whose
   /// primitives are passed individually.
-  std::unique_ptr<const CurveClumps> clumps;
+  std::unique_ptr<const CurveBvhNodes> nodes;
 };
 
 /// Creates and commits a geometry for a mesh of curves or points. The caller releases it.

@@ -43,7 +43,7 @@ struct EmbreeDevice {
 
 namespace {
 
-void both_at_once(const CurveClumps::Task& a, const CurveClumps::Task& b) {
+void run_in_parallel(const CurveBvhNodes::Task& a, const CurveBvhNodes::Task& b) {
   const TaskOrder order;
   const auto one = [&](size_t i) { i == 0 ? a() : b(); };
   tbb::parallel_for(size_t{0}, size_t{2}, order.around(one));
@@ -97,10 +97,10 @@ RTCDevice EmbreeHierarchy::device() const {
 }
 
 size_t EmbreeHierarchy::bytes() const {
-  size_t clumps = 0;
+  size_t nodes = 0;
   for (const auto& [mesh, curves] : curves_)
-    if (curves->clumps) clumps += curves->clumps->bytes();
-  return static_cast<size_t>(std::max<int64_t>(0, device_->bytes)) + clumps;
+    if (curves->nodes) nodes += curves->nodes->bytes();
+  return static_cast<size_t>(std::max<int64_t>(0, device_->bytes)) + nodes;
 }
 
 bool EmbreeHierarchy::fits(const Scene& scene) const {
@@ -109,13 +109,14 @@ bool EmbreeHierarchy::fits(const Scene& scene) const {
          fibre_meshes(scene) == fibres_;
 }
 
-void EmbreeHierarchy::check(const char* doing) const {
+void EmbreeHierarchy::check(const char* operation) const {
   const RTCError error = rtcGetDeviceError(device());
   if (error == RTC_ERROR_NONE) return;
   const char* why = error == RTC_ERROR_OUT_OF_MEMORY
                         ? "out of memory; use fewer triangles, curves or points"
                         : rtcGetDeviceLastErrorMessage(device());
-  throw Error(std::string("the ray tracer failed while ") + doing + ": " + (why ? why : "unknown"));
+  throw Error(std::string("the ray tracer failed while ") + operation + ": " +
+              (why ? why : "unknown"));
 }
 
 RTCScene EmbreeHierarchy::new_scene() const {
@@ -133,8 +134,8 @@ RTCGeometry EmbreeHierarchy::make_mesh(uint32_t mesh_id) {
     auto& curves = curves_[mesh_id];
     curves = std::make_shared<const CurveGeometry>(CurveGeometry{
         &mesh, mesh_id, filtered_[mesh_id] != 0, fibres_[mesh_id] != 0,
-        CurveClumps::serve(mesh) ? std::make_unique<const CurveClumps>(mesh, both_at_once)
-                                 : nullptr});
+        CurveBvhNodes::supports(mesh) ? std::make_unique<const CurveBvhNodes>(mesh, run_in_parallel)
+                                      : nullptr});
     return make_curve_geometry(device(), *curves, rule_);
   }
   RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -162,7 +163,7 @@ RTCGeometry EmbreeHierarchy::make_mesh(uint32_t mesh_id) {
   return g;
 }
 
-void EmbreeHierarchy::attach_light(uint32_t id, const PlacedShape& shape) const {
+void EmbreeHierarchy::attach_light(uint32_t id, const LightGeometry& shape) const {
   if (shape.shape == LightShape::kParallelogram) {
     const LightRecord& light = shape.light;
     RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -184,7 +185,7 @@ void EmbreeHierarchy::attach_light(uint32_t id, const PlacedShape& shape) const 
   } else {
     RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_USER);
     rtcSetGeometryUserPrimitiveCount(g, 1);
-    rtcSetGeometryUserData(g, const_cast<PlacedShape*>(&shape));  // callbacks only read it
+    rtcSetGeometryUserData(g, const_cast<LightGeometry*>(&shape));  // callbacks only read it
     rtcSetGeometryBoundsFunction(g, light_box, nullptr);
     rtcSetGeometryIntersectFunction(
         g, rule_ != HitRule::kEmbree ? intersect_lights : intersect_lights_bare);
@@ -198,7 +199,7 @@ void EmbreeHierarchy::attach_light(uint32_t id, const PlacedShape& shape) const 
 void EmbreeHierarchy::build(const EmbreeHierarchy* origin) {
   const auto& groups = geometry_->groups;
   const auto& instances = geometry_->instances;
-  const auto is_kept = [&](uint32_t mesh) {
+  const auto is_reused = [&](uint32_t mesh) {
     return origin && origin->filtered_[mesh] == filtered_[mesh] &&
            origin->fibres_[mesh] == fibres_[mesh];
   };
@@ -210,7 +211,7 @@ void EmbreeHierarchy::build(const EmbreeHierarchy* origin) {
   for (const Group& group : groups)
     for (uint32_t mesh : group.meshes) {
       if (mesh_geometries_[mesh]) continue;
-      if (is_kept(mesh)) {
+      if (is_reused(mesh)) {
         mesh_geometries_[mesh] = origin->mesh_geometries_[mesh];
         rtcRetainGeometry(mesh_geometries_[mesh]);
       } else {
@@ -223,7 +224,7 @@ void EmbreeHierarchy::build(const EmbreeHierarchy* origin) {
   std::vector<size_t> built;
   for (size_t g = 1; g < groups.size(); ++g) {
     const auto& meshes = groups[g].meshes;
-    if (origin && std::all_of(meshes.begin(), meshes.end(), is_kept)) {
+    if (origin && std::all_of(meshes.begin(), meshes.end(), is_reused)) {
       group_scenes_[g] = origin->group_scenes_[g];
       rtcRetainScene(group_scenes_[g]);
       continue;

@@ -44,18 +44,18 @@ class EmbreeHierarchy {
 
  private:
   void build(const EmbreeHierarchy* origin);
-  void check(const char* doing) const;
+  void check(const char* operation) const;
   RTCScene new_scene() const;
   RTCGeometry make_mesh(uint32_t mesh_id);
-  void attach_light(uint32_t id, const PlacedShape& shape) const;
+  void attach_light(uint32_t id, const LightGeometry& shape) const;
   void release();
 
   std::shared_ptr<const SceneGeometry> geometry_;
   HitRule rule_;
   std::shared_ptr<EmbreeDevice> device_;
-  std::vector<uint8_t> filtered_;    ///< by mesh: see filtered_meshes()
-  std::vector<uint8_t> fibres_;      ///< by mesh: see fibre_meshes()
-  std::vector<PlacedShape> shapes_;  ///< by light record
+  std::vector<uint8_t> filtered_;      ///< by mesh: see filtered_meshes()
+  std::vector<uint8_t> fibres_;        ///< by mesh: see fibre_meshes()
+  std::vector<LightGeometry> shapes_;  ///< by light record
   RTCScene top_ = nullptr;
   std::vector<RTCScene> group_scenes_;
   std::vector<RTCGeometry> mesh_geometries_;

@@ -34,7 +34,7 @@ double intersect_parallelogram(const LightRecord& light, const double (&o)[3],
 }
 
 /// Returns the bounds of a light without its motion.
-Bounds box_at_rest(const PlacedShape& shape) {
+Bounds box_at_mid_shutter(const LightGeometry& shape) {
   const LightRecord& l = shape.light;
   if (shape.kind->box) return shape.kind->box(l);
   float lo[3], hi[3];
@@ -47,7 +47,7 @@ Bounds box_at_rest(const PlacedShape& shape) {
 
 }  // namespace
 
-bool PlacedShape::operator==(const PlacedShape& other) const {
+bool LightGeometry::operator==(const LightGeometry& other) const {
   const LightRecord &a = light, &b = other.light;
   return shape == other.shape && a.kind == b.kind && a.radius == b.radius &&
          std::ranges::equal(a.p, b.p) && std::ranges::equal(a.u, b.u) &&
@@ -55,60 +55,61 @@ bool PlacedShape::operator==(const PlacedShape& other) const {
          steps == other.steps;
 }
 
-std::vector<PlacedShape> light_shapes(const Scene& scene) {
-  std::vector<PlacedShape> shapes;
+std::vector<LightGeometry> light_shapes(const Scene& scene) {
+  std::vector<LightGeometry> shapes;
   const LightSet& set = scene.light_set();
   for (const LightRecord& record : set.records) {
     const size_t number = shapes.size();
-    PlacedShape& placed = shapes.emplace_back();
+    LightGeometry& geometry = shapes.emplace_back();
     const LightKindInfo& kind = info_of(static_cast<LightKind>(record.kind));
     if (!kind.shape || !(record.area > 0) || record.hidden != 0) continue;
-    placed.shape = kind.shape(record);
-    if (placed.shape == LightShape::kNone) continue;
-    placed.kind = &kind;
-    placed.light.kind = record.kind;
-    placed.light.radius = record.radius;
-    std::ranges::copy(record.p, placed.light.p);
-    std::ranges::copy(record.u, placed.light.u);
-    std::ranges::copy(record.v, placed.light.v);
+    geometry.shape = kind.shape(record);
+    if (geometry.shape == LightShape::kNone) continue;
+    geometry.kind = &kind;
+    geometry.light.kind = record.kind;
+    geometry.light.radius = record.radius;
+    std::ranges::copy(record.p, geometry.light.p);
+    std::ranges::copy(record.u, geometry.light.u);
+    std::ranges::copy(record.v, geometry.light.v);
     if (number >= set.motions.size() || set.motions[number].segments == 0) continue;
     const LightMotion& motion = set.motions[number];
-    placed.shape = LightShape::kOwn;
-    placed.motion = motion;
-    placed.motion.first = 0;
+    geometry.shape = LightShape::kCustom;
+    geometry.motion = motion;
+    geometry.motion.first = 0;
     const auto first = set.motion_steps.begin() + motion.first;
-    placed.steps.assign(first, first + motion.segments + 1);
+    geometry.steps.assign(first, first + motion.segments + 1);
   }
   return shapes;
 }
 
-Bounds own_shape_bounds(const PlacedShape& shape) {
-  const Bounds rests = box_at_rest(shape);
+Bounds custom_shape_bounds(const LightGeometry& shape) {
+  const Bounds rests = box_at_mid_shutter(shape);
   if (shape.steps.empty()) return rests;
   const Vec3<float> centre = (rests.lo + rests.hi) * 0.5f, half = (rests.hi - rests.lo) * 0.5f;
   const double x{half.x}, y{half.y}, z{half.z};
-  const Ball way = along_way(shape.motion, shape.steps,
-                             Ball{{double{centre.x}, double{centre.y}, double{centre.z}},
+  const BoundingSphere swept =
+      swept_bounds(shape.motion, shape.steps,
+                   BoundingSphere{{double{centre.x}, double{centre.y}, double{centre.z}},
                                   std::sqrt(x * x + y * y + z * z)});
   float lo[3], hi[3];
   for (int i = 0; i < 3; ++i) {
-    const double slack = way.radius + 1e-6 * std::abs(way.centre[i]);
-    lo[i] = static_cast<float>(way.centre[i] - slack);
-    hi[i] = static_cast<float>(way.centre[i] + slack);
+    const double slack = swept.radius + 1e-6 * std::abs(swept.centre[i]);
+    lo[i] = static_cast<float>(swept.centre[i] - slack);
+    hi[i] = static_cast<float>(swept.centre[i] + slack);
   }
   return {{lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}};
 }
 
-float intersect_own_shape(const PlacedShape& shape, const float (&origin)[3], const float (&dir)[3],
-                          float time) {
+float intersect_custom_shape(const LightGeometry& shape, const float (&origin)[3],
+                             const float (&dir)[3], float time) {
   double o[3], d[3];
   std::ranges::copy(origin, o);
   std::ranges::copy(dir, d);
   if (!shape.steps.empty()) {
-    const double seen[3] = {o[0], o[1], o[2]}, along[3] = {d[0], d[1], d[2]};
-    const LightPlace place(shape.motion, shape.steps, double{time});
-    place.point_to_rest(seen, o);
-    place.to_rest(along, d);
+    const double ray_origin[3] = {o[0], o[1], o[2]}, along[3] = {d[0], d[1], d[2]};
+    const PreciseLightPose pose(shape.motion, shape.steps, double{time});
+    pose.point_to_rest(ray_origin, o);
+    pose.to_rest(along, d);
   }
   for (int i = 0; i < 3; ++i) o[i] -= double{shape.light.p[i]};
   const double t = shape.kind->intersect ? shape.kind->intersect(shape.light, o, d)

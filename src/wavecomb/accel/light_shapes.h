@@ -10,26 +10,27 @@
 namespace wavecomb {
 
 /// Geometry of a light, without its emission.
-struct PlacedShape {
+struct LightGeometry {
   LightShape shape = LightShape::kNone;
   LightRecord light{};                  ///< only kind, p, u, v and radius are set
   const LightKindInfo* kind = nullptr;  ///< null for kNone
-  LightMotion motion{};                 ///< motion, if any; such lights use LightShape::kOwn
+  LightMotion motion{};                 ///< motion, if any; such lights use LightShape::kCustom
   std::vector<LightStep> steps;
 
-  bool operator==(const PlacedShape& other) const;
+  bool operator==(const LightGeometry& other) const;
 };
 
 /// Returns the shapes by light record; kNone if rays do not hit the light.
-std::vector<PlacedShape> light_shapes(const Scene& scene);
+std::vector<LightGeometry> light_shapes(const Scene& scene);
 
-/// Returns conservative bounds of a kOwn shape over its whole motion.
-Bounds own_shape_bounds(const PlacedShape& shape);
+/// Returns conservative bounds of a custom shape over its whole motion.
+Bounds custom_shape_bounds(const LightGeometry& shape);
 
-/// Returns the distance along `dir` to a kOwn shape in units of |dir|, or 0 if it is not in front.
-/// Tests one ray at a time in double precision, so that hits do not depend on other rays: Embree's
-/// spheres and discs round differently in packets and single rays. `time`: shutter time in [0, 1].
-float intersect_own_shape(const PlacedShape& shape, const float (&origin)[3], const float (&dir)[3],
-                          float time);
+/// Returns the distance along `dir` to a custom shape in units of |dir|, or 0 if it is not in
+/// front. Tests one ray at a time in double precision, so that hits do not depend on other rays:
+/// Embree's spheres and discs round differently in packets and single rays. `time`: shutter time in
+/// [0, 1].
+float intersect_custom_shape(const LightGeometry& shape, const float (&origin)[3],
+                             const float (&dir)[3], float time);
 
 }  // namespace wavecomb

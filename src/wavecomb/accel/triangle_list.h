@@ -25,9 +25,9 @@ namespace wavecomb {
 class TriangleList {
  public:
   /// With more triangles, a BVH is faster (docs/decisions/small-scene-traversal.md).
-  static constexpr uint32_t kMostTriangles = 96;
-  static constexpr uint32_t kMostVertices = 128;  ///< distinct positions
-  static constexpr uint32_t kMostShapes = 4;      ///< lights that are not parallelograms
+  static constexpr uint32_t kMaxTriangles = 96;
+  static constexpr uint32_t kMaxVertices = 128;  ///< distinct positions
+  static constexpr uint32_t kMaxShapes = 4;      ///< lights that are not parallelograms
 
   /// Returns null if the scene exceeds these limits or has motion, curves or points.
   static std::unique_ptr<const TriangleList> make(const Scene& scene);
@@ -42,7 +42,7 @@ class TriangleList {
   struct Triangle {
     float n[3], p[3];
     uint16_t vertex[3];
-    bool filtered;       ///< hits must pass is_met()
+    bool filtered;       ///< hits must pass accepts_hit()
     bool in_same_plane;  ///< n and p equal those of the previous triangle
     uint32_t mesh;
   };
@@ -51,7 +51,7 @@ class TriangleList {
   };
   /// Light shape with its bounding sphere.
   struct Shape {
-    PlacedShape placed;
+    LightGeometry light_geometry;
     float centre[3], radius;
   };
   /// Ids of hits by entry: triangles, then light shapes, then one entry for a miss.

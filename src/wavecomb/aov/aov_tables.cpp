@@ -28,41 +28,41 @@ AovTables::AovTables(const Scene& scene, const Settings& settings) {
   check_id_layers(layout.set, scene.instances().size() + 1, scene.materials().size());
   // Ids of instances and materials do not need these tables, but ids of objects do.
   if (layout.set.has(AovKind::kCoverage)) crypto = CryptoTables(scene, layout.set);
-  if (layout.set.has(Aov::kLightGroups)) keep_groups(scene, settings);
-  if (layout.set.has(Aov::kExpressions)) keep_expressions(scene, settings);
+  if (layout.set.has(Aov::kLightGroups)) add_groups(scene, settings);
+  if (layout.set.has(Aov::kExpressions)) add_expressions(scene, settings);
 }
 
-void AovTables::keep_groups(const Scene& scene, const Settings& settings) {
-  const std::vector<std::string>& there = scene.light_groups();
+void AovTables::add_groups(const Scene& scene, const Settings& settings) {
+  const std::vector<std::string>& scene_groups = scene.light_groups();
   if (settings.light_groups.empty()) {
-    kept_names = there;
+    layer_names = scene_groups;
   } else {
     for (const std::string& name : settings.light_groups) {
-      if (std::find(there.begin(), there.end(), name) == there.end()) {
+      if (std::find(scene_groups.begin(), scene_groups.end(), name) == scene_groups.end()) {
         std::string list;
-        for (const std::string& known : there) list += (list.empty() ? "" : ", ") + known;
+        for (const std::string& known : scene_groups) list += (list.empty() ? "" : ", ") + known;
         throw Error("the scene has no light group '" + name + "'; it has " + list);
       }
-      if (std::find(kept_names.begin(), kept_names.end(), name) == kept_names.end())
-        kept_names.push_back(name);
+      if (std::find(layer_names.begin(), layer_names.end(), name) == layer_names.end())
+        layer_names.push_back(name);
     }
   }
-  std::vector<uint32_t> place(there.size(), kNoGroup);
-  for (size_t g = 0; g < there.size(); ++g) {
-    const auto at = std::find(kept_names.begin(), kept_names.end(), there[g]);
-    if (at != kept_names.end()) place[g] = static_cast<uint32_t>(at - kept_names.begin());
+  std::vector<uint32_t> group_index(scene_groups.size(), kNoGroup);
+  for (size_t g = 0; g < scene_groups.size(); ++g) {
+    const auto at = std::find(layer_names.begin(), layer_names.end(), scene_groups[g]);
+    if (at != layer_names.end()) group_index[g] = static_cast<uint32_t>(at - layer_names.begin());
   }
-  kept_group = scene.groups_of_lights();
-  for (uint32_t& group : kept_group) group = place[group];
-  group_of_rest = place.front();
-  layout.light_groups = static_cast<uint32_t>(kept_names.size());
+  film_group = scene.groups_of_lights();
+  for (uint32_t& group : film_group) group = group_index[group];
+  group_of_rest = group_index.front();
+  layout.light_groups = static_cast<uint32_t>(layer_names.size());
 }
 
-void AovTables::keep_expressions(const Scene& scene, const Settings& settings) {
+void AovTables::add_expressions(const Scene& scene, const Settings& settings) {
   automaton = PathAutomaton(settings.expressions, scene.light_groups());
   if (settings.joins_light()) backward = BackwardAutomaton(automaton);
   layout.expressions = automaton.expressions;
-  for (const NamedExpression& one : settings.expressions) kept_names.push_back(one.name);
+  for (const NamedExpression& one : settings.expressions) layer_names.push_back(one.name);
   const std::vector<uint32_t> groups = scene.groups_of_lights();
   const std::vector<uint8_t> objects = scene.lights_of_objects();
   const LightSet& set = scene.light_set();

@@ -24,10 +24,10 @@ struct AovTables {
   AovLayout layout;
   CryptoTables crypto;
   /// Index of each light's group among the film's groups, or kNoGroup.
-  std::vector<uint32_t> kept_group;
+  std::vector<uint32_t> film_group;
   uint32_t group_of_rest = kNoGroup;  ///< index of the group of emission without a light
   /// Names of the film's light groups, followed by those of its expressions.
-  std::vector<std::string> kept_names;
+  std::vector<std::string> layer_names;
   PathAutomaton automaton;             ///< of the light path expressions
   BackwardAutomaton backward;          ///< for light paths, if the render has any
   std::vector<uint32_t> end_of_light;  ///< parameter of PathExpressions; empty if unused
@@ -36,32 +36,32 @@ struct AovTables {
   bool models_cost = false;
   bool connects = false;  ///< whether camera paths connect to light paths
 
-  /// Returns the object id (AovHit) of geometry `geom` of instance `inst`, or kNothingHit if
+  /// Returns the object id (AovHit) of geometry `geom` of instance `inst`, or kNoHitId if
   /// unused.
   template <typename F>
   UInt<F> object(const UInt<F>& inst, const UInt<F>& geom, const Mask<F>& active) const {
     using U = UInt<F>;
-    if (crypto.first_object.empty()) return U(kNothingHit);
+    if (crypto.first_object.empty()) return U(kNoHitId);
     return gather<U>(crypto.first_object.data(), inst, Mask<U>(active)) + geom;
   }
   /// Returns the object id of light record `light`.
   template <typename U>
   U light_object(const U& light) const {
-    return crypto.first_object.empty() ? U(kNothingHit) : U(light + crypto.first_light);
+    return crypto.first_object.empty() ? U(kNoHitId) : U(light + crypto.first_light);
   }
 
   /// Returns the object id of volume `volume`.
   template <typename U>
   U volume_object(const U& volume) const {
-    return crypto.first_object.empty() ? U(kNothingHit) : U(volume + crypto.first_volume);
+    return crypto.first_object.empty() ? U(kNoHitId) : U(volume + crypto.first_volume);
   }
 
   /// Throws Error for unknown light groups, and for AOVs that the scene does not support.
   AovTables(const Scene& scene, const Settings& settings);
 
  private:
-  void keep_groups(const Scene& scene, const Settings& settings);
-  void keep_expressions(const Scene& scene, const Settings& settings);
+  void add_groups(const Scene& scene, const Settings& settings);
+  void add_expressions(const Scene& scene, const Settings& settings);
 };
 
 }  // namespace wavecomb

@@ -52,7 +52,7 @@ class PathFirstHits {
     const F depth = camera_depth<F>(camera, p, time, active);
     store_depth<F>(slot, depth, active);
     if (!hits_) return;
-    const UInt<F> none(kNothingHit);
+    const UInt<F> none(kNoHitId);
     store_row<FirstHitRow, F>(hits_.rows, slot,
                               {p, names_->light_object(light), none, none, depth,
                                camera_distance<F>(camera, p, time, active)},
@@ -85,16 +85,16 @@ class PathFirstHits {
   template <typename F>
   [[gnu::noinline, gnu::cold]] void hit_volume(const CameraSetup& camera, const UInt<F>& slot,
                                                const Vec3<F>& p, const F& time,
-                                               const VolumeSeen<F>& seen,
+                                               const VolumeHit<F>& volume_event,
                                                const Mask<F>& active) const {
     if (end_) scatter_ray_end<F>(slot, camera_depth<F>(camera, p, time, active), F(1.f), active);
     if (!hits_) return;
     const F far(std::numeric_limits<float>::infinity());
-    const UInt<F> object =
-        select(Mask<UInt<F>>(seen.in_mesh), seen.place, names_->volume_object(seen.volume));
+    const UInt<F> object = select(Mask<UInt<F>>(volume_event.in_mesh), volume_event.object,
+                                  names_->volume_object(volume_event.volume));
     store_row<FirstHitRow, F>(
-        hits_.rows, slot, {Vec3<F>(F(0.f)), object, seen.material, UInt<F>(kNothingHit), far, far},
-        active);
+        hits_.rows, slot,
+        {Vec3<F>(F(0.f)), object, volume_event.material, UInt<F>(kNoHitId), far, far}, active);
   }
   bool wants_transmittance() const { return transmits_; }
   /// Records the transmittance `through` of volumes along the camera ray; 0 if the path scattered.
@@ -120,8 +120,7 @@ class PathFirstHits {
     if (depth_) std::fill_n(depth_.rows, slots, kFar);
     for (uint32_t i = 0; end_ && i < slots; ++i)
       store_row<RayEndRow, float>(end_.rows, i, {kFar, 0.f, Color<float>(1.f)}, true);
-    const FirstHitRow<float> none{Vec3<float>(0.f), kNothingHit, kNothingHit,
-                                  kNothingHit,      kFar,        kFar};
+    const FirstHitRow<float> none{Vec3<float>(0.f), kNoHitId, kNoHitId, kNoHitId, kFar, kFar};
     for (uint32_t i = 0; hits_ && i < slots; ++i)
       store_row<FirstHitRow, float>(hits_.rows, i, none, true);
   }

@@ -10,7 +10,7 @@ namespace wavecomb {
 /// Returns the film indices of the groups of the lanes' lights; kNoGroup for groups without a layer
 /// and for kNoLight.
 template <typename F>
-inline UInt<F> kept_group(const uint32_t* kept, const UInt<F>& light, const Mask<F>& active) {
+inline UInt<F> film_group(const uint32_t* kept, const UInt<F>& light, const Mask<F>& active) {
   using U = UInt<F>;
   const Mask<U> known(active & Mask<F>(light != U(kNoLight)));
   return select(known, gather<U>(kept, light, known), U(kNoGroup));

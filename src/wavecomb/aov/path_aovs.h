@@ -61,18 +61,18 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     uint32_t words = 0;
     for (const AovRow& row : kAovs) {
       if (row.source != AovSource::kVertex || !set.has(row.aov)) continue;
-      vertex_at_[place_of(row.aov)] = words;
+      vertex_at_[aov_index(row.aov)] = words;
       words += row.channels;
     }
     rows(vertex_, words > 0, words);
     for (Block& part : parts_) rows(part, set.any(AovSet::kParts), kRadianceWords);
-    rows(early_links_, set.any(AovSet::kParts) && tables && tables->connects, kRadianceWords);
+    rows(early_connections_, set.any(AovSet::kParts) && tables && tables->connects, kRadianceWords);
     rows(groups_, layout.light_groups > 0, kRadianceWords * layout.light_groups);
     if (layout.expressions > 0)
       expressions_ =
           PathExpressions(capacity, tables->automaton, tables->end_of_light, tables->multipliers);
     rows(guides_, set.has(AovSource::kGuide), kRowWords<GuideRow>);
-    rows(light_samples_, set.has(AovSource::kWay), kRadianceWords);
+    rows(light_samples_, set.has(AovSource::kMis), kRadianceWords);
     rows(bounces_, set.has(AovSource::kBounce), kRowWords<BounceRow>);
   }
 
@@ -87,7 +87,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   /// Clears the slots below `slots`.
   void clear(size_t slots) {
     for (const Block* block :
-         {&vertex_, &guides_, &groups_, &light_samples_, &bounces_, &early_links_})
+         {&vertex_, &guides_, &groups_, &light_samples_, &bounces_, &early_connections_})
       block->zero(slots);
     clear_hits(slots);
     clear_costs(slots);
@@ -119,8 +119,8 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     if (depth == 0 && vertex_) {
       const UInt<F> row = slot * static_cast<uint32_t>(vertex_.words);
       for_each_vertex_value<F>(v, path, [&](Aov aov, const auto& value) {
-        const uint32_t at = vertex_at_[place_of(aov)];
-        if (at != kNotKept) scatter_words<F>(vertex_.rows, value, row + at, active);
+        const uint32_t at = vertex_at_[aov_index(aov)];
+        if (at != kNoWords) scatter_words<F>(vertex_.rows, value, row + at, active);
       });
     }
     if (guides_) store_guides<F>(slot, v, path, active);
@@ -143,7 +143,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   template <typename F>
   UInt<F> group_of(const UInt<F>& light, const Mask<F>& active) const {
     if (!groups_) return UInt<F>(kNoGroup);
-    return kept_group<F>(tables_->kept_group.data(), light, active);
+    return film_group<F>(tables_->film_group.data(), light, active);
   }
   const PathExpressions& expressions() const { return expressions_; }
   /// Adds a contribution of `light`, or kNoLight, to the paths in the active lanes' slots, which
@@ -156,23 +156,24 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   }
   /// Adds emission of volumes.
   template <typename F>
-  void add_glow(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
+  void add_volume_emission(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
     if (groups_) add<F>(slot, UInt<F>(tables_->group_of_rest), c, active);
-    if (expressions_) expressions_.add_glow<F>(slot, c, active);
+    if (expressions_) expressions_.add_volume_emission<F>(slot, c, active);
   }
   /// Adds the contribution `c` of the light sample of the last vertex, from a light of `group`.
   template <typename F>
   void add_direct(const UInt<F>& slot, const UInt<F>& group, const Color<F>& c,
                   const Mask<F>& active) const {
     if (groups_) add<F>(slot, group, c, active);
-    if (expressions_) expressions_.add_lit<F>(slot, c, active);
+    if (expressions_) expressions_.add_light_sample<F>(slot, c, active);
   }
   /// Adds the contribution `c` to light group `group` only.
   template <typename F>
   void add(const UInt<F>& slot, const UInt<F>& group, const Color<F>& c,
            const Mask<F>& active) const {
-    const Mask<F> kept = active & Mask<F>(group != UInt<F>(kNoGroup));
-    if (any(kept)) add_radiance<F>(groups_.rows, slot * layout_.light_groups + group, c, kept);
+    const Mask<F> grouped = active & Mask<F>(group != UInt<F>(kNoGroup));
+    if (any(grouped))
+      add_radiance<F>(groups_.rows, slot * layout_.light_groups + group, c, grouped);
   }
   bool wants_light_samples() const { return bool(light_samples_); }
   /// Adds the contribution `c` of light samples to the paths in the active lanes' slots, which must
@@ -181,13 +182,13 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   void add_light_sample(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
     add_radiance<F>(light_samples_.rows, slot, c, active);
   }
-  bool wants_links() const { return early_links_ || wants_lights() || light_samples_; }
+  bool wants_connections() const { return early_connections_ || wants_lights() || light_samples_; }
   /// Adds the contribution `c` of connections between vertices at `depth` and vertices of light
   /// paths from `light`. light_path_aovs.h adds it to light path expressions.
   template <typename F>
-  void add_link(uint32_t depth, const UInt<F>& slot, const UInt<F>& light, const Color<F>& c,
-                const Mask<F>& active) const {
-    if (early_links_ && depth == 0) add_radiance<F>(early_links_.rows, slot, c, active);
+  void add_connection(uint32_t depth, const UInt<F>& slot, const UInt<F>& light, const Color<F>& c,
+                      const Mask<F>& active) const {
+    if (early_connections_ && depth == 0) add_radiance<F>(early_connections_.rows, slot, c, active);
     if (groups_) add<F>(slot, group_of<F>(light, active), c, active);
     if (light_samples_) add_light_sample<F>(slot, c, active);
   }
@@ -197,7 +198,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
                        const UInt<F>& slot, const PathState<F>& path, const Mask<F>& active) const {
     split_environment<F>(
         scene, settings, depth, path, active,
-        [&](uint32_t light) { return expressions_ || tables_->kept_group[light] != kNoGroup; },
+        [&](uint32_t light) { return expressions_ || tables_->film_group[light] != kNoGroup; },
         [&](uint32_t light, const Color<F>& share) {
           add_light<F>(slot, UInt<F>(light), share, active);
         });
@@ -222,7 +223,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
       for (size_t i = 0; block && i < slots * words; ++i) block.rows[i] *= exposure;
     };
     for (const Block& part : parts_) scale(part, kRadianceWords);
-    scale(early_links_, kRadianceWords);
+    scale(early_connections_, kRadianceWords);
     scale(groups_, kRadianceWords * layout_.light_groups);
     expressions_.scale(exposure, slots);
     scale(light_samples_, kRadianceWords);
@@ -259,15 +260,15 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   void for_each_vertex_aov(AovKind kind, const Put& put) const;
 
   std::array<const Block*, 8> blocks() const {
-    return {&vertex_, &parts_[0], &parts_[1],      &early_links_,
+    return {&vertex_, &parts_[0], &parts_[1],      &early_connections_,
             &groups_, &guides_,   &light_samples_, &bounces_};
   }
 
   /// Marks an AOV without words in vertex_.
-  static constexpr uint32_t kNotKept = 0xffffffffu;
-  static constexpr std::array<uint32_t, kAovCount> nothing_kept() {
+  static constexpr uint32_t kNoWords = 0xffffffffu;
+  static constexpr std::array<uint32_t, kAovCount> no_words() {
     std::array<uint32_t, kAovCount> at{};
-    at.fill(kNotKept);
+    at.fill(kNoWords);
     return at;
   }
 
@@ -276,34 +277,34 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   void store_guides(const UInt<F>& slot, const VertexAovs<F>& v, const PathState<F>& path,
                     const Mask<F>& active) const {
     const GuideRow<F> before = load_row<GuideRow, F>(guides_.rows, slot, active);
-    const Mask<F> seen = active & (before.is_final == 0.f);
-    if (none(seen)) return;
+    const Mask<F> updates = active & (before.is_final == 0.f);
+    if (none(updates)) return;
     const Guides<F> g = guides_of<F>(v, path);
     store_row<GuideRow, F>(guides_.rows, slot,
-                           {g.albedo, g.normal, select(v.is_clear, F(0.f), F(1.f))}, seen);
+                           {g.albedo, g.normal, select(v.is_clear, F(0.f), F(1.f))}, updates);
   }
 
   /// Adds the bounce of a vertex, if it has one.
   template <typename F>
   void add_bounce(const UInt<F>& slot, const VertexAovs<F>& v, const Mask<F>& active) const {
-    const Mask<F> there = active & (v.survival >= 0.f);
-    if (none(there)) return;
-    BounceRow<F> row = load_row<BounceRow, F>(bounces_.rows, slot, there);
+    const Mask<F> has_survival = active & (v.survival >= 0.f);
+    if (none(has_survival)) return;
+    BounceRow<F> row = load_row<BounceRow, F>(bounces_.rows, slot, has_survival);
     row.guided += v.guided;
     row.survived += v.survival;
     row.bounces += 1.f;
-    store_row<BounceRow, F>(bounces_.rows, slot, row, there);
+    store_row<BounceRow, F>(bounces_.rows, slot, row, has_survival);
   }
 
   AovLayout layout_;
   const AovTables* tables_ = nullptr;
   Block vertex_;
-  /// First word of each AOV in a row of vertex_, or kNotKept.
-  std::array<uint32_t, kAovCount> vertex_at_ = nothing_kept();
+  /// First word of each AOV in a row of vertex_, or kNoWords.
+  std::array<uint32_t, kAovCount> vertex_at_ = no_words();
   std::array<Block, 2> parts_;  ///< radiance before the light samples of vertices 0 and 1
   /// Contributions of connections at first vertices. They are indirect light, although they are
   /// added between the two copies in parts_.
-  Block early_links_;
+  Block early_connections_;
   Block groups_;  ///< radiance by light group; the groups of a slot are adjacent
   Block guides_, bounces_;
   PathExpressions expressions_;

@@ -28,13 +28,13 @@ template <typename F>
 struct ExpressionRow {
   UInt<F> states;  ///< of the three colours, ten bits each
   // Current light sample: states before its scattering, event, path end, and diffuse fraction.
-  UInt<F> lit_states, lit_event, lit_end;
-  Color<F> lit_diffuse;
+  UInt<F> light_states, light_event, light_end;
+  Color<F> light_diffuse;
   // Last bounce, for lights with multipliers: states before it, its event plus 1 (0 for a specular
   // bounce and before the first bounce), and its diffuse fraction.
   UInt<F> from_states, bounce;
   Color<F> bounce_diffuse;
-  WAVECOMB_FIELDS(states, lit_states, lit_event, lit_end, lit_diffuse, from_states, bounce,
+  WAVECOMB_FIELDS(states, light_states, light_event, light_end, light_diffuse, from_states, bounce,
                   bounce_diffuse)
 };
 
@@ -49,7 +49,7 @@ inline void for_each_colour(const Color<F>& c, const Each& each) {
 /// Automaton states of the three colours in one word, and their transitions.
 struct ColourStates {
   static constexpr uint32_t kBits = 10, kMask = 1023;
-  static_assert(PathAutomaton::kMostStates <= kMask + 1);
+  static_assert(PathAutomaton::kMaxStates <= kMask + 1);
 
   template <typename F>
   static UInt<F> of(const UInt<F>& states, uint32_t colour) {
@@ -69,7 +69,7 @@ struct ColourStates {
   /// Returns the states after a bounce. `u` in [0, 1) chooses the lobe of each colour.
   template <typename F>
   static UInt<F> after(const uint32_t* table, const UInt<F>& states,
-                       const ScatteringNote<F>& bounce, const F& u, const Mask<F>& active) {
+                       const ScatteringEvent<F>& bounce, const F& u, const Mask<F>& active) {
     using U = UInt<F>;
     U all(0u);
     for_each_colour<F>(bounce.diffuse, [&](uint32_t c, const F& share) {
@@ -131,8 +131,8 @@ class PathExpressions {
 
   /// Adds emission of volumes to the paths.
   template <typename F>
-  [[gnu::noinline, gnu::cold]] void add_glow(const UInt<F>& slot, const Color<F>& c,
-                                             const Mask<F>& active) const {
+  [[gnu::noinline, gnu::cold]] void add_volume_emission(const UInt<F>& slot, const Color<F>& c,
+                                                        const Mask<F>& active) const {
     if (none(active)) return;
     const UInt<F> states = load_row<ExpressionRow, F>(rows_.floats(0), slot, active).states;
     add_to<F>(slot, states, UInt<F>(end_of_light_[lights_ + 1]), c, active);
@@ -147,10 +147,10 @@ class PathExpressions {
                                             const Mask<F>& active) const {
     using U = UInt<F>;
     ExpressionRow<F> row = load_row<ExpressionRow, F>(rows_.floats(0), slot, active);
-    row.lit_states = row.states;
-    row.lit_event = v.lit.event;
-    row.lit_diffuse = v.lit.diffuse;
-    row.lit_end = end_of<F>(v.lit_by, has_shadow);
+    row.light_states = row.states;
+    row.light_event = v.light_scattering.event;
+    row.light_diffuse = v.light_scattering.diffuse;
+    row.light_end = end_of<F>(v.light_id, has_shadow);
     const U path = hash_u32<U>(key.pixel_hash, key.sample);
     const F u = unit_float<F>(hash_u32<U>(path, U(0x2c1b3c6du + depth)));
     row.from_states = row.states;
@@ -173,15 +173,15 @@ class PathExpressions {
 
   /// Adds the contribution `c` of the current light sample.
   template <typename F>
-  [[gnu::noinline, gnu::cold]] void add_lit(const UInt<F>& slot, const Color<F>& c,
-                                            const Mask<F>& active) const {
+  [[gnu::noinline, gnu::cold]] void add_light_sample(const UInt<F>& slot, const Color<F>& c,
+                                                     const Mask<F>& active) const {
     using U = UInt<F>;
     if (none(active)) return;
     const ExpressionRow<F> row = load_row<ExpressionRow, F>(rows_.floats(0), slot, active);
-    const Color<F> diffuse = c * row.lit_diffuse;
+    const Color<F> diffuse = c * row.light_diffuse;
     const auto add_part = [&](uint32_t lobe, const Color<F>& part) {
-      add_to<F>(slot, next_of_all<F>(row.lit_states, row.lit_event, U(lobe), active), row.lit_end,
-                part, active);
+      add_to<F>(slot, next_of_all<F>(row.light_states, row.light_event, U(lobe), active),
+                row.light_end, part, active);
     };
     add_part(kDiffuseEvent, diffuse);
     add_part(kGlossyEvent, c - diffuse);

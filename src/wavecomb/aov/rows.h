@@ -10,7 +10,7 @@
 
 namespace wavecomb {
 
-/// First hit of a camera ray, before shading. Indices are kNothingHit if there is none.
+/// First hit of a camera ray, before shading. Indices are kNoHitId if there is none.
 template <typename F>
 struct FirstHitRow {
   Vec3<F> position;
@@ -19,11 +19,11 @@ struct FirstHitRow {
   WAVECOMB_FIELDS(position, object, material, instance, depth, distance)
 };
 
-/// Volume event of a path: the index of the volume, or placed_geometry() of the mesh that the
+/// Volume event of a path: the index of the volume, or instance_geometry() of the mesh that the
 /// medium fills, and the material.
 template <typename F>
-struct VolumeSeen {
-  UInt<F> volume, place, material;
+struct VolumeHit {
+  UInt<F> volume, object, material;
   Mask<F> in_mesh;
 };
 

@@ -11,7 +11,7 @@ namespace wavecomb {
 /// Returns the image position of a point at a shutter time, in pixels from the upper left corner,
 /// seen through the centre of a lens without distortion. Not for latlong cameras.
 template <typename F>
-inline Vec2<F> place_in_picture(const CameraSetup& camera, const Vec3<F>& p, const F& time,
+inline Vec2<F> project_to_image(const CameraSetup& camera, const Vec3<F>& p, const F& time,
                                 const Mask<F>& active) {
   const CameraSpace<F> space(camera, time, active);
   const Vec3<F> from = p - space.m.t;
@@ -31,11 +31,11 @@ inline Vec2<F> place_in_picture(const CameraSetup& camera, const Vec3<F>& p, con
 template <typename F>
 inline Vec2<F> screen_motion(const CameraSetup& camera, const Vec3<F>& first, const Vec3<F>& last,
                              const Mask<F>& active) {
-  const Vec2<F> a = place_in_picture<F>(camera, first, F(0.f), active);
-  const Vec2<F> b = place_in_picture<F>(camera, last, F(1.f), active);
+  const Vec2<F> a = project_to_image<F>(camera, first, F(0.f), active);
+  const Vec2<F> b = project_to_image<F>(camera, last, F(1.f), active);
   const F x = b.x - a.x, y = a.y - b.y;
-  const Mask<F> good = is_finite(x) & is_finite(y);
-  return {select(good, x, F(0.f)), select(good, y, F(0.f))};
+  const Mask<F> valid = is_finite(x) & is_finite(y);
+  return {select(valid, x, F(0.f)), select(valid, y, F(0.f))};
 }
 
 /// Returns the motion of the point that is at `p` on lights `light` at `time`.

@@ -22,8 +22,10 @@ struct Affine {
   }
   /// Returns column j of A, the image of axis j.
   Vec3<float> axis(int j) const {
-    const auto pick = [j](const Vec3<float>& r) { return j == 0 ? r.x : (j == 1 ? r.y : r.z); };
-    return {pick(row[0]), pick(row[1]), pick(row[2])};
+    const auto component = [j](const Vec3<float>& r) {
+      return j == 0 ? r.x : (j == 1 ? r.y : r.z);
+    };
+    return {component(row[0]), component(row[1]), component(row[2])};
   }
   float determinant() const {
     const Affine& m = *this;

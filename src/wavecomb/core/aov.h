@@ -34,7 +34,7 @@ enum class AovSource : uint8_t {
   kVertex,  ///< after shading the first vertex
   kGuide,   ///< after the last vertex that provides denoiser features
   kLight,   ///< when light contributes to the path
-  kWay,     ///< as kLight, separated by sampling technique
+  kMis,     ///< as kLight, separated by sampling technique
   kTime,    ///< measured with the clock
   kBounce,  ///< over all bounces of the path
 };
@@ -54,52 +54,52 @@ enum class AovContent : uint8_t {
 /// channels in files, or is "" for numbers or a single channel. `title` is the label in the window;
 /// "" hides the layer there.
 // clang-format off
-#define WAVECOMB_AOVS(X)                                                                          \
-  X(Albedo, "albedo", 3, "RGB", kColour, kMean, kVertex, "Albedo")                                \
-  X(Normal, "normal", 3, "XYZ", kDirection, kMean, kVertex, "Normal")                             \
-  X(Depth, "depth", 1, "Z", kValue, kMeanOfHits, kHit, "Depth")                                   \
-  X(Position, "position", 3, "XYZ", kExact, kNearest, kHit, "Position")                           \
-  X(Uv, "uv", 2, "UV", kValue, kNearest, kVertex, "Texture coordinates")                          \
-  X(MaterialId, "material_id", 1, "", kId, kNearest, kHit, "Materials")                           \
-  X(InstanceId, "instance_id", 1, "", kId, kNearest, kHit, "Instances")                           \
-  X(CryptoObject, "crypto_object", 0, "", kId, kCoverage, kHit, "Objects (Cryptomatte)")          \
-  X(CryptoMaterial, "crypto_material", 0, "", kId, kCoverage, kHit, "Materials (Cryptomatte)")    \
-  X(CryptoAsset, "crypto_asset", 0, "", kId, kCoverage, kHit, "Assets (Cryptomatte)")             \
-  X(Emission, "emission", 3, "RGB", kLight, kMean, kLight, "Emission")                            \
-  X(Direct, "direct", 3, "RGB", kLight, kMean, kLight, "Direct light")                            \
-  X(Indirect, "indirect", 3, "RGB", kLight, kMean, kLight, "Indirect light")                      \
-  X(LightGroups, "light_groups", 0, "RGB", kLight, kGroups, kLight, "")                           \
-  X(Cost, "cost", 1, "", kValue, kSum, kTime, "Cost per pixel")                                   \
-  X(GuideAlbedo, "guide_albedo", 3, "RGB", kColour, kMean, kGuide, "")                            \
-  X(GuideNormal, "guide_normal", 3, "XYZ", kDirection, kMean, kGuide, "")                         \
-  X(Alpha, "alpha", 1, "", kValue, kMean, kHit, "Alpha")                                          \
-  X(ByBounces, "by_bounces", 3, "RGB", kLight, kMean, kWay, "Found by bounces")                   \
-  X(ByLightSamples, "by_light_samples", 3, "RGB", kLight, kMean, kWay, "Found by light samples")  \
-  X(ByLightPaths, "by_light_paths", 3, "RGB", kLight, kMean, kWay, "Found by light paths")        \
-  X(GuidedShare, "guided_share", 1, "", kValue, kMean, kBounce, "Guided share")                   \
-  X(Survival, "survival", 1, "", kValue, kMean, kBounce, "Survival of roulette")                  \
-  X(Expressions, "lpe", 0, "RGB", kLight, kExpressions, kLight, "")                               \
-  X(DepthNearest, "depth_nearest", 1, "Z", kExact, kNearest, kHit, "Depth, unfiltered")           \
-  X(Distance, "distance", 1, "", kExact, kNearest, kHit, "Distance, unfiltered")                  \
-  X(Motion, "motion", 2, "UV", kExact, kNearest, kHit, "Motion in the picture")                   \
-  X(Deep, "deep", 0, "", kValue, kDeep, kHit, "")                                                 \
-  X(Transmittance, "transmittance", 3, "RGB", kColour, kMean, kHit, "Transmittance of volumes")   \
+#define WAVECOMB_AOVS(X)                                                                         \
+  X(Albedo, "albedo", 3, "RGB", kColour, kMean, kVertex, "Albedo")                               \
+  X(Normal, "normal", 3, "XYZ", kDirection, kMean, kVertex, "Normal")                            \
+  X(Depth, "depth", 1, "Z", kValue, kMeanOfHits, kHit, "Depth")                                  \
+  X(Position, "position", 3, "XYZ", kExact, kNearest, kHit, "Position")                          \
+  X(Uv, "uv", 2, "UV", kValue, kNearest, kVertex, "Texture coordinates")                         \
+  X(MaterialId, "material_id", 1, "", kId, kNearest, kHit, "Materials")                          \
+  X(InstanceId, "instance_id", 1, "", kId, kNearest, kHit, "Instances")                          \
+  X(CryptoObject, "crypto_object", 0, "", kId, kCoverage, kHit, "Objects (Cryptomatte)")         \
+  X(CryptoMaterial, "crypto_material", 0, "", kId, kCoverage, kHit, "Materials (Cryptomatte)")   \
+  X(CryptoAsset, "crypto_asset", 0, "", kId, kCoverage, kHit, "Assets (Cryptomatte)")            \
+  X(Emission, "emission", 3, "RGB", kLight, kMean, kLight, "Emission")                           \
+  X(Direct, "direct", 3, "RGB", kLight, kMean, kLight, "Direct light")                           \
+  X(Indirect, "indirect", 3, "RGB", kLight, kMean, kLight, "Indirect light")                     \
+  X(LightGroups, "light_groups", 0, "RGB", kLight, kGroups, kLight, "")                          \
+  X(Cost, "cost", 1, "", kValue, kSum, kTime, "Cost per pixel")                                  \
+  X(GuideAlbedo, "guide_albedo", 3, "RGB", kColour, kMean, kGuide, "")                           \
+  X(GuideNormal, "guide_normal", 3, "XYZ", kDirection, kMean, kGuide, "")                        \
+  X(Alpha, "alpha", 1, "", kValue, kMean, kHit, "Alpha")                                         \
+  X(ByBounces, "by_bounces", 3, "RGB", kLight, kMean, kMis, "Found by bounces")                  \
+  X(ByLightSamples, "by_light_samples", 3, "RGB", kLight, kMean, kMis, "Found by light samples") \
+  X(ByLightPaths, "by_light_paths", 3, "RGB", kLight, kMean, kMis, "Found by light paths")       \
+  X(GuidedShare, "guided_share", 1, "", kValue, kMean, kBounce, "Guided share")                  \
+  X(Survival, "survival", 1, "", kValue, kMean, kBounce, "Survival of roulette")                 \
+  X(Expressions, "lpe", 0, "RGB", kLight, kExpressions, kLight, "")                              \
+  X(DepthNearest, "depth_nearest", 1, "Z", kExact, kNearest, kHit, "Depth, unfiltered")          \
+  X(Distance, "distance", 1, "", kExact, kNearest, kHit, "Distance, unfiltered")                 \
+  X(Motion, "motion", 2, "UV", kExact, kNearest, kHit, "Motion in the picture")                  \
+  X(Deep, "deep", 0, "", kValue, kDeep, kHit, "")                                                \
+  X(Transmittance, "transmittance", 3, "RGB", kColour, kMean, kHit, "Transmittance of volumes")  \
   X(HalfDepth, "half_depth", 1, "Z", kValue, kMedian, kHit, "Depth to half opacity")
 // clang-format on
 
 namespace detail {
 #define WAVECOMB_AOV(id, name, channels, letters, content, kind, source, title) k##id,
-enum class AovPlace : uint32_t { WAVECOMB_AOVS(WAVECOMB_AOV) kCount };
+enum class AovIndex : uint32_t { WAVECOMB_AOVS(WAVECOMB_AOV) kCount };
 #undef WAVECOMB_AOV
 }  // namespace detail
 
-inline constexpr auto kAovCount = static_cast<uint32_t>(detail::AovPlace::kCount);
+inline constexpr auto kAovCount = static_cast<uint32_t>(detail::AovIndex::kCount);
 static_assert(kAovCount <= 32);
 
 /// AOV flags, one bit each.
 enum class Aov : uint32_t {
 #define WAVECOMB_AOV(id, name, channels, letters, content, kind, source, title) \
-  k##id = 1u << static_cast<uint32_t>(detail::AovPlace::k##id),
+  k##id = 1u << static_cast<uint32_t>(detail::AovIndex::k##id),
   WAVECOMB_AOVS(WAVECOMB_AOV)
 #undef WAVECOMB_AOV
 };
@@ -123,11 +123,11 @@ inline constexpr AovRow kAovs[] = {
 #undef WAVECOMB_AOV
 };
 /// Returns the row index of an AOV.
-constexpr uint32_t place_of(Aov aov) {
+constexpr uint32_t aov_index(Aov aov) {
   return static_cast<uint32_t>(std::countr_zero(static_cast<uint32_t>(aov)));
 }
 constexpr const AovRow& row_of(Aov aov) {
-  return kAovs[place_of(aov)];
+  return kAovs[aov_index(aov)];
 }
 constexpr const char* aov_name(Aov aov) {
   return row_of(aov).name;
@@ -157,7 +157,7 @@ constexpr uint32_t aov_bits(AovSource source) {
 /// A set of AOVs.
 struct AovSet {
   /// AOVs stored by default, which have members in Film::Layers and in images.
-  static constexpr uint32_t kUsual = Aov::kAlbedo | Aov::kNormal | Aov::kDepth;
+  static constexpr uint32_t kStoredByDefault = Aov::kAlbedo | Aov::kNormal | Aov::kDepth;
   /// Components of the beauty: emission + direct + indirect.
   static constexpr uint32_t kParts = Aov::kEmission | Aov::kDirect | Aov::kIndirect;
   /// All AOVs that are requested by name and written as layers of an image.
@@ -165,7 +165,7 @@ struct AovSet {
     return row.kind != AovKind::kExpressions && row.kind != AovKind::kDeep;
   });
 
-  uint32_t bits = kUsual;
+  uint32_t bits = kStoredByDefault;
   bool operator==(const AovSet&) const = default;
 
   bool has(Aov a) const { return any(static_cast<uint32_t>(a)); }
@@ -180,7 +180,7 @@ struct AovSet {
 };
 
 /// Upper limit of deep samples per pixel.
-inline constexpr uint32_t kMostDeepSamples = 64;
+inline constexpr uint32_t kMaxDeepSamples = 64;
 
 /// Resolution of deep images in depth.
 struct DeepLimits {

@@ -12,15 +12,15 @@ struct FixedPoint {
   int exponent = -24;
 
   /// Largest magnitude of a value, in units, so that a sum of 2^21 values cannot overflow.
-  static constexpr int64_t kMost = int64_t{1} << 41;
+  static constexpr int64_t kMax = int64_t{1} << 41;
 
-  /// Converts to the nearest multiple, ties to even. Magnitudes above kMost are clamped; NaN
+  /// Converts to the nearest multiple, ties to even. Magnitudes above kMax are clamped; NaN
   /// becomes 0.
   int64_t from(float x) const {
     const double units = std::ldexp(double{x}, -exponent);
-    constexpr auto most = static_cast<double>(kMost);
-    if (!(units > -most)) return std::isnan(units) ? 0 : -kMost;
-    return units < most ? static_cast<int64_t>(std::nearbyint(units)) : kMost;
+    constexpr auto most = static_cast<double>(kMax);
+    if (!(units > -most)) return std::isnan(units) ? 0 : -kMax;
+    return units < most ? static_cast<int64_t>(std::nearbyint(units)) : kMax;
   }
   double to_double(int64_t units) const { return std::ldexp(static_cast<double>(units), exponent); }
 };

@@ -40,11 +40,11 @@ template <typename F>
 inline Frame<F> make_frame(const Vec3<F>& n, const Vec3<F>& tangent, const F& handedness = F(1.f)) {
   const Vec3<F> s = fma(n, F(-dot(n, tangent)), tangent);
   const F len2 = length_squared(s);
-  const Mask<F> good = (len2 > 1e-6f * length_squared(tangent)) & (len2 > 0.f) & is_finite(len2);
+  const Mask<F> valid = (len2 > 1e-6f * length_squared(tangent)) & (len2 > 0.f) & is_finite(len2);
   const Frame<F> other = make_frame(n);
-  const Vec3<F> unit = s * F(1.f / sqrt(select(good, len2, F(1.f))));
-  const Vec3<F> sx = select<F>(good, unit, other.s);
-  return {sx, select<F>(good, cross(n, sx) * handedness, other.t), n};
+  const Vec3<F> unit = s * F(1.f / sqrt(select(valid, len2, F(1.f))));
+  const Vec3<F> sx = select<F>(valid, unit, other.s);
+  return {sx, select<F>(valid, cross(n, sx) * handedness, other.t), n};
 }
 
 /// Trigonometry of a local direction w with respect to n = (0, 0, 1).

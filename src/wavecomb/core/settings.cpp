@@ -6,22 +6,22 @@
 
 namespace wavecomb {
 
-LightPathRefusal light_path_refusal(const Settings& s) {
+LightPathConflict light_path_conflict(const Settings& s) {
   if (s.guiding != Guiding::kOff) return {"guiding", "guiding off"};
   if (s.clamp_indirect > 0) return {"clamp_indirect", "clamp_indirect 0"};
   if (s.cosine_sampling) return {"cosine_sampling", "none"};
   if (s.aovs.has(Aov::kDeep)) return {"the AOV deep, which lacks light path contributions", "none"};
   if (s.merge_radius <= 0) return {};
   if (s.connects()) return {"merge_radius", "merge_radius 0"};
-  if (s.keeps_error()) return {"merge_radius and errors of pixels", "merge_radius 0"};
+  if (s.needs_error()) return {"merge_radius and errors of pixels", "merge_radius 0"};
   for (const Aov aov : {Aov::kDirect, Aov::kIndirect, Aov::kLightGroups, Aov::kExpressions})
     if (s.aovs.has(aov)) return {"merge_radius and AOVs that split the beauty", "merge_radius 0"};
   return {};
 }
 
-Error light_path_error(const Settings& s, const LightPathRefusal& refusal) {
+Error light_path_error(const Settings& s, const LightPathConflict& conflict) {
   return Error("transport " + std::string(s.connects() ? "bdpt" : "light") + " does not go with " +
-               refusal.what + "; give " + refusal.instead + ", or transport path or auto");
+               conflict.what + "; give " + conflict.instead + ", or transport path or auto");
 }
 
 void Settings::check() const {
@@ -31,8 +31,8 @@ void Settings::check() const {
         "firefly reweight does not go with deep images, whose samples would not add up to the "
         "beauty; give firefly keep");
   if (joins_light())
-    if (const LightPathRefusal refusal = light_path_refusal(*this); !refusal.what.empty())
-      throw light_path_error(*this, refusal);
+    if (const LightPathConflict conflict = light_path_conflict(*this); !conflict.what.empty())
+      throw light_path_error(*this, conflict);
   check_expressions(expressions);
   if (uint64_t{width} * height > kMaxPixels)
     throw Error("width x height is " + std::to_string(uint64_t{width} * height) +
@@ -53,11 +53,11 @@ void Settings::check() const {
   }
   if (adaptive > 0 && noise > 0)
     throw Error("adaptive and noise are both set; set only one of them");
-  if (allots() && is_adaptive())
+  if (allocates_samples() && is_adaptive())
     throw Error(
         "allocate is for renders with a given number of samples or seconds; adaptive and noise "
         "distribute samples themselves: set only one of them");
-  if (allots() && region)
+  if (allocates_samples() && region)
     throw Error(
         "allocate error and efficiency depend on the whole image, so a region would differ from "
         "the same part of a full render; give allocate even, or no region");

@@ -159,8 +159,10 @@ struct Settings {
   Region rendered() const { return region.value_or(Region{0, 0, width, height}); }
   /// Returns the pixels of the film.
   Region film() const { return crop ? rendered() : Region{0, 0, width, height}; }
-  bool allots() const { return allocate != Allocate::kEven; }
-  bool keeps_error() const { return error || is_adaptive() || allots(); }
+  bool allocates_samples() const { return allocate != Allocate::kEven; }
+  bool needs_error() const { return error || is_adaptive() || allocates_samples(); }
+  [[deprecated("use allocates_samples()")]] bool allots() const { return allocates_samples(); }
+  [[deprecated("use needs_error()")]] bool keeps_error() const { return needs_error(); }
   /// Throws Error that names the option and its valid values if a setting is invalid.
   void check() const;
   bool operator==(const Settings&) const = default;
@@ -168,12 +170,17 @@ struct Settings {
 
 /// Setting that light paths cannot be combined with, and the value to use instead; `what` is empty
 /// if there is none.
-struct LightPathRefusal {
+struct LightPathConflict {
   std::string what, instead;
 };
+using LightPathRefusal [[deprecated("use LightPathConflict")]] = LightPathConflict;
 /// Returns the first setting that light paths cannot be combined with, if any.
-LightPathRefusal light_path_refusal(const Settings& settings);
+LightPathConflict light_path_conflict(const Settings& settings);
+[[deprecated("use light_path_conflict()")]] inline LightPathConflict light_path_refusal(
+    const Settings& settings) {
+  return light_path_conflict(settings);
+}
 /// Returns the Error for such a setting; `settings` must use light paths.
-Error light_path_error(const Settings& settings, const LightPathRefusal& refusal);
+Error light_path_error(const Settings& settings, const LightPathConflict& conflict);
 
 }  // namespace wavecomb

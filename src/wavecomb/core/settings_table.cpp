@@ -66,8 +66,8 @@ SettingInfo number(const char* name, const char* label, double least, double mos
 /// Returns a row of a number whose default depends on other settings; `used` returns the value in
 /// use.
 template <auto kMember>
-SettingInfo number_or_own(const char* name, const char* label, double least, double most,
-                          const char* help, SettingValue (*used)(const Settings&)) {
+SettingInfo number_or_unset(const char* name, const char* label, double least, double most,
+                            const char* help, SettingValue (*used)(const Settings&)) {
   SettingInfo info;
   info.name = name;
   info.label = label;
@@ -96,7 +96,7 @@ std::vector<SettingChoice> ray_orders() {
 }
 
 // Upper limits of path depth and of samples per pixel.
-constexpr double kMostDepth = 4096, kMostSamples = 1 << 20;
+constexpr double kMaxDepth = 4096, kMaxSamples = 1 << 20;
 
 SettingInfo with_steps(SettingInfo info, std::vector<double> steps, const char* zero) {
   info.steps = std::move(steps);
@@ -117,14 +117,14 @@ SettingInfo same_bits(SettingInfo info) {
 }
 
 /// Returns the settings that define the image.
-std::vector<SettingInfo> picture_settings() {
+std::vector<SettingInfo> image_settings() {
   using S = Settings;
   return {
       in_expectation(
           number<&S::width>("width", "Width", 1, kMaxSize, "Width of the image in pixels.")),
       in_expectation(
           number<&S::height>("height", "Height", 1, kMaxSize, "Height of the image in pixels.")),
-      in_expectation(number<&S::max_depth>("max_depth", "Max depth", 0, kMostDepth,
+      in_expectation(number<&S::max_depth>("max_depth", "Max depth", 0, kMaxDepth,
                                            "Maximum number of scattering events of a path.")),
       number<&S::seed>("seed", "Seed", 0, 0xffffffffu, "Seed of all random numbers."),
       choice<&S::sampler>("sampler", "Sampler",
@@ -136,7 +136,7 @@ std::vector<SettingInfo> picture_settings() {
                                          {"gaussian", "Gaussian with sigma of 1/6 of its width."},
                                          {"blackman-harris", "Blackman-Harris window."}},
                                         "Pixel filter: weights of samples around a pixel.")),
-      in_expectation(number_or_own<&S::filter_width>(
+      in_expectation(number_or_unset<&S::filter_width>(
           "filter_width", "Filter width", 0.01f, 32,
           "Full filter width in pixels; its own is 1 for the box, else 3.",
           [](const S& s) -> SettingValue { return double{s.used_filter_width()}; })),
@@ -162,7 +162,7 @@ std::vector<SettingInfo> picture_settings() {
           row<&S::error>("error", "Errors", "Stores error and variance estimates of each pixel.")),
       in_expectation(number<&S::overscan>("overscan", "Overscan", 0, kMaxSize / 2,
                                           "Extra pixels to render beyond each edge of the image.")),
-      number<&S::deep_samples>("deep_samples", "Deep samples", 1, kMostDeepSamples,
+      number<&S::deep_samples>("deep_samples", "Deep samples", 1, kMaxDeepSamples,
                                "Maximum number of samples per pixel of a deep image."),
       number<&S::deep_tolerance>("deep_tolerance", "Deep tolerance", 0, 1,
                                  "Merges samples of a deep image whose depths differ by at most "
@@ -212,7 +212,7 @@ std::vector<SettingInfo> work_settings() {
             "Reduces the weight of rare bright samples, which darkens the image slightly. The "
             "layer unbiased keeps them."}},
           "Treatment of samples much brighter than others.")),
-      number<&S::roulette_depth>("roulette_depth", "From depth", 0, kMostDepth,
+      number<&S::roulette_depth>("roulette_depth", "From depth", 0, kMaxDepth,
                                  "First vertex at which roulette may terminate a path."),
       choice<&S::light_selection>(
           "light_selection", "Lights",
@@ -251,9 +251,9 @@ std::vector<SettingInfo> sample_settings() {
       number<&S::noise>("noise", "Noise", 0, 1,
                         "Renders until the image's mean relative error is below this value.",
                         "off"),
-      number<&S::min_spp>("min_spp", "Min samples", 1, kMostSamples,
+      number<&S::min_spp>("min_spp", "Min samples", 1, kMaxSamples,
                           "Samples per pixel before the first error estimate."),
-      same_bits(number<&S::spp>("spp", "Samples", 1, kMostSamples,
+      same_bits(number<&S::spp>("spp", "Samples", 1, kMaxSamples,
                                 "Samples per pixel; the maximum with adaptive sampling.")),
       choice<&S::allocate>("allocate", "Sample allocation",
                            {{"even", "The same number for all pixels."},
@@ -306,7 +306,7 @@ std::vector<SettingInfo> order_settings() {
                            "appears soon."),
   };
   for (SettingInfo& setting : settings) {
-    setting.changes_picture =
+    setting.changes_image =
         setting.name == std::string_view("costs") || setting.name == std::string_view("integrator");
     setting.changes_bits = false;
   }
@@ -321,7 +321,7 @@ std::vector<SettingInfo> make_settings() {
       table.push_back(std::move(setting));
     }
   };
-  add(SettingGroup::kPicture, picture_settings());
+  add(SettingGroup::kImage, image_settings());
   add(SettingGroup::kWork, work_settings());
   add(SettingGroup::kWork, sample_settings());
   add(SettingGroup::kOrder, order_settings());

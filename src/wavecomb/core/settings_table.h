@@ -26,7 +26,7 @@ struct SettingChoice {
 };
 
 /// Subject of a setting: definition of the image, amount of work, or order of computation.
-enum class SettingGroup : uint8_t { kPicture, kWork, kOrder };
+enum class SettingGroup : uint8_t { kImage, kWork, kOrder };
 
 /// Row of the settings table.
 ///
@@ -36,13 +36,13 @@ struct SettingInfo {
   const char* label = "";  ///< label in a form
   const char* help = "";   ///< one sentence
   /// Whether the image depends on the setting; otherwise it affects only how it is computed.
-  bool changes_picture = true;
+  bool changes_image = true;
   /// Whether the bits of the beauty image depend on the setting, at equal samples of each pixel.
   bool changes_bits = true;
   /// Whether the expectation of the image depends on the setting, that is, the limit for many
   /// samples. Other settings change noise, work, or layers that describe them.
   bool changes_expectation = false;
-  SettingGroup group = SettingGroup::kPicture;
+  SettingGroup group = SettingGroup::kImage;
   double least = 0, most = -1;         ///< range of numbers; no limits if least > most
   const char* zero = "";               ///< meaning of 0, if it has a special one
   std::vector<double> steps;           ///< allowed values besides 0; empty means all

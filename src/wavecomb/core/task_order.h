@@ -4,9 +4,9 @@
 
 #if defined(__SANITIZE_THREAD__)
 #include <sanitizer/tsan_interface.h>
-#define WAVECOMB_UNSEEN __attribute__((no_sanitize_thread))
+#define WAVECOMB_NO_TSAN __attribute__((no_sanitize_thread))
 #else
-#define WAVECOMB_UNSEEN
+#define WAVECOMB_NO_TSAN
 #endif
 
 namespace wavecomb {
@@ -29,7 +29,7 @@ class TaskOrder {
   template <typename Body>
   auto around(const Body& body) const {
     // Not sanitised, since the captures are read before the annotation takes effect.
-    return [this, &body](const auto&... arguments) WAVECOMB_UNSEEN {
+    return [this, &body](const auto&... arguments) WAVECOMB_NO_TSAN {
       const Task task(*this);
       body(arguments...);
     };
@@ -47,8 +47,8 @@ class TaskOrder {
   };
 
 #if defined(__SANITIZE_THREAD__)
-  static void acquire(const char& place) { __tsan_acquire(const_cast<char*>(&place)); }
-  static void release(const char& place) { __tsan_release(const_cast<char*>(&place)); }
+  static void acquire(const char& address) { __tsan_acquire(const_cast<char*>(&address)); }
+  static void release(const char& address) { __tsan_release(const_cast<char*>(&address)); }
 #else
   static void acquire(const char&) {}
   static void release(const char&) {}

@@ -24,7 +24,7 @@ AovLayer make_layer(std::string name, uint32_t channels, size_t pixels, const Wr
 }
 
 /// Sorts `ids` and removes duplicates.
-void keep_once(std::vector<uint32_t>& ids) {
+void sort_unique(std::vector<uint32_t>& ids) {
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
 }
@@ -32,7 +32,7 @@ void keep_once(std::vector<uint32_t>& ids) {
 }  // namespace
 
 AovFilm::AovFilm(size_t pixels, const AovLayout& layout)
-    : layout_(layout), splat_places_(layout), pixels_(pixels) {
+    : layout_(layout), light_splat_layout_(layout), pixels_(pixels) {
   for (const AovRow& row : kAovs) {
     if (!layout.set.has(row.aov)) continue;
     switch (row.kind) {
@@ -42,10 +42,10 @@ AovFilm::AovFilm(size_t pixels, const AovLayout& layout)
       case AovKind::kExpressions:
       case AovKind::kSum:
       case AovKind::kMedian:
-        sums_[place_of(row.aov)].resize(pixels * words_of(row));
+        sums_[aov_index(row.aov)].resize(pixels * words_of(row));
         break;
       case AovKind::kNearest:
-        nearest_[place_of(row.aov)].resize(pixels * words_of(row));
+        nearest_[aov_index(row.aov)].resize(pixels * words_of(row));
         break;
       case AovKind::kCoverage:
         crypto_[level_index(row.aov)].resize(pixels);
@@ -90,7 +90,7 @@ AovLayer AovFilm::crypto_layer(Aov level, const std::vector<uint32_t>& samples) 
 AovLayer AovFilm::layer(Aov aov, const std::vector<uint32_t>& samples) const {
   const AovRow& row = row_of(aov);
   if (!layout_.set.has(aov)) return {};
-  const std::vector<double>& sums = sums_[place_of(aov)];
+  const std::vector<double>& sums = sums_[aov_index(aov)];
   const auto scaled = [&](const auto& scale) {
     return make_layer(row.name, row.channels, pixels_, [&](size_t i, float* out) {
       for (uint32_t c = 0; c < row.channels; ++c)
@@ -100,11 +100,11 @@ AovLayer AovFilm::layer(Aov aov, const std::vector<uint32_t>& samples) const {
   switch (row.kind) {
     case AovKind::kMean: {
       AovLayer layer = scaled([&](size_t i) { return inverse_count(samples[i]); });
-      if (const uint32_t place = splat_places_.of(aov);
-          !splats_.empty() && place != SplatPlaces::kNowhere)
+      if (const uint32_t sum_index = light_splat_layout_.of(aov);
+          !splats_.empty() && sum_index != LightSplatLayout::kNotStored)
         for (size_t i = 0; i < layer.values.size(); ++i)
           layer.values[i] = static_cast<float>(sums[i] * inverse_count(samples[i / 3]) +
-                                               splat_mean(i / 3, place, i % 3));
+                                               light_splat_mean(i / 3, sum_index, i % 3));
       return layer;
     }
     case AovKind::kMeanOfHits: {
@@ -116,7 +116,7 @@ AovLayer AovFilm::layer(Aov aov, const std::vector<uint32_t>& samples) const {
     case AovKind::kSum:
       return scaled([](size_t /*i*/) { return 1.0; });
     case AovKind::kNearest:
-      return {row.name, row.channels, nearest_[place_of(aov)]};
+      return {row.name, row.channels, nearest_[aov_index(aov)]};
     case AovKind::kCoverage:
       return crypto_layer(aov, samples);
     case AovKind::kMedian:
@@ -131,33 +131,33 @@ AovLayer AovFilm::layer(Aov aov, const std::vector<uint32_t>& samples) const {
   return {};
 }
 
-AovLayer AovFilm::one_of_many(Aov aov, uint32_t which, std::string name,
+AovLayer AovFilm::multi_layer(Aov aov, uint32_t which, std::string name,
                               const std::vector<uint32_t>& samples) const {
-  const std::vector<double>& sums = sums_[place_of(aov)];
+  const std::vector<double>& sums = sums_[aov_index(aov)];
   const size_t words = words_of(row_of(aov));
-  const uint32_t place = splat_places_.of(aov, which);
+  const uint32_t sum_index = light_splat_layout_.of(aov, which);
   return make_layer(std::move(name), 3, pixels_, [&](size_t i, float* v) {
     for (size_t c = 0; c < 3; ++c)
       v[c] = static_cast<float>(sums[i * words + 3 * which + c] * inverse_count(samples[i]) +
-                                splat_mean(i, place, c));
+                                light_splat_mean(i, sum_index, c));
   });
 }
 
 template <typename Layer>
-void AovFilm::for_each_of_many(const std::vector<std::string>& many_names,
-                               const Layer& layer) const {
+void AovFilm::for_each_multi_layer(const std::vector<std::string>& multi_layer_names,
+                                   const Layer& layer) const {
   const uint32_t groups = layout_.light_groups;
   for (uint32_t g = 0; layout_.set.has(Aov::kLightGroups) && g < groups; ++g)
-    layer(Aov::kLightGroups, g, kLightPrefix + many_names[g]);
+    layer(Aov::kLightGroups, g, kLightPrefix + multi_layer_names[g]);
   for (uint32_t e = 0; layout_.set.has(Aov::kExpressions) && e < layout_.expressions; ++e)
-    layer(Aov::kExpressions, e, kExpressionPrefix + many_names[groups + e]);
+    layer(Aov::kExpressions, e, kExpressionPrefix + multi_layer_names[groups + e]);
 }
 
 AovLayer AovFilm::layer(const std::string& name, const std::vector<uint32_t>& samples,
-                        const std::vector<std::string>& many_names) const {
+                        const std::vector<std::string>& multi_layer_names) const {
   AovLayer found;
-  for_each_of_many(many_names, [&](Aov aov, uint32_t which, const std::string& one) {
-    if (name == one) found = one_of_many(aov, which, one, samples);
+  for_each_multi_layer(multi_layer_names, [&](Aov aov, uint32_t which, const std::string& one) {
+    if (name == one) found = multi_layer(aov, which, one, samples);
   });
   if (!found.name.empty()) return found;
   for (const AovRow& row : kAovs)
@@ -167,8 +167,8 @@ AovLayer AovFilm::layer(const std::string& name, const std::vector<uint32_t>& sa
 
 AovLayer AovFilm::take(Aov aov, const std::vector<uint32_t>& samples) {
   AovLayer taken = layer(aov, samples);
-  release(sums_[place_of(aov)]);
-  release(nearest_[place_of(aov)]);
+  release(sums_[aov_index(aov)]);
+  release(nearest_[aov_index(aov)]);
   if (row_of(aov).kind == AovKind::kCoverage) release(crypto_[level_index(aov)]);
   layout_.set.bits &= ~static_cast<uint32_t>(aov);
   return taken;
@@ -182,12 +182,12 @@ DeepLayer AovFilm::take_deep(const std::vector<uint32_t>& samples) {
 }
 
 std::vector<AovLayer> AovFilm::finish(const std::vector<uint32_t>& samples,
-                                      const std::vector<std::string>& many_names) && {
+                                      const std::vector<std::string>& multi_layer_names) && {
   std::vector<AovLayer> out;
   for (const AovRow& row : kAovs) {
     if (!layout_.set.has(row.aov)) continue;
-    for_each_of_many(many_names, [&](Aov aov, uint32_t which, const std::string& name) {
-      if (aov == row.aov) out.push_back(one_of_many(aov, which, name, samples));
+    for_each_multi_layer(multi_layer_names, [&](Aov aov, uint32_t which, const std::string& name) {
+      if (aov == row.aov) out.push_back(multi_layer(aov, which, name, samples));
     });
     AovLayer layer = take(row.aov, samples);
     if (!layer.values.empty()) out.push_back(std::move(layer));
@@ -204,10 +204,10 @@ std::vector<uint32_t> crypto_ids(const AovLayer& pairs) {
     // Neighbouring pixels mostly have the same ids, so occasional deduplication bounds the list.
     if (ids.empty() || ids.back() != id) ids.push_back(id);
     if (ids.size() < limit) continue;
-    keep_once(ids);
+    sort_unique(ids);
     limit = std::max(limit, 2 * ids.size());
   }
-  keep_once(ids);
+  sort_unique(ids);
   return ids;
 }
 

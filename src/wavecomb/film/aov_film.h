@@ -18,11 +18,11 @@
 namespace wavecomb {
 
 /// Material, instance or object id of a sample that hit nothing.
-inline constexpr uint32_t kNothingHit = 0xffffffffu;
+inline constexpr uint32_t kNoHitId = 0xffffffffu;
 
 /// Returns the value written to an id layer: the id plus 1, or 0 if nothing was hit.
 inline float id_value(uint32_t id) {
-  return id == kNothingHit ? 0.f : static_cast<float>(id) + 1.f;
+  return id == kNoHitId ? 0.f : static_cast<float>(id) + 1.f;
 }
 
 /// Image layer with `channels` interleaved values per pixel; row 0 is at the top.
@@ -53,7 +53,7 @@ class AovFilm {
   /// Returns the sums of a mean, sum or median AOV at `pixel`, one per channel, or null if the AOV
   /// is not stored. Light groups are consecutive RGB triples, and so are light path expressions.
   double* sums(Aov aov, size_t pixel) {
-    std::vector<double>& all = sums_[place_of(aov)];
+    std::vector<double>& all = sums_[aov_index(aov)];
     return all.empty() ? nullptr : all.data() + pixel * words_of(row_of(aov));
   }
   /// Adds `values`, one per channel, to an AOV that is stored.
@@ -77,18 +77,18 @@ class AovFilm {
   }
   /// Replaces the channels of a kNearest AOV; does nothing if the AOV is not stored.
   void put(Aov aov, size_t pixel, const float* values) {
-    std::vector<float>& all = nearest_[place_of(aov)];
+    std::vector<float>& all = nearest_[aov_index(aov)];
     for (uint32_t c = 0; c < row_of(aov).channels && !all.empty(); ++c)
       all[pixel * row_of(aov).channels + c] = values[c];
   }
   /// Adds a sample to the Cryptomatte levels. `object`: index of ObjectNames; either id may be
-  /// kNothingHit.
+  /// kNoHitId.
   void add_ids(size_t pixel, uint32_t object, uint32_t material, const CryptoTables& tables) {
-    if (object != kNothingHit) {
+    if (object != kNoHitId) {
       if (!crypto_[0].empty()) crypto_[0][pixel].add(tables.object_id[object]);
       if (!crypto_[2].empty()) crypto_[2][pixel].add(tables.asset_id[object]);
     }
-    if (material != kNothingHit && !crypto_[1].empty())
+    if (material != kNoHitId && !crypto_[1].empty())
       crypto_[1][pixel].add(tables.material_id[material]);
   }
 
@@ -98,13 +98,16 @@ class AovFilm {
   // ---- light splats (contributions of light paths) ----------------------------------------------
 
   /// Allocates sums for light splats in units of `unit`, for the layers that include them.
-  void keep_splats(FixedPoint unit) { splats_ = SplatSums(pixels_ * splat_places_.count, unit); }
-  /// Adds a light splat to layer `place` (see SplatPlaces) of a pixel. The order does not matter.
-  void add_splat(size_t pixel, uint32_t place, float r, float g, float b) {
-    splats_.add(pixel * splat_places_.count + place, r, g, b);
+  void allocate_light_splats(FixedPoint unit) {
+    splats_ = LightSplatSums(pixels_ * light_splat_layout_.count, unit);
+  }
+  /// Adds a light splat to layer `sum_index` (see LightSplatLayout) of a pixel. The order does not
+  /// matter.
+  void add_light_splat(size_t pixel, uint32_t sum_index, float r, float g, float b) {
+    splats_.add(pixel * light_splat_layout_.count + sum_index, r, g, b);
   }
   /// Sets the scale that turns sums of light splats into means.
-  void scale_splats(const SplatScale& scale) { splat_scale_ = scale; }
+  void set_light_splat_scale(const LightSplatScale& scale) { light_splat_scale_ = scale; }
 
   // ---- layers -----------------------------------------------------------------------------------
 
@@ -112,15 +115,16 @@ class AovFilm {
   /// stored. `samples`: sample count of each pixel.
   AovLayer layer(Aov aov, const std::vector<uint32_t>& samples) const;
   /// Returns a layer by name, which may be "light_NAME" or "lpe_NAME"; its name is empty if no such
-  /// layer is stored. `many_names`: names of the stored light groups, then of the expressions.
+  /// layer is stored. `multi_layer_names`: names of the stored light groups, then of the
+  /// expressions.
   AovLayer layer(const std::string& name, const std::vector<uint32_t>& samples,
-                 const std::vector<std::string>& many_names) const;
+                 const std::vector<std::string>& multi_layer_names) const;
   /// Returns the layer of an AOV and frees its sums.
   AovLayer take(Aov aov, const std::vector<uint32_t>& samples);
   /// Returns all stored layers that were not taken. Each AOV's sums are freed as soon as its layer
   /// is complete. Layers of light groups are named "light_NAME", those of expressions "lpe_NAME".
   std::vector<AovLayer> finish(const std::vector<uint32_t>& samples,
-                               const std::vector<std::string>& many_names) &&;
+                               const std::vector<std::string>& multi_layer_names) &&;
   size_t bytes() const;
   /// Returns the deep image and frees its sums; empty if the render has none.
   DeepLayer take_deep(const std::vector<uint32_t>& samples);
@@ -130,8 +134,8 @@ class AovFilm {
   void for_each_block(const Block& block) {
     for (const AovRow& row : kAovs) {
       const std::string name = std::string("aov_") + row.name;
-      block(name, sums_[place_of(row.aov)]);
-      block(name, nearest_[place_of(row.aov)]);
+      block(name, sums_[aov_index(row.aov)]);
+      block(name, nearest_[aov_index(row.aov)]);
       if (row.kind == AovKind::kCoverage) block(name, crypto_[level_index(row.aov)]);
     }
     block("aov_splats", splats_.sums());
@@ -140,7 +144,9 @@ class AovFilm {
   }
 
  private:
-  static uint32_t level_index(Aov level) { return place_of(level) - place_of(Aov::kCryptoObject); }
+  static uint32_t level_index(Aov level) {
+    return aov_index(level) - aov_index(Aov::kCryptoObject);
+  }
   /// Number of values per pixel in the sums of an AOV.
   size_t words_of(const AovRow& row) const {
     if (row.kind == AovKind::kGroups) return 3 * layout_.light_groups;
@@ -149,27 +155,30 @@ class AovFilm {
   }
   AovLayer crypto_layer(Aov level, const std::vector<uint32_t>& samples) const;
   /// Returns layer `which` of the light groups or of the expressions.
-  AovLayer one_of_many(Aov aov, uint32_t which, std::string name,
+  AovLayer multi_layer(Aov aov, uint32_t which, std::string name,
                        const std::vector<uint32_t>& samples) const;
   /// Calls layer(aov, which, name) for each stored light group and expression.
   template <typename Layer>
-  void for_each_of_many(const std::vector<std::string>& many_names, const Layer& layer) const;
+  void for_each_multi_layer(const std::vector<std::string>& multi_layer_names,
+                            const Layer& layer) const;
 
-  /// Returns the contribution of light splats to channel `c` of layer `place` (kNowhere gives 0).
-  double splat_mean(size_t pixel, uint32_t place, size_t c) const {
-    if (splats_.empty() || place == SplatPlaces::kNowhere) return 0;
-    return splat_scale_.of(splats_.value(pixel * splat_places_.count + place, c));
+  /// Returns the contribution of light splats to channel `c` of layer `sum_index` (kNotStored gives
+  /// 0).
+  double light_splat_mean(size_t pixel, uint32_t sum_index, size_t c) const {
+    if (splats_.empty() || sum_index == LightSplatLayout::kNotStored) return 0;
+    return light_splat_scale_.of(splats_.value(pixel * light_splat_layout_.count + sum_index, c));
   }
 
   AovLayout layout_;
-  SplatPlaces splat_places_;
+  LightSplatLayout light_splat_layout_;
   size_t pixels_ = 0;
-  // Indexed by place_of(aov); empty if the AOV is not stored.
+  // Indexed by aov_index(aov); empty if the AOV is not stored.
   std::array<std::vector<double>, kAovCount> sums_;
   std::array<std::vector<float>, kAovCount> nearest_;
   std::array<std::vector<CryptoPixel>, kCryptoLevels> crypto_;
-  SplatSums splats_;  ///< index: pixel * splat_places_.count + place; empty without light splats
-  SplatScale splat_scale_;
+  LightSplatSums splats_;  ///< index: pixel * light_splat_layout_.count + sum index; empty without
+                           ///< light splats
+  LightSplatScale light_splat_scale_;
   DeepFilm deep_;
   std::vector<uint32_t> hits_;  ///< number of samples that hit something
   std::vector<float> centre2_;  ///< squared distance of the nearest sample to the centre, pixels^2

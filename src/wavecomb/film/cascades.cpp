@@ -35,8 +35,8 @@ void Cascades::add(size_t pixel, const float* rgb) {
   }
 }
 
-float Cascades::share_kept(const Levels& own, const Levels& around, float pixels, float samples,
-                           float samples_around, uint32_t layer) const {
+float Cascades::kept_fraction(const Levels& own, const Levels& around, float pixels, float samples,
+                              float samples_around, uint32_t layer) const {
   const auto count = [&](const Levels& levels) {
     float sum = 0;
     for (uint32_t i = layer - 1; i <= std::min(layer + 1, kLayers - 1); ++i)
@@ -74,8 +74,8 @@ std::vector<float> Cascades::excess(const std::vector<uint32_t>& samples) const 
       const auto n = static_cast<float>(samples[i]);
       for (uint32_t k = 1; k < kLayers; ++k) {
         if (is_dark(levels[i][k])) continue;
-        const float kept = share_kept(levels[i], around, pixels, n, samples_around, k);
-        for (size_t c = 0; c < 3; ++c) out[3 * i + c] += (1 - kept) * sums_[i][k][c] / n;
+        const float fraction = kept_fraction(levels[i], around, pixels, n, samples_around, k);
+        for (size_t c = 0; c < 3; ++c) out[3 * i + c] += (1 - fraction) * sums_[i][k][c] / n;
       }
     }
   return out;

@@ -62,8 +62,8 @@ class Cascades {
 
   /// Returns r_i of `layer` from the layers of the pixel (`own`) and the sums over its
   /// neighbourhood (`around`, of `pixels` pixels with `samples_around` samples).
-  float share_kept(const Levels& own, const Levels& around, float pixels, float samples,
-                   float samples_around, uint32_t layer) const;
+  float kept_fraction(const Levels& own, const Levels& around, float pixels, float samples,
+                      float samples_around, uint32_t layer) const;
 
   uint32_t width_ = 0, height_ = 0;
   Levels brightness_{};  ///< B_i

@@ -13,7 +13,7 @@
 namespace wavecomb {
 namespace {
 
-static_assert(kMostDeepSamples <= 255, "counted in a byte");
+static_assert(kMaxDeepSamples <= 255, "counted in a byte");
 
 /// Returns the length of a depth range relative to its far end.
 float spread(float front, float back) {
@@ -57,7 +57,7 @@ void DeepFilm::add(size_t pixel, float z, bool in_volume, const float* rgb) {
 
 void DeepFilm::insert(size_t pixel, uint32_t at, const DeepBin& added) {
   const uint32_t n = used_[pixel];
-  std::array<DeepBin, kMostDeepSamples + 1> all;
+  std::array<DeepBin, kMaxDeepSamples + 1> all;
   for (uint32_t i = 0, to = 0; to <= n; ++to) all[to] = to == at ? added : bin(pixel, i++);
   uint32_t size = n + 1;
   if (size > limits_.most) {
@@ -109,8 +109,8 @@ std::vector<std::byte> DeepFilm::packed() const {
 }
 
 void DeepFilm::unpack(std::span<const std::byte> bytes) {
-  const auto check = [](bool is_good) {
-    if (!is_good) throw Error("the checkpoint has deep samples of a different image; start anew");
+  const auto check = [](bool is_symbol) {
+    if (!is_symbol) throw Error("the checkpoint has deep samples of a different image; start anew");
   };
   check(bytes.size() >= used_.size());
   std::vector<uint8_t> used(used_.size());

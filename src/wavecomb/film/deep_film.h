@@ -50,8 +50,8 @@ struct ZeroedMemory {
   template <typename U>
   void construct(U* /*place*/) {}
   template <typename U, typename From>
-  void construct(U* place, From&& from) {
-    ::new (static_cast<void*>(place)) U(std::forward<From>(from));
+  void construct(U* target, From&& from) {
+    ::new (static_cast<void*>(target)) U(std::forward<From>(from));
   }
   bool operator==(const ZeroedMemory&) const = default;
 };

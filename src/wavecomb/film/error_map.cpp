@@ -10,10 +10,11 @@ namespace wavecomb {
 namespace {
 
 /// Error terms of one pixel, summed over rgb: `light` is the pixel mean, `difference` the absolute
-/// difference between the full mean and the half mean. `own2` and `splat2` are squared differences
-/// of the pixel's own samples and of light splats. `known` is false without two full halves.
+/// difference between the full mean and the half mean. `camera_paths2` and `light_splats2` are
+/// squared differences of the pixel's own samples and of light splats. `known` is false without two
+/// full halves.
 struct PixelError {
-  double light = 0, difference = 0, own2 = 0, splat2 = 0;
+  double light = 0, difference = 0, camera_paths2 = 0, light_splats2 = 0;
   bool known = false;
 };
 
@@ -26,17 +27,17 @@ PixelError pixel_error(const Film& film, size_t pixel) {
   // Var(I - A) = var (1 / half - 1 / n). The scale makes it var / n, the variance of the mean.
   const double scale = std::sqrt(static_cast<double>(in_half) / (n - in_half));
   PixelError out;
-  std::array<double, 3> splats{}, splat_difference{};
+  std::array<double, 3> splats{}, light_splat_difference{};
   if (!film.splats().empty()) {
     splats = film.splats().mean(pixel);
-    splat_difference = film.splats().difference(pixel);
+    light_splat_difference = film.splats().difference(pixel);
   }
   for (size_t c = 0; c < 3; ++c) {
     const double mean = sums[c] / n, own = (mean - e.half[c] / in_half) * scale;
     out.light += mean + splats[c];
-    out.difference += std::abs(own + splat_difference[c]);
-    out.own2 += own * own;
-    out.splat2 += splat_difference[c] * splat_difference[c];
+    out.difference += std::abs(own + light_splat_difference[c]);
+    out.camera_paths2 += own * own;
+    out.light_splats2 += light_splat_difference[c] * light_splat_difference[c];
   }
   if (!std::isfinite(out.light) || !std::isfinite(out.difference)) out = {};
   out.known = true;
@@ -101,8 +102,8 @@ NoiseParts measure_noise_parts(const Film& film, std::span<const uint8_t> active
     if (!active.empty() && active[i] == 0) continue;
     const PixelError e = pixel_error(film, i);
     if (!e.known || !(e.light > 0)) continue;
-    parts.own += e.own2 / e.light;
-    parts.splats += e.splat2 / e.light;
+    parts.own += e.camera_paths2 / e.light;
+    parts.splats += e.light_splats2 / e.light;
   }
   return parts;
 }

@@ -34,9 +34,9 @@ std::vector<float> Film::means(const std::vector<float>& excess) const {
   return out;
 }
 
-void Film::note_light_paths() {
+void Film::update_light_path_aovs() {
   if (splats_.empty()) return;
-  aovs_.scale_splats(splats_.scale());
+  aovs_.set_light_splat_scale(splats_.scale());
   for (size_t i = 0; i < pixels_.size(); ++i) {
     double* sums = aovs_.sums(Aov::kByLightPaths, i);
     if (!sums) return;
@@ -91,14 +91,14 @@ std::vector<Film::Block> Film::blocks() {
   return out;
 }
 
-Film::Layers Film::finish(const std::vector<std::string>& many_names) && {
+Film::Layers Film::finish(const std::vector<std::string>& multi_layer_names) && {
   Layers layers;
   layers.beauty = beauty();
   layers.samples = samples();
   layers.variance = variance();
   std::vector<float> kept;
   if (has_cascades()) kept = unbiased();
-  note_light_paths();
+  update_light_path_aovs();
   release(errors_);
   release(pixels_);
   splats_ = {};
@@ -108,7 +108,7 @@ Film::Layers Film::finish(const std::vector<std::string>& many_names) && {
   layers.albedo = aovs_.take(Aov::kAlbedo, layers.samples).values;
   layers.normal = aovs_.take(Aov::kNormal, layers.samples).values;
   layers.depth = aovs_.take(Aov::kDepth, layers.samples).values;
-  layers.aovs = std::move(aovs_).finish(layers.samples, many_names);
+  layers.aovs = std::move(aovs_).finish(layers.samples, multi_layer_names);
   if (!kept.empty()) layers.aovs.push_back({"unbiased", 3, std::move(kept)});
   return layers;
 }

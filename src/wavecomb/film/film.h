@@ -47,38 +47,38 @@ class Film {
   /// Allocates sums for light splats in units of `unit`, for `paths` light path indices of which
   /// each stands for `scale` light paths per sample. The beauty becomes the pixel means plus the
   /// splat means; AOVs get splat sums as well.
-  void keep_splats(FixedPoint unit, size_t paths = 0, double scale = 1) {
-    splats_ = SplatLayer(pixels_.size(), unit, paths, scale, has_error());
-    aovs_.keep_splats(unit);
+  void allocate_light_splats(FixedPoint unit, size_t paths = 0, double scale = 1) {
+    splats_ = LightSplatLayer(pixels_.size(), unit, paths, scale, has_error());
+    aovs_.allocate_light_splats(unit);
   }
-  /// Allocates a row of kVisibleWords floats per pixel for the visible points of merging
+  /// Allocates a row of kMergePointWords floats per pixel for the merge points
   /// (light_paths/merge_grid.h).
-  static constexpr size_t kVisibleWords = 16;
-  void keep_visible_points() { visible_.assign(pixels_.size() * kVisibleWords, 0.f); }
-  std::span<const float> visible_points() const { return visible_; }
-  void set_visible_point(size_t i, const float* row) {
-    std::copy_n(row, kVisibleWords, visible_.data() + i * kVisibleWords);
+  static constexpr size_t kMergePointWords = 16;
+  void allocate_merge_points() { visible_.assign(pixels_.size() * kMergePointWords, 0.f); }
+  std::span<const float> merge_points() const { return visible_; }
+  void set_merge_point(size_t i, const float* row) {
+    std::copy_n(row, kMergePointWords, visible_.data() + i * kMergePointWords);
   }
   /// Adds all light splats of `list` and clears it.
-  void take(SplatList& list) {
+  void take(LightSplatList& list) {
     splats_.add(list);
     list.clear();
   }
   /// Adds a light splat to `list`; if it is full, adds the list to the film first.
-  void collect(SplatList& list, const SplatList::Splat& splat) {
+  void collect(LightSplatList& list, const LightSplatList::LightSplat& splat) {
     if (list.add(splat)) return;
     take(list);
     (void)list.add(splat);
   }
   /// Allocates brightness cascades, so that beauty() reduces fireflies. `darkest`: luminance of the
   /// darkest layer.
-  void keep_cascades(float darkest) { cascades_ = Cascades(window_, darkest); }
+  void allocate_cascades(float darkest) { cascades_ = Cascades(window_, darkest); }
   bool has_cascades() const { return !cascades_.empty(); }
   Cascades& cascades() { return cascades_; }
   /// Updates the AOVs of light path contributions from the current light splats.
-  void note_light_paths();
-  SplatLayer& splats() { return splats_; }
-  const SplatLayer& splats() const { return splats_; }
+  void update_light_path_aovs();
+  LightSplatLayer& splats() { return splats_; }
+  const LightSplatLayer& splats() const { return splats_; }
   /// Row-major index of an image pixel within the window.
   size_t index(uint32_t x, uint32_t y) const { return window_.index(x, y); }
   const Pixel& pixel(size_t i) const { return pixels_[i]; }
@@ -126,8 +126,9 @@ class Film {
     DeepLayer deep;
   };
   /// Returns all layers and ends the film. Sums are freed as soon as they are used, because sums
-  /// and layers together are the peak memory of small scenes. `many_names`: see AovFilm::layer.
-  Layers finish(const std::vector<std::string>& many_names) &&;
+  /// and layers together are the peak memory of small scenes. `multi_layer_names`: see
+  /// AovFilm::layer.
+  Layers finish(const std::vector<std::string>& multi_layer_names) &&;
 
  private:
   /// Returns pixel means minus `excess` as interleaved rgb; an empty `excess` subtracts nothing.
@@ -137,8 +138,8 @@ class Film {
   std::vector<Pixel> pixels_;
   AovFilm aovs_;
   std::vector<ErrorSums> errors_;
-  SplatLayer splats_;  ///< empty without light splats
-  Cascades cascades_;  ///< empty without firefly reduction
+  LightSplatLayer splats_;  ///< empty without light splats
+  Cascades cascades_;       ///< empty without firefly reduction
   std::vector<float> visible_;
 };
 

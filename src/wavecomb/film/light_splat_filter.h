@@ -13,7 +13,7 @@ namespace wavecomb {
 
 /// Wrap-around of a panoramic image: points repeat after a full turn in x, and beyond a pole they
 /// appear upside down and half a turn away. `pixels` of 0 means that the image does not wrap.
-struct PictureTurn {
+struct ImageWrap {
   float pixels = 0;            ///< width of a full turn in pixels
   float north = 0, south = 0;  ///< y coordinates of the poles in pixels
 };
@@ -22,21 +22,21 @@ struct PictureTurn {
 /// of the image, contributes to each pixel with the filter density at its offset from the pixel
 /// centre. This matches the density with which the pixel's own samples, all of weight 1, would lie
 /// there.
-class SplatFilter {
+class LightSplatFilter {
  public:
   /// `rendered`: pixels that receive light splats.
-  SplatFilter(const FilterTable& filter, const Region& rendered, const PictureTurn& turn = {})
+  LightSplatFilter(const FilterTable& filter, const Region& rendered, const ImageWrap& turn = {})
       : filter_(filter), rendered_(rendered), turn_(turn) {}
 
   /// Returns whether a splat at (x, y) contributes to any pixel.
   template <typename F>
   Mask<F> reaches(const F& x, const F& y) const {
     if (turn_.pixels == 0) [[likely]]
-      return (x >= left()) & (x < right()) & holds_row<F>(y);
+      return (x >= left()) & (x < right()) & contains_row<F>(y);
     const F half = x + 0.5f * turn_.pixels;
-    return (holds_row<F>(y) & comes_round<F>(x)) |
-           ((holds_row<F>(F(2 * turn_.north - y)) | holds_row<F>(F(2 * turn_.south - y))) &
-            comes_round<F>(half));
+    return (contains_row<F>(y) & wraps_into_image<F>(x)) |
+           ((contains_row<F>(F(2 * turn_.north - y)) | contains_row<F>(F(2 * turn_.south - y))) &
+            wraps_into_image<F>(half));
   }
 
   /// Calls add(pixel, weight) for each pixel (Film::index) to which a splat at (x, y) contributes.
@@ -59,7 +59,7 @@ class SplatFilter {
   float low(uint32_t edge) const { return static_cast<float>(edge) + 0.5f - filter_.radius(); }
   float high(uint32_t edge) const { return static_cast<float>(edge) - 0.5f + filter_.radius(); }
   template <typename F>
-  Mask<F> holds_row(const F& y) const {
+  Mask<F> contains_row(const F& y) const {
     return (y >= low(rendered_.y0)) & (y < high(rendered_.y1));
   }
   /// Shifts x by whole turns to within one turn to the right of left().
@@ -69,13 +69,13 @@ class SplatFilter {
   }
   /// Whether a position reaches a rendered column after whole turns.
   template <typename F>
-  Mask<F> comes_round(const F& x) const {
+  Mask<F> wraps_into_image(const F& x) const {
     return after_left<F>(x) < right();
   }
 
   template <typename Add>
   void spread_around(const Film& film, float x, float y, const Add& add) const {
-    if (!holds_row<float>(y)) return;
+    if (!contains_row<float>(y)) return;
     for (float at = after_left<float>(x); at < right(); at += turn_.pixels)
       spread_at(film, at, y, add);
   }
@@ -103,7 +103,7 @@ class SplatFilter {
 
   const FilterTable& filter_;
   Region rendered_;
-  PictureTurn turn_;
+  ImageWrap turn_;
 };
 
 }  // namespace wavecomb

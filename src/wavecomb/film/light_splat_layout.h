@@ -11,24 +11,24 @@ namespace wavecomb {
 /// Position of each layer among the splat sums of a pixel. A light path that reaches the camera has
 /// scattered at least once: once is direct light, more often is indirect light. It is never
 /// emission.
-struct SplatPlaces {
-  static constexpr uint32_t kNowhere = 0xffffffffu;  ///< the layer is not stored
+struct LightSplatLayout {
+  static constexpr uint32_t kNotStored = 0xffffffffu;  ///< the layer is not stored
 
-  uint32_t direct = kNowhere, indirect = kNowhere;
-  uint32_t first_group = kNowhere, first_expression = kNowhere;
+  uint32_t direct = kNotStored, indirect = kNotStored;
+  uint32_t first_group = kNotStored, first_expression = kNotStored;
   uint32_t count = 0;  ///< number of splat sums per pixel
 
-  SplatPlaces() = default;
-  explicit SplatPlaces(const AovLayout& layout) {
-    const auto take = [&](bool wanted, uint32_t layers) {
-      if (!wanted || layers == 0) return kNowhere;
+  LightSplatLayout() = default;
+  explicit LightSplatLayout(const AovLayout& layout) {
+    const auto allocate = [&](bool wanted, uint32_t layers) {
+      if (!wanted || layers == 0) return kNotStored;
       count += layers;
       return count - layers;
     };
-    direct = take(layout.set.has(Aov::kDirect), 1);
-    indirect = take(layout.set.has(Aov::kIndirect), 1);
-    first_group = take(layout.set.has(Aov::kLightGroups), layout.light_groups);
-    first_expression = take(layout.set.has(Aov::kExpressions), layout.expressions);
+    direct = allocate(layout.set.has(Aov::kDirect), 1);
+    indirect = allocate(layout.set.has(Aov::kIndirect), 1);
+    first_group = allocate(layout.set.has(Aov::kLightGroups), layout.light_groups);
+    first_expression = allocate(layout.set.has(Aov::kExpressions), layout.expressions);
   }
 
   /// Returns the position of an AOV with one layer, or of layer `which` of an AOV with several.
@@ -37,8 +37,8 @@ struct SplatPlaces {
                            : aov == Aov::kIndirect    ? indirect
                            : aov == Aov::kLightGroups ? first_group
                            : aov == Aov::kExpressions ? first_expression
-                                                      : kNowhere;
-    return first == kNowhere ? kNowhere : first + which;
+                                                      : kNotStored;
+    return first == kNotStored ? kNotStored : first + which;
   }
 };
 

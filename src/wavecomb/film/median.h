@@ -35,30 +35,31 @@ class MedianSketch {
     if (count <= kMarkers) {
       q[count - 1] = u;
       std::sort(q, q + count);
-      for (uint32_t i = 1; i + 1 < kMarkers; ++i) s_[kPlaces + i - 1] = i;
+      for (uint32_t i = 1; i + 1 < kMarkers; ++i) s_[kPositions + i - 1] = i;
       return;
     }
     q[0] = std::min(q[0], u);
     q[kMarkers - 1] = std::max(q[kMarkers - 1], u);
     for (uint32_t i = 1; i + 1 < kMarkers; ++i)
-      if (u < q[i]) ++s_[kPlaces + i - 1];
+      if (u < q[i]) ++s_[kPositions + i - 1];
     for (uint32_t i = 1; i + 1 < kMarkers; ++i) adjust(i);
   }
 
  private:
   friend double median_of(const double* state);
-  enum Word : uint32_t { kScale, kCount, kInfinite, kHeights, kPlaces = kHeights + 5 };
+  enum Word : uint32_t { kScale, kCount, kInfinite, kHeights, kPositions = kHeights + 5 };
   static constexpr uint32_t kMarkers = 5;
 
   /// Returns the number of values below marker `i`.
-  double place(uint32_t i) const {
+  double marker_position(uint32_t i) const {
     if (i == 0) return 0;
-    return i + 1 == kMarkers ? s_[kCount] - 1 : s_[kPlaces + i - 1];
+    return i + 1 == kMarkers ? s_[kCount] - 1 : s_[kPositions + i - 1];
   }
   /// Moves marker `i` by one position if it is at least one away from its ideal position.
   void adjust(uint32_t i) {
     double* const q = s_ + kHeights;
-    const double at = place(i), before = place(i - 1), after = place(i + 1);
+    const double at = marker_position(i), before = marker_position(i - 1),
+                 after = marker_position(i + 1);
     const double wants = (s_[kCount] - 1) * i / (kMarkers - 1) - at;
     double step = 0;
     if (wants >= 1 && after - at > 1) step = 1;
@@ -71,7 +72,7 @@ class MedianSketch {
       q[i] = curved;
     else
       q[i] += step > 0 ? up : -down;
-    s_[kPlaces + i - 1] += step;
+    s_[kPositions + i - 1] += step;
   }
 
   double* s_;

@@ -62,7 +62,7 @@ Shape shape_of(const GraphOp& op) {
 }
 
 /// Returns the smallest allowed vector width of an operation.
-uint32_t least_width(GraphCode code) {
+uint32_t min_width(GraphCode code) {
   const bool three =
       code == GraphCode::kCross || code == GraphCode::kRgbToHsv || code == GraphCode::kHsvToRgb;
   return three ? 3 : 1;
@@ -110,8 +110,8 @@ uint32_t graph_inputs(const Graph& graph) {
 
 void check_graph(const Graph& graph, const std::string& name, size_t texture_count,
                  uint32_t parameters) {
-  const auto require = [&](bool good, const char* what) {
-    if (!good) throw Error(name + " has a graph with " + what + "; compile it again");
+  const auto require = [&](bool valid, const char* what) {
+    if (!valid) throw Error(name + " has a graph with " + what + "; compile it again");
   };
   require(graph.ops.size() <= kMaxGraphOps, "too many operations");
   require(graph.constants.size() < kGraphConstant, "too many constants");
@@ -119,14 +119,14 @@ void check_graph(const Graph& graph, const std::string& name, size_t texture_cou
   const auto readable = [&](uint32_t from, uint32_t width) {
     if ((from & kGraphConstant) != 0)
       return (from & ~uint32_t{kGraphConstant}) + width <= graph.constants.size();
-    bool good = from + width <= kMaxGraphRegisters;
-    for (uint32_t i = from; good && i < from + width; ++i) good = written[i];
-    return good;
+    bool valid = from + width <= kMaxGraphRegisters;
+    for (uint32_t i = from; valid && i < from + width; ++i) valid = written[i];
+    return valid;
   };
   for (const GraphOp& op : graph.ops) {
     require(op.code < kGraphCodeCount, "an unknown operation");
     const auto code = static_cast<GraphCode>(op.code);
-    require(op.width >= least_width(code) && op.width <= (least_width(code) == 3 ? 3 : 4),
+    require(op.width >= min_width(code) && op.width <= (min_width(code) == 3 ? 3 : 4),
             "a vector of a wrong size");
     const Shape shape = shape_of(op);
     for (uint32_t k = 0; k < shape.operands; ++k) {

@@ -21,7 +21,7 @@ struct GraphPoint {
   Vec3<F> view{F(0.f), F(0.f), F(1.f)};
   Vec3<F> normal_x{F(1.f), F(0.f), F(0.f)}, normal_y{F(0.f), F(1.f), F(0.f)},
       normal_z{F(0.f), F(0.f), F(1.f)};
-  MeshPlace<F> place;  ///< position on the mesh, for attributes
+  MeshPosition<F> mesh_position;  ///< position on the mesh, for attributes
 };
 
 /// Runs `program` for all active lanes at `at`. `registers` has room for kMaxGraphRegisters values

@@ -93,9 +93,9 @@ inline void noise_values(const F (&p)[N], uint32_t width, F* out) {
   noise::perlin<3, F>(p, value);
   for (uint32_t i = 0; i < width && i < 3; ++i) out[i] = value[i];
   if (width < 4) return;
-  constexpr float kElsewhere[3] = {19.f, 73.f, 29.f};
+  constexpr float kNoiseOffset[3] = {19.f, 73.f, 29.f};
   F q[N];
-  for (size_t i = 0; i < N; ++i) q[i] = p[i] + kElsewhere[i];
+  for (size_t i = 0; i < N; ++i) q[i] = p[i] + kNoiseOffset[i];
   noise::perlin<1, F>(q, out + 3);
 }
 
@@ -117,14 +117,14 @@ inline void octaves(const F (&p)[3], uint32_t count, const F& lacunarity, const 
 template <typename F>
 inline void fractal_values(const F (&p)[3], uint32_t width, uint32_t count, const F& lacunarity,
                            const F& diminish, F* out) {
-  const F elsewhere[3] = {p[0] + 19.f, p[1] + 193.f, p[2] + 17.f};
+  const F offset_point[3] = {p[0] + 19.f, p[1] + 193.f, p[2] + 17.f};
   if (width < 3) {
     octaves<1, F>(p, count, lacunarity, diminish, out);
-    if (width == 2) octaves<1, F>(elsewhere, count, lacunarity, diminish, out + 1);
+    if (width == 2) octaves<1, F>(offset_point, count, lacunarity, diminish, out + 1);
     return;
   }
   octaves<3, F>(p, count, lacunarity, diminish, out);
-  if (width == 4) octaves<1, F>(elsewhere, count, lacunarity, diminish, out + 3);
+  if (width == 4) octaves<1, F>(offset_point, count, lacunarity, diminish, out + 3);
 }
 
 }  // namespace detail
@@ -321,7 +321,7 @@ template <typename F>
       }
       case GraphCode::kAttribute:
         one([](const F& a) { return a; });
-        read_attribute<F>(view.attributes, op.number, width, at.place, active, to);
+        read_attribute<F>(view.attributes, op.number, width, at.mesh_position, active, to);
         break;
     }
   }

@@ -18,7 +18,7 @@ namespace {
 /// Cells with more records are divided.
 constexpr size_t kCellRecords = 2048;
 /// Minimum number of records for a region to get a separate distribution.
-constexpr double kOwnRecords = 64;
+constexpr double kMinRegionRecords = 64;
 /// Maximum number of records from which the directions of a cell are computed.
 constexpr size_t kDirections = 8192;
 /// Weight of the parent cell's distribution and moments, in records.
@@ -28,34 +28,36 @@ constexpr double kMaterialRecords = 512;
 /// Fraction of bounces sampled by the BSDF in the first round, before moments are known.
 constexpr float kFirstShare = 0.5f;
 
-uint32_t code_of(const GuideGrid& grid, const float (&p)[3]) {
+uint32_t code_of(const GuidingGrid& grid, const float (&p)[3]) {
   uint32_t step[3];
-  for (int i = 0; i < 3; ++i) step[i] = detail::guide_steps<float>(p[i], grid.lo[i], grid.scale[i]);
+  for (int i = 0; i < 3; ++i)
+    step[i] = detail::guiding_steps<float>(p[i], grid.lo[i], grid.scale[i]);
   return morton_3(step[0], step[1], step[2]);
 }
 
 /// Extracts every third bit of a Morton code, starting with the lowest.
 uint32_t compact_bits_3(uint32_t x) {
   uint32_t out = 0;
-  for (uint32_t i = 0; i < kGuideBits; ++i) out |= (x >> (3 * i) & 1u) << i;
+  for (uint32_t i = 0; i < kGuidingBits; ++i) out |= (x >> (3 * i) & 1u) << i;
   return out;
 }
 
 }  // namespace
 
-GuideGrid::GuideGrid(const float (&low)[3], const float (&high)[3]) {
+GuidingGrid::GuidingGrid(const float (&low)[3], const float (&high)[3]) {
   for (int i = 0; i < 3; ++i) {
     const double size = double{high[i]} - double{low[i]};
     lo[i] = low[i];
-    scale[i] = size > 0 && std::isfinite(size) ? static_cast<float>((1u << kGuideBits) / size) : 0;
+    scale[i] =
+        size > 0 && std::isfinite(size) ? static_cast<float>((1u << kGuidingBits) / size) : 0;
   }
 }
 
 /// Builds the octree from the root down and creates the regions.
-class GuideFieldBuilder {
+class GuidingFieldBuilder {
  public:
-  GuideFieldBuilder(GuideField& field, std::span<const TrainingRecord> records, size_t materials,
-                    bool first, bool guides)
+  GuidingFieldBuilder(GuidingField& field, std::span<const TrainingRecord> records,
+                      size_t materials, bool first, bool guides)
       : field_(field), parts_(field.parts_), first_(first), guides_(guides) {
     std::vector<std::pair<uint32_t, uint32_t>> order(records.size());
     for (uint32_t i = 0; i < records.size(); ++i)
@@ -71,26 +73,26 @@ class GuideFieldBuilder {
       ratios_.reserve(records.size());
       for (const TrainingRecord& r : records_) ratios_.push_back(share_ratios(r));
     }
-    weigh_materials(materials);
+    compute_material_fractions(materials);
   }
 
   void build(size_t cell_records) {
     cell_records_ = cell_records;
-    parts_.entries.assign(kGuideTopCells, kGuideCell);
+    parts_.entries.assign(kGuidingTopCells, kGuidingCell);
     parts_.cells.clear();
     parts_.tables.clear();
     parts_.spheres.clear();
     parts_.bsdf_share.clear();
     field_.facts_ = {records_.size(), 0, 0, 0, 0, 1};
-    bring_ = off_ = on_ = 0;
+    contributing_ = off_ = on_ = 0;
     guided_ = 0;
     for (RegionPart& part : levels_[0]) part = {};
     divide(0, 0, 0, records_.size());
-    GuideFacts& facts = field_.facts_;
-    facts.cells = static_cast<uint32_t>(parts_.cells.size() / kGuideAxes);
+    GuidingFieldStatistics& facts = field_.facts_;
+    facts.cells = static_cast<uint32_t>(parts_.cells.size() / kGuidingAxes);
     facts.regions = static_cast<uint32_t>(parts_.bsdf_share.size());
     for (const float a : parts_.bsdf_share) facts.guided_regions += a < 1 ? 1 : 0;
-    if (bring_ > 0) facts.guided_share = guided_ / bring_;
+    if (contributing_ > 0) facts.guided_share = guided_ / contributing_;
     if (off_ > 0) facts.moment_ratio = on_ / off_;
   }
 
@@ -99,13 +101,13 @@ class GuideFieldBuilder {
   struct RegionPart {
     DirectionBins density{};  ///< sums to 1, or 0 if nothing is known
     double count = 0;
-    GuideSphere sphere;  ///< centre of the directions of `density`
+    ParallaxSphere sphere;  ///< centre of the directions of `density`
     ShareMoments moments;
-    uint32_t region = kNoGuideRegion;  ///< once created
+    uint32_t region = kNoGuidingRegion;  ///< once created
   };
-  using Cell = std::array<RegionPart, kGuideAxes>;
+  using Cell = std::array<RegionPart, kGuidingAxes>;
 
-  void weigh_materials(size_t materials) {
+  void compute_material_fractions(size_t materials) {
     parts_.material_share.assign(std::max<size_t>(materials, 1), 0.f);
     if (first_) return;
     std::vector<ShareMoments> moments(parts_.material_share.size());
@@ -138,17 +140,18 @@ class GuideFieldBuilder {
       by_axis_[r.axis].push_back(&r);
       if (!first_) cell[r.axis].moments.add(ratios_[i], std::min(double{r.value}, cut));
     }
-    for (uint32_t axis = 0; axis < kGuideAxes; ++axis) {
+    for (uint32_t axis = 0; axis < kGuidingAxes; ++axis) {
       RegionPart& part = cell[axis];
       part.count = static_cast<double>(by_axis_[axis].size());
       part.sphere = fit_sphere(by_axis_[axis], cut);
-      part.density = direction_bins(some_bounces(by_axis_[axis], kDirections), part.sphere, cut);
+      part.density =
+          direction_bins(subset_of_bounces(by_axis_[axis], kDirections), part.sphere, cut);
       const RegionPart* above = depth > 0 ? &levels_[depth - 1][axis] : nullptr;
       const double sum = std::accumulate(part.density.begin(), part.density.end(), 0.0);
       const double prior = above && above->count > 0 ? kPrior : 0;
       const double n = sum > 0 ? part.count : 0;
       if (n + prior == 0) continue;
-      for (uint32_t b = 0; b < kGuideBins; ++b) {
+      for (uint32_t b = 0; b < kGuidingBins; ++b) {
         const double own = n > 0 ? part.density[b] / sum * n : 0;
         part.density[b] = (own + (prior > 0 ? prior * above->density[b] : 0)) / (n + prior);
       }
@@ -158,16 +161,17 @@ class GuideFieldBuilder {
   }
 
   /// Returns the region of a cell and axis. Too few records: the region of the nearest ancestor
-  /// with enough, or kNoGuideRegion.
+  /// with enough, or kNoGuidingRegion.
   uint32_t region_of(uint32_t depth, uint32_t axis) {
     RegionPart& part = levels_[depth][axis];
-    if (part.count < kOwnRecords) return depth > 0 ? region_of(depth - 1, axis) : kNoGuideRegion;
-    if (part.region != kNoGuideRegion) return part.region;
+    if (part.count < kMinRegionRecords)
+      return depth > 0 ? region_of(depth - 1, axis) : kNoGuidingRegion;
+    if (part.region != kNoGuidingRegion) return part.region;
     part.region = static_cast<uint32_t>(parts_.bsdf_share.size());
     const size_t at = parts_.tables.size();
-    parts_.tables.resize(at + kGuideWords);
-    write_guide_table(smoothed(part.density),
-                      std::span(parts_.tables).subspan(at).first<kGuideWords>());
+    parts_.tables.resize(at + kGuidingWords);
+    write_guiding_table(smoothed(part.density),
+                        std::span(parts_.tables).subspan(at).first<kGuidingWords>());
     parts_.spheres.push_back(part.sphere);
     parts_.bsdf_share.push_back(!guides_ ? 1.f
                                 : first_ ? kFirstShare
@@ -179,11 +183,11 @@ class GuideFieldBuilder {
   /// records are [begin, end).
   void divide(uint32_t depth, uint32_t code, size_t begin, size_t end) {
     read(depth, begin, end);
-    if (end - begin <= cell_records_ || depth == kGuideBits) {
+    if (end - begin <= cell_records_ || depth == kGuidingBits) {
       add_cell(depth, code, begin, end);
       return;
     }
-    const uint32_t shift = 3 * (kGuideBits - depth - 1);
+    const uint32_t shift = 3 * (kGuidingBits - depth - 1);
     size_t from = begin;
     for (uint32_t child = 0; child < 8; ++child) {
       const uint32_t first = code | child << shift;
@@ -199,26 +203,26 @@ class GuideFieldBuilder {
   }
 
   void add_cell(uint32_t depth, uint32_t code, size_t begin, size_t end) {
-    const auto cell = static_cast<uint32_t>(parts_.cells.size() / kGuideAxes);
-    for (uint32_t axis = 0; axis < kGuideAxes; ++axis)
+    const auto cell = static_cast<uint32_t>(parts_.cells.size() / kGuidingAxes);
+    for (uint32_t axis = 0; axis < kGuidingAxes; ++axis)
       parts_.cells.push_back(region_of(depth, axis));
-    fill(depth, code, kGuideCell | cell);
-    const uint32_t* regions = parts_.cells.data() + size_t{cell} * kGuideAxes;
+    fill(depth, code, kGuidingCell | cell);
+    const uint32_t* regions = parts_.cells.data() + size_t{cell} * kGuidingAxes;
     for (size_t i = begin; i < end; ++i) {
       const TrainingRecord& r = records_[i];
       const uint32_t region = regions[r.axis];
       float a = 1;
-      if (region != kNoGuideRegion)
+      if (region != kNoGuidingRegion)
         a = std::max(parts_.bsdf_share[region], r.material < parts_.material_share.size()
                                                     ? parts_.material_share[r.material]
                                                     : 0.f);
-      const double brought = double{r.weight} * double{r.value};
-      bring_ += brought;
-      guided_ += a < 1 ? brought * (1 - double{a}) : 0;
-      if (!(r.guide_pdf > 0)) continue;
-      const double moment = brought * brought * double{r.pdf};
+      const double contribution = double{r.weight} * double{r.value};
+      contributing_ += contribution;
+      guided_ += a < 1 ? contribution * (1 - double{a}) : 0;
+      if (!(r.guiding_pdf > 0)) continue;
+      const double moment = contribution * contribution * double{r.pdf};
       off_ += moment / double{r.bsdf_pdf};
-      on_ += moment / (double{a} * double{r.bsdf_pdf} + (1 - double{a}) * double{r.guide_pdf});
+      on_ += moment / (double{a} * double{r.bsdf_pdf} + (1 - double{a}) * double{r.guiding_pdf});
     }
   }
 
@@ -227,9 +231,9 @@ class GuideFieldBuilder {
     const uint32_t x = compact_bits_3(code), y = compact_bits_3(code >> 1),
                    z = compact_bits_3(code >> 2);
     std::vector<uint32_t>& entries = parts_.entries;
-    uint32_t bits = kGuideTopBits, first = 0, width = kGuideTopBits;
+    uint32_t bits = kGuidingTopBits, first = 0, width = kGuidingTopBits;
     for (;;) {
-      const uint32_t shift = kGuideBits - bits, mask = (1u << width) - 1;
+      const uint32_t shift = kGuidingBits - bits, mask = (1u << width) - 1;
       const uint32_t at[3] = {x >> shift & mask, y >> shift & mask, z >> shift & mask};
       if (depth <= bits) {
         const uint32_t size = 1u << (bits - depth);
@@ -241,53 +245,54 @@ class GuideFieldBuilder {
         return;
       }
       uint32_t& here = entries[first + at[0] + (at[1] << width) + (at[2] << (2 * width))];
-      if (here >= kGuideCell) {
+      if (here >= kGuidingCell) {
         here = static_cast<uint32_t>(entries.size());
         first = here;
-        entries.resize(entries.size() + kGuideBrickCells, kGuideCell);
+        entries.resize(entries.size() + kGuidingBrickCells, kGuidingCell);
       } else {
         first = here;
       }
-      bits += kGuideBrickBits;
-      width = kGuideBrickBits;
+      bits += kGuidingBrickBits;
+      width = kGuidingBrickBits;
     }
   }
 
-  GuideField& field_;
-  GuideParts& parts_;  ///< parts of field_
+  GuidingField& field_;
+  GuidingFieldArrays& parts_;  ///< parts of field_
   bool first_, guides_;
   std::vector<TrainingRecord> records_;  ///< sorted by Morton code
   std::vector<ShareRatios> ratios_;      ///< of records_; empty in the first round
   std::vector<uint32_t> codes_;
   size_t cell_records_ = kCellRecords;
-  std::array<std::vector<const TrainingRecord*>, kGuideAxes> by_axis_;  ///< scratch of read()
-  std::array<Cell, kGuideBits + 1> levels_;  ///< path from the root to the node in divide()
-  double bring_ = 0, guided_ = 0, off_ = 0, on_ = 0;
+  std::array<std::vector<const TrainingRecord*>, kGuidingAxes> by_axis_;  ///< scratch of read()
+  std::array<Cell, kGuidingBits + 1> levels_;  ///< path from the root to the node in divide()
+  double contributing_ = 0, guided_ = 0, off_ = 0, on_ = 0;
 };
 
-GuideField::GuideField(const GuideGrid& grid, std::span<const TrainingRecord> records,
-                       size_t materials, bool first, bool guides, size_t most_bytes)
+GuidingField::GuidingField(const GuidingGrid& grid, std::span<const TrainingRecord> records,
+                           size_t materials, bool first, bool guides, size_t max_bytes)
     : grid_(grid) {
   const auto builder =
-      std::make_unique<GuideFieldBuilder>(*this, records, materials, first, guides);
+      std::make_unique<GuidingFieldBuilder>(*this, records, materials, first, guides);
   for (size_t cell_records = kCellRecords;; cell_records *= 2) {
     builder->build(cell_records);
-    if (bytes() <= most_bytes || cell_records >= records.size()) break;
+    if (bytes() <= max_bytes || cell_records >= records.size()) break;
   }
-  weigh_bounces({}, {});
+  compute_survival({}, {});
 }
 
-GuideField::GuideField(const GuideGrid& grid, GuideParts parts, const GuideFacts& facts,
-                       size_t materials)
+GuidingField::GuidingField(const GuidingGrid& grid, GuidingFieldArrays parts,
+                           const GuidingFieldStatistics& facts, size_t materials)
     : grid_(grid), parts_(std::move(parts)), facts_(facts) {
-  check_guide_parts(parts_, materials);
+  check_guiding_arrays(parts_, materials);
 }
 
-uint64_t bounce_place(const GuideGrid& grid, const Vec3<float>& p, uint32_t axis) {
+uint64_t bounce_position_key(const GuidingGrid& grid, const Vec3<float>& p, uint32_t axis) {
   return uint64_t{code_of(grid, {p.x, p.y, p.z})} << 3 | axis;
 }
 
-void GuideField::weigh_bounces(std::span<const BounceLesson> lessons, const PathLesson& paths) {
+void GuidingField::compute_survival(std::span<const BounceSample> training_samples,
+                                    const PathStatistics& paths) {
   struct Sums {
     double count = 0, value = 0, squared = 0, cost = 0;
   };
@@ -295,35 +300,36 @@ void GuideField::weigh_bounces(std::span<const BounceLesson> lessons, const Path
   std::vector<Sums> sums(regions + 1);  // the last one: all regions
   parts_.survival.assign(regions, 0.f);
   const auto for_each = [&, v = view()](const auto& add) {
-    for (const BounceLesson& lesson : lessons) {
+    for (const BounceSample& sample : training_samples) {
       if (!v.grid) break;
-      const auto code = static_cast<uint32_t>(lesson.place >> 3);
-      const uint32_t cell = detail::guide_cell<float>(
+      const auto code = static_cast<uint32_t>(sample.position_key >> 3);
+      const uint32_t cell = detail::guiding_cell<float>(
           v, compact_bits_3(code), compact_bits_3(code >> 1), compact_bits_3(code >> 2), true);
-      const uint32_t region = parts_.cells[size_t{cell} * kGuideAxes + (lesson.place & 7u)];
-      if (region != kNoGuideRegion) add(sums[region], lesson);
-      add(sums[regions], lesson);
+      const uint32_t region =
+          parts_.cells[size_t{cell} * kGuidingAxes + (sample.position_key & 7u)];
+      if (region != kNoGuidingRegion) add(sums[region], sample);
+      add(sums[regions], sample);
     }
   };
-  for_each([](Sums& s, const BounceLesson& lesson) {
+  for_each([](Sums& s, const BounceSample& sample) {
     s.count += 1;
-    s.value += double{lesson.value};
-    s.cost += double{lesson.cost};
+    s.value += double{sample.value};
+    s.cost += double{sample.cost};
   });
   // Clamp squares as values are clamped: no bounce counts for more than sqrt(n) times the mean.
-  for_each([](Sums& s, const BounceLesson& lesson) {
-    s.squared += std::min(double{lesson.squared}, s.value * s.value / s.count);
+  for_each([](Sums& s, const BounceSample& sample) {
+    s.squared += std::min(double{sample.squared}, s.value * s.value / s.count);
   });
   for (size_t i = 0; i < regions; ++i) {
-    const Sums& s = sums[i].count >= kOwnRecords ? sums[i] : sums[regions];
+    const Sums& s = sums[i].count >= kMinRegionRecords ? sums[i] : sums[regions];
     if (s.cost > 0 && paths.variance > 0)
       parts_.survival[i] = static_cast<float>(
           std::sqrt(std::max(s.squared, 0.0) / s.cost * paths.cost / paths.variance));
   }
 }
 
-GuideView GuideField::view() const {
-  GuideView view;
+GuidingView GuidingField::view() const {
+  GuidingView view;
   for (int i = 0; i < 3; ++i) {
     view.lo[i] = grid_.lo[i];
     view.scale[i] = grid_.scale[i];
@@ -339,7 +345,7 @@ GuideView GuideField::view() const {
   return view;
 }
 
-size_t GuideField::bytes() const {
+size_t GuidingField::bytes() const {
   return parts_.bytes();
 }
 

@@ -30,20 +30,20 @@
 
 namespace wavecomb {
 
-/// Grid of 2^kGuideBits steps per axis over the bounds of the scene.
-struct GuideGrid {
+/// Grid of 2^kGuidingBits steps per axis over the bounds of the scene.
+struct GuidingGrid {
   float lo[3] = {}, scale[3] = {};
 
   /// Takes the corners of the bounds, low <= high.
-  GuideGrid(const float (&low)[3], const float (&high)[3]);
+  GuidingGrid(const float (&low)[3], const float (&high)[3]);
 };
 
 /// Packs position and axis: the Morton code of the grid position of p, and in the lowest three bits
-/// the guide_axis of the surface.
-uint64_t bounce_place(const GuideGrid& grid, const Vec3<float>& p, uint32_t axis);
+/// the guiding_axis of the surface.
+uint64_t bounce_position_key(const GuidingGrid& grid, const Vec3<float>& p, uint32_t axis);
 
 /// Summary figures of a field.
-struct GuideFacts {
+struct GuidingFieldStatistics {
   uint64_t records = 0;  ///< bounces that contribute light
   uint32_t cells = 0, regions = 0, guided_regions = 0;
   /// Mean probability that the field samples a bounce, and second moment of the mixture relative to
@@ -51,38 +51,40 @@ struct GuideFacts {
   double guided_share = 0, moment_ratio = 1;
 };
 
-/// A guiding field and the arrays that kernels read. Immutable except for weigh_bounces.
-class GuideField {
+/// A guiding field and the arrays that kernels read. Immutable except for compute_survival.
+class GuidingField {
  public:
-  /// Creates an empty field. It guides nothing but defines the grid for bounce_place.
-  explicit GuideField(const GuideGrid& grid) : grid_(grid) {}
+  /// Creates an empty field. It guides nothing but defines the grid for bounce_position_key.
+  explicit GuidingField(const GuidingGrid& grid) : grid_(grid) {}
   /// Builds a field from training records. `materials` is the number of materials. `first` means:
   /// the records hold no densities of a field yet, so each region is guided half of the time. With
   /// `guides` false, all bounces are left to the BSDF. The cell size doubles until the field takes
-  /// at most `most_bytes` or cannot shrink further.
-  GuideField(const GuideGrid& grid, std::span<const TrainingRecord> records, size_t materials,
-             bool first, bool guides, size_t most_bytes);
+  /// at most `max_bytes` or cannot shrink further.
+  GuidingField(const GuidingGrid& grid, std::span<const TrainingRecord> records, size_t materials,
+               bool first, bool guides, size_t max_bytes);
   /// Restores a field that was saved for a scene with this number of materials. Throws Error if
   /// `parts` are inconsistent.
-  GuideField(const GuideGrid& grid, GuideParts parts, const GuideFacts& facts, size_t materials);
+  GuidingField(const GuidingGrid& grid, GuidingFieldArrays parts,
+               const GuidingFieldStatistics& facts, size_t materials);
 
   /// Computes the survival factor of each region from bounces with and without contribution
   /// (guiding/roulette.h).
-  void weigh_bounces(std::span<const BounceLesson> lessons, const PathLesson& paths);
+  void compute_survival(std::span<const BounceSample> training_samples,
+                        const PathStatistics& paths);
 
-  /// Pointers to the arrays; valid while the field exists and weigh_bounces is not called.
-  GuideView view() const;
+  /// Pointers to the arrays; valid while the field exists and compute_survival is not called.
+  GuidingView view() const;
   /// Memory of the arrays.
   size_t bytes() const;
-  const GuideFacts& facts() const { return facts_; }
-  const GuideParts& parts() const { return parts_; }
+  const GuidingFieldStatistics& facts() const { return facts_; }
+  const GuidingFieldArrays& parts() const { return parts_; }
 
  private:
-  friend class GuideFieldBuilder;
+  friend class GuidingFieldBuilder;
 
-  GuideGrid grid_;
-  GuideParts parts_;
-  GuideFacts facts_;
+  GuidingGrid grid_;
+  GuidingFieldArrays parts_;
+  GuidingFieldStatistics facts_;
 };
 
 }  // namespace wavecomb

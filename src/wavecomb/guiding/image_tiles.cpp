@@ -10,22 +10,22 @@
 namespace wavecomb {
 namespace {
 
-constexpr uint32_t kMostRows = 16, kPathsOfTile = 64;
+constexpr uint32_t kMaxRows = 16, kPathsOfTile = 64;
 /// Resolution of sums, and largest luminance that counts, both relative to the median.
-constexpr double kStep = 0x1p-20, kMostOfMedian = 64;
+constexpr double kStep = 0x1p-20, kMaxOfMedian = 64;
 
 }  // namespace
 
-PictureTiles::PictureTiles(const Settings& settings, std::span<const uint32_t> pixels,
-                           std::span<const float> luminance)
+ImageTiles::ImageTiles(const Settings& settings, std::span<const uint32_t> pixels,
+                       std::span<const float> luminance)
     : width_(settings.width), height_(settings.height) {
-  while (rows_ < kMostRows && (rows_ + 1) * (rows_ + 1) * kPathsOfTile <= pixels.size()) ++rows_;
-  std::vector<float> lit;
+  while (rows_ < kMaxRows && (rows_ + 1) * (rows_ + 1) * kPathsOfTile <= pixels.size()) ++rows_;
+  std::vector<float> nonzero;
   for (const float y : luminance)
-    if (std::isfinite(y) && y > 0) lit.push_back(y);
-  if (lit.empty()) return;
-  const auto middle = lit.begin() + static_cast<std::ptrdiff_t>(lit.size() / 2);
-  std::nth_element(lit.begin(), middle, lit.end());
+    if (std::isfinite(y) && y > 0) nonzero.push_back(y);
+  if (nonzero.empty()) return;
+  const auto middle = nonzero.begin() + static_cast<std::ptrdiff_t>(nonzero.size() / 2);
+  std::nth_element(nonzero.begin(), middle, nonzero.end());
   const double unit{*middle};
   struct Tile {
     uint64_t sum = 0, count = 0;
@@ -34,7 +34,7 @@ PictureTiles::PictureTiles(const Settings& settings, std::span<const uint32_t> p
   Tile all;
   for (size_t i = 0; i < pixels.size(); ++i) {
     const double y = luminance[i] > 0 ? double{luminance[i]} / unit : 0;  // 0 for NaN
-    const auto steps = static_cast<uint64_t>(std::nearbyint(std::min(y, kMostOfMedian) / kStep));
+    const auto steps = static_cast<uint64_t>(std::nearbyint(std::min(y, kMaxOfMedian) / kStep));
     Tile& tile = tiles[of(pixels[i])];
     tile.sum += steps;
     ++tile.count;
@@ -53,15 +53,15 @@ PictureTiles::PictureTiles(const Settings& settings, std::span<const uint32_t> p
   }
 }
 
-PictureTiles::PictureTiles(const Settings& settings, std::vector<double> inverse_scales)
+ImageTiles::ImageTiles(const Settings& settings, std::vector<double> inverse_scales)
     : width_(settings.width), height_(settings.height), inverse_(std::move(inverse_scales)) {
-  while (rows_ < kMostRows && rows_ * rows_ < inverse_.size()) ++rows_;
+  while (rows_ < kMaxRows && rows_ * rows_ < inverse_.size()) ++rows_;
   if (!inverse_.empty() && inverse_.size() != count())
     throw Error("the brightness of the picture that was learned before is damaged; start anew");
   for (const double scale : inverse_) table_.push_back(static_cast<float>(scale));
 }
 
-void PictureTiles::apply(GuideView& view) const {
+void ImageTiles::apply(GuidingView& view) const {
   if (!is_lit()) return;
   view.tiles = table_.data();
   view.tile_rows = rows_;
@@ -70,7 +70,7 @@ void PictureTiles::apply(GuideView& view) const {
   view.tiles_of_y = static_cast<float>(rows_) / static_cast<float>(height_) * (1 - 0x1p-20f);
 }
 
-uint32_t PictureTiles::of(uint32_t pixel) const {
+uint32_t ImageTiles::of(uint32_t pixel) const {
   const uint32_t x = (pixel & 0xffffu) * rows_ / width_;
   return x + (pixel >> 16) * rows_ / height_ * rows_;
 }

@@ -13,14 +13,14 @@ namespace wavecomb {
 
 /// Brightness of the whole image in at most 16 x 16 tiles of at least 64 paths. Sums are integers,
 /// so the result does not depend on the order of the paths.
-class PictureTiles {
+class ImageTiles {
  public:
   /// Path i belongs to pixel pixels[i] (x | y << 16) and has the radiance luminance[i].
-  PictureTiles(const Settings& settings, std::span<const uint32_t> pixels,
-               std::span<const float> luminance);
+  ImageTiles(const Settings& settings, std::span<const uint32_t> pixels,
+             std::span<const float> luminance);
   /// Restores tiles from inverse_scales() of an image of this size. Throws Error if the size does
   /// not match.
-  PictureTiles(const Settings& settings, std::vector<double> inverse_scales);
+  ImageTiles(const Settings& settings, std::vector<double> inverse_scales);
 
   uint32_t count() const { return rows_ * rows_; }
   /// Returns the tile of a pixel.
@@ -33,7 +33,7 @@ class PictureTiles {
   /// By tile, row by row; empty if no path contributed light.
   const std::vector<double>& inverse_scales() const { return inverse_; }
   /// Writes the tiles to `view`, if any path contributed light.
-  void apply(GuideView& view) const;
+  void apply(GuidingView& view) const;
 
  private:
   uint32_t width_, height_, rows_ = 1;

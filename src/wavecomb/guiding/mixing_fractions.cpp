@@ -5,10 +5,10 @@ namespace wavecomb {
 
 ShareRatios share_ratios(const TrainingRecord& r) {
   ShareRatios ratios{};
-  if (!(r.guide_pdf > 0)) return ratios;
+  if (!(r.guiding_pdf > 0)) return ratios;
   for (size_t i = 0; i < ratios.size(); ++i) {
     const float a = kBsdfShares[i];
-    ratios[i] = r.pdf / (a * r.bsdf_pdf + (1 - a) * r.guide_pdf);
+    ratios[i] = r.pdf / (a * r.bsdf_pdf + (1 - a) * r.guiding_pdf);
   }
   return ratios;
 }

@@ -20,36 +20,36 @@
 namespace wavecomb {
 
 /// Sphere on which the incident light of a region is assumed to lie.
-struct GuideSphere {
-  float middle[3] = {};  ///< centre of the region's positions
-  float nearness = 0;    ///< 1 / radius; 0 means: no parallax
+struct ParallaxSphere {
+  float centre[3] = {};        ///< centre of the region's positions
+  float inverse_distance = 0;  ///< 1 / radius; 0 means: no parallax
 };
 
 /// Maximum distance of a shading point from the centre, in radii.
-inline constexpr float kMostOffset = 0.7f;
+inline constexpr float kMaxOffset = 0.7f;
 
-/// Position relative to the centre of the sphere, in radii, clamped to length kMostOffset.
+/// Position relative to the centre of the sphere, in radii, clamped to length kMaxOffset.
 template <typename F>
-inline Vec3<F> sphere_offset(const Vec3<F>& p, const Vec3<F>& middle, const F& nearness) {
+inline Vec3<F> sphere_offset(const Vec3<F>& p, const Vec3<F>& centre, const F& inverse_distance) {
   const auto along = [&](const F& x, const F& m) {
-    return clamp(F((x - m) * nearness), F(-1.f), F(1.f));
+    return clamp(F((x - m) * inverse_distance), F(-1.f), F(1.f));
   };
-  const Vec3<F> o{along(p.x, middle.x), along(p.y, middle.y), along(p.z, middle.z)};
-  constexpr float most = kMostOffset * kMostOffset;
+  const Vec3<F> o{along(p.x, centre.x), along(p.y, centre.y), along(p.z, centre.z)};
+  constexpr float most = kMaxOffset * kMaxOffset;
   return o * safe_sqrt(F(most / max(dot(o, o), F(most))));
 }
 
 /// Direction from the centre, and the factor from a density over such directions to a density over
 /// directions from the shading point.
 template <typename F>
-struct FromMiddle {
+struct CentreDirection {
   Vec3<F> w;
   F factor;
 };
 
 /// Maps the direction w from the shading point at `offset` to the direction from the centre.
 template <typename F>
-inline FromMiddle<F> seen_from_middle(const Vec3<F>& offset, const Vec3<F>& w) {
+inline CentreDirection<F> direction_from_centre(const Vec3<F>& offset, const Vec3<F>& w) {
   const F along = dot(offset, w);
   const F c = safe_sqrt(F(fma(along, along, F(1.f)) - dot(offset, offset)));
   const F s = c - along;
@@ -57,9 +57,9 @@ inline FromMiddle<F> seen_from_middle(const Vec3<F>& offset, const Vec3<F>& w) {
 }
 
 /// Maps the direction w from the centre to the direction from the shading point at `offset`: the
-/// inverse of seen_from_middle.
+/// inverse of direction_from_centre.
 template <typename F>
-inline Vec3<F> seen_from_place(const Vec3<F>& offset, const Vec3<F>& w) {
+inline Vec3<F> direction_from_point(const Vec3<F>& offset, const Vec3<F>& w) {
   return normalize(w - offset);
 }
 

@@ -3,20 +3,20 @@
 
 namespace wavecomb {
 
-void weigh_path(std::span<const PathStep> path, double ray_cost, double tail,
-                std::span<BounceWorth> worth) {
+void compute_path_moments(std::span<const PathStep> path, double ray_cost, double tail,
+                          std::span<BounceMoments> moments) {
   for (size_t j = path.size(); j-- > 0;) {
     const PathStep& v = path[j];
     const double value = v.value();
-    worth[j] = {value * value, 0};
+    moments[j] = {value * value, 0};
     if (!(v.left > 0)) continue;
-    worth[j].cost = ray_cost + tail;
+    moments[j].cost = ray_cost + tail;
     if (j + 1 == path.size()) continue;
     const PathStep& next = path[j + 1];
     const double weight = next.arrived / v.arrived, next_value = next.value();
-    worth[j].cost = ray_cost + next.vertex_cost + next.survival * worth[j + 1].cost;
-    worth[j].squared +=
-        weight * weight * (worth[j + 1].squared / next.survival - next_value * next_value);
+    moments[j].cost = ray_cost + next.vertex_cost + next.survival * moments[j + 1].cost;
+    moments[j].squared +=
+        weight * weight * (moments[j + 1].squared / next.survival - next_value * next_value);
   }
 }
 

@@ -16,24 +16,24 @@ namespace wavecomb {
 
 /// A path vertex and the bounce that leaves it.
 struct PathStep {
-  double arrived;      ///< luminance of the throughput before the vertex
-  double left;         ///< luminance of the throughput after the bounce; 0 if there is none
-  double brought;      ///< contribution of the bounce and all that follows
-  double survival;     ///< survival probability q
-  double vertex_cost;  ///< shading cost including the light sample
+  double arrived;       ///< luminance of the throughput before the vertex
+  double left;          ///< luminance of the throughput after the bounce; 0 if there is none
+  double contribution;  ///< contribution of the bounce and all that follows
+  double survival;      ///< survival probability q
+  double vertex_cost;   ///< shading cost including the light sample
 
   /// Contribution l for a throughput of 1.
-  double value() const { return left > 0 ? brought / arrived : 0; }
+  double value() const { return left > 0 ? contribution / arrived : 0; }
 };
 
 /// Second moment and cost of a bounce for a throughput of 1 at its vertex.
-struct BounceWorth {
+struct BounceMoments {
   double squared, cost;
 };
 
-/// Computes `worth` for each step of `path`. `ray_cost` is the cost of tracing a ray, `tail` the
+/// Computes `moments` for each step of `path`. `ray_cost` is the cost of tracing a ray, `tail` the
 /// cost of what follows the last vertex after its ray. All costs are in the same unit.
-void weigh_path(std::span<const PathStep> path, double ray_cost, double tail,
-                std::span<BounceWorth> worth);
+void compute_path_moments(std::span<const PathStep> path, double ray_cost, double tail,
+                          std::span<BounceMoments> moments);
 
 }  // namespace wavecomb

@@ -13,7 +13,7 @@ namespace wavecomb {
 namespace {
 
 /// Candidates for the inverse radius, relative to the inverse of the harmonic mean distance.
-constexpr std::array<float, 4> kNearnesses = {0.f, 0.5f, 1.f, 1.5f};
+constexpr std::array<float, 4> kInverseDistances = {0.f, 0.5f, 1.f, 1.5f};
 /// Number of bounces with which the candidates are compared.
 constexpr size_t kTried = 2048;
 /// Standard deviation of the blur in radians, and its cutoff in standard deviations.
@@ -23,42 +23,42 @@ Vec3<float> vector_of(const float (&v)[3]) {
   return {v[0], v[1], v[2]};
 }
 
-uint32_t bin_of(const TrainingRecord& r, const GuideSphere& sphere) {
+uint32_t bin_of(const TrainingRecord& r, const ParallaxSphere& sphere) {
   const Vec3<float> offset =
-      sphere_offset<float>(vector_of(r.p), vector_of(sphere.middle), sphere.nearness);
+      sphere_offset<float>(vector_of(r.p), vector_of(sphere.centre), sphere.inverse_distance);
   const Vec2<float> at =
-      octahedral_point<float>(seen_from_middle<float>(offset, vector_of(r.wi)).w);
+      octahedral_point<float>(direction_from_centre<float>(offset, vector_of(r.wi)).w);
   const auto step = [](float x) {
-    return std::min(static_cast<uint32_t>(x * kGuideSide), kGuideSide - 1);
+    return std::min(static_cast<uint32_t>(x * kGuidingSide), kGuidingSide - 1);
   };
-  return step(at.y) * kGuideSide + step(at.x);
+  return step(at.y) * kGuidingSide + step(at.x);
 }
 
 /// Computes the mean position of the bounces and the mean inverse distance of their hits, weighted
 /// by contribution. No bounce has a weight above `cut`.
-GuideSphere sphere_of(Bounces bounces, double cut) {
-  double middle[3] = {}, nearness = 0, weight = 0;
+ParallaxSphere sphere_of(Bounces bounces, double cut) {
+  double centre[3] = {}, inverse_distance = 0, weight = 0;
   for (const TrainingRecord* r : bounces) {
-    for (int i = 0; i < 3; ++i) middle[i] += double{r->p[i]};
-    if (r->nearness < 0) continue;
+    for (int i = 0; i < 3; ++i) centre[i] += double{r->p[i]};
+    if (r->inverse_distance < 0) continue;
     const double value = std::min(double{r->value}, cut);
-    nearness += value * double{r->nearness};
+    inverse_distance += value * double{r->inverse_distance};
     weight += value;
   }
-  GuideSphere sphere;
+  ParallaxSphere sphere;
   for (int i = 0; i < 3; ++i)
-    sphere.middle[i] = static_cast<float>(middle[i] / static_cast<double>(bounces.size()));
-  if (weight > 0 && std::isfinite(nearness))
-    sphere.nearness = static_cast<float>(nearness / weight);
+    sphere.centre[i] = static_cast<float>(centre[i] / static_cast<double>(bounces.size()));
+  if (weight > 0 && std::isfinite(inverse_distance))
+    sphere.inverse_distance = static_cast<float>(inverse_distance / weight);
   return sphere;
 }
 
-double farthest(Bounces bounces, const GuideSphere& sphere) {
+double farthest(Bounces bounces, const ParallaxSphere& sphere) {
   double most = 0;
   for (const TrainingRecord* r : bounces) {
     double squared = 0;
     for (int i = 0; i < 3; ++i) {
-      const double d = double{r->p[i]} - double{sphere.middle[i]};
+      const double d = double{r->p[i]} - double{sphere.centre[i]};
       squared += d * d;
     }
     most = std::max(most, squared);
@@ -67,16 +67,16 @@ double farthest(Bounces bounces, const GuideSphere& sphere) {
 }
 
 /// For each bin, the bins that receive its weight after the blur, with their fractions.
-using Blur = std::array<std::vector<std::pair<uint32_t, double>>, kGuideBins>;
+using Blur = std::array<std::vector<std::pair<uint32_t, double>>, kGuidingBins>;
 
 Blur make_blur() {
-  std::array<Vec3<float>, kGuideBins> directions;
-  for (uint32_t b = 0; b < kGuideBins; ++b) directions[b] = bin_direction(b);
+  std::array<Vec3<float>, kGuidingBins> directions;
+  for (uint32_t b = 0; b < kGuidingBins; ++b) directions[b] = bin_direction(b);
   Blur blur;
   const double least = std::cos(kBlurReach * kBlur);
-  for (uint32_t b = 0; b < kGuideBins; ++b) {
+  for (uint32_t b = 0; b < kGuidingBins; ++b) {
     double sum = 0;
-    for (uint32_t other = 0; other < kGuideBins; ++other) {
+    for (uint32_t other = 0; other < kGuidingBins; ++other) {
       const double cosine = double{dot(directions[b], directions[other])};
       if (cosine < least && other != b) continue;
       sum += blur[b].emplace_back(other, std::exp((cosine - 1) / (kBlur * kBlur))).second;
@@ -89,38 +89,40 @@ Blur make_blur() {
 }  // namespace
 
 Vec3<float> bin_direction(uint32_t bin) {
-  constexpr float width = 1.f / static_cast<float>(kGuideSide);
-  return octahedral_direction<float>((static_cast<float>(bin % kGuideSide) + 0.5f) * width,
-                                     (static_cast<float>(bin / kGuideSide) + 0.5f) * width);
+  constexpr float width = 1.f / static_cast<float>(kGuidingSide);
+  return octahedral_direction<float>((static_cast<float>(bin % kGuidingSide) + 0.5f) * width,
+                                     (static_cast<float>(bin / kGuidingSide) + 0.5f) * width);
 }
 
-DirectionBins direction_bins(Bounces bounces, const GuideSphere& sphere, double cut) {
+DirectionBins direction_bins(Bounces bounces, const ParallaxSphere& sphere, double cut) {
   DirectionBins bins{};
   for (const TrainingRecord* r : bounces)
     bins[bin_of(*r, sphere)] += std::min(double{r->value}, cut);
   return bins;
 }
 
-std::vector<const TrainingRecord*> some_bounces(Bounces bounces, size_t count) {
+std::vector<const TrainingRecord*> subset_of_bounces(Bounces bounces, size_t count) {
   std::vector<const TrainingRecord*> some(std::min(bounces.size(), count));
   for (size_t i = 0; i < some.size(); ++i) some[i] = bounces[i * bounces.size() / some.size()];
   return some;
 }
 
-GuideSphere fit_sphere(Bounces bounces, double cut) {
+ParallaxSphere fit_sphere(Bounces bounces, double cut) {
   if (bounces.empty()) return {};
-  const GuideSphere met = sphere_of(bounces, cut);
-  GuideSphere best = met;
-  best.nearness = 0;
+  const ParallaxSphere met = sphere_of(bounces, cut);
+  ParallaxSphere best = met;
+  best.inverse_distance = 0;
   const double reach = farthest(bounces, met);
-  if (!(reach > 0 && met.nearness > 0)) return best;
-  const auto some = some_bounces(bounces, kTried);
+  if (!(reach > 0 && met.inverse_distance > 0)) return best;
+  const auto some = subset_of_bounces(bounces, kTried);
   double most = 0;
-  for (const float factor : kNearnesses) {
-    GuideSphere sphere = met;
-    sphere.nearness = std::min(factor * met.nearness, static_cast<float>(kMostOffset / reach));
+  for (const float factor : kInverseDistances) {
+    ParallaxSphere sphere = met;
+    sphere.inverse_distance =
+        std::min(factor * met.inverse_distance, static_cast<float>(kMaxOffset / reach));
     double squares = 0;
-    for (const double brought : direction_bins(some, sphere, cut)) squares += brought * brought;
+    for (const double contribution : direction_bins(some, sphere, cut))
+      squares += contribution * contribution;
     if (squares <= most) continue;
     most = squares;
     best = sphere;
@@ -131,7 +133,7 @@ GuideSphere fit_sphere(Bounces bounces, double cut) {
 DirectionBins smoothed(const DirectionBins& bins) {
   static const Blur blur = make_blur();
   DirectionBins out{};
-  for (uint32_t b = 0; b < kGuideBins; ++b)
+  for (uint32_t b = 0; b < kGuidingBins; ++b)
     if (bins[b] > 0)
       for (const auto& [other, share] : blur[b]) out[other] += share * bins[b];
   return out;

@@ -14,7 +14,7 @@
 namespace wavecomb {
 
 /// Weights of direction bins, row by row of the equal-area square (directions.h).
-using DirectionBins = std::array<double, kGuideBins>;
+using DirectionBins = std::array<double, kGuidingBins>;
 /// Returns the unit vector at the centre of a bin.
 Vec3<float> bin_direction(uint32_t bin);
 
@@ -26,14 +26,14 @@ using Bounces = std::span<const TrainingRecord* const>;
 /// sum of squares, that is, the most concentrated distribution. Candidates are multiples of the
 /// mean hit distance, because an opening is nearer than what is seen through it. The value of each
 /// bounce is clamped to `cut`.
-GuideSphere fit_sphere(Bounces bounces, double cut);
+ParallaxSphere fit_sphere(Bounces bounces, double cut);
 
 /// Returns `count` of the bounces at equal index intervals, or all if there are fewer.
-std::vector<const TrainingRecord*> some_bounces(Bounces bounces, size_t count);
+std::vector<const TrainingRecord*> subset_of_bounces(Bounces bounces, size_t count);
 
 /// Sums the values of bounces, clamped to `cut`, by their direction as seen from the centre of
 /// `sphere`.
-DirectionBins direction_bins(Bounces bounces, const GuideSphere& sphere, double cut);
+DirectionBins direction_bins(Bounces bounces, const ParallaxSphere& sphere, double cut);
 
 /// Blurs the bins by about 5 degrees, since a few hundred bounces per region leave gaps.
 DirectionBins smoothed(const DirectionBins& bins);

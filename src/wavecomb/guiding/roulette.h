@@ -20,24 +20,24 @@
 namespace wavecomb {
 
 /// Minimum survival probability.
-inline constexpr float kLeastSurvival = 0.1f;
+inline constexpr float kMinSurvival = 0.1f;
 
 /// Survival probability in a region with training samples; `share` is T / I.
 template <typename F>
-inline F worthwhile_survival(const GuidePlace<F>& place, const F& share) {
-  return clamp(F(share * place.survival), F(kLeastSurvival), F(1.f));
+inline F efficient_survival(const GuidingLookup<F>& guiding, const F& share) {
+  return clamp(F(share * guiding.survival), F(kMinSurvival), F(1.f));
 }
 
 /// Training sample of roulette: a bounce with or without contribution.
-struct BounceLesson {
-  uint64_t place;  ///< bounce_place
-  float value;     ///< TrainingRecord::value, or 0 without contribution
-  float squared;   ///< second moment under roulette
-  float cost;      ///< expected cost of the bounce and all that follows, in rays
+struct BounceSample {
+  uint64_t position_key;  ///< bounce_position_key
+  float value;            ///< TrainingRecord::value, or 0 without contribution
+  float squared;          ///< second moment under roulette
+  float cost;             ///< expected cost of the bounce and all that follows, in rays
 };
 
 /// Expected cost and variance of a camera path under roulette, or their means over paths.
-struct PathLesson {
+struct PathStatistics {
   double cost = 0;  ///< expected cost, in rays
   /// Variance that roulette adds to a path. For the mean over paths: the whole variance over the
   /// squared brightness of the image.

@@ -9,17 +9,18 @@
 namespace wavecomb {
 namespace {
 
-/// Assigns 65536 sample values to kGuideSide bins by weight. Each bin gets one, and the rest
+/// Assigns 65536 sample values to kGuidingSide bins by weight. Each bin gets one, and the rest
 /// follows the rounded cumulative sum, so that the total is exact.
-void write_row(std::span<const double, kGuideSide> weights, std::span<uint32_t, kGuideSide> words) {
+void write_row(std::span<const double, kGuidingSide> weights,
+               std::span<uint32_t, kGuidingSide> words) {
   constexpr uint32_t kNumbers = 1u << 16;
   const double all = std::accumulate(weights.begin(), weights.end(), 0.0);
-  const double free = kNumbers - kGuideSide;
+  const double free = kNumbers - kGuidingSide;
   double running = 0;
   uint32_t start = 0;
-  for (uint32_t i = 0; i < kGuideSide; ++i) {
-    running += all > 0 ? weights[i] / all : 1.0 / kGuideSide;
-    const bool last = i + 1 == kGuideSide;
+  for (uint32_t i = 0; i < kGuidingSide; ++i) {
+    running += all > 0 ? weights[i] / all : 1.0 / kGuidingSide;
+    const bool last = i + 1 == kGuidingSide;
     const uint32_t end =
         last ? kNumbers
              : i + 1 + static_cast<uint32_t>(std::nearbyint(std::min(running, 1.0) * free));
@@ -30,15 +31,15 @@ void write_row(std::span<const double, kGuideSide> weights, std::span<uint32_t, 
 
 }  // namespace
 
-void write_guide_table(std::span<const double, kGuideBins> weights,
-                       std::span<uint32_t, kGuideWords> table) {
-  std::array<double, kGuideSide> rows;
-  for (uint32_t r = 0; r < kGuideSide; ++r) {
-    const auto row = weights.subspan(size_t{r} * kGuideSide).first<kGuideSide>();
+void write_guiding_table(std::span<const double, kGuidingBins> weights,
+                         std::span<uint32_t, kGuidingWords> table) {
+  std::array<double, kGuidingSide> rows;
+  for (uint32_t r = 0; r < kGuidingSide; ++r) {
+    const auto row = weights.subspan(size_t{r} * kGuidingSide).first<kGuidingSide>();
     rows[r] = std::accumulate(row.begin(), row.end(), 0.0);
-    write_row(row, table.subspan(kGuideSide + size_t{r} * kGuideSide).first<kGuideSide>());
+    write_row(row, table.subspan(kGuidingSide + size_t{r} * kGuidingSide).first<kGuidingSide>());
   }
-  write_row(rows, table.first<kGuideSide>());
+  write_row(rows, table.first<kGuidingSide>());
 }
 
 }  // namespace wavecomb

@@ -8,18 +8,18 @@ namespace wavecomb {
 
 /// A training bounce that contributes light.
 struct TrainingRecord {
-  float p[3];      ///< position of the vertex
-  float wi[3];     ///< sampled direction
-  float nearness;  ///< 1 / distance to the next hit; 0: no hit; negative: unknown
+  float p[3];              ///< position of the vertex
+  float wi[3];             ///< sampled direction
+  float inverse_distance;  ///< 1 / distance to the next hit; 0: no hit; negative: unknown
   uint32_t material;
-  uint8_t axis;  ///< guide_axis of the surface
+  uint8_t axis;  ///< guiding_axis of the surface
   /// Radiance that returned along wi, times f |cos| over pdf: a one-sample estimate of the integral
   /// of f L |cos| over directions, with L the incident radiance.
   float value;
-  float pdf;        ///< density with which wi was sampled
-  float bsdf_pdf;   ///< density of wi under the BSDF alone
-  float guide_pdf;  ///< density under the field in use; 0 if there was none
-  float weight;     ///< throughput over image brightness
+  float pdf;          ///< density with which wi was sampled
+  float bsdf_pdf;     ///< density of wi under the BSDF alone
+  float guiding_pdf;  ///< density under the field in use; 0 if there was none
+  float weight;       ///< throughput over image brightness
 };
 
 }  // namespace wavecomb

@@ -25,7 +25,7 @@ struct CameraSpace {
   F det;
 
   CameraSpace(const CameraSetup& camera, const F& time, const Mask<F>& active)
-      : m(camera_place<F>(camera, time, active)) {
+      : m(camera_transform<F>(camera, time, active)) {
     const Vec3<F> a(m.row[0].x, m.row[1].x, m.row[2].x), b(m.row[0].y, m.row[1].y, m.row[2].y),
         c(m.row[0].z, m.row[1].z, m.row[2].z);
     x = cross(b, c);
@@ -93,7 +93,7 @@ struct CameraConnection {
 };
 
 /// Connects p to the camera. `u` and `v` in [0, 1) sample the point on the lens. If a latlong image
-/// shows a point several times, this returns one position, and SplatFilter adds the others.
+/// shows a point several times, this returns one position, and LightSplatFilter adds the others.
 template <typename F>
 inline CameraConnection<F> connect_to_camera(const CameraSetup& camera, const Vec3<F>& p,
                                              const F& u, const F& v, const F& time,

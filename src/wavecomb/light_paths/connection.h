@@ -41,12 +41,12 @@ WAVECOMB_INLINE Connection<F> connect_to_point(const Interaction& at, const Vec3
   const Vec3<F> from_surface = to - at.s.p;
   Connection<F> c;
   c.o = at.origin(from_surface);
-  const Vec3<F> way = to - c.o;
-  c.distance2 = length_squared(way);
-  const Mask<F> apart = c.distance2 > 0.f;
-  c.d = way * F(1.f / sqrt(select(apart, c.distance2, F(1.f))));
-  const Mask<F> outside = dot(from_surface, at.s.ng) > 0.f, seen = dot(c.d, at.s.ng) > 0.f;
-  c.valid = apart & ((outside & seen) | not_(Mask<F>(outside | seen)));
+  const Vec3<F> offset = to - c.o;
+  c.distance2 = length_squared(offset);
+  const Mask<F> separated = c.distance2 > 0.f;
+  c.d = offset * F(1.f / sqrt(select(separated, c.distance2, F(1.f))));
+  const Mask<F> outside = dot(from_surface, at.s.ng) > 0.f, ray_outside = dot(c.d, at.s.ng) > 0.f;
+  c.valid = separated & ((outside & ray_outside) | not_(Mask<F>(outside | ray_outside)));
   return c;
 }
 
@@ -90,9 +90,10 @@ template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
 WAVECOMB_INLINE LightConnection<F> connect_to_light(const Vertex<F, kFeatures>& v,
                                                     const Interaction& at,
                                                     const LightReceiver<F>& receiver,
-                                                    const Sample4<F>& r, const Mask<F>& lit) {
+                                                    const Sample4<F>& r,
+                                                    const Mask<F>& active_lights) {
   const LightView& lights = v.scene.lights;
-  LightConnection<F> c{sample_light<F>(lights, receiver, r.x, r.y, r.z, lit), receiver.p};
+  LightConnection<F> c{sample_light<F>(lights, receiver, r.x, r.y, r.z, active_lights), receiver.p};
   if constexpr (Bsdf::kOnSurface && Bsdf::kTransmits) {
     const Vec3<F>& through = v.path.dir;
     const auto outside = [&](const Vec3<F>& d) { return Mask<F>(dot(d, at.s.ng) > 0.f); };
@@ -109,21 +110,21 @@ WAVECOMB_INLINE LightConnection<F> connect_to_light(const Vertex<F, kFeatures>& 
     const F distance = near.distance;
     near.distance = select(crossing, max(F(distance - closer), F(0.f)), distance);
     if constexpr (Bsdf::kHasTerminator) {
-      const Mask<F> lifted =
-          lit & Mask<F>(at.bsdf.passes_light()) & (length_squared(at.s.terminator) > 0.f);
-      if (any(lifted)) {
+      const Mask<F> has_terminator =
+          active_lights & Mask<F>(at.bsdf.passes_light()) & (length_squared(at.s.terminator) > 0.f);
+      if (any(has_terminator)) {
         LightReceiver<F> beyond = receiver;
         beyond.p = far;
-        LightSample<F> other = sample_light<F>(lights, beyond, r.x, r.y, r.z, lifted);
-        near.distance = select(lifted, distance, near.distance);
-        near.valid = near.valid & not_(Mask<F>(lifted & crossing));
-        other.valid = other.valid & lifted & crosses(other.wi);
+        LightSample<F> other = sample_light<F>(lights, beyond, r.x, r.y, r.z, has_terminator);
+        near.distance = select(has_terminator, distance, near.distance);
+        near.valid = near.valid & not_(Mask<F>(has_terminator & crossing));
+        other.valid = other.valid & has_terminator & crosses(other.wi);
         const Mask<F> both = near.valid & other.valid;
-        const Mask<F> takes =
+        const Mask<F> uses_other =
             other.valid & (not_(near.valid) | (candidate_number<F>(v.key, v.depth) < 0.5f));
-        near = detail::select_light<F>(takes, other, near);
+        near = detail::select_light<F>(uses_other, other, near);
         near.weight = near.weight * select(both, F(2.f), F(1.f));
-        c.origin = select<F>(lifted, select<F>(takes, far, receiver.p), c.origin);
+        c.origin = select<F>(has_terminator, select<F>(uses_other, far, receiver.p), c.origin);
       }
     }
   }

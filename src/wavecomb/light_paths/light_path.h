@@ -60,11 +60,13 @@ inline LightPath<F> begin_light_path(const LightView& lights, const Settings& se
                                      const Mask<F>& active) {
   LightPath<F> path;
   path.key = light_path_key<F>(settings, pixel, sample);
-  const Sample4<F> way = sample_4d<F>(settings.sampler, path.key, kCameraSet);
+  const Sample4<F> camera_sample = sample_4d<F>(settings.sampler, path.key, kCameraSet);
   const Sample4<F> choice =
       sample_4d<F>(settings.sampler, path.key, vertex_set(VertexSet::kEmission, 0));
-  path.emission =
-      sample_emission<F>(lights, {choice.x, way.z, way.w, way.x, way.y, choice.y}, active);
+  path.emission = sample_emission<F>(
+      lights,
+      {choice.x, camera_sample.z, camera_sample.w, camera_sample.x, camera_sample.y, choice.y},
+      active);
   const F largest = max_component(path.emission.flux);
   const F scale = 1.f / select(path.emission.valid, largest, F(1.f));
   path.flux = path.emission.flux;
@@ -76,7 +78,7 @@ inline LightPath<F> begin_light_path(const LightView& lights, const Settings& se
 /// Parameters of the render that vertices of light paths need.
 struct LightPathSetup {
   const CameraSetup& camera;
-  const SplatFilter& filter;
+  const LightSplatFilter& filter;
   float share;           ///< 1 / N, where N is the number of light paths in the image per sample
   float camera_squares;  ///< WaveContext::camera_squares
   const Merger* merger;  ///< null without merging
@@ -85,8 +87,8 @@ struct LightPathSetup {
 /// Returns the setup of a WaveContext.
 template <typename Context>
 inline LightPathSetup light_path_setup(const Context& context, const Merger* merger = nullptr) {
-  return {*context.camera, *context.splat_filter, context.light_path_share(),
-          context.camera_squares, context.lessons ? nullptr : merger};
+  return {*context.camera, *context.light_splat_filter, context.light_path_share(),
+          context.camera_squares, context.aim_samples ? nullptr : merger};
 }
 
 /// Returns the settings for shading camera paths in a render that may have light paths.
@@ -117,7 +119,7 @@ inline PathState<F> light_path_state(const CameraSetup& camera, const LightPathR
                                      const F& t, const F& time, const Mask<F>& active) {
   F width(kConeShare * camera.step_y);
   if (camera.projection != Projection::kOrthographic)
-    width *= length(Vec3<F>(fma(row.d, t, row.o) - camera_place<F>(camera, time, active).t));
+    width *= length(Vec3<F>(fma(row.d, t, row.o) - camera_transform<F>(camera, time, active).t));
   return {.dir = row.d,
           .throughput = row.throughput,
           .eta_scale = row.eta_scale,

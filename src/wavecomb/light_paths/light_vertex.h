@@ -45,207 +45,225 @@ namespace wavecomb {
 namespace detail {
 
 /// Lower bound for the density of camera paths relative to light paths.
-inline constexpr float kLeastRatio = 1e-9f;
-/// Least cosine between the normals of a visible point and of a vertex that is merged with it.
-inline constexpr float kLeastAlike = 0.7f;
+inline constexpr float kMinRatio = 1e-9f;
+/// Least cosine between the normals of a merge point and of a vertex that is merged with it.
+inline constexpr float kMinNormalCosine = 0.7f;
 
 /// Shading point of a light path, with the direction that the light arrives from.
 template <typename Bsdf, typename F, typename Interaction>
-struct LitPlace {
+struct LightPathPoint {
   const Interaction& at;
   Frame<F> frame;
   Vec3<F> l;  ///< local direction to the light, computed as a connection (light_paths/connection.h)
   F inverse_cos;          ///< 1 / |g l|
   Color<F> flux;          ///< flux that arrives
-  F linked;               ///< F, see above
+  F connection_density;   ///< F, see above
   F sampled;              ///< p_light at the first vertex, else 0
   Mask<F> by_light_only;  ///< lanes with a light that bounces cannot hit
   Mask<F> active;
 
   /// Returns |g w| / |g l| for a world direction.
-  F turn(const Vec3<F>& w) const { return abs(dot(at.s.ng, w)) * inverse_cos; }
+  F cosine_ratio(const Vec3<F>& w) const { return abs(dot(at.s.ng, w)) * inverse_cos; }
   /// Returns p-> + p_light, where `bounce` is p->.
-  F found(const F& bounce) const { return select(by_light_only, F(0.f), bounce) + sampled; }
+  F camera_density(const F& bounce) const {
+    return select(by_light_only, F(0.f), bounce) + sampled;
+  }
   /// Returns S (p-> + p_light) + F, where `s` is S before this vertex.
-  F others(const F& s, const F& bounce) const { return s * found(bounce) + linked; }
+  F relative_density(const F& s, const F& bounce) const {
+    return s * camera_density(bounce) + connection_density;
+  }
 };
 
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
-WAVECOMB_INLINE LitPlace<Bsdf, F, Interaction> lit_place(const Vertex<F, kFeatures>& v,
-                                                         const Interaction& at,
-                                                         const Mask<F>& is_first) {
+WAVECOMB_INLINE LightPathPoint<Bsdf, F, Interaction> light_path_point(const Vertex<F, kFeatures>& v,
+                                                                      const Interaction& at,
+                                                                      const Mask<F>& is_first) {
   const Vec3<F> back = -v.path.dir;
   const F cosine = abs(dot(at.s.ng, back));
   // Direction to the origin of the flux, as a bounce of a camera path would reach it.
   Connection<F> c = connect_to_point<F>(at, v.path.o);
-  const Mask<F> afar = is_first & Mask<F>(v.path.light < UInt<F>(v.scene.lights.infinite_count));
-  c.o = select<F>(afar, at.origin(back), c.o);
-  c.d = select<F>(afar, back, c.d);
-  const F distance = select(afar, v.t, sqrt(c.distance2));
-  LitPlace<Bsdf, F, Interaction> place{at,
-                                       at.unbent_frame(v),
-                                       {},
-                                       F(1.f / select(cosine > 0.f, cosine, F(1.f))),
-                                       select<F>(is_first, v.path.throughput, at.throughput),
-                                       F(0.f),
-                                       F(0.f),
-                                       Mask<F>(false),
-                                       Mask<F>(false)};
-  place.l = place.frame.to_local(c.d);
-  place.active = v.active & (cosine > 0.f) & (afar | c.valid) & at.is_consistent(c.d, place.l);
-  if (const Mask<F> first = place.active & is_first; any(first)) {
+  const Mask<F> from_infinite =
+      is_first & Mask<F>(v.path.light < UInt<F>(v.scene.lights.infinite_count));
+  c.o = select<F>(from_infinite, at.origin(back), c.o);
+  c.d = select<F>(from_infinite, back, c.d);
+  const F distance = select(from_infinite, v.t, sqrt(c.distance2));
+  LightPathPoint<Bsdf, F, Interaction> path_point{
+      at,
+      at.unadjusted_frame(v),
+      {},
+      F(1.f / select(cosine > 0.f, cosine, F(1.f))),
+      select<F>(is_first, v.path.throughput, at.throughput),
+      F(0.f),
+      F(0.f),
+      Mask<F>(false),
+      Mask<F>(false)};
+  path_point.l = path_point.frame.to_local(c.d);
+  path_point.active =
+      v.active & (cosine > 0.f) & (from_infinite | c.valid) & at.is_consistent(c.d, path_point.l);
+  if (const Mask<F> first = path_point.active & is_first; any(first)) {
     LightReceiver<F> receiver(c.o);
     if (v.scene.lights.by_tree && !Bsdf::kTransmits)
-      receiver.normal = pack_normal<F>(select<F>(place.l.z < 0.f, -place.frame.n, place.frame.n));
-    const LightReach<F> reach =
-        light_reach<F>(v.scene.lights, v.path.light, receiver, c.d, distance, first);
+      receiver.normal =
+          pack_normal<F>(select<F>(path_point.l.z < 0.f, -path_point.frame.n, path_point.frame.n));
+    const CameraPathDensity<F> reach =
+        camera_path_density<F>(v.scene.lights, v.path.light, receiver, c.d, distance, first);
     // Vertices that have only delta lobes do not sample lights.
-    place.sampled = select(first & at.bsdf.has_non_delta(), reach.density, F(0.f));
-    place.by_light_only = first & reach.is_delta;
+    path_point.sampled = select(first & at.bsdf.has_non_delta(), reach.density, F(0.f));
+    path_point.by_light_only = first & reach.is_delta;
   }
   if (v.settings.connects) {
-    const Mask<F> links = place.active & (v.path.bounce_pdf > 0.f);
-    const F linked = F(distance * distance) / select(links, v.path.bounce_pdf, F(1.f));
-    place.linked = select(links, min(linked, F(kMostRatio)), F(0.f));
+    const Mask<F> can_connect_back = path_point.active & (v.path.bounce_pdf > 0.f);
+    const F connection_density =
+        F(distance * distance) / select(can_connect_back, v.path.bounce_pdf, F(1.f));
+    path_point.connection_density =
+        select(can_connect_back, min(connection_density, F(kMaxRatio)), F(0.f));
   }
-  return place;
+  return path_point;
 }
 
 /// Viewer of a vertex: the direction from the vertex to the viewer, and whether the vertex scatters
 /// towards it.
 template <typename F>
-struct Looker {
+struct Viewer {
   Vec3<F> w, local;
   F distance2;
-  Mask<F> sees;
+  Mask<F> is_visible;
 };
 
-template <typename Bsdf, typename F, uint32_t kFeatures, typename Place>
-WAVECOMB_INLINE Looker<F> looker_at(const Vertex<F, kFeatures>& v, const Place& place,
+template <typename Bsdf, typename F, uint32_t kFeatures, typename PathPoint>
+WAVECOMB_INLINE Viewer<F> viewer_at(const Vertex<F, kFeatures>& v, const PathPoint& path_point,
                                     const Vec3<F>& to, const Mask<F>& wanted) {
-  const auto& at = place.at;
-  Looker<F> out;
-  const Vec3<F> way = to - at.s.p;
-  out.distance2 = length_squared(way);
-  out.w = way * F(1.f / sqrt(select(out.distance2 > 0.f, out.distance2, F(1.f))));
-  out.local = place.frame.to_local(out.w);
-  out.sees = wanted & (out.distance2 > 0.f) & at.is_consistent(out.w, out.local) &
-             not_(at.bends(v, place.frame, -out.w));
-  if (Bsdf::kAbsorbs) out.sees = out.sees & (dot(at.s.ng, out.w) > 0.f);
+  const auto& at = path_point.at;
+  Viewer<F> out;
+  const Vec3<F> offset = to - at.s.p;
+  out.distance2 = length_squared(offset);
+  out.w = offset * F(1.f / sqrt(select(out.distance2 > 0.f, out.distance2, F(1.f))));
+  out.local = path_point.frame.to_local(out.w);
+  out.is_visible = wanted & (out.distance2 > 0.f) & at.is_consistent(out.w, out.local) &
+                   not_(at.is_adjusted(v, path_point.frame, -out.w));
+  if (Bsdf::kAbsorbs) out.is_visible = out.is_visible & (dot(at.s.ng, out.w) > 0.f);
   return out;
 }
 
 /// Sets up the shadow ray towards the viewer at `to`, which carries the contribution `light`.
-template <typename F, typename Place>
-WAVECOMB_INLINE void ask_whether_seen(const Place& place, const Looker<F>& looker,
-                                      const Vec3<F>& to, const Color<F>& light,
-                                      VertexResult<F>& out) {
+template <typename F, typename PathPoint>
+WAVECOMB_INLINE void set_visibility_ray(const PathPoint& path_point, const Viewer<F>& viewer,
+                                        const Vec3<F>& to, const Color<F>& light,
+                                        VertexResult<F>& out) {
   out.direct = clean<F>(light, 0.f);
-  out.has_shadow = looker.sees & (max_component(out.direct) > 0.f);
-  out.shadow_o = place.at.light_path_origin(looker.w);
+  out.has_shadow = viewer.is_visible & (max_component(out.direct) > 0.f);
+  out.shadow_o = path_point.at.light_path_origin(viewer.w);
   const Vec3<F> ray = to - out.shadow_o;
   const F length2 = length_squared(ray);
   const F size = sqrt(select(length2 > 0.f, length2, F(1.f)));
   out.shadow_d = ray * F(1.f / size);
-  out.shadow_tfar = size * kShadowReach;
+  out.shadow_tfar = size * kShadowRayFraction;
 }
 
 /// Classifies the scattering towards the viewer, if light path expressions need it.
-template <typename F, uint32_t kFeatures, typename Place>
-WAVECOMB_INLINE void note_shown(const Vertex<F, kFeatures>& v, const Place& place,
-                                const Looker<F>& looker) {
+template <typename F, uint32_t kFeatures, typename PathPoint>
+WAVECOMB_INLINE void record_scattering(const Vertex<F, kFeatures>& v, const PathPoint& path_point,
+                                       const Viewer<F>& viewer) {
   if (v.wants_events()) [[unlikely]]
-    v.aovs->lit = note_event<std::remove_cvref_t<decltype(place.at.bsdf)>, F>(
-        place.at.bsdf, looker.local, place.l);
+    v.aovs->light_scattering = classify_event<std::remove_cvref_t<decltype(path_point.at.bsdf)>, F>(
+        path_point.at.bsdf, viewer.local, path_point.l);
 }
 
 /// Returns the value of a light splat: its contribution `light` or, with camera_squares, the
-/// addition to the variance of camera paths. `others` is the density of camera paths relative to
-/// light paths.
+/// addition to the variance of camera paths. `relative_density` is the density of camera paths
+/// relative to light paths.
 template <typename F>
-WAVECOMB_INLINE Color<F> shown_light(const LightPathSetup& setup, const Color<F>& light,
-                                     const F& others) {
+WAVECOMB_INLINE Color<F> splat_value(const LightPathSetup& setup, const Color<F>& light,
+                                     const F& relative_density) {
   if (setup.camera_squares <= 0.f) [[likely]]
     return light;
   const F y = luminance<F>(light);
   const F y2 = y * F(y * F(1.f / setup.camera_squares));
-  return Color<F>(F(y2 * F(F(1.f + others) / max(others, F(kLeastRatio)))));
+  return Color<F>(F(y2 * F(F(1.f + relative_density) / max(relative_density, F(kMinRatio)))));
 }
 
 /// Connects the vertex to the camera.
-template <typename Bsdf, typename F, uint32_t kFeatures, typename Place>
-WAVECOMB_INLINE void show_to_camera(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
-                                    const Place& place, const Sample4<F>& r,
-                                    LightVertexResult<F>& out) {
-  const auto& at = place.at;
-  const Mask<F> wanted = place.active & at.bsdf.has_non_delta();
+template <typename Bsdf, typename F, uint32_t kFeatures, typename PathPoint>
+WAVECOMB_INLINE void connect_vertex_to_camera(const Vertex<F, kFeatures>& v,
+                                              const LightPathSetup& setup,
+                                              const PathPoint& path_point, const Sample4<F>& r,
+                                              LightVertexResult<F>& out) {
+  const auto& at = path_point.at;
+  const Mask<F> wanted = path_point.active & at.bsdf.has_non_delta();
   if (!Bsdf::kHasNonDelta || none(wanted)) return;
-  out.offered = wanted;
+  out.is_candidate = wanted;
   out.p = at.s.p;
   const CameraConnection<F> c =
       connect_to_camera<F>(setup.camera, at.s.p, r.y, r.z, v.hit.time, wanted);
-  const Looker<F> looker = looker_at<Bsdf, F>(
-      v, place, c.to, Mask<F>(wanted & c.valid & setup.filter.reaches(c.x, c.y)));
-  if (none(looker.sees)) return;
-  const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(looker.local), place.l);
-  const F seen = place.turn(looker.w) * c.density;
-  const F others = place.others(v.path.mis_sum, e.pdf) * F(seen * setup.share);
-  const F brightness = seen * (setup.share * setup.camera.exposure) / F(1.f + others);
-  const Color<F> light = place.flux * e.f_cos * brightness;
-  ask_whether_seen<F>(place, looker, c.to, shown_light<F>(setup, light, others), out.v);
+  const Viewer<F> viewer = viewer_at<Bsdf, F>(
+      v, path_point, c.to, Mask<F>(wanted & c.valid & setup.filter.reaches(c.x, c.y)));
+  if (none(viewer.is_visible)) return;
+  const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(viewer.local), path_point.l);
+  const F camera_factor = path_point.cosine_ratio(viewer.w) * c.density;
+  const F relative_density =
+      path_point.relative_density(v.path.mis_sum, e.pdf) * F(camera_factor * setup.share);
+  const F brightness =
+      camera_factor * (setup.share * setup.camera.exposure) / F(1.f + relative_density);
+  const Color<F> light = path_point.flux * e.f_cos * brightness;
+  set_visibility_ray<F>(path_point, viewer, c.to, splat_value<F>(setup, light, relative_density),
+                        out.v);
   out.x = c.x;
   out.y = c.y;
-  note_shown<F>(v, place, looker);
+  record_scattering<F>(v, path_point, viewer);
 }
 
 /// Merges the path with nearby points that the camera sees in mirrors and through glass
 /// (merge_point.h). Each lane handles one point at a time.
-template <typename Bsdf, typename F, uint32_t kFeatures, typename Place>
+template <typename Bsdf, typename F, uint32_t kFeatures, typename PathPoint>
 WAVECOMB_INLINE void merge(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
-                           const Place& place) {
+                           const PathPoint& path_point) {
   using U = UInt<F>;
   constexpr size_t kLanes = kWidth<F>;
-  const auto& at = place.at;
-  const Mask<F> wanted = place.active & at.bsdf.has_non_delta();
+  const auto& at = path_point.at;
+  const Mask<F> wanted = path_point.active & at.bsdf.has_non_delta();
   if (!Bsdf::kHasNonDelta || none(wanted)) return;
-  const VisibleGrid& grid = *setup.merger->grid;
+  const MergeGrid& grid = *setup.merger->grid;
   alignas(64) float x[kLanes], y[kLanes], z[kLanes], on[kLanes];
   alignas(64) uint32_t pixel[kLanes] = {};
   store(x, at.s.p.x);
   store(y, at.s.p.y);
   store(z, at.s.p.z);
   store(on, select(wanted, F(1.f), F(0.f)));
-  std::array<VisibleGrid::Search, kLanes> searches;
+  std::array<MergeGrid::Search, kLanes> searches;
   for (size_t i = 0; i < kLanes; ++i)
-    if (on[i] != 0) searches[i] = VisibleGrid::Search(grid, x[i], y[i], z[i]);
+    if (on[i] != 0) searches[i] = MergeGrid::Search(grid, x[i], y[i], z[i]);
   for (;;) {
-    bool goes_on = false;
+    bool continues = false;
     for (size_t i = 0; i < kLanes; ++i) {
       on[i] = on[i] != 0 && searches[i].next(pixel[i]) ? 1.f : 0.f;
-      goes_on |= on[i] != 0;
+      continues |= on[i] != 0;
     }
-    if (!goes_on) return;
-    const Mask<F> found = load<F>(on) > 0.f;
+    if (!continues) return;
+    const Mask<F> has_point = load<F>(on) > 0.f;
     const U index = load<U>(pixel);
-    const auto point = load_row<VisiblePoint, F>(grid.points(), index, found);
-    const Vec3<F> local = place.frame.to_local(point.w);
-    const F turned = abs(dot(at.s.ng, unpack_normal<F>(point.normal)));
-    const Mask<F> sees = found & at.is_consistent(point.w, local) & (turned > kLeastAlike) &
-                         not_(at.bends(v, place.frame, -point.w)) &
-                         Mask<F>(point.depth + (v.depth + 1u) <= U(v.settings.max_depth));
-    if (none(sees)) continue;
-    const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(local), place.l);
+    const auto point = load_row<MergePoint, F>(grid.points(), index, has_point);
+    const Vec3<F> local = path_point.frame.to_local(point.w);
+    const F normal_cosine = abs(dot(at.s.ng, unpack_normal<F>(point.normal)));
+    const Mask<F> is_visible = has_point & at.is_consistent(point.w, local) &
+                               (normal_cosine > kMinNormalCosine) &
+                               not_(at.is_adjusted(v, path_point.frame, -point.w)) &
+                               Mask<F>(point.depth + (v.depth + 1u) <= U(v.settings.max_depth));
+    if (none(is_visible)) continue;
+    const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(local), path_point.l);
     const F area = F(point.radius * point.radius) * kPi;
-    const F seen = place.inverse_cos / select(sees, area, F(1.f));
-    const F others = place.others(v.path.mis_sum, e.pdf) * F(seen * setup.share);
-    const F brightness = seen * (setup.share * setup.camera.exposure) / F(1.f + others);
-    const Color<F> light = place.flux * e.f_cos * point.light * brightness;
-    const Color<F> shown =
-        select<F>(sees, clean<F>(shown_light<F>(setup, light, others), 0.f), Color<F>(F(0.f)));
+    const F camera_factor = path_point.inverse_cos / select(is_visible, area, F(1.f));
+    const F relative_density =
+        path_point.relative_density(v.path.mis_sum, e.pdf) * F(camera_factor * setup.share);
+    const F brightness =
+        camera_factor * (setup.share * setup.camera.exposure) / F(1.f + relative_density);
+    const Color<F> light = path_point.flux * e.f_cos * point.light * brightness;
+    const Color<F> value =
+        select<F>(is_visible, clean<F>(splat_value<F>(setup, light, relative_density), 0.f),
+                  Color<F>(F(0.f)));
     alignas(64) float r[kLanes], g[kLanes], b[kLanes];
-    store(r, shown.x);
-    store(g, shown.y);
-    store(b, shown.z);
+    store(r, value.x);
+    store(g, value.y);
+    store(b, value.z);
     for (size_t i = 0; i < kLanes; ++i)
       if (on[i] != 0 && (r[i] > 0 || g[i] > 0 || b[i] > 0))
         setup.merger->film->collect(*setup.merger->splats, {pixel[i], r[i], g[i], b[i]});
@@ -253,70 +271,72 @@ WAVECOMB_INLINE void merge(const Vertex<F, kFeatures>& v, const LightPathSetup& 
 }
 
 /// Connects the vertex to a vertex of a camera path.
-template <typename Bsdf, typename F, uint32_t kFeatures, typename Place>
-WAVECOMB_INLINE void connect(const Vertex<F, kFeatures>& v, const Place& place,
+template <typename Bsdf, typename F, uint32_t kFeatures, typename PathPoint>
+WAVECOMB_INLINE void connect(const Vertex<F, kFeatures>& v, const PathPoint& path_point,
                              const ConnectionRow<F>& target, VertexResult<F>& out) {
-  const auto& at = place.at;
-  const Mask<F> wanted = place.active & at.bsdf.has_non_delta();
+  const auto& at = path_point.at;
+  const Mask<F> wanted = path_point.active & at.bsdf.has_non_delta();
   if (!Bsdf::kHasNonDelta || none(wanted)) return;
-  const Looker<F> looker = looker_at<Bsdf, F>(v, place, target.from, wanted);
-  if (none(looker.sees)) return;
-  const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(looker.local), place.l);
-  const F back = at.bsdf.eval(at.bsdf.view(place.l), looker.local).pdf;
-  const F nearness = 1.f / select(looker.sees, looker.distance2, F(1.f));
-  const F turn = place.turn(looker.w) * nearness;
-  const F before = min(F(target.ratio * F(back * nearness)), F(kMostRatio));
-  const F others =
-      min(F(place.others(v.path.mis_sum, e.pdf) * F(turn * target.pdf)), F(kMostRatio));
-  const F brightness = turn / F(F(1.f + before) + others);
-  ask_whether_seen<F>(place, looker, target.from,
-                      Color<F>(place.flux * e.f_cos * target.light * brightness), out);
-  note_shown<F>(v, place, looker);
+  const Viewer<F> viewer = viewer_at<Bsdf, F>(v, path_point, target.from, wanted);
+  if (none(viewer.is_visible)) return;
+  const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(viewer.local), path_point.l);
+  const F back = at.bsdf.eval(at.bsdf.view(path_point.l), viewer.local).pdf;
+  const F inverse_distance2 = 1.f / select(viewer.is_visible, viewer.distance2, F(1.f));
+  const F cosine_ratio = path_point.cosine_ratio(viewer.w) * inverse_distance2;
+  const F before = min(F(target.ratio * F(back * inverse_distance2)), F(kMaxRatio));
+  const F relative_density =
+      min(F(path_point.relative_density(v.path.mis_sum, e.pdf) * F(cosine_ratio * target.pdf)),
+          F(kMaxRatio));
+  const F brightness = cosine_ratio / F(F(1.f + before) + relative_density);
+  set_visibility_ray<F>(path_point, viewer, target.from,
+                        Color<F>(path_point.flux * e.f_cos * target.light * brightness), out);
+  record_scattering<F>(v, path_point, viewer);
 }
 
 /// Samples the bounce and the next ray.
-template <typename Bsdf, typename F, uint32_t kFeatures, typename Place>
-WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const Place& place,
+template <typename Bsdf, typename F, uint32_t kFeatures, typename PathPoint>
+WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const PathPoint& path_point,
                                   const Sample4<F>& r, VertexResult<F>& out) {
-  const auto& at = place.at;
-  const BsdfSample<F> b = at.bsdf.sample(at.bsdf.view(place.l), r.x, r.y, r.z);
-  const Vec3<F> d = normalize(place.frame.to_world(b.wi));
-  const F turn = place.turn(d);
-  const F over_pdf = turn / select(b.pdf > 0.f, b.pdf, F(1.f));
-  const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(b.wi), place.l);
+  const auto& at = path_point.at;
+  const BsdfSample<F> b = at.bsdf.sample(at.bsdf.view(path_point.l), r.x, r.y, r.z);
+  const Vec3<F> d = normalize(path_point.frame.to_world(b.wi));
+  const F cosine_ratio = path_point.cosine_ratio(d);
+  const F over_pdf = cosine_ratio / select(b.pdf > 0.f, b.pdf, F(1.f));
+  const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(b.wi), path_point.l);
   Color<F> weight = e.f_cos * over_pdf;
-  F s = v.path.mis_sum * F(place.found(e.pdf) * over_pdf);
-  if (v.settings.connects) s = fma(place.linked, over_pdf, s);
-  Mask<F> goes = v.active;
+  F s = v.path.mis_sum * F(path_point.camera_density(e.pdf) * over_pdf);
+  if (v.settings.connects) s = fma(path_point.connection_density, over_pdf, s);
+  Mask<F> continues = v.active;
   if (any(b.is_delta)) {
     const F eta2 = b.eta * b.eta;
     const F z = abs(b.wi.z);
-    const F angles = turn * F(abs(place.l.z) / select(z > 0.f, z, F(1.f)));
+    const F angles = cosine_ratio * F(abs(path_point.l.z) / select(z > 0.f, z, F(1.f)));
     weight = select<F>(b.is_delta, b.weight * F(angles * eta2), weight);
-    const F by_angle = select(place.by_light_only, F(0.f), F(angles / eta2));
+    const F by_angle = select(path_point.by_light_only, F(0.f), F(angles / eta2));
     s = select(b.is_delta, F(v.path.mis_sum * by_angle), s);
-    goes = not_(b.is_delta & passes_one_way<Bsdf, F>(at.bsdf, place.l, b.wi));
+    continues = not_(b.is_delta & is_asymmetric<Bsdf, F>(at.bsdf, path_point.l, b.wi));
   }
   if (v.wants_events()) [[unlikely]] {
-    v.aovs->bounce = note_event<std::remove_cvref_t<decltype(at.bsdf)>, F>(at.bsdf, b.wi, place.l);
+    v.aovs->bounce =
+        classify_event<std::remove_cvref_t<decltype(at.bsdf)>, F>(at.bsdf, b.wi, path_point.l);
     v.aovs->bounce.is_delta = b.is_delta;
   }
   out.next.dir = d;
-  out.next.throughput = place.flux * weight;
-  out.next.mis_sum = min(s, F(kMostRatio));
+  out.next.throughput = path_point.flux * weight;
+  out.next.mis_sum = min(s, F(kMaxRatio));
   out.next.bounce_pdf = F(0.f);
   if (v.settings.connects) {
-    Mask<F> may_look = not_(b.is_delta);
-    if (Bsdf::kAbsorbs) may_look = may_look & (dot(at.s.ng, d) > 0.f);
-    out.next.bounce_pdf = select(may_look, b.pdf, F(0.f));
+    Mask<F> can_connect = not_(b.is_delta);
+    if (Bsdf::kAbsorbs) can_connect = can_connect & (dot(at.s.ng, d) > 0.f);
+    out.next.bounce_pdf = select(can_connect, b.pdf, F(0.f));
   }
   out.next.eta_scale = v.path.eta_scale;
   out.next.light = v.path.light;
   out.next.cone_width = out.next.cone_spread = F(0.f);
   out.next.o = at.light_path_origin(d);
   const F largest = max_component(out.next.throughput);
-  out.alive = place.active & goes & (b.pdf > 0.f) & at.is_consistent(d, b.wi) &
-              not_(at.bends(v, place.frame, -d)) & (largest > 0.f) & is_finite(largest);
+  out.alive = path_point.active & continues & (b.pdf > 0.f) & at.is_consistent(d, b.wi) &
+              not_(at.is_adjusted(v, path_point.frame, -d)) & (largest > 0.f) & is_finite(largest);
 }
 
 }  // namespace detail
@@ -324,11 +344,11 @@ WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const Place& pl
 /// Runs the steps of a vertex of the active lanes' light paths, with shading program `Bsdf`.
 /// `v.hit.time` is the shutter time of the path, and `v.path.cone_width` is the width of a camera
 /// ray's cone at the hit. If `v.aovs` wants events, classifies the scattering towards the viewer
-/// (`lit`) and of the bounce (`bounce`). With a null `target`, the vertex is connected to the
-/// camera and the path continues; otherwise it is connected to the camera path's vertices in
+/// (`light_scattering`) and of the bounce (`bounce`). With a null `target`, the vertex is connected
+/// to the camera and the path continues; otherwise it is connected to the camera path's vertices in
 /// `target`, and `v.depth` has no meaning.
 template <typename Bsdf, typename F, uint32_t kFeatures>
-WAVECOMB_INLINE LightVertexResult<F> take_light_steps(const Vertex<F, kFeatures>& v,
+WAVECOMB_INLINE LightVertexResult<F> light_path_steps(const Vertex<F, kFeatures>& v,
                                                       const LightPathSetup& setup,
                                                       const ConnectionTarget<F>* target) {
   LightVertexResult<F> out;
@@ -336,33 +356,33 @@ WAVECOMB_INLINE LightVertexResult<F> take_light_steps(const Vertex<F, kFeatures>
   out.v.direct = Color<F>(F(0.f));
   out.v.has_shadow = Mask<F>(false);
   out.v.alive = Mask<F>(false);
-  out.offered = Mask<F>(false);
+  out.is_candidate = Mask<F>(false);
   if constexpr (Bsdf::kOnFibre) return out;
   const auto at = interact<Bsdf, F>(v);
-  const auto place =
-      detail::lit_place<Bsdf, F>(v, at, target ? target->is_first : Mask<F>(v.depth == 0));
+  const auto path_point =
+      detail::light_path_point<Bsdf, F>(v, at, target ? target->is_first : Mask<F>(v.depth == 0));
   if (target) [[unlikely]] {
-    detail::connect<Bsdf, F>(v, place, target->row, out.v);
+    detail::connect<Bsdf, F>(v, path_point, target->row, out.v);
     return out;
   }
   const Sample4<F> r_light =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kLight, v.depth));
-  detail::show_to_camera<Bsdf, F>(v, setup, place, r_light, out);
+  detail::connect_vertex_to_camera<Bsdf, F>(v, setup, path_point, r_light, out);
   if (setup.merger) [[unlikely]]
-    detail::merge<Bsdf, F>(v, setup, place);
+    detail::merge<Bsdf, F>(v, setup, path_point);
   if (v.depth + 1 >= v.settings.max_depth) return out;
   const Sample4<F> r_bsdf =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kBsdf, v.depth));
-  detail::scatter_flux<Bsdf, F>(v, place, r_bsdf, out.v);
-  survive<F>(v, GuidePlace<F>{}, max_component(place.flux), r_light.w, out.v);
+  detail::scatter_flux<Bsdf, F>(v, path_point, r_bsdf, out.v);
+  survive<F>(v, GuidingLookup<F>{}, max_component(path_point.flux), r_light.w, out.v);
   return out;
 }
 
-/// Runs take_light_steps() without inlining, for the reference integrator.
+/// Runs light_path_steps() without inlining, for the reference integrator.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 LightVertexResult<F> shade_light_vertex(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
                                         const ConnectionTarget<F>* target) {
-  return take_light_steps<Bsdf, F>(v, setup, target);
+  return light_path_steps<Bsdf, F>(v, setup, target);
 }
 
 }  // namespace wavecomb

@@ -71,29 +71,29 @@ class LightVertices {
   SoaBlock rows_;
 };
 
-/// Stores the vertex at `p` in the lanes of `offered` that the path's hash selects: of n vertices
-/// so far, the last one replaces the stored one with probability 1 / n. Returns the lanes whose
-/// vertex was stored.
+/// Stores the vertex at `p` in the lanes of `is_candidate` that the path's hash selects: of n
+/// vertices so far, the last one replaces the stored one with probability 1 / n. Returns the lanes
+/// whose vertex was stored.
 template <typename F>
-inline Mask<F> keep_light_vertex(const LightVertices& to, uint32_t depth,
-                                 const LightPathRow<F>& path, const ShadingRecord<F>& record,
-                                 const UInt<F>& material, const Vec3<F>& p,
-                                 const Mask<F>& offered) {
+inline Mask<F> store_light_vertex(const LightVertices& to, uint32_t depth,
+                                  const LightPathRow<F>& path, const ShadingRecord<F>& record,
+                                  const UInt<F>& material, const Vec3<F>& p,
+                                  const Mask<F>& is_candidate) {
   using U = UInt<F>;
-  if (none(offered)) return Mask<F>(false);
-  LightVertexRow<F> row = load_row<LightVertexRow, F>(to.chosen, record.slot, offered);
+  if (none(is_candidate)) return Mask<F>(false);
+  LightVertexRow<F> row = load_row<LightVertexRow, F>(to.chosen, record.slot, is_candidate);
   row.vertices = row.vertices + 1u;
   const U number = hash_u32<U>(path.key.pixel_hash, path.key.sample);
   const F u = unit_float<F>(hash_u32<U>(number, U(0x7f4a7c15u + depth)));
-  const Mask<F> taken = offered & (F(u * F(Int<F>(row.vertices))) < 1.f);
-  row.p = select<F>(taken, p, row.p);
-  row.depth = select(Mask<U>(taken), U(depth), row.depth);
-  row.material = select(Mask<U>(taken), material, row.material);
-  store_row<LightVertexRow, F>(to.chosen, record.slot, row, offered);
-  if (none(taken)) return taken;
-  store_row<LightPathRow, F>(to.paths, record.slot, path, taken);
-  store_row<ShadingRecord, F>(to.records, record.slot, record, taken);
-  return taken;
+  const Mask<F> replaces = is_candidate & (F(u * F(Int<F>(row.vertices))) < 1.f);
+  row.p = select<F>(replaces, p, row.p);
+  row.depth = select(Mask<U>(replaces), U(depth), row.depth);
+  row.material = select(Mask<U>(replaces), material, row.material);
+  store_row<LightVertexRow, F>(to.chosen, record.slot, row, is_candidate);
+  if (none(replaces)) return replaces;
+  store_row<LightPathRow, F>(to.paths, record.slot, path, replaces);
+  store_row<ShadingRecord, F>(to.records, record.slot, record, replaces);
+  return replaces;
 }
 
 }  // namespace wavecomb

@@ -12,13 +12,13 @@
 
 namespace wavecomb {
 
-static_assert(kVisibleWords == Film::kVisibleWords);
+static_assert(kMergePointWords == Film::kMergePointWords);
 
-/// Hash grid of visible points. Each point is stored in the cells that the sphere of its radius
+/// Hash grid of merge points. Each point is stored in the cells that the sphere of its radius
 /// overlaps. The cell size depends on the radius.
 ///
 /// Contract: build() must not run during searches.
-class VisibleGrid {
+class MergeGrid {
  public:
   /// Builds the grid. `points` holds one row for each pixel and must outlive the grid.
   void build(std::span<const float> points);
@@ -28,12 +28,12 @@ class VisibleGrid {
   class Search {
    public:
     Search() = default;
-    Search(const VisibleGrid& grid, float x, float y, float z) : grid_(&grid), at_{x, y, z} {}
+    Search(const MergeGrid& grid, float x, float y, float z) : grid_(&grid), at_{x, y, z} {}
     /// Advances to the next point and returns its pixel in `pixel`. Returns false at the end.
     bool next(uint32_t& pixel);
 
    private:
-    const VisibleGrid* grid_ = nullptr;
+    const MergeGrid* grid_ = nullptr;
     float at_[3] = {};
     size_t level_ = 0;
     uint32_t begin_ = 0, end_ = 0;
@@ -48,10 +48,10 @@ class VisibleGrid {
   std::vector<uint32_t> starts_, entries_;
 };
 
-/// Targets of merging light paths with visible points.
+/// Targets of merging light paths.
 struct Merger {
-  const VisibleGrid* grid;  ///< null if there are no points
-  SplatList* splats;
+  const MergeGrid* grid;  ///< null if there are no points
+  LightSplatList* splats;
   Film* film;
 };
 

@@ -21,9 +21,9 @@
 
 namespace wavecomb {
 
-/// Visible point, as a row.
+/// Merge point, as a row.
 template <typename F>
-struct VisiblePoint {
+struct MergePoint {
   Vec3<F> p;
   F radius;        ///< 0 if there is no point
   Vec3<F> w;       ///< unit vector towards the viewer
@@ -32,32 +32,32 @@ struct VisiblePoint {
   UInt<F> depth;   ///< number of vertices of the camera path before the point
   WAVECOMB_FIELDS(p, radius, w, normal, light, depth)
 };
-inline constexpr size_t kVisibleWords = kRowWords<VisiblePoint>;
+inline constexpr size_t kMergePointWords = kRowWords<MergePoint>;
 
-/// Visible point that a vertex of a camera path may store.
+/// Merge point that a vertex of a camera path may store.
 template <typename F>
-struct VisibleOffer {
-  VisiblePoint<F> row;
-  Mask<F> seen{false};  ///< lanes that store a point
+struct MergePointOffer {
+  MergePoint<F> row;
+  Mask<F> stored{false};  ///< lanes that store a point
 };
 
-/// Visible points of the paths of a wave.
+/// Merge points of the paths of a wave.
 ///
 /// Contract: owned by one wave, or one reference integrator. Each slot has one row.
-class VisibleRows {
+class MergePointRows {
  public:
-  VisibleRows() = default;
+  MergePointRows() = default;
   /// Allocates rows for `capacity` slots; 0 disables merging.
-  explicit VisibleRows(size_t capacity)
-      : block_(capacity > 0 ? SoaBlock(1, capacity * kVisibleWords) : SoaBlock()) {
+  explicit MergePointRows(size_t capacity)
+      : block_(capacity > 0 ? SoaBlock(1, capacity * kMergePointWords) : SoaBlock()) {
     if (capacity > 0) rows = block_.floats(0);
   }
 
   explicit operator bool() const { return rows != nullptr; }
   size_t bytes() const { return block_.bytes(); }
   /// Clears the points of slots below `slots`.
-  void clear(size_t slots) const { std::memset(rows, 0, slots * kVisibleWords * sizeof(float)); }
-  const float* row(size_t slot) const { return rows + slot * kVisibleWords; }
+  void clear(size_t slots) const { std::memset(rows, 0, slots * kMergePointWords * sizeof(float)); }
+  const float* row(size_t slot) const { return rows + slot * kMergePointWords; }
 
   float* rows = nullptr;
 

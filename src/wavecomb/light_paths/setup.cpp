@@ -12,10 +12,10 @@ namespace wavecomb {
 namespace {
 
 /// Scale of the sphere around all surfaces, slightly above 1.
-constexpr float kRoom = 1.001f;
+constexpr float kRadiusMargin = 1.001f;
 
-Bounds shape_bounds(const PlacedShape& shape) {
-  if (shape.shape == LightShape::kOwn) return own_shape_bounds(shape);
+Bounds shape_bounds(const LightGeometry& shape) {
+  if (shape.shape == LightShape::kCustom) return custom_shape_bounds(shape);
   Bounds box;
   const LightRecord& l = shape.light;
   for (const float a : {0.f, 1.f})
@@ -25,7 +25,7 @@ Bounds shape_bounds(const PlacedShape& shape) {
   return box;
 }
 
-bool sends_paths_itself(const LightRecord& record) {
+bool emits_own_paths(const LightRecord& record) {
   return record.camera_only == 0;
 }
 
@@ -38,7 +38,7 @@ float farthest(const Bounds& box, const Vec3<float>& from) {
 
 }  // namespace
 
-LightPathRefusal light_path_refusal(const Scene& scene) {
+LightPathConflict light_path_conflict(const Scene& scene) {
   const Camera& camera = scene.camera();
   if (distorts(camera) && camera.projection != Projection::kLatlong)
     return {"lenses that distort", "a camera without lens distortion"};
@@ -48,7 +48,7 @@ LightPathRefusal light_path_refusal(const Scene& scene) {
     return {"prims that some rays do not see, nor with holdouts", "a stage without them"};
   if (scene.view().walks.media)
     return {"light that walks below surfaces", "a stage without subsurface scattering"};
-  if (scene.view().interiors.media)
+  if (scene.view().nested_media.media)
     return {
         "media inside of meshes",
         "a stage without transmission scatter, priorities and objects inside of absorbing glass"};
@@ -57,16 +57,16 @@ LightPathRefusal light_path_refusal(const Scene& scene) {
   return {};
 }
 
-SplatFilter splat_filter_of(const CameraSetup& camera, const FilterTable& filter,
-                            const Region& rendered) {
+LightSplatFilter make_light_splat_filter(const CameraSetup& camera, const FilterTable& filter,
+                                         const Region& rendered) {
   if (camera.projection != Projection::kLatlong) return {filter, rendered};
   const auto row = [&](float latitude) { return (camera.y1 - latitude) / camera.step_y; };
   return {filter, rendered, {2 * kPi / camera.step_x, row(0.5f * kPi), row(-0.5f * kPi)}};
 }
 
 void check_light_paths(const Scene& scene, const Settings& settings) {
-  if (const LightPathRefusal refusal = light_path_refusal(scene); !refusal.what.empty())
-    throw light_path_error(settings, refusal);
+  if (const LightPathConflict conflict = light_path_conflict(scene); !conflict.what.empty())
+    throw light_path_error(settings, conflict);
 }
 
 float scene_brightness(const Scene& scene) {
@@ -78,35 +78,35 @@ float scene_brightness(const Scene& scene) {
   return std::ldexp(1.f, std::clamp(exponent, -100, 100));
 }
 
-FixedPoint splat_unit(const Scene& scene) {
+FixedPoint light_splat_unit(const Scene& scene) {
   return {std::ilogb(scene_brightness(scene)) - 44};
 }
 
 void send_paths(const Scene& scene, LightView& view) {
   const Bounds& b = scene.bounds();
-  if (b.empty() || view.count == 0 || !view.pick.bins) return;
+  if (b.empty() || view.count == 0 || !view.power_table.bins) return;
   const Vec3<float> centre = (b.lo + b.hi) * 0.5f;
   view.centre[0] = centre.x;
   view.centre[1] = centre.y;
   view.centre[2] = centre.z;
-  view.radius = scene.view().scale * kRoom;
+  view.radius = scene.view().scale * kRadiusMargin;
   view.reach = view.radius;
-  for (const PlacedShape& shape : light_shapes(scene))
+  for (const LightGeometry& shape : light_shapes(scene))
     if (shape.shape != LightShape::kNone)
-      view.reach = std::max(view.reach, farthest(shape_bounds(shape), centre) * kRoom);
+      view.reach = std::max(view.reach, farthest(shape_bounds(shape), centre) * kRadiusMargin);
 }
 
-bool sends_paths(const Scene& scene) {
+bool emits_paths(const Scene& scene) {
   const LightSet& set = scene.light_set();
   return !set.triangles.empty() ||
-         std::any_of(set.records.begin(), set.records.end(), sends_paths_itself);
+         std::any_of(set.records.begin(), set.records.end(), emits_own_paths);
 }
 
 std::vector<std::string> lights_without_paths(const Scene& scene) {
   std::vector<std::string> names;
   const LightSet& set = scene.light_set();
   for (size_t i = 0; i < scene.lights().size(); ++i) {
-    if (!sends_paths_itself(set.records[set.of_input[i]])) names.push_back(scene.lights()[i].name);
+    if (!emits_own_paths(set.records[set.of_input[i]])) names.push_back(scene.lights()[i].name);
   }
   for (const Light& light : scene.geometry()->mesh_lights) names.push_back(light.name);
   return names;

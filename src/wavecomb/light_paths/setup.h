@@ -29,7 +29,7 @@ struct LightPathShare {
 };
 
 /// Returns the feature of the scene that does not work with light paths. Empty if there is none.
-LightPathRefusal light_path_refusal(const Scene& scene);
+LightPathConflict light_path_conflict(const Scene& scene);
 /// Throws Error if the scene has such a feature.
 void check_light_paths(const Scene& scene, const Settings& settings);
 
@@ -39,18 +39,18 @@ float scene_brightness(const Scene& scene);
 /// Returns the fixed-point unit of light splats: scene_brightness() / 2^44. Splats thus keep at
 /// least 20 bits of contributions above 2^-24 of that brightness, and reach up to 2^17 times the
 /// brightness.
-FixedPoint splat_unit(const Scene& scene);
+FixedPoint light_splat_unit(const Scene& scene);
 
 /// Returns the filter that distributes contributions of light paths to the pixels of a render.
-SplatFilter splat_filter_of(const CameraSetup& camera, const FilterTable& filter,
-                            const Region& rendered);
+LightSplatFilter make_light_splat_filter(const CameraSetup& camera, const FilterTable& filter,
+                                         const Region& rendered);
 
 /// Enables light paths for the lights of `view`: sets the sphere around all surfaces, and the
 /// distance from which paths of infinite lights start, in front of all light shapes.
 void send_paths(const Scene& scene, LightView& view);
 
 /// Returns whether any light of the scene emits light paths.
-bool sends_paths(const Scene& scene);
+bool emits_paths(const Scene& scene);
 
 /// Returns the names of the lights that emit no light paths. Camera paths find all of their light.
 std::vector<std::string> lights_without_paths(const Scene& scene);

@@ -37,16 +37,16 @@ namespace wavecomb {
 
 /// Compile-time properties of a program. A program derives from this and overrides what differs.
 struct BsdfTraits {
-  static constexpr bool kEmits = false;         ///< its materials may emit
-  static constexpr bool kAbsorbs = false;       ///< attenuates rays inside: Params::transmittance
-  static constexpr bool kHasNonDelta = true;    ///< has lobes that light samples can evaluate
-  static constexpr bool kTransmits = false;     ///< non-delta lobes may lead to the other side
-  static constexpr bool kWalks = false;         ///< has subsurface walks and `enters(wo, wi)`
-  static constexpr bool kHasTerminator = true;  ///< offsets rays at the shadow terminator
-  static constexpr bool kTextured = true;       ///< its materials may read textures or graphs
-  static constexpr bool kReadsIor = false;      ///< reads the index of refraction
-  static constexpr bool kOnSurface = true;      ///< shades hits; otherwise has an `interact`
-  static constexpr bool kOnSplats = false;      ///< provides the emission of Gaussian splats
+  static constexpr bool kEmits = false;          ///< its materials may emit
+  static constexpr bool kAbsorbs = false;        ///< attenuates rays inside: Params::transmittance
+  static constexpr bool kHasNonDelta = true;     ///< has lobes that light samples can evaluate
+  static constexpr bool kTransmits = false;      ///< non-delta lobes may lead to the other side
+  static constexpr bool kHasSubsurface = false;  ///< has subsurface walks and `enters(wo, wi)`
+  static constexpr bool kHasTerminator = true;   ///< offsets rays at the shadow terminator
+  static constexpr bool kTextured = true;        ///< its materials may read textures or graphs
+  static constexpr bool kReadsIor = false;       ///< reads the index of refraction
+  static constexpr bool kOnSurface = true;       ///< shades hits; otherwise has an `interact`
+  static constexpr bool kOnGaussianSplats = false;  ///< provides the emission of Gaussian splats
   /// Scatters like a whole fibre around an axis: x of the local frame lies along the fibre
   /// (geometry/hit/fibre_frame.h), and there are no two sides. It is not reciprocal, so light paths
   /// exclude it.
@@ -135,7 +135,7 @@ struct ShadingParams {
 /// Inputs plus the program-specific parameters, in the order of their row
 /// (material/description/programs.h).
 template <typename F>
-struct OwnShadingParams : ShadingParams<F> {
+struct SpecificShadingParams : ShadingParams<F> {
   std::array<F, kMaxProgramParameters> own;
 };
 

@@ -45,7 +45,7 @@ struct Normals {
   Vec3<F> wo;
   alignas(64) float x[kSamples], y[kSamples], z[kSamples], cosine[kSamples], up[kSamples];
 
-  void see(const Numbers& numbers, float cos_o, float roughness) {
+  void add_view(const Numbers& numbers, float cos_o, float roughness) {
     ggx.alpha = F(std::max(roughness * roughness, kDeltaAlpha));
     wo = Vec3<F>(F(std::sqrt(1 - cos_o * cos_o)), F(0.f), F(cos_o));
     for (uint32_t i = 0; i < kSamples; i += 16) {
@@ -85,8 +85,8 @@ struct Normals {
     return {mean(reflected), mean(transmitted)};
   }
 
-  std::vector<WeighedPoint> points() const {
-    std::vector<WeighedPoint> all(kSamples);
+  std::vector<PointMass> points() const {
+    std::vector<PointMass> all(kSamples);
     for (uint32_t i = 0; i < kSamples; ++i) all[i] = {double{cosine[i]}, double{up[i]} / kSamples};
     return all;
   }
@@ -107,10 +107,10 @@ EnergyTables::EnergyTables() : values_(kSize) {
   for (uint32_t j = 0; j < kRoughnesses; ++j)
     for (uint32_t i = 0; i < kCosines; ++i) {
       const uint32_t node = j * kCosines + i;
-      normals.see(numbers, cosine_at(i, kCosines), part(j, kRoughnesses));
+      normals.add_view(numbers, cosine_at(i, kCosines), part(j, kRoughnesses));
       values_[node] = normals.white();
       float* rule = values_.data() + kRuleAt + node;
-      for (const WeighedPoint& p : gauss_rule<kRule>(normals.points())) {
+      for (const PointMass& p : gauss_rule<kRule>(normals.points())) {
         rule[0] = static_cast<float>(std::sqrt(std::clamp(p.x, 0.0, 1.0)));
         rule[kPlane] = static_cast<float>(p.weight);
         rule += 2 * size_t{kPlane};

@@ -59,15 +59,15 @@ struct EnergyLookup {
 
   EnergyLookup(const float* values, const F& cosine, const F& roughness) : table(values) {
     using T = EnergyTables;
-    const auto place = [](const F& x, uint32_t count, UInt<F>& below) {
+    const auto split = [](const F& x, uint32_t count, UInt<F>& below) {
       const F scaled = clamp(x, F(0.f), F(1.f)) * static_cast<float>(count - 1);
       const F whole = min(floor(scaled), F(static_cast<float>(count - 2)));
       below = UInt<F>(to_int<F>(whole));
       return F(scaled - whole);
     };
     UInt<F> i, j;
-    at_cosine = place(safe_sqrt(cosine), T::kCosines, i);
-    at_roughness = place(roughness, T::kRoughnesses, j);
+    at_cosine = split(safe_sqrt(cosine), T::kCosines, i);
+    at_roughness = split(roughness, T::kRoughnesses, j);
     node = j * T::kCosines + i;
   }
 

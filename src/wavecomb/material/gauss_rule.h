@@ -10,7 +10,7 @@
 namespace wavecomb {
 
 /// Point mass at x.
-struct WeighedPoint {
+struct PointMass {
   double x, weight;
 };
 
@@ -20,11 +20,11 @@ struct WeighedPoint {
 /// Polynomials: Computation and Approximation", 2004, section 2.2.3). If the points nearly
 /// coincide, all n nodes are their mean.
 template <size_t n>
-inline std::array<WeighedPoint, n> gauss_rule(const std::vector<WeighedPoint>& points) {
+inline std::array<PointMass, n> gauss_rule(const std::vector<PointMass>& points) {
   // Recurrence p_(k+1) = (x - a_k) p_k - b_k p_(k-1), with norm_k = sum of weight p_k^2.
   std::array<double, n> a{}, b{}, norm{};
   std::vector<double> before(points.size(), 0.0), now(points.size(), 1.0);
-  std::array<WeighedPoint, n> rule{};
+  std::array<PointMass, n> rule{};
   for (size_t k = 0; k < n; ++k) {
     double mass = 0, first = 0;
     for (size_t i = 0; i < points.size(); ++i) {

@@ -12,7 +12,7 @@ namespace wavecomb {
 
 /// Returns pointers to the components of `p` in the order of kGraphParameters.
 template <typename F>
-inline std::array<F*, kFirstOpenPbrOutput> parameter_places(ShadingParams<F>& p) {
+inline std::array<F*, kFirstOpenPbrOutput> parameter_pointers(ShadingParams<F>& p) {
   return {&p.base_color.x,
           &p.base_color.y,
           &p.base_color.z,
@@ -37,12 +37,12 @@ namespace detail {
 
 /// Returns `n` as a unit normal in the upper hemisphere, or (0, 0, 1) if it is degenerate.
 template <typename F>
-inline Vec3<F> sane_normal(const Vec3<F>& n) {
+inline Vec3<F> valid_normal(const Vec3<F>& n) {
   const Vec3<F> up(n.x, n.y, max(n.z, F(0.01f)));
   const F len2 = length_squared(up);
-  const Mask<F> good = is_finite(len2) & (max(max(abs(n.x), abs(n.y)), n.z) > 1e-6f);
-  const F inv = 1.f / sqrt(select(good, len2, F(1.f)));
-  return select<F>(good, up * inv, Vec3<F>(F(0.f), F(0.f), F(1.f)));
+  const Mask<F> valid = is_finite(len2) & (max(max(abs(n.x), abs(n.y)), n.z) > 1e-6f);
+  const F inv = 1.f / sqrt(select(valid, len2, F(1.f)));
+  return select<F>(valid, up * inv, Vec3<F>(F(0.f), F(0.f), F(1.f)));
 }
 
 /// Runs the graphs of the active lanes, each of which must have one, and writes their outputs to
@@ -53,7 +53,7 @@ template <typename F, typename Params>
                                         const GraphPoint<F>& at, const Mask<F>& active, Params& p) {
   using U = UInt<F>;
   const U graph = gather_member<F>(view.materials, &MaterialRecord::graph, material, active);
-  const auto places = parameter_places(p);
+  const auto pointers = parameter_pointers(p);
   const F opacity = p.opacity;
   F registers[kMaxGraphRegisters];
   for_each_graph<F>(graph, active, [&](uint32_t id, const Mask<F>& same) {
@@ -62,13 +62,13 @@ template <typename F, typename Params>
     bool tilts = false;
     for (uint32_t i = 0; i < program.output_count; ++i) {
       const GraphOutput& output = view.graphs.outputs[program.first_output + i];
-      if (output.parameter >= places.size()) continue;
+      if (output.parameter >= pointers.size()) continue;
       tilts = tilts || output.parameter == kNormalOutput;
-      F& to = *places[output.parameter];
+      F& to = *pointers[output.parameter];
       const F value = graph_output<F>(view.graphs, program, output, registers);
-      to = select(same, sane_output<F>(output.parameter, value), to);
+      to = select(same, valid_output<F>(output.parameter, value), to);
     }
-    if (tilts) p.normal = select<F>(same, sane_normal(p.normal), p.normal);
+    if (tilts) p.normal = select<F>(same, valid_normal(p.normal), p.normal);
   });
   // Presence is handled during traversal; a surface that was hit keeps its full opacity.
   const Mask<F> presence = Mask<F>((p.flags & U(uint32_t{kPresence})) != U(0u));

@@ -16,7 +16,7 @@ namespace wavecomb {
 template <typename F>
 struct OpenPbrParams : ShadingParams<F>, OpenPbrInputs<F> {
   F thin_walled;        ///< 0 or 1
-  F walks;              ///< WalkKind of the subsurface random walk
+  F subsurface;         ///< SubsurfaceKind of the subsurface random walk
   const float* energy;  ///< EnergyTables
 
   /// Fetches the parameters of this program, see fetch_params.
@@ -25,11 +25,11 @@ struct OpenPbrParams : ShadingParams<F>, OpenPbrInputs<F> {
                              const Footprint<F>& footprint, const MakePoint& make_point,
                              const Mask<F>& active);
 
-  /// Transmittance over a distance `t` inside the material; 1 for rays outside. `cos_seen` is the
-  /// cosine between the normal and wo: negative inside.
-  Color<F> transmittance(const F& t, const F& cos_seen) const {
+  /// Transmittance over a distance `t` inside the material; 1 for rays outside. `view_cosine` is
+  /// the cosine between the normal and wo: negative inside.
+  Color<F> transmittance(const F& t, const F& view_cosine) const {
     const Mask<F> inside =
-        (cos_seen < 0.f) & (this->transmission_weight > 0.f) & (thin_walled < 0.5f);
+        (view_cosine < 0.f) & (this->transmission_weight > 0.f) & (thin_walled < 0.5f);
     const Color<F>& extinction = this->extinction;
     const F length = select(inside, t, F(0.f));
     return {exp(F(-extinction.x * length)), exp(F(-extinction.y * length)),
@@ -39,9 +39,9 @@ struct OpenPbrParams : ShadingParams<F>, OpenPbrInputs<F> {
 
 /// Pointers to the components of `p` in the order of GraphParameter.
 template <typename F>
-inline std::array<F*, kGraphOutputCount> parameter_places(OpenPbrParams<F>& p) {
+inline std::array<F*, kGraphOutputCount> parameter_pointers(OpenPbrParams<F>& p) {
   std::array<F*, kGraphOutputCount> all;
-  const auto inputs = parameter_places(static_cast<ShadingParams<F>&>(p));
+  const auto inputs = parameter_pointers(static_cast<ShadingParams<F>&>(p));
   std::copy(inputs.begin(), inputs.end(), all.begin());
   detail::for_each_word<0, F>(static_cast<OpenPbrInputs<F>&>(p),
                               [&](auto at, F& value) { all[kFirstOpenPbrOutput + at] = &value; });
@@ -64,7 +64,7 @@ inline OpenPbrParams<F> OpenPbrParams<F>::fetch(const MaterialView& view, const 
   const auto r = detail::make_reader<R, F>(view.openpbr, record, uniform, active);
   static_cast<OpenPbrInputs<F>&>(p) = r.template row<OpenPbrInputs>();
   p.thin_walled = r[&R::thin_walled];
-  p.walks = r[&R::walks];
+  p.subsurface = r[&R::subsurface];
   p.energy = view.energy;
   if constexpr (kGraphs) complete_params<F>(view, material, make_point, active, p);
   return p;

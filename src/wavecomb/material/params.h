@@ -33,7 +33,7 @@ WAVECOMB_INLINE ShadingParams<F> evaluate_params(const MaterialView& view, const
   ShadingParams<F> p;
   p.base_color = saturate(color(Input::kBaseColor, &R::base_color));
   p.specular_color = saturate(color(Input::kSpecularColor, &R::specular_color));
-  p.emission = sane_emission(color(Input::kEmission, &R::emission));
+  p.emission = valid_emission(color(Input::kEmission, &R::emission));
   p.roughness = real(Input::kRoughness, &R::roughness);
   p.metallic = real(Input::kMetallic, &R::metallic);
   p.clearcoat = real(Input::kClearcoat, &R::clearcoat);
@@ -41,7 +41,7 @@ WAVECOMB_INLINE ShadingParams<F> evaluate_params(const MaterialView& view, const
   p.opacity = real(Input::kOpacity, &R::opacity);
   const F threshold = r[&R::opacity_threshold];
   p.opacity = select(opacity_is_presence(inputs, threshold), F(1.f), p.opacity);
-  p.normal = sane_normal(color(Input::kNormal, &R::normal));
+  p.normal = valid_normal(color(Input::kNormal, &R::normal));
   p.ior = clamp(r[&R::ior], F(1.f / kMaxIor), F(kMaxIor));
   p.conductor_eta = max(r[&R::conductor_eta], Color<F>(F(0.f)));
   p.conductor_k = max(r[&R::conductor_k], Color<F>(F(0.f)));
@@ -96,9 +96,9 @@ WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UI
 namespace detail {
 /// Reads the first `kOwn` program-specific parameters; the rest are 0.
 template <size_t kOwn, typename F>
-WAVECOMB_INLINE std::array<F, kMaxProgramParameters> own_values(const MaterialView& view,
-                                                                const UInt<F>& material,
-                                                                const Mask<F>& active) {
+WAVECOMB_INLINE std::array<F, kMaxProgramParameters> specific_values(const MaterialView& view,
+                                                                     const UInt<F>& material,
+                                                                     const Mask<F>& active) {
   using R = ProgramParameterRecord;
   const auto r = make_reader<R, F>(view.own, material, active);
   std::array<F, kMaxProgramParameters> own;
@@ -108,8 +108,8 @@ WAVECOMB_INLINE std::array<F, kMaxProgramParameters> own_values(const MaterialVi
 
 template <typename Bsdf, typename F>
 struct ParamsOf {
-  using Type = std::conditional_t<(info_of(Bsdf::kProgram).own_count() > 0), OwnShadingParams<F>,
-                                  ShadingParams<F>>;
+  using Type = std::conditional_t<(info_of(Bsdf::kProgram).specific_count() > 0),
+                                  SpecificShadingParams<F>, ShadingParams<F>>;
 };
 template <typename Bsdf, typename F>
   requires requires { typename Bsdf::Params; }
@@ -127,7 +127,7 @@ template <typename Bsdf, uint32_t kInputs, typename F, typename MakePoint>
 WAVECOMB_INLINE ParamsOf<Bsdf, F> fetch_for(const MaterialView& materials, const UInt<F>& material,
                                             const Vec2<F>& uv, const Footprint<F>& footprint,
                                             const MakePoint& make_point, const Mask<F>& active) {
-  constexpr size_t kOwn = info_of(Bsdf::kProgram).own_count();
+  constexpr size_t kOwn = info_of(Bsdf::kProgram).specific_count();
   if constexpr (requires { typename Bsdf::Params; }) {
     static_assert(kOwn == 0, "Params::fetch must read the program-specific parameters");
     return Bsdf::Params::template fetch<kInputs, Bsdf::kTextured>(materials, material, uv,
@@ -136,10 +136,10 @@ WAVECOMB_INLINE ParamsOf<Bsdf, F> fetch_for(const MaterialView& materials, const
     return fetch_params<kInputs, F, Bsdf::kTextured>(materials, material, uv, footprint, make_point,
                                                      active);
   } else {
-    OwnShadingParams<F> p;
+    SpecificShadingParams<F> p;
     static_cast<ShadingParams<F>&>(p) = fetch_params<kInputs, F, Bsdf::kTextured>(
         materials, material, uv, footprint, make_point, active);
-    p.own = detail::own_values<kOwn, F>(materials, material, active);
+    p.own = detail::specific_values<kOwn, F>(materials, material, active);
     return p;
   }
 }

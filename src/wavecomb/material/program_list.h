@@ -44,7 +44,7 @@ static_assert(Programs<float>::kSize == kSurfaceProgramCount);
 
 namespace detail {
 template <typename Wanted, typename... Bsdf>
-constexpr size_t place_of(ProgramList<Bsdf...>) {
+constexpr size_t program_index(ProgramList<Bsdf...>) {
   size_t i = 0;
   (void)((std::is_same_v<Wanted, Bsdf> || (++i, false)) || ...);
   return i;
@@ -65,9 +65,9 @@ using AppendedProgram = decltype(detail::list_before<Last>(List{}));
 /// Id of a program: its position in the list, or its kProgram if it is not in the list.
 template <typename Bsdf, typename F>
 constexpr size_t id_of() {
-  constexpr size_t kPlace = detail::place_of<Bsdf>(Programs<F>{});
-  if constexpr (kPlace < kSurfaceProgramCount)
-    return kPlace;
+  constexpr size_t kProgramIndex = detail::program_index<Bsdf>(Programs<F>{});
+  if constexpr (kProgramIndex < kSurfaceProgramCount)
+    return kProgramIndex;
   else
     return static_cast<size_t>(Bsdf::kProgram);
 }

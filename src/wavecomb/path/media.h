@@ -3,26 +3,32 @@
 /// on a class `Media`, so that scenes without volumes use kernels without that code. Its members
 /// are
 ///
-///   static constexpr bool kAny;      whether there are volumes; if not, only Programs is needed
-///   static constexpr bool kShines;   whether volumes may emit; if so, it needs the next two
-///   bool shines() const;             whether they do
-///   Color<F> emission(const Passage<F>&, const Mask<F>& active) const;   radiance of the segment
-///   template <typename F> using Programs;      ProgramList of all programs, with those of surfaces
-///   template <typename F> Flight<F> fly(const Passage<F>&, const Color<F>& throughput,
-///                                       const Mask<F>& active) const;
-///   template <typename F> Color<F> transmittance(const Passage<F>&, const Mask<F>& active) const;
+///   // Whether there are volumes; if not, only Programs is needed.
+///   static constexpr bool kAny;
+///   // Whether volumes may emit; if so, the next two functions are needed.
+///   static constexpr bool kHasEmission;
+///   bool has_emission() const;
+///   // Radiance of the segment.
+///   Color<F> emission(const MediumQuery<F>&, const Mask<F>& active) const;
+///   // ProgramList of all programs, with those of surfaces.
+///   template <typename F> using Programs;
+///   template <typename F>
+///   Flight<F> sample_flight(const MediumQuery<F>&, const Color<F>& throughput,
+///                           const Mask<F>& active) const;
+///   template <typename F>
+///   Color<F> transmittance(const MediumQuery<F>&, const Mask<F>& active) const;
 ///
 /// With `kStreams`, the class instead handles all rays of a wave at once, since packets would wait
 /// for their longest segments:
 ///
-///   void fly_all(Wave&, uint32_t depth, SamplerKind) const;      before the hits are collected
+///   void sample_wave_flights(Wave&, uint32_t depth, SamplerKind) const;  before collecting hits
 ///   Flight<F> flight(const Wave&, size_t ray, const Color<F>& throughput) const;
-///   void pass_all(Wave&, uint32_t depth, SamplerKind) const;     for free shadow rays
-///   Color<F> passed(const Wave&, size_t ray) const;
+///   void attenuate_shadow_rays(Wave&, uint32_t depth, SamplerKind) const;  for free shadow rays
+///   Color<F> shadow_transmittance(const Wave&, size_t ray) const;
 ///
 /// A separate shading program shades events in volumes (BsdfTraits::kOnSurface is false).
 ///
-/// Contract: the result of a lane depends only on its own passage, and random numbers come only
+/// Contract: the result of a lane depends only on its own segment, and random numbers come only
 /// from VertexSet::kFlight and kShadow, so that the schedule has no effect.
 #pragma once
 
@@ -34,7 +40,7 @@ namespace wavecomb {
 /// Ray segment without surfaces: points o + x d with 0 < x < t. It ends at the vertex of `depth`
 /// or, for a shadow ray, leads from that vertex to a light.
 template <typename F>
-struct Passage {
+struct MediumQuery {
   SamplerKind sampler;
   const SampleKey<F>& key;
   uint32_t depth;
@@ -43,7 +49,7 @@ struct Passage {
   F time{0.f};  ///< shutter time, if the scene moves
 };
 
-/// Result of a free flight along a passage.
+/// Result of a free flight along a segment.
 template <typename F>
 struct Flight {
   Mask<F> stopped;   ///< whether an event ends the flight
@@ -52,12 +58,12 @@ struct Flight {
   /// Factor of the throughput. Without an event, it is transmittance over the probability of
   /// passing; with an event, transmittance times extinction over the density of t.
   Color<F> weight;
-  Mask<F> walked{false};  ///< whether the path has moved by collisions that are no vertices
+  Mask<F> has_scattered{false};  ///< whether the path has moved by collisions that are no vertices
 };
 
 /// Scene without volumes and media.
 struct NoMedia {
-  static constexpr bool kAny = false, kShines = false, kStreams = false;
+  static constexpr bool kAny = false, kHasEmission = false, kStreams = false;
   template <typename F>
   using Programs = wavecomb::Programs<F>;
 };

@@ -81,23 +81,23 @@ struct PathColdRow {
   WAVECOMB_FIELDS(time, link, importance)
 };
 
-/// Bits of InsideRow::crossed beside the material: whether the bounce and the shadow ray continue
-/// on the other side of the surface, and whether the path arrived from outside.
+/// Bits of MediumStackRow::crossed beside the material: whether the bounce and the shadow ray
+/// continue on the other side of the surface, and whether the path arrived from outside.
 enum Crossing : uint32_t { kBounceCrosses = 1, kShadowCrosses = 2, kEnters = 4 };
 inline constexpr uint32_t kCrossingBits = 3;
 
-/// Medium stack of a path: at most four entries, each a placed_geometry() and a material, in the
-/// order in which the path entered them. kNothing marks the unused entries at the end
+/// Medium stack of a path: at most four entries, each an instance_geometry() and a material, in the
+/// order in which the path entered them. kNoMaterial marks the unused entries at the end
 /// (medium/nested/nested_media.h).
 template <typename F>
-struct InsideRow {
-  UInt<F> place_0, place_1, place_2, place_3, material_0, material_1, material_2, material_3;
-  UInt<F> place;    ///< placed_geometry() of the vertex
+struct MediumStackRow {
+  UInt<F> object_0, object_1, object_2, object_3, material_0, material_1, material_2, material_3;
+  UInt<F> object;   ///< instance_geometry() of the vertex
   UInt<F> crossed;  ///< result of shading the vertex: Crossing bits and the material
   F outer;          ///< PathState::outer and PathState::medium of the vertex
   UInt<F> medium;
-  WAVECOMB_FIELDS(place_0, place_1, place_2, place_3, material_0, material_1, material_2,
-                  material_3, place, crossed, outer, medium)
+  WAVECOMB_FIELDS(object_0, object_1, object_2, object_3, material_0, material_1, material_2,
+                  material_3, object, crossed, outer, medium)
 };
 
 /// Shadow ray of a path, which has at most one at each vertex.
@@ -145,41 +145,43 @@ class PathPool {
  public:
   PathPool() = default;
   /// Allocates `capacity` slots. The flags add optional rows: `cold` PathColdRow, `joined`
-  /// PathState::ratio, `knows` InsideRow, `shaded` VertexResult::shade, `split` PathState::diffuse.
-  PathPool(size_t capacity, bool cold, bool joined = false, bool knows = false, bool shaded = false,
-           bool split = false)
+  /// PathState::ratio, `nested` MediumStackRow, `shaded` VertexResult::shadow_tint, `split`
+  /// PathState::diffuse.
+  PathPool(size_t capacity, bool cold, bool joined = false, bool nested = false,
+           bool shaded = false, bool split = false)
       : rows_(1, capacity * (kRowWords<PathRow> + kRowWords<ShadowRow> + kRadianceWords)),
         cold_(cold ? SoaBlock(1, capacity * kRowWords<PathColdRow>) : SoaBlock()),
         ratios_(joined ? SoaBlock(1, capacity) : SoaBlock()),
-        inside_(knows ? SoaBlock(1, capacity * kRowWords<InsideRow>) : SoaBlock()),
-        shades_(shaded ? SoaBlock(1, capacity * kRadianceWords) : SoaBlock()),
+        medium_stacks_(nested ? SoaBlock(1, capacity * kRowWords<MediumStackRow>) : SoaBlock()),
+        shadow_tints_(shaded ? SoaBlock(1, capacity * kRadianceWords) : SoaBlock()),
         diffuse_(split ? SoaBlock(1, capacity * kRadianceWords) : SoaBlock()) {
     paths = rows_.floats(0);
     shadows = paths + capacity * kRowWords<PathRow>;
     radiance = shadows + capacity * kRowWords<ShadowRow>;
     this->cold = cold ? cold_.floats(0) : nullptr;
     ratio = joined ? ratios_.floats(0) : nullptr;
-    inside = knows ? inside_.floats(0) : nullptr;
-    shades = shaded ? shades_.floats(0) : nullptr;
+    inside = nested ? medium_stacks_.floats(0) : nullptr;
+    shadow_tints = shaded ? shadow_tints_.floats(0) : nullptr;
     diffuse = split ? diffuse_.floats(0) : nullptr;
   }
 
-  float* paths = nullptr;     ///< PathRow or LightPathRow
-  float* shadows = nullptr;   ///< ShadowRow
-  float* radiance = nullptr;  ///< RadianceRow
-  float* cold = nullptr;      ///< PathColdRow, or null
-  float* ratio = nullptr;     ///< pack_ratio() of the paths; null without light paths
-  float* inside = nullptr;    ///< InsideRow; null without nested dielectrics
-  float* shades = nullptr;    ///< RadianceRow of VertexResult::shade; null if shadows are black
+  float* paths = nullptr;          ///< PathRow or LightPathRow
+  float* shadows = nullptr;        ///< ShadowRow
+  float* radiance = nullptr;       ///< RadianceRow
+  float* cold = nullptr;           ///< PathColdRow, or null
+  float* ratio = nullptr;          ///< pack_ratio() of the paths; null without light paths
+  float* medium_stacks = nullptr;  ///< MediumStackRow; null without nested dielectrics
+  float* shadow_tints =
+      nullptr;  ///< RadianceRow of VertexResult::shadow_tint; null if shadows are black
   /// RadianceRow of PathState::diffuse; null if no light has multipliers
   float* diffuse = nullptr;
   size_t bytes() const {
-    return rows_.bytes() + cold_.bytes() + ratios_.bytes() + inside_.bytes() + shades_.bytes() +
-           diffuse_.bytes();
+    return rows_.bytes() + cold_.bytes() + ratios_.bytes() + medium_stacks_.bytes() +
+           shadow_tints_.bytes() + diffuse_.bytes();
   }
 
  private:
-  SoaBlock rows_, cold_, ratios_, inside_, shades_, diffuse_;
+  SoaBlock rows_, cold_, ratios_, medium_stacks_, shadow_tints_, diffuse_;
 };
 
 /// Adds `c` to the active lanes' rows of `radiance`. The rows must be distinct.

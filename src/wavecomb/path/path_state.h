@@ -29,8 +29,8 @@ struct ShadeSettings {
   float clamp_indirect;  ///< largest luminance of indirect contributions; 0 disables clamping
   bool schlick_fresnel;
   bool cosine_sampling;
-  bool filters_textures_whole;
-  bool shows_sky;            ///< whether camera rays show domes and distant lights
+  bool filters_all_lookups;
+  bool shows_environment;    ///< whether camera rays show domes and distant lights
   bool connects;             ///< whether vertices of camera paths and light paths are connected
   bool joins_light = false;  ///< whether MIS weights of camera paths include light paths
   /// Merge radius divided by the width of the path's ray cone. 0 disables merging.
@@ -47,19 +47,19 @@ struct ShadeSettings {
         clamp_indirect(s.clamp_indirect),
         schlick_fresnel(s.schlick_fresnel),
         cosine_sampling(s.cosine_sampling),
-        filters_textures_whole(s.texture_filter == TextureFilter::kWhole),
-        shows_sky(!s.alpha),
+        filters_all_lookups(s.texture_filter == TextureFilter::kWhole),
+        shows_environment(!s.alpha),
         connects(s.connects()) {}
 
   /// Returns whether a path that leaves the scene after `depth` vertices adds the environment's
   /// light.
-  bool sees_sky(uint32_t depth) const { return shows_sky || depth > 0; }
+  bool adds_environment(uint32_t depth) const { return shows_environment || depth > 0; }
 
   /// Returns the settings for light paths, which filter textures at every vertex, since each vertex
   /// is connected to the camera.
   ShadeSettings of_light_paths() const {
     ShadeSettings s = *this;
-    s.filters_textures_whole = true;
+    s.filters_all_lookups = true;
     return s;
   }
 };
@@ -88,7 +88,7 @@ struct PathState {
   F mis_sum{0.f};     ///< the sum S of the MIS weight
   F bounce_pdf{0.f};  ///< density of the previous bounce; 0 if its vertex cannot be connected
   UInt<F> light{0u};  ///< light that the path left
-  // Only for scenes with nested dielectrics (InsideRow):
+  // Only for scenes with nested dielectrics (MediumStackRow):
   F outer{1.f};        ///< index of refraction on the other side of the surface
   UInt<F> medium{0u};  ///< material whose medium scatters here
   F time{0.5f};        ///< shutter time, if lights move
@@ -165,20 +165,21 @@ struct VertexResult {
   F shadow_tfar;
   UInt<F> shadow_set;  ///< result of shadow_set(); 0 without light linking
   Color<F> direct;     ///< contribution if the shadow ray is free, already clamped
-  Color<F> shade;     ///< fraction of `direct` that remains if the shadow ray is blocked, by colour
+  Color<F>
+      shadow_tint;    ///< fraction of `direct` that remains if the shadow ray is blocked, by colour
   Mask<F> alive;      ///< whether the path continues
   PathState<F> next;  ///< ray and state of the next path segment
-  // For training of the guiding field, if Vertex::guide is set: guide_axis of the surface, and
+  // For training of the guiding field, if Vertex::guide is set: guiding_axis of the surface, and
   // density of the bounce by the BSDF alone.
   UInt<F> axis;
   F bsdf_pdf;
-  UInt<F> crossed;  ///< InsideRow::crossed, if the scene has nested dielectrics
+  UInt<F> crossed;  ///< MediumStackRow::crossed, if the scene has nested dielectrics
 };
 
 /// Classification of a scattering for light path expressions: its PathEvent, and its diffuse
 /// fraction by colour. The rest is glossy, or specular if `is_delta`.
 template <typename F>
-struct ScatteringNote {
+struct ScatteringEvent {
   UInt<F> event{0u};
   Color<F> diffuse{F(0.f)};
   Mask<F> is_delta{false};
@@ -195,14 +196,14 @@ struct VertexAovs {
   Vec3<F> normal;
   Mask<F> is_clear;  ///< whether the surface has only delta lobes, such as a mirror or glass
   Vec2<F> uv;
-  UInt<F> emitter, lit_by;  ///< lights that contribute `emitted` and `direct`, or kNoLight
+  UInt<F> emitter, light_id;  ///< lights that contribute `emitted` and `direct`, or kNoLight
   // With wants_lights: the position from which a light was sampled, and the MIS weight that
   // `direct` contains. A weight of -1 means that no light was sampled.
-  Vec3<F> lit_at;
+  Vec3<F> light_position;
   F light_weight;
   // With wants_events: classification of the scattering of the light sample and of the bounce
   // (path/steps/note_events.h).
-  ScatteringNote<F> lit, bounce;
+  ScatteringEvent<F> light_scattering, bounce;
   // With wants_bounces: the probability that the guiding field sampled the direction of the bounce,
   // and the survival probability of roulette. A survival of -1 means that there was no bounce.
   F guided, survival;
@@ -237,7 +238,7 @@ struct ConnectionOffer {
   Mask<F> wanted;  ///< whether such a vertex exists and the path would not exceed the maximum depth
   ConnectionRow<F> row;  ///< output; black where `wanted` is false
   /// Output, if light path expressions are active; undefined where `wanted` is false.
-  ScatteringNote<F> note{};
+  ScatteringEvent<F> scattering{};
 };
 
 /// Returns the offer of camera paths in `slot`, at `depth`, to the light path vertices chosen for
@@ -271,24 +272,24 @@ struct Vertex {
   const PathState<F>& path;
   VertexAovs<F>* aovs;  ///< null if no AOV needs the vertex
   const Mask<F>& active;
-  const GuideView* guide = nullptr;     ///< guiding field that guides bounces or is in training
-  ConnectionOffer<F>* offer = nullptr;  ///< null without connections
-  VisibleOffer<F>* visible = nullptr;   ///< null without merging
+  const GuidingView* guide = nullptr;     ///< guiding field that guides bounces or is in training
+  ConnectionOffer<F>* offer = nullptr;    ///< null without connections
+  MergePointOffer<F>* visible = nullptr;  ///< null without merging
 
   static constexpr bool has(Feature feature) { return (kFeatures & feature) != 0; }
   /// Returns the AOV values to write, or null.
-  VertexAovs<F>* notes() const { return has(kNotes) ? aovs : nullptr; }
+  VertexAovs<F>* recorded_aovs() const { return has(kRecordsAovs) ? aovs : nullptr; }
   bool joins_light() const { return has(kJoined) && settings.joins_light; }
-  bool wants_lights() const { return notes() && aovs->wants_lights; }
-  bool wants_events() const { return notes() && aovs->wants_events; }
-  bool wants_bounces() const { return notes() && aovs->wants_bounces; }
-  bool knows_inside() const { return has(kInside) && scene.interiors.media; }
+  bool wants_lights() const { return recorded_aovs() && aovs->wants_lights; }
+  bool wants_events() const { return recorded_aovs() && aovs->wants_events; }
+  bool wants_bounces() const { return recorded_aovs() && aovs->wants_bounces; }
+  bool has_medium_stack() const { return has(kNestedMedia) && scene.nested_media.media; }
   bool has_links() const { return has(kLinks) && scene.lights.links.members; }
 };
 
 /// Length of a shadow ray as a fraction of the distance to the light, so that the ray ends before
 /// the light's surface.
-inline constexpr float kShadowReach = 0.9999f;
+inline constexpr float kShadowRayFraction = 0.9999f;
 
 /// Returns `c`, scaled down to a luminance of at most `limit` (0 means no limit). Returns black if
 /// `c` is not finite.
@@ -312,28 +313,28 @@ inline float clamp_limit(const ShadeSettings& s, uint32_t bounces) {
 /// Returns the index of geometry `geom` of instance `inst` in arrays that have one entry for each
 /// geometry of each instance.
 template <typename F>
-inline UInt<F> placed_geometry(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
-                               const Mask<F>& active) {
+inline UInt<F> instance_geometry(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
+                                 const Mask<F>& active) {
   return gather_member<F>(scene.instances, &InstanceRecord::emissive, inst, active) + geom;
 }
 
 /// Returns the lanes whose camera ray hits a holdout, which is black and has alpha 0. Requires
 /// scene.visibility.
 template <typename F>
-inline Mask<F> held_out(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
-                        const Mask<F>& active) {
+inline Mask<F> is_holdout(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
+                          const Mask<F>& active) {
   using U = UInt<F>;
-  const U seen =
-      gather<U>(scene.visibility, placed_geometry<F>(scene, inst, geom, active), Mask<U>(active));
-  return active & Mask<F>((seen & static_cast<uint32_t>(kHeldOut)) != U(0u));
+  const U visibility_bits =
+      gather<U>(scene.visibility, instance_geometry<F>(scene, inst, geom, active), Mask<U>(active));
+  return active & Mask<F>((visibility_bits & static_cast<uint32_t>(kHoldout)) != U(0u));
 }
 
 /// Returns the link class of geometry `geom` of instance `inst`.
 template <typename F>
 inline UInt<F> link_class(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
                           const Mask<F>& active) {
-  return gather<UInt<F>>(scene.lights.links.classes, placed_geometry<F>(scene, inst, geom, active),
-                         Mask<UInt<F>>(active));
+  return gather<UInt<F>>(scene.lights.links.classes,
+                         instance_geometry<F>(scene, inst, geom, active), Mask<UInt<F>>(active));
 }
 
 }  // namespace wavecomb

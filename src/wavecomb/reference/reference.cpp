@@ -26,7 +26,7 @@ void ReferenceIntegrator::run(size_t i, const WaveTask& task) {
   ReferenceWorker& worker = *workers_[i];
   if (context_.has_media())
     trace_task(context_, worker, task,
-               Volumes(context_, worker.counts, worker.walks, worker.interiors));
+               Volumes(context_, worker.counts, worker.walks, worker.nested_media));
   else
     trace_task(context_, *workers_[i], task, NoMedia());
 }

@@ -42,7 +42,7 @@ void trace_task(const WaveContext& context, ReferenceWorker& worker, const WaveT
       ++sum.samples;
       if (film.has_cascades()) film.cascades().add(film.index(x, y), &radiance.x);
       worker.aovs.resolve(film.aovs(), film.index(x, y), 0, 1, tracer.radiance());
-      if (worker.visible) film.set_visible_point(film.index(x, y), worker.visible.row(0));
+      if (worker.visible) film.set_merge_point(film.index(x, y), worker.visible.row(0));
     }
     film.pixel(x, y) = sum;
   }

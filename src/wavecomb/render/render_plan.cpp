@@ -93,7 +93,7 @@ RenderPlan::RenderPlan(const Scene& scene, const EmbreeAccelerator& accelerator,
       camera(scene.camera(), settings.width, settings.height, filter, settings.overscan),
       aovs(scene, settings),
       window(settings.film()),
-      splat_filter(splat_filter_of(camera, filter, settings.rendered())),
+      light_splat_filter(make_light_splat_filter(camera, filter, settings.rendered())),
       view(view_for(scene, settings, waves.threads)) {
   if (policy) {
     policies.push_back(policy);
@@ -108,18 +108,18 @@ RenderPlan::RenderPlan(const Scene& scene, const EmbreeAccelerator& accelerator,
 }
 
 Film RenderPlan::make_film() const {
-  Film film(window, aovs.layout, settings.keeps_error());
+  Film film(window, aovs.layout, settings.needs_error());
   if (settings.joins_light())
-    film.keep_splats(splat_unit(scene), size_t{settings.width} * settings.height,
-                     double{light_share.paths()});
-  if (settings.merges()) film.keep_visible_points();
+    film.allocate_light_splats(light_splat_unit(scene), size_t{settings.width} * settings.height,
+                               double{light_share.paths()});
+  if (settings.merges()) film.allocate_merge_points();
   if (settings.firefly == Firefly::kReweight)
-    film.keep_cascades(scene_brightness(scene) * kDarkestShare);
+    film.allocate_cascades(scene_brightness(scene) * kDarkestShare);
   return film;
 }
 
 WaveContext RenderPlan::make_context(Film& film, RenderCosts& costs, RayRecorder* recorder,
-                                     const VisibleGrid* visible) const {
+                                     const MergeGrid* visible) const {
   const bool wants_position = std::any_of(policies.begin(), policies.end(), [](const auto* one) {
     return (one->columns() & kPositionColumn) != 0;
   });
@@ -140,7 +140,7 @@ WaveContext RenderPlan::make_context(Film& film, RenderCosts& costs, RayRecorder
       .measures_costs = costs.measures(),
       .recorder = recorder,
       .aovs = &aovs,
-      .splat_filter = settings.joins_light() ? &splat_filter : nullptr,
+      .light_splat_filter = settings.joins_light() ? &light_splat_filter : nullptr,
       .light_paths = light_share.paths(),
       .visible = visible,
   };

@@ -64,9 +64,10 @@ struct RenderPlan {
   FilterTable filter;
   CameraSetup camera;
   AovTables aovs;
-  Region window;             ///< pixels of the film
-  SplatFilter splat_filter;  ///< pixel filter of connections from light paths to the camera
-  SceneView view;            ///< with the light tree, if lights are selected by it
+  Region window;  ///< pixels of the film
+  LightSplatFilter
+      light_splat_filter;  ///< pixel filter of connections from light paths to the camera
+  SceneView view;          ///< with the light tree, if lights are selected by it
   /// Names of the lights that send no paths, if others do.
   std::vector<std::string> lights_without_paths;
 
@@ -76,7 +77,7 @@ struct RenderPlan {
   /// those of this render, and `visible` holds the points with which light paths are merged, or is
   /// null.
   WaveContext make_context(Film& film, RenderCosts& costs, RayRecorder* recorder,
-                           const VisibleGrid* visible) const;
+                           const MergeGrid* visible) const;
 
  private:
   std::vector<std::unique_ptr<SchedulingPolicy>> owned_policies_;

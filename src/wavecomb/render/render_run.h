@@ -24,7 +24,7 @@
 namespace wavecomb {
 
 /// Data that the pilot renders for one image share. Both pointers are null in other renders.
-struct TrialShared {
+struct PilotShared {
   const Settings* image = nullptr;                  ///< image whose lights are calibrated
   std::shared_ptr<const LightAiming>* aiming = {};  ///< from the first pilot render
 };
@@ -41,7 +41,7 @@ class RenderRun {
 
   /// Runs the pilots and all passes. Calls `learned` on the worker thread when the pilots are done,
   /// unless the render was stopped before. Throws what callbacks and workers throw.
-  void run(PilotCache& cache, const TrialShared& shared,
+  void run(PilotCache& cache, const PilotShared& shared,
            const std::function<void(const PilotResults&)>& learned);
 
   /// Returns the statistics of the render so far. Contract: while no worker runs.
@@ -49,12 +49,12 @@ class RenderRun {
   CostProfile cost_profile() const { return costs_.profile(); }
   /// Returns the image and frees the film. Adds the error of the image and the peak memory to
   /// `statistics`.
-  Picture finish(RenderStatistics& statistics);
+  RenderedImage finish(RenderStatistics& statistics);
 
  private:
   /// Fills the film from a checkpoint, if there is one. Returns the state of its pass.
   PassState resume();
-  void work(PilotCache& cache, const TrialShared& shared,
+  void work(PilotCache& cache, const PilotShared& shared,
             const std::function<void(const PilotResults&)>& learned);
   void take_snapshot(bool is_finished);
   /// Throws Error if a texture could not be read, because pixels that use it are black.
@@ -68,7 +68,7 @@ class RenderRun {
   RenderCosts costs_;
   Film film_;
   std::vector<std::byte> learned_before_;  ///< packed_training() of an earlier render
-  VisibleGrid visible_;
+  MergeGrid visible_;
   WaveContext context_;
   Clock::time_point start_ = Clock::now();
   std::unique_ptr<Integrator> integrator_;

@@ -36,11 +36,11 @@ struct WavefrontRenderer::Impl {
   PilotCache pilot_cache;
 
   /// Renders with settings whose transport is decided. Pilot renders pass data in `shared`.
-  Picture render(const Settings& settings, LightPathShare light_share, const RenderOptions& options,
-                 Watch& watch, const TrialShared& shared = {});
+  RenderedImage render(const Settings& settings, LightPathShare light_share,
+                       const RenderOptions& options, Watch& watch, const PilotShared& shared = {});
   /// Renders a small image for choose_transport(). Stops if `outer` is stopped.
-  TransportTrial try_out(const Settings& settings, LightPathShare share, bool wants_squares,
-                         const TrialShared& shared, const Watch& outer);
+  TransportPilot render_pilot(const Settings& settings, LightPathShare share, bool wants_squares,
+                              const PilotShared& shared, const Watch& outer);
 };
 
 namespace {
@@ -80,7 +80,7 @@ WavefrontRenderer::WavefrontRenderer(std::unique_ptr<Impl> impl) : impl_(std::mo
 
 WavefrontRenderer::~WavefrontRenderer() = default;
 
-std::unique_ptr<WavefrontRenderer> WavefrontRenderer::twin() const {
+std::unique_ptr<WavefrontRenderer> WavefrontRenderer::clone() const {
   auto impl = std::make_unique<Impl>();
   const std::lock_guard lock(impl_->mutex);
   impl->scene = impl_->scene;
@@ -136,15 +136,15 @@ std::vector<std::byte> WavefrontRenderer::packed_learned() const {
   return impl_->learned ? packed_training(*impl_->learned->training) : std::vector<std::byte>();
 }
 
-std::optional<LearnedPlace> WavefrontRenderer::learned(float x, float y, uint32_t width,
-                                                       uint32_t height) const {
-  const std::optional<Pick> seen = pick(x, y, width, height);
+std::optional<LearnedData> WavefrontRenderer::learned(float x, float y, uint32_t width,
+                                                      uint32_t height) const {
+  const std::optional<Pick> picked = pick(x, y, width, height);
   std::unique_lock lock(impl_->mutex);
   const auto learned = impl_->learned;
   lock.unlock();
-  if (!seen || seen->light != kNoLight || !learned) return std::nullopt;
-  const Vec3<float> n = dot(seen->normal, seen->dir) > 0 ? -seen->normal : seen->normal;
-  return look_up(*learned, {seen->position, n, seen->material});
+  if (!picked || picked->light != kNoLight || !learned) return std::nullopt;
+  const Vec3<float> n = dot(picked->normal, picked->dir) > 0 ? -picked->normal : picked->normal;
+  return look_up(*learned, {picked->position, n, picked->material});
 }
 
 RenderStatistics WavefrontRenderer::statistics() const {
@@ -157,26 +157,26 @@ CostProfile WavefrontRenderer::cost_profile() const {
   return impl_->profile;
 }
 
-TransportTrial WavefrontRenderer::Impl::try_out(const Settings& settings, LightPathShare share,
-                                                bool wants_squares, const TrialShared& shared,
-                                                const Watch& outer) {
+TransportPilot WavefrontRenderer::Impl::render_pilot(const Settings& settings, LightPathShare share,
+                                                     bool wants_squares, const PilotShared& shared,
+                                                     const Watch& outer) {
   RenderOptions options;
   options.wants_camera_squares = wants_squares;
   options.progress = [&](const RenderStatus&) {
-    return outer.stopped() ? Request::kStop : Request::kGoOn;
+    return outer.stopped() ? Request::kStop : Request::kContinue;
   };
   Watch watch(options.interval_s);
-  TransportTrial trial;
-  Picture picture = render(settings, share, options, watch, shared);
-  trial.beauty = std::move(picture.beauty);
-  for (AovLayer& layer : picture.aovs)
-    if (layer.name == aov_name(Aov::kByLightPaths)) trial.by_light_paths = std::move(layer.values);
-  trial.rays = statistics.rays + statistics.shadow_rays;
-  trial.records = statistics.records;
-  return trial;
+  TransportPilot pilot;
+  RenderedImage image = render(settings, share, options, watch, shared);
+  pilot.beauty = std::move(image.beauty);
+  for (AovLayer& layer : image.aovs)
+    if (layer.name == aov_name(Aov::kByLightPaths)) pilot.by_light_paths = std::move(layer.values);
+  pilot.rays = statistics.rays + statistics.shadow_rays;
+  pilot.records = statistics.records;
+  return pilot;
 }
 
-Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions& options) {
+RenderedImage WavefrontRenderer::render(const Settings& settings, const RenderOptions& options) {
   settings.check();
   Watch watch(options.interval_s);
   const Running running(*impl_, watch);
@@ -187,26 +187,26 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
     return impl_->render(used, {}, options, watch);
   }
   std::shared_ptr<const LightAiming> aiming;
-  const TrialShared shared{&settings, &aiming};
+  const PilotShared shared{&settings, &aiming};
   const TransportChoice choice = choose_transport(
       *impl_->scene, settings,
       [&](const Settings& s, LightPathShare share, bool squares) {
-        return impl_->try_out(s, share, squares, shared, watch);
+        return impl_->render_pilot(s, share, squares, shared, watch);
       },
       [&] { return watch.stopped(); });
   Settings chosen = settings;
   chosen.transport = choice.transport;
   if (chosen.time_limit > 0)
     chosen.time_limit = std::max(1e-6f, chosen.time_limit - static_cast<float>(choice.seconds));
-  Picture picture = impl_->render(chosen, choice.share, options, watch);
+  RenderedImage image = impl_->render(chosen, choice.share, options, watch);
   const std::lock_guard lock(impl_->mutex);
   impl_->statistics.transport = choice;
-  return picture;
+  return image;
 }
 
-Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare light_share,
-                                        const RenderOptions& options, Watch& watch,
-                                        const TrialShared& shared) {
+RenderedImage WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare light_share,
+                                              const RenderOptions& options, Watch& watch,
+                                              const PilotShared& shared) {
   const RenderPlan plan(*scene, *accel, settings, light_share, options.policy);
   RenderRun run(scene, plan, options, watch, build_s);
   run.run(pilot_cache, shared, [&](const PilotResults& found) {
@@ -221,9 +221,9 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
     profile = run.cost_profile();
   };
   keep();
-  Picture picture = run.finish(s);
+  RenderedImage image = run.finish(s);
   keep();
-  return picture;
+  return image;
 }
 
 }  // namespace wavecomb

@@ -24,7 +24,7 @@ class RayRecorder;
 class Scene;
 class SchedulingPolicy;
 struct CostProfile;
-struct LearnedPlace;
+struct LearnedData;
 struct PassState;
 struct Pick;
 struct RenderStatistics;
@@ -39,20 +39,21 @@ struct CryptoManifest {
 
 /// Rendered image: means over the samples, row 0 at the top. Layers that were not requested are
 /// empty.
-struct Picture {
+struct RenderedImage {
   uint32_t width = 0, height = 0;
   std::vector<float> beauty;  ///< rgb, linear Rec.709
   std::vector<float> albedo;  ///< rgb
   std::vector<float> normal;  ///< xyz, world space, mean of unit vectors
   std::vector<float> depth;   ///< along the camera's axis; infinite where rays leave the scene
   std::vector<uint32_t> samples;
-  // Empty unless Settings::keeps_error() is true:
+  // Empty unless Settings::needs_error() is true:
   std::vector<float> error{};     ///< ErrorMap::error
   std::vector<float> variance{};  ///< rgb, Film::variance
   std::vector<AovLayer> aovs{};   ///< other layers of Settings::aovs
   std::vector<CryptoManifest> manifests{};
   DeepLayer deep{};
 };
+using Picture [[deprecated("use RenderedImage")]] = RenderedImage;
 
 /// Callbacks and inputs of a render beside its settings. The thread that called render() calls the
 /// callbacks. An exception from a callback ends the render.
@@ -99,7 +100,7 @@ class WavefrontRenderer {
   /// the image, not on threads, wave size, lanes or policy, nor on whether the render was resumed.
   /// With a time limit, it also depends on the number of samples rendered in that time. Throws
   /// Error for invalid settings.
-  Picture render(const Settings& settings, const RenderOptions& options = {});
+  RenderedImage render(const Settings& settings, const RenderOptions& options = {});
   /// Stops the running render, if there is one, at the end of a wave. render() then returns the
   /// samples so far.
   void stop();
@@ -109,7 +110,8 @@ class WavefrontRenderer {
   void edit(const SceneEdit& change);
   /// Returns another renderer of the same scene, which can be edited and run independently. Both
   /// share the acceleration structure and the geometry.
-  std::unique_ptr<WavefrontRenderer> twin() const;
+  std::unique_ptr<WavefrontRenderer> clone() const;
+  [[deprecated("use clone()")]] std::unique_ptr<WavefrontRenderer> twin() const { return clone(); }
   std::shared_ptr<const Scene> scene() const;
   /// Returns the number of edits so far.
   uint64_t version() const;
@@ -117,7 +119,7 @@ class WavefrontRenderer {
   std::optional<Pick> pick(float x, float y, uint32_t width, uint32_t height) const;
   /// Returns the learned data at the surface that pick() finds, from the running or else the last
   /// render. Returns nothing if there is no surface or nothing was learned yet.
-  std::optional<LearnedPlace> learned(float x, float y, uint32_t width, uint32_t height) const;
+  std::optional<LearnedData> learned(float x, float y, uint32_t width, uint32_t height) const;
 
   /// Returns the packed_training() of the last render, unless it was stopped before it learned.
   std::vector<std::byte> packed_learned() const;

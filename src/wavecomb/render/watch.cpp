@@ -7,7 +7,7 @@
 
 namespace wavecomb {
 
-void Watch::run(const std::function<void()>& work, const std::function<Request()>& look,
+void Watch::run(const std::function<void()>& work, const std::function<Request()>& poll,
                 const std::function<void()>& snapshot) {
   std::exception_ptr failure, thrown;
   std::thread runner([&] {
@@ -25,17 +25,17 @@ void Watch::run(const std::function<void()>& work, const std::function<Request()
   std::unique_lock lock(mutex_);
   while (!finished_) {
     const bool is_called = changed_.wait_for(lock, std::chrono::duration<double>(interval_s_),
-                                             [&] { return finished_ || resting_; });
+                                             [&] { return finished_ || paused_; });
     if (finished_) break;
     if (!is_called && wanted_) continue;  // a pause was already requested
-    const bool takes_snapshot = resting_;
+    const bool takes_snapshot = paused_;
     lock.unlock();
-    Request request = Request::kGoOn;
+    Request request = Request::kContinue;
     try {
       if (takes_snapshot)
         snapshot();
       else if (!thrown)
-        request = look();
+        request = poll();
     } catch (...) {
       thrown = std::current_exception();
       request = Request::kStop;
@@ -43,7 +43,7 @@ void Watch::run(const std::function<void()>& work, const std::function<Request()
     lock.lock();
     if (request == Request::kStop) stop();
     if (takes_snapshot) {
-      wanted_ = resting_ = false;
+      wanted_ = paused_ = false;
       halted_ = false;
       changed_.notify_all();
     } else if (request == Request::kSnapshot && snapshot) {
@@ -59,9 +59,9 @@ void Watch::run(const std::function<void()>& work, const std::function<Request()
 void Watch::rest() {
   std::unique_lock lock(mutex_);
   if (!wanted_) return;
-  resting_ = true;
+  paused_ = true;
   changed_.notify_all();
-  changed_.wait(lock, [&] { return !resting_; });
+  changed_.wait(lock, [&] { return !paused_; });
 }
 
 }  // namespace wavecomb

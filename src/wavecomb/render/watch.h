@@ -12,23 +12,23 @@ namespace wavecomb {
 
 /// Answers of the supervising thread.
 enum class Request : uint8_t {
-  kGoOn,
+  kContinue,
   kSnapshot,  ///< pause the work to take a snapshot
   kStop,
 };
 
 /// Runs work on a separate thread and supervises it.
 ///
-/// Contract: run() once. It calls look() and snapshot() on its own thread.
+/// Contract: run() once. It calls poll() and snapshot() on its own thread.
 class Watch {
  public:
-  /// `interval_s` is the time between calls of look() in seconds.
+  /// `interval_s` is the time between calls of poll() in seconds.
   explicit Watch(double interval_s = 0.1) : interval_s_(interval_s) {}
 
-  /// Runs `work` on a separate thread. Calls `look` every interval, and `snapshot` with the work
-  /// paused if `look` requested one. An exception from any of them stops the work and is rethrown
+  /// Runs `work` on a separate thread. Calls `poll` every interval, and `snapshot` with the work
+  /// paused if `poll` requested one. An exception from any of them stops the work and is rethrown
   /// here.
-  void run(const std::function<void()>& work, const std::function<Request()>& look,
+  void run(const std::function<void()>& work, const std::function<Request()>& poll,
            const std::function<void()>& snapshot);
 
   /// Asks the work to end soon. Any thread may call this.
@@ -48,7 +48,7 @@ class Watch {
   std::atomic<bool> halted_{false}, stopped_{false};
   std::mutex mutex_;
   std::condition_variable changed_;
-  bool wanted_ = false, resting_ = false, finished_ = false;
+  bool wanted_ = false, paused_ = false, finished_ = false;
 };
 
 }  // namespace wavecomb

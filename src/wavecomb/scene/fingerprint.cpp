@@ -124,13 +124,14 @@ uint64_t hash_materials(const Scene& scene) {
     h.add(m.program);
     for (const MaterialParameter& p : material_table())
       std::visit(
-          [&](const auto& place) {
-            if constexpr (!std::is_same_v<decltype(place), const OwnParameter&>)
-              h.add(m.*place);
-            else if (place.is_of(m) && m.own_value(place.index) != place.info().standard)
-              add_named(h, p.name, m.own_value(place.index));
+          [&](const auto& accessor) {
+            if constexpr (!std::is_same_v<decltype(accessor), const SpecificParameter&>)
+              h.add(m.*accessor);
+            else if (accessor.is_of(m) &&
+                     m.specific_value(accessor.index) != accessor.info().standard)
+              add_named(h, p.name, m.specific_value(accessor.index));
           },
-          p.place);
+          p.accessor);
     if (has_trait(m.program, program_trait::kLayered)) {
       const OpenPbr& o = m.openpbr;
 #define WAVECOMB_ADD(kind, name, standard, least, most) h.add(o.name);
@@ -200,7 +201,7 @@ void add_value(Hash& h, const LightParameter& p, const LightValue& value) {
 void add_light(Hash& h, const Light& l) {
   h.add(l.kind, l.to_world);
   for (const LightParameter& p : light_table())
-    if (!p.is_own || p.is_of(l.kind)) add_value(h, p, p.read(l));
+    if (!p.is_specific || p.is_of(l.kind)) add_value(h, p, p.read(l));
 }
 
 uint64_t hash_lights(const Scene& scene) {
@@ -214,7 +215,7 @@ uint64_t hash_lights(const Scene& scene) {
     }
   for (const VisibilityRule& rule : scene.geometry()->visibility) {
     h.add_bytes(rule.path.data(), rule.path.size());
-    h.add(rule.said, rule.bits);
+    h.add(rule.specified, rule.bits);
   }
   for (const IesProfile& p : scene.geometry()->profiles) {
     h.add_array(std::span<const float>(p.vertical));

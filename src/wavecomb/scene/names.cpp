@@ -18,7 +18,7 @@ std::string_view below(std::string_view path, std::string_view root) {
 }
 
 /// Returns `path` as seen through a placement called `outer` of a group with root `root`.
-std::string seen_through(std::string outer, std::string_view root, std::string_view path) {
+std::string path_through(std::string outer, std::string_view root, std::string_view path) {
   outer += below(path, root);
   return outer;
 }
@@ -81,7 +81,7 @@ std::string ObjectNames::placement_name(uint32_t placement) const {
   const Placement& p = scene_.placements()[placement];
   const std::string outer = placement_name(p.parent);
   if (p.name == kNoName) return numbered(outer, placement);
-  std::string name = seen_through(outer, parent_root(p), scene_.names()[p.name].text);
+  std::string name = path_through(outer, parent_root(p), scene_.names()[p.name].text);
   return p.number == kNoName ? name : numbered(std::move(name), p.number);
 }
 
@@ -97,7 +97,7 @@ std::string ObjectNames::object(uint32_t index) const {
   const std::string& mesh = scene_.meshes()[found.mesh].name;
   if (found.instance == 0) return mesh;
   const Instance& instance = scene_.instances()[found.instance - 1];
-  return seen_through(placement_name(instance.placement), scene_.groups()[instance.group].root,
+  return path_through(placement_name(instance.placement), scene_.groups()[instance.group].root,
                       mesh);
 }
 
@@ -109,7 +109,7 @@ std::string ObjectNames::asset(uint32_t index) const {
   if (found.instance == 0) return model.empty() ? second_level(mesh.name) : std::string(model);
   const Instance& instance = scene_.instances()[found.instance - 1];
   if (!model.empty())
-    return seen_through(placement_name(instance.placement), scene_.groups()[instance.group].root,
+    return path_through(placement_name(instance.placement), scene_.groups()[instance.group].root,
                         model);
   uint32_t outermost = instance.placement;
   for (uint32_t p = instance.placement; p != kNoName; p = scene_.placements()[p].parent) {
@@ -120,7 +120,7 @@ std::string ObjectNames::asset(uint32_t index) const {
     if (name.asset_length == 0) continue;
     // If the name of one of several instances names the asset, the asset is that instance.
     if (name.asset_length == name.text.size()) return placement_name(p);
-    return seen_through(placement_name(placement.parent), parent_root(placement),
+    return path_through(placement_name(placement.parent), parent_root(placement),
                         name.text.substr(0, name.asset_length));
   }
   return placement_name(outermost);

@@ -27,8 +27,8 @@ Bounds mesh_bounds(const Mesh& mesh) {
   return out;
 }
 
-void add_placed(Bounds& out, const Bounds& box, const Instance& instance,
-                std::span<const MatrixStep> steps) {
+void add_instance_bounds(Bounds& out, const Bounds& box, const Instance& instance,
+                         std::span<const MatrixStep> steps) {
   if (box.empty()) return;
   const auto add_box = [&](const Affine& to_world) {
     for (int corner = 0; corner < 8; ++corner)
@@ -55,7 +55,7 @@ Bounds object_bounds(const Scene& scene, std::string_view prim) {
   for (const Instance& instance : scene.instances())
     for (uint32_t mesh : scene.groups()[instance.group].meshes)
       if (is_in(names.object(object++), prim))
-        add_placed(out, bounds_of(mesh), instance, scene.geometry()->steps);
+        add_instance_bounds(out, bounds_of(mesh), instance, scene.geometry()->steps);
   return out;
 }
 

@@ -14,8 +14,8 @@ namespace wavecomb {
 Bounds mesh_bounds(const Mesh& mesh);
 
 /// Extends `out` by the corners of a box in an instance, over the whole shutter interval.
-void add_placed(Bounds& out, const Bounds& box, const Instance& instance,
-                std::span<const MatrixStep> steps);
+void add_instance_bounds(Bounds& out, const Bounds& box, const Instance& instance,
+                         std::span<const MatrixStep> steps);
 
 /// Returns the world bounds, over the whole shutter interval, of all meshes at or below a prim
 /// (named as by ObjectNames); "/World/Forest" includes the object "/World/Forest[12]/Leaves". The

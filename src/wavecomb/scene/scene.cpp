@@ -94,8 +94,8 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
                std::ranges::any_of(geometry_->volume_records, &VolumeRecord::emits)};
   v.walks = {materials_->walks.empty() ? nullptr : materials_->walks.data(),
              geometry_->exit_material};
-  v.interiors = {materials_->interiors.empty() ? nullptr : materials_->interiors.data(),
-                 geometry_->inside_material};
+  v.nested_media = {materials_->nested_media.empty() ? nullptr : materials_->nested_media.data(),
+                    geometry_->event_material};
   v.has_motion = geometry_->moves() || v.lights.motions;
   v.has_emissive_meshes = !lights_->emissive.empty();
   v.has_curves = std::any_of(meshes().begin(), meshes().end(),
@@ -116,7 +116,7 @@ void Scene::link() {
   // Bounce rays must be able to hit emitters that are sampled as lights, since their MIS weights
   // assume that they can.
   for (size_t i = 0; i < lights_->emissive.size(); ++i)
-    if (lights_->emissive[i] != kNoLight) visibility[i] |= kSeenByBounces;
+    if (lights_->emissive[i] != kNoLight) visibility[i] |= kVisibleToBounces;
   visibility_ = std::make_shared<const std::vector<uint32_t>>(std::move(visibility));
   view_.visibility = visibility_->data();
 }
@@ -140,17 +140,17 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
   }
 
   std::shared_ptr<const SceneMaterials> new_materials = materials_;
-  bool shines_otherwise = !edit.lights.empty();
+  bool emission_changed = !edit.lights.empty();
   if (!edit.materials.empty()) {
     const bool any_mesh_lights = !geometry_->mesh_lights.empty();
     std::vector<Material> all = materials();
     for (const auto& [id, material] : edit.materials) {
-      shines_otherwise = shines_otherwise || !same_emission(all[id], material, any_mesh_lights);
+      emission_changed = emission_changed || !same_emission(all[id], material, any_mesh_lights);
       all[id] = material;
     }
     new_materials = std::make_shared<const SceneMaterials>(
         std::move(all), materials_->graphs, geometry_->textures, geometry_->exit_material,
-        geometry_->inside_material);
+        geometry_->event_material);
   }
   std::shared_ptr<const SceneTangents> new_tangents = tangents_;
   if (new_materials->wants_tangents != materials_->wants_tangents)
@@ -159,7 +159,7 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
           std::make_shared<const SceneTangents>(*geometry_, *new_materials, tangents_.get());
     });
   std::shared_ptr<const SceneLights> new_lights = lights_;
-  if (shines_otherwise) {
+  if (emission_changed) {
     std::vector<Light> all = lights();
     for (const auto& [i, light] : edit.lights) all[i] = light;
     with_threads(threads, [&] {
@@ -231,7 +231,7 @@ SceneBytes Scene::bytes() const {
          materials_->graphs->ops, materials_->graphs->constants, materials_->graphs->images,
          materials_->graphs->outputs) +
       of(lights_->emissive, lights_->mesh_lights, set.mesh_lights, set.records, set.triangles,
-         set.triangle_uvs, set.pick_bins, set.powers, set.portals, set.portal_groups, set.shapings,
+         set.triangle_uvs, set.power_bins, set.powers, set.portals, set.portal_groups, set.shapings,
          set.ies, set.ies_numbers, set.filters, set.shadows, set.motions, set.motion_steps) +
       lights_->tree_bytes() + g.names.bytes();
   std::set<const void*> grids;

@@ -40,8 +40,8 @@ struct SceneView {
   LightView lights;
   MotionView motion;
   VolumeView volumes;
-  WalkView walks;
-  InteriorView interiors;
+  SubsurfaceView subsurface;
+  MeshMediaView nested_media;
   float scale = 1;  ///< radius of the bounding sphere
   bool has_presence = false;
   bool has_emissive_meshes = false;

@@ -27,11 +27,11 @@ struct CountedGrid {
 
   CountedGrid(std::shared_ptr<const VolumeGrid> g, std::shared_ptr<TileStore> s)
       : grid(std::move(g)), store(std::move(s)) {
-    store->keep_grid(grid.get(), grid->bytes());
+    store->register_grid(grid.get(), grid->bytes());
   }
   CountedGrid(const CountedGrid&) = delete;
   CountedGrid& operator=(const CountedGrid&) = delete;
-  ~CountedGrid() { store->drop_grid(grid.get()); }
+  ~CountedGrid() { store->unregister_grid(grid.get()); }
 };
 
 std::shared_ptr<const VolumeGrid> counted(const std::shared_ptr<const VolumeGrid>& grid,
@@ -99,9 +99,9 @@ uint32_t SceneBuilder::add_material(Material material) {
   if (static_cast<uint32_t>(material.program) >= kSurfaceProgramCount)
     throw Error(quoted("material", material.name) + " has program '" +
                 info_of(material.program).name + "', which is not for surfaces; choose another");
-  const bool glows = material.emission.x > 0 || material.emission.y > 0 ||
-                     material.emission.z > 0 || material.has_texture(Input::kEmission);
-  if (glows && !material.emits())
+  const bool is_emissive = material.emission.x > 0 || material.emission.y > 0 ||
+                           material.emission.z > 0 || material.has_texture(Input::kEmission);
+  if (is_emissive && !material.emits())
     warnings_.push_back(quoted("material", material.name) + " has emission, which its program '" +
                         kProgramNames[static_cast<size_t>(material.program)] +
                         "' does not read; use emissive or principled");
@@ -157,9 +157,9 @@ void SceneBuilder::add_instance(uint32_t parent, uint32_t child, const Affine& t
       !std::all_of(steps.begin(), steps.end(), [](const Affine& m) { return finite(m); }))
     throw Error("an instance of " + quoted("group", groups_[child].name) +
                 " has a transform that is not finite; give finite numbers");
-  if (steps.size() == 1 || steps.size() > kMostSteps)
+  if (steps.size() == 1 || steps.size() > kMaxSteps)
     throw Error("the motion of an instance of " + quoted("group", groups_[child].name) +
-                " needs 2 to " + std::to_string(kMostSteps) + " steps");
+                " needs 2 to " + std::to_string(kMaxSteps) + " steps");
   StepRange motion;
   if (!steps.empty())
     motion = {static_cast<uint32_t>(node_steps_.size()), static_cast<uint32_t>(steps.size() - 1)};
@@ -225,14 +225,14 @@ uint32_t SceneBuilder::add_volume(Volume volume) {
       if (field->grid) field->grid = counted(field->grid, store_);
   if (volume.moves()) {
     const auto known = std::find_if(volumes_.rbegin(), volumes_.rend(), [&](const Volume& other) {
-      return other.motion && moves_alike(other, volume);
+      return other.motion && has_same_motion(other, volume);
     });
     volume.motion =
         known != volumes_.rend() ? known->motion : std::make_shared<const VolumeMotion>(volume);
   }
   volumes_.push_back(std::move(volume));
-  if (volumes_.size() > kMostVolumes)
-    throw Error("more than " + with_commas(kMostVolumes) + " volumes, " +
+  if (volumes_.size() > kMaxVolumes)
+    throw Error("more than " + with_commas(kMaxVolumes) + " volumes, " +
                 quoted("volume", volumes_.back().name) + " among them; put some into one grid");
   return static_cast<uint32_t>(volumes_.size() - 1);
 }

@@ -18,7 +18,7 @@ namespace {
 
 /// Throws Error if a program-specific number is out of range; check_material reports numbers that
 /// are not finite.
-void check_own(const std::string& of, const ProgramParameter& p, float value) {
+void check_specific(const std::string& of, const ProgramParameter& p, float value) {
   if (value < p.least || value > p.most)
     throw Error(of + ": " + p.name + " is " + text(double{value}) + "; it must be from " +
                 text(double{p.least}) + " to " + text(double{p.most}));
@@ -49,20 +49,20 @@ void check_material(const Material& material, size_t texture_count, size_t graph
     if (graph != kNoGraph && graph >= graph_count)
       throw Error(name + " has a graph that was never added; add graphs before materials");
   const OpenPbr& o = material.openpbr;
-  bool good = std::isfinite(o.transmission_depth) &&
-              std::isfinite(o.transmission_scatter_anisotropy) && std::isfinite(o.nested_priority);
+  bool valid = std::isfinite(o.transmission_depth) &&
+               std::isfinite(o.transmission_scatter_anisotropy) && std::isfinite(o.nested_priority);
   const auto check_color = [&](const Vec3<float>& v) {
     if (!finite(v)) throw Error(name + " has a colour that is not finite; give finite numbers");
   };
   const auto check = [&](const auto& value) {
     if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, float>)
-      good = good && std::isfinite(value);
+      valid = valid && std::isfinite(value);
     else
       check_color(value);
   };
   for_each_parameter<float>(material, [&](const MaterialParameter& p, float value) {
     check(value);
-    if (p.own()) check_own(name, p.own()->info(), value);
+    if (p.own()) check_specific(name, p.own()->info(), value);
   });
   for_each_parameter<Vec3<float>>(
       material, [&](const MaterialParameter&, const Vec3<float>& value) { check(value); });
@@ -71,7 +71,7 @@ void check_material(const Material& material, size_t texture_count, size_t graph
   check(o.transmission_scatter);
   std::apply([&](const auto&... input) { (check(input), ...); },
              static_cast<const OpenPbrInputs<float>&>(o).fields());
-  if (!good) throw Error(name + " has a parameter that is not finite; give finite numbers");
+  if (!valid) throw Error(name + " has a parameter that is not finite; give finite numbers");
   if (material.ior <= 0) throw Error(name + " has an ior of 0 or less; give a positive one");
 }
 
@@ -97,12 +97,12 @@ void check_profile(const IesProfile& p) {
 }
 
 void check_filter(const LightFilter& f, size_t textures, size_t filters) {
-  const auto good = [](const auto&... values) { return (std::isfinite(values) && ...); };
+  const auto valid = [](const auto&... values) { return (std::isfinite(values) && ...); };
   bool is_finite = finite(f.to_world) &&
-                   good(f.distance, f.near_start, f.near_end, f.far_start, f.far_end, f.density);
+                   valid(f.distance, f.near_start, f.near_end, f.far_start, f.far_end, f.density);
   for (const Vec3<float>& line :
        {f.sides[0], f.sides[1], f.sides[2], f.sides[3], f.picture_u, f.picture_v})
-    is_finite = is_finite && good(line.x, line.y, line.z);
+    is_finite = is_finite && valid(line.x, line.y, line.z);
   if (!is_finite) throw Error("a light filter has a value that is not finite; give finite numbers");
   if (f.texture != kNoTexture && f.texture >= textures)
     throw Error("a light filter's texture was never added; add textures before filters");

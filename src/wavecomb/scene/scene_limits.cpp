@@ -42,10 +42,10 @@ void check_counts(const SceneCounts& counts) {
   check(counts.materials, kGatherWords / kMaterialWords, "materials", "share some");
   check(counts.instances, kMaxInstances, "instances", "use fewer");
   check(counts.grouped, kGatherWords, "meshes in groups", "join some");
-  check(counts.placed, kGatherWords, "meshes in instances",
+  check(counts.instanced_meshes, kGatherWords, "meshes in instances",
         "join the meshes that are instanced together");
   check(counts.placements, uint64_t{kNoName}, "instances of groups of instances", "nest fewer");
-  check(counts.steps, kMostRowWords / words_of<MatrixStep>, "transforms over the shutter",
+  check(counts.steps, kMaxRowWords / words_of<MatrixStep>, "transforms over the shutter",
         "use fewer motion steps");
   check(counts.lights, kGatherWords / words_of<LightRecord>, "lights", "use fewer");
   check(counts.profile_values, kGatherWords, "values of IES profiles", "use smaller files");

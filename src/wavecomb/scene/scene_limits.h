@@ -10,7 +10,7 @@ namespace wavecomb {
 /// Maximum size in 32-bit words of a table read by gather instructions, whose indices are signed.
 inline constexpr uint64_t kGatherWords = uint64_t{1} << 31;
 /// Maximum size in 32-bit words of a table whose rows are loaded whole, with unsigned indices.
-inline constexpr uint64_t kMostRowWords = uint64_t{1} << 32;
+inline constexpr uint64_t kMaxRowWords = uint64_t{1} << 32;
 
 /// Maximum number of instances, of 16 32-bit words each; the first is the world.
 inline constexpr uint64_t kMaxInstances = kGatherWords / 16 - 1;
@@ -18,12 +18,12 @@ inline constexpr uint64_t kMaxInstances = kGatherWords / 16 - 1;
 /// Numbers of all objects that kernels index.
 struct SceneCounts {
   uint64_t meshes = 0, materials = 0, instances = 0;
-  uint64_t grouped = 0;         ///< sum over all groups of their meshes
-  uint64_t placed = 0;          ///< sum over all instances, including the world, of their meshes
-  uint64_t placements = 0;      ///< nested instances, including those that contain only groups
-  uint64_t steps = 0;           ///< transforms of moving instances
-  uint64_t lights = 0;          ///< including instances of mesh lights and portals
-  uint64_t profile_values = 0;  ///< angles and candela of IES profiles
+  uint64_t grouped = 0;           ///< sum over all groups of their meshes
+  uint64_t instanced_meshes = 0;  ///< sum over all instances, including the world, of their meshes
+  uint64_t placements = 0;        ///< nested instances, including those that contain only groups
+  uint64_t steps = 0;             ///< transforms of moving instances
+  uint64_t lights = 0;            ///< including instances of mesh lights and portals
+  uint64_t profile_values = 0;    ///< angles and candela of IES profiles
   /// geometry sets for light linking (one bit each) times classes, in 32-bit words
   uint64_t link_words =
       0;  ///< sets of geometry that lights are linked to, a bit each, times classes

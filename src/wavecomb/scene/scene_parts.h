@@ -105,11 +105,11 @@ struct SceneGeometry {
   std::vector<MatrixStep> steps;  ///< transforms of all moving instances
   std::vector<VolumeRecord> volume_records;
   uint32_t first_volume_material = 0;  ///< VolumeView::first_material
-  /// WalkView::exit_material; kInheritMaterial if no material has a subsurface radius, so that the
-  /// scene has no subsurface random walks.
+  /// SubsurfaceView::exit_material; kInheritMaterial if no material has a subsurface radius, so
+  /// that the scene has no subsurface random walks.
   uint32_t exit_material = kInheritMaterial;
-  /// InteriorView::event_material; kInheritMaterial if no material needs a medium stack.
-  uint32_t inside_material = kInheritMaterial;
+  /// MeshMediaView::event_material; kInheritMaterial if no material needs a medium stack.
+  uint32_t event_material = kInheritMaterial;
   std::vector<StepRange> instance_motions;  ///< by instance record; empty if no instance moves
   bool moves() const {
     return mesh_motions.size() > 1 || !steps.empty() ||
@@ -124,10 +124,12 @@ struct SceneGeometry {
   /// returns whether one did. `inherited` is the material of the instance.
   template <typename Test>
   bool any_material(uint32_t mesh, uint32_t inherited, const Test& test) const {
-    const auto worn = [&](uint32_t m) { return test(m == kInheritMaterial ? inherited : m); };
-    if (meshes[mesh].face_materials.empty()) return worn(meshes[mesh].material);
+    const auto bound_material = [&](uint32_t m) {
+      return test(m == kInheritMaterial ? inherited : m);
+    };
+    if (meshes[mesh].face_materials.empty()) return bound_material(meshes[mesh].material);
     for (uint32_t m : face_materials[mesh])
-      if (worn(m)) return true;
+      if (bound_material(m)) return true;
     return false;
   }
 };
@@ -135,13 +137,13 @@ struct SceneGeometry {
 /// Materials and their packed form.
 struct SceneMaterials {
   /// Packs materials. `textures` are those of the scene, which materials and graphs read.
-  /// `exit_material` and `inside_material` are those of SceneGeometry.
+  /// `exit_material` and `event_material` are those of SceneGeometry.
   SceneMaterials(std::vector<Material> materials, std::shared_ptr<const GraphSet> graphs,
                  std::span<const TexturePtr> textures, uint32_t exit_material,
-                 uint32_t inside_material);
+                 uint32_t event_material);
 
   std::vector<Material> materials;  ///< as the caller described them
-  std::vector<Material> shaded;     ///< after simplification by settled() (simplified_material.h)
+  std::vector<Material> shaded;  ///< after simplification by simplified() (simplified_material.h)
   std::shared_ptr<const GraphSet> graphs;
   std::vector<MaterialRecord> records;
   std::vector<TextureUseRecord> uses;
@@ -153,9 +155,9 @@ struct SceneMaterials {
   /// By material; empty if no program has specific parameters.
   std::vector<ProgramParameterRecord> own;
   /// By material; empty if there are no subsurface random walks.
-  std::vector<WalkMedium<float>> walks;
+  std::vector<SubsurfaceMedium<float>> walks;
   /// By material; empty if paths need no medium stack.
-  std::vector<InteriorMedium<float>> interiors;
+  std::vector<MeshMedium<float>> nested_media;
   bool has_presence = false, has_emission = false;
 };
 
@@ -185,8 +187,8 @@ struct SceneLights {
 
  private:
   mutable std::once_flag grown_;
-  mutable LightTree late_tree_;
-  mutable std::atomic<uint64_t> late_bytes_{0};
+  mutable LightTree lazy_tree_;
+  mutable std::atomic<uint64_t> lazy_bytes_{0};
 };
 
 }  // namespace wavecomb

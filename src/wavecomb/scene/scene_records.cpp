@@ -49,7 +49,7 @@ MeshRecord make_mesh_record(const Mesh& mesh) {
   r.uvs = address(mesh.uvs.data());
   r.face_materials = address(mesh.face_materials.empty() ? nullptr : mesh.face_materials.data());
   r.radii = address(mesh.radii.data());
-  if (mesh.primitive == Primitive::kSplat) {
+  if (mesh.primitive == Primitive::kGaussianSplat) {
     r.normals = address(mesh.splats.data());
     r.uvs = address(mesh.harmonics.data());
     r.flags |= mesh.harmonics_degree << kHarmonicsShift;
@@ -135,7 +135,7 @@ void SceneBuilder::make_records(SceneGeometry& geometry, uint32_t grey) const {
     r.emissive = emissive;
     emissive += static_cast<uint32_t>(geometry.groups[i.group].meshes.size());
     geometry.instance_records.push_back(r);
-    add_placed(geometry.bounds, bounds[i.group], i, geometry.steps);
+    add_instance_bounds(geometry.bounds, bounds[i.group], i, geometry.steps);
   }
   for (const Volume& volume : geometry.volumes) {
     geometry.volume_records.push_back(make_volume_record(volume));

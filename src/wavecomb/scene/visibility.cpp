@@ -20,22 +20,23 @@ std::string_view above(std::string_view path) {
   return slash == std::string_view::npos ? std::string_view() : path.substr(0, slash);
 }
 
-/// Returns the visibility of the object that is seen as `placed`, a mesh called `own` in a group of
-/// root `root`. For each bit, the rule of the nearest prim among the object and its ancestors wins.
-uint32_t visibility_of(const Rules& rules, std::string_view placed, std::string_view own,
-                       std::string_view root) {
-  uint32_t said = 0, bits = 0;
-  const auto listen = [&](std::string_view path) {
+/// Returns the visibility of the object that is seen as `object_path`, a mesh called `group_path`
+/// in a group of root `root`. For each bit, the rule of the nearest prim among the object and its
+/// ancestors wins.
+uint32_t visibility_of(const Rules& rules, std::string_view object_path,
+                       std::string_view group_path, std::string_view root) {
+  uint32_t specified = 0, bits = 0;
+  const auto apply_rule = [&](std::string_view path) {
     const auto rule = rules.find(path);
     if (rule == rules.end()) return;
-    bits |= rule->second.bits & rule->second.said & ~said;
-    said |= rule->second.said;
+    bits |= rule->second.bits & rule->second.specified & ~specified;
+    specified |= rule->second.specified;
   };
-  for (; !placed.empty(); placed = above(placed), own = above(own)) {
-    listen(placed);
-    if (own.size() > root.size() && own != placed) listen(own);
+  for (; !object_path.empty(); object_path = above(object_path), group_path = above(group_path)) {
+    apply_rule(object_path);
+    if (group_path.size() > root.size() && group_path != object_path) apply_rule(group_path);
   }
-  return bits | (kSeenByAll & ~said);
+  return bits | (kVisibleToAll & ~specified);
 }
 
 }  // namespace
@@ -46,18 +47,19 @@ std::vector<uint32_t> object_visibility(const Scene& scene, const ObjectNames& n
   Rules by_path;
   for (const VisibilityRule& rule : geometry.visibility) {
     VisibilityRule& whole = by_path[rule.path];
-    whole.bits = (whole.bits & ~rule.said) | (rule.bits & rule.said);
-    whole.said |= rule.said;
+    whole.bits = (whole.bits & ~rule.specified) | (rule.bits & rule.specified);
+    whole.specified |= rule.specified;
   }
   std::vector<uint32_t> all;
   for (size_t i = 0; i < geometry.instance_records.size(); ++i) {
     const Group& group = geometry.groups[i == 0 ? 0 : geometry.instances[i - 1].group];
     for (const uint32_t mesh : group.meshes) {
-      const std::string placed = without_numbers(names.object(static_cast<uint32_t>(all.size())));
-      all.push_back(visibility_of(by_path, placed, geometry.meshes[mesh].name, group.root));
+      const std::string object_path =
+          without_numbers(names.object(static_cast<uint32_t>(all.size())));
+      all.push_back(visibility_of(by_path, object_path, geometry.meshes[mesh].name, group.root));
     }
   }
-  if (std::all_of(all.begin(), all.end(), [](uint32_t v) { return v == kSeenByAll; })) return {};
+  if (std::all_of(all.begin(), all.end(), [](uint32_t v) { return v == kVisibleToAll; })) return {};
   return all;
 }
 

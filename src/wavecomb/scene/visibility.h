@@ -13,20 +13,20 @@ class Scene;
 
 /// Kinds of rays as bits, and the holdout flag.
 enum RayVisibility : uint32_t {
-  kSeenByCamera = 1,
-  kSeenByShadowRays = 2,
-  kSeenByBounces = 4,
-  kSeenByAll = kSeenByCamera | kSeenByShadowRays | kSeenByBounces,
+  kVisibleToCamera = 1,
+  kVisibleToShadowRays = 2,
+  kVisibleToBounces = 4,
+  kVisibleToAll = kVisibleToCamera | kVisibleToShadowRays | kVisibleToBounces,
   /// Camera rays stop here with black radiance and alpha 0.
-  kHeldOut = 8,
+  kHoldout = 8,
 };
 
 /// Visibility of a prim and of its descendants without a rule. For prims inside a group, the path
 /// is that of the group's first placement, and the rule applies to all of its placements.
 struct VisibilityRule {
   std::string path;
-  uint32_t said = 0;  ///< mask of the RayVisibility bits that the rule sets
-  uint32_t bits = 0;  ///< values of these bits
+  uint32_t specified = 0;  ///< mask of the RayVisibility bits that the rule sets
+  uint32_t bits = 0;       ///< values of these bits
 };
 
 /// Returns the RayVisibility of all objects, for the meshes of each instance in order as in
@@ -36,8 +36,8 @@ std::vector<uint32_t> object_visibility(const Scene& scene, const ObjectNames& n
 /// Returns the kind of the ray that a path traces after `depth` vertices, or of its shadow ray
 /// there.
 constexpr uint32_t ray_kind(uint32_t depth, bool shadow) {
-  if (shadow) return kSeenByShadowRays;
-  return depth == 0 ? kSeenByCamera : kSeenByBounces;
+  if (shadow) return kVisibleToShadowRays;
+  return depth == 0 ? kVisibleToCamera : kVisibleToBounces;
 }
 
 }  // namespace wavecomb

@@ -28,10 +28,10 @@ size_t Chooser::choose(uint32_t depth, std::span<const Work> work) {
   // measurement may have been caused by other programs on the machine.
   const uint32_t turn = calls / kRetryPeriod;
   const size_t other = turn % arms_;
-  if (turn / arms_ % kAnywayPeriod == kAnywayPeriod - 1) return other;
+  if (turn / arms_ % kExplorePeriod == kExplorePeriod - 1) return other;
   const Stat& s = stat(depth, other);
   const double ns = work[other].packets * s.packet_ns + work[other].records * s.record_ns;
-  return ns < least * kNearlyAsGood ? other : best;
+  return ns < least * kSimilarCost ? other : best;
 }
 
 void Chooser::learn(uint32_t depth, size_t arm, const Work& work, double run_ns,

@@ -47,9 +47,9 @@ class Chooser {
 
   static constexpr uint32_t kFirstTries = 4;
   static constexpr uint32_t kRetryPeriod = 64;
-  static constexpr uint32_t kAnywayPeriod = 8;
+  static constexpr uint32_t kExplorePeriod = 8;
   static constexpr double kOutlier = 2;
-  static constexpr double kNearlyAsGood = 1.15;
+  static constexpr double kSimilarCost = 1.15;
   static constexpr double kWeight = 0.2;
 
   size_t arms_;

@@ -15,13 +15,13 @@ void CostTracker::charge(std::span<const uint32_t> materials, double ns) {
 
 void CostTracker::take(CostTracker& other) {
   for (size_t m = 0; m < ns_.size(); ++m) {
-    const uint64_t records = other.seen_[m] - other.seen_before_[m];
-    const double beside = records > 0 ? other.beside_ns_[m] / static_cast<double>(records) : 0;
-    ns_[m] += other.ns_[m] + beside * static_cast<double>(other.timed_[m]);
+    const uint64_t records = other.record_counts_[m] - other.counts_before_[m];
+    const double untimed = records > 0 ? other.untimed_ns_[m] / static_cast<double>(records) : 0;
+    ns_[m] += other.ns_[m] + untimed * static_cast<double>(other.timed_[m]);
     timed_[m] += other.timed_[m];
     other.ns_[m] = 0;
-    other.beside_ns_[m] = 0;
-    other.seen_before_[m] = other.seen_[m];
+    other.untimed_ns_[m] = 0;
+    other.counts_before_[m] = other.record_counts_[m];
     other.timed_[m] = 0;
   }
 }

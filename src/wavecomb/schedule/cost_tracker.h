@@ -17,19 +17,19 @@ class CostTracker {
  public:
   explicit CostTracker(size_t materials = 0)
       : ns_(materials),
-        beside_ns_(materials),
+        untimed_ns_(materials),
         timed_(materials),
-        seen_(materials),
-        seen_before_(materials) {}
+        record_counts_(materials),
+        counts_before_(materials) {}
 
   /// Adds a timed batch: `ns` nanoseconds for one record of each entry of `materials`.
   void charge(std::span<const uint32_t> materials, double ns);
   /// Adds time spent on records of a material outside their timed batches, such as subsurface
   /// random walks. `ns` covers all counted records, timed or not.
-  void charge_beside(uint32_t material, double ns) { beside_ns_[material] += ns; }
+  void charge_untimed(uint32_t material, double ns) { untimed_ns_[material] += ns; }
   /// Counts records, timed or not.
   void count(std::span<const uint32_t> materials) {
-    for (uint32_t m : materials) ++seen_[m];
+    for (uint32_t m : materials) ++record_counts_[m];
   }
   /// Returns whether to time the next batch of `records`: one in 8 large batches and one in 32
   /// small ones, so that reading the clock takes less than 1 % of shading time.
@@ -42,14 +42,14 @@ class CostTracker {
   /// Number of timed records, by material.
   std::span<const uint64_t> timed() const { return timed_; }
   /// Number of records, timed or not, by material.
-  std::span<const uint64_t> seen() const { return seen_; }
-  /// Adds the measurements of `other` and clears them, except for `seen`. The time charged beside
-  /// batches is averaged over all records of a material and added to its timed records.
+  std::span<const uint64_t> record_counts() const { return record_counts_; }
+  /// Adds the measurements of `other` and clears them, except for `record_counts`. The time charged
+  /// beside batches is averaged over all records of a material and added to its timed records.
   void take(CostTracker& other);
 
  private:
-  std::vector<double> ns_, beside_ns_;
-  std::vector<uint64_t> timed_, seen_, seen_before_;
+  std::vector<double> ns_, untimed_ns_;
+  std::vector<uint64_t> timed_, record_counts_, counts_before_;
   uint32_t large_ = 0, small_ = 0;
 };
 

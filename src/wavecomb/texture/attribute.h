@@ -12,7 +12,7 @@ namespace wavecomb {
 /// Position on a mesh: mesh and primitive index, and the barycentric coordinates u and v of
 /// vertices 1 and 2 of a triangle. For curves, u is the position along the segment.
 template <typename F>
-struct MeshPlace {
+struct MeshPosition {
   UInt<F> mesh = UInt<F>(kNoMesh), prim = UInt<F>(0u);
   F u = F(0.f), v = F(0.f);
 };
@@ -62,15 +62,15 @@ inline void corner_values(const AttributeRecord& record, uint32_t prim, size_t (
 /// packets and scalars.
 template <typename F>
 inline void read_attribute(const AttributeView& view, uint32_t id, uint32_t width,
-                           const MeshPlace<F>& place, const Mask<F>& active, F* out) {
+                           const MeshPosition<F>& mesh_position, const Mask<F>& active, F* out) {
   if (view.of_mesh == nullptr) return;
   using detail::InMemory;
-  constexpr uint32_t kMost = 4;
-  const InMemory<UInt<F>> mesh(place.mesh), prim(place.prim);
+  constexpr uint32_t kMax = 4;
+  const InMemory<UInt<F>> mesh(mesh_position.mesh), prim(mesh_position.prim);
   InMemory<UInt<F>> found;
   alignas(64) float along[kWidth<F>];
-  alignas(64) float corner[3][kMost][kWidth<F>] = {};
-  store(along, place.u);
+  alignas(64) float corner[3][kMax][kWidth<F>] = {};
+  store(along, mesh_position.u);
   const uint32_t bits = lane_bits<F>(active);
   for (size_t i = 0; i < kWidth<F>; ++i) {
     if ((bits >> i & 1u) == 0 || mesh.value[i] == kNoMesh) continue;
@@ -86,14 +86,14 @@ inline void read_attribute(const AttributeView& view, uint32_t id, uint32_t widt
     detail::corner_values(*record, prim.value[i], at);
     const auto* values = reinterpret_cast<const float*>(record->values);
     for (size_t k = 0; k < 3; ++k)
-      for (uint32_t c = 0; c < width && c < kMost; ++c)
+      for (uint32_t c = 0; c < width && c < kMax; ++c)
         corner[k][c][i] = values[at[k] * record->width + c];
   }
   const Mask<F> has = active & Mask<F>(load<UInt<F>>(found.value) != UInt<F>(0u));
   const F u = load<F>(along);
-  for (uint32_t c = 0; c < width && c < kMost; ++c) {
+  for (uint32_t c = 0; c < width && c < kMax; ++c) {
     const F c0 = load<F>(corner[0][c]), c1 = load<F>(corner[1][c]), c2 = load<F>(corner[2][c]);
-    out[c] = select(has, fma(F(c2 - c0), place.v, fma(F(c1 - c0), u, c0)), out[c]);
+    out[c] = select(has, fma(F(c2 - c0), mesh_position.v, fma(F(c1 - c0), u, c0)), out[c]);
   }
 }
 

@@ -100,7 +100,7 @@ inline Taps<F> make_taps(Wrap wrap, const F& x, const UInt<F>& size) {
 
 /// Returns the storage index, in texels, of column x and row y of a level.
 template <typename F>
-inline UInt<F> texel_place(const LevelLanes<F>& level, const UInt<F>& x, const UInt<F>& y) {
+inline UInt<F> texel_offset(const LevelLanes<F>& level, const UInt<F>& x, const UInt<F>& y) {
   static_assert(TextureView::kTile == 8);
   const UInt<F> tile = (y >> 3) * level.tiles_x + (x >> 3);
   return level.offset + (tile << 6) + ((y & 7u) << 3) + (x & 7u);
@@ -164,7 +164,7 @@ inline Texel<F> fetch(const TextureView& texture, const UInt<F>& i, const Mask<F
 template <typename F>
 inline Texel<F> tap(const TextureView& texture, const LevelLanes<F>& level, const UInt<F>& x,
                     const UInt<F>& y, const Mask<F>& in, const Mask<F>& active) {
-  const Texel<F> texel = fetch<F>(texture, texel_place<F>(level, x, y), active);
+  const Texel<F> texel = fetch<F>(texture, texel_offset<F>(level, x, y), active);
   if (texture.wrap_s != Wrap::kBlack && texture.wrap_t != Wrap::kBlack) return texel;
   const F zero(0.f);
   return select_texel<F>(in, texel, {zero, zero, zero, texture.has_alpha ? zero : F(1.f)});

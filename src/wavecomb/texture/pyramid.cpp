@@ -282,7 +282,7 @@ class Pyramid {
       const size_t n = size_t{std::min(kTile, at.width - x)} * C;
       for (size_t i = 0; i < n; ++i) codes[i] = encode(row[i], i % C);
       std::memcpy(storage_ + texel_index(at, x, y) * (C * sizeof(T)), codes, n * sizeof(T));
-      range.note(row, codes, n);
+      range.extend(row, codes, n);
     }
     range.add_to(totals, encode, [&](T code, size_t c) {
       return decode_value(reinterpret_cast<const std::byte*>(&code), view_.format,

@@ -29,19 +29,19 @@ class RowRange {
   }
 
   /// Adds `n` values, C <= n <= kRow, and their stored codes.
-  void note(const float* values, const T* codes, size_t n) {
-    const Value* noted;
+  void extend(const float* values, const T* codes, size_t n) {
+    const Value* row_values;
     if constexpr (kByCode)
-      noted = codes;
+      row_values = codes;
     else
-      noted = values;
+      row_values = values;
     // Local copies do not alias and have a fixed length, so that the loops become a few
     // comparisons.
     Value all[kRow];
     if (n == kRow) {
-      std::copy_n(noted, kRow, all);
+      std::copy_n(row_values, kRow, all);
     } else {
-      for (size_t i = 0; i < kRow; ++i) all[i] = noted[i < n ? i : i % C];
+      for (size_t i = 0; i < kRow; ++i) all[i] = row_values[i < n ? i : i % C];
     }
     for (size_t i = 0; i < kRow; ++i) low_[i] = std::min(low_[i], all[i]);
     for (size_t i = 0; i < kRow; ++i) high_[i] = std::max(high_[i], all[i]);

@@ -28,12 +28,12 @@ void TileQueue::begin(uint32_t tile) {
   ++loading_;
 }
 
-void TileQueue::end(uint32_t tile, size_t room) {
+void TileQueue::end(uint32_t tile, size_t tile_limit) {
   --loading_;
   const uint32_t left = tiles_[tile].left_at;
-  const bool soon = left != 0 && releases_ - left < room;
+  const bool soon = left != 0 && releases_ - left < tile_limit;
   append(tile, soon ? State::kSecond : State::kFirst);
-  if (queues_[1].size * 8 > room * kSecondEighths) {
+  if (queues_[1].size * 8 > tile_limit * kSecondEighths) {
     const uint32_t oldest = queues_[1].oldest;
     unlink(oldest);
     append(oldest, State::kFirst);

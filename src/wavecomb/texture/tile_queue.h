@@ -27,8 +27,8 @@ class TileQueue {
 
   /// Marks an absent tile as loading.
   void begin(uint32_t tile);
-  /// Marks a loading tile as resident. `room`: number of tiles that fit in memory.
-  void end(uint32_t tile, size_t room);
+  /// Marks a loading tile as resident. `tile_limit`: number of tiles that fit in memory.
+  void end(uint32_t tile, size_t tile_limit);
   /// Forgets a tile whose contents will be replaced.
   void drop(uint32_t tile);
   /// Removes the next tile to evict and writes it to `tile`; returns false if none is resident.
@@ -36,7 +36,7 @@ class TileQueue {
 
  private:
   static constexpr uint32_t kNone = 0xffffffffu;
-  /// Maximum fraction of `room` for the second queue, in eighths.
+  /// Maximum fraction of `tile_limit` for the second queue, in eighths.
   static constexpr size_t kSecondEighths = 6;
   struct Tile {
     uint32_t older = kNone, newer = kNone;

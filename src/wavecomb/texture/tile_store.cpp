@@ -19,8 +19,8 @@ using Clock = std::chrono::steady_clock;
 /// Tiles per chunk of address space, unless a texture needs more.
 constexpr uint32_t kChunkTiles = 4096;
 /// Number of reader threads served by one keeper thread, which also waits for the file.
-constexpr unsigned kReadersPerKeeper = 8;
-constexpr unsigned kMaxKeepers = 8;
+constexpr unsigned kReadersPerLoader = 8;
+constexpr unsigned kMaxLoaders = 8;
 
 size_t round_up(size_t n, size_t unit) {
   return (n + unit - 1) / unit * unit;
@@ -39,9 +39,9 @@ std::string no_memory(int reason) {
 }
 
 uint64_t checked(uint64_t limit_bytes) {
-  if (limit_bytes < TileStore::kLeastBytes)
+  if (limit_bytes < TileStore::kMinBytes)
     throw Error("texture limit " + megabytes(limit_bytes) + ": give at least " +
-                megabytes(TileStore::kLeastBytes));
+                megabytes(TileStore::kMinBytes));
   return limit_bytes;
 }
 
@@ -56,14 +56,14 @@ TileStore::TileStore(uint64_t limit_bytes, std::string folder)
 
 TileStore::~TileStore() {
   faults_.stop();
-  for (std::thread& keeper : keepers_) keeper.join();
+  for (std::thread& loader : loaders_) loader.join();
 }
 
 uint64_t TileStore::resident_bytes() const {
   return queue_.bytes() + (file_ ? queue_.resident() * tile_bytes_ : held_bytes_);
 }
 
-size_t TileStore::room() const {
+size_t TileStore::tile_limit() const {
   // Enough tiles that concurrent readers do not evict each other's tiles for ever.
   constexpr size_t kLeast = 32;
   const uint64_t own = std::min(queue_.bytes() + counts_.grid_bytes, limit_bytes_);
@@ -85,21 +85,21 @@ void TileStore::spill_before(uint64_t more) {
   if (!file_ && resident_bytes() + counts_.grid_bytes + more > limit_bytes_) spill();
 }
 
-void TileStore::keep_grid(const void* grid, size_t bytes) {
+void TileStore::register_grid(const void* grid, size_t bytes) {
   const std::lock_guard lock(mutex_);
-  Grid& kept = grids_.insert({grid, Grid{bytes, 0}}).first->second;
-  if (kept.uses++ > 0) return;
-  counts_.grid_bytes += kept.bytes;
+  Grid& entry = grids_.insert({grid, Grid{bytes, 0}}).first->second;
+  if (entry.uses++ > 0) return;
+  counts_.grid_bytes += entry.bytes;
   if (!ranges_.empty()) spill_before(0);
-  make_room();
+  evict_tiles();
 }
 
-void TileStore::drop_grid(const void* grid) {
+void TileStore::unregister_grid(const void* grid) {
   const std::lock_guard lock(mutex_);
-  const auto kept = grids_.find(grid);
-  if (kept == grids_.end() || --kept->second.uses > 0) return;
-  counts_.grid_bytes -= kept->second.bytes;
-  grids_.erase(kept);
+  const auto entry = grids_.find(grid);
+  if (entry == grids_.end() || --entry->second.uses > 0) return;
+  counts_.grid_bytes -= entry->second.bytes;
+  grids_.erase(entry);
 }
 
 const std::byte* TileStore::add(const std::byte* data, size_t bytes) {
@@ -183,7 +183,7 @@ uint32_t TileStore::allocate(uint32_t count) {
     places_[base] = chunks_.size();
     chunks_.push_back({base, first, size});
     queue_.resize(first + size);
-    if (file_) make_room();
+    if (file_) evict_tiles();
     at = free_.emplace(first, size).first;
   }
   const auto [first, size] = *at;
@@ -238,19 +238,19 @@ void TileStore::spill() {
     file->write(nothing.data(), range.count * tile_bytes_ - bytes, offset + bytes);
   }
   // Start the threads before memory is released, since only they can bring tiles back.
-  start_keepers();
+  start_loaders();
   for (const auto& [first, range] : ranges_)
     faults_.release(address(first), range.count * tile_bytes_);
   held_bytes_ = 0;
   file_ = std::move(file);
 }
 
-void TileStore::start_keepers() {
+void TileStore::start_loaders() {
   const unsigned readers = std::max(1u, std::thread::hardware_concurrency());
-  const unsigned count = std::clamp(readers / kReadersPerKeeper, 1u, kMaxKeepers);
-  if (!keepers_.empty()) return;
+  const unsigned count = std::clamp(readers / kReadersPerLoader, 1u, kMaxLoaders);
+  if (!loaders_.empty()) return;
   buffers_.resize(count * tile_bytes_);
-  keepers_.reserve(count);
+  loaders_.reserve(count);
   // Block signals in the new threads, so that the existing threads handle them.
   sigset_t all, before;
   sigfillset(&all);
@@ -258,22 +258,22 @@ void TileStore::start_keepers() {
   int reason = 0;
   try {
     for (unsigned i = 0; i < count; ++i)
-      keepers_.emplace_back([this, buffer = &buffers_[i * tile_bytes_]] { keep(buffer); });
+      loaders_.emplace_back([this, buffer = &buffers_[i * tile_bytes_]] { keep(buffer); });
   } catch (const std::system_error& error) {
     reason = error.code().value();
   }
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
   // A few threads suffice if not all could be started.
-  if (keepers_.empty()) throw Error(no_memory(reason));
+  if (loaders_.empty()) throw Error(no_memory(reason));
 }
 
 void TileStore::put(const std::byte* at, const std::byte* from, size_t bytes) {
   if (const int reason = faults_.fill(at, from, bytes)) throw Error(no_memory(reason));
 }
 
-void TileStore::make_room() {
+void TileStore::evict_tiles() {
   uint32_t tile;
-  while (queue_.resident() > room() && queue_.release(tile)) {
+  while (queue_.resident() > tile_limit() && queue_.release(tile)) {
     // The lock is held, so that the state of a tile always matches its memory.
     faults_.release(address(tile), tile_bytes_);
     ++counts_.releases;
@@ -281,20 +281,21 @@ void TileStore::make_room() {
 }
 
 void TileStore::keep(std::byte* buffer) noexcept {
-  const std::byte* places[UserFaults::kMostPlaces];
-  while (const size_t count = faults_.wait(places))
-    for (size_t i = 0; i < count; ++i) serve(places[i], buffer);
+  const std::byte* addresses[UserFaults::kMaxAddresses];
+  while (const size_t count = faults_.wait(addresses))
+    for (size_t i = 0; i < count; ++i) serve(addresses[i], buffer);
 }
 
 void TileStore::serve(const std::byte* at, std::byte* buffer) {
   const Clock::time_point start = Clock::now();
   std::unique_lock lock(mutex_);
   const uint32_t tile = tile_at(at);
-  const std::byte* place = address(tile);
+  const std::byte* tile_address = address(tile);
   if (queue_.state(tile) == TileQueue::State::kLoading) return;  // the loading thread wakes readers
-  if (queue_.state(tile) != TileQueue::State::kAbsent) return faults_.wake(place, tile_bytes_);
+  if (queue_.state(tile) != TileQueue::State::kAbsent)
+    return faults_.wake(tile_address, tile_bytes_);
   queue_.begin(tile);
-  make_room();
+  evict_tiles();
   counts_.peak_bytes = std::max(counts_.peak_bytes, resident_bytes());
   lock.unlock();
   // Readers must be resumed in any case; check() reports the failure to the render later.
@@ -303,13 +304,13 @@ void TileStore::serve(const std::byte* at, std::byte* buffer) {
     std::fill_n(buffer, tile_bytes_, std::byte{0});
     failure = Failure::kFile;
   }
-  const int reason = faults_.fill(place, buffer, tile_bytes_);
+  const int reason = faults_.fill(tile_address, buffer, tile_bytes_);
   if (reason != 0) {
-    faults_.give_up(place, tile_bytes_);
+    faults_.abandon(tile_address, tile_bytes_);
     failure = Failure::kMemory;
   }
   lock.lock();
-  queue_.end(tile, room());
+  queue_.end(tile, tile_limit());
   ++counts_.loads;
   if (failure != Failure::kNone && failure_.load(std::memory_order_relaxed) == Failure::kNone) {
     reason_ = reason;

@@ -50,10 +50,10 @@ class TileStore {
   /// channels.
   static constexpr size_t kTileBytes = 16384;
   /// Smallest limit, which allows some tiles for each reader.
-  static constexpr uint64_t kLeastBytes = 1'000'000;
+  static constexpr uint64_t kMinBytes = 1'000'000;
 
   /// `folder`: for the temporary file, which may grow to the size of all textures. Throws Error if
-  /// the limit is below kLeastBytes or the system lacks support (UserFaults::obstacle).
+  /// the limit is below kMinBytes or the system lacks support (UserFaults::unsupported_reason).
   TileStore(uint64_t limit_bytes, std::string folder);
   ~TileStore();
   TileStore(const TileStore&) = delete;
@@ -71,10 +71,11 @@ class TileStore {
   /// Frees memory returned by add().
   void remove(const std::byte* at);
 
-  /// Registers a grid of `bytes` bytes in memory and evicts textures to make room. Each drop_grid()
-  /// undoes one call; the last one unregisters the grid. Throws Error like expect().
-  void keep_grid(const void* grid, size_t bytes);
-  void drop_grid(const void* grid);
+  /// Registers a grid of `bytes` bytes in memory and evicts textures to make room. Each
+  /// unregister_grid() undoes one call; the last one unregisters the grid. Throws Error like
+  /// expect().
+  void register_grid(const void* grid, size_t bytes);
+  void unregister_grid(const void* grid);
 
   uint64_t limit_bytes() const { return limit_bytes_; }
   StoreStatistics statistics() const;
@@ -101,12 +102,12 @@ class TileStore {
   /// Calls spill() if textures, grids and `more` bytes would exceed the limit in memory.
   void spill_before(uint64_t more);
   /// Number of tiles that fit within the limit.
-  size_t room() const;
+  size_t tile_limit() const;
   /// Evicts tiles until the resident ones fit.
-  void make_room();
+  void evict_tiles();
   /// Moves all textures to the temporary file. Throws Error on failure.
   void spill();
-  void start_keepers();
+  void start_loaders();
   void put(const std::byte* at, const std::byte* from, size_t bytes);
 
   // On threads of the store, where exceptions would not be caught.
@@ -140,7 +141,7 @@ class TileStore {
   std::atomic<Failure> failure_{Failure::kNone};
   int reason_ = 0;                  ///< errno of a kMemory failure
   std::vector<std::byte> buffers_;  ///< one tile per keeper
-  std::vector<std::thread> keepers_;
+  std::vector<std::thread> loaders_;
 };
 
 }  // namespace wavecomb

@@ -50,7 +50,7 @@ std::string reason_of(int error) {
 
 }  // namespace
 
-std::string UserFaults::obstacle() {
+std::string UserFaults::unsupported_reason() {
   const int fd = open_faults();
   if (fd < 0) return reason_of(errno);
   ::close(fd);
@@ -103,7 +103,7 @@ int UserFaults::fill(const std::byte* at, const std::byte* from, size_t bytes) n
   return 0;
 }
 
-void UserFaults::give_up(const std::byte* at, size_t bytes) noexcept {
+void UserFaults::abandon(const std::byte* at, size_t bytes) noexcept {
   // From here on the kernel fills the range with zero pages like other memory.
   uffdio_range range{number(at), bytes};
   ::ioctl(faults_, UFFDIO_UNREGISTER, &range);
@@ -119,7 +119,7 @@ void UserFaults::wake(const std::byte* at, size_t bytes) noexcept {
   ::ioctl(faults_, UFFDIO_WAKE, &range);
 }
 
-size_t UserFaults::wait(const std::byte** places) noexcept {
+size_t UserFaults::wait(const std::byte** addresses) noexcept {
   for (;;) {
     pollfd files[2] = {{faults_, POLLIN, 0}, {stop_, POLLIN, 0}};
     // Keep serving after any poll error, such as lack of memory, since readers are waiting.
@@ -128,12 +128,12 @@ size_t UserFaults::wait(const std::byte** places) noexcept {
       continue;
     }
     if (files[1].revents != 0) return 0;
-    uffd_msg messages[kMostPlaces];
+    uffd_msg messages[kMaxAddresses];
     const ssize_t size = ::read(faults_, messages, sizeof(messages));
     size_t count = 0;
     for (size_t i = 0; size > 0 && i < static_cast<size_t>(size) / sizeof(uffd_msg); ++i)
       if (messages[i].event == UFFD_EVENT_PAGEFAULT)
-        places[count++] =
+        addresses[count++] =
             reinterpret_cast<const std::byte*>(uintptr_t{messages[i].arg.pagefault.address});
     if (count > 0) return count;  // otherwise another thread took the events
   }
@@ -151,11 +151,11 @@ size_t page_bytes() {
 
 #else
 
-std::string UserFaults::obstacle() {
+std::string UserFaults::unsupported_reason() {
   return "the system has no userfaultfd; it needs Linux 5.11 or later";
 }
 UserFaults::UserFaults() {
-  throw Error(obstacle());
+  throw Error(unsupported_reason());
 }
 UserFaults::~UserFaults() = default;
 const std::byte* UserFaults::map(size_t) {
@@ -164,7 +164,7 @@ const std::byte* UserFaults::map(size_t) {
 int UserFaults::fill(const std::byte*, const std::byte*, size_t) noexcept {
   return 0;
 }
-void UserFaults::give_up(const std::byte*, size_t) noexcept {}
+void UserFaults::abandon(const std::byte*, size_t) noexcept {}
 void UserFaults::release(const std::byte*, size_t) noexcept {}
 void UserFaults::wake(const std::byte*, size_t) noexcept {}
 size_t UserFaults::wait(const std::byte**) noexcept {

@@ -16,9 +16,9 @@ namespace wavecomb {
 class UserFaults {
  public:
   /// Returns a short reason why the system lacks support, or "" if it has it.
-  static std::string obstacle();
+  static std::string unsupported_reason();
 
-  /// Throws Error with the text of obstacle() if unsupported.
+  /// Throws Error with the text of unsupported_reason() if unsupported.
   UserFaults();
   /// Unmaps all memory. No thread may be waiting or reading.
   ~UserFaults();
@@ -33,16 +33,16 @@ class UserFaults {
   [[nodiscard]] int fill(const std::byte* at, const std::byte* from, size_t bytes) noexcept;
   /// Resumes threads that wait for a range that cannot be filled. Unfilled pages read as zero.
   /// Needs no memory.
-  void give_up(const std::byte* at, size_t bytes) noexcept;
+  void abandon(const std::byte* at, size_t bytes) noexcept;
   /// Frees the memory of a range; reading it blocks again.
   void release(const std::byte* at, size_t bytes) noexcept;
   /// Wakes threads that wait for a range that is already filled.
   void wake(const std::byte* at, size_t bytes) noexcept;
   /// Maximum number of addresses returned by one wait().
-  static constexpr size_t kMostPlaces = 16;
-  /// Blocks until a thread reads an unfilled page. Writes the addresses of up to kMostPlaces such
-  /// reads to `places` and returns their number, or 0 after stop().
-  size_t wait(const std::byte** places) noexcept;
+  static constexpr size_t kMaxAddresses = 16;
+  /// Blocks until a thread reads an unfilled page. Writes the addresses of up to kMaxAddresses such
+  /// reads to `addresses` and returns their number, or 0 after stop().
+  size_t wait(const std::byte** addresses) noexcept;
   /// Ends all current and future wait() calls.
   void stop();
 

@@ -8,7 +8,7 @@ namespace {
 
 /// Largest number of instances to search. It suffices to find every material of a typical scene and
 /// takes negligible time.
-constexpr size_t kMostInstances = 1 << 14;
+constexpr size_t kMaxInstances = 1 << 14;
 /// Number of faces to inspect in each mesh, evenly spaced.
 constexpr size_t kFaces = 256;
 
@@ -17,7 +17,7 @@ constexpr size_t kFaces = 256;
 std::vector<CalibrationHits> find_calibration_hits(const Scene& scene) {
   const SceneView view = scene.view();
   std::vector<CalibrationHits> of_material(scene.materials().size());
-  const size_t instances = std::min(scene.instances().size() + 1, kMostInstances);
+  const size_t instances = std::min(scene.instances().size() + 1, kMaxInstances);
   for (uint32_t inst = 0; inst < instances; ++inst) {
     const Group& group = scene.groups()[inst == 0 ? 0 : scene.instances()[inst - 1].group];
     for (uint32_t geom = 0; geom < group.meshes.size(); ++geom) {
@@ -29,7 +29,7 @@ std::vector<CalibrationHits> find_calibration_hits(const Scene& scene) {
         uint32_t material = mesh.face_materials.empty() ? mesh.material : mesh.face_materials[f];
         if (material == kInheritMaterial) material = view.instances[inst].material;
         CalibrationHits& hits = of_material[material];
-        if (hits.distinct == CalibrationHits::kMost) {
+        if (hits.distinct == CalibrationHits::kMax) {
           if (mesh.face_materials.empty()) break;
           continue;
         }

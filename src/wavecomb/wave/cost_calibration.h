@@ -16,12 +16,12 @@ struct CalibrationHit {
 
 /// Synthetic hits of one material: `count` records distributed over `distinct` triangles.
 struct CalibrationHits {
-  static constexpr uint32_t kMost = 64;
+  static constexpr uint32_t kMax = 64;
   uint32_t material = 0;
   uint32_t count = 0;
   uint32_t distinct = 0;
   float fill = 1;  ///< average fraction of active lanes in packets; at least one lane is active
-  CalibrationHit hits[kMost];
+  CalibrationHit hits[kMax];
 };
 
 /// Returns triangles of each material that is bound to a visible mesh, distributed over its meshes.

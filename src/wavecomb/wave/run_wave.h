@@ -34,7 +34,8 @@ struct CameraPaths {
   }
   void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                uint32_t depth) const {
-    if constexpr (Media::kStreams) media.template fly_all<F>(wave, depth, settings.sampler);
+    if constexpr (Media::kStreams)
+      media.template sample_wave_flights<F>(wave, depth, settings.sampler);
     wavecomb::collect<F>(wave, context, settings, depth, media);
   }
   static const auto& kernels(const WaveContext& context, const ShadeSettings& settings) {
@@ -64,9 +65,9 @@ struct LightPaths {
   static constexpr const float* tfar = nullptr;
   const WaveTask* task = nullptr;
 
-  void generate(Wave& wave, const WaveContext& context, const WaveTask& its_task) {
-    task = &its_task;
-    generate_light<F>(wave, context, its_task);
+  void generate(Wave& wave, const WaveContext& context, const WaveTask& next_task) {
+    task = &next_task;
+    generate_light<F>(wave, context, next_task);
     fetch_rays<F>(wave);
   }
   static bool are_coherent(const WaveContext& /*context*/) { return false; }
@@ -75,8 +76,8 @@ struct LightPaths {
   }
   void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                uint32_t depth) const {
-    if (context.lessons && depth == 0) [[unlikely]]
-      note_first_places(wave, context, *task);
+    if (context.aim_samples && depth == 0) [[unlikely]]
+      record_first_hits(wave, context, *task);
     wavecomb::collect<F, NoMedia, true>(wave, context, settings, depth, NoMedia());
   }
   static const auto& kernels(const WaveContext& /*context*/, const ShadeSettings& /*settings*/) {
@@ -87,10 +88,10 @@ struct LightPaths {
   }
   static void connect(Wave& /*wave*/, const WaveContext& /*context*/, uint32_t /*depth*/) {}
   static void end_depth(Wave& /*wave*/, const WaveTask& /*task*/, uint32_t /*depth*/) {}
-  static void resolve(Wave& wave, const WaveContext& context, const WaveTask& its_task,
+  static void resolve(Wave& wave, const WaveContext& context, const WaveTask& next_task,
                       uint32_t /*depth*/) {
     if (context.merges()) context.film->take(wave.splats);
-    count_light_paths(context, its_task);
+    count_light_paths(context, next_task);
   }
 };
 
@@ -156,9 +157,9 @@ void run_stages(Wave& wave, const WaveContext& context, const WaveTask& task, Pa
 template <typename F>
 void run_connected_light(Wave& wave, const WaveContext& context, const WaveTask& task) {
   wave.light_vertices.clear(task.path_count());
-  wave.light_use = Wave::LightUse::kKeep;
+  wave.light_use = Wave::LightUse::kStore;
   run_stages<F>(wave, context, task, LightPaths<F>());
-  wave.light_use = Wave::LightUse::kShow;
+  wave.light_use = Wave::LightUse::kToCamera;
 }
 
 /// Runs a wave of camera paths in lanes of type F.

@@ -37,7 +37,7 @@
 
 namespace wavecomb {
 
-class AimLessons;
+class AimSamples;
 
 /// Data that all waves of a render read.
 struct WaveContext {
@@ -58,23 +58,25 @@ struct WaveContext {
   RayRecorder* recorder;               ///< receives the rays of benchmarks, otherwise null
   const AovTables* aovs = nullptr;     ///< object names and groups for AOVs; null if unused
   HistoryReader* histories = nullptr;  ///< receives vertices of finished paths; null if unused
-  const GuideView* guide = nullptr;    ///< guides bounces, or is in training; null without guiding
+  const GuidingView* guide = nullptr;  ///< guides bounces, or is in training; null without guiding
   bool discards = false;  ///< if true, paths serve `histories` only, and the film gets none
-  const SplatFilter* splat_filter = nullptr;  ///< filter of light paths; null without light paths
-  AimLessons* lessons = nullptr;  ///< receives the contributions of light paths instead of the film
-  float light_paths = 1;          ///< light paths per camera path, averaged over the image
+  const LightSplatFilter* light_splat_filter =
+      nullptr;  ///< filter of light paths; null without light paths
+  AimSamples* aim_samples =
+      nullptr;            ///< receives the contributions of light paths instead of the film
+  float light_paths = 1;  ///< light paths per camera path, averaged over the image
   /// Not 0 in some pilot renders: light splats then carry, instead of light, the variance that this
   /// light would add to a sample of a pixel if camera paths had to find it, divided by this
   /// brightness (light_vertex.h). 0 means that splats carry light.
   float camera_squares = 0;
 
   /// Points of camera paths to merge light paths with; null without merging.
-  const VisibleGrid* visible = nullptr;
+  const MergeGrid* visible = nullptr;
 
   /// Returns whether light paths are merged with points of camera paths.
   bool merges() const { return visible != nullptr; }
   /// Returns whether the render has light paths.
-  bool joins_light() const { return splat_filter != nullptr; }
+  bool joins_light() const { return light_splat_filter != nullptr; }
   /// Returns whether vertices of camera paths connect to vertices of light paths.
   bool connects() const { return joins_light() && settings->connects(); }
   /// Returns one over the number of light paths in the whole image for each sample of a pixel.
@@ -85,18 +87,18 @@ struct WaveContext {
 
   /// Returns whether the scene has volumes, nested dielectrics or subsurface scattering.
   bool has_media() const {
-    return scene.volumes.count > 0 || scene.walks.media != nullptr || knows_inside();
+    return scene.volumes.count > 0 || scene.walks.media != nullptr || has_medium_stack();
   }
   /// Returns whether paths keep a medium stack.
-  bool knows_inside() const { return scene.interiors.media != nullptr; }
+  bool has_medium_stack() const { return scene.nested_media.media != nullptr; }
   /// Returns whether paths need a shutter time.
   bool moves() const { return scene.has_motion || camera->moves(); }
   /// Returns whether paths keep the link class of the surface that they left.
   bool links() const { return scene.lights.links.members != nullptr; }
   /// Returns whether paths keep the importance of their pixel.
-  bool weighs_pixels() const { return guide && guide->tiles; }
+  bool uses_pixel_importance() const { return guide && guide->tiles; }
   /// Returns the number of vertices to keep for each path.
-  uint32_t kept_vertices() const { return histories ? histories->most() : 0; }
+  uint32_t stored_vertices() const { return histories ? histories->most() : 0; }
   bool orders_rays() const {
     return settings->ray_order != RayOrder::kSlot || settings->shadow_order != RayOrder::kSlot;
   }
@@ -108,11 +110,11 @@ struct WaveContext {
 /// allocates nothing.
 struct Wave {
   Wave(uint32_t capacity, const WaveContext& context)
-      : pool(capacity, context.moves() || context.links() || context.weighs_pixels(),
-             context.joins_light(), context.knows_inside(), context.scene.lights.shadows != nullptr,
-             context.scene.lights.has_multipliers),
+      : pool(capacity, context.moves() || context.links() || context.uses_pixel_importance(),
+             context.joins_light(), context.has_medium_stack(),
+             context.scene.lights.shadows != nullptr, context.scene.lights.has_multipliers),
         aovs(capacity, context.film->aovs().layout(), context.aovs),
-        history(capacity, context.kept_vertices()),
+        history(capacity, context.stored_vertices()),
         rays(capacity),
         hits(capacity),
         shading(capacity, kRowWords<ShadingRecord>),
@@ -120,14 +122,14 @@ struct Wave {
         columns(3, capacity),
         times(context.scene.has_motion ? SoaBlock(1, capacity) : SoaBlock()),
         walks(context.scene.walks.media ? SoaBlock(kWalkColumns, capacity) : SoaBlock()),
-        ways(context.has_media() ? SoaBlock(kWayColumns, capacity) : SoaBlock()),
-        interiors(context.knows_inside() ? capacity : 0),
+        segments(context.has_media() ? SoaBlock(kSegmentColumns, capacity) : SoaBlock()),
+        nested_media(context.has_medium_stack() ? capacity : 0),
         sorter(capacity),
         ray_sorter(context.orders_rays() ? capacity : 0),
         ray_indices(context.orders_rays() ? capacity + SoaBlock::kPad : 0),
         scratch(context.traits.size()),
         costs(context.traits.size()),
-        splats(context.joins_light() ? kSplats : 0),
+        splats(context.joins_light() ? kLightSplats : 0),
         policy_chooser(context.policies.size()),
         ray_chooser(kRayOrders),
         shadow_chooser(kRayOrders),
@@ -136,9 +138,9 @@ struct Wave {
         light_aovs(context.joins_light() ? LightPathAovs(capacity, context.film->aovs().layout(),
                                                          context.aovs, context.connects())
                                          : LightPathAovs()) {}
-  static constexpr size_t kWayColumns = 14, kWalkColumns = 36;
-  static constexpr size_t kSplats = 4096;  ///< size of the buffer of light splats
-  static constexpr size_t kRayOrders = 4;  ///< slot, morton, morton-octant and direction
+  static constexpr size_t kSegmentColumns = 14, kWalkColumns = 36;
+  static constexpr size_t kLightSplats = 4096;  ///< size of the buffer of light splats
+  static constexpr size_t kRayOrders = 4;       ///< slot, morton, morton-octant and direction
 
   PathPool pool;
   PathAovs aovs;
@@ -147,16 +149,16 @@ struct Wave {
   HitBuffer hits;
   ShadingQueue shading;
   ShadowQueue shadows;
-  SoaBlock columns;  ///< columns of ShadingQueueView: throughput, position key, texture key
-  SoaBlock times;    ///< shutter times of the traced rays, if the scene has motion
-  SoaBlock walks;    ///< subsurface random walks (medium/subsurface/walk_queue.h)
-  SoaBlock ways;     ///< free flights in volumes (medium/wave/volumes.h)
-  InteriorBuffers interiors;  ///< buffers of the medium stack (medium/nested/nested_media.h)
+  SoaBlock columns;   ///< columns of ShadingQueueView: throughput, position key, texture key
+  SoaBlock times;     ///< shutter times of the traced rays, if the scene has motion
+  SoaBlock walks;     ///< subsurface random walks (medium/subsurface/walk_queue.h)
+  SoaBlock segments;  ///< free flights in volumes (medium/wave/volumes.h)
+  NestedMediaBuffers nested_media;  ///< buffers of the medium stack (medium/nested/nested_media.h)
   RadixSorter sorter, ray_sorter;
   std::vector<uint32_t> ray_indices;  ///< padded by one packet
   std::vector<float> scratch;         ///< one value for each material, for policies
   CostTracker costs;
-  SplatList splats;
+  LightSplatList splats;
   Chooser policy_chooser, ray_chooser, shadow_chooser;
   CoherenceCounts coherence;
   /// Number of shading queues so far, of which some are measured for coherence.
@@ -164,16 +166,16 @@ struct Wave {
   PhaseClock clock;
   Counts counts;
   LightVertices light_vertices;
-  VisibleRows visible;
+  MergePointRows visible;
   LightPathAovs light_aovs;  ///< AOVs of light paths
   /// Purpose of shading the vertices of light paths: connect them to the camera; connect them to
   /// the camera and store them; or connect them to the camera path in the same slot.
-  enum class LightUse : uint8_t { kShow, kKeep, kConnect } light_use = LightUse::kShow;
+  enum class LightUse : uint8_t { kToCamera, kStore, kConnect } light_use = LightUse::kToCamera;
 
   size_t bytes() const {
     return pool.bytes() + aovs.bytes() + history.bytes() + rays.bytes() + hits.bytes() +
            shading.bytes() + shadows.bytes() + columns.bytes() + times.bytes() + walks.bytes() +
-           ways.bytes() + interiors.bytes() + splats.bytes() + light_vertices.bytes() +
+           segments.bytes() + nested_media.bytes() + splats.bytes() + light_vertices.bytes() +
            visible.bytes() + light_aovs.bytes();
   }
 };

@@ -21,7 +21,7 @@ BackwardAutomaton::BackwardAutomaton(const PathAutomaton& forward)
   const auto number = [&](MatchedFrom f) {
     const auto [at, is_new] = numbers.try_emplace(f, static_cast<uint32_t>(functions.size()));
     if (is_new) functions.push_back(std::move(f));
-    if (functions.size() > kMostStates)
+    if (functions.size() > kMaxStates)
       throw Error(
           "light path expressions: light paths would need too many states; use fewer "
           "expressions or less repetition, or transport path");

@@ -21,10 +21,10 @@ namespace wavecomb {
 ///
 /// Contract: immutable.
 struct BackwardAutomaton {
-  static constexpr uint32_t kMostStates = PathAutomaton::kMostStates;
+  static constexpr uint32_t kMaxStates = PathAutomaton::kMaxStates;
 
   BackwardAutomaton() = default;
-  /// Throws Error if there would be more than kMostStates states.
+  /// Throws Error if there would be more than kMaxStates states.
   explicit BackwardAutomaton(const PathAutomaton& forward);
 
   uint32_t forward_states = 0;

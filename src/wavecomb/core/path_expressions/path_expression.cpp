@@ -11,9 +11,9 @@
 namespace wavecomb {
 namespace {
 
-constexpr uint32_t kMostNfaStates = 2000;
+constexpr uint32_t kMaxNfaStates = 2000;
 /// Maximum number of states of the deterministic automaton before minimisation.
-constexpr size_t kMostSets = 4096;
+constexpr size_t kMaxSets = 4096;
 using StateSet = std::vector<uint32_t>;  ///< sorted in ascending order
 
 /// Nondeterministic automaton of all expressions (Thompson 1968).
@@ -49,7 +49,7 @@ class PathNfa {
   };
 
   uint32_t add_state() {
-    if (edges_.size() == kMostNfaStates)
+    if (edges_.size() == kMaxNfaStates)
       throw Error("light path expressions " + names_ +
                   ": they are too long; use fewer expressions or less repetition");
     edges_.emplace_back();
@@ -123,7 +123,7 @@ std::vector<PathStateRow> reached_rows(const PathNfa& nfa, uint32_t ends) {
   };
   number(nfa.step(nfa.start(), kCameraSymbol));
   std::vector<PathStateRow> rows;
-  for (size_t i = 0; i < sets.size() && i <= kMostSets; ++i) {
+  for (size_t i = 0; i < sets.size() && i <= kMaxSets; ++i) {
     PathStateRow row;
     const StateSet from = sets[i];
     for (size_t e = 0; e < kPathEvents; ++e)
@@ -136,7 +136,7 @@ std::vector<PathStateRow> reached_rows(const PathNfa& nfa, uint32_t ends) {
 }
 
 /// Minimises the automaton by merging equivalent states (Moore 1956); the first state stays first.
-std::vector<PathStateRow> least_rows(const std::vector<PathStateRow>& rows) {
+std::vector<PathStateRow> minimal_rows(const std::vector<PathStateRow>& rows) {
   std::vector<uint32_t> classes(rows.size(), 0);
   std::vector<PathStateRow> least;
   for (size_t known = 0;;) {
@@ -144,8 +144,8 @@ std::vector<PathStateRow> least_rows(const std::vector<PathStateRow>& rows) {
     std::vector<uint32_t> finer;
     least.clear();
     for (const PathStateRow& row : rows) {
-      PathStateRow seen{row.next, row.matched};
-      for (uint32_t& to : seen.next) to = classes[to];
+      PathStateRow mapped{row.next, row.matched};
+      for (uint32_t& to : mapped.next) to = classes[to];
       const auto [at, is_new] = numbers.try_emplace(seen, static_cast<uint32_t>(numbers.size()));
       if (is_new) least.push_back(std::move(seen));
       finer.push_back(at->second);
@@ -172,8 +172,8 @@ PathAutomaton::PathAutomaton(std::span<const NamedExpression> all,
   PathNfa nfa(names_of(all));
   for (const NamedExpression& one : all) nfa.add_expression(parse_expression(one, &keys));
   std::vector<PathStateRow> rows = reached_rows(nfa, ends);
-  if (rows.size() <= kMostSets) rows = least_rows(rows);
-  if (rows.size() > kMostStates)
+  if (rows.size() <= kMaxSets) rows = minimal_rows(rows);
+  if (rows.size() > kMaxStates)
     throw Error("light path expressions " + names_of(all) +
                 ": they need too many states; use fewer expressions or less repetition");
   for (const PathStateRow& row : rows) {
@@ -184,16 +184,16 @@ PathAutomaton::PathAutomaton(std::span<const NamedExpression> all,
 }
 
 void check_expressions(std::span<const NamedExpression> expressions) {
-  if (expressions.size() > PathAutomaton::kMostExpressions)
+  if (expressions.size() > PathAutomaton::kMaxExpressions)
     throw Error("there are " + std::to_string(expressions.size()) +
                 " light path expressions; the limit is " +
-                std::to_string(PathAutomaton::kMostExpressions));
+                std::to_string(PathAutomaton::kMaxExpressions));
   for (size_t i = 0; i < expressions.size(); ++i) {
     const NamedExpression& one = expressions[i];
-    const auto is_good = [](char c) {
+    const auto is_symbol = [](char c) {
       return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
     };
-    if (one.name.empty() || !std::all_of(one.name.begin(), one.name.end(), is_good))
+    if (one.name.empty() || !std::all_of(one.name.begin(), one.name.end(), is_symbol))
       throw Error("light path expression '" + one.name +
                   "': the name may contain only letters, digits and underscores");
     for (size_t j = 0; j < i; ++j)

@@ -24,7 +24,12 @@ struct NamedExpression {
 /// Scattering event: reflection or transmission by a diffuse, glossy or singular (mirror) lobe,
 /// scattering in a volume, or entering a surface for a subsurface random walk that leaves by a
 /// reflection.
-enum class PathEvent : uint32_t { kReflection = 0, kTransmission = 3, kVolume = 6, kBelow = 7 };
+enum class PathEvent : uint32_t {
+  kReflection = 0,
+  kTransmission = 3,
+  kVolume = 6,
+  kSubsurface = 7
+};
 inline constexpr uint32_t kPathEvents = 8;
 /// Offsets to add to a reflection or transmission.
 inline constexpr uint32_t kDiffuseEvent = 0, kGlossyEvent = 1, kSingularEvent = 2;
@@ -41,8 +46,8 @@ constexpr uint32_t path_end(PathEnd end, uint32_t key) {
 ///
 /// Contract: immutable. State 0 is that of a path that has just left the camera.
 struct PathAutomaton {
-  static constexpr uint32_t kMostExpressions = 32;
-  static constexpr uint32_t kMostStates = 1024;
+  static constexpr uint32_t kMaxExpressions = 32;
+  static constexpr uint32_t kMaxStates = 1024;
   /// Number of words per row of `next`.
   static constexpr uint32_t kNextWords = 8;
 

@@ -9,8 +9,8 @@
 namespace wavecomb {
 namespace {
 
-constexpr uint32_t kMostRepeats = 64;
-constexpr uint32_t kMostNesting = 64;
+constexpr uint32_t kMaxRepeats = 64;
+constexpr uint32_t kMaxNesting = 64;
 
 /// Returns the symbols that a letter matches, alone or at its position in <>.
 PathSymbols symbols_of_letter(char letter) {
@@ -20,7 +20,7 @@ PathSymbols symbols_of_letter(char letter) {
   };
   const auto ends = [&](std::initializer_list<PathEnd> kinds) {
     for (const PathEnd end : kinds)
-      for (uint32_t key = 0; key < kMostKeys; ++key) s.set(kFirstEnd + path_end(end, key));
+      for (uint32_t key = 0; key < kMaxKeys; ++key) s.set(kFirstEnd + path_end(end, key));
   };
   switch (letter) {
     case 'C':
@@ -36,7 +36,7 @@ PathSymbols symbols_of_letter(char letter) {
       events({static_cast<uint32_t>(PathEvent::kVolume)});
       break;
     case 'W':
-      events({static_cast<uint32_t>(PathEvent::kBelow)});
+      events({static_cast<uint32_t>(PathEvent::kSubsurface)});
       break;
     case 'D':
       events({kDiffuseEvent, 3 + kDiffuseEvent});
@@ -106,7 +106,7 @@ class ExpressionParser {
   }
 
   PathPattern choice() {
-    if (++depth_ > kMostNesting) fail("groups are nested too deep");
+    if (++depth_ > kMaxNesting) fail("groups are nested too deep");
     PathPattern p{.kind = PathPattern::Kind::kChoice};
     do {
       p.parts.push_back(sequence());
@@ -135,7 +135,7 @@ class ExpressionParser {
       } else if (!take('*')) {
         return p;
       }
-      if (n == kMostNesting) fail("too many repetitions of repetitions");
+      if (n == kMaxNesting) fail("too many repetitions of repetitions");
       PathPattern outer{.kind = PathPattern::Kind::kRepeat, .least = least, .most = most};
       outer.parts.push_back(std::move(p));
       p = std::move(outer);
@@ -153,7 +153,7 @@ class ExpressionParser {
     uint32_t n = 0;
     for (; peek() >= '0' && peek() <= '9'; ++at_) {
       n = 10 * n + static_cast<uint32_t>(peek() - '0');
-      if (n > kMostRepeats) fail("a count is at most " + std::to_string(kMostRepeats));
+      if (n > kMaxRepeats) fail("a count is at most " + std::to_string(kMaxRepeats));
     }
     return n;
   }
@@ -192,7 +192,7 @@ class ExpressionParser {
     return c == '.' ? all_symbols() : symbols_of_letter(c);
   }
   /// Parses one position in <>: a letter of `known`, or [...] of such letters.
-  PathSymbols place(std::string_view known) {
+  PathSymbols parse_position(std::string_view known) {
     if (!take('[')) return letter(known);
     const bool is_negated = take('^');
     PathSymbols s;
@@ -205,10 +205,10 @@ class ExpressionParser {
 
   /// Parses the part after '<': type of event, type of scattering, and light group.
   PathSymbols event() {
-    PathSymbols s = place(".CLOBERTVW");
+    PathSymbols s = parse_position(".CLOBERTVW");
     // Ends of paths have no scattering type, so <L.> is L.
     if (peek() != '>' && peek() != '\'') {
-      const PathSymbols scattered = place(".DGS");
+      const PathSymbols scattered = parse_position(".DGS");
       PathSymbols scattering;
       for (size_t e = 0; e < kPathEvents; ++e) scattering.set(kFirstEvent + e);
       const PathSymbols all = all_symbols();

@@ -12,8 +12,8 @@ namespace wavecomb {
 
 /// Indices of path symbols: the camera, then events, then ends.
 inline constexpr size_t kCameraSymbol = 0, kFirstEvent = 1, kFirstEnd = kFirstEvent + kPathEvents;
-inline constexpr size_t kMostKeys = 64;
-using PathSymbols = std::bitset<kFirstEnd + kPathEnds * kMostKeys>;
+inline constexpr size_t kMaxKeys = 64;
+using PathSymbols = std::bitset<kFirstEnd + kPathEnds * kMaxKeys>;
 
 /// Node of a syntax tree: one of a set of symbols, a sequence of parts, an alternative of parts, or
 /// a repeated part.

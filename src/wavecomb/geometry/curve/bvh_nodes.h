@@ -18,38 +18,38 @@
 
 namespace wavecomb {
 
-/// Nodes of a mesh of curves that does not deform (see serve()); the mesh must outlive them.
-class CurveClumps {
+/// Nodes of a mesh of curves that does not deform (see supports()); the mesh must outlive them.
+class CurveBvhNodes {
  public:
-  static constexpr uint32_t kPieces = 8;  ///< maximum number of sub-segments per node
+  static constexpr uint32_t kMaxSubSegments = 8;  ///< maximum number of sub-segments per node
 
   /// Returns whether nodes can be built for a mesh.
-  static bool serve(const Mesh& mesh) { return mesh.is_strands() && !mesh.deforms(); }
+  static bool supports(const Mesh& mesh) { return mesh.is_strands() && !mesh.deforms(); }
 
   /// Function that runs two tasks, possibly in parallel.
   using Task = std::function<void()>;
-  using Both = std::function<void(const Task&, const Task&)>;
+  using RunBoth = std::function<void(const Task&, const Task&)>;
 
-  /// Builds the nodes. `both`: runs parallel tasks; the default runs them one after another.
-  explicit CurveClumps(
-      const Mesh& mesh, const Both& both = [](const Task& a, const Task& b) {
+  /// Builds the nodes. `run_both`: runs parallel tasks; the default runs them one after another.
+  explicit CurveBvhNodes(
+      const Mesh& mesh, const RunBoth& run_both = [](const Task& a, const Task& b) {
         a();
         b();
       });
 
-  uint32_t count() const { return static_cast<uint32_t>(clumps_.size()); }
-  size_t bytes() const { return clumps_.size() * sizeof(Clump); }
+  uint32_t count() const { return static_cast<uint32_t>(nodes_.size()); }
+  size_t bytes() const { return nodes_.size() * sizeof(Node); }
 
   /// Returns conservative bounds of a node.
-  Bounds bounds(uint32_t clump) const;
+  Bounds bounds(uint32_t node) const;
 
   /// Returns a bit mask of the sub-segments of a node that a ray may hit with 0 < t <= tfar.
-  uint32_t may_meet(uint32_t clump, const CurveRay& ray, float tfar) const;
+  uint32_t may_hit(uint32_t node, const CurveRay& ray, float tfar) const;
 
-  /// Returns the sub-segment of bit k of may_meet().
-  CurvePiece piece(uint32_t clump, uint32_t k) const {
-    const uint32_t number = clumps_[clump].number[k];
-    return {number / CurvePiece::kNodes, number % CurvePiece::kNodes};
+  /// Returns the sub-segment of bit k of may_hit().
+  SubSegment sub_segment(uint32_t node, uint32_t k) const {
+    const uint32_t number = nodes_[node].number[k];
+    return {number / SubSegment::kNodes, number % SubSegment::kNodes};
   }
 
  private:
@@ -57,21 +57,21 @@ class CurveClumps {
 
   /// Node with quantised capsules. The ends of sub-segment k are at low[axis] + step * cell. The
   /// lower 16 bits of cells[axis][k] are the cell of the first end, the upper 16 bits that of the
-  /// second. The radius is step * radius[k]. number[k] is segment * CurvePiece::kNodes + node, or
+  /// second. The radius is step * radius[k]. number[k] is segment * SubSegment::kNodes + node, or
   /// kNone.
-  struct alignas(32) Clump {
-    std::array<std::array<uint32_t, kPieces>, 3> cells;
-    std::array<uint32_t, kPieces> number;
-    std::array<uint16_t, kPieces> radius;
+  struct alignas(32) Node {
+    std::array<std::array<uint32_t, kMaxSubSegments>, 3> cells;
+    std::array<uint32_t, kMaxSubSegments> number;
+    std::array<uint16_t, kMaxSubSegments> radius;
     std::array<float, 3> low;
     float step;
   };
-  static_assert(sizeof(Clump) == 160);
+  static_assert(sizeof(Node) == 160);
 
-  Clump make(const uint32_t* first, uint32_t n) const;
+  Node make(const uint32_t* first, uint32_t n) const;
 
   const Mesh& mesh_;
-  std::vector<Clump> clumps_;
+  std::vector<Node> nodes_;
 };
 
 }  // namespace wavecomb

@@ -20,9 +20,9 @@ inline Mask<F> passes_capsules(const Vec3<F>& a, const Vec3<F>& b, const F& radi
   // The direction of the axis has the rounding error of its ends. If one end is within the radius,
   // the other is at most the axis length farther away, which bounds the error of the products.
   const F reach = fma(radius, length, F(rounding * (length + radius)));
-  const F beside = abs(fma(cx, a.y, F(-(cy * a.x))));
+  const F separation = abs(fma(cx, a.y, F(-(cy * a.x))));
   const F along_a = fma(cx, a.x, F(cy * a.y)), along_b = fma(cx, b.x, F(cy * b.y));
-  return (beside > reach) | (along_a > reach) | (along_b < -reach) |
+  return (separation > reach) | (along_a > reach) | (along_b < -reach) |
          (max(a.z, b.z) + radius < z_near) | (min(a.z, b.z) - radius > z_far);
 }
 

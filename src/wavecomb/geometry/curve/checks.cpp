@@ -19,7 +19,7 @@ void check_curves(const Mesh& mesh, const std::string& name) {
   };
   if (vertices > kCurveFirstPoint / 4 || mesh.primitive_count() > kCurveFirstPoint / 4)
     throw Error(name + " has too many points for 32-bit offsets; split it");
-  if (mesh.primitive == Primitive::kSplat) check_splats(mesh, name);
+  if (mesh.primitive == Primitive::kGaussianSplat) check_gaussian_splats(mesh, name);
   need(mesh.radii.size(), vertices, "radii");
   if (mesh.is_ribbon()) need(mesh.normals.size(), 3 * vertices * mesh.steps, "normal coordinates");
   if (points) need(mesh.indices.size(), 0, "indices");
@@ -38,8 +38,8 @@ void check_curves(const Mesh& mesh, const std::string& name) {
       throw Error(name + " has a radius that is negative or not finite; give one of 0 or more");
   for (uint32_t word : mesh.indices) {
     const size_t first = word & kCurveFirstPoint;
-    const size_t before = (word & kCurveGoesOnBefore) != 0 ? 1 : 0;
-    const size_t after = (word & kCurveGoesOnAfter) != 0 ? 1 : 0;
+    const size_t before = (word & kCurveContinuesBefore) != 0 ? 1 : 0;
+    const size_t after = (word & kCurveContinuesAfter) != 0 ? 1 : 0;
     if (first < before || first + mesh.segment_points() + after > vertices)
       throw Error(name + " has a segment at control point " + std::to_string(first) + " but only " +
                   std::to_string(vertices) + " points");
@@ -47,7 +47,8 @@ void check_curves(const Mesh& mesh, const std::string& name) {
 }
 
 uint32_t curve_flags(const Mesh& mesh) {
-  if (mesh.is_dots()) return mesh.primitive == Primitive::kSplat ? kIsSplat : kIsSphere;
+  if (mesh.is_dots())
+    return mesh.primitive == Primitive::kGaussianSplat ? kIsGaussianSplat : kIsSphere;
   return (mesh.is_ribbon() ? kIsRibbon : kIsTube) | (mesh.is_cubic() ? kIsCubic : 0u);
 }
 

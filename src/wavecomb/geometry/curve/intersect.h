@@ -22,11 +22,11 @@ struct CurveHit {
 /// Hits of a ray on one primitive, sorted by distance.
 class CurveHits {
  public:
-  static constexpr uint32_t kMost = 8;  ///< farther hits than the nearest 8 are dropped
+  static constexpr uint32_t kMax = 8;  ///< farther hits than the nearest 8 are dropped
 
   void add(const CurveHit& hit) {
-    if (count_ == kMost && !(hit.t < hits_[kMost - 1].t)) return;
-    uint32_t at = count_ < kMost ? count_++ : kMost - 1;
+    if (count_ == kMax && !(hit.t < hits_[kMax - 1].t)) return;
+    uint32_t at = count_ < kMax ? count_++ : kMax - 1;
     for (; at > 0 && hit.t < hits_[at - 1].t; --at) hits_[at] = hits_[at - 1];
     hits_[at] = hit;
   }
@@ -35,13 +35,13 @@ class CurveHits {
   const CurveHit* end() const { return hits_.data() + count_; }
 
  private:
-  std::array<CurveHit, kMost> hits_;
+  std::array<CurveHit, kMax> hits_;
   uint32_t count_ = 0;
 };
 
 /// Sub-segment: node 1 is the whole segment; nodes 2 n and 2 n + 1 are the halves of n in
 /// parameter.
-struct CurvePiece {
+struct SubSegment {
   static constexpr uint32_t kNodes = 8;  ///< node indices are less than this
 
   uint32_t prim;
@@ -60,7 +60,7 @@ Bounds curve_bounds(const Mesh& mesh, uint32_t prim, uint32_t step = 0);
 /// hit. `time`: in [0, 1] over the mesh's motion steps. `outside`: skips hits from inside. Includes
 /// all hits on the given sub-segment and possibly others of its segment; hits are bit-identical to
 /// those of the whole segment.
-CurveHits intersect_curve(const Mesh& mesh, const CurvePiece& piece, const CurveRay& ray,
+CurveHits intersect_curve(const Mesh& mesh, const SubSegment& sub_segment, const CurveRay& ray,
                           float tfar, CurveQuery query, float time = 0, bool outside = false);
 
 }  // namespace wavecomb

@@ -12,15 +12,15 @@
 namespace wavecomb {
 
 /// Maximum number of halvings for which all resulting sub-segments fit in the lanes of a vector.
-inline constexpr int kLeafHalvings = 3;
+inline constexpr int kLaneHalvings = 3;
 
 namespace detail {
 
 /// Weights of the control points at the ends of the final sub-segments.
-struct LeafWeights {
+struct SubSegmentWeights {
   alignas(64) float at[4][16] = {};
 
-  explicit constexpr LeafWeights(int halvings) {
+  explicit constexpr SubSegmentWeights(int halvings) {
     const int n = 1 << halvings;
     for (int i = 0; i <= n; ++i) {
       const float u = static_cast<float>(i) / static_cast<float>(n), w = 1 - u;
@@ -32,26 +32,27 @@ struct LeafWeights {
   }
 };
 
-inline constexpr std::array<LeafWeights, kLeafHalvings + 1> kLeafWeights = {
-    LeafWeights(0), LeafWeights(1), LeafWeights(2), LeafWeights(3)};
+inline constexpr std::array<SubSegmentWeights, kLaneHalvings + 1> kSubSegmentWeights = {
+    SubSegmentWeights(0), SubSegmentWeights(1), SubSegmentWeights(2), SubSegmentWeights(3)};
 
 }  // namespace detail
 
 /// Returns a bit mask of the final sub-segments that the ray may hit with z_near <= z <= z_far.
-/// `piece`: sub-segment in ray space, which is halved `halvings` times; `r`: its maximum radius;
-/// `bulge`: deviation of the final sub-segments from straight lines. Computed in float with a
-/// margin for rounding, so that no hit is missed.
-inline uint32_t leaves_near(const curve_math::Bezier& piece, int halvings, double r, double bulge,
-                            double z_near, double z_far) {
-  using F = FloatP<1 << kLeafHalvings>;
+/// `sub_segment`: sub-segment in ray space, which is halved `halvings` times; `r`: its maximum
+/// radius; `bulge`: deviation of the final sub-segments from straight lines. Computed in float with
+/// a margin for rounding, so that no hit is missed.
+inline uint32_t sub_segments_near(const curve_math::Bezier& sub_segment, int halvings, double r,
+                                  double bulge, double z_near, double z_far) {
+  using F = FloatP<1 << kLaneHalvings>;
   using curve_math::V;
   constexpr double kRounding = 4e-6;  // relative error of float dot products
-  const detail::LeafWeights& weights = detail::kLeafWeights[static_cast<size_t>(halvings)];
+  const detail::SubSegmentWeights& weights =
+      detail::kSubSegmentWeights[static_cast<size_t>(halvings)];
   Vec3<F> a, b;
   const auto ends = [&](double V::* axis, F& at_a, F& at_b) {
     at_a = at_b = F(0.f);
     for (int k = 0; k < 4; ++k) {
-      const F p(static_cast<float>(piece.p[k].*axis));
+      const F p(static_cast<float>(sub_segment.p[k].*axis));
       at_a = fma(load<F>(&weights.at[k][0]), p, at_a);
       at_b = fma(load<F>(&weights.at[k][1]), p, at_b);
     }
@@ -60,7 +61,7 @@ inline uint32_t leaves_near(const curve_math::Bezier& piece, int halvings, doubl
   ends(&V::y, a.y, b.y);
   ends(&V::z, a.z, b.z);
   double size = 0, deep = 0;
-  for (const V& p : piece.p) {
+  for (const V& p : sub_segment.p) {
     size = std::max(size, std::abs(p.x) + std::abs(p.y));
     deep = std::max(deep, std::abs(p.z));
   }

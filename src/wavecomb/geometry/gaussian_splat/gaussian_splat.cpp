@@ -11,10 +11,10 @@ namespace {
 
 using namespace curve_math;
 
-constexpr double kMostDeviations = 3, kLeastAlpha = 1.0 / 255;
-constexpr size_t kMostSplats = 0xffffffffu / 48;  ///< harmonics use 32-bit offsets
+constexpr double kMaxDeviations = 3, kMinAlpha = 1.0 / 255;
+constexpr size_t kMaxGaussianSplats = 0xffffffffu / 48;  ///< harmonics use 32-bit offsets
 /// Bounds of scales, whose products must stay within the range of float.
-constexpr float kLeastScale = 1e-9f, kMostScale = 1e9f;
+constexpr float kMinScale = 1e-9f, kMaxScale = 1e9f;
 
 void need(const std::string& name, size_t has, size_t want, const char* what) {
   if (has != want)
@@ -35,23 +35,25 @@ void axes_of(const float* q, const std::string& name, V (&axis)[3]) {
 }
 
 /// Transforms a vector to units of standard deviations along the axes of a Gaussian splat.
-V whitened(const SplatRow& row, const V& v) {
+V whitened(const GaussianSplatRow& row, const V& v) {
   return {dot_d(vec(row.whiten), v), dot_d(vec(row.whiten + 3), v), dot_d(vec(row.whiten + 6), v)};
 }
 
 }  // namespace
 
-std::vector<SplatRow> splat_rows(std::span<const float> scales, std::span<const float> orientations,
-                                 std::span<const float> opacities, const std::string& name) {
+std::vector<GaussianSplatRow> make_gaussian_splat_rows(std::span<const float> scales,
+                                                       std::span<const float> orientations,
+                                                       std::span<const float> opacities,
+                                                       const std::string& name) {
   const size_t n = opacities.size();
   need(name, scales.size(), 3 * n, "scales");
   need(name, orientations.size(), 4 * n, "parts of orientations");
-  std::vector<SplatRow> rows(n);
+  std::vector<GaussianSplatRow> rows(n);
   for (size_t i = 0; i < n; ++i) {
-    SplatRow& row = rows[i];
+    GaussianSplatRow& row = rows[i];
     const float* s = &scales[3 * i];
     for (size_t k = 0; k < 3; ++k)
-      if (!(s[k] >= kLeastScale && s[k] <= kMostScale))
+      if (!(s[k] >= kMinScale && s[k] <= kMaxScale))
         throw Error(name + " has a scale that is not from 1e-9 to 1e9; fix or remove it");
     if (!(opacities[i] >= 0 && opacities[i] <= 1))
       throw Error(name + " has an opacity that is not from 0 to 1; fix or remove it");
@@ -59,9 +61,9 @@ std::vector<SplatRow> splat_rows(std::span<const float> scales, std::span<const 
     axes_of(&orientations[4 * i], name, axis);
     row.opacity = opacities[i];
     // Invisible Gaussian splats get a row as well, so that indices stay the same.
-    const double visible = 2 * std::log(std::max(opacities[i] / kLeastAlpha, 1.0));
-    const double cut = std::min(kMostDeviations * kMostDeviations, visible);
-    row.cut = opacities[i] < static_cast<float>(kLeastAlpha) ? -1.f : static_cast<float>(cut);
+    const double visible = 2 * std::log(std::max(opacities[i] / kMinAlpha, 1.0));
+    const double cut = std::min(kMaxDeviations * kMaxDeviations, visible);
+    row.cut = opacities[i] < static_cast<float>(kMinAlpha) ? -1.f : static_cast<float>(cut);
     const double reach = std::sqrt(std::max(double{row.cut}, 0.0)) * (1 + 1e-6);
     double square[3] = {};
     for (size_t k = 0; k < 3; ++k) {
@@ -77,16 +79,17 @@ std::vector<SplatRow> splat_rows(std::span<const float> scales, std::span<const 
   return rows;
 }
 
-std::vector<float> splat_radii(std::span<const SplatRow> rows) {
+std::vector<float> gaussian_splat_radii(std::span<const GaussianSplatRow> rows) {
   std::vector<float> radii;
   radii.reserve(rows.size());
-  for (const SplatRow& row : rows) radii.push_back(length(splat_reach(row)));
+  for (const GaussianSplatRow& row : rows) radii.push_back(length(gaussian_splat_extent(row)));
   return radii;
 }
 
-void check_splats(const Mesh& mesh, const std::string& name) {
+void check_gaussian_splats(const Mesh& mesh, const std::string& name) {
   const size_t n = mesh.vertex_count(), degree = mesh.harmonics_degree;
-  if (n > kMostSplats) throw Error(name + " has too many splats for 32-bit offsets; split it");
+  if (n > kMaxGaussianSplats)
+    throw Error(name + " has too many splats for 32-bit offsets; split it");
   need(name, mesh.splats.size(), n, "rows of splats");
   if (degree > 3) throw Error(name + " has harmonics of a degree above 3; leave those out");
   need(name, mesh.harmonics.size(), 3 * (degree + 1) * (degree + 1) * n, "harmonics");
@@ -94,19 +97,20 @@ void check_splats(const Mesh& mesh, const std::string& name) {
     throw Error(name + " has harmonics that are not finite; fix or remove them");
 }
 
-Vec3<float> splat_reach(const SplatRow& row) {
+Vec3<float> gaussian_splat_extent(const GaussianSplatRow& row) {
   return {row.half[0], row.half[1], row.half[2]};
 }
 
-void intersect_splat(const SplatRow& row, const Vec3<float>& centre, const CurveRay& ray,
-                     float tfar, CurveHits& hits) {
+void intersect_gaussian_splat(const GaussianSplatRow& row, const Vec3<float>& centre,
+                              const CurveRay& ray, float tfar, CurveHits& hits) {
   const V o = whitened(row, ray.space.o - widen(centre)), d = whitened(row, vec(ray.dir));
   const double d2 = dot_d(d, d), t = -dot_d(o, d) / d2;
   if (!(t > 0 && t <= tfar)) return;
   const V w = o + d * t;
   if (!(dot_d(w, w) <= row.cut)) return;
   const Vec3<float> at = narrow(w);
-  const SplatFrame<float> frame = splat_frame<float>(narrow(d * (1 / std::sqrt(d2))));
+  const GaussianSplatFrame<float> frame =
+      gaussian_splat_frame<float>(narrow(d * (1 / std::sqrt(d2))));
   hits.add({static_cast<float>(t), dot(at, frame.x), dot(at, frame.y)});
 }
 

@@ -9,7 +9,7 @@
 namespace wavecomb {
 
 /// Maximum number of harmonics per Gaussian splat, up to degree 3.
-inline constexpr uint32_t kMostHarmonics = 16;
+inline constexpr uint32_t kMaxHarmonics = 16;
 
 /// Returns the degree of harmonic k.
 constexpr uint32_t harmonic_degree(uint32_t k) {
@@ -20,7 +20,7 @@ constexpr uint32_t harmonic_degree(uint32_t k) {
 /// degree l, then m = -l to l. Orthonormal over the sphere, with the Condon-Shortley phase (-1)^m,
 /// as in Kerbl et al. (2023).
 template <typename F>
-inline std::array<F, kMostHarmonics> harmonics(const Vec3<F>& d) {
+inline std::array<F, kMaxHarmonics> harmonics(const Vec3<F>& d) {
   const F xx = d.x * d.x, yy = d.y * d.y, zz = d.z * d.z;
   const F xy = d.x * d.y, xz = d.x * d.z, yz = d.y * d.z, across = xx - yy;
   const F high = 4.f * zz - xx - yy;

@@ -128,7 +128,7 @@ template <typename F>
     far = max(far, select<F>(on, reach + Vec3<F>(s.r[k]), Vec3<F>(F(0.f))));
   }
   const MovedInstance<F> instance = moved_instance<F>(scene, hit.inst, hit.time, maps, far, active);
-  maps.place(instance);
+  maps.set_instance(instance);
   return instance.size;
 }
 
@@ -140,7 +140,7 @@ __attribute__((noinline)) void setup_curved(const SceneView& scene, const MeshHi
   const MeshReader<F> mesh(scene.meshes, hit.mesh, active);
   InstanceMaps<F> maps(scene.instances, hit.inst, active);
   const auto is = [&](uint32_t flag) { return active & Mask<F>((mesh.flags & flag) != U(0u)); };
-  const Mask<F> spheres = is(kIsDots), ribbons = is(kIsRibbon), splats = is(kIsSplat);
+  const Mask<F> spheres = is(kIsDots), ribbons = is(kIsRibbon), splats = is(kIsGaussianSplat);
   const Mask<F> strands = active & not_(spheres);
   CurveSegment<F> s;
   s.cubic = is(kIsCubic);
@@ -172,8 +172,8 @@ __attribute__((noinline)) void setup_curved(const SceneView& scene, const MeshHi
           spheres);
   }
   if (any(splats)) {
-    const SplatMap<F> map(mesh, hit.prim, splats);
-    const Vec3<F> p = s.p[0] + splat_offset<F>(map, maps, hit.u, hit.v, dir);
+    const GaussianSplatMap<F> map(mesh, hit.prim, splats);
+    const Vec3<F> p = s.p[0] + gaussian_splat_offset<F>(map, maps, hit.u, hit.v, dir);
     merge(c, {p, c.n, c.dpdu, c.size, c.du, c.dv}, splats);
   }
 

@@ -20,8 +20,9 @@ inline Vec3<F> ribbon_fibre_normal(const Surface<F>& s, const Vec3<F>& dir, cons
   const Vec3<F> across = cross(along, s.ng) * s.handedness;
   const Vec3<F> back = fma(along, dot(along, dir), -dir);
   const F back2 = length_squared(back);
-  const Mask<F> aside = back2 > 1e-12f;
-  const Vec3<F> w = select<F>(aside, back * F(1.f / sqrt(select(aside, back2, F(1.f)))), s.ng);
+  const Mask<F> off_axis = back2 > 1e-12f;
+  const Vec3<F> w =
+      select<F>(off_axis, back * F(1.f / sqrt(select(off_axis, back2, F(1.f)))), s.ng);
   const F h = clamp(fma(v, F(2.f), F(-1.f)), F(-1.f), F(1.f));
   return fma(make_frame<F>(w, across).s, h, w * safe_sqrt(F(1.f - h * h)));
 }

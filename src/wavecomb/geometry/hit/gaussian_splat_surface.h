@@ -10,10 +10,10 @@ namespace wavecomb::detail {
 
 /// Map from offsets to standard deviations of a Gaussian splat, as three matrix rows.
 template <typename F>
-struct SplatMap {
+struct GaussianSplatMap {
   Vec3<F> row[3];
 
-  SplatMap(const MeshReader<F>& mesh, const UInt<F>& prim, const Mask<F>& active) {
+  GaussianSplatMap(const MeshReader<F>& mesh, const UInt<F>& prim, const Mask<F>& active) {
     const auto r = mesh.template row<16>(&MeshRecord::normals, prim, active);
     for (uint32_t k = 0; k < 3; ++k) row[k] = {r[3 * k], r[3 * k + 1], r[3 * k + 2]};
   }
@@ -38,11 +38,11 @@ inline Vec3<F> local_direction(const InstanceMaps<F>& maps, const Vec3<F>& dir) 
 
 /// Returns the offset from the centre to the position of hits (u, v) by rays along `dir`.
 template <typename F>
-inline Vec3<F> splat_offset(const SplatMap<F>& map, const InstanceMaps<F>& maps, const F& u,
-                            const F& v, const Vec3<F>& dir) {
+inline Vec3<F> gaussian_splat_offset(const GaussianSplatMap<F>& map, const InstanceMaps<F>& maps,
+                                     const F& u, const F& v, const Vec3<F>& dir) {
   const Vec3<F> e = map.whiten(local_direction<F>(maps, dir));
   const F inverse = 1.f / sqrt(max(length_squared(e), F(1e-30f)));
-  const SplatFrame<F> frame = splat_frame<F>(e * inverse);
+  const GaussianSplatFrame<F> frame = gaussian_splat_frame<F>(e * inverse);
   return map.unwhiten(fma(frame.y, v, frame.x * u));
 }
 
@@ -53,20 +53,22 @@ namespace wavecomb {
 /// Returns the factor by which a Gaussian splat multiplies its material's emission for rays along
 /// `dir`: 0.5 plus the sum of its harmonics, clamped to at least 0. It is 1 for other hits.
 template <typename F>
-[[gnu::noinline, gnu::cold]] Color<F> splat_radiance(const SceneView& scene, const MeshHit<F>& hit,
-                                                     const Vec3<F>& dir, const Mask<F>& active) {
+[[gnu::noinline, gnu::cold]] Color<F> gaussian_splat_radiance(const SceneView& scene,
+                                                              const MeshHit<F>& hit,
+                                                              const Vec3<F>& dir,
+                                                              const Mask<F>& active) {
   using U = UInt<F>;
   const detail::MeshReader<F> mesh(scene.meshes, hit.mesh, active);
-  const Mask<F> splats = active & Mask<F>((mesh.flags & uint32_t{kIsSplat}) != U(0u));
+  const Mask<F> splats = active & Mask<F>((mesh.flags & uint32_t{kIsGaussianSplat}) != U(0u));
   if (none(splats)) return Color<F>(F(1.f));
   detail::InstanceMaps<F> maps(scene.instances, hit.inst, splats);
   if (scene.has_motion)
-    maps.place(moved_instance<F>(scene, hit.inst, hit.time, maps, Vec3<F>(F(0.f)), splats));
+    maps.set_instance(moved_instance<F>(scene, hit.inst, hit.time, maps, Vec3<F>(F(0.f)), splats));
   const auto basis = harmonics<F>(detail::local_direction<F>(maps, dir));
   const U degree = (mesh.flags >> kHarmonicsShift) & 3u;
   const U first = hit.prim * ((degree + 1u) * (degree + 1u));
   Color<F> sum(F(0.5f));
-  for (uint32_t k = 0; k < kMostHarmonics; ++k) {
+  for (uint32_t k = 0; k < kMaxHarmonics; ++k) {
     const Mask<F> on = splats & Mask<F>(degree >= U(harmonic_degree(k)));
     if (none(on)) break;
     const Color<F> c = mesh.vec3(&MeshRecord::uvs, first + k, on);

@@ -39,7 +39,7 @@ struct MatrixPair {
   /// `first`, `segments`: the StepRange of each active lane, which must move.
   MatrixPair(const MatrixStep* steps, const UInt<F>& first, const UInt<F>& segments, const F& time,
              const Mask<F>& active) {
-    const BetweenSteps<F> at(time, segments);
+    const StepInterpolation<F> at(time, segments);
     const UInt<F> word = (first + at.before) * 16u;
     a = load_rows<16, F>(steps, word, active);
     b = load_rows<16, F>(steps, word + 16u, active);
@@ -67,10 +67,10 @@ class MovingRows {
     for (size_t i = 0; i < kWidth<F>; ++i) {
       const MeshRecord& record = scene.meshes[(bits >> i & 1u) != 0 ? index.value[i] : 0u];
       const MeshMotion& motion = scene.motion.meshes[record.motion];
-      const BetweenSteps<float> place(at[i], motion.segments);
-      before_[i] = record.*array + place.before * (motion.*stride);
+      const StepInterpolation<float> interpolation(at[i], motion.segments);
+      before_[i] = record.*array + interpolation.before * (motion.*stride);
       after_[i] = before_[i] + (motion.*stride);  // the stride is 0 for a mesh that does not deform
-      parts[i] = place.part;
+      parts[i] = interpolation.part;
     }
     part_ = load<F>(parts);
   }

@@ -14,7 +14,7 @@ namespace wavecomb {
 namespace detail {
 /// Returns 1 if a ray along `dir` hits the side to which `ng` points, else -1.
 template <typename F>
-WAVECOMB_INLINE F side_met(const Vec3<F>& dir, const Vec3<F>& ng) {
+WAVECOMB_INLINE F incident_side(const Vec3<F>& dir, const Vec3<F>& ng) {
   return select(dot(dir, ng) < 0.f, F(1.f), F(-1.f));
 }
 }  // namespace detail
@@ -24,11 +24,11 @@ WAVECOMB_INLINE F side_met(const Vec3<F>& dir, const Vec3<F>& ng) {
 template <typename F>
 WAVECOMB_INLINE Vec3<F> facing_normal(const Vec3<F>& dir, const Vec3<F>& ng, const Vec3<F>& n) {
   constexpr float kEdge = 1e-3f;
-  const F towards = detail::side_met(dir, ng);
-  const F seen = -dot(dir, n) * towards;
-  const Mask<F> away = seen < kEdge;
+  const F towards = detail::incident_side(dir, ng);
+  const F view_cosine = -dot(dir, n) * towards;
+  const Mask<F> away = view_cosine < kEdge;
   if (none(away)) return n;
-  return select<F>(away, normalize(fma(dir, F(-towards * (kEdge - seen)), n)), n);
+  return select<F>(away, normalize(fma(dir, F(-towards * (kEdge - view_cosine)), n)), n);
 }
 
 /// Returns `n`, which faces the viewer, bent until its mirror direction r = 2 (w . n) n - w leaves
@@ -38,17 +38,17 @@ WAVECOMB_INLINE Vec3<F> facing_normal(const Vec3<F>& dir, const Vec3<F>& ng, con
 /// with a normal map.
 template <typename F>
 WAVECOMB_INLINE Vec3<F> reflecting_normal(const Vec3<F>& dir, const Vec3<F>& ng, const Vec3<F>& n) {
-  constexpr float kHeight = 0.01f, kLeastCosine = 1e-4f;
-  const F towards = detail::side_met(dir, ng);
+  constexpr float kHeight = 0.01f, kMinCosine = 1e-4f;
+  const F towards = detail::incident_side(dir, ng);
   const Vec3<F> g = ng * towards, w = -dir;
   const F c = dot(w, g);
   const Vec3<F> r = fma(n, F(2.f * dot(w, n)), dir);
   const F height = dot(r, g), least = min(F(0.9f * c), F(kHeight));
   const Mask<F> below = height < least;
   if (none(below)) return n;
-  const Vec3<F> lifted = normalize(fma(g, F(least - height), r));
+  const Vec3<F> raised = normalize(fma(g, F(least - height), r));
   // At grazing incidence the sum would cancel out.
-  const Vec3<F> between = select<F>(c < kLeastCosine, g, w + lifted);
+  const Vec3<F> between = select<F>(c < kMinCosine, g, w + raised);
   return select<F>(below, normalize(between) * towards, n);
 }
 

@@ -35,7 +35,7 @@ struct Surface {
   F offset;         ///< bound of the position error along ng
   /// Vector along ng from p to the smooth surface that the vertex normals suggest.
   Vec3<F> terminator;
-  Vec3<F> unbent;  ///< ns before facing_normal adjusted it
+  Vec3<F> unadjusted;  ///< ns before facing_normal adjusted it
 };
 
 namespace detail {
@@ -130,7 +130,7 @@ struct InstanceMaps {
   }
 
   /// Replaces the transforms of instances that move.
-  void place(const MovedInstance<F>& to) {
+  void set_instance(const MovedInstance<F>& to) {
     for (int i = 0; i < 3; ++i) row[i] = select<F>(to.moves, to.to_world.row[i], row[i]);
     t = select<F>(to.moves, to.to_world.t, t);
     side = select(to.moves, to.side, side);

@@ -36,9 +36,9 @@ struct TangentCodes {
                                       : vertex[k].value[i];
       };
       if (record.segments != 0) {
-        const BetweenSteps<float> place(time[i], record.segments);
-        codes += size_t{place.before} * record.step;
-        part[i] = place.part;
+        const StepInterpolation<float> interpolation(time[i], record.segments);
+        codes += size_t{interpolation.before} * record.step;
+        part[i] = interpolation.part;
         for (size_t k = 0; k < 3; ++k) after[k].value[i] = codes[record.step + at(k)];
         moves = true;
       }

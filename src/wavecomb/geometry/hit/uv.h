@@ -35,9 +35,9 @@ WAVECOMB_INLINE UvTriangle<F> uv_triangle(const MeshReader<F>& mesh,
   const Mask<F> has_uv = Mask<F>((mesh.flags & (kUvsPerVertex | kUvsPerCorner)) != U(0u)) & active;
   Vec2<F> t0{F(0.f), F(0.f)}, t1{F(1.f), F(0.f)}, t2{F(0.f), F(1.f)};
   if (any(has_uv)) {
-    const Mask<U> pick(Mask<F>((mesh.flags & kUvsPerCorner) != U(0u)));
+    const Mask<U> selected(Mask<F>((mesh.flags & kUvsPerCorner) != U(0u)));
     const auto fetch = [&](const U& at, const U& index, Vec2<F>& out) {
-      const Vec2<F> value = mesh.vec2(&MeshRecord::uvs, select(pick, at, index), has_uv);
+      const Vec2<F> value = mesh.vec2(&MeshRecord::uvs, select(selected, at, index), has_uv);
       out = {select(has_uv, value.x, out.x), select(has_uv, value.y, out.y)};
     };
     const U corner = prim * 3u;

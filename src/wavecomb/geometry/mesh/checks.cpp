@@ -35,8 +35,8 @@ void check_mesh(const Mesh& mesh, const std::vector<std::string>& names) {
     return;
   }
   if (mesh.indices.size() % 3 != 0) throw Error(name + ": indices must be triples");
-  if (mesh.steps < 1 || mesh.steps > kMostSteps || mesh.positions.size() % (3 * mesh.steps) != 0)
-    throw Error(name + " needs as many points at each of 1 to " + std::to_string(kMostSteps) +
+  if (mesh.steps < 1 || mesh.steps > kMaxSteps || mesh.positions.size() % (3 * mesh.steps) != 0)
+    throw Error(name + " needs as many points at each of 1 to " + std::to_string(kMaxSteps) +
                 " steps of its motion");
   if (mesh.vertex_count() > 0x7fffffffu / 3 || mesh.triangle_count() > 0x7fffffffu / 9)
     throw Error(name + " has too many points or triangles for 32-bit offsets; split it");

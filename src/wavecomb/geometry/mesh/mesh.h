@@ -38,19 +38,21 @@ enum class Primitive : uint8_t {
   kLinearRibbon,
   kCubicRibbon,
   kSphere,
-  kSplat
+  kGaussianSplat,
+  kSplat [[deprecated("use kGaussianSplat")]] = kGaussianSplat
 };
 
 /// Shape and opacity of a Gaussian splat, made by geometry/gaussian_splat/gaussian_splat.h; centre
 /// and colour are stored separately.
-struct alignas(64) SplatRow {
+struct alignas(64) GaussianSplatRow {
   float whiten[9];  ///< rows of the map from offsets to standard deviations
   float opacity;    ///< opacity along a ray through the centre
   float cut;      ///< square of the cutoff in standard deviations, beyond which rays miss the splat
   float half[3];  ///< half extents of the bounding box about the centre
   float unused[2] = {};
 };
-static_assert(sizeof(SplatRow) == 64);
+using SplatRow [[deprecated("use GaussianSplatRow")]] = GaussianSplatRow;
+static_assert(sizeof(GaussianSplatRow) == 64);
 
 /// An indexed triangle mesh, curves or points (geometry/curve/segment.h), or splats
 /// (geometry/gaussian_splat/gaussian_splat.h), which need a material of program emissive. The
@@ -79,7 +81,7 @@ struct Mesh {
   uint32_t mesh_light = 0xffffffffu;         ///< SceneBuilder::add_mesh_light, or kNoLight
   /// Length of the prefix of `name` that names the asset of the mesh; 0 if unknown.
   uint32_t asset_length = 0;
-  std::span<const SplatRow> splats;  ///< 1 per splat
+  std::span<const GaussianSplatRow> splats;  ///< 1 per splat
   std::span<const float> harmonics;  ///< 3 (harmonics_degree + 1)^2 floats per splat: its colour
   uint32_t harmonics_degree = 0;     ///< 0 to 3
   std::vector<MeshAttribute> attributes;  ///< for the first step, as for uvs
@@ -90,7 +92,9 @@ struct Mesh {
   bool is_curved() const { return primitive != Primitive::kTriangle; }
   bool is_strands() const { return is_curved() && !is_dots(); }
   /// Returns whether each point is a primitive.
-  bool is_dots() const { return primitive == Primitive::kSphere || primitive == Primitive::kSplat; }
+  bool is_dots() const {
+    return primitive == Primitive::kSphere || primitive == Primitive::kGaussianSplat;
+  }
   bool is_ribbon() const {
     return primitive == Primitive::kLinearRibbon || primitive == Primitive::kCubicRibbon;
   }
@@ -109,8 +113,8 @@ struct Mesh {
   bool deforms() const { return steps > 1; }
 };
 
-/// Packed mesh: addresses and flags, 16 32-bit words. For splats `normals` points to SplatRow and
-/// `uvs` to the harmonics.
+/// Packed mesh: addresses and flags, 16 32-bit words. For splats `normals` points to
+/// GaussianSplatRow and `uvs` to the harmonics.
 struct alignas(64) MeshRecord {
   uint64_t positions, indices, normals, uvs, face_materials;
   uint32_t material;
@@ -129,8 +133,8 @@ enum MeshFlags : uint32_t {
   kIsRibbon = 32,
   kIsSphere = 64,
   kIsCubic = 128,
-  kIsSplat = 256,
-  kIsDots = kIsSphere | kIsSplat,
+  kIsGaussianSplat = 256,
+  kIsDots = kIsSphere | kIsGaussianSplat,
   kIsCurved = kIsTube | kIsRibbon | kIsDots,
 };
 /// Shift of Mesh::harmonics_degree in MeshRecord::flags, 2 bits.

@@ -13,7 +13,7 @@
 namespace wavecomb {
 
 /// Maximum number of motion steps, as in Embree.
-inline constexpr uint32_t kMostSteps = 129;
+inline constexpr uint32_t kMaxSteps = 129;
 
 /// Motion of a mesh that deforms: distances between the arrays of consecutive steps.
 /// MeshRecord::motion is an index into a list of these, whose first entry is for meshes that do not
@@ -27,11 +27,11 @@ static_assert(sizeof(MeshMotion) == 24);
 
 /// Position of a time in [0, 1] among equally spaced steps, one more than `segments`.
 template <typename F>
-struct BetweenSteps {
+struct StepInterpolation {
   UInt<F> before;  ///< index of the step at or before the time
   F part;          ///< interpolation weight of the following step
 
-  BetweenSteps(const F& time, const UInt<F>& segments) {
+  StepInterpolation(const F& time, const UInt<F>& segments) {
     const F at = time * F(Int<F>(segments));
     const UInt<F> whole(to_int<F>(at)), last = segments - 1u;
     before = select(Mask<UInt<F>>(whole < last), whole, last);
@@ -80,11 +80,11 @@ inline Affine between(const Affine& a, const Affine& b, float part) {
 
 /// Returns the transform at step k of n, resampled from `steps`.
 inline Affine at_step(std::span<const Affine> steps, uint32_t k, uint32_t n) {
-  const uint64_t place = uint64_t{k} * (steps.size() - 1);
-  const size_t before = place / n;
-  if (place % n == 0) return steps[before];
+  const uint64_t offset = uint64_t{k} * (steps.size() - 1);
+  const size_t before = offset / n;
+  if (offset % n == 0) return steps[before];
   return between(steps[before], steps[before + 1],
-                 static_cast<float>(place % n) / static_cast<float>(n));
+                 static_cast<float>(offset % n) / static_cast<float>(n));
 }
 
 /// Returns the number of segments for the product of two motions: enough for the steps of both, up

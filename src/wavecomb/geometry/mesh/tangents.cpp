@@ -15,9 +15,9 @@ namespace {
 using V = Vec3<float>;
 /// Number of triangles whose tangents are computed before they are summed, which bounds the scratch
 /// memory, and number of triangles of a task.
-constexpr size_t kBatch = 65536, kPiece = 1024;
+constexpr size_t kBatch = 65536, kChunk = 1024;
 /// A mean shorter than this fraction of its weights has no reliable direction.
-constexpr float kLeastMean = 1e-2f;
+constexpr float kMinMean = 1e-2f;
 
 V unit(const V& v) {
   const float len2 = length_squared(v);
@@ -31,14 +31,14 @@ class Corners {
 
   uint32_t vertex(size_t corner) const { return mesh_.indices[corner]; }
   std::array<float, 2> uv(size_t corner) const {
-    const float* p = &mesh_.uvs[2 * place(mesh_.uvs_at, corner)];
+    const float* p = &mesh_.uvs[2 * value_index(mesh_.uvs_at, corner)];
     return {p[0], p[1]};
   }
   V position(size_t corner, uint32_t step) const {
     return row(mesh_.positions, vertex(corner), step);
   }
   V normal(size_t corner, uint32_t step) const {
-    return row(mesh_.normals, place(mesh_.normals_at, corner), step);
+    return row(mesh_.normals, value_index(mesh_.normals_at, corner), step);
   }
   /// Returns twice the signed area of a triangle in texture space, negative if it is mirrored.
   float uv_area(size_t triangle) const {
@@ -57,7 +57,7 @@ class Corners {
   }
 
  private:
-  size_t place(Attribute at, size_t corner) const {
+  size_t value_index(Attribute at, size_t corner) const {
     return at == Attribute::kCorner ? corner : mesh_.indices[corner];
   }
   V row(std::span<const float> values, size_t index, uint32_t step) const {
@@ -77,10 +77,10 @@ std::array<V, 3> contributions(const Corners& at, size_t triangle, uint32_t step
   for (size_t k = 0; k < 3; ++k) p[k] = at.position(3 * triangle + k, step);
   for (size_t k = 0; k < 3; ++k) {
     const V n = unit(at.normal(3 * triangle + k, step));
-    const auto lay = [&](const V& v) { return V(v - n * dot(n, v)); };
-    const V a = lay(p[(k + 1) % 3] - p[k]), b = lay(p[(k + 2) % 3] - p[k]);
+    const auto project = [&](const V& v) { return V(v - n * dot(n, v)); };
+    const V a = project(p[(k + 1) % 3] - p[k]), b = project(p[(k + 2) % 3] - p[k]);
     const float angle = atan2(length(cross(a, b)), dot(a, b));
-    if (std::isfinite(angle)) out[k] = unit(lay(t)) * angle;
+    if (std::isfinite(angle)) out[k] = unit(project(t)) * angle;
   }
   return out;
 }
@@ -132,8 +132,8 @@ std::vector<Sum> add_up(const Mesh& mesh, const Corners& at, uint32_t step,
   std::vector<std::array<V, 3>> scratch(std::min(triangles, kBatch));
   for (size_t from = 0; from < triangles; from += kBatch) {
     const size_t n = std::min(kBatch, triangles - from);
-    parallel_for((n + kPiece - 1) / kPiece, [&](size_t piece) {
-      for (size_t i = piece * kPiece; i < std::min(n, (piece + 1) * kPiece); ++i)
+    parallel_for((n + kChunk - 1) / kChunk, [&](size_t chunk) {
+      for (size_t i = chunk * kChunk; i < std::min(n, (chunk + 1) * kChunk); ++i)
         scratch[i] = contributions(at, from + i, step);
     });
     for (size_t i = 0; i < n; ++i)
@@ -147,27 +147,28 @@ std::vector<Sum> add_up(const Mesh& mesh, const Corners& at, uint32_t step,
 }
 
 /// Returns for each mesh whether one of its materials needs tangents.
-std::vector<uint8_t> meshes_that_ask(const SceneGeometry& geometry,
-                                     const SceneMaterials& materials) {
+std::vector<uint8_t> meshes_with_tangents(const SceneGeometry& geometry,
+                                          const SceneMaterials& materials) {
   const std::vector<Mesh>& meshes = geometry.meshes;
-  std::vector<uint8_t> asks(meshes.size());
-  const auto look = [&](uint32_t group, uint32_t inherited) {
+  std::vector<uint8_t> needs_tangents(meshes.size());
+  const auto visit = [&](uint32_t group, uint32_t inherited) {
     for (const uint32_t m : geometry.groups[group].meshes)
-      if (!asks[m] && meshes[m].normals_at != Attribute::kNone &&
+      if (!needs_tangents[m] && meshes[m].normals_at != Attribute::kNone &&
           meshes[m].uvs_at != Attribute::kNone && !meshes[m].is_curved())
-        asks[m] = geometry.any_material(
-            m, inherited, [&](uint32_t worn) { return materials.wants_tangents[worn] != 0; });
+        needs_tangents[m] = geometry.any_material(m, inherited, [&](uint32_t bound_material) {
+          return materials.wants_tangents[bound_material] != 0;
+        });
   };
   // Consecutive instances of the same group and material are visited once.
-  look(0, geometry.instance_records[0].material);
+  visit(0, geometry.instance_records[0].material);
   uint32_t group = kNone, material = kNone;
   for (const Instance& i : geometry.instances) {
     if (i.group == group && i.material == material) continue;
     group = i.group;
     material = i.material;
-    look(group, material);
+    visit(group, material);
   }
-  return asks;
+  return needs_tangents;
 }
 
 }  // namespace
@@ -184,7 +185,7 @@ MeshTangents make_tangents(const Mesh& mesh) {
     const std::vector<Sum> sums = add_up(mesh, at, step, of_corner, shares.size());
     const auto code = [&](uint32_t share) {
       const Sum& sum = sums[share];
-      return length(sum.v) > kLeastMean * sum.weight ? encode_direction(sum.v) : kNoDirection;
+      return length(sum.v) > kMinMean * sum.weight ? encode_direction(sum.v) : kNoDirection;
     };
     uint32_t* to = &out.codes[a_step * step];
     if (out.at_corners)
@@ -200,12 +201,12 @@ SceneTangents::SceneTangents(const SceneGeometry& geometry, const SceneMaterials
                              const SceneTangents* before) {
   if (std::ranges::all_of(materials.wants_tangents, [](uint8_t wants) { return wants == 0; }))
     return;
-  const std::vector<uint8_t> asks = meshes_that_ask(geometry, materials);
-  if (std::ranges::all_of(asks, [](uint8_t a) { return a == 0; })) return;
-  of_mesh.resize(asks.size());
-  records.resize(asks.size());
-  parallel_for(asks.size(), [&](size_t m) {
-    if (!asks[m]) return;
+  const std::vector<uint8_t> needs_tangents = meshes_with_tangents(geometry, materials);
+  if (std::ranges::all_of(needs_tangents, [](uint8_t a) { return a == 0; })) return;
+  of_mesh.resize(needs_tangents.size());
+  records.resize(needs_tangents.size());
+  parallel_for(needs_tangents.size(), [&](size_t m) {
+    if (!needs_tangents[m]) return;
     if (before && !before->of_mesh.empty()) of_mesh[m] = before->of_mesh[m];
     if (!of_mesh[m])
       of_mesh[m] = std::make_shared<const MeshTangents>(make_tangents(geometry.meshes[m]));

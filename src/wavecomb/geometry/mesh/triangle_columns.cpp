@@ -10,8 +10,8 @@ namespace {
 /// Lines run along (kSlopeX, kSlopeY, 1); coordinates perpendicular to them are x - kSlopeX z and y
 /// - kSlopeY z.
 constexpr float kSlopeX = 0.2371f, kSlopeY = 0.1549f;
-constexpr uint32_t kMostCells = 512;  ///< grid cells along one side
-constexpr size_t kMostEntries = 16;   ///< mean number of cells that a triangle overlaps
+constexpr uint32_t kMaxCells = 512;  ///< grid cells along one side
+constexpr size_t kMaxEntries = 16;   ///< mean number of cells that a triangle overlaps
 
 }  // namespace
 
@@ -28,7 +28,7 @@ uint32_t TriangleColumns::cell(float at, float lowest, float per_unit) const {
 TriangleColumns::TriangleColumns(const Mesh& mesh)
     : positions_(mesh.positions), indices_(mesh.indices) {
   const size_t count = mesh.triangle_count();
-  side_ = std::clamp(static_cast<uint32_t>(std::sqrt(static_cast<double>(count))), 1u, kMostCells);
+  side_ = std::clamp(static_cast<uint32_t>(std::sqrt(static_cast<double>(count))), 1u, kMaxCells);
   for (int k = 0; k < 2; ++k) low_[k] = 1e30f, high_[k] = -1e30f;
   for (const uint32_t i : indices_) {
     const Vec3<float> p = vertex(i);
@@ -51,7 +51,7 @@ TriangleColumns::TriangleColumns(const Mesh& mesh)
       per_unit_[k] = high_[k] > low_[k] ? static_cast<float>(side_) / (high_[k] - low_[k]) : 0.f;
     size_t entries = 0;
     for (size_t t = 0; t < count; ++t) each_cell(t, [&](size_t) { ++entries; });
-    if (side_ == 1 || entries <= kMostEntries * count) break;
+    if (side_ == 1 || entries <= kMaxEntries * count) break;
   }
   first_.assign(size_t{side_} * side_ + 1, 0);
   for (size_t t = 0; t < count; ++t) each_cell(t, [&](size_t k) { ++first_[k + 1]; });

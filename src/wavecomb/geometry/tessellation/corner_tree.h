@@ -27,7 +27,7 @@ class CornerTree {
  public:
   static constexpr uint32_t kNone = 0xffffffffu;
 
-  explicit CornerTree(std::span<const Corner> corners) : place_of_(corners.size()) {
+  explicit CornerTree(std::span<const Corner> corners) : position_of_(corners.size()) {
     std::vector<uint32_t> order(corners.size());
     std::iota(order.begin(), order.end(), 0u);
     std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
@@ -42,34 +42,34 @@ class CornerTree {
         counts.push_back(0);
       }
       ++counts.back();
-      place_of_[i] = static_cast<uint32_t>(sorted.size() - 1);
+      position_of_[i] = static_cast<uint32_t>(sorted.size() - 1);
     }
-    std::vector<uint32_t> places(sorted.size());
-    std::iota(places.begin(), places.end(), 0u);
-    build(sorted, places, 0, static_cast<uint32_t>(places.size()), kNone);
-    std::vector<uint32_t> rank(places.size());
-    leaf_of_.resize(places.size());
-    for (uint32_t i = 0; i < places.size(); ++i) {
-      rank[places[i]] = i;
-      places_.push_back(sorted[places[i]]);
-      counts_.push_back(counts[places[i]]);
+    std::vector<uint32_t> positions(sorted.size());
+    std::iota(positions.begin(), positions.end(), 0u);
+    build(sorted, positions, 0, static_cast<uint32_t>(positions.size()), kNone);
+    std::vector<uint32_t> rank(positions.size());
+    leaf_of_.resize(positions.size());
+    for (uint32_t i = 0; i < positions.size(); ++i) {
+      rank[positions[i]] = i;
+      positions_.push_back(sorted[positions[i]]);
+      counts_.push_back(counts[positions[i]]);
     }
     for (uint32_t n = 0; n < nodes_.size(); ++n)
       if (nodes_[n].child == kNone)
         std::fill(leaf_of_.begin() + nodes_[n].begin, leaf_of_.begin() + nodes_[n].end, n);
-    for (uint32_t& place : place_of_) place = rank[place];
+    for (uint32_t& position : position_of_) position = rank[position];
   }
 
   /// Number of different positions.
-  size_t place_count() const { return places_.size(); }
+  size_t position_count() const { return positions_.size(); }
   /// Index of the position of a corner.
-  uint32_t place_of(uint32_t corner) const { return place_of_[corner]; }
+  uint32_t position_of(uint32_t corner) const { return position_of_[corner]; }
 
   /// Removes a corner. Returns whether it was the last one at its position.
   bool remove(uint32_t corner) {
-    const uint32_t place = place_of_[corner];
-    if (--counts_[place] > 0) return false;
-    for (uint32_t n = leaf_of_[place]; n != kNone; n = nodes_[n].parent) --nodes_[n].alive;
+    const uint32_t position = position_of_[corner];
+    if (--counts_[position] > 0) return false;
+    for (uint32_t n = leaf_of_[position]; n != kNone; n = nodes_[n].parent) --nodes_[n].alive;
     return true;
   }
 
@@ -99,7 +99,7 @@ class CornerTree {
       }
       const uint32_t size = node.end - node.begin;
       for (uint32_t k = 0, i = chance % size; k < size; ++k, i = i + 1 == size ? 0 : i + 1) {
-        const Corner& p = places_[node.begin + i];
+        const Corner& p = positions_[node.begin + i];
         if (counts_[node.begin + i] > 0 && turn_of(a, b, p) >= 0 && turn_of(b, c, p) >= 0 &&
             turn_of(c, a, p) >= 0 && !(p == a) && !(p == b) && !(p == c))
           return node.begin + i;
@@ -127,19 +127,19 @@ class CornerTree {
     }
   };
 
-  uint32_t build(std::span<const Corner> at, std::vector<uint32_t>& places, uint32_t begin,
+  uint32_t build(std::span<const Corner> at, std::vector<uint32_t>& positions, uint32_t begin,
                  uint32_t end, uint32_t parent) {
     const auto index = static_cast<uint32_t>(nodes_.size());
     nodes_.emplace_back();
-    fill(index, at, places, begin, end, parent);
+    fill(index, at, positions, begin, end, parent);
     return index;
   }
 
-  void fill(uint32_t index, std::span<const Corner> at, std::vector<uint32_t>& places,
+  void fill(uint32_t index, std::span<const Corner> at, std::vector<uint32_t>& positions,
             uint32_t begin, uint32_t end, uint32_t parent) {
-    Node node{at[places[begin]], at[places[begin]], begin, end, end - begin, parent, kNone};
+    Node node{at[positions[begin]], at[positions[begin]], begin, end, end - begin, parent, kNone};
     for (uint32_t i = begin; i < end; ++i) {
-      const Corner& p = at[places[i]];
+      const Corner& p = at[positions[i]];
       node.lo = {std::min(node.lo.x, p.x), std::min(node.lo.y, p.y)};
       node.hi = {std::max(node.hi.x, p.x), std::max(node.hi.y, p.y)};
     }
@@ -147,20 +147,20 @@ class CornerTree {
       const bool wide = node.hi.x - node.lo.x >= node.hi.y - node.lo.y;
       const uint32_t middle = begin + (end - begin) / 2;
       std::nth_element(
-          places.begin() + begin, places.begin() + middle, places.begin() + end,
+          positions.begin() + begin, positions.begin() + middle, positions.begin() + end,
           [&](uint32_t a, uint32_t b) { return wide ? at[a].x < at[b].x : at[a].y < at[b].y; });
       node.child = static_cast<uint32_t>(nodes_.size());
       nodes_.resize(nodes_.size() + 2);
-      fill(node.child, at, places, begin, middle, index);
-      fill(node.child + 1, at, places, middle, end, index);
+      fill(node.child, at, positions, begin, middle, index);
+      fill(node.child + 1, at, positions, middle, end, index);
     }
     nodes_[index] = node;
   }
 
   std::vector<Node> nodes_;
-  std::vector<Corner> places_;    ///< in leaf order
-  std::vector<uint32_t> counts_;  ///< remaining corners per position
-  std::vector<uint32_t> leaf_of_, place_of_;
+  std::vector<Corner> positions_;  ///< in leaf order
+  std::vector<uint32_t> counts_;   ///< remaining corners per position
+  std::vector<uint32_t> leaf_of_, position_of_;
   uint32_t random_ = 1;
 };
 

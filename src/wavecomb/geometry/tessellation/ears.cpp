@@ -55,16 +55,16 @@ class NumberSet {
 /// Ear clipping of one polygon.
 class Clipper {
  public:
-  Clipper(std::span<const Corner> corners, uint64_t most_steps)
+  Clipper(std::span<const Corner> corners, uint64_t max_steps)
       : corners_(corners),
-        most_steps_(most_steps),
+        max_steps_(max_steps),
         left_(corners.size()),
         open_(corners.size()),
         next_(corners.size()),
         previous_(corners.size()),
         blocked_(corners.size()),
         tree_(corners),
-        first_(tree_.place_count(), kNone) {
+        first_(tree_.position_count(), kNone) {
     const auto n = static_cast<uint32_t>(corners.size());
     for (uint32_t i = 0; i < n; ++i) {
       next_[i] = i + 1 == n ? 0 : i + 1;
@@ -73,41 +73,41 @@ class Clipper {
     }
   }
 
-  Ears run() {
-    Ears ears;
-    ears.corners.reserve(3 * (left_ - 2));
+  PolygonTriangulation run() {
+    PolygonTriangulation triangulation;
+    triangulation.corners.reserve(3 * (left_ - 2));
     const auto put = [&](uint32_t a, uint32_t b, uint32_t c) {
-      for (const uint32_t corner : {a, b, c}) ears.corners.push_back(corner);
+      for (const uint32_t corner : {a, b, c}) triangulation.corners.push_back(corner);
     };
-    uint32_t due = 0;
+    uint32_t start_corner = 0;
     while (left_ > 3) {
-      uint32_t ear = due;
-      if (steps_ < most_steps_)
-        ear = next_ear(due);
+      uint32_t ear = start_corner;
+      if (steps_ < max_steps_)
+        ear = next_ear(start_corner);
       else
-        ++ears.hurried;
+        ++triangulation.untested;
       put(previous_[ear], ear, next_[ear]);
-      due = next_[ear];
+      start_corner = next_[ear];
       cut(ear);
     }
-    uint32_t rest[3] = {due, next_[due], previous_[due]};
+    uint32_t rest[3] = {start_corner, next_[start_corner], previous_[start_corner]};
     std::sort(rest, rest + 3);
     put(rest[0], rest[1], rest[2]);
-    return ears;
+    return triangulation;
   }
 
  private:
   /// Entry in the list of corners that wait until a blocking position is free.
   struct Blocked {
-    uint32_t place = kNone, next = kNone, previous = kNone;
+    uint32_t position = kNone, next = kNone, previous = kNone;
   };
 
-  /// Returns the first ear at or after corner `due`, or `due` if there is none.
-  uint32_t next_ear(uint32_t due) {
-    for (uint32_t at = due;;) {
+  /// Returns the first ear at or after corner `start_corner`, or `start_corner` if there is none.
+  uint32_t next_ear(uint32_t start_corner) {
+    for (uint32_t at = start_corner;;) {
       uint32_t found = open_.next(at);
       if (found == kNone) found = open_.next(0);
-      if (found == kNone) return due;
+      if (found == kNone) return start_corner;
       if (is_ear(found)) return found;
       open_.remove(found);
       at = found;
@@ -118,18 +118,18 @@ class Clipper {
     ++steps_;
     const Corner &a = corners_[previous_[i]], &b = corners_[i], &c = corners_[next_[i]];
     if (turn_of(a, b, c) <= 0) return false;
-    const uint32_t place = tree_.find(a, b, c, steps_);
-    if (place == kNone) return true;
-    blocked_[i] = {place, first_[place], kNone};
-    if (first_[place] != kNone) blocked_[first_[place]].previous = i;
-    first_[place] = i;
+    const uint32_t position = tree_.find(a, b, c, steps_);
+    if (position == kNone) return true;
+    blocked_[i] = {position, first_[position], kNone};
+    if (first_[position] != kNone) blocked_[first_[position]].previous = i;
+    first_[position] = i;
     return false;
   }
 
   void reopen(uint32_t i) {
     Blocked& b = blocked_[i];
-    if (b.place != kNone) {
-      (b.previous == kNone ? first_[b.place] : blocked_[b.previous].next) = b.next;
+    if (b.position != kNone) {
+      (b.previous == kNone ? first_[b.position] : blocked_[b.previous].next) = b.next;
       if (b.next != kNone) blocked_[b.next].previous = b.previous;
       b = {};
     }
@@ -144,13 +144,14 @@ class Clipper {
     previous_[c] = a;
     --left_;
     if (tree_.remove(i))
-      for (const uint32_t place = tree_.place_of(i); first_[place] != kNone;) reopen(first_[place]);
+      for (const uint32_t position = tree_.position_of(i); first_[position] != kNone;)
+        reopen(first_[position]);
     reopen(a);
     reopen(c);
   }
 
   std::span<const Corner> corners_;
-  uint64_t most_steps_, steps_ = 0;
+  uint64_t max_steps_, steps_ = 0;
   size_t left_;
   NumberSet open_;  ///< corners that may be ears
   std::vector<uint32_t> next_, previous_;
@@ -161,19 +162,19 @@ class Clipper {
 
 }  // namespace
 
-Ears clip_ears(std::span<const double> flat, uint64_t most_steps) {
+PolygonTriangulation clip_ears(std::span<const double> flat, uint64_t max_steps) {
   std::vector<Corner> corners(flat.size() / 2);
   for (size_t i = 0; i < corners.size(); ++i) corners[i] = {flat[2 * i], flat[2 * i + 1]};
   if (corners.size() < 3) return {};
   for (const Corner& c : corners)
     if (!std::isfinite(c.x) || !std::isfinite(c.y)) {
-      Ears fan;
+      PolygonTriangulation fan;
       for (size_t i = 1; i + 1 < corners.size(); ++i)
         for (const size_t corner : {size_t{0}, i, i + 1})
           fan.corners.push_back(static_cast<int64_t>(corner));
       return fan;
     }
-  return Clipper(corners, most_steps).run();
+  return Clipper(corners, max_steps).run();
 }
 
 }  // namespace wavecomb

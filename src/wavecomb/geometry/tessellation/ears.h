@@ -9,14 +9,14 @@
 namespace wavecomb {
 
 /// Triangulation of a polygon.
-struct Ears {
+struct PolygonTriangulation {
   std::vector<int64_t> corners;  ///< 3 per triangle, n - 2 triangles for n corners
-  uint64_t hurried = 0;          ///< ears cut without a test, once the step limit was reached
+  uint64_t untested = 0;         ///< ears cut without a test, once the step limit was reached
 };
 
 /// Step limit of clip_ears, about a second. In the worst known cases a face of 100,000 corners
 /// takes two thirds of it and a face of 5,000 corners a fiftieth.
-inline constexpr uint64_t kEarSteps = uint64_t{1} << 26;
+inline constexpr uint64_t kMaxClippingSteps = uint64_t{1} << 26;
 
 /// Triangulates a polygon in the plane, counter-clockwise, by clipping ears from its first corner
 /// on (G. Meisters, "Polygons Have Ears", 1975). A corner is an ear if no other remaining corner
@@ -29,7 +29,8 @@ inline constexpr uint64_t kEarSteps = uint64_t{1} << 26;
 /// included, n corners take O(n sqrt(n)) steps.
 ///
 /// `flat` holds x and y of each corner. If a coordinate is not finite, the result is a fan. Corners
-/// that remain after `most_steps` are cut without a test.
-Ears clip_ears(std::span<const double> flat, uint64_t most_steps = kEarSteps);
+/// that remain after `max_steps` are cut without a test.
+PolygonTriangulation clip_ears(std::span<const double> flat,
+                               uint64_t max_steps = kMaxClippingSteps);
 
 }  // namespace wavecomb

@@ -201,7 +201,7 @@ template <Sdc::SchemeType kScheme, bool kTangents, typename V, typename Out>
 void limit(const Sdc::Options& options, const Far::TopologyLevel& level, const V* from, Out&& out) {
   const Sdc::Scheme<kScheme> scheme(options);
   in_bands(level.GetNumVertices(), [&] {
-    return [&, place = Mask(), u = Mask(), v = Mask()](int vertex) mutable {
+    return [&, position = Mask(), u = Mask(), v = Mask()](int vertex) mutable {
       const Far::ConstIndexArray edges = level.GetVertexEdges(vertex);
       V value, by_u, by_v;
       value.Clear();
@@ -221,16 +221,16 @@ void limit(const Sdc::Options& options, const Far::TopologyLevel& level, const V
           sum.AddWithWeight(from[other_end(level, edges[i], vertex)], mask.EdgeWeight(i));
         sum.AddWithWeight(from[vertex], mask.VertexWeight(0));
       };
-      for (Mask* mask : {&place, &u, &v}) mask->fit(std::max(edges.size(), faces.size()));
+      for (Mask* mask : {&position, &u, &v}) mask->fit(std::max(edges.size(), faces.size()));
       if constexpr (kTangents) {
-        scheme.ComputeVertexLimitMask(around, place, u, v, level.GetVertexRule(vertex));
-        add(value, place);
+        scheme.ComputeVertexLimitMask(around, position, u, v, level.GetVertexRule(vertex));
+        add(value, position);
         add(by_u, u);
         add(by_v, v);
         out(vertex, value, &by_u, &by_v);
       } else {
-        scheme.ComputeVertexLimitMask(around, place, level.GetVertexRule(vertex));
-        add(value, place);
+        scheme.ComputeVertexLimitMask(around, position, level.GetVertexRule(vertex));
+        add(value, position);
         out(vertex, value, static_cast<const V*>(nullptr), static_cast<const V*>(nullptr));
       }
     };

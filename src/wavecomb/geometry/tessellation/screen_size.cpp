@@ -11,7 +11,7 @@ namespace wavecomb {
 namespace {
 
 /// Weight of edges outside the image.
-constexpr double kUnseen = 0.125;
+constexpr double kOutsideWeight = 0.125;
 /// Image bounds are enlarged by this factor.
 constexpr double kMargin = 1.1;
 
@@ -44,18 +44,18 @@ struct Mean {
 double edge_pixels(std::span<const float> points, std::span<const int32_t> face_sizes,
                    std::span<const int32_t> corners, const double* to_world,
                    const ScreenView& view) {
-  std::vector<Point> seen(points.size() / 3);
-  for (size_t i = 0; i < seen.size(); ++i) {
+  std::vector<Point> projected(points.size() / 3);
+  for (size_t i = 0; i < projected.size(); ++i) {
     const Point p{points[3 * i], points[3 * i + 1], points[3 * i + 2]};
-    seen[i] = transformed(view.to_camera.data(), transformed(to_world, p));
+    projected[i] = transformed(view.to_camera.data(), transformed(to_world, p));
   }
-  Mean in_picture, outside;
+  Mean in_image, outside;
   size_t at = 0;
   for (const int32_t size : face_sizes) {
     const auto count = static_cast<size_t>(std::max(size, 0));
     for (size_t c = 0; c < count; ++c) {
-      const Point& a = seen[static_cast<size_t>(corners[at + c])];
-      const Point& b = seen[static_cast<size_t>(corners[at + (c + 1) % count])];
+      const Point& a = projected[static_cast<size_t>(corners[at + c])];
+      const Point& b = projected[static_cast<size_t>(corners[at + (c + 1) % count])];
       const Point along = b - a, middle = (a + b) * 0.5;
       const double length = length_of(along);
       // The distance is at least half the edge length, so edges that pass the camera stay finite.
@@ -63,13 +63,13 @@ double edge_pixels(std::span<const float> points, std::span<const int32_t> face_
       if (!(distance > 0)) continue;
       const double pixels = view.pixels * length / distance;
       if (is_inside(a, view) || is_inside(b, view) || is_inside(middle, view))
-        in_picture.add(pixels);
+        in_image.add(pixels);
       else
-        outside.add(kUnseen * pixels);
+        outside.add(kOutsideWeight * pixels);
     }
     at += count;
   }
-  return std::max(in_picture.value(), outside.value());
+  return std::max(in_image.value(), outside.value());
 }
 
 }  // namespace wavecomb

@@ -104,21 +104,21 @@ struct Subdivision::Refiner {
   }
 
   /// Collects the visible faces.
-  void find_drawn() {
+  void find_visible_faces() {
     const Far::TopologyLevel& cage = far->GetLevel(0);
     for (int f = 0; f < cage.GetNumFaces() && !has_holes; ++f) has_holes = cage.IsFaceHole(f);
     if (!has_holes) return;
     for (int f = 0; f < last().GetNumFaces(); ++f)
       if (!cage.IsFaceHole(base_of(f))) drawn.push_back(f);
   }
-  size_t drawn_count() const {
+  size_t visible_face_count() const {
     return has_holes ? drawn.size() : static_cast<size_t>(last().GetNumFaces());
   }
 
   /// Calls f(index, face) for each visible face, in parallel bands.
   template <typename F>
-  void each_drawn(F&& f) const {
-    parallel_bands(drawn_count(), masks::kBand, [&](size_t first, size_t end) {
+  void for_each_visible_face(F&& f) const {
+    parallel_bands(visible_face_count(), masks::kBand, [&](size_t first, size_t end) {
       for (size_t i = first; i < end; ++i) f(i, has_holes ? drawn[i] : static_cast<int>(i));
     });
   }
@@ -229,7 +229,7 @@ Subdivision::Subdivision(const Cage& cage, uint32_t level) {
   Far::TopologyRefiner::UniformOptions uniform(static_cast<int>(level));
   uniform.fullTopologyInLastLevel = true;
   refiner_->far->RefineUniform(uniform);
-  refiner_->find_drawn();
+  refiner_->find_visible_faces();
 }
 
 Subdivision::~Subdivision() = default;
@@ -248,11 +248,11 @@ RefinedFaces Subdivision::faces() const {
   RefinedFaces faces;
   faces.size = refiner_->scheme == Scheme::kLoop ? 3 : 4;
   faces.vertex_count = vertex_count();
-  faces.corners.resize(refiner_->drawn_count() * faces.size);
-  faces.base.resize(refiner_->drawn_count());
-  refiner_->each_drawn([&](size_t place, int f) {
-    std::copy_n(last.GetFaceVertices(f).begin(), faces.size, &faces.corners[place * faces.size]);
-    faces.base[place] = static_cast<uint32_t>(refiner_->base_of(f));
+  faces.corners.resize(refiner_->visible_face_count() * faces.size);
+  faces.base.resize(refiner_->visible_face_count());
+  refiner_->for_each_visible_face([&](size_t index, int f) {
+    std::copy_n(last.GetFaceVertices(f).begin(), faces.size, &faces.corners[index * faces.size]);
+    faces.base[index] = static_cast<uint32_t>(refiner_->base_of(f));
   });
   if (last.GetNumFVarChannels() > 0) faces.first_values = face_varying_corners(0);
   return faces;
@@ -261,10 +261,10 @@ RefinedFaces Subdivision::faces() const {
 std::vector<uint32_t> Subdivision::face_varying_corners(uint32_t channel) const {
   const Far::TopologyLevel& last = refiner_->last();
   const size_t size = refiner_->scheme == Scheme::kLoop ? 3 : 4;
-  std::vector<uint32_t> out(refiner_->drawn_count() * size);
-  refiner_->each_drawn([&](size_t place, int f) {
+  std::vector<uint32_t> out(refiner_->visible_face_count() * size);
+  refiner_->for_each_visible_face([&](size_t index, int f) {
     const Far::ConstIndexArray values = last.GetFaceFVarValues(f, static_cast<int>(channel));
-    std::copy_n(values.begin(), size, &out[place * size]);
+    std::copy_n(values.begin(), size, &out[index * size]);
   });
   return out;
 }
@@ -293,11 +293,11 @@ std::vector<uint32_t> Subdivision::normal_sectors(const RefinedFaces& faces,
     }
   });
   // Index in `faces` of each face of the level.
-  std::vector<uint32_t> place;
+  std::vector<uint32_t> index;
   if (refiner_->has_holes) {
-    place.assign(static_cast<size_t>(last.GetNumFaces()), ~0u);
-    refiner_->each_drawn(
-        [&](size_t at, int f) { place[static_cast<size_t>(f)] = static_cast<uint32_t>(at); });
+    index.assign(static_cast<size_t>(last.GetNumFaces()), ~0u);
+    refiner_->for_each_visible_face(
+        [&](size_t at, int f) { index[static_cast<size_t>(f)] = static_cast<uint32_t>(at); });
   }
   std::vector<uint32_t> normals = faces.corners;
   std::vector<int> sector;
@@ -319,7 +319,7 @@ std::vector<uint32_t> Subdivision::normal_sectors(const RefinedFaces& faces,
       bool used = false;
       for (int f = s; f < around.size(); ++f) {
         const auto face = static_cast<size_t>(around[f]);
-        const uint32_t at = place.empty() ? static_cast<uint32_t>(face) : place[face];
+        const uint32_t at = index.empty() ? static_cast<uint32_t>(face) : index[face];
         if (sector[static_cast<size_t>(f)] != s || at == ~0u) continue;
         normals[static_cast<size_t>(at) * faces.size + local[f]] = count;
         used = true;

@@ -30,18 +30,18 @@ struct Work {
 /// Determines which normals are computed as sums over faces. Returns their index in the list of
 /// sums, or ~0 if the limit normal is known. It is known if it is non-zero in `work.normals` and
 /// the vertex has a single normal.
-std::vector<uint32_t> sum_places(const Work& work, size_t normal_count, size_t& sum_count) {
+std::vector<uint32_t> sum_indices(const Work& work, size_t normal_count, size_t& sum_count) {
   const size_t known = work.normals.size() / 3, points = work.faces.vertex_count;
-  std::vector<uint32_t> places(normal_count, ~0u);
+  std::vector<uint32_t> sum_of_normal(normal_count, ~0u);
   for (size_t c = 0; c < work.sectors.size() && normal_count > points; ++c)
-    if (work.sectors[c] >= points) places[work.faces.corners[c]] = 0;
+    if (work.sectors[c] >= points) sum_of_normal[work.faces.corners[c]] = 0;
   sum_count = 0;
   for (size_t i = 0; i < normal_count; ++i) {
     const float* n = i < known ? &work.normals[3 * i] : nullptr;
-    if (n == nullptr || places[i] == 0 || (n[0] == 0 && n[1] == 0 && n[2] == 0))
-      places[i] = static_cast<uint32_t>(sum_count++);
+    if (n == nullptr || sum_of_normal[i] == 0 || (n[0] == 0 && n[1] == 0 && n[2] == 0))
+      sum_of_normal[i] = static_cast<uint32_t>(sum_count++);
   }
-  return places;
+  return sum_of_normal;
 }
 
 /// Calls f(corner, first, end) for all corners in order. Each thread handles a separate range
@@ -59,23 +59,23 @@ void each_corner(size_t corners, size_t count, F&& f) {
 /// sector.
 void set_normals(Work& work, size_t normal_count) {
   size_t sum_count = 0;
-  const std::vector<uint32_t> places = sum_places(work, normal_count, sum_count);
+  const std::vector<uint32_t> sum_of_normal = sum_indices(work, normal_count, sum_count);
   std::vector<Point> sums(sum_count, Point{0, 0, 0});
   const uint32_t k = work.faces.size;
   each_corner(work.sectors.size(), sum_count, [&](size_t c, size_t first, size_t end) {
-    const uint32_t place = places[work.sectors[c]];
-    if (place < first || place >= end) return;
+    const uint32_t sum_index = sum_of_normal[work.sectors[c]];
+    if (sum_index < first || sum_index >= end) return;
     const size_t face = c / k * k, at = c - face;
     const uint32_t* corner = &work.faces.corners[face];
     const Point here = point_at(work.positions, corner[at]);
     const Point to_next = point_at(work.positions, corner[(at + 1) % k]) - here;
     const Point to_last = point_at(work.positions, corner[(at + k - 1) % k]) - here;
-    sums[place] = sums[place] + cross_of(to_next, to_last);
+    sums[sum_index] = sums[sum_index] + cross_of(to_next, to_last);
   });
   work.normals.resize(3 * normal_count);
   parallel_bands(normal_count, kBand, [&](size_t first, size_t end) {
     for (size_t i = first; i < end; ++i)
-      if (places[i] != ~0u) put(work.normals, i, unit(sums[places[i]]));
+      if (sum_of_normal[i] != ~0u) put(work.normals, i, unit(sums[sum_of_normal[i]]));
   });
 }
 
@@ -108,7 +108,7 @@ void displace(Work& work, const SurfaceDesc& desc) {
 }
 
 /// Transforms points and normals by desc.matrix, in double precision.
-void place(Work& work, const SurfaceDesc& desc, bool& mirrored) {
+void make_positions(Work& work, const SurfaceDesc& desc, bool& mirrored) {
   const std::array<double, 16>& m = desc.matrix;
   const Point x{m[0], m[1], m[2]}, y{m[4], m[5], m[6]}, z{m[8], m[9], m[10]},
       t{m[12], m[13], m[14]};
@@ -246,11 +246,11 @@ SurfaceValues on_triangles(const Spread& spread, uint32_t width,
   for (size_t c = 0; c < origins.size(); ++c) {
     const uint32_t point = mesh.triangles[c];
     const float* const here = value_at(c);
-    float* const there = &out.values[size_t{point} * width];
+    float* const target = &out.values[size_t{point} * width];
     if (first[point] == kNone) {
       first[point] = static_cast<uint32_t>(c);
-      std::copy_n(here, width, there);
-    } else if (!std::equal(here, here + width, there)) {
+      std::copy_n(here, width, target);
+    } else if (!std::equal(here, here + width, target)) {
       out.per_corner = true;
       break;
     }
@@ -359,7 +359,7 @@ SurfaceMesh make_surface(const SurfaceDesc& desc) {
     set_normals(work, normal_count);
   }
   bool mirrored = false;
-  place(work, desc, mirrored);
+  make_positions(work, desc, mirrored);
   std::vector<uint32_t> origins;
   emit(work, mirrored != desc.left_handed, mesh, primvars.empty() ? nullptr : &origins);
   mesh.primvars.resize(primvars.size());

@@ -23,7 +23,7 @@ inline void for_each_graph(const UInt<F>& graph, const Mask<F>& active, const Fu
 
 /// Clamps a graph value to the range of component `i`.
 template <typename F>
-inline F sane_output(uint32_t i, const F& value) {
+inline F valid_output(uint32_t i, const F& value) {
   return clamp(value, F(kGraphRanges.low[i]), F(kGraphRanges.high[i]));
 }
 
@@ -41,7 +41,7 @@ template <typename F>
       const uint32_t k = output.parameter - first;
       if (k >= 3) continue;
       const F result = graph_output<F>(view.graphs, program, output, registers);
-      value[k] = select(same, sane_output<F>(output.parameter, result), value[k]);
+      value[k] = select(same, valid_output<F>(output.parameter, result), value[k]);
     }
   });
   return {value[0], value[1], value[2]};

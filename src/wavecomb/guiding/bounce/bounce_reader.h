@@ -15,12 +15,12 @@
 namespace wavecomb {
 
 /// Training samples, in path order.
-struct Lessons {
+struct TrainingSamples {
   std::vector<TrainingRecord> records;  ///< bounces that contributed light, of all rounds
-  std::vector<BounceLesson> bounces;    ///< all bounces of the last round
+  std::vector<BounceSample> bounces;    ///< all bounces of the last round
   // One per path of the last round:
   std::vector<float> luminances;
-  std::vector<PathLesson> paths;
+  std::vector<PathStatistics> paths;
 };
 
 /// Cost model in units of one ray traced through a BVH.
@@ -36,12 +36,12 @@ struct PathCosts {
 };
 
 /// Parameters of a training round.
-struct LessonPlan {
+struct TrainingPlan {
   uint32_t first, samples;  ///< first sample and number of samples of each pixel
-  uint32_t most_depth;
-  const GuideGrid& grid;
-  GuideView guide;            ///< field that guides the bounces, or empty
-  const PictureTiles* tiles;  ///< brightness of the image; null if unknown
+  uint32_t max_depth;
+  const GuidingGrid& grid;
+  GuidingView guide;        ///< field that guides the bounces, or empty
+  const ImageTiles* tiles;  ///< brightness of the image; null if unknown
   PathCosts costs;
   uint32_t roulette_depth;
 };
@@ -55,28 +55,28 @@ class BounceReader final : public HistoryReader {
   static constexpr uint32_t kVertices = 6;
 
   /// `pixels` and `plan` must outlive the reader.
-  BounceReader(std::span<const uint32_t> pixels, const LessonPlan& plan);
+  BounceReader(std::span<const uint32_t> pixels, const TrainingPlan& plan);
 
   uint32_t most() const override { return kVertices; }
   void ended(const PathHistory& history, const float* radiance, const WaveTask& task) override;
   /// Appends the training samples in path order.
-  void append_to(Lessons& lessons) const;
+  void append_to(TrainingSamples& training_samples) const;
 
  private:
   /// Adds the training samples of the path in `slot`, which has index `path` and ended with the
   /// radiance `end`. `inverse_scale` is one over the brightness of the image at its pixel.
   void read(const PathHistory& history, uint32_t slot, const Color<float>& end, size_t path,
             float inverse_scale);
-  void add_record(size_t path, const HistoryRow<float>& v, const GuidePlace<float>& place,
-                  float nearness, float value, float weight);
+  void add_record(size_t path, const HistoryRow<float>& v, const GuidingLookup<float>& guiding,
+                  float inverse_distance, float value, float weight);
 
   std::span<const uint32_t> pixels_;
-  const LessonPlan& plan_;
+  const TrainingPlan& plan_;
   std::vector<TrainingRecord> records_;  ///< kVertices for each path
-  std::vector<BounceLesson> bounces_;    ///< kVertices for each path
+  std::vector<BounceSample> bounces_;    ///< kVertices for each path
   std::vector<uint8_t> record_counts_, bounce_counts_;
   std::vector<float> luminance_;
-  std::vector<PathLesson> paths_;
+  std::vector<PathStatistics> paths_;
 };
 
 }  // namespace wavecomb

@@ -10,8 +10,8 @@ namespace {
 constexpr double kStep = 0x1p-20;  ///< resolution of sums
 /// Lower limit of probabilities in sums. Terms are then at most 2^24, and a sum of 2^19 of them
 /// fits in 64 bits.
-constexpr double kLeastShare = 0x1p-8;
-constexpr double kMostMean = 64;  ///< limit of |N - M|
+constexpr double kMinShare = 0x1p-8;
+constexpr double kMaxMean = 64;  ///< limit of |N - M|
 constexpr int kIterations = 24;
 
 int64_t to_steps(double value) {
@@ -33,7 +33,7 @@ void LightBalance::add(size_t cell, size_t part, double value, double weight) {
   if (!std::isfinite(value) || !(value > 0) || !(weight > 0) || !(share > 0)) return;
   // value = a / (share + r), weight = share / (share + r).
   const double r = std::clamp(share * (1 / weight - 1), 0.0, 1e6);
-  const double at_one = std::min(kMostValue, value * (share + r) / (1 + r));
+  const double at_one = std::min(kMaxValue, value * (share + r) / (1 + r));
   samples_.push_back({static_cast<uint32_t>(cell), static_cast<uint32_t>(part),
                       static_cast<float>(at_one * (1 + r)), static_cast<float>(r)});
 }
@@ -44,7 +44,7 @@ std::vector<double> LightBalance::gains(std::span<const double> p) const {
     int64_t bounces_less_lights;  ///< estimate of N - M from this sample
   };
   const auto term = [&](const Sample& s) {
-    const double share = std::max(p[s.part], kLeastShare), a{s.a}, r{s.r};
+    const double share = std::max(p[s.part], kMinShare), a{s.a}, r{s.r};
     const double inverse = 1 / (share + r);
     return Term{a, r, inverse, to_steps(a * (r - share) * inverse / first_[s.part])};
   };
@@ -58,7 +58,7 @@ std::vector<double> LightBalance::gains(std::span<const double> p) const {
     if (others > 0)
       mean = std::clamp(
           from_steps(cells[s.cell] - t.bounces_less_lights) / static_cast<double>(others),
-          -kMostMean, kMostMean);
+          -kMaxMean, kMaxMean);
     sums[s.part] += to_steps(t.a * (t.a - 2 * mean * t.r) * t.inverse * t.inverse);
   }
   std::vector<double> out(p.size(), 0);
@@ -91,12 +91,13 @@ std::vector<double> LightBalance::shares(std::span<const double> power) const {
 
 void NodeBalance::add(bool right, double probability, double value, double weight) {
   if (!std::isfinite(value) || !(value > 0) || !(weight > 0) || !(probability > 0)) return;
-  const double brought = std::min(LightBalance::kMostValue, value), w = std::max(weight, 0x1p-10);
+  const double contribution = std::min(LightBalance::kMaxValue, value),
+               w = std::max(weight, 0x1p-10);
   for (int i = -kSteps; i <= kSteps; ++i) {
     const double odds = std::exp2(0.5 * i), factor = right ? odds : 1 / odds;
     const double after = probability * factor / (probability * factor + 1 - probability);
     squares_[static_cast<size_t>(i + kSteps)] += static_cast<uint64_t>(
-        to_steps(brought * brought / (w * (w * after / probability + 1 - w))));
+        to_steps(contribution * contribution / (w * (w * after / probability + 1 - w))));
   }
   ++count_;
 }

@@ -36,7 +36,7 @@ class LightBalance {
 
   /// Adds a selection of `part` at a vertex in `cell`. `value` is the contribution of the light
   /// sample times its MIS weight, divided by the brightness of the image there, and `weight` is
-  /// that MIS weight. Ignores values that are not finite, and clamps to kMostValue the value that
+  /// that MIS weight. Ignores values that are not finite, and clamps to kMaxValue the value that
   /// the sample would have at a selection probability of 1.
   void add(size_t cell, size_t part, double value, double weight);
 
@@ -46,7 +46,7 @@ class LightBalance {
   std::vector<double> shares(std::span<const double> power) const;
 
   static constexpr double kFloor = 0.1;
-  static constexpr double kMostValue = 16;
+  static constexpr double kMaxValue = 16;
 
  private:
   struct Sample {

@@ -51,7 +51,7 @@ void add_meshes(const Scene& scene, LightParts& parts, std::vector<Candidate>& o
   parallel_for(meshes.size(), [&](size_t m) {
     const size_t begin = parts.of_mesh[m].first;
     const size_t end = m + 1 < meshes.size() ? parts.of_mesh[m + 1].first : set.size();
-    for (size_t light = begin; light < end; ++light) powers[m] += double{set.pick_pdf(light)};
+    for (size_t light = begin; light < end; ++light) powers[m] += double{set.selection_pdf(light)};
   });
   for (uint32_t m = 0; m < meshes.size(); ++m)
     if (powers[m] > 0) out.push_back({powers[m], meshes[m]->name, kNoLight, m});
@@ -85,23 +85,24 @@ void make_parts(const std::vector<Candidate>& candidates, size_t most, LightPart
     if (!alone[i]) put(candidates[i], static_cast<uint32_t>(parts.size() - 1));
 }
 
-void weigh_tree(const LightSet& set, const LightTree& tree, const LightParts& parts,
-                std::span<const double> shares, std::span<const NodeTilt> tilts,
-                WeighedLights& out) {
+void build_tree_tables(const LightSet& set, const LightTree& tree, const LightParts& parts,
+                       std::span<const double> shares, std::span<const NodeTilt> tilts,
+                       CalibratedLights& out) {
   out.infinite_ends.resize(set.infinite_count);
   out.infinite_pdf.resize(set.infinite_count);
   std::vector<uint32_t> numbers(set.infinite_count, 0);
   uint32_t left = kNumbers;
-  auto to_come = static_cast<uint32_t>(std::count_if(
+  auto remaining_lights = static_cast<uint32_t>(std::count_if(
       tree.infinite_pdf.begin(), tree.infinite_pdf.end(), [](float pdf) { return pdf > 0; }));
   for (uint32_t i = 0; i < set.infinite_count; ++i) {
     const uint32_t part = parts.of_record[i];
     if (part == kNoPart) continue;
     const double share = shares[part] * double{tree.infinite_pdf[i]} / parts.power[part];
     // Leave at least a thousandth to the tree, and one random value to each later light.
-    const uint32_t kept = std::min(kNumbers / 1000, left - to_come) + to_come - 1;
-    --to_come;
-    numbers[i] = std::min(left - kept, 1 + static_cast<uint32_t>(share * (kNumbers - 1)));
+    const uint32_t reserved =
+        std::min(kNumbers / 1000, left - remaining_lights) + remaining_lights - 1;
+    --remaining_lights;
+    numbers[i] = std::min(left - reserved, 1 + static_cast<uint32_t>(share * (kNumbers - 1)));
     left -= numbers[i];
     out.shares[part] += numbers[i] * 0x1p-24;
   }
@@ -136,15 +137,15 @@ LightParts divide_lights(const Scene& scene, bool by_tree) {
   LightParts parts;
   parts.by_tree = by_tree;
   parts.of_record.assign(set.record_count, kNoPart);
-  if (by_tree ? set.tree.numbers == 0 : set.size() > kMostWeighed) return {};
+  if (by_tree ? set.tree.numbers == 0 : set.size() > kMaxCalibratedLights) return {};
   std::vector<Candidate> candidates;
   std::vector<double> powers(set.record_count);
   const size_t records = by_tree ? set.infinite_count : set.record_count;
   for (size_t i = 0; i < records; ++i)
-    powers[i] = double{by_tree ? set.tree.infinite_pdf[i] : set.records[i].pick_pdf};
+    powers[i] = double{by_tree ? set.tree.infinite_pdf[i] : set.records[i].selection_pdf};
   add_records(scene, records, powers, candidates);
   if (!by_tree) add_meshes(scene, parts, candidates);
-  make_parts(candidates, LightParts::kMost - (by_tree ? 1 : 0), parts);
+  make_parts(candidates, LightParts::kMax - (by_tree ? 1 : 0), parts);
   if (by_tree) {
     parts.power.push_back(set.tree.numbers * 0x1p-24);
     parts.names.push_back("tree");
@@ -153,12 +154,12 @@ LightParts divide_lights(const Scene& scene, bool by_tree) {
   return parts;
 }
 
-void WeighedLights::apply(LightView& view) const {
+void CalibratedLights::apply(LightView& view) const {
   if (shares.empty()) return;
-  if (!pick_pdf.empty()) {
-    view.pick_pdf = pick_pdf.data();
-    view.pick = pick;
-    view.pick.bins = pick_bins.data();
+  if (!selection_pdf.empty()) {
+    view.selection_pdf = selection_pdf.data();
+    view.power_table = power_table;
+    view.power_table.bins = power_bins.data();
     return;
   }
   view.tree.numbers = tree_numbers;
@@ -167,7 +168,8 @@ void WeighedLights::apply(LightView& view) const {
   if (!nodes.empty()) view.tree.nodes = nodes.data();
 }
 
-LightWeigher::LightWeigher(const LightSet& set, const LightTree& tree, const LightParts& parts)
+LightTableBuilder::LightTableBuilder(const LightSet& set, const LightTree& tree,
+                                     const LightParts& parts)
     : set_(set), tree_(tree), parts_(parts) {
   if (parts.by_tree) return;
   for (size_t i = 0; i < set.record_count; ++i)
@@ -180,36 +182,37 @@ LightWeigher::LightWeigher(const LightSet& set, const LightTree& tree, const Lig
   by_power_.resize(set.size());
   weights_.assign(set.size(), 0);
   parallel_for(ranges_.size(), [&](size_t r) {
-    for (size_t i = ranges_[r].begin; i < ranges_[r].end; ++i) by_power_[i] = set.pick_pdf(i);
+    for (size_t i = ranges_[r].begin; i < ranges_[r].end; ++i) by_power_[i] = set.selection_pdf(i);
   });
 }
 
-void LightWeigher::weigh_table(std::span<const double> shares, WeighedLights& out) {
+void LightTableBuilder::build_power_tables(std::span<const double> shares, CalibratedLights& out) {
   parallel_for(ranges_.size(), [&](size_t r) {
     const Range& range = ranges_[r];
     const double factor = shares[range.part] / parts_.power[range.part];
     for (size_t i = range.begin; i < range.end; ++i) weights_[i] = double{by_power_[i]} * factor;
   });
-  out.pick = build_pick_table(weights_, set_.first_triangle(), out.pick_bins, numbers_);
-  out.pick_pdf.resize(numbers_.size());
+  out.power_table = build_power_table(weights_, set_.first_triangle(), out.power_bins, numbers_);
+  out.selection_pdf.resize(numbers_.size());
   std::vector<uint64_t> sums(ranges_.size(), 0);
   parallel_for(ranges_.size(), [&](size_t r) {
     for (size_t i = ranges_[r].begin; i < ranges_[r].end; ++i) {
       sums[r] += numbers_[i];
-      out.pick_pdf[i] = static_cast<float>(numbers_[i]) * 0x1p-24f;
+      out.selection_pdf[i] = static_cast<float>(numbers_[i]) * 0x1p-24f;
     }
   });
   for (size_t r = 0; r < ranges_.size(); ++r)
     out.shares[ranges_[r].part] += static_cast<double>(sums[r]) * 0x1p-24;
 }
 
-WeighedLights LightWeigher::weigh(std::span<const double> shares, std::span<const NodeTilt> tilts) {
-  WeighedLights out;
+CalibratedLights LightTableBuilder::build_tables(std::span<const double> shares,
+                                                 std::span<const NodeTilt> tilts) {
+  CalibratedLights out;
   out.shares.assign(parts_.size(), 0);
   if (parts_.by_tree)
-    weigh_tree(set_, tree_, parts_, shares, tilts, out);
+    build_tree_tables(set_, tree_, parts_, shares, tilts, out);
   else
-    weigh_table(shares, out);
+    build_power_tables(shares, out);
   return out;
 }
 

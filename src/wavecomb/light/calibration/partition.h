@@ -15,11 +15,11 @@ namespace wavecomb {
 inline constexpr uint32_t kNoPart = 0xffffffffu;
 
 /// Division of all lights that emit into parts. Selection by power: each infinite light, each
-/// finite light and each emissive mesh of an instance is a part, but if there are more than kMost,
+/// finite light and each emissive mesh of an instance is a part, but if there are more than kMax,
 /// the weakest together form one part. Selection by tree: each infinite light is a part, and the
 /// tree is the last part.
 struct LightParts {
-  static constexpr size_t kMost = 64;
+  static constexpr size_t kMax = 64;
   bool by_tree = false;
   std::vector<double> power;        ///< selection probability by power of each part; the sum is 1
   std::vector<std::string> names;   ///< names of lights and meshes, "tree", "N others"
@@ -34,11 +34,11 @@ struct LightParts {
 /// Largest number of lights that are calibrated when selected by power. Each needs 8 bytes in
 /// addition to its 64, and about 30 more during calibration. Each light keeps at least one of the
 /// 2^24 random values, which leaves at least half of the values to distribute.
-inline constexpr size_t kMostWeighed = size_t{1} << 23;
+inline constexpr size_t kMaxCalibratedLights = size_t{1} << 23;
 
 /// Divides the lights of a scene for selection by tree or by power. Returns no parts if there is
-/// nothing to distribute: fewer than two parts or more than kMostWeighed lights (by power), or no
-/// light in the tree.
+/// nothing to distribute: fewer than two parts or more than kMaxCalibratedLights lights (by power),
+/// or no light in the tree.
 LightParts divide_lights(const Scene& scene, bool by_tree);
 
 /// Changed odds at a light tree node: a factor on the odds of the right child over the left child,
@@ -49,11 +49,11 @@ struct NodeTilt {
 };
 
 /// Calibrated light tables that replace those of a LightView.
-struct WeighedLights {
-  std::vector<double> shares;   ///< by part, after rounding; empty if the tables of the view remain
-  std::vector<float> pick_pdf;  ///< by light; empty for selection by tree
-  std::vector<uint32_t> pick_bins;
-  PickTable pick;  ///< with a null pointer to the bins
+struct CalibratedLights {
+  std::vector<double> shares;  ///< by part, after rounding; empty if the tables of the view remain
+  std::vector<float> selection_pdf;  ///< by light; empty for selection by tree
+  std::vector<uint32_t> power_bins;
+  PowerTable power_table;  ///< with a null pointer to the bins
   std::vector<uint32_t> infinite_ends;
   std::vector<float> infinite_pdf;
   uint32_t tree_numbers = 0;
@@ -66,15 +66,15 @@ struct WeighedLights {
 /// Builds light tables with other selection probabilities, any number of times.
 ///
 /// Contract: the arguments of the constructor outlive it.
-class LightWeigher {
+class LightTableBuilder {
  public:
-  /// `tree` is the tree of the set. It needs nodes only if tilts are passed to weigh().
-  LightWeigher(const LightSet& set, const LightTree& tree, const LightParts& parts);
+  /// `tree` is the tree of the set. It needs nodes only if tilts are passed to build_tables().
+  LightTableBuilder(const LightSet& set, const LightTree& tree, const LightParts& parts);
 
   /// Builds tables in which part i has the selection probability shares[i] (> 0, sum 1), up to
-  /// rounding to multiples of 2^-24 and the floor of build_pick_table(). Within a part, the
+  /// rounding to multiples of 2^-24 and the floor of build_power_table(). Within a part, the
   /// relative probabilities stay the same, except for the odds at the nodes of `tilts`.
-  WeighedLights weigh(std::span<const double> shares, std::span<const NodeTilt> tilts);
+  CalibratedLights build_tables(std::span<const double> shares, std::span<const NodeTilt> tilts);
 
  private:
   /// Lights [begin, end) of one part.
@@ -82,7 +82,7 @@ class LightWeigher {
     size_t begin, end;
     uint32_t part;
   };
-  void weigh_table(std::span<const double> shares, WeighedLights& out);
+  void build_power_tables(std::span<const double> shares, CalibratedLights& out);
 
   const LightSet& set_;
   const LightTree& tree_;

@@ -10,14 +10,14 @@ namespace wavecomb {
 /// distribution of its light with probability `even`, and uniformly through sphere k with
 /// probability share[k]. These probabilities sum to 1.
 struct LightAim {
-  static constexpr uint32_t kMost = 16;
+  static constexpr uint32_t kMax = 16;
 
   uint32_t count = 0;
   float even = 1;
-  float x[kMost] = {}, y[kMost] = {}, z[kMost] = {};
-  float radius[kMost] = {};
-  float share[kMost] = {};
-  float end[kMost] = {};  ///< even + share[0] + ... + share[k]
+  float x[kMax] = {}, y[kMax] = {}, z[kMax] = {};
+  float radius[kMax] = {};
+  float share[kMax] = {};
+  float end[kMax] = {};  ///< even + share[0] + ... + share[k]
 };
 
 }  // namespace wavecomb

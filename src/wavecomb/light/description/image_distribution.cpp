@@ -47,11 +47,11 @@ class RowMeans {
     std::vector<double> line(n);
     for (uint32_t x = 0; x < n; ++x) {
       const auto t = texel_at(texture_, 0, x, y);
-      const auto lit = [](float texel, float scale) {
+      const auto emitted = [](float texel, float scale) {
         return std::max(0.0, double{texel}) * double{scale};
       };
-      line[x] = 0.212656 * lit(t[0], color_.x) + 0.715158 * lit(t[1], color_.y) +
-                0.072186 * lit(t[2], color_.z);
+      line[x] = 0.212656 * emitted(t[0], color_.x) + 0.715158 * emitted(t[1], color_.y) +
+                0.072186 * emitted(t[2], color_.z);
     }
     const auto at = [&](uint32_t i) { return i == n ? 0.0 : line[i]; };
     std::vector<double> smooth(n), cells(cells_, 0.0);
@@ -81,9 +81,9 @@ double accumulate(std::span<const double> weights, uint16_t* cumulative) {
   double sum = 0;
   for (const double w : weights) sum += w;
   const auto counts = [&](size_t i) { return !(sum > 0) || weights[i] > 0 || i + 1 == n; };
-  uint32_t lit = 0;
-  for (size_t i = 0; i < n; ++i) lit += counts(i);
-  const uint32_t free = Distribution2D::kCounts - lit;
+  uint32_t emitted = 0;
+  for (size_t i = 0; i < n; ++i) emitted += counts(i);
+  const uint32_t free = Distribution2D::kCounts - emitted;
   double running = 0;
   uint32_t before = 0;
   for (size_t i = 0; i < n; ++i) {
@@ -107,10 +107,10 @@ struct Cells {
 };
 
 /// Computes the cells; `wrap` determines the rows above the top and below the bottom.
-Cells cell_means(const TextureView& texture, const Vec3<float>& color, uint32_t most_height,
+Cells cell_means(const TextureView& texture, const Vec3<float>& color, uint32_t max_height,
                  Wrap wrap) {
   const uint32_t width = texture.levels[0].width, height = texture.levels[0].height;
-  Cells cells{std::min(width, kMaxWidth), std::min(height, most_height), {}};
+  Cells cells{std::min(width, kMaxWidth), std::min(height, max_height), {}};
   cells.mean.assign(size_t{cells.width} * cells.height, 0.0);
   const RowMeans means(texture, color, cells.width);
   std::vector<std::vector<double>> some(std::min(height, kRows));  // RowMeans of the next rows
@@ -120,15 +120,15 @@ Cells cell_means(const TextureView& texture, const Vec3<float>& color, uint32_t 
                    [&](size_t i) { some[i] = means(y + static_cast<uint32_t>(i)); });
     return std::move(some[y % kRows]);
   };
-  const auto beside = [&](int step, const std::vector<double>& edge) {
+  const auto neighbour_row = [&](int step, const std::vector<double>& edge) {
     const uint32_t y = neighbour(wrap, step < 0 ? 0 : height - 1, step, height);
     if (y == height) return std::vector<double>(cells.width, 0.0);
     return wrap == Wrap::kRepeat ? means(y) : edge;
   };
   // Bilinear lookups blend adjacent rows, as in RowMeans.
-  std::vector<double> row = mean_of(0), above = beside(-1, row), below;
+  std::vector<double> row = mean_of(0), above = neighbour_row(-1, row), below;
   for (uint32_t y = 0; y < height; ++y) {
-    below = y + 1 < height ? mean_of(y + 1) : beside(1, row);
+    below = y + 1 < height ? mean_of(y + 1) : neighbour_row(1, row);
     for_each_overlap(y, height, cells.height, [&](size_t c, double part) {
       double* to = cells.mean.data() + c * cells.width;
       for (uint32_t x = 0; x < cells.width; ++x)
@@ -145,8 +145,8 @@ Cells cell_means(const TextureView& texture, const Vec3<float>& color, uint32_t 
 template <typename Part>
 Distribution2D make_distribution(const Cells& cells, const Part& part) {
   using Line = Distribution2D::Line;
-  static_assert(kMaxWidth <= Distribution2D::kMost && kMaxDomeHeight <= Distribution2D::kMost &&
-                kMaxRectHeight <= Distribution2D::kMost);
+  static_assert(kMaxWidth <= Distribution2D::kMax && kMaxDomeHeight <= Distribution2D::kMax &&
+                kMaxRectHeight <= Distribution2D::kMax);
   const auto lines_of = [](uint32_t n) {
     return (n + Distribution2D::kLine - 1) / Distribution2D::kLine;
   };

@@ -17,7 +17,7 @@
 namespace wavecomb {
 
 /// Inputs of a light kind for making records, and the set that receives its additional data.
-struct LightMaking {
+struct LightBuildContext {
   LightSet& set;           ///< receives densities, portals and shapings
   const LightSet* before;  ///< as in LightInputs
   double scene_radius;
@@ -27,14 +27,14 @@ struct LightMaking {
 };
 
 /// A record under construction, and the power on which its selection probability is based, W.
-struct MadeLight {
+struct LightBuild {
   LightRecord record{};
   double power = 0;
 };
 
 /// Shape that rays can hit: none, the parallelogram p, u, v of the record, or the shape of `box`
 /// and `intersect`.
-enum class LightShape : uint8_t { kNone, kParallelogram, kOwn };
+enum class LightShape : uint8_t { kNone, kParallelogram, kCustom };
 
 /// Description of a kind of light for the scene and the accelerator. Its kernels are in the header
 /// of the kind.
@@ -45,17 +45,17 @@ struct LightKindInfo {
   /// Names of the rows of light_table() that this kind uses in addition to those of its traits and
   /// of all lights.
   std::vector<const char*> parameters;
-  /// Rows of parameters specific to this kind, made by own_parameter.
+  /// Rows of parameters specific to this kind, made by specific_parameter.
   std::vector<LightParameter> own;
   /// Sets position, area, radiance and power. Null if the records are made elsewhere.
-  void (*make)(MadeLight&, const Light&, LightMaking&) = nullptr;
+  void (*make)(LightBuild&, const Light&, LightBuildContext&) = nullptr;
   /// Sets bounds for the light tree, which are initialized to `light.p` and the intensity power /
   /// pi. Null if the kind is not in the tree.
   void (*bound)(LightCluster&, const LightRecord& light, double power) = nullptr;
   /// Returns the shape of a record. Null if rays cannot hit this kind.
   LightShape (*shape)(const LightRecord&) = nullptr;
-  /// For LightShape::kOwn: a slightly enlarged bounding box, and the distance to the hit along d in
-  /// units of |d|, or 0 if there is none ahead. `o` is relative to light.p. One ray at a time in
+  /// For LightShape::kCustom: a slightly enlarged bounding box, and the distance to the hit along d
+  /// in units of |d|, or 0 if there is none ahead. `o` is relative to light.p. One ray at a time in
   /// double precision, so that a hit does not depend on the other rays of its packet.
   Bounds (*box)(const LightRecord&) = nullptr;
   double (*intersect)(const LightRecord&, const double* o, const double* d) = nullptr;
@@ -70,19 +70,19 @@ inline const LightKindInfo& info_of(LightKind kind) {
 }
 
 /// Makes the record of a light and computes its power.
-MadeLight make_light(const Light& light, LightMaking& making);
+LightBuild make_light(const Light& light, LightBuildContext& context);
 /// Packs a light filter.
 FilterRecord make_light_filter(const LightFilter& filter);
 
 /// Makes the record of a mesh light instance, with the values that its triangles share.
-LightRecord make_mesh_light(const PlacedMeshLight& placed, LightMaking& making);
+LightRecord make_mesh_light(const MeshLightInstance& instance, LightBuildContext& context);
 
 /// A packed triangle and its power in W.
-struct MadeTriangle {
+struct TriangleBuild {
   TriangleLight light{};
   double power = 0;
 };
 /// Packs a triangle, without setting the index of its texture coordinates.
-MadeTriangle make_triangle(const LightSet& set, const EmissiveTriangle& triangle);
+TriangleBuild make_triangle(const LightSet& set, const EmissiveTriangle& triangle);
 
 }  // namespace wavecomb

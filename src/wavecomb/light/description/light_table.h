@@ -31,13 +31,13 @@ enum class LightGroup : uint8_t { kEmission, kShape, kShaping, kResponse };
 /// Traits that kinds of lights share.
 namespace light_trait {
 /// A light with a transform, as opposed to the light of a mesh.
-inline constexpr uint32_t kPlaced = 1;
-inline constexpr uint32_t kSized = 2;      ///< `normalize` has an effect
-inline constexpr uint32_t kShaped = 4;     ///< supports UsdLuxShapingAPI
-inline constexpr uint32_t kSeen = 8;       ///< rays can hit its shape
-inline constexpr uint32_t kPictured = 16;  ///< supports a texture
-inline constexpr uint32_t kInfinite = 32;  ///< surrounds the scene at infinite distance
-inline constexpr uint32_t kFiltered = 64;  ///< supports light filters
+inline constexpr uint32_t kHasTransform = 1;
+inline constexpr uint32_t kSized = 2;         ///< `normalize` has an effect
+inline constexpr uint32_t kShaped = 4;        ///< supports UsdLuxShapingAPI
+inline constexpr uint32_t kVisibleShape = 8;  ///< rays can hit its shape
+inline constexpr uint32_t kTextured = 16;     ///< supports a texture
+inline constexpr uint32_t kInfinite = 32;     ///< surrounds the scene at infinite distance
+inline constexpr uint32_t kFiltered = 64;     ///< supports light filters
 /// Its radiance is the background of light path expressions.
 inline constexpr uint32_t kBackground = 128;
 }  // namespace light_trait
@@ -54,13 +54,13 @@ struct LightParameter {
   /// Bounds of a number or of each component of a colour; all values are finite.
   double least = -std::numeric_limits<double>::infinity();
   double most = std::numeric_limits<double>::infinity();
-  double usual = 1;  ///< upper end of a slider if there is no `most`
+  double slider_max = 1;  ///< upper end of a slider if there is no `most`
   std::vector<const char*> choices;
   /// Lights with this trait have the parameter, in addition to the kinds that name it.
   uint32_t trait = 0;
-  bool is_common = false;  ///< all lights have it
-  bool is_own = false;     ///< specific to one kind of light
-  uint32_t kinds = 0;      ///< bit k: lights of LightKind k have it
+  bool is_common = false;    ///< all lights have it
+  bool is_specific = false;  ///< specific to one kind of light
+  uint32_t kinds = 0;        ///< bit k: lights of LightKind k have it
 
   LightValue (*read)(const Light&) = nullptr;
   void (*write)(Light&, const LightValue&) = nullptr;
@@ -80,16 +80,16 @@ std::span<const LightParameter> light_table();
 /// Returns the row of a parameter, or null for an unknown name.
 const LightParameter* find_light_parameter(std::string_view name);
 
-/// Returns value `kIndex` of the parameters specific to a kind, at most kMaxOwnParameters, for
+/// Returns value `kIndex` of the parameters specific to a kind, at most kMaxSpecificParameters, for
 /// LightKindInfo::own.
 template <size_t kIndex>
-float own_value(const Light& light, float standard) {
-  static_assert(kIndex < kMaxOwnParameters);
+float specific_value(const Light& light, float standard) {
+  static_assert(kIndex < kMaxSpecificParameters);
   return light.own[kIndex].value_or(standard);
 }
 template <size_t kIndex, float kStandard>
-LightParameter own_parameter(const char* name, const char* label, const char* input,
-                             const char* help, double least, double most) {
+LightParameter specific_parameter(const char* name, const char* label, const char* input,
+                                  const char* help, double least, double most) {
   LightParameter p;
   p.name = name;
   p.label = label;
@@ -98,8 +98,10 @@ LightParameter own_parameter(const char* name, const char* label, const char* in
   p.group = LightGroup::kShape;
   p.least = least;
   p.most = most;
-  p.is_own = true;
-  p.read = [](const Light& light) -> LightValue { return own_value<kIndex>(light, kStandard); };
+  p.is_specific = true;
+  p.read = [](const Light& light) -> LightValue {
+    return specific_value<kIndex>(light, kStandard);
+  };
   p.write = [](Light& light, const LightValue& value) {
     light.own[kIndex] = std::get<float>(value);
   };
@@ -120,8 +122,8 @@ struct LightReferences {
 
 /// Throws Error with one line that names the light if a value is not finite or out of range, if an
 /// id refers to an object that was never added, or if the kind has no transform.
-void check_light(const Light& light, const LightReferences& there);
+void check_light(const Light& light, const LightReferences& references);
 /// Applies the same checks to a mesh light.
-void check_mesh_light(const Light& light, const LightReferences& there);
+void check_mesh_light(const Light& light, const LightReferences& references);
 
 }  // namespace wavecomb

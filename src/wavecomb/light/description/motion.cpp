@@ -12,7 +12,7 @@ namespace wavecomb {
 namespace {
 
 /// Number of poses between two steps at which bounds are computed.
-constexpr int kLooks = 8;
+constexpr int kPosesPerStep = 8;
 
 using Matrix = double[3][3];
 
@@ -43,7 +43,7 @@ bool invert_transposed(const Matrix& m, Matrix& out) {
 /// Computes the rotation closest to `to` times the inverse of `from`, by polar decomposition with
 /// Newton steps X <- (X + X^-T) / 2 (N. Higham, "Computing the Polar Decomposition", 1986). Returns
 /// false if there is none.
-bool turn_between(const Affine& from, const Affine& to, Matrix& x) {
+bool rotation_between(const Affine& from, const Affine& to, Matrix& x) {
   Matrix a, b, inverse;
   set_linear(a, from);
   set_linear(b, to);
@@ -63,7 +63,7 @@ bool turn_between(const Affine& from, const Affine& to, Matrix& x) {
 }
 
 /// Writes the unit quaternion of a rotation, with the sign that is closer to `before`.
-void put_turn(const Matrix& m, const float (&before)[4], float (&to)[4]) {
+void store_rotation(const Matrix& m, const float (&before)[4], float (&to)[4]) {
   double q[4];
   const double trace = m[0][0] + m[1][1] + m[2][2];
   if (trace > 0) {
@@ -102,10 +102,11 @@ double dot3(const double* a, const double* b) {
 
 /// Calls one(place) for poses at equal times over the whole motion.
 template <typename Function>
-void look_along(const LightMotion& motion, std::span<const LightStep> steps, const Function& one) {
-  const uint32_t looks = motion.segments * kLooks;
-  for (uint32_t k = 0; k <= looks; ++k)
-    one(LightPlace(motion, steps, static_cast<double>(k) / static_cast<double>(looks)));
+void for_each_pose(const LightMotion& motion, std::span<const LightStep> steps,
+                   const Function& one) {
+  const uint32_t pose_count = motion.segments * kPosesPerStep;
+  for (uint32_t k = 0; k <= pose_count; ++k)
+    one(PreciseLightPose(motion, steps, static_cast<double>(k) / static_cast<double>(pose_count)));
 }
 
 }  // namespace
@@ -122,17 +123,18 @@ void add_motions(LightSet& set, std::span<const Light> lights) {
     const Vec3<float>& rest = light.to_world.t;
     put(motion.origin, rest.x, rest.y, rest.z);
     LightStep step;
-    for (const Affine& there : light.motion) {
+    for (const Affine& pose : light.motion) {
       Matrix turn;
       const float before[4] = {step.turn[0], step.turn[1], step.turn[2], step.turn[3]};
-      if (turn_between(light.to_world, there, turn)) put_turn(turn, before, step.turn);
-      put(step.place, there.t.x, there.t.y, there.t.z);
+      if (rotation_between(light.to_world, pose, turn)) store_rotation(turn, before, step.turn);
+      put(step.position, pose.t.x, pose.t.y, pose.t.z);
       set.motion_steps.push_back(step);
     }
   }
 }
 
-LightPlace::LightPlace(const LightMotion& motion, std::span<const LightStep> steps, double time) {
+PreciseLightPose::PreciseLightPose(const LightMotion& motion, std::span<const LightStep> steps,
+                                   double time) {
   const double at = std::clamp(time, 0.0, 1.0) * static_cast<double>(motion.segments);
   const uint32_t before = std::min(static_cast<uint32_t>(at), motion.segments - 1);
   const double part = at - static_cast<double>(before);
@@ -145,7 +147,7 @@ LightPlace::LightPlace(const LightMotion& motion, std::span<const LightStep> ste
   }
   for (double& c : q) c /= std::sqrt(length);
   for (int i = 0; i < 3; ++i) {
-    place[i] = mix(a.place[i], b.place[i]);
+    position[i] = mix(a.position[i], b.position[i]);
     origin[i] = double{motion.origin[i]};
   }
   const double xx = q[0] * q[0], yy = q[1] * q[1], zz = q[2] * q[2], xy = q[0] * q[1],
@@ -156,83 +158,84 @@ LightPlace::LightPlace(const LightMotion& motion, std::span<const LightStep> ste
   put(z, 2 * (xz + yw), 2 * (yz - xw), 1 - 2 * (xx + yy));
 }
 
-void LightPlace::to_rest(const double (&direction)[3], double (&out)[3]) const {
+void PreciseLightPose::to_rest(const double (&direction)[3], double (&out)[3]) const {
   out[0] = dot3(x, direction);
   out[1] = dot3(y, direction);
   out[2] = dot3(z, direction);
 }
 
-void LightPlace::point_to_rest(const double (&point)[3], double (&out)[3]) const {
-  const double away[3] = {point[0] - place[0], point[1] - place[1], point[2] - place[2]};
+void PreciseLightPose::point_to_rest(const double (&point)[3], double (&out)[3]) const {
+  const double away[3] = {point[0] - position[0], point[1] - position[1], point[2] - position[2]};
   to_rest(away, out);
   for (int i = 0; i < 3; ++i) out[i] += origin[i];
 }
 
-void LightPlace::to_world(const double (&direction)[3], double (&out)[3]) const {
+void PreciseLightPose::to_world(const double (&direction)[3], double (&out)[3]) const {
   for (int i = 0; i < 3; ++i)
     out[i] = x[i] * direction[0] + y[i] * direction[1] + z[i] * direction[2];
 }
 
-Ball along_way(const LightMotion& motion, std::span<const LightStep> steps, const Ball& at_rest) {
+BoundingSphere swept_bounds(const LightMotion& motion, std::span<const LightStep> steps,
+                            const BoundingSphere& at_rest) {
   const double off[3] = {at_rest.centre[0] - double{motion.origin[0]},
                          at_rest.centre[1] - double{motion.origin[1]},
                          at_rest.centre[2] - double{motion.origin[2]}};
-  double lo[3], hi[3], before[3], apart = 0;
+  double lo[3], hi[3], before[3], opening = 0;
   bool first = true;
-  look_along(motion, steps, [&](const LightPlace& there) {
+  for_each_pose(motion, steps, [&](const PreciseLightPose& pose) {
     double c[3], square = 0;
-    there.to_world(off, c);
+    pose.to_world(off, c);
     for (int i = 0; i < 3; ++i) {
-      c[i] += there.place[i];
+      c[i] += pose.position[i];
       lo[i] = first ? c[i] : std::min(lo[i], c[i]);
       hi[i] = first ? c[i] : std::max(hi[i], c[i]);
       square += first ? 0 : (c[i] - before[i]) * (c[i] - before[i]);
       before[i] = c[i];
     }
-    apart = std::max(apart, std::sqrt(square));
+    opening = std::max(opening, std::sqrt(square));
     first = false;
   });
-  Ball all{};
+  BoundingSphere all{};
   double reach = 0;
   for (int i = 0; i < 3; ++i) {
     all.centre[i] = 0.5 * (lo[i] + hi[i]);
     reach += (hi[i] - all.centre[i]) * (hi[i] - all.centre[i]);
   }
   // Between two poses, the path deviates by less than their distance.
-  all.radius = (at_rest.radius + std::sqrt(reach) + apart) * (1 + 1e-5);
+  all.radius = (at_rest.radius + std::sqrt(reach) + opening) * (1 + 1e-5);
   return all;
 }
 
-LightCluster along_way(const LightMotion& motion, std::span<const LightStep> steps,
-                       const LightCluster& at_rest) {
-  LightCluster way = at_rest;
-  Ball ball{};
+LightCluster swept_bounds(const LightMotion& motion, std::span<const LightStep> steps,
+                          const LightCluster& at_rest) {
+  LightCluster swept = at_rest;
+  BoundingSphere sphere{};
   double square = 0;
   for (int i = 0; i < 3; ++i) {
-    ball.centre[i] = 0.5 * (double{at_rest.lo[i]} + double{at_rest.hi[i]});
+    sphere.centre[i] = 0.5 * (double{at_rest.lo[i]} + double{at_rest.hi[i]});
     square += std::pow(0.5 * (double{at_rest.hi[i]} - double{at_rest.lo[i]}), 2);
   }
-  ball.radius = std::sqrt(square);
-  ball = along_way(motion, steps, ball);
+  sphere.radius = std::sqrt(square);
+  sphere = swept_bounds(motion, steps, sphere);
   for (int i = 0; i < 3; ++i) {
-    way.lo[i] = static_cast<float>(ball.centre[i] - ball.radius);
-    way.hi[i] = static_cast<float>(ball.centre[i] + ball.radius);
+    swept.lo[i] = static_cast<float>(sphere.centre[i] - sphere.radius);
+    swept.hi[i] = static_cast<float>(sphere.centre[i] + sphere.radius);
   }
   DirectionCone cone = at_rest.normals;
   bool first = true;
-  double before[3], apart = 0;
-  look_along(motion, steps, [&](const LightPlace& there) {
+  double before[3], opening = 0;
+  for_each_pose(motion, steps, [&](const PreciseLightPose& pose) {
     DirectionCone turned = at_rest.normals;
-    there.to_world(at_rest.normals.axis, turned.axis);
+    pose.to_world(at_rest.normals.axis, turned.axis);
     cone = first ? turned : unite(cone, turned);
     if (!first)
-      apart = std::max(apart, std::acos(std::clamp(dot3(before, turned.axis), -1.0, 1.0)));
+      opening = std::max(opening, std::acos(std::clamp(dot3(before, turned.axis), -1.0, 1.0)));
     std::copy_n(turned.axis, 3, before);
     first = false;
   });
-  cone.angle = std::min(cone.angle + 0.5 * apart, std::numbers::pi);
-  way.normals = cone;
-  return way;
+  cone.angle = std::min(cone.angle + 0.5 * opening, std::numbers::pi);
+  swept.normals = cone;
+  return swept;
 }
 
 }  // namespace wavecomb

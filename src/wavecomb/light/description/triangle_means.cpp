@@ -11,7 +11,7 @@ namespace {
 
 /// Lower limit of the expected opacity where opacity varies, so that light sampling does not ignore
 /// triangles whose estimated mean is 0.
-constexpr float kLeastOpacity = 1.f / 16;
+constexpr float kMinOpacity = 1.f / 16;
 
 /// Returns the mean of a texture as an input reads it.
 Vec3<float> mean_texture(const SceneGeometry& geometry, const TextureUse& use) {
@@ -52,7 +52,7 @@ Vec3<float> mean_graph(const SceneGeometry& geometry, const SceneMaterials& mate
     GraphPoint<float> at;
     at.uv = {mixed(t.uv0[0], t.uv1[0], t.uv2[0]), mixed(t.uv0[1], t.uv1[1], t.uv2[1])};
     at.footprint = width;
-    at.place = {t.mesh, t.prim, u, v};
+    at.mesh_position = {t.mesh, t.prim, u, v};
     at.position = {mixed(t.p0[0], t.p1[0], t.p2[0]), mixed(t.p0[1], t.p1[1], t.p2[1]),
                    mixed(t.p0[2], t.p1[2], t.p2[2])};
     at.local_position = mixed(local(0), local(1), local(2));
@@ -97,7 +97,7 @@ void set_mean_opacity(const SceneGeometry& geometry, const SceneMaterials& mater
   t.opacity_varies = material.needs_presence() && material.opacity_varies();
   if (!material.needs_presence()) return;
   const float threshold = material.opacity_threshold;
-  const auto there = [threshold](float opacity) {
+  const auto presence_of = [threshold](float opacity) {
     return threshold > 0 ? (opacity < threshold ? 0.f : 1.f) : opacity;
   };
   const auto unit = [](float x) { return std::clamp(x, 0.f, 1.f); };
@@ -108,11 +108,11 @@ void set_mean_opacity(const SceneGeometry& geometry, const SceneMaterials& mater
     opacity =
         unit(mean_texture(geometry, material.textures[static_cast<size_t>(Input::kOpacity)]).x);
   if (material.opacity_graph != kNoGraph)
-    opacity = mean_graph(geometry, materials, material.opacity_graph, kOpacityOutput,
-                         Vec3<float>(opacity), t,
-                         [&](const Vec3<float>& value) { return Vec3<float>(there(value.x)); })
+    opacity = mean_graph(
+                  geometry, materials, material.opacity_graph, kOpacityOutput, Vec3<float>(opacity),
+                  t, [&](const Vec3<float>& value) { return Vec3<float>(presence_of(value.x)); })
                   .x;
-  t.opacity = t.opacity_varies ? std::max(opacity, kLeastOpacity) : there(opacity);
+  t.opacity = t.opacity_varies ? std::max(opacity, kMinOpacity) : presence_of(opacity);
 }
 
 }  // namespace wavecomb

@@ -30,13 +30,14 @@ inline F sphere_one_minus_cos(const F& radius, const F& distance2) {
 
 /// Returns g for lines through `p` along +-d, from infinite lights.
 template <typename F>
-[[gnu::noinline]] F aim_from_afar(const LightView& view, const Vec3<F>& p, const Vec3<F>& d) {
+[[gnu::noinline]] F aim_density_infinite(const LightView& view, const Vec3<F>& p,
+                                         const Vec3<F>& d) {
   const LightAim& aim = *view.aim;
   F g(aim.even);
   for (uint32_t k = 0; k < aim.count; ++k) {
     const float r2 = aim.radius[k] * aim.radius[k];
-    const Vec3<F> way = Vec3<F>(F(aim.x[k]), F(aim.y[k]), F(aim.z[k])) - p;
-    const Vec3<F> across = way - d * dot(way, d);
+    const Vec3<F> to_centre = Vec3<F>(F(aim.x[k]), F(aim.y[k]), F(aim.z[k])) - p;
+    const Vec3<F> across = to_centre - d * dot(to_centre, d);
     g += select(length_squared(across) < r2, F(aim.share[k] * (view.radius * view.radius / r2)),
                 F(0.f));
   }
@@ -46,25 +47,26 @@ template <typename F>
 /// Returns g for paths from the point `p` on a finite light along d. `own` is the light's own
 /// density of that direction.
 template <typename F>
-[[gnu::noinline]] F aim_from_near(const LightView& view, const Vec3<F>& p, const Vec3<F>& d,
-                                  const F& own) {
+[[gnu::noinline]] F aim_density_finite(const LightView& view, const Vec3<F>& p, const Vec3<F>& d,
+                                       const F& own) {
   const LightAim& aim = *view.aim;
-  F met(0.f);
+  F sum(0.f);
   for (uint32_t k = 0; k < aim.count; ++k) {
     const F radius(aim.radius[k]);
-    const Vec3<F> way = Vec3<F>(F(aim.x[k]), F(aim.y[k]), F(aim.z[k])) - p;
-    const F along = dot(way, d);
-    const F one_minus_cos = sphere_one_minus_cos<F>(radius, length_squared(way));
-    const Mask<F> ahead = (along > 0.f) & (length_squared(way - d * along) < radius * radius);
-    met += select(ahead | (one_minus_cos == 2.f), F(aim.share[k] / one_minus_cos), F(0.f));
+    const Vec3<F> to_centre = Vec3<F>(F(aim.x[k]), F(aim.y[k]), F(aim.z[k])) - p;
+    const F along = dot(to_centre, d);
+    const F one_minus_cos = sphere_one_minus_cos<F>(radius, length_squared(to_centre));
+    const Mask<F> ahead = (along > 0.f) & (length_squared(to_centre - d * along) < radius * radius);
+    sum += select(ahead | (one_minus_cos == 2.f), F(aim.share[k] / one_minus_cos), F(0.f));
   }
-  return F(met * kInv2Pi) / select(own > 0.f, own, F(1.f)) + aim.even;
+  return F(sum * kInv2Pi) / select(own > 0.f, own, F(1.f)) + aim.even;
 }
 
 /// Returns the solid angle density with which the finite light `light`, without aiming, emits paths
 /// from `p` along d.
 template <typename Kind, typename F>
-inline F own_direction_density(const LightReader<F>& light, const Vec3<F>& p, const Vec3<F>& d) {
+inline F unaimed_direction_density(const LightReader<F>& light, const Vec3<F>& p,
+                                   const Vec3<F>& d) {
   const F by_cosine = max(dot(Kind::template emission_normal<F>(light, p), d), F(0.f)) * kInvPi;
   return select(Kind::template is_delta<F>(light), F(kInv4Pi), by_cosine);
 }
@@ -74,10 +76,10 @@ template <typename Kind, typename F>
 inline F aim_of_kind(const LightView& view, const LightReader<F>& light, const Vec3<F>& from,
                      const Vec3<F>& dir, const F& t) {
   if constexpr (Kind::kIsInfinite) {
-    return aim_from_afar<F>(view, from, dir);
+    return aim_density_infinite<F>(view, from, dir);
   } else {
     const Vec3<F> p = fma(dir, t, from);
-    return aim_from_near<F>(view, p, -dir, own_direction_density<Kind, F>(light, p, -dir));
+    return aim_density_finite<F>(view, p, -dir, unaimed_direction_density<Kind, F>(light, p, -dir));
   }
 }
 
@@ -102,8 +104,8 @@ struct AimChoice {
 
 /// Aims paths from infinite lights: replaces their origins. (u, v) is the sample for the origin.
 template <typename F>
-[[gnu::noinline]] void aim_places(const LightView& view, const F& number, const F& u, const F& v,
-                                  KindEmission<F>& e, const Mask<F>& lanes) {
+[[gnu::noinline]] void aim_origins(const LightView& view, const F& number, const F& u, const F& v,
+                                   KindEmission<F>& e, const Mask<F>& lanes) {
   const AimChoice<F> choice(*view.aim, number, lanes);
   const Vec2<F> at = square_to_disk(u, v);
   const Frame<F> frame = make_frame(e.d);
@@ -112,7 +114,7 @@ template <typename F>
   const Vec3<F> across = fma(frame.s, F(at.x * choice.radius),
                              fma(frame.t, F(at.y * choice.radius), Vec3<F>(e.d * back)));
   e.p = select<F>(choice.aims, choice.centre + across, e.p);
-  e.density = e.density * aim_from_afar<F>(view, e.p, e.d);
+  e.density = e.density * aim_density_infinite<F>(view, e.p, e.d);
 }
 
 /// Aims paths from finite lights: replaces their directions. (s, t) is the sample for the
@@ -122,20 +124,20 @@ template <typename F>
                                       const F& t, float sides, KindEmission<F>& e,
                                       const Mask<F>& lanes) {
   const AimChoice<F> choice(*view.aim, number, lanes);
-  const Vec3<F> way = choice.centre - e.p;
-  const F distance2 = length_squared(way);
+  const Vec3<F> to_centre = choice.centre - e.p;
+  const F distance2 = length_squared(to_centre);
   const F one_minus_cos = sphere_one_minus_cos<F>(choice.radius, distance2);
   const Mask<F> away = distance2 > 0.f;
-  const Vec3<F> axis = select<F>(away, way * F(1.f / sqrt(select(away, distance2, F(1.f)))),
+  const Vec3<F> axis = select<F>(away, to_centre * F(1.f / sqrt(select(away, distance2, F(1.f)))),
                                  Vec3<F>(F(0.f), F(0.f), F(1.f)));
   const Vec3<F> d = make_frame(axis).to_world(square_to_cone(s, t, one_minus_cos));
   e.d = select<F>(choice.aims, d, e.d);
   const F cosine = dot(e.n, e.d);
   if (sides == 2.f) e.n = select<F>(cosine < 0.f, -e.n, e.n);
   const Mask<F> point = length_squared(e.n) == 0.f;
-  const F shown = sides == 2.f ? F(abs(cosine)) : cosine;
-  const F own = select(point, F(kInv4Pi), F(shown * (kInvPi / sides)));
-  e.density = select(own > 0.f, F(e.density * aim_from_near<F>(view, e.p, e.d, own)), F(0.f));
+  const F front_cosine = sides == 2.f ? F(abs(cosine)) : cosine;
+  const F own = select(point, F(kInv4Pi), F(front_cosine * (kInvPi / sides)));
+  e.density = select(own > 0.f, F(e.density * aim_density_finite<F>(view, e.p, e.d, own)), F(0.f));
 }
 
 }  // namespace wavecomb::detail

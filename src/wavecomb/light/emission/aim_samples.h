@@ -12,22 +12,22 @@ namespace wavecomb {
 /// Training samples, one for each light path, by light path number.
 ///
 /// Contract: only the wave that traces a path writes its row, and no two waves trace the same path.
-class AimLessons {
+class AimSamples {
  public:
-  explicit AimLessons(size_t paths) : rows_(paths) {}
+  explicit AimSamples(size_t paths) : rows_(paths) {}
 
-  /// Records the first hit `place` of path `path`.
-  void begin(uint32_t path, const Vec3<float>& place) {
-    rows_[path] = {place.x, place.y, place.z, 0.f};
+  /// Records the first hit `point` of path `path`.
+  void begin(uint32_t path, const Vec3<float>& point) {
+    rows_[path] = {point.x, point.y, point.z, 0.f};
   }
   /// Adds the unblocked contribution of the path's vertex at `depth`, summed over all pixels.
-  void bring(uint32_t path, uint32_t depth, const Vec3<float>& light) {
-    if (depth > 0) rows_[path].worth += luminance(light);
+  void add(uint32_t path, uint32_t depth, const Vec3<float>& light) {
+    if (depth > 0) rows_[path].contribution += luminance(light);
   }
-  const std::vector<AimLesson>& rows() const { return rows_; }
+  const std::vector<AimSample>& rows() const { return rows_; }
 
  private:
-  std::vector<AimLesson> rows_;
+  std::vector<AimSample> rows_;
 };
 
 }  // namespace wavecomb

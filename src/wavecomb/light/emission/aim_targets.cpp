@@ -15,89 +15,90 @@ namespace {
 /// and keep the weights of aimed paths bounded.
 constexpr float kEvenShare = 0.25f;
 /// Minimum number of training samples per sphere, and number of candidate split cells per axis.
-constexpr uint32_t kLeastLessons = 4, kCuts = 16;
+constexpr uint32_t kMinSamples = 4, kSplits = 16;
 /// Range of sphere radii, relative to the radius of the scene.
-constexpr double kLeastRadius = 0x1p-12, kMostRadius = 1;
+constexpr double kMinRadius = 0x1p-12, kMaxRadius = 1;
 /// Minimum likelihood gain of a split, relative to the total contribution.
-constexpr double kLeastCutGain = 0.01;
+constexpr double kMinSplitGain = 0.01;
 
-using Place = std::array<float, 3>;
+using Position = std::array<float, 3>;
 
-Place place_of(const AimLesson& lesson) {
-  return {lesson.x, lesson.y, lesson.z};
+Position position_of(const AimSample& sample) {
+  return {sample.x, sample.y, sample.z};
 }
 
 /// Bounding box, total contribution and number of a set of training samples.
-struct Heap {
-  Place lo{}, hi{};
-  double worth = 0;
+struct SampleBounds {
+  Position lo{}, hi{};
+  double contribution = 0;
   uint32_t count = 0;
 
-  void add(const Place& l, const Place& h, double more, uint32_t n) {
+  void add(const Position& l, const Position& h, double more, uint32_t n) {
     for (size_t a = 0; a < 3; ++a) {
       lo[a] = count == 0 ? l[a] : std::min(lo[a], l[a]);
       hi[a] = count == 0 ? h[a] : std::max(hi[a], h[a]);
     }
-    worth += more;
+    contribution += more;
     count += n;
   }
-  void add(const Heap& other) {
-    if (other.count > 0) add(other.lo, other.hi, other.worth, other.count);
+  void add(const SampleBounds& other) {
+    if (other.count > 0) add(other.lo, other.hi, other.contribution, other.count);
   }
   /// Radius of the sphere around the box, enlarged by 1 + 1 / sqrt(count) because few samples
   /// underestimate the extent.
   double radius(double scene) const {
     double square = 0;
     for (size_t a = 0; a < 3; ++a) square += 0.25 * std::pow(double{hi[a]} - double{lo[a]}, 2);
-    const double room = 1 + 1 / std::sqrt(static_cast<double>(std::max(count, 1u)));
-    return std::clamp(std::sqrt(square) * room, kLeastRadius * scene, kMostRadius * scene);
+    const double enlargement = 1 + 1 / std::sqrt(static_cast<double>(std::max(count, 1u)));
+    return std::clamp(std::sqrt(square) * enlargement, kMinRadius * scene, kMaxRadius * scene);
   }
   /// Log-likelihood of the set, up to a constant: W log(W / A) with A = r^2.
   double likelihood(double scene) const {
-    return worth > 0 ? worth * (std::log(worth) - 2 * std::log(radius(scene))) : 0;
+    return contribution > 0 ? contribution * (std::log(contribution) - 2 * std::log(radius(scene)))
+                            : 0;
   }
 };
 
-struct Cut {
+struct Split {
   double gain = 0;
   size_t axis = 0;
   float at = 0;
 };
 
-struct Piece {
+struct SampleRange {
   size_t begin, end;
-  Heap heap;
-  Cut cut;
+  SampleBounds bounds;
+  Split split;
 };
 
-/// Returns the index of the split cell, of kCuts along `axis` of `box`, that contains `at`.
-uint32_t cut_cell(const Heap& box, size_t axis, float at) {
+/// Returns the index of the split cell, of kSplits along `axis` of `box`, that contains `at`.
+uint32_t split_cell(const SampleBounds& box, size_t axis, float at) {
   const float wide = box.hi[axis] - box.lo[axis];
   const float share = wide > 0 ? (at - box.lo[axis]) / wide : 0;
-  return std::min(static_cast<uint32_t>(share * static_cast<float>(kCuts)), kCuts - 1);
+  return std::min(static_cast<uint32_t>(share * static_cast<float>(kSplits)), kSplits - 1);
 }
 
 /// Finds the axis-aligned split of `whole` that gains most likelihood; a gain of 0 means that there
 /// is none.
-Cut best_cut(std::span<const AimLesson> lessons, const Heap& whole, double scene) {
-  Cut best;
+Split best_split(std::span<const AimSample> aim_samples, const SampleBounds& whole, double scene) {
+  Split best;
   for (size_t axis = 0; axis < 3; ++axis) {
     if (!(whole.hi[axis] > whole.lo[axis])) continue;
-    std::array<Heap, kCuts> cells;
-    for (const AimLesson& lesson : lessons) {
-      const Place p = place_of(lesson);
-      cells[cut_cell(whole, axis, p[axis])].add(p, p, double{lesson.worth}, 1);
+    std::array<SampleBounds, kSplits> cells;
+    for (const AimSample& sample : aim_samples) {
+      const Position p = position_of(sample);
+      cells[split_cell(whole, axis, p[axis])].add(p, p, double{sample.contribution}, 1);
     }
-    std::array<Heap, kCuts> above;  // sums of cells i and higher
-    Heap sum;
-    for (size_t i = kCuts; i-- > 0;) {
+    std::array<SampleBounds, kSplits> above;  // sums of cells i and higher
+    SampleBounds sum;
+    for (size_t i = kSplits; i-- > 0;) {
       sum.add(cells[i]);
       above[i] = sum;
     }
-    Heap below;
-    for (size_t i = 1; i < kCuts; ++i) {
+    SampleBounds below;
+    for (size_t i = 1; i < kSplits; ++i) {
       below.add(cells[i - 1]);
-      if (std::min(below.count, above[i].count) < kLeastLessons) continue;
+      if (std::min(below.count, above[i].count) < kMinSamples) continue;
       const double gain =
           below.likelihood(scene) + above[i].likelihood(scene) - whole.likelihood(scene);
       if (gain > best.gain) best = {gain, axis, static_cast<float>(i)};
@@ -106,63 +107,66 @@ Cut best_cut(std::span<const AimLesson> lessons, const Heap& whole, double scene
   return best;
 }
 
-Piece make_piece(std::span<const AimLesson> all, size_t begin, size_t end, double scene) {
-  Piece piece{begin, end, {}, {}};
+SampleRange make_range(std::span<const AimSample> all, size_t begin, size_t end, double scene) {
+  SampleRange range{begin, end, {}, {}};
   const auto some = all.subspan(begin, end - begin);
-  for (const AimLesson& lesson : some)
-    piece.heap.add(place_of(lesson), place_of(lesson), double{lesson.worth}, 1);
-  piece.cut = best_cut(some, piece.heap, scene);
-  return piece;
+  for (const AimSample& sample : some)
+    range.bounds.add(position_of(sample), position_of(sample), double{sample.contribution}, 1);
+  range.split = best_split(some, range.bounds, scene);
+  return range;
 }
 
-/// Splits the samples greedily, the largest gain first, into at most LightAim::kMost pieces.
-std::vector<Piece> cut_up(std::vector<AimLesson>& all, double scene) {
-  std::vector<Piece> pieces{make_piece(all, 0, all.size(), scene)};
-  const double least = kLeastCutGain * pieces[0].heap.worth;
-  while (pieces.size() < LightAim::kMost) {
-    const auto most =
-        std::max_element(pieces.begin(), pieces.end(),
-                         [](const Piece& a, const Piece& b) { return a.cut.gain < b.cut.gain; });
-    if (!(most->cut.gain > least)) break;
-    const Piece old = *most;
+/// Splits the samples greedily, the largest gain first, into at most LightAim::kMax pieces.
+std::vector<SampleRange> split_greedily(std::vector<AimSample>& all, double scene) {
+  std::vector<SampleRange> ranges{make_range(all, 0, all.size(), scene)};
+  const double least = kMinSplitGain * ranges[0].bounds.contribution;
+  while (ranges.size() < LightAim::kMax) {
+    const auto most = std::max_element(
+        ranges.begin(), ranges.end(),
+        [](const SampleRange& a, const SampleRange& b) { return a.split.gain < b.split.gain; });
+    if (!(most->split.gain > least)) break;
+    const SampleRange old = *most;
     const auto from = all.begin() + static_cast<std::ptrdiff_t>(old.begin);
     const auto to = all.begin() + static_cast<std::ptrdiff_t>(old.end);
-    const auto middle = std::stable_partition(from, to, [&](const AimLesson& lesson) {
-      return static_cast<float>(cut_cell(old.heap, old.cut.axis, place_of(lesson)[old.cut.axis])) <
-             old.cut.at;
+    const auto middle = std::stable_partition(from, to, [&](const AimSample& sample) {
+      return static_cast<float>(split_cell(old.bounds, old.split.axis,
+                                           position_of(sample)[old.split.axis])) < old.split.at;
     });
-    const auto cut = static_cast<size_t>(middle - all.begin());
-    *most = make_piece(all, old.begin, cut, scene);
-    pieces.push_back(make_piece(all, cut, old.end, scene));
+    const auto split = static_cast<size_t>(middle - all.begin());
+    *most = make_range(all, old.begin, split, scene);
+    ranges.push_back(make_range(all, split, old.end, scene));
   }
-  return pieces;
+  return ranges;
 }
 
 }  // namespace
 
-LightAim aim_targets(std::span<const AimLesson> lessons, float scene_radius) {
-  std::vector<AimLesson> all;
-  std::copy_if(lessons.begin(), lessons.end(), std::back_inserter(all),
-               [](const AimLesson& l) { return l.worth > 0 && std::isfinite(l.worth); });
+LightAim aim_targets(std::span<const AimSample> aim_samples, float scene_radius) {
+  std::vector<AimSample> all;
+  std::copy_if(
+      aim_samples.begin(), aim_samples.end(), std::back_inserter(all),
+      [](const AimSample& l) { return l.contribution > 0 && std::isfinite(l.contribution); });
   LightAim aim;
-  if (all.size() < kLeastLessons || !(scene_radius > 0)) return aim;
+  if (all.size() < kMinSamples || !(scene_radius > 0)) return aim;
   const auto scene = double{scene_radius};
-  double worth = 0;
-  for (const AimLesson& l : all) worth += double{l.worth};
-  for (AimLesson& l : all) l.worth = static_cast<float>(double{l.worth} / worth);
-  const std::vector<Piece> pieces = cut_up(all, scene);
-  worth = 0;
-  for (const Piece& piece : pieces) worth += piece.heap.worth;
+  double contribution = 0;
+  for (const AimSample& l : all) contribution += double{l.contribution};
+  for (AimSample& l : all)
+    l.contribution = static_cast<float>(double{l.contribution} / contribution);
+  const std::vector<SampleRange> ranges = split_greedily(all, scene);
+  contribution = 0;
+  for (const SampleRange& range : ranges) contribution += range.bounds.contribution;
   aim.even = kEvenShare;
   double end = double{kEvenShare};
-  for (const Piece& piece : pieces) {
+  for (const SampleRange& range : ranges) {
     const uint32_t k = aim.count++;
-    const auto middle = [&](size_t a) { return 0.5f * (piece.heap.lo[a] + piece.heap.hi[a]); };
+    const auto middle = [&](size_t a) { return 0.5f * (range.bounds.lo[a] + range.bounds.hi[a]); };
     aim.x[k] = middle(0);
     aim.y[k] = middle(1);
     aim.z[k] = middle(2);
-    aim.radius[k] = static_cast<float>(piece.heap.radius(scene));
-    aim.share[k] = static_cast<float>((1 - double{kEvenShare}) * piece.heap.worth / worth);
+    aim.radius[k] = static_cast<float>(range.bounds.radius(scene));
+    aim.share[k] =
+        static_cast<float>((1 - double{kEvenShare}) * range.bounds.contribution / contribution);
     end += double{aim.share[k]};
     aim.end[k] = static_cast<float>(end);
   }

@@ -11,9 +11,9 @@ namespace wavecomb {
 /// Training sample of a light path: its first hit, and the luminance that it contributes to the
 /// image from its second vertex on. The contribution of the first vertex is not counted, because
 /// light samples find it as well.
-struct AimLesson {
+struct AimSample {
   float x = 0, y = 0, z = 0;
-  float worth = 0;
+  float contribution = 0;
 };
 
 /// Fits spheres around the first hits of light paths that contribute to the image. Bounding boxes
@@ -25,6 +25,6 @@ struct AimLesson {
 ///   sum_k W_k log(W_k / A_k) - W log(W / A),
 /// which the splits maximise. `scene_radius` is the radius of the bounding sphere of all surfaces.
 /// Returns no spheres if fewer than four samples contribute.
-LightAim aim_targets(std::span<const AimLesson> lessons, float scene_radius);
+LightAim aim_targets(std::span<const AimSample> aim_samples, float scene_radius);
 
 }  // namespace wavecomb

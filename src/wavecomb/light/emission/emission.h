@@ -28,7 +28,7 @@ struct Emission {
 /// and the sphere it is aimed at.
 template <typename F>
 struct EmissionNumbers {
-  F pick, u, v, s, t, aim;
+  F light, u, v, s, t, aim;
 };
 
 /// Density with which camera paths find a light from the first surface that a light path hits.
@@ -36,7 +36,7 @@ struct EmissionNumbers {
 /// of selecting the light times the squared distance d^2, since 1 / d^2 takes the place of its
 /// solid angle. For a distant light without an angle it is the probability of selecting the light.
 template <typename F>
-struct LightReach {
+struct CameraPathDensity {
   F density;
   Mask<F> is_delta;  ///< whether no bounce can hit the light
 };
@@ -56,7 +56,8 @@ F emission_density(const LightView& view, const UInt<F>& light, const Vec3<F>& f
 /// Returns how light samples and bounces at `from` find `light`, which emitted a path that arrived
 /// along -dir over the distance t.
 template <typename F>
-LightReach<F> light_reach(const LightView& view, const UInt<F>& light, const LightReceiver<F>& from,
-                          const Vec3<F>& dir, const F& t, const Mask<F>& active);
+CameraPathDensity<F> camera_path_density(const LightView& view, const UInt<F>& light,
+                                         const LightReceiver<F>& from, const Vec3<F>& dir,
+                                         const F& t, const Mask<F>& active);
 
 }  // namespace wavecomb

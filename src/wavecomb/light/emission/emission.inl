@@ -13,27 +13,27 @@ namespace detail {
 
 /// Returns the lanes whose light emits light paths.
 template <typename F>
-inline Mask<F> sends_paths(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
+inline Mask<F> emits_paths(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
   using U = UInt<F>;
-  const Mask<F> there = active & Mask<F>(light < U(view.count));
-  const Mask<F> triangle = there & Mask<F>(light >= U(view.first_triangle));
-  const Mask<F> record = there & not_(triangle);
-  Mask<F> sends = there;
+  const Mask<F> listed = active & Mask<F>(light < U(view.count));
+  const Mask<F> triangle = listed & Mask<F>(light >= U(view.first_triangle));
+  const Mask<F> record = listed & not_(triangle);
+  Mask<F> emits = listed;
   if (any(triangle) && view.mesh_lights)
-    sends = sends & (not_(triangle) | Mask<F>(record_of<F>(view, light, triangle) == U(kNoLight)));
+    emits = emits & (not_(triangle) | Mask<F>(record_of<F>(view, light, triangle) == U(kNoLight)));
   if (any(record)) {
     const LightReader<F> reader(view.lights, light, record);
-    sends = sends & (not_(record) | Mask<F>(reader[&LightRecord::camera_only] == U(0u)));
+    emits = emits & (not_(record) | Mask<F>(reader[&LightRecord::camera_only] == U(0u)));
   }
-  return sends;
+  return emits;
 }
 
-/// Returns the probability with which sample_emission() selects a light. `recorded` is the pick_pdf
-/// in its record or row.
+/// Returns the probability with which sample_emission() selects a light. `recorded` is the
+/// selection_pdf in its record or row.
 template <typename F>
-inline F emission_pick_pdf(const LightView& view, const UInt<F>& light, const F& recorded,
-                           const Mask<F>& active) {
-  return view.pick_pdf ? gather<F>(view.pick_pdf, light, active) : recorded;
+inline F emission_selection_pdf(const LightView& view, const UInt<F>& light, const F& recorded,
+                                const Mask<F>& active) {
+  return view.selection_pdf ? gather<F>(view.selection_pdf, light, active) : recorded;
 }
 
 /// Returns the magnitude of the terms that a point on a light is computed from.
@@ -65,12 +65,12 @@ template <typename F>
   Emission<F> out{Vec3<F>(F(0.f)),  Vec3<F>(F(0.f), F(0.f), F(1.f)),
                   Color<F>(F(0.f)), F(0.f),
                   U(kNoLight),      Mask<F>(false)};
-  if (!view.sends_paths() || view.count == 0 || none(wanted)) return out;
-  const U light = detail::pick_light<F>(view, r.pick, wanted);
-  const Mask<F> active = detail::sends_paths<F>(view, light, wanted);
+  if (!view.emits_paths() || view.count == 0 || none(wanted)) return out;
+  const U light = detail::light_by_power<F>(view, r.light, wanted);
+  const Mask<F> active = detail::emits_paths<F>(view, light, wanted);
   const auto put = [&](const detail::KindEmission<F>& e, const F& recorded, const F& size,
                        const Mask<F>& lanes) {
-    const F density = e.density * detail::emission_pick_pdf<F>(view, light, recorded, lanes);
+    const F density = e.density * detail::emission_selection_pdf<F>(view, light, recorded, lanes);
     const Mask<F> valid = lanes & (density > 0.f) & is_finite(density) & not_(is_black(e.radiance));
     const F inverse = 1.f / select(valid, density, F(1.f));
     // Offsets the origin from the light by more than its rounding error.
@@ -86,7 +86,7 @@ template <typename F>
     detail::KindEmission<F> e =
         detail::emit_triangle<F>(reader, view, r.u, r.v, r.s, r.t, triangle);
     if (view.aim) detail::aim_directions<F>(view, r.aim, r.s, r.t, 2.f, e, triangle);
-    put(e, reader.pick_pdf, detail::size_of_terms<F>(reader.p, reader.u, reader.v), triangle);
+    put(e, reader.selection_pdf, detail::size_of_terms<F>(reader.p, reader.u, reader.v), triangle);
   }
   const Mask<F> others = active & not_(triangle);
   if (any(others)) {
@@ -99,7 +99,7 @@ template <typename F>
           });
           if (view.aim) {
             if (visit(kind, []<typename Kind>(Kind) { return Kind::kIsInfinite; }))
-              detail::aim_places<F>(view, r.aim, r.u, r.v, e, lanes);
+              detail::aim_origins<F>(view, r.aim, r.u, r.v, e, lanes);
             else
               detail::aim_directions<F>(view, r.aim, r.s, r.t, 1.f, e, lanes);
           }
@@ -109,7 +109,7 @@ template <typename F>
             e.radiance = detail::filtered<F>(view, reader[&LightRecord::filter], {e.p, e.d, F(0.f)},
                                              e.radiance, lanes);
           const F size = detail::size_of_terms<F>(reader.p(), reader.u(), reader.v());
-          put(e, reader.pick_pdf(), F(size + reader.radius()), lanes);
+          put(e, reader.selection_pdf(), F(size + reader.radius()), lanes);
         });
   }
   out.light = select(Mask<U>(out.valid), light, out.light);
@@ -122,21 +122,21 @@ template <typename F>
                                      const Mask<F>& wanted) {
   F density(0.f);
   if (none(wanted)) return density;
-  const Mask<F> active = detail::sends_paths<F>(view, light, wanted);
+  const Mask<F> active = detail::emits_paths<F>(view, light, wanted);
   const auto put = [&](const F& one, const F& recorded, const Mask<F>& lanes) {
-    const F all = one * detail::emission_pick_pdf<F>(view, light, recorded, lanes);
+    const F all = one * detail::emission_selection_pdf<F>(view, light, recorded, lanes);
     density = select(lanes & is_finite(all), all, density);
   };
   const Mask<F> triangle = active & Mask<F>(light >= UInt<F>(view.first_triangle));
   if (any(triangle)) {
     const detail::TriangleReader<F> reader(view, light, triangle);
     const F area = length(reader.m);
-    F one = 0.5f * detail::even_emission_density<F>(area);
+    F one = 0.5f * detail::uniform_emission_density<F>(area);
     if (view.aim) {
       const F own = abs(dot(reader.m, dir)) * F(0.5f * kInvPi) / select(area > 0.f, area, F(1.f));
-      one = one * detail::aim_from_near<F>(view, fma(dir, t, from), -dir, own);
+      one = one * detail::aim_density_finite<F>(view, fma(dir, t, from), -dir, own);
     }
-    put(one, reader.pick_pdf, triangle);
+    put(one, reader.selection_pdf, triangle);
   }
   const Mask<F> others = active & not_(triangle);
   if (none(others)) return density;
@@ -149,19 +149,21 @@ template <typename F>
           if (!view.aim) return even;
           return F(even * detail::aim_of_kind<Kind, F>(view, reader, from, dir, t));
         });
-        put(one, reader.pick_pdf(), lanes);
+        put(one, reader.selection_pdf(), lanes);
       });
   return density;
 }
 
 template <typename F>
-[[gnu::noinline]] LightReach<F> light_reach(const LightView& view, const UInt<F>& light,
-                                            const LightReceiver<F>& from, const Vec3<F>& dir,
-                                            const F& t, const Mask<F>& active) {
+[[gnu::noinline]] CameraPathDensity<F> camera_path_density(const LightView& view,
+                                                           const UInt<F>& light,
+                                                           const LightReceiver<F>& from,
+                                                           const Vec3<F>& dir, const F& t,
+                                                           const Mask<F>& active) {
   using U = UInt<F>;
-  LightReach<F> reach{F(0.f), Mask<F>(false)};
+  CameraPathDensity<F> result{F(0.f), Mask<F>(false)};
   const Mask<F> triangle = active & Mask<F>(light >= U(view.first_triangle));
-  if (any(triangle)) reach.density = triangle_light_pdf<F>(view, light, from, dir, t, triangle);
+  if (any(triangle)) result.density = triangle_light_pdf<F>(view, light, from, dir, t, triangle);
   const Mask<F> infinite = active & Mask<F>(light < U(view.infinite_count));
   for (uint32_t i = 0; i < view.infinite_count && any(infinite); ++i) {
     const Mask<F> here = infinite & Mask<F>(light == U(i));
@@ -172,22 +174,24 @@ template <typename F>
     const F pdf = is_delta ? F(1.f) : visit(record.kind, [&]<typename Kind>(Kind) {
       return Kind::template escape<F>({view, record, from.p, dir, here}).pdf;
     });
-    reach.density = select(here, F(pdf * infinite_pick_pdf(view, i)), reach.density);
-    if (is_delta) reach.is_delta = reach.is_delta | here;
+    result.density = select(here, F(pdf * infinite_selection_pdf(view, i)), result.density);
+    if (is_delta) result.is_delta = result.is_delta | here;
   }
-  const Mask<F> placed = active & not_(triangle) & not_(infinite);
-  if (none(placed)) return reach;
-  const detail::LightReader<F> reader(view.lights, light, placed);
-  const Mask<F> point = detail::is_delta_light<F>(reader, placed);
-  const Mask<F> area = placed & not_(point);
+  const Mask<F> finite = active & not_(triangle) & not_(infinite);
+  if (none(finite)) return result;
+  const detail::LightReader<F> reader(view.lights, light, finite);
+  const Mask<F> point = detail::is_delta_light<F>(reader, finite);
+  const Mask<F> area = finite & not_(point);
   if (any(area))
-    reach.density = select(area, light_hit<F>(view, light, from, dir, t, area).pdf, reach.density);
+    result.density =
+        select(area, light_hit<F>(view, light, from, dir, t, area).pdf, result.density);
   if (any(point)) {
-    const F pick = detail::finite_pick_pdf<F>(view, light, reader.pick_pdf(), from, point);
-    reach.density = select(point, F(pick * t * t), reach.density);
-    reach.is_delta = reach.is_delta | point;
+    const F selection_pdf =
+        detail::finite_selection_pdf<F>(view, light, reader.selection_pdf(), from, point);
+    result.density = select(point, F(selection_pdf * t * t), result.density);
+    result.is_delta = result.is_delta | point;
   }
-  return reach;
+  return result;
 }
 
 }  // namespace wavecomb

@@ -7,12 +7,12 @@
 #include "wavecomb/light/kinds/record_builder.h"
 
 namespace wavecomb {
-namespace making {
+namespace record_builder {
 namespace {
 
 /// Stores the inverse of `to_world`: its rows and its translation. All are 0 if `to_world` is
 /// singular.
-void put_inverse(FilterRecord& r, const Affine& to_world) {
+void store_inverse(FilterRecord& r, const Affine& to_world) {
   const Double3 axes[3] = {to_double(to_world.axis(0)), to_double(to_world.axis(1)),
                            to_double(to_world.axis(2))};
   const double det = dot(axes[0], cross(axes[1], axes[2]));
@@ -26,34 +26,35 @@ void put_inverse(FilterRecord& r, const Affine& to_world) {
   }
 }
 
-void put_line(float (&to)[3], const Vec3<float>& line) {
+void store_line(float (&to)[3], const Vec3<float>& line) {
   put(to, to_double(line));
 }
 
 }  // namespace
 
-ShadowLookRecord make_shadow(const ShadowLook& look) {
-  ShadowLookRecord r{};
-  put(r.color, to_double(look.color));
-  r.distance = look.distance < 0 ? kFarAway : look.distance;
+ShadowRecord make_shadow(const ShadowAttributes& attributes) {
+  ShadowRecord r{};
+  put(r.color, to_double(attributes.color));
+  r.distance = attributes.distance < 0 ? kFarAway : attributes.distance;
   // The falloff zone ends at the surface at the latest.
-  r.falloff = look.distance < 0 ? 0.f : std::clamp(look.falloff, 0.f, look.distance);
-  r.inverse_gamma = 1 / std::max(look.gamma, 1e-3f);
+  r.falloff =
+      attributes.distance < 0 ? 0.f : std::clamp(attributes.falloff, 0.f, attributes.distance);
+  r.inverse_gamma = 1 / std::max(attributes.gamma, 1e-3f);
   return r;
 }
 
-}  // namespace making
+}  // namespace record_builder
 
 FilterRecord make_light_filter(const LightFilter& filter) {
-  using namespace making;
+  using namespace record_builder;
   FilterRecord r{};
-  put_inverse(r, filter.to_world);
-  put_line(r.side_0, filter.sides[0]);
-  put_line(r.side_1, filter.sides[1]);
-  put_line(r.side_2, filter.sides[2]);
-  put_line(r.side_3, filter.sides[3]);
-  put_line(r.picture_u, filter.picture_u);
-  put_line(r.picture_v, filter.picture_v);
+  store_inverse(r, filter.to_world);
+  store_line(r.side_0, filter.sides[0]);
+  store_line(r.side_1, filter.sides[1]);
+  store_line(r.side_2, filter.sides[2]);
+  store_line(r.side_3, filter.sides[3]);
+  store_line(r.picture_u, filter.picture_u);
+  store_line(r.picture_v, filter.picture_v);
   r.distance = filter.distance;
   r.texture = filter.texture;
   const auto inverse = [](float from, float to) { return to > from ? 1 / (to - from) : 0.f; };

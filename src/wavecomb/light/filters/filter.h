@@ -21,8 +21,8 @@ namespace wavecomb::detail {
 /// Light that leaves a light: position and direction in world space, and distance to the
 /// illuminated point.
 template <typename F>
-struct Leaving {
-  Vec3<F> place, along;
+struct LeavingLight {
+  Vec3<F> position, along;
   F distance;
 };
 
@@ -47,17 +47,17 @@ struct FilterReader : RecordReader<F> {
     }
     Color<F> result(passed);
     const UInt<F> texture = (*this)[&R::texture];
-    const Mask<F> pictured = lanes & Mask<F>(texture != UInt<F>(kNoTexture));
-    if (any(pictured)) {
+    const Mask<F> has_image = lanes & Mask<F>(texture != UInt<F>(kNoTexture));
+    if (any(has_image)) {
       const Texel<F> texel = lookup<F>(textures, texture, along(&R::picture_u),
-                                       along(&R::picture_v), F(0.f), pictured);
+                                       along(&R::picture_v), F(0.f), has_image);
       result =
-          select<F>(pictured, result * not_negative(Color<F>(texel.r, texel.g, texel.b)), result);
+          select<F>(has_image, result * not_negative(Color<F>(texel.r, texel.g, texel.b)), result);
     }
     return result;
   }
 
-  Color<F> passed(const TextureView* textures, const Leaving<F>& light,
+  Color<F> passed(const TextureView* textures, const LeavingLight<F>& light,
                   const Mask<F>& lanes) const {
     using R = FilterRecord;
     const F near = clamp(F(F(light.distance - (*this)[&R::near_start]) * (*this)[&R::near_inverse]),
@@ -66,19 +66,21 @@ struct FilterReader : RecordReader<F> {
                         F(0.f), F(1.f));
     Color<F> result(F(near * F(1.f - far)));
     const F window = (*this)[&R::distance];
-    const Mask<F> framed = lanes & (window > 0.f);
-    if (any(framed)) {
+    const Mask<F> in_frame = lanes & (window > 0.f);
+    if (any(in_frame)) {
       const Vec3<F> rows[3] = {(*this)[&R::row_x], (*this)[&R::row_y], (*this)[&R::row_z]};
       const Vec3<F> origin = (*this)[&R::origin];
-      const Vec3<F> x{dot(rows[0], light.place) + origin.x, dot(rows[1], light.place) + origin.y,
-                      dot(rows[2], light.place) + origin.z};
+      const Vec3<F> x{dot(rows[0], light.position) + origin.x,
+                      dot(rows[1], light.position) + origin.y,
+                      dot(rows[2], light.position) + origin.z};
       const Vec3<F> e{dot(rows[0], light.along), dot(rows[1], light.along),
                       dot(rows[2], light.along)};
-      const F way = window + x.z;
-      const Mask<F> through = framed & (e.z < 0.f) & (way > 0.f);
-      const F s = way / select(through, F(-e.z), F(1.f));
-      const Color<F> shown = at_window(textures, fma(e.x, s, x.x), fma(e.y, s, x.y), through);
-      result = select<F>(framed, select<F>(through, result * shown, Color<F>(F(0.f))), result);
+      const F along_axis = window + x.z;
+      const Mask<F> through = in_frame & (e.z < 0.f) & (along_axis > 0.f);
+      const F s = along_axis / select(through, F(-e.z), F(1.f));
+      const Color<F> transmitted = at_window(textures, fma(e.x, s, x.x), fma(e.y, s, x.y), through);
+      result =
+          select<F>(in_frame, select<F>(through, result * transmitted, Color<F>(F(0.f))), result);
     }
     return lerp(Color<F>(F(1.f)), result, (*this)[&R::density]);
   }
@@ -88,7 +90,7 @@ struct FilterReader : RecordReader<F> {
 /// unchanged.
 template <typename F>
 [[gnu::noinline]] Color<F> filtered(const LightView& view, const UInt<F>& filter,
-                                    const Leaving<F>& light, const Color<F>& radiance,
+                                    const LeavingLight<F>& light, const Color<F>& radiance,
                                     const Mask<F>& lanes) {
   using U = UInt<F>;
   Color<F> result = radiance;

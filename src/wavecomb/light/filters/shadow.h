@@ -15,27 +15,27 @@ namespace wavecomb {
 
 /// Length of a light's shadow rays, and the fraction of its light that remains in its shadows.
 template <typename F>
-struct ShadowReach {
+struct ShadowExtent {
   F distance;
   Color<F> color;
 };
 
-/// Returns the shadow reach of shadow record `look`. With kPlainShadow it is unlimited, and shadows
-/// are black.
+/// Returns the extent of the shadows of shadow record `shadow`. With kPlainShadow it is unlimited,
+/// and shadows are black.
 template <typename F>
-[[gnu::noinline]] ShadowReach<F> shadow_reach(const LightView& view, const UInt<F>& look,
-                                              const F& u, const Mask<F>& active) {
-  const Mask<F> known = active & Mask<F>(look != UInt<F>(kPlainShadow));
-  ShadowReach<F> reach{F(kFarAway), Color<F>(F(0.f))};
-  if (none(known)) return reach;
-  using R = ShadowLookRecord;
-  const auto record = detail::make_reader<R, F>(view.shadows, look, known);
+[[gnu::noinline]] ShadowExtent<F> shadow_extent(const LightView& view, const UInt<F>& shadow,
+                                                const F& u, const Mask<F>& active) {
+  const Mask<F> known = active & Mask<F>(shadow != UInt<F>(kPlainShadow));
+  ShadowExtent<F> extent{F(kFarAway), Color<F>(F(0.f))};
+  if (none(known)) return extent;
+  using R = ShadowRecord;
+  const auto record = detail::make_reader<R, F>(view.shadows, shadow, known);
   const F falloff = record[&R::falloff];
   const F x = select(u > 0.f, pow(max(u, F(1e-30f)), record[&R::inverse_gamma]), F(0.f));
   const F end = record[&R::distance] - select(falloff > 0.f, F(falloff * x), F(0.f));
-  reach.distance = select(known, max(end, F(0.f)), reach.distance);
-  reach.color = select<F>(known, Color<F>(record[&R::color]), reach.color);
-  return reach;
+  extent.distance = select(known, max(end, F(0.f)), extent.distance);
+  extent.color = select<F>(known, Color<F>(record[&R::color]), extent.color);
+  return extent;
 }
 
 }  // namespace wavecomb

@@ -3,11 +3,11 @@
 
 #include "wavecomb/light/kinds/record_builder.h"
 
-namespace wavecomb::making {
+namespace wavecomb::record_builder {
 
-void add_shaping(MadeLight& made, const Light& light, LightMaking& making) {
+void add_shaping(LightBuild& out, const Light& light, LightBuildContext& context) {
   const Shaping& s = light.shaping;
-  const double power = made.power;
+  const double power = out.power;
   const Double3 minus_z = unit(to_double(light.to_world.axis(2)) * -1.0);
   ShapingRecord r{};
   put(r.axis, minus_z);
@@ -37,20 +37,20 @@ void add_shaping(MadeLight& made, const Light& light, LightMaking& making) {
   r.angle_scale = s.ies_angle_scale;
   if (s.focus > 0) {
     const double left = 1.0 / (1.0 + double{s.focus});
-    made.power *= left + (1 - left) * std::min(1.0, luminance(double{r.tint[0]}, double{r.tint[1]},
-                                                              double{r.tint[2]}));
+    out.power *= left + (1 - left) * std::min(1.0, luminance(double{r.tint[0]}, double{r.tint[1]},
+                                                             double{r.tint[2]}));
   }
-  if (s.cone_angle < 180) made.power *= (1 - std::cos(cone)) / 2;
+  if (s.cone_angle < 180) out.power *= (1 - std::cos(cone)) / 2;
   if (s.ies != kNoIes) {
-    const IesProfile& profile = making.profiles[s.ies];
+    const IesProfile& profile = context.profiles[s.ies];
     const double mean = profile.mean();
     r.ies_scale = s.ies_normalize && mean > 0 ? static_cast<float>(1 / mean) : 1.f;
-    made.power *= mean * double{r.ies_scale} * (profile.covers_sphere() ? 1 : 0.5);
+    out.power *= mean * double{r.ies_scale} * (profile.covers_sphere() ? 1 : 0.5);
   }
   if (info_of(light.kind).has(light_trait::kInfinite))
-    made.power = power;  // all of the light travels along the axis
-  made.record.shaping = static_cast<uint32_t>(making.set.shapings.size());
-  making.set.shapings.push_back(r);
+    out.power = power;  // all of the light travels along the axis
+  out.record.shaping = static_cast<uint32_t>(context.set.shapings.size());
+  context.set.shapings.push_back(r);
 }
 
-}  // namespace wavecomb::making
+}  // namespace wavecomb::record_builder

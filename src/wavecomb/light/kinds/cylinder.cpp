@@ -6,20 +6,20 @@
 namespace wavecomb {
 namespace {
 
-using namespace making;
+using namespace record_builder;
 
 /// Makes the record of a circular cylinder about the transformed axis, with the volume of the
 /// transformed cylinder.
-void make(MadeLight& made, const Light& light, LightMaking& /*making*/) {
+void make(LightBuild& out, const Light& light, LightBuildContext& /*context*/) {
   const Affine& m = light.to_world;
   const Double3 x = to_double(m.axis(0)), y = to_double(m.axis(1)), z = to_double(m.axis(2));
   const Double3 axis = x * std::fabs(double{light.length});
   const double stretch = length(x) > 0 ? std::fabs(dot(x, cross(y, z))) / length(x) : 0;
   const double radius = std::fabs(double{light.radius}) * std::sqrt(stretch);
-  put(made.record.p, subtract(to_double(m.t), axis * 0.5));
-  put(made.record.u, axis);
-  made.record.radius = static_cast<float>(radius);
-  finish_area(made, light, 2 * kPiD * radius * length(axis));
+  put(out.record.p, subtract(to_double(m.t), axis * 0.5));
+  put(out.record.u, axis);
+  out.record.radius = static_cast<float>(radius);
+  finish_area(out, light, 2 * kPiD * radius * length(axis));
 }
 
 /// Returns the end of the axis, which starts at p.
@@ -36,7 +36,7 @@ void bound(LightCluster& cluster, const LightRecord& light, double power) {
 }
 
 LightShape shape(const LightRecord& /*light*/) {
-  return LightShape::kOwn;
+  return LightShape::kCustom;
 }
 
 Bounds box(const LightRecord& light) {
@@ -77,7 +77,7 @@ LightKindInfo CylinderKind::describe() {
   LightKindInfo kind;
   kind.name = "cylinder";
   kind.prims = {"CylinderLight"};
-  kind.traits = kPlaced | kSized | kShaped | kSeen | kFiltered;
+  kind.traits = kHasTransform | kSized | kShaped | kVisibleShape | kFiltered;
   kind.parameters = {"radius", "length"};
   kind.make = &make;
   kind.bound = &bound;

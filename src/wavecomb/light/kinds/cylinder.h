@@ -67,14 +67,14 @@ inline CylinderSpan<F> cylinder_span(const CylinderFrame<F>& c, const F& s) {
   const F z0 = c.begin, z1 = c.begin + c.length;
   const F s2 = s * s;
   const F h0 = sqrt(fma(z0, z0, s2)), h1 = sqrt(fma(z1, z1, s2));
-  const Mask<F> good = (h0 > 0.f) & (h1 > 0.f);
+  const Mask<F> valid = (h0 > 0.f) & (h1 > 0.f);
   const F x = z1 * h0, y = z0 * h1;
   const F sum = x + y;
   const Mask<F> one_side = z0 * z1 > 0.f;
   const F numerator =
       select(one_side, F(s2 * c.length * F(z0 + z1) / select(one_side, sum, F(1.f))), F(x - y));
   return {z0 / select(h0 > 0.f, h0, F(1.f)),
-          select(good, F(numerator / select(good, F(h0 * h1), F(1.f))), F(0.f)),
+          select(valid, F(numerator / select(valid, F(h0 * h1), F(1.f))), F(0.f)),
           s2 / select(h0 > 0.f, F(h0 * F(h0 + abs(z0))), F(1.f)), one_side};
 }
 
@@ -89,10 +89,11 @@ template <typename F>
 inline CylinderSlope<F> cylinder_slope(const CylinderSpan<F>& span, const F& v) {
   const F step = v * span.size;
   const F sign = select(span.begin < 0.f, F(-1.f), F(1.f));
-  const F lack = clamp(fma(-sign, step, span.rest), F(0.f), F(1.f));
+  const F missing_length = clamp(fma(-sign, step, span.rest), F(0.f), F(1.f));
   const F sine = clamp(F(span.begin + step), F(-1.f), F(1.f));
-  const F rest = select(span.one_side, lack, F(1.f - abs(sine)));
-  return {select(span.one_side, F(sign * F(1.f - lack)), sine), safe_sqrt(F(rest * F(2.f - rest)))};
+  const F rest = select(span.one_side, missing_length, F(1.f - abs(sine)));
+  return {select(span.one_side, F(sign * F(1.f - missing_length)), sine),
+          safe_sqrt(F(rest * F(2.f - rest)))};
 }
 
 /// Returns the solid angle density of a direction that hits the near side, where the span at its
@@ -100,9 +101,9 @@ inline CylinderSlope<F> cylinder_slope(const CylinderSpan<F>& span, const F& v) 
 template <typename F>
 inline F cylinder_pdf(const CylinderFrame<F>& c, const F& size) {
   const F area = 2.f * c.alpha * size;
-  const Mask<F> good = c.outside & (area > 0.f);
-  const F pdf = 1.f / select(good, area, F(1.f));
-  return select(good & is_finite(pdf), pdf, F(0.f));
+  const Mask<F> valid = c.outside & (area > 0.f);
+  const F pdf = 1.f / select(valid, area, F(1.f));
+  return select(valid & is_finite(pdf), pdf, F(0.f));
 }
 
 template <typename F>
@@ -116,9 +117,9 @@ inline KindSample<F> sample_cylinder(const LightReader<F>& light, const Vec3<F>&
   const auto [sin_gamma, cos_gamma] = cylinder_slope<F>(span, v);
   const Vec3<F> across = fma(c.e, cos_alpha, c.f * sin_alpha);
   const Vec3<F> wi = fma(across, cos_gamma, c.a * sin_gamma);
-  const Mask<F> good = cos_gamma > 0.f;
-  return {wi, s / select(good, cos_gamma, F(1.f)), light.radiance(),
-          select(good, cylinder_pdf<F>(c, span.size), F(0.f)), Mask<F>(false)};
+  const Mask<F> valid = cos_gamma > 0.f;
+  return {wi, s / select(valid, cos_gamma, F(1.f)), light.radiance(),
+          select(valid, cylinder_pdf<F>(c, span.size), F(0.f)), Mask<F>(false)};
 }
 
 /// Returns radiance and density for a ray from `origin` that hit the cylinder at distance t. The
@@ -129,10 +130,10 @@ inline KindHit<F> hit_cylinder(const LightReader<F>& light, const Vec3<F>& origi
   const CylinderFrame<F> c = make_cylinder_frame<F>(light, origin);
   const F x = dot(dir, c.e), y = dot(dir, c.f);
   const F flat2 = fma(x, x, F(y * y));
-  const Mask<F> good = c.outside & (flat2 > 0.f);
-  const F inverse = 1.f / sqrt(select(good, flat2, F(1.f)));
+  const Mask<F> valid = c.outside & (flat2 > 0.f);
+  const F inverse = 1.f / sqrt(select(valid, flat2, F(1.f)));
   // The near side is hit before the ray reaches its closest point to the axis.
-  const Mask<F> front = good & (F(t * flat2) <= F(c.distance * x));
+  const Mask<F> front = valid & (F(t * flat2) <= F(c.distance * x));
   const F s = cylinder_across<F>(c, F(y * inverse), F(x * inverse));
   const F size = cylinder_span<F>(c, s).size;
   return {select<F>(front, light.radiance(), Color<F>(F(0.f))),
@@ -148,7 +149,7 @@ inline KindEmission<F> emit_cylinder(const EmissionQuery<F>& q) {
   const Vec3<F> n = fma(frame.s, cosine, Vec3<F>(frame.t * sine));
   const Vec3<F> p = fma(n, light.radius(), fma(light.u(), q.v, light.p()));
   return emit_by_cosine<F>(p, n, q.s, q.t, light.radiance(),
-                           even_emission_density<F>(light.area()));
+                           uniform_emission_density<F>(light.area()));
 }
 
 }  // namespace wavecomb::detail
@@ -173,7 +174,7 @@ struct CylinderKind : FiniteKind {
     return detail::sample_cylinder<F>(q.light, q.from, q.u, q.v);
   }
   template <typename F>
-  static detail::KindHit<F> hit(const detail::LightMeeting<F>& m) {
+  static detail::KindHit<F> hit(const detail::LightHitQuery<F>& m) {
     return detail::hit_cylinder<F>(m.light, m.origin, m.dir, m.t);
   }
   template <typename F>
@@ -181,8 +182,8 @@ struct CylinderKind : FiniteKind {
     return detail::emit_cylinder<F>(q);
   }
   template <typename F>
-  static F emission_density(const detail::LightMeeting<F>& m) {
-    return detail::even_emission_density<F>(m.light.area());
+  static F emission_density(const detail::LightHitQuery<F>& m) {
+    return detail::uniform_emission_density<F>(m.light.area());
   }
 };
 

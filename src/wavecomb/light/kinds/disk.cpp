@@ -6,13 +6,13 @@
 namespace wavecomb {
 namespace {
 
-using namespace making;
+using namespace record_builder;
 
-void make(MadeLight& made, const Light& light, LightMaking& /*making*/) {
+void make(LightBuild& out, const Light& light, LightBuildContext& /*context*/) {
   const Affine& m = light.to_world;
   const double radius = std::fabs(double{light.radius});
-  put(made.record.p, to_double(m.t));
-  finish_flat(made, light, to_double(m.axis(0)) * radius, to_double(m.axis(1)) * radius, kPiD);
+  put(out.record.p, to_double(m.t));
+  finish_flat(out, light, to_double(m.axis(0)) * radius, to_double(m.axis(1)) * radius, kPiD);
 }
 
 /// Computes the half extents of the axis-aligned box around the ellipse.
@@ -28,7 +28,7 @@ void bound(LightCluster& cluster, const LightRecord& light, double /*power*/) {
 }
 
 LightShape shape(const LightRecord& /*light*/) {
-  return LightShape::kOwn;
+  return LightShape::kCustom;
 }
 
 Bounds box(const LightRecord& light) {
@@ -56,7 +56,7 @@ LightKindInfo DiskKind::describe() {
   LightKindInfo kind;
   kind.name = "disk";
   kind.prims = {"DiskLight"};
-  kind.traits = kPlaced | kSized | kShaped | kSeen | kFiltered;
+  kind.traits = kHasTransform | kSized | kShaped | kVisibleShape | kFiltered;
   kind.parameters = {"radius"};
   kind.make = &make;
   kind.bound = &bound;

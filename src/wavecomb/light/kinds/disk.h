@@ -34,7 +34,7 @@ inline KindEmission<F> emit_disk(const EmissionQuery<F>& q) {
   const LightReader<F>& light = q.light;
   const Vec2<F> ab = square_to_disk(q.u, q.v);
   return emit_by_cosine<F>(fma(light.u(), ab.x, fma(light.v(), ab.y, light.p())), light.n(), q.s,
-                           q.t, light.radiance(), even_emission_density<F>(light.area()));
+                           q.t, light.radiance(), uniform_emission_density<F>(light.area()));
 }
 
 }  // namespace wavecomb::detail
@@ -49,7 +49,7 @@ struct DiskKind : FlatKind {
     return detail::sample_disk<F>(q.light, q.from, q.u, q.v);
   }
   template <typename F>
-  static detail::KindHit<F> hit(const detail::LightMeeting<F>& m) {
+  static detail::KindHit<F> hit(const detail::LightHitQuery<F>& m) {
     return detail::hit_disk<F>(m.light, m.dir, m.t);
   }
   template <typename F>
@@ -57,8 +57,8 @@ struct DiskKind : FlatKind {
     return detail::emit_disk<F>(q);
   }
   template <typename F>
-  static F emission_density(const detail::LightMeeting<F>& m) {
-    return detail::even_emission_density<F>(m.light.area());
+  static F emission_density(const detail::LightHitQuery<F>& m) {
+    return detail::uniform_emission_density<F>(m.light.area());
   }
 };
 

@@ -44,14 +44,14 @@ inline F distant_emission_density(const LightView& view, const LightReader<F>& l
                                   const Vec3<F>& dir) {
   const F direction_pdf =
       select(light.one_minus_cos() == 0.f, F(1.f), hit_distant<F>(light, dir).pdf);
-  return density_from_afar<F>(view, direction_pdf);
+  return infinite_emission_pdf<F>(view, direction_pdf);
 }
 
 /// Samples a path in a direction of the cone.
 template <typename F>
 inline KindEmission<F> emit_distant(const EmissionQuery<F>& q) {
-  const KindSample<F> way = sample_distant<F>(q.light, q.s, q.t);
-  return emit_from_afar<F>(q.view, -way.wi, q.u, q.v, way.radiance, way.pdf);
+  const KindSample<F> direction = sample_distant<F>(q.light, q.s, q.t);
+  return emit_infinite<F>(q.view, -direction.wi, q.u, q.v, direction.radiance, direction.pdf);
 }
 
 }  // namespace wavecomb::detail
@@ -78,7 +78,7 @@ struct DistantKind : InfiniteKind {
     return detail::emit_distant<F>(q);
   }
   template <typename F>
-  static F emission_density(const detail::LightMeeting<F>& m) {
+  static F emission_density(const detail::LightHitQuery<F>& m) {
     return detail::distant_emission_density<F>(m.view, m.light, m.dir);
   }
 };

@@ -6,10 +6,10 @@
 namespace wavecomb {
 namespace {
 
-using namespace making;
+using namespace record_builder;
 
 /// Sets the world axes of the dome: rotation and mirroring, without scale. The pole has priority.
-void put_axes(LightRecord& record, const Affine& m) {
+void set_axes(LightRecord& record, const Affine& m) {
   const Double3 y = unit(to_double(m.axis(1)));
   Double3 z = to_double(m.axis(2));
   z = subtract(z, y * dot(y, z));
@@ -25,15 +25,15 @@ void put_axes(LightRecord& record, const Affine& m) {
 }
 
 /// Adds the sampling distribution of the image. Returns the mean luminance of the image.
-double add_image(LightRecord& record, LightMaking& making) {
-  Distribution2D d = density_of(record, making, &build_dome_distribution);
+double add_image(LightRecord& record, LightBuildContext& context) {
+  Distribution2D d = density_of(record, context, &build_dome_distribution);
   const double mean = d.mean_luminance;
   if (d.width == 0) {  // black
     record.texture = kNoTexture;
     put(record.radiance, {0, 0, 0});
   } else {
-    record.distribution = static_cast<uint32_t>(making.set.distributions.size());
-    making.set.distributions.push_back(std::move(d));
+    record.distribution = static_cast<uint32_t>(context.set.distributions.size());
+    context.set.distributions.push_back(std::move(d));
   }
   return mean;
 }
@@ -45,7 +45,7 @@ void add_portals(LightRecord& record, const std::vector<Affine>& portals, LightS
   for (const Affine& square : portals) {
     Light portal;
     portal.to_world = square;
-    MadeLight rect;
+    LightBuild rect;
     put(rect.record.p, to_double(square.point({0.5f, -0.5f, 0})));
     finish_flat(rect, portal, to_double(square.axis(0)) * -1, to_double(square.axis(1)), 1);
     rect.record.texture = kNoTexture;
@@ -58,13 +58,13 @@ void add_portals(LightRecord& record, const std::vector<Affine>& portals, LightS
       {first, static_cast<uint32_t>(portals.size()), static_cast<float>(spread)});
 }
 
-void make(MadeLight& made, const Light& light, LightMaking& making) {
+void make(LightBuild& out, const Light& light, LightBuildContext& context) {
   const LightColour colour(light);
-  put_axes(made.record, light.to_world);
-  put_radiance(made.record, colour.rgb);
-  const double mean = light.texture == kNoTexture ? colour.mean : add_image(made.record, making);
-  made.power = 4 * kPiD * mean * kPiD * making.scene_radius * making.scene_radius;
-  if (!light.portals.empty()) add_portals(made.record, light.portals, making.set);
+  set_axes(out.record, light.to_world);
+  set_radiance(out.record, colour.rgb);
+  const double mean = light.texture == kNoTexture ? colour.mean : add_image(out.record, context);
+  out.power = 4 * kPiD * mean * kPiD * context.scene_radius * context.scene_radius;
+  if (!light.portals.empty()) add_portals(out.record, light.portals, context.set);
 }
 
 }  // namespace
@@ -74,7 +74,7 @@ LightKindInfo DomeKind::describe() {
   LightKindInfo kind;
   kind.name = "dome";
   kind.prims = {"DomeLight", "DomeLight_1"};
-  kind.traits = kPlaced | kPictured | kInfinite | kBackground;
+  kind.traits = kHasTransform | kTextured | kInfinite | kBackground;
   kind.parameters = {"portals"};
   kind.make = &make;
   return kind;

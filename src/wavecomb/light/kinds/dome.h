@@ -47,9 +47,9 @@ inline Color<F> dome_radiance(const LightReader<F>& light, const TextureView& te
 template <typename F>
 inline F dome_pdf(const F& density, const F& sin_theta) {
   const F measure = sin_theta * kTwoPiSquared;
-  const Mask<F> good = measure > 0.f;
-  const F pdf = density / select(good, measure, F(1.f));
-  return select(good & is_finite(pdf), pdf, F(0.f));
+  const Mask<F> valid = measure > 0.f;
+  const F pdf = density / select(valid, measure, F(1.f));
+  return select(valid & is_finite(pdf), pdf, F(0.f));
 }
 
 /// Samples a direction by the distribution of the image.
@@ -178,14 +178,14 @@ inline KindSample<F> sample_dome(const LightView& view, const UInt<F>& lights,
 /// Samples a path in a direction by the distribution of the image. Does not use portals.
 template <typename F>
 inline KindEmission<F> emit_dome(const EmissionQuery<F>& q) {
-  const KindSample<F> way = sample_dome_light<F>(q.view, q.light, q.s, q.t, q.lanes);
-  return emit_from_afar<F>(q.view, -way.wi, q.u, q.v, way.radiance, way.pdf);
+  const KindSample<F> direction = sample_dome_light<F>(q.view, q.light, q.s, q.t, q.lanes);
+  return emit_infinite<F>(q.view, -direction.wi, q.u, q.v, direction.radiance, direction.pdf);
 }
 
 /// Returns KindEmission::density of emit_dome() for paths along -dir. Evaluates one image after the
 /// other.
 template <typename F>
-inline F dome_emission_density(const LightMeeting<F>& m) {
+inline F dome_emission_density(const LightHitQuery<F>& m) {
   F pdf(kInv4Pi);
   const UInt<F> index = m.light[&LightRecord::distribution];
   const Vec3<F> w = to_dome<F>(m.light, m.dir);
@@ -198,7 +198,7 @@ inline F dome_emission_density(const LightMeeting<F>& m) {
     const F image = image_pdf_at<F>(m.view.distributions[one], at.s, at.down, same);
     pdf = select(same, dome_pdf<F>(image, at.sin_theta), pdf);
   }
-  return density_from_afar<F>(m.view, pdf);
+  return infinite_emission_pdf<F>(m.view, pdf);
 }
 
 }  // namespace wavecomb::detail
@@ -225,7 +225,7 @@ struct DomeKind : InfiniteKind {
     return detail::emit_dome<F>(q);
   }
   template <typename F>
-  static F emission_density(const detail::LightMeeting<F>& m) {
+  static F emission_density(const detail::LightHitQuery<F>& m) {
     return detail::dome_emission_density<F>(m);
   }
 };

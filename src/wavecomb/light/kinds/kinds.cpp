@@ -24,12 +24,12 @@ bool fades(std::span<const LightFilter> filters, uint32_t filter) {
 
 }  // namespace
 
-MadeLight make_light(const Light& light, LightMaking& making) {
+LightBuild make_light(const Light& light, LightBuildContext& context) {
   const LightKindInfo& kind = info_of(light.kind);
-  MadeLight made;
-  LightRecord& r = made.record;
+  LightBuild out;
+  LightRecord& r = out.record;
   r.kind = static_cast<uint32_t>(light.kind);
-  r.texture = kind.has(light_trait::kPictured) ? light.texture : kNoTexture;
+  r.texture = kind.has(light_trait::kTextured) ? light.texture : kNoTexture;
   r.shaping = kNoShaping;
   r.portals = kNoPortals;
   r.distribution = kNoDistribution;
@@ -40,17 +40,17 @@ MadeLight make_light(const Light& light, LightMaking& making) {
   r.shadow_link = light.shadow_link;
   r.shadow = kPlainShadow;
   if (!light.shadow.is_plain()) {
-    r.shadow = static_cast<uint32_t>(making.set.shadows.size());
-    making.set.shadows.push_back(making::make_shadow(light.shadow));
+    r.shadow = static_cast<uint32_t>(context.set.shadows.size());
+    context.set.shadows.push_back(record_builder::make_shadow(light.shadow));
   }
   r.filter = kind.has(light_trait::kFiltered) ? light.filter : kNoFilter;
   r.sampled_only = r.hidden != 0 || r.shadow_link != kNoSet || r.shadow != kPlainShadow;
   r.camera_only = r.sampled_only != 0 || r.diffuse != 1 || r.specular != 1 ||
-                  r.light_link != kNoSet || light.moves() || fades(making.filters, r.filter);
-  if (kind.make) kind.make(made, light, making);
+                  r.light_link != kNoSet || light.moves() || fades(context.filters, r.filter);
+  if (kind.make) kind.make(out, light, context);
   if (!light.shaping.is_plain() && kind.has(light_trait::kShaped))
-    making::add_shaping(made, light, making);
-  return made;
+    record_builder::add_shaping(out, light, context);
+  return out;
 }
 
 }  // namespace wavecomb

@@ -53,16 +53,16 @@ concept FiniteKindClass = requires(const LightReader<float>& light, const Vec3<f
 ///   emission_normal   finite kinds: unit normal at a point of the light; 0 if it has none
 template <typename Kind>
 concept LightKindClass =
-    requires(const detail::LightQuery<float>& query, const detail::LightMeeting<float>& meeting,
+    requires(const detail::LightQuery<float>& query, const detail::LightHitQuery<float>& hit_query,
              const detail::LightEscape<float>& escape, const detail::EmissionQuery<float>& emission,
              const detail::LightReader<float>& light) {
       { Kind::describe() } -> std::same_as<LightKindInfo>;
       { Kind::kIsInfinite } -> std::convertible_to<bool>;
       { Kind::template sample<float>(query) } -> std::same_as<detail::KindSample<float>>;
-      { Kind::template hit<float>(meeting) } -> std::same_as<detail::KindHit<float>>;
+      { Kind::template hit<float>(hit_query) } -> std::same_as<detail::KindHit<float>>;
       { Kind::template escape<float>(escape) } -> std::same_as<detail::KindHit<float>>;
       { Kind::template emit<float>(emission) } -> std::same_as<detail::KindEmission<float>>;
-      { Kind::template emission_density<float>(meeting) } -> std::same_as<float>;
+      { Kind::template emission_density<float>(hit_query) } -> std::same_as<float>;
       { Kind::template is_delta<float>(light) } -> std::same_as<Mask<float>>;
     } &&
     (Kind::kIsInfinite || detail::FiniteKindClass<Kind>);

@@ -8,14 +8,14 @@
 /// so that light from outside the portals also counts. With w the solid angle of the portals and i
 /// PortalGroup::image_solid_angle, a = i / (i + w), clamped: the smaller of the two finds the light
 /// better. Points that see no portal from its back (the side that light leaves at), or only ones
-/// smaller than kLeastRectSolidAngle, use the image alone.
+/// smaller than kMinRectSolidAngle, use the image alone.
 #pragma once
 
 #include "wavecomb/light/kinds/rect.h"
 
 namespace wavecomb::detail {
 
-inline constexpr float kLeastPortalShare = 0.2f, kMostPortalShare = 0.9f;
+inline constexpr float kMinPortalShare = 0.2f, kMaxPortalShare = 0.9f;
 
 /// Portals of one dome, as seen from the points `from`.
 template <typename F>
@@ -35,7 +35,7 @@ class Portals {
 
   /// Returns the probability of sampling through the portals.
   F share() const {
-    const F a = clamp(F(image_ / F(total_ + image_)), F(kLeastPortalShare), F(kMostPortalShare));
+    const F a = clamp(F(image_ / F(total_ + image_)), F(kMinPortalShare), F(kMaxPortalShare));
     return select(total_ > 0.f, a, F(0.f));
   }
 
@@ -43,12 +43,12 @@ class Portals {
   /// visible.
   Vec3<F> sample(const F& u, const F& v) const {
     Vec3<F> wi(F(0.f), F(0.f), F(1.f));
-    const F pick = u * total_;
+    const F u_scaled = u * total_;
     F before(0.f);
     for_each([&](const SphericalRect<F>& r, const LightReader<F>& portal) {
-      const Mask<F> here = r.usable & (pick >= before);
+      const Mask<F> here = r.usable & (u_scaled >= before);
       const F size = select(r.usable, r.solid_angle, F(1.f));
-      const F inside = clamp(F((pick - before) / size), F(0.f), F(kOneMinusEpsilon));
+      const F inside = clamp(F((u_scaled - before) / size), F(0.f), F(kOneMinusEpsilon));
       const Vec2<F> at = sample_spherical_rect<F>(r, inside, v);
       const Vec3<F> q = fma(portal.u(), at.x, fma(portal.v(), at.y, portal.p()));
       wi = select<F>(here, make_direction<F>(q - from_).wi, wi);

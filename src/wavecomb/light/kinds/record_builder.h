@@ -7,14 +7,14 @@
 
 #include "wavecomb/light/description/kind_info.h"
 
-namespace wavecomb::making {
+namespace wavecomb::record_builder {
 
 inline constexpr double kPiD = 3.14159265358979323846;
 
 /// Smaller areas are indistinguishable from 0 in float. Such lights are dark.
-inline constexpr double kLeastArea = 1e-36;
+inline constexpr double kMinArea = 1e-36;
 /// Largest radiance. Products of larger values overflow.
-inline constexpr double kMostRadiance = 1e30;
+inline constexpr double kMaxRadiance = 1e30;
 
 struct Double3 {
   double x, y, z;
@@ -52,9 +52,9 @@ inline double luminance(double r, double g, double b) {
   return 0.212656 * r + 0.715158 * g + 0.072186 * b;
 }
 
-inline void put_radiance(LightRecord& record, const Double3& v) {
+inline void set_radiance(LightRecord& record, const Double3& v) {
   put(record.radiance,
-      {std::min(v.x, kMostRadiance), std::min(v.y, kMostRadiance), std::min(v.z, kMostRadiance)});
+      {std::min(v.x, kMaxRadiance), std::min(v.y, kMaxRadiance), std::min(v.z, kMaxRadiance)});
 }
 
 /// Light::color without negative components, and its luminance.
@@ -69,26 +69,26 @@ struct LightColour {
 };
 
 /// Sets radiance and power of a light with the given surface area. A light without area is dark.
-void finish_area(MadeLight& made, const Light& light, double area);
+void finish_area(LightBuild& out, const Light& light, double area);
 
 /// Sets area, emission directions, radiance and power of a planar light with the given edges or
 /// half axes, whose area is `area_factor` |u x v|.
-void finish_flat(MadeLight& made, const Light& light, const Double3& u, const Double3& v,
+void finish_flat(LightBuild& out, const Light& light, const Double3& u, const Double3& v,
                  double area_factor);
 
 /// Returns the sampling distribution of a light with this texture and radiance: the one in
 /// making.before if it exists, else the result of `build`.
-Distribution2D density_of(const LightRecord& light, const LightMaking& making,
+Distribution2D density_of(const LightRecord& light, const LightBuildContext& context,
                           Distribution2D (*build)(const TextureView&, const Vec3<float>&));
 
 /// Adds the shaping to a light, and scales its power by the fraction of light that the shaping
 /// passes. Each attribute contributes its mean over all directions, as if they were independent.
-void add_shaping(MadeLight& made, const Light& light, LightMaking& making);
+void add_shaping(LightBuild& out, const Light& light, LightBuildContext& context);
 
 /// Returns the packed shadow attributes of a light.
-ShadowLookRecord make_shadow(const ShadowLook& look);
+ShadowRecord make_shadow(const ShadowAttributes& attributes);
 
 /// Returns a box from point `a` to point `b`, extended by `half` and a tolerance for rounding.
 Bounds box_around(const float (&a)[3], const float (&b)[3], const float (&half)[3]);
 
-}  // namespace wavecomb::making
+}  // namespace wavecomb::record_builder

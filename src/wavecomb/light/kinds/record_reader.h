@@ -33,7 +33,7 @@ struct LightReader : RecordReader<F> {
   F area() const { return (*this)[&LightRecord::area]; }
   F radius() const { return (*this)[&LightRecord::radius]; }
   F one_minus_cos() const { return (*this)[&LightRecord::one_minus_cos]; }
-  F pick_pdf() const { return (*this)[&LightRecord::pick_pdf]; }
+  F selection_pdf() const { return (*this)[&LightRecord::selection_pdf]; }
   UInt<F> texture() const { return (*this)[&LightRecord::texture]; }
   UInt<F> shaping() const { return (*this)[&LightRecord::shaping]; }
 };
@@ -83,7 +83,7 @@ struct LightQuery {
 
 /// Rays origin + t dir that hit the shape of a light.
 template <typename F>
-struct LightMeeting {
+struct LightHitQuery {
   const LightView& view;
   const LightReader<F>& light;
   const Vec3<F>&origin, &dir;
@@ -136,7 +136,7 @@ inline KindEmission<F> emit_by_cosine(const Vec3<F>& p, const Vec3<F>& n, const 
 
 /// Returns kInvPi / area, or 0 if that is out of range.
 template <typename F>
-inline F even_emission_density(const F& area) {
+inline F uniform_emission_density(const F& area) {
   const F density = kInvPi / select(area > 0.f, area, F(1.f));
   return select((area > 0.f) & is_finite(density), density, F(0.f));
 }
@@ -144,9 +144,8 @@ inline F even_emission_density(const F& area) {
 /// Returns a path along `d` through the sphere around the scene. It starts on a disk of the
 /// sphere's radius in front of the scene, at a point sampled by (u, v).
 template <typename F>
-inline KindEmission<F> emit_from_afar(const LightView& view, const Vec3<F>& d, const F& u,
-                                      const F& v, const Color<F>& radiance,
-                                      const F& direction_pdf) {
+inline KindEmission<F> emit_infinite(const LightView& view, const Vec3<F>& d, const F& u,
+                                     const F& v, const Color<F>& radiance, const F& direction_pdf) {
   const Vec2<F> at = square_to_disk(u, v);
   const Frame<F> frame = make_frame(d);
   const Vec3<F> centre{F(view.centre[0]), F(view.centre[1]), F(view.centre[2])};
@@ -155,9 +154,9 @@ inline KindEmission<F> emit_from_afar(const LightView& view, const Vec3<F>& d, c
   return {centre + across, d, Vec3<F>(F(0.f)), radiance,
           direction_pdf * (kInvPi / (view.radius * view.radius))};
 }
-/// Returns the density of emit_from_afar() for a direction with density `direction_pdf`.
+/// Returns the density of emit_infinite() for a direction with density `direction_pdf`.
 template <typename F>
-inline F density_from_afar(const LightView& view, const F& direction_pdf) {
+inline F infinite_emission_pdf(const LightView& view, const F& direction_pdf) {
   return direction_pdf * (kInvPi / (view.radius * view.radius));
 }
 
@@ -172,9 +171,9 @@ inline KindHit<F> dark() {
 template <typename F>
 inline F area_to_solid_angle(const F& d2, const F& cos_light, const F& area) {
   const F projected = cos_light * area;
-  const Mask<F> good = (projected > 0.f) & (d2 > 0.f);
-  const F pdf = d2 / select(good, projected, F(1.f));
-  return select(good & is_finite(pdf), pdf, F(0.f));
+  const Mask<F> valid = (projected > 0.f) & (d2 > 0.f);
+  const F pdf = d2 / select(valid, projected, F(1.f));
+  return select(valid & is_finite(pdf), pdf, F(0.f));
 }
 
 /// Unit vector along d, and its length. The vector is finite even if d is 0.
@@ -186,9 +185,9 @@ struct Direction {
 template <typename F>
 inline Direction<F> make_direction(const Vec3<F>& d) {
   const F length2 = length_squared(d);
-  const Mask<F> good = (length2 > 0.f) & is_finite(length2);
-  const F safe = sqrt(select(good, length2, F(1.f)));
-  return {d * F(1.f / safe), select(good, length2, F(0.f)), select(good, safe, F(0.f))};
+  const Mask<F> valid = (length2 > 0.f) & is_finite(length2);
+  const F safe = sqrt(select(valid, length2, F(1.f)));
+  return {d * F(1.f / safe), select(valid, length2, F(0.f)), select(valid, safe, F(0.f))};
 }
 
 /// Returns v as a unit vector, or 0 if it is 0.
@@ -212,7 +211,7 @@ struct LightKindInfo;
 struct InfiniteKind {
   static constexpr bool kIsInfinite = true;
   template <typename F>
-  static detail::KindHit<F> hit(const detail::LightMeeting<F>& /*meeting*/) {
+  static detail::KindHit<F> hit(const detail::LightHitQuery<F>& /*query*/) {
     return detail::dark<F>();
   }
 };

@@ -6,33 +6,32 @@
 namespace wavecomb {
 namespace {
 
-using namespace making;
+using namespace record_builder;
 
 /// Images whose distribution has at least this spread are sampled uniformly, which adds no noise.
-constexpr float kEvenSpread = 0.9f;
+constexpr float kUniformSpread = 0.9f;
 
 /// Adds the sampling distribution of the image, and sets the power by its mean.
-void add_picture(MadeLight& made, LightMaking& making) {
-  Distribution2D d = density_of(made.record, making, &build_rect_distribution);
-  made.power = kPiD * double{made.record.area} * d.mean_luminance;
+void add_texture_distribution(LightBuild& out, LightBuildContext& context) {
+  Distribution2D d = density_of(out.record, context, &build_rect_distribution);
+  out.power = kPiD * double{out.record.area} * d.mean_luminance;
   if (d.width == 0) {  // black
-    made.record.texture = kNoTexture;
-    put(made.record.radiance, {0, 0, 0});
-  } else if (d.spread < kEvenSpread) {
-    made.record.distribution = static_cast<uint32_t>(making.set.distributions.size());
-    making.set.distributions.push_back(std::move(d));
+    out.record.texture = kNoTexture;
+    put(out.record.radiance, {0, 0, 0});
+  } else if (d.spread < kUniformSpread) {
+    out.record.distribution = static_cast<uint32_t>(context.set.distributions.size());
+    context.set.distributions.push_back(std::move(d));
   }
 }
 
 /// Makes the record. Seen from the front, along +z with +y up, +x is to the left, so s runs along
 /// -x.
-void make(MadeLight& made, const Light& light, LightMaking& making) {
+void make(LightBuild& out, const Light& light, LightBuildContext& context) {
   const Affine& m = light.to_world;
   const double w = std::fabs(double{light.width}), h = std::fabs(double{light.height});
-  put(made.record.p,
-      to_double(m.point({static_cast<float>(w / 2), static_cast<float>(-h / 2), 0})));
-  finish_flat(made, light, to_double(m.axis(0)) * -w, to_double(m.axis(1)) * h, 1);
-  if (made.record.texture != kNoTexture) add_picture(made, making);
+  put(out.record.p, to_double(m.point({static_cast<float>(w / 2), static_cast<float>(-h / 2), 0})));
+  finish_flat(out, light, to_double(m.axis(0)) * -w, to_double(m.axis(1)) * h, 1);
+  if (out.record.texture != kNoTexture) add_texture_distribution(out, context);
 }
 
 void bound(LightCluster& cluster, const LightRecord& light, double /*power*/) {
@@ -53,7 +52,7 @@ LightKindInfo RectKind::describe() {
   LightKindInfo kind;
   kind.name = "rect";
   kind.prims = {"RectLight"};
-  kind.traits = kPlaced | kSized | kShaped | kSeen | kPictured | kFiltered;
+  kind.traits = kHasTransform | kSized | kShaped | kVisibleShape | kTextured | kFiltered;
   kind.parameters = {"width", "height"};
   kind.make = &make;
   kind.bound = &bound;

@@ -33,7 +33,7 @@ inline Color<F> rect_radiance(const LightReader<F>& light, const TextureView* te
 }
 
 /// Below this solid angle, area sampling is as good, and solid angles lose precision.
-inline constexpr float kLeastRectSolidAngle = 2e-3f;
+inline constexpr float kMinRectSolidAngle = 2e-3f;
 
 /// Rectangle as seen from a point (C. Urena, M. Fajardo, A. King, "An Area-Preserving
 /// Parametrization for Spherical Rectangles", CGF 32(4) 2013). The point is the origin, x and y run
@@ -84,7 +84,7 @@ inline SphericalRect<F> make_spherical_rect(const LightReader<F>& light, const V
   r.near_y = 1.f / sqrt(max(edge0, least));
   r.b0 = -r.y0 * r.near_y;
   r.b1 = r.y1 / sqrt(max(edge1, least));
-  r.usable = (abs(dot(r.x, r.y)) < 1e-5f) & (r.z > 0.f) & (r.solid_angle > kLeastRectSolidAngle) &
+  r.usable = (abs(dot(r.x, r.y)) < 1e-5f) & (r.z > 0.f) & (r.solid_angle > kMinRectSolidAngle) &
              is_finite(r.solid_angle);
   return r;
 }
@@ -114,9 +114,9 @@ inline Vec2<F> sample_spherical_rect(const SphericalRect<F>& r, const F& u, cons
 template <typename F>
 inline F rect_pdf(const SphericalRect<F>& r, const F& distance2, const F& cos_light,
                   const F& area) {
-  const Mask<F> seen = (cos_light > 0.f) & (distance2 > 0.f) & (area > 0.f);
+  const Mask<F> visible = (cos_light > 0.f) & (distance2 > 0.f) & (area > 0.f);
   const F by_angle = 1.f / select(r.usable, r.solid_angle, F(1.f));
-  const F pdf = select(seen, by_angle, F(0.f));
+  const F pdf = select(visible, by_angle, F(0.f));
   if (all(r.usable)) return pdf;
   return select(r.usable, pdf, area_to_solid_angle<F>(distance2, cos_light, area));
 }
@@ -126,7 +126,7 @@ inline F rect_pdf(const SphericalRect<F>& r, const F& distance2, const F& cos_li
 /// fraction g is bounded from below by solid angle / (area * largest solid angle per area, z /
 /// d^3).
 template <typename F>
-inline F picture_share(const SphericalRect<F>& r, const F& area, float spread) {
+inline F texture_share(const SphericalRect<F>& r, const F& area, float spread) {
   const F x = clamp(F(0.f), r.x0, r.x1), y = clamp(F(0.f), r.y0, r.y1);
   const F d2 = fma(x, x, fma(y, y, F(r.z * r.z)));
   const F most = area * r.z;
@@ -138,14 +138,14 @@ inline F picture_share(const SphericalRect<F>& r, const F& area, float spread) {
 
 /// Returns the lanes whose rectangle is sampled by an image.
 template <typename F>
-inline Mask<F> has_picture(const LightReader<F>& light, const Mask<F>& active) {
+inline Mask<F> has_light_texture(const LightReader<F>& light, const Mask<F>& active) {
   return active & Mask<F>(light.texture() != UInt<F>(kNoTexture)) &
          Mask<F>(light[&LightRecord::distribution] != UInt<F>(kNoDistribution));
 }
 
 /// Calls `one(distribution, lanes)` for each image in the lanes.
 template <typename F, typename Function>
-inline void for_each_picture(const LightView& view, const LightReader<F>& light,
+inline void for_each_texture(const LightView& view, const LightReader<F>& light,
                              const Mask<F>& lanes, const Function& one) {
   const UInt<F> index = light[&LightRecord::distribution];
   Mask<F> pending = lanes;
@@ -160,46 +160,46 @@ inline void for_each_picture(const LightView& view, const LightReader<F>& light,
 
 /// Samples the rectangle without its image: (u, v) to fractions of its edges.
 template <typename F>
-inline Vec2<F> sample_rect_evenly(const SphericalRect<F>& r, const F& u, const F& v,
-                                  const Mask<F>& active) {
+inline Vec2<F> sample_rect_uniformly(const SphericalRect<F>& r, const F& u, const F& v,
+                                     const Mask<F>& active) {
   if (none(active & r.usable)) return {u, v};
   const Vec2<F> by_angle = sample_spherical_rect<F>(r, u, v);
   return {select(r.usable, by_angle.x, u), select(r.usable, by_angle.y, v)};
 }
 
 /// Point on the rectangle in fractions of its edges. Without an image, `share` is 0 and
-/// `picture_pdf`, which is over the unit square, is ignored.
+/// `texture_pdf`, which is over the unit square, is ignored.
 template <typename F>
 struct RectPoint {
   Vec2<F> at;
-  F share, picture_pdf;
+  F share, texture_pdf;
 };
 
 template <typename F>
-[[gnu::noinline]] RectPoint<F> sample_pictured_rect(const LightView& view,
+[[gnu::noinline]] RectPoint<F> sample_textured_rect(const LightView& view,
                                                     const LightReader<F>& light,
                                                     const SphericalRect<F>& r, const F& u,
                                                     const F& v, const Mask<F>& active) {
   F share(0.f);
-  const Mask<F> pictured = has_picture<F>(light, active);
-  for_each_picture<F>(view, light, pictured, [&](const Distribution2D& d, const Mask<F>& lanes) {
-    share = select(lanes, picture_share<F>(r, light.area(), d.spread), share);
+  const Mask<F> has_image = has_light_texture<F>(light, active);
+  for_each_texture<F>(view, light, has_image, [&](const Distribution2D& d, const Mask<F>& lanes) {
+    share = select(lanes, texture_share<F>(r, light.area(), d.spread), share);
   });
-  const Mask<F> by_picture = pictured & (u < share);
+  const Mask<F> by_texture = has_image & (u < share);
   const F rest = clamp(F((u - share) / F(1.f - share)), F(0.f), F(kOneMinusEpsilon));
-  RectPoint<F> point{sample_rect_evenly<F>(r, select(by_picture, u, rest), v, active), share,
+  RectPoint<F> point{sample_rect_uniformly<F>(r, select(by_texture, u, rest), v, active), share,
                      F(0.f)};
-  const F within = select(by_picture, F(u / select(by_picture, share, F(1.f))), F(0.f));
-  for_each_picture<F>(view, light, pictured, [&](const Distribution2D& d, const Mask<F>& lanes) {
-    const Mask<F> here = lanes & by_picture, elsewhere = lanes & not_(by_picture);
+  const F within = select(by_texture, F(u / select(by_texture, share, F(1.f))), F(0.f));
+  for_each_texture<F>(view, light, has_image, [&](const Distribution2D& d, const Mask<F>& lanes) {
+    const Mask<F> here = lanes & by_texture, by_area = lanes & not_(by_texture);
     if (any(here)) {
       const ImagePoint<F> p = sample_image<F>(d, within, v, here);
       point.at = {select(here, p.x, point.at.x), select(here, F(1.f - p.y), point.at.y)};
-      point.picture_pdf = select(here, p.pdf, point.picture_pdf);
+      point.texture_pdf = select(here, p.pdf, point.texture_pdf);
     }
-    if (any(elsewhere)) {
-      const F pdf = image_pdf_at<F>(d, point.at.x, F(1.f - point.at.y), elsewhere);
-      point.picture_pdf = select(elsewhere, pdf, point.picture_pdf);
+    if (any(by_area)) {
+      const F pdf = image_pdf_at<F>(d, point.at.x, F(1.f - point.at.y), by_area);
+      point.texture_pdf = select(by_area, pdf, point.texture_pdf);
     }
   });
   return point;
@@ -207,10 +207,10 @@ template <typename F>
 
 /// Returns the solid angle density of the mixture. `even` is the density without the image.
 template <typename F>
-inline F pictured_rect_pdf(const F& share, const F& picture_pdf, const F& even, const F& distance2,
+inline F textured_rect_pdf(const F& share, const F& texture_pdf, const F& even, const F& distance2,
                            const F& cos_light, const F& area) {
-  const F by_picture = picture_pdf * area_to_solid_angle<F>(distance2, cos_light, area);
-  return fma(share, by_picture, F(F(1.f - share) * even));
+  const F by_texture = texture_pdf * area_to_solid_angle<F>(distance2, cos_light, area);
+  return fma(share, by_texture, F(F(1.f - share) * even));
 }
 
 /// Samples a point q = p + a u + b v. The rectangle emits only towards n.
@@ -220,17 +220,17 @@ inline KindSample<F> sample_rect(const LightView& view, const LightReader<F>& li
                                  const Mask<F>& active) {
   const SphericalRect<F> r = make_spherical_rect<F>(light, from);
   RectPoint<F> point{Vec2<F>{u, v}, F(0.f), F(0.f)};
-  const bool pictured = any(has_picture<F>(light, active));
-  if (pictured) [[unlikely]]
-    point = sample_pictured_rect<F>(view, light, r, u, v, active);
+  const bool has_image = any(has_light_texture<F>(light, active));
+  if (has_image) [[unlikely]]
+    point = sample_textured_rect<F>(view, light, r, u, v, active);
   else
-    point.at = sample_rect_evenly<F>(r, u, v, active);
+    point.at = sample_rect_uniformly<F>(r, u, v, active);
   const Vec3<F> q = fma(light.u(), point.at.x, fma(light.v(), point.at.y, light.p()));
   const Direction<F> d = make_direction<F>(q - from);
   const F cos_light = -dot(d.wi, light.n());
   F pdf = rect_pdf<F>(r, d.length2, cos_light, light.area());
-  if (pictured) [[unlikely]]
-    pdf = pictured_rect_pdf<F>(point.share, point.picture_pdf, pdf, d.length2, cos_light,
+  if (has_image) [[unlikely]]
+    pdf = textured_rect_pdf<F>(point.share, point.texture_pdf, pdf, d.length2, cos_light,
                                light.area());
   return {d.wi, d.length,
           rect_radiance<F>(light, view.materials.textures, point.at.x, point.at.y,
@@ -241,7 +241,7 @@ inline KindSample<F> sample_rect(const LightView& view, const LightReader<F>& li
 /// Returns the position of a point of the rectangle's plane in fractions of its edges: with h = q -
 /// p = a u + b v and m = u x v, a = (h x v) . m / m^2 and b = (u x h) . m / m^2.
 template <typename F>
-inline Vec2<F> place_on_rect(const LightReader<F>& light, const Vec3<F>& q) {
+inline Vec2<F> rect_uv(const LightReader<F>& light, const Vec3<F>& q) {
   const Vec3<F> h = q - light.p();
   const Vec3<F> edge_u = light.u(), edge_v = light.v();
   const Vec3<F> m = cross(edge_u, edge_v);
@@ -259,13 +259,13 @@ inline KindHit<F> hit_rect(const LightView& view, const LightReader<F>& light,
                            const Mask<F>& active) {
   const F cos_light = -dot(dir, light.n());
   const Mask<F> front = active & (cos_light > 0.f);
-  const Vec2<F> at = place_on_rect<F>(light, fma(dir, t, origin));
+  const Vec2<F> at = rect_uv<F>(light, fma(dir, t, origin));
   const Color<F> radiance = rect_radiance<F>(light, view.materials.textures, at.x, at.y, front);
   const SphericalRect<F> r = make_spherical_rect<F>(light, origin);
   F pdf = rect_pdf<F>(r, F(t * t), cos_light, light.area());
-  const Mask<F> pictured = has_picture<F>(light, front);
-  for_each_picture<F>(view, light, pictured, [&](const Distribution2D& d, const Mask<F>& lanes) {
-    const F mixed = pictured_rect_pdf<F>(picture_share<F>(r, light.area(), d.spread),
+  const Mask<F> has_image = has_light_texture<F>(light, front);
+  for_each_texture<F>(view, light, has_image, [&](const Distribution2D& d, const Mask<F>& lanes) {
+    const F mixed = textured_rect_pdf<F>(texture_share<F>(r, light.area(), d.spread),
                                          image_pdf_at<F>(d, at.x, F(1.f - at.y), lanes), pdf,
                                          F(t * t), cos_light, light.area());
     pdf = select(lanes, mixed, pdf);
@@ -279,8 +279,8 @@ inline KindEmission<F> emit_rect(const EmissionQuery<F>& q) {
   const LightReader<F>& light = q.light;
   Vec2<F> at{q.u, q.v};
   F square_pdf(1.f);
-  const Mask<F> pictured = has_picture<F>(light, q.lanes);
-  for_each_picture<F>(q.view, light, pictured, [&](const Distribution2D& d, const Mask<F>& lanes) {
+  const Mask<F> has_image = has_light_texture<F>(light, q.lanes);
+  for_each_texture<F>(q.view, light, has_image, [&](const Distribution2D& d, const Mask<F>& lanes) {
     const ImagePoint<F> point = sample_image<F>(d, q.u, q.v, lanes);
     at = {select(lanes, point.x, at.x), select(lanes, F(1.f - point.y), at.y)};
     square_pdf = select(lanes, point.pdf, square_pdf);
@@ -288,18 +288,18 @@ inline KindEmission<F> emit_rect(const EmissionQuery<F>& q) {
   const Vec3<F> p = fma(light.u(), at.x, fma(light.v(), at.y, light.p()));
   return emit_by_cosine<F>(p, light.n(), q.s, q.t,
                            rect_radiance<F>(light, q.view.materials.textures, at.x, at.y, q.lanes),
-                           F(square_pdf * even_emission_density<F>(light.area())));
+                           F(square_pdf * uniform_emission_density<F>(light.area())));
 }
 
 /// Returns KindEmission::density of emit_rect() for a ray that hits the rectangle.
 template <typename F>
-inline F rect_emission_density(const LightMeeting<F>& m) {
+inline F rect_emission_density(const LightHitQuery<F>& m) {
   const LightReader<F>& light = m.light;
-  F density = even_emission_density<F>(light.area());
-  const Mask<F> pictured = has_picture<F>(light, m.lanes);
-  if (none(pictured)) return density;
-  const Vec2<F> at = place_on_rect<F>(light, fma(m.dir, m.t, m.origin));
-  for_each_picture<F>(m.view, light, pictured, [&](const Distribution2D& d, const Mask<F>& lanes) {
+  F density = uniform_emission_density<F>(light.area());
+  const Mask<F> has_image = has_light_texture<F>(light, m.lanes);
+  if (none(has_image)) return density;
+  const Vec2<F> at = rect_uv<F>(light, fma(m.dir, m.t, m.origin));
+  for_each_texture<F>(m.view, light, has_image, [&](const Distribution2D& d, const Mask<F>& lanes) {
     density *= select(lanes, image_pdf_at<F>(d, at.x, F(1.f - at.y), lanes), F(1.f));
   });
   return density;
@@ -317,7 +317,7 @@ struct RectKind : FlatKind {
     return detail::sample_rect<F>(q.view, q.light, q.from, q.u, q.v, q.lanes);
   }
   template <typename F>
-  static detail::KindHit<F> hit(const detail::LightMeeting<F>& m) {
+  static detail::KindHit<F> hit(const detail::LightHitQuery<F>& m) {
     return detail::hit_rect<F>(m.view, m.light, m.origin, m.dir, m.t, m.lanes);
   }
   template <typename F>
@@ -325,7 +325,7 @@ struct RectKind : FlatKind {
     return detail::emit_rect<F>(q);
   }
   template <typename F>
-  static F emission_density(const detail::LightMeeting<F>& m) {
+  static F emission_density(const detail::LightHitQuery<F>& m) {
     return detail::rect_emission_density<F>(m);
   }
 };

@@ -6,26 +6,26 @@
 namespace wavecomb {
 namespace {
 
-using namespace making;
+using namespace record_builder;
 
 /// Makes the record of a sphere with the volume of the transformed sphere, or of a point light if
 /// the radius is 0.
-void make(MadeLight& made, const Light& light, LightMaking& /*making*/) {
+void make(LightBuild& out, const Light& light, LightBuildContext& /*context*/) {
   const Affine& m = light.to_world;
   const Double3 x = to_double(m.axis(0)), y = to_double(m.axis(1)), z = to_double(m.axis(2));
   const double radius = std::fabs(light.radius) * std::cbrt(std::fabs(dot(x, cross(y, z))));
-  put(made.record.p, to_double(m.t));
-  made.record.radius = static_cast<float>(radius);
+  put(out.record.p, to_double(m.t));
+  out.record.radius = static_cast<float>(radius);
   if (light.radius == 0) {
     const LightColour colour(light);
     const double scale = light.normalize ? 0.25 : 1;  // pi r^2 / (4 pi r^2)
-    put_radiance(made.record, colour.rgb * scale);
-    made.power = 4 * kPiD * scale * colour.mean;
+    set_radiance(out.record, colour.rgb * scale);
+    out.power = 4 * kPiD * scale * colour.mean;
     return;
   }
   const double area = 4 * kPiD * radius * radius;
-  finish_area(made, light, area);
-  if (!(area >= kLeastArea)) made.record.radius = 1e-18f;  // 0 would make it a point light
+  finish_area(out, light, area);
+  if (!(area >= kMinArea)) out.record.radius = 1e-18f;  // 0 would make it a point light
 }
 
 void bound(LightCluster& cluster, const LightRecord& light, double power) {
@@ -35,7 +35,7 @@ void bound(LightCluster& cluster, const LightRecord& light, double power) {
 }
 
 LightShape shape(const LightRecord& light) {
-  return light.radius > 0 ? LightShape::kOwn : LightShape::kNone;
+  return light.radius > 0 ? LightShape::kCustom : LightShape::kNone;
 }
 
 Bounds box(const LightRecord& light) {
@@ -61,7 +61,7 @@ LightKindInfo SphereKind::describe() {
   LightKindInfo kind;
   kind.name = "sphere";
   kind.prims = {"SphereLight"};
-  kind.traits = kPlaced | kSized | kShaped | kSeen | kFiltered;
+  kind.traits = kHasTransform | kSized | kShaped | kVisibleShape | kFiltered;
   kind.parameters = {"radius"};
   kind.make = &make;
   kind.bound = &bound;

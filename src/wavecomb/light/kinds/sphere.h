@@ -31,9 +31,9 @@ inline SphereCone<F> make_sphere_cone(const LightReader<F>& light, const Vec3<F>
 /// is too small.
 template <typename F>
 inline F sphere_cone_pdf(const SphereCone<F>& cone) {
-  const Mask<F> good = cone.outside & (cone.one_minus_cos > 0.f);
-  const F pdf = kInv2Pi / select(good, cone.one_minus_cos, F(1.f));
-  return select(good & is_finite(pdf), pdf, F(0.f));
+  const Mask<F> valid = cone.outside & (cone.one_minus_cos > 0.f);
+  const F pdf = kInv2Pi / select(valid, cone.one_minus_cos, F(1.f));
+  return select(valid & is_finite(pdf), pdf, F(0.f));
 }
 
 /// Samples a direction uniformly in the cone that the sphere subtends (P. Shirley, C. Wang, K.
@@ -74,8 +74,9 @@ inline KindEmission<F> emit_sphere(const EmissionQuery<F>& q) {
   const LightReader<F>& light = q.light;
   const Mask<F> is_point = light.radius() == 0.f;
   const Vec3<F> n = square_to_sphere(q.u, q.v);
-  KindEmission<F> e = emit_by_cosine<F>(fma(n, light.radius(), light.p()), n, q.s, q.t,
-                                        light.radiance(), even_emission_density<F>(light.area()));
+  KindEmission<F> e =
+      emit_by_cosine<F>(fma(n, light.radius(), light.p()), n, q.s, q.t, light.radiance(),
+                        uniform_emission_density<F>(light.area()));
   e.d = select<F>(is_point, square_to_sphere(q.s, q.t), e.d);
   e.n = select<F>(is_point, Vec3<F>(F(0.f)), e.n);
   e.density = select(is_point, F(kInv4Pi), e.density);
@@ -85,7 +86,7 @@ inline KindEmission<F> emit_sphere(const EmissionQuery<F>& q) {
 /// Returns KindEmission::density of emit_sphere().
 template <typename F>
 inline F sphere_emission_density(const LightReader<F>& light) {
-  return select(light.radius() == 0.f, F(kInv4Pi), even_emission_density<F>(light.area()));
+  return select(light.radius() == 0.f, F(kInv4Pi), uniform_emission_density<F>(light.area()));
 }
 
 }  // namespace wavecomb::detail
@@ -109,7 +110,7 @@ struct SphereKind : FiniteKind {
     return detail::sample_sphere<F>(q.light, q.from, q.u, q.v);
   }
   template <typename F>
-  static detail::KindHit<F> hit(const detail::LightMeeting<F>& m) {
+  static detail::KindHit<F> hit(const detail::LightHitQuery<F>& m) {
     return detail::hit_sphere<F>(m.light, m.origin);
   }
   template <typename F>
@@ -117,7 +118,7 @@ struct SphereKind : FiniteKind {
     return detail::emit_sphere<F>(q);
   }
   template <typename F>
-  static F emission_density(const detail::LightMeeting<F>& m) {
+  static F emission_density(const detail::LightHitQuery<F>& m) {
     return detail::sphere_emission_density<F>(m.light);
   }
 };

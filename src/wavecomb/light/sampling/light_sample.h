@@ -37,15 +37,15 @@ inline F balance_weight(const F& a, const F& b) {
   return select(a > 0.f, F(1.f / (1.f + b / select(a > 0.f, a, F(1.f)))), F(0.f));
 }
 
-/// Returns the light that sample_light() selects with u_pick, or kNoLight.
+/// Returns the light that sample_light() selects with u_light, or kNoLight.
 template <typename F>
-UInt<F> chosen_light(const LightView& view, const LightReceiver<F>& to, const F& u_pick,
-                     const Mask<F>& active);
+UInt<F> select_light_index(const LightView& view, const LightReceiver<F>& to, const F& u_light,
+                           const Mask<F>& active);
 
 /// Selects a light by power or by the light tree, and samples a point on it as seen from `to`. The
-/// random numbers are in [0, 1). u_pick is a multiple of 2^-24, as samplers provide it.
+/// random numbers are in [0, 1). u_light is a multiple of 2^-24, as samplers provide it.
 template <typename F>
-LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to, const F& u_pick,
+LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to, const F& u_light,
                             const F& u, const F& v, const Mask<F>& wanted);
 
 template <typename F>
@@ -95,9 +95,9 @@ struct LightEffect {
 };
 
 /// Returns the probability with which sample_light() selects infinite light `light`.
-inline float infinite_pick_pdf(const LightView& view, uint32_t light) {
+inline float infinite_selection_pdf(const LightView& view, uint32_t light) {
   if (view.by_tree) return view.tree.infinite_pdf[light];
-  return view.pick_pdf ? view.pick_pdf[light] : view.lights[light].pick_pdf;
+  return view.selection_pdf ? view.selection_pdf[light] : view.lights[light].selection_pdf;
 }
 
 /// Returns the balance heuristic weight of a bounce with density `p` (ignored for delta lobes)

@@ -14,20 +14,20 @@ namespace wavecomb {
 
 namespace detail {
 
-/// Returns a light by the 24 bits of u_pick (a multiple of 2^-24 in [0, 1)) and the PickTable. All
-/// arithmetic is in integers, so that pick_pdf is exact.
+/// Returns a light by the 24 bits of u_light (a multiple of 2^-24 in [0, 1)) and the PowerTable.
+/// All arithmetic is in integers, so that selection_pdf is exact.
 template <typename F>
-inline UInt<F> pick_light(const LightView& view, const F& u_pick, const Mask<F>& active) {
+inline UInt<F> light_by_power(const LightView& view, const F& u_light, const Mask<F>& active) {
   using U = UInt<F>;
   if (view.count == 1) return U(0u);
-  const PickTable& pick = view.pick;
-  const U number = U(to_int<F>(F(u_pick * 0x1p24f)));
-  const Mask<U> triangle = number >= U(pick.split);
-  const U k = number - select(triangle, U(pick.split), U(0u));
-  const U shift = select(triangle, U(pick.shift[1]), U(pick.shift[0]));
+  const PowerTable& table = view.power_table;
+  const U number = U(to_int<F>(F(u_light * 0x1p24f)));
+  const Mask<U> triangle = number >= U(table.split);
+  const U k = number - select(triangle, U(table.split), U(0u));
+  const U shift = select(triangle, U(table.shift[1]), U(table.shift[0]));
   const U bin = k >> shift;
   const U entry =
-      gather<U>(pick.bins, bin + select(triangle, U(pick.triangle_bins), U(0u)), Mask<U>(active));
+      gather<U>(table.bins, bin + select(triangle, U(table.triangle_bins), U(0u)), Mask<U>(active));
   const U other = entry >> shift;
   const U rest = k - (bin << shift), threshold = entry - (other << shift);
   return select(rest < threshold, bin, other) + select(triangle, U(view.first_triangle), U(0u));
@@ -35,35 +35,35 @@ inline UInt<F> pick_light(const LightView& view, const F& u_pick, const Mask<F>&
 
 /// Selection of a light, by the light tree or by light weights.
 template <typename F>
-struct LightPick {
+struct SelectedLight {
   UInt<F> light;
   F probability;   ///< selection probability, if it is not in the light's record
   Mask<F> active;  ///< lanes with a light
   bool of_record;
 
-  LightPick(const LightView& view, const LightReceiver<F>& to, const F& u_pick,
-            const Mask<F>& wanted)
-      : probability(0.f), active(wanted), of_record(!view.by_tree && !view.pick_pdf) {
+  SelectedLight(const LightView& view, const LightReceiver<F>& to, const F& u_light,
+                const Mask<F>& wanted)
+      : probability(0.f), active(wanted), of_record(!view.by_tree && !view.selection_pdf) {
     if (view.by_tree) {
-      const LightChoice<F> choice = choose_by_tree<F>(view, to, u_pick, wanted);
+      const LightChoice<F> choice = choose_by_tree<F>(view, to, u_light, wanted);
       light = choice.light;
       probability = choice.pdf;
       active = wanted & (choice.pdf > 0.f);
     } else {
-      light = pick_light<F>(view, u_pick, wanted);
-      if (view.pick_pdf) probability = gather<F>(view.pick_pdf, light, wanted);
+      light = light_by_power<F>(view, u_light, wanted);
+      if (view.selection_pdf) probability = gather<F>(view.selection_pdf, light, wanted);
     }
   }
   F pdf(const F& recorded) const { return of_record ? recorded : probability; }
 };
 
 /// Returns the probability with which sample_light() selects finite light `light`, whose record has
-/// the pick_pdf `recorded`.
+/// the selection_pdf `recorded`.
 template <typename F>
-inline F finite_pick_pdf(const LightView& view, const UInt<F>& light, const F& recorded,
-                         const LightReceiver<F>& to, const Mask<F>& active) {
+inline F finite_selection_pdf(const LightView& view, const UInt<F>& light, const F& recorded,
+                              const LightReceiver<F>& to, const Mask<F>& active) {
   if (view.by_tree) return tree_pdf<F>(view, light, to, active);
-  return view.pick_pdf ? gather<F>(view.pick_pdf, light, active) : recorded;
+  return view.selection_pdf ? gather<F>(view.selection_pdf, light, active) : recorded;
 }
 
 /// Calls `one(kind, lanes)` for each kind of light in the active lanes.
@@ -80,15 +80,15 @@ inline void for_each_kind(const UInt<F>& kind, const Mask<F>& active, const Func
 }  // namespace detail
 
 template <typename F>
-UInt<F> chosen_light(const LightView& view, const LightReceiver<F>& to, const F& u_pick,
-                     const Mask<F>& active) {
+UInt<F> select_light_index(const LightView& view, const LightReceiver<F>& to, const F& u_light,
+                           const Mask<F>& active) {
   if (view.count == 0 || none(active)) return UInt<F>(kNoLight);
-  if (view.by_tree) return detail::choose_by_tree<F>(view, to, u_pick, active).light;
-  return detail::pick_light<F>(view, u_pick, active);
+  if (view.by_tree) return detail::choose_by_tree<F>(view, to, u_light, active).light;
+  return detail::light_by_power<F>(view, u_light, active);
 }
 
 template <typename F>
-LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to, const F& u_pick,
+LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to, const F& u_light,
                             const F& u, const F& v, const Mask<F>& wanted) {
   const F zero(0.f);
   const Vec3<F>& p = to.p;
@@ -100,12 +100,13 @@ LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to, c
                         Mask<F>(false),
                         UInt<F>(kNoLight)};
   if (view.count == 0 || none(wanted)) return result;
-  const detail::LightPick<F> pick(view, to, u_pick, wanted);
-  const UInt<F>& index = pick.light;
+  const detail::SelectedLight<F> selected(view, to, u_light, wanted);
+  const UInt<F>& index = selected.light;
   result.light = index;
-  const Mask<F>& active = pick.active;
-  const auto put = [&](const detail::KindSample<F>& s, const F& pick_pdf, const Mask<F>& lanes) {
-    const F pdf = s.pdf * pick_pdf;
+  const Mask<F>& active = selected.active;
+  const auto put = [&](const detail::KindSample<F>& s, const F& selection_pdf,
+                       const Mask<F>& lanes) {
+    const F pdf = s.pdf * selection_pdf;
     const Mask<F> valid = lanes & (pdf > 0.f) & is_finite(pdf) & not_(is_black(s.radiance));
     const F inverse = 1.f / select(valid, pdf, F(1.f));
     result.wi = select<F>(valid, s.wi, result.wi);
@@ -120,8 +121,8 @@ LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to, c
     const detail::TriangleReader<F> light(view, index, triangle);
     detail::KindSample<F> s = detail::sample_triangle<F>(light, view, p, u, v, triangle);
     if (view.mesh_lights) [[unlikely]]
-      s.radiance = detail::of_mesh_light<F>(view, index, light, s, triangle);
-    put(s, pick.pdf(light.pick_pdf), triangle);
+      s.radiance = detail::mesh_light_sample_radiance<F>(view, index, light, s, triangle);
+    put(s, selected.pdf(light.selection_pdf), triangle);
   }
   const Mask<F> others = active & not_(triangle);
   if (none(others)) return result;
@@ -145,7 +146,7 @@ LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to, c
                                            s.radiance, lanes & (s.pdf > 0.f));
         if (view.motions) [[unlikely]]
           s.wi = light_pose<F>(view, index, to.time, lanes).to_world(s.wi);
-        put(s, pick.pdf(light.pick_pdf()), lanes);
+        put(s, selected.pdf(light.selection_pdf()), lanes);
       });
   return result;
 }
@@ -157,7 +158,8 @@ LightHit<F> light_hit(const LightView& view, const UInt<F>& light, const LightRe
   const Mask<F> active = hit_lanes & Mask<F>(light < UInt<F>(view.first_triangle));
   if (none(active)) return result;
   const detail::LightReader<F> reader(view.lights, light, active);
-  const F pick_pdf = detail::finite_pick_pdf<F>(view, light, reader.pick_pdf(), from, active);
+  const F selection_pdf =
+      detail::finite_selection_pdf<F>(view, light, reader.selection_pdf(), from, active);
   Vec3<F> origin = from.p, dir = along;
   if (view.motions) [[unlikely]] {
     const LightPose<F> pose = light_pose<F>(view, light, from.time, active);
@@ -175,7 +177,7 @@ LightHit<F> light_hit(const LightView& view, const UInt<F>& light, const LightRe
           hit.radiance = detail::filtered<F>(view, reader[&LightRecord::filter],
                                              {fma(dir, t, origin), -dir, t}, hit.radiance, lanes);
         result.radiance = select<F>(lanes, hit.radiance, result.radiance);
-        result.pdf = select(lanes, F(hit.pdf * pick_pdf), result.pdf);
+        result.pdf = select(lanes, F(hit.pdf * selection_pdf), result.pdf);
       });
   return result;
 }
@@ -186,8 +188,9 @@ F triangle_light_pdf(const LightView& view, const UInt<F>& light, const LightRec
   const Mask<F> lanes = active & Mask<F>(light >= UInt<F>(view.first_triangle));
   if (none(lanes)) return F(0.f);
   const detail::TriangleDensity<F> d = detail::triangle_pdf<F>(view, light, dir, t, lanes);
-  const F pick_pdf = detail::finite_pick_pdf<F>(view, light, d.pick_pdf, from, lanes);
-  return select(lanes, F(d.solid_angle * pick_pdf), F(0.f));
+  const F selection_pdf =
+      detail::finite_selection_pdf<F>(view, light, d.selection_pdf, from, lanes);
+  return select(lanes, F(d.solid_angle * selection_pdf), F(0.f));
 }
 
 }  // namespace wavecomb

@@ -12,17 +12,18 @@ template <typename F>
 inline Mask<F> is_linked(const LinkView& links, const UInt<F>& link, const UInt<F>& set,
                          const Mask<F>& active) {
   using U = UInt<F>;
-  const Mask<F> asked = active & Mask<F>(set != U(kNoSet)) & Mask<F>(link != U(0u));
-  if (none(asked)) return Mask<F>(true);
-  const U word = gather<U>(links.members, (link - 1u) * links.words + (set >> 5), Mask<U>(asked));
-  return not_(asked) | Mask<F>(((word >> (set & 31u)) & 1u) != U(0u));
+  const Mask<F> restricted = active & Mask<F>(set != U(kNoSet)) & Mask<F>(link != U(0u));
+  if (none(restricted)) return Mask<F>(true);
+  const U word =
+      gather<U>(links.members, (link - 1u) * links.words + (set >> 5), Mask<U>(restricted));
+  return not_(restricted) | Mask<F>(((word >> (set & 31u)) & 1u) != U(0u));
 }
 
 /// Returns the lanes in which light `light` illuminates surfaces of class `link`. Emissive
 /// triangles without a light record illuminate all surfaces.
 template <typename F>
-inline Mask<F> shines_on(const LightView& view, const UInt<F>& link, const UInt<F>& light,
-                         const Mask<F>& active) {
+inline Mask<F> illuminates(const LightView& view, const UInt<F>& link, const UInt<F>& light,
+                           const Mask<F>& active) {
   const UInt<F> record = detail::record_of<F>(view, light, active);
   const Mask<F> known = active & Mask<F>(record != UInt<F>(kNoLight));
   if (none(known)) return Mask<F>(true);

@@ -15,16 +15,16 @@ namespace wavecomb {
 template <typename F>
 struct LightPose {
   Vec3<F> x, y, z;  ///< directions of the rest pose's axes
-  Vec3<F> place, origin;
+  Vec3<F> position, origin;
 
   Vec3<F> to_rest(const Vec3<F>& direction) const {
     return {dot(x, direction), dot(y, direction), dot(z, direction)};
   }
-  Vec3<F> point_to_rest(const Vec3<F>& p) const { return to_rest(p - place) + origin; }
+  Vec3<F> point_to_rest(const Vec3<F>& p) const { return to_rest(p - position) + origin; }
   Vec3<F> to_world(const Vec3<F>& direction) const {
     return fma(x, direction.x, fma(y, direction.y, Vec3<F>(z * direction.z)));
   }
-  Vec3<F> point_to_world(const Vec3<F>& p) const { return to_world(p - origin) + place; }
+  Vec3<F> point_to_world(const Vec3<F>& p) const { return to_world(p - origin) + position; }
 };
 
 /// Returns the pose of light records `light` at `time`. Used only with LightView::motions.
@@ -35,7 +35,7 @@ template <typename F>
   const auto m = load_rows<8, F>(view.motions, light * 8u, lanes);
   const U first = float_bits<F>(m[3]), segments = float_bits<F>(m[4]);
   const Mask<F> moves = lanes & Mask<F>(segments != U(0u));
-  const BetweenSteps<F> at(time, select(Mask<U>(moves), segments, U(1u)));
+  const StepInterpolation<F> at(time, select(Mask<U>(moves), segments, U(1u)));
   const U step = (first + at.before) * 8u;
   const auto a = load_rows<8, F>(view.motion_steps, step, moves);
   const auto b = load_rows<8, F>(view.motion_steps, step + 8u, moves);

@@ -38,7 +38,7 @@ inline constexpr float kCosineSlack = 4e-3f;
 /// value is 1, which treats all lights around a point as distant. On the street of
 /// benchmarks/light_selection.py, 0.5 has a quarter less error with 1,000 lights, a third less with
 /// 10,000, and the same with 100. Values below 0.25 are worse again.
-inline constexpr float kNearest = 0.5f;
+inline constexpr float kMinDistanceRatio = 0.5f;
 
 /// Cosine and sine of an angle from 0 to pi.
 template <typename F>
@@ -88,10 +88,11 @@ inline F light_importance(const F* r, const Vec3<F>& p, const Vec3<F>& normal,
 
   const Angle<F> off_receiver = angle_of_cosine<F>(dot(normal, w));
   const F cos_receiver = select(any_side, F(1.f), less<F>(off_receiver, bound).cos);
-  const Mask<F> shines = (cos_light > cos_e - kCosineSlack) & (cos_receiver > -kCosineSlack);
+  const Mask<F> can_contribute =
+      (cos_light > cos_e - kCosineSlack) & (cos_receiver > -kCosineSlack);
   const F importance = r[4] * max(cos_light, F(kCosineSlack)) * max(cos_receiver, F(kCosineSlack)) /
-                       max(max(d2, F(r2 * kNearest)), F(1e-30f));
-  return select(shines, max(importance, F(1e-37f)), F(0.f));
+                       max(max(d2, F(r2 * kMinDistanceRatio)), F(1e-30f));
+  return select(can_contribute, max(importance, F(1e-37f)), F(0.f));
 }
 
 /// Descends from the root to a light. `goes_right(probability of the left child, lanes)` selects
@@ -104,9 +105,9 @@ inline LightChoice<F> descend(const LightTreeView& tree, const LightReceiver<F>&
   const Mask<F> any_side = Mask<F>(to.normal == U(0u));
   U at(tree.root);
   F pdf(1.f);
-  Mask<F> going = active & Mask<F>(at < U(kTreeLeaf));
-  while (any(going)) {
-    const auto r = load_rows<16, F>(tree.nodes, at * 16u, going);
+  Mask<F> descending = active & Mask<F>(at < U(kTreeLeaf));
+  while (any(descending)) {
+    const auto r = load_rows<16, F>(tree.nodes, at * 16u, descending);
     const F left = light_importance<F>(r.data(), to.p, normal, any_side);
     const F right = light_importance<F>(r.data() + 8, to.p, normal, any_side);
     const F sum = left + right;
@@ -114,42 +115,43 @@ inline LightChoice<F> descend(const LightTreeView& tree, const LightReceiver<F>&
     // Every child that can contribute keeps a minimum probability.
     const Mask<F> both = (left > 0.f) & (right > 0.f);
     p_left = select(both, clamp(p_left, F(0x1p-12f), F(1.f - 0x1p-12f)), p_left);
-    const Mask<F> take_right = goes_right(p_left, going);
+    const Mask<F> take_right = goes_right(p_left, descending);
     const F p = select(take_right, F(1.f - p_left), p_left);
-    pdf = select(going, select(sum > 0.f, F(pdf * p), F(0.f)), pdf);
+    pdf = select(descending, select(sum > 0.f, F(pdf * p), F(0.f)), pdf);
     const U next = select(Mask<U>(take_right), float_bits<F>(r[15]), float_bits<F>(r[7]));
-    at = select(Mask<U>(going), next, at);
-    going = going & (pdf > 0.f) & Mask<F>(at < U(kTreeLeaf));
+    at = select(Mask<U>(descending), next, at);
+    descending = descending & (pdf > 0.f) & Mask<F>(at < U(kTreeLeaf));
   }
   const Mask<F> found = active & (pdf > 0.f);
   return {select(Mask<U>(found), U(at & ~kTreeLeaf), U(kNoLight)), select(found, pdf, F(0.f))};
 }
 
-/// Returns the light that u_pick (a multiple of 2^-24 in [0, 1)) selects for `to`. Infinite lights
-/// have fixed intervals of u_pick. Within the interval of the tree, the position is rescaled to [0,
-/// 1) for the first node, and what each choice leaves is rescaled for the next one. Bits below the
-/// precision of u_pick are generated from `to.seed`.
+/// Returns the light that u_light (a multiple of 2^-24 in [0, 1)) selects for `to`. Infinite lights
+/// have fixed intervals of u_light. Within the interval of the tree, the position is rescaled to
+/// [0, 1) for the first node, and what each choice leaves is rescaled for the next one. Bits below
+/// the precision of u_light are generated from `to.seed`.
 template <typename F>
 [[gnu::noinline]] LightChoice<F> choose_by_tree(const LightView& view, const LightReceiver<F>& to,
-                                                const F& u_pick, const Mask<F>& active) {
+                                                const F& u_light, const Mask<F>& active) {
   using U = UInt<F>;
   const LightTreeView& tree = view.tree;
-  const U number = U(to_int<F>(F(u_pick * 0x1p24f)));
+  const U number = U(to_int<F>(F(u_light * 0x1p24f)));
   const Mask<F> in_tree = active & Mask<F>(number < U(tree.numbers));
   U bits = to.seed;
-  const auto fresh = [&] {
+  const auto next_random = [&] {
     bits = bits * 747796405u + 2891336453u;
     return unit_float<F>(UInt<F>(bits ^ (bits >> 15)));
   };
   const auto below_one = [](const F& x) { return min(x, F(kOneMinusEpsilon)); };
-  F u = below_one(F((F(Int<F>(number)) + fresh()) / F(static_cast<float>(tree.numbers))));
-  LightChoice<F> choice = descend<F>(tree, to, in_tree, [&](const F& p_left, const Mask<F>& going) {
-    const Mask<F> right = going & not_(u < p_left);
-    const F p = select(right, F(1.f - p_left), p_left);
-    const F rest = select(right, F(u - p_left), u);
-    u = below_one(F((rest + fresh() * 0x1p-24f) / select(p > 0.f, p, F(1.f))));
-    return right;
-  });
+  F u = below_one(F((F(Int<F>(number)) + next_random()) / F(static_cast<float>(tree.numbers))));
+  LightChoice<F> choice =
+      descend<F>(tree, to, in_tree, [&](const F& p_left, const Mask<F>& descending) {
+        const Mask<F> right = descending & not_(u < p_left);
+        const F p = select(right, F(1.f - p_left), p_left);
+        const F rest = select(right, F(u - p_left), u);
+        u = below_one(F((rest + next_random() * 0x1p-24f) / select(p > 0.f, p, F(1.f))));
+        return right;
+      });
   for (uint32_t i = 0; i < view.infinite_count; ++i) {
     const uint32_t begin = i == 0 ? tree.numbers : tree.infinite_ends[i - 1];
     const Mask<F> here =
@@ -168,16 +170,16 @@ template <typename F>
                              const LightReceiver<F>& to, const Mask<F>& active) {
   using U = UInt<F>;
   const U trail = gather<U>(view.tree.trails, light, Mask<U>(active));
-  const Mask<F> there = active & Mask<F>(trail != U(kNoLight));
-  U way = trail;
+  const Mask<F> is_listed = active & Mask<F>(trail != U(kNoLight));
+  U turns = trail;
   const LightChoice<F> choice =
-      descend<F>(view.tree, to, there, [&](const F&, const Mask<F>& going) {
-        const Mask<F> right = going & Mask<F>((way & 1u) != U(0u));
-        way = way >> 1;
+      descend<F>(view.tree, to, is_listed, [&](const F&, const Mask<F>& descending) {
+        const Mask<F> right = descending & Mask<F>((turns & 1u) != U(0u));
+        turns = turns >> 1;
         return right;
       });
   const float share = static_cast<float>(view.tree.numbers) * 0x1p-24f;
-  return select(there, F(choice.pdf * share), F(0.f));
+  return select(is_listed, F(choice.pdf * share), F(0.f));
 }
 
 }  // namespace detail

@@ -29,14 +29,14 @@ using light_tree::most_of;
 constexpr uint32_t kNumbers = 1u << 24;
 constexpr size_t kBins = 12;
 /// Number of effective lights from which a tree reduces noise (docs/light-selection.md).
-constexpr float kLeastForTree = 2;
+constexpr float kMinForTree = 2;
 /// Maximum number of ranges built in parallel, and minimum number of lights of a range.
 constexpr size_t kTasks = 64, kParallel = 4096;
 
 /// A range of items and its node, with the path to it from the root.
 struct Range {
   size_t begin, end;
-  uint32_t place;  ///< node index
+  uint32_t node_index;  ///< index in LightTree::nodes
   uint32_t depth, trail;
   size_t size() const { return end - begin; }
 };
@@ -85,8 +85,8 @@ class Builder {
   /// nodes.
   static std::pair<Range, Range> children(const Range& r, size_t cut) {
     const auto left_nodes = static_cast<uint32_t>(cut - r.begin - 1);
-    return {{r.begin, cut, r.place + 1, r.depth + 1, r.trail},
-            {cut, r.end, r.place + 1 + left_nodes, r.depth + 1, r.trail | 1u << r.depth}};
+    return {{r.begin, cut, r.node_index + 1, r.depth + 1, r.trail},
+            {cut, r.end, r.node_index + 1 + left_nodes, r.depth + 1, r.trail | 1u << r.depth}};
   }
 
   LightCluster build(const Range& r) {
@@ -105,10 +105,10 @@ class Builder {
   }
 
   LightCluster join(const Range& r, const LightCluster& a, const LightCluster& b) {
-    tree_.nodes[r.place].child[0] = encode(a);
-    tree_.nodes[r.place].child[1] = encode(b);
+    tree_.nodes[r.node_index].child[0] = encode(a);
+    tree_.nodes[r.node_index].child[1] = encode(b);
     LightCluster c = unite(a, b);
-    c.next = r.place;
+    c.next = r.node_index;
     return c;
   }
 
@@ -191,7 +191,7 @@ class Builder {
       return bound_light(set.triangles[light - set.first_triangle()], power);
     const LightCluster rests = bound_light(set.records[light], power);
     if (set.motions.empty() || set.motions[light].segments == 0) return rests;
-    return along_way(set.motions[light], set.motion_steps, rests);
+    return swept_bounds(set.motions[light], set.motion_steps, rests);
   }
 
  private:
@@ -215,11 +215,11 @@ Item make_item(const LightCluster& c, uint32_t light, double scale) {
 }
 
 /// Distributes the 2^24 random numbers among the tree and the infinite lights that emit.
-void share_numbers(const LightSet& set, std::span<const double> powers, size_t lit_in_tree,
+void share_numbers(const LightSet& set, std::span<const double> powers, size_t emitting_in_tree,
                    LightTree& tree) {
   const size_t infinite = set.infinite_count;
-  size_t lit = lit_in_tree;
-  for (size_t i = 0; i < infinite; ++i) lit += powers[i] > 0 ? 1 : 0;
+  size_t emitting = emitting_in_tree;
+  for (size_t i = 0; i < infinite; ++i) emitting += powers[i] > 0 ? 1 : 0;
   tree.infinite_ends.resize(infinite);
   tree.infinite_pdf.resize(infinite);
   std::vector<uint32_t> numbers(infinite, 0);
@@ -230,17 +230,17 @@ void share_numbers(const LightSet& set, std::span<const double> powers, size_t l
   constexpr double floor_share = 0.01;
   for (size_t i = 0; i < infinite; ++i) {
     if (!(powers[i] > 0)) continue;
-    const double share =
-        (1 - floor_share) * (powers[i] / largest / total) + floor_share / static_cast<double>(lit);
+    const double share = (1 - floor_share) * (powers[i] / largest / total) +
+                         floor_share / static_cast<double>(emitting);
     // The tree keeps at least one number in a thousand, so that finite lights are sampled even
     // under a bright dome.
-    const uint32_t most = left - (lit_in_tree > 0 ? kNumbers / 1000 : 0);
+    const uint32_t most = left - (emitting_in_tree > 0 ? kNumbers / 1000 : 0);
     numbers[i] = std::min(most, 1 + static_cast<uint32_t>(share * (kNumbers - 1)));
     left -= numbers[i];
   }
-  if (lit_in_tree == 0 && left < kNumbers)  // Remainder of rounding
+  if (emitting_in_tree == 0 && left < kNumbers)  // Remainder of rounding
     *std::find_if(numbers.rbegin(), numbers.rend(), [](uint32_t n) { return n > 0; }) += left;
-  tree.numbers = lit_in_tree > 0 ? left : 0;
+  tree.numbers = emitting_in_tree > 0 ? left : 0;
   uint32_t end = tree.numbers;
   for (size_t i = 0; i < infinite; ++i) {
     tree.infinite_ends[i] = end += numbers[i];
@@ -264,17 +264,17 @@ LightTreeView LightTree::view() const {
           root,         numbers,       effective_lights};
 }
 
-bool pays_as_tree(float effective_lights) {
-  return effective_lights >= kLeastForTree;
+bool prefers_tree(float effective_lights) {
+  return effective_lights >= kMinForTree;
 }
 
 LightTree outline_light_tree(const LightSet& set, std::span<const double> powers) {
   LightTree tree;
   const std::span<const double> finite = powers.subspan(set.infinite_count);
-  const auto lit = static_cast<size_t>(
+  const auto emitting = static_cast<size_t>(
       std::count_if(finite.begin(), finite.end(), [](double power) { return power > 0; }));
-  share_numbers(set, powers, lit, tree);
-  if (lit == 0) return tree;
+  share_numbers(set, powers, emitting, tree);
+  if (emitting == 0) return tree;
   const auto [total, largest] = total_power(finite);
   double squares = 0;
   for (const double power : finite)
@@ -286,33 +286,34 @@ LightTree outline_light_tree(const LightSet& set, std::span<const double> powers
 LightTree build_light_tree(const LightSet& set, std::span<const double> powers) {
   LightTree tree = outline_light_tree(set, powers);
   tree.trails.assign(powers.size(), kNoLight);
-  std::vector<uint32_t> lit;
+  std::vector<uint32_t> emitting;
   for (size_t i = set.infinite_count; i < powers.size(); ++i)
-    if (powers[i] > 0) lit.push_back(static_cast<uint32_t>(i));
-  if (lit.empty()) return tree;
+    if (powers[i] > 0) emitting.push_back(static_cast<uint32_t>(i));
+  if (emitting.empty()) return tree;
   const auto [relative, largest] = total_power(powers.subspan(set.infinite_count));
   double total = relative * largest;
   if (!std::isfinite(total)) total = largest;
-  std::vector<Item> items(lit.size());
+  std::vector<Item> items(emitting.size());
   constexpr size_t kChunk = 4096;
-  parallel_for((lit.size() + kChunk - 1) / kChunk, [&](size_t chunk) {
-    for (size_t i = chunk * kChunk; i < std::min(lit.size(), (chunk + 1) * kChunk); ++i)
-      items[i] = make_item(Builder::cluster_of(set, lit[i], powers[lit[i]]), lit[i], 1 / total);
+  parallel_for((emitting.size() + kChunk - 1) / kChunk, [&](size_t chunk) {
+    for (size_t i = chunk * kChunk; i < std::min(emitting.size(), (chunk + 1) * kChunk); ++i)
+      items[i] = make_item(Builder::cluster_of(set, emitting[i], powers[emitting[i]]), emitting[i],
+                           1 / total);
   });
-  tree.nodes.resize(lit.size() - 1);
+  tree.nodes.resize(emitting.size() - 1);
   Builder(set, std::move(items), total, tree).run(powers);
   return tree;
 }
 
 bool chooses_by_tree(LightSelection selection, const LightView& lights) {
   const float effective = lights.tree.effective_lights;
-  const bool tree_alone = lights.pick.bins == nullptr && lights.count > 0;
+  const bool tree_alone = lights.power_table.bins == nullptr && lights.count > 0;
   if (tree_alone && selection == LightSelection::kPower)
-    throw Error("by power one of " + with_commas(kMaxPicked) +
+    throw Error("by power one of " + with_commas(kMaxPowerLights) +
                 " lights can be chosen; the scene has " + with_commas(lights.count) +
                 " lights and emissive triangles; choose --light-selection tree");
   if (tree_alone) return true;
-  if (selection == LightSelection::kAuto) return pays_as_tree(effective);
+  if (selection == LightSelection::kAuto) return prefers_tree(effective);
   return selection == LightSelection::kTree && effective > 0;
 }
 

@@ -32,14 +32,14 @@ struct LightTree {
 LightTree outline_light_tree(const LightSet& set, std::span<const double> powers);
 
 /// Returns whether LightSelection::kAuto uses a tree for this number of effective lights.
-bool pays_as_tree(float effective_lights);
+bool prefers_tree(float effective_lights);
 
 /// Builds the tree over the finite lights of `set` with `powers` (of all lights, W) above 0: binned
 /// splits that minimize the cost by bounds, orientation and power ("SAOH"), down to single lights,
 /// after A. Conty Estevez and C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree
 /// Splitting", 2018, section 4. Runs in parallel; the result does not depend on the number of
-/// threads. Infinite lights are selected by power as in build_pick_table, with one random number in
-/// a hundred distributed evenly among all lights.
+/// threads. Infinite lights are selected by power as in build_power_table, with one random number
+/// in a hundred distributed evenly among all lights.
 LightTree build_light_tree(const LightSet& set, std::span<const double> powers);
 
 /// Returns whether lights are selected by tree. A scene without finite lights has no tree. kAuto

@@ -53,7 +53,7 @@ void connect(Wave& wave, const WaveContext& context, uint32_t depth) {
   wave.light_use = Wave::LightUse::kConnect;
   const ShadeSettings settings = ShadeSettings(*context.settings).of_light_paths();
   shade<F>(wave, context, settings, depth, kShadeLightBatch);
-  wave.light_use = Wave::LightUse::kShow;
+  wave.light_use = Wave::LightUse::kToCamera;
   compact_shadows<F>(wave);
   const ShadowQueue& q = wave.shadows;
   if (q.size == 0) return;
@@ -65,10 +65,10 @@ void connect(Wave& wave, const WaveContext& context, uint32_t depth) {
     const U slot = load<U>(q.slot + i);
     const Color<F> c{load<F>(q.r + i), load<F>(q.g + i), load<F>(q.b + i)};
     add_radiance<F>(wave.pool.radiance, slot, c, active);
-    if (wave.aovs.wants_links()) [[unlikely]] {
+    if (wave.aovs.wants_connections()) [[unlikely]] {
       const auto light =
           gather_field<F>(wave.light_vertices.paths, &LightPathRow<float>::light, slot, active);
-      wave.aovs.add_link<F>(depth, slot, light, c, active);
+      wave.aovs.add_connection<F>(depth, slot, light, c, active);
       if (wave.light_aovs.wants_events())
         wave.light_aovs.connect<F>(wave.aovs.expressions(), slot, c, active);
     }

@@ -15,7 +15,7 @@ WAVECOMB_INLINE LightVertexResult<F> shade_one_of_light(const Vertex<F, kFeature
   if constexpr (kIsScalar<F>)
     return shade_light_vertex<Bsdf, F>(v, setup, target);
   else
-    return take_light_steps<Bsdf, F>(v, setup, target);
+    return light_path_steps<Bsdf, F>(v, setup, target);
 }
 
 /// Shades records [begin, end) of the shading order for the purpose in Wave::light_use, as
@@ -58,17 +58,17 @@ void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettin
     const VertexResult<F>& v = out.v;
     if (aovs.wants_events) [[unlikely]] {
       if (connects)
-        wave.light_aovs.link<F>(r.slot, aovs.lit, active);
+        wave.light_aovs.record_connection<F>(r.slot, aovs.light_scattering, active);
       else
         wave.light_aovs.shade<F>(depth, r.slot, path.key, aovs, active);
     }
-    if (wave.light_use == Wave::LightUse::kKeep) {
-      const Mask<F> kept =
-          keep_light_vertex<F>(vertices, depth, path, r, packet.material, out.p, out.offered);
-      if (aovs.wants_events && any(kept)) [[unlikely]]
-        wave.light_aovs.keep<F>(r.slot, kept);
+    if (wave.light_use == Wave::LightUse::kStore) {
+      const Mask<F> stored =
+          store_light_vertex<F>(vertices, depth, path, r, packet.material, out.p, out.is_candidate);
+      if (aovs.wants_events && any(stored)) [[unlikely]]
+        wave.light_aovs.mark_stored<F>(r.slot, stored);
     }
-    packet.note(queue, v.alive, v.next.dir, v.has_shadow, v.shadow_d);
+    packet.store(queue, v.alive, v.next.dir, v.has_shadow, v.shadow_d);
     if (any(v.has_shadow))
       store_row<ShadowRow, F>(
           pool.shadows, r.slot,

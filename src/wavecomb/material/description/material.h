@@ -77,7 +77,10 @@ struct Material {
   uint32_t graph = kNoGraph, opacity_graph = kNoGraph, emission_graph = kNoGraph;
 
   /// Returns parameter `i` of those specific to the program.
-  float own_value(size_t i) const { return own[i].value_or(info_of(program).own[i].standard); }
+  float specific_value(size_t i) const { return own[i].value_or(info_of(program).own[i].standard); }
+  [[deprecated("use specific_value()")]] float own_value(size_t i) const {
+    return specific_value(i);
+  }
   bool has_texture(Input s) const { return textures[static_cast<size_t>(s)].texture != kNoTexture; }
   /// Returns whether the material can emit: its program reads the emission input, which is not
   /// zero.

@@ -25,8 +25,9 @@ std::vector<MaterialParameter> make_material_parameters() {
       {"presence", &M::presence},
   };
   for (uint32_t id = 0; id < kProgramCount; ++id)
-    for (size_t i = 0; i < kPrograms[id].own_count(); ++i)
-      table.push_back({kPrograms[id].own[i].name, OwnParameter{static_cast<ProgramId>(id), i}});
+    for (size_t i = 0; i < kPrograms[id].specific_count(); ++i)
+      table.push_back(
+          {kPrograms[id].own[i].name, SpecificParameter{static_cast<ProgramId>(id), i}});
   return table;
 }
 

@@ -17,7 +17,7 @@
 namespace wavecomb {
 
 /// A parameter specific to one program: number `index` of ProgramInfo::own.
-struct OwnParameter {
+struct SpecificParameter {
   ProgramId program;
   size_t index;
 
@@ -28,10 +28,11 @@ struct OwnParameter {
 /// Description of a material parameter. Contract: lives as long as the program.
 struct MaterialParameter {
   const char* name;  ///< keyword of add_material
-  std::variant<float Material::*, Vec3<float> Material::*, bool Material::*, OwnParameter> place;
+  std::variant<float Material::*, Vec3<float> Material::*, bool Material::*, SpecificParameter>
+      accessor;
 
   /// Null if materials of any program have the parameter.
-  const OwnParameter* own() const { return std::get_if<OwnParameter>(&place); }
+  const SpecificParameter* own() const { return std::get_if<SpecificParameter>(&accessor); }
 };
 
 /// Returns all parameters in the order in which fingerprints hash them. A new member of Material
@@ -44,10 +45,11 @@ std::span<const MaterialParameter> material_table();
 template <typename Value, typename Object, typename Visit>
 void for_each_parameter(Object& material, const Visit& visit) {
   for (const MaterialParameter& p : material_table()) {
-    if (const auto* member = std::get_if<Value Material::*>(&p.place)) visit(p, material.**member);
+    if (const auto* member = std::get_if<Value Material::*>(&p.accessor))
+      visit(p, material.**member);
     if constexpr (std::is_same_v<Value, float>)
-      if (const OwnParameter* own = p.own(); own && own->is_of(material)) {
-        float value = material.own_value(own->index);
+      if (const SpecificParameter* own = p.own(); own && own->is_of(material)) {
+        float value = material.specific_value(own->index);
         visit(p, value);
         if constexpr (!std::is_const_v<Object>) material.own[own->index] = value;
       }

@@ -102,7 +102,7 @@ struct OpenPbr : OpenPbrInputs<float> {
 /// Packed OpenPBR inputs: 32 32-bit words.
 struct alignas(64) OpenPbrRecord : OpenPbrInputs<float> {
   float thin_walled;  ///< 0 or 1
-  float walks;        ///< WalkKind
+  float subsurface;   ///< SubsurfaceKind
   float pad;
 };
 static_assert(sizeof(OpenPbrRecord) == 128);

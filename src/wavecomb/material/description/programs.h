@@ -78,7 +78,7 @@ struct ProgramInfo {
   float model_ns;   ///< estimated cost of each record
   std::array<ProgramParameter, kMaxProgramParameters> own;
 
-  constexpr size_t own_count() const {
+  constexpr size_t specific_count() const {
     size_t count = 0;
     while (count < own.size() && own[count].name) ++count;
     return count;

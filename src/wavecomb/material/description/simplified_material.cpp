@@ -69,17 +69,17 @@ InputRange input_range(Input input, const TextureUse& use, const Texture& textur
     const auto at = [&](float texel) { return fma(texel, use.scale[from], use.bias[from]); };
     const auto [least, most] = std::minmax({at(texels.low[from]), at(texels.high[from])});
     const uint32_t component = first + (is_color(input) || input == Input::kNormal ? c : 0);
-    const auto bring = [&](float x) {
+    const auto clamp_to_range = [&](float x) {
       return clamp(x, kGraphRanges.low[component], kGraphRanges.high[component]);
     };
     const bool is_normal = input == Input::kNormal;
-    low[c] = is_normal ? least : bring(least);
-    high[c] = is_normal ? most : bring(most);
+    low[c] = is_normal ? least : clamp_to_range(least);
+    high[c] = is_normal ? most : clamp_to_range(most);
   }
   return {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
 }
 
-Material settled(Material m, const GraphSet& graphs, std::span<const TexturePtr> textures) {
+Material simplified(Material m, const GraphSet& graphs, std::span<const TexturePtr> textures) {
   const auto fix = [&](Input input, const Vec3<float>& value) {
     put(m, input, value);
     m.textures[static_cast<size_t>(input)] = TextureUse{};
@@ -95,14 +95,14 @@ Material settled(Material m, const GraphSet& graphs, std::span<const TexturePtr>
   }
   // Replaces a graph that only traversal and light sampling evaluate. Shading still runs the
   // complete graph.
-  const auto settle = [&](uint32_t& graph, Input input, uint32_t first, uint32_t count) {
+  const auto simplify = [&](uint32_t& graph, Input input, uint32_t first, uint32_t count) {
     const auto value = only_value(driven_ranges(graphs, graph, textures), first, count);
     if (!value) return;
     fix(input, *value);
     graph = kNoGraph;
   };
-  settle(m.opacity_graph, Input::kOpacity, kOpacityOutput, 1);
-  settle(m.emission_graph, Input::kEmission, kEmissionOutput, 3);
+  simplify(m.opacity_graph, Input::kOpacity, kOpacityOutput, 1);
+  simplify(m.emission_graph, Input::kEmission, kEmissionOutput, 3);
   return m;
 }
 

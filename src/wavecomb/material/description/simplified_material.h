@@ -23,6 +23,7 @@ InputRange input_range(Input input, const TextureUse& use, const Texture& textur
 /// results are identical, with fewer texture lookups. If no texture is left, shading uses a
 /// different tangent frame, so that individual samples differ while their expectation stays the
 /// same.
-Material settled(Material material, const GraphSet& graphs, std::span<const TexturePtr> textures);
+Material simplified(Material material, const GraphSet& graphs,
+                    std::span<const TexturePtr> textures);
 
 }  // namespace wavecomb

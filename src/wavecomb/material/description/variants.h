@@ -12,15 +12,16 @@ namespace wavecomb {
 
 /// Features of the programs principled and openpbr that a variant can omit.
 enum Part : uint32_t {
-  kVaries = 1,     ///< reads textures or a value graph
-  kGlows = 2,      ///< emission
-  kMetals = 4,     ///< metallic above 0, or F0 by specular_color
-  kCoats = 8,      ///< a clearcoat
-  kPasses = 16,    ///< clearcoat
-  kBacks = 32,     ///< straight or refracted transmission
-  kFuzzes = 64,    ///< openpbr: diffuse transmission of thin walls, and subsurface random walks
-  kFilms = 128,    ///< openpbr: a thin film
-  kBrushes = 256,  ///< openpbr: anisotropy and its rotation
+  kTexturePart = 1,        ///< reads textures or a value graph
+  kEmissionPart = 2,       ///< emission
+  kMetalPart = 4,          ///< metallic above 0, or F0 by specular_color
+  kCoatPart = 8,           ///< clearcoat
+  kTransmissionPart = 16,  ///< straight or refracted transmission
+  // openpbr only:
+  kBackDiffusePart = 32,  ///< diffuse transmission of thin walls, and subsurface random walks
+  kFuzzPart = 64,         ///< fuzz
+  kFilmPart = 128,        ///< thin film
+  kAnisotropyPart = 256,  ///< anisotropy and its rotation
 };
 inline constexpr uint32_t kAllParts =
     kVaries | kGlows | kMetals | kCoats | kPasses | kBacks | kFuzzes | kFilms | kBrushes;
@@ -28,13 +29,13 @@ inline constexpr uint32_t kAllParts =
 /// Reduced variants: X(name, program, parts), in ascending order of cost. A material uses the first
 /// variant that has all of its parts. CMake reads this list as well and makes a compile unit for
 /// each row.
-#define WAVECOMB_VARIANTS(X)                       \
-  X(gloss, principled, 0)                          \
-  X(tinted_gloss, principled, kMetals)             \
-  X(textured_gloss, principled, kVaries)           \
-  X(textured_metal, principled, kVaries | kMetals) \
-  X(base, openpbr, kMetals)                        \
-  X(textured_base, openpbr, kVaries | kMetals)
+#define WAVECOMB_VARIANTS(X)                               \
+  X(gloss, principled, 0)                                  \
+  X(tinted_gloss, principled, kMetalPart)                  \
+  X(textured_gloss, principled, kTexturePart)              \
+  X(textured_metal, principled, kTexturePart | kMetalPart) \
+  X(base, openpbr, kMetalPart)                             \
+  X(textured_base, openpbr, kTexturePart | kMetalPart)
 
 struct Variant {
   const char* name;
@@ -66,11 +67,12 @@ constexpr ProgramId program_of(uint32_t variant) {
 
 /// Returns the parts that a settled material (simplified_material.h) may use, whatever values its
 /// textures have and whatever its graphs return within their ranges (ranges.h). `textures`
-/// are those that the graphs may read. `may_walk` is set if the scene has subsurface random walks.
+/// are those that the graphs may read. `allows_subsurface` is set if the scene has subsurface
+/// random walks.
 uint32_t parts_of(const Material& material, const GraphSet& graphs,
-                  std::span<const TexturePtr> textures, bool may_walk = false);
+                  std::span<const TexturePtr> textures, bool allows_subsurface = false);
 
 /// Returns the least expensive variant of a program that has all of these parts.
-uint32_t least_variant(ProgramId program, uint32_t parts);
+uint32_t cheapest_variant(ProgramId program, uint32_t parts);
 
 }  // namespace wavecomb

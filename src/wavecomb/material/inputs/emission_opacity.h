@@ -36,7 +36,7 @@ inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material
                                const Mask<F>& active) {
   const detail::InputReader<F> inputs(view, material, uv, footprint, active);
   const Vec3<F> constant = inputs.record[&MaterialRecord::emission];
-  const Color<F> plain = detail::sane_emission(inputs.value(Input::kEmission, constant));
+  const Color<F> plain = detail::valid_emission(inputs.value(Input::kEmission, constant));
   const UInt<F> graph = inputs.record[&MaterialRecord::emission_graph];
   const Mask<F> driven = active & Mask<F>(graph != UInt<F>(kNoGraph));
   if (none(driven)) return plain;

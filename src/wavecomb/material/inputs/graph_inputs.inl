@@ -18,12 +18,12 @@ template <typename F>
   at.position = s.p;
   at.normal = s.ns;
   at.view = -dir;
-  at.place = {hit.mesh, hit.prim, hit.u, hit.v};
+  at.mesh_position = {hit.mesh, hit.prim, hit.u, hit.v};
   const uint32_t wanted = scene.materials.graphs.inputs;
   const auto unit = [](const Vec3<F>& v, const Vec3<F>& otherwise) {
     const F len2 = length_squared(v);
-    const Mask<F> good = (len2 > 0.f) & is_finite(len2);
-    return select<F>(good, v * F(1.f / sqrt(select(good, len2, F(1.f)))), otherwise);
+    const Mask<F> valid = (len2 > 0.f) & is_finite(len2);
+    return select<F>(valid, v * F(1.f / sqrt(select(valid, len2, F(1.f)))), otherwise);
   };
   if ((wanted &
        (graph_input_bit(GraphInput::kTangent) | graph_input_bit(GraphInput::kBitangent))) != 0) {
@@ -37,7 +37,7 @@ template <typename F>
   if ((wanted & kOfSpace) == 0) return at;
   detail::InstanceMaps<F> maps(scene.instances, hit.inst, active);
   if (scene.has_motion)
-    maps.place(moved_instance<F>(scene, hit.inst, hit.time, maps, Vec3<F>(F(0.f)), active));
+    maps.set_instance(moved_instance<F>(scene, hit.inst, hit.time, maps, Vec3<F>(F(0.f)), active));
   // Inverse of the transform by cofactors.
   const Vec3<F>* m = maps.row;
   const Vec3<F> c[3] = {cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])};

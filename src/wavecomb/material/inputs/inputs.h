@@ -52,8 +52,10 @@ struct InputReader {
     const auto use = make_reader<TextureUseRecord, F>(view.uses, index, uniform, textured);
     // Emission is filtered isotropically: emitters are few and bright, and light samples have no
     // ray footprint.
-    const Footprint<F> seen = s == Input::kEmission ? Footprint<F>(footprint.width) : footprint;
-    return select<F>(textured, read_texture<F>(view, use, uv, seen, textured), constant);
+    const Footprint<F> lookup_footprint =
+        s == Input::kEmission ? Footprint<F>(footprint.width) : footprint;
+    return select<F>(textured, read_texture<F>(view, use, uv, lookup_footprint, textured),
+                     constant);
   }
   F value(Input s, const F& constant) const { return value(s, Vec3<F>(constant)).x; }
 };
@@ -68,7 +70,7 @@ inline Color<F> saturate(const Color<F>& c) {
 }
 
 template <typename F>
-inline Color<F> sane_emission(const Color<F>& c) {
+inline Color<F> valid_emission(const Color<F>& c) {
   return {min(max(c.x, F(0.f)), F(kMaxEmission)), min(max(c.y, F(0.f)), F(kMaxEmission)),
           min(max(c.z, F(0.f)), F(kMaxEmission))};
 }

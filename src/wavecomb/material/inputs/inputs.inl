@@ -17,11 +17,11 @@ Vec3<F> read_texture(const MaterialView& view, const RecordReader<F>& use, const
   const F t = fma(m[3], uv.x, fma(m[4], uv.y, m[5]));
   // The footprint grows by the length of the longer transformed axis.
   const F stretch = sqrt(max(fma(m[0], m[0], F(m[3] * m[3])), fma(m[1], m[1], F(m[4] * m[4]))));
-  const Footprint<F> seen = footprint.scaled(stretch);
+  const Footprint<F> lookup_footprint = footprint.scaled(stretch);
   const UInt<F> id = use[&R::texture];
-  const Texel<F> texel =
-      use.shared ? lookup<F>(view.textures[first_active(id, active)], s, t, seen, active)
-                 : lookup<F>(view.textures, id, s, t, seen, active);
+  const Texel<F> texel = use.shared ? lookup<F>(view.textures[first_active(id, active)], s, t,
+                                                lookup_footprint, active)
+                                    : lookup<F>(view.textures, id, s, t, lookup_footprint, active);
   const auto channel = [&](const F& value, size_t i) {
     return fma(value, use.at(&R::scale, i), use.at(&R::bias, i));
   };

@@ -74,19 +74,19 @@ struct CoatFresnel {
 /// energy (Kelemen and Szirmay-Kalos, "A Microfacet Based Coupled Specular-Matte BRDF Model", 2001,
 /// eq. 6).
 template <typename F>
-inline F seen_through_coat(const F& f_o, const F& f_i, const F& f_avg) {
+inline F coat_transmission(const F& f_o, const F& f_i, const F& f_avg) {
   return F(1.f - f_o) * F(1.f - f_i) / max(F(1.f - f_avg), F(1e-4f));
 }
 
-/// Factor of seen_through_coat that does not depend on the light: (1 - f_o) / (1 - f_avg).
+/// Factor of coat_transmission that does not depend on the light: (1 - f_o) / (1 - f_avg).
 template <typename F>
-inline F seen_below_coat(const F& f_o, const F& f_avg) {
+inline F coat_view_factor(const F& f_o, const F& f_avg) {
   return F(1.f - f_o) / max(F(1.f - f_avg), F(1e-4f));
 }
 template <typename F>
-inline Color<F> seen_below_coat(const Color<F>& f_o, const Color<F>& f_avg) {
-  return {seen_below_coat(f_o.x, f_avg.x), seen_below_coat(f_o.y, f_avg.y),
-          seen_below_coat(f_o.z, f_avg.z)};
+inline Color<F> coat_view_factor(const Color<F>& f_o, const Color<F>& f_avg) {
+  return {coat_view_factor(f_o.x, f_avg.x), coat_view_factor(f_o.y, f_avg.y),
+          coat_view_factor(f_o.z, f_avg.z)};
 }
 
 }  // namespace wavecomb

@@ -126,13 +126,13 @@ struct EonDiffuse {
     const F z = safe_sqrt(fnma(x, x, fnma(y, y, F(1.f))));
     const Vec3<F> turned(fma(t.a, x, F(t.b * z)), F(t.c * y), fma(t.d, x, z));
     const F len2 = length_squared(turned);
-    const Mask<F> good = len2 > 1e-20f;
+    const Mask<F> valid = len2 > 1e-20f;
     const Vec3<F> ltc =
-        AzimuthFrame<F>(wo).from(turned) * F(1.f / sqrt(select(good, len2, F(1.f))));
+        AzimuthFrame<F>(wo).from(turned) * F(1.f / sqrt(select(valid, len2, F(1.f))));
     const F sin_u = safe_sqrt(fnma(u, u, F(1.f)));
     const Vec3<F> flat(F(sin_u * cosine), F(sin_u * sine), u);
     const Vec3<F> up(F(0.f), F(0.f), F(1.f));
-    return select<F>(choice < t.uniform, flat, select<F>(good, ltc, up));
+    return select<F>(choice < t.uniform, flat, select<F>(valid, ltc, up));
   }
 };
 

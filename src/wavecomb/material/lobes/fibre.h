@@ -51,14 +51,14 @@ inline F scaled_bessel_i0(const F& x) {
 ///   -sin sin + cos cos - 1 = -((cos_i - cos_o)^2 + (sin_i + sin_o)^2) / 2,
 /// which avoids cancellation in narrow lobes.
 template <typename F>
-class AlongFibre {
+class LongitudinalLobe {
  public:
-  explicit AlongFibre(const F& variance)
+  explicit LongitudinalLobe(const F& variance)
       : v_(max(variance, F(kLeast))), inverse_(1.f / v_), tail_(exp(F(-2.f * inverse_))) {}
 
   F density(const F& sin_i, const F& cos_i, const F& sin_o, const F& cos_o) const {
-    const F apart = fma(F(cos_i - cos_o), F(cos_i - cos_o), sqr(F(sin_i + sin_o)));
-    return exp(F(-0.5f * apart * inverse_)) * scaled_bessel_i0(F(cos_i * cos_o * inverse_)) *
+    const F separation2 = fma(F(cos_i - cos_o), F(cos_i - cos_o), sqr(F(sin_i + sin_o)));
+    return exp(F(-0.5f * separation2 * inverse_)) * scaled_bessel_i0(F(cos_i * cos_o * inverse_)) *
            inverse_ / F(1.f - tail_);
   }
   /// Samples sin theta_i from two sample values in [0, 1) (d'Eon, "Importance Sampling for
@@ -79,9 +79,9 @@ class AlongFibre {
 /// N_p, the azimuthal lobe: a logistic density of scale s, truncated to [-pi, pi] (Chiang et al.
 /// 2016, eq. 11 and 12).
 template <typename F>
-class AboutFibre {
+class AzimuthalLobe {
  public:
-  explicit AboutFibre(const F& scale)
+  explicit AzimuthalLobe(const F& scale)
       : s_(max(scale, F(1e-3f))), inverse_(1.f / s_), tail_(exp(F(-kPi * inverse_))) {}
 
   /// Density at x in [-pi, pi].
@@ -185,12 +185,12 @@ template <typename F>
 inline typename Fibre<F>::View Fibre<F>::view(const Vec3<F>& wo) const {
   View v;
   const F across = sqrt(fma(wo.y, wo.y, F(wo.z * wo.z)));
-  const Mask<F> aside = across > 1e-12f;
-  const F inverse = 1.f / select(aside, across, F(1.f));
+  const Mask<F> off_axis = across > 1e-12f;
+  const F inverse = 1.f / select(off_axis, across, F(1.f));
   v.sin_o = clamp(wo.x, F(-1.f), F(1.f));
   v.cos_o = min(across, F(1.f));
-  v.y = select(aside, F(wo.y * inverse), F(0.f));
-  v.z = select(aside, F(wo.z * inverse), F(1.f));
+  v.y = select(off_axis, F(wo.y * inverse), F(0.f));
+  v.z = select(off_axis, F(wo.z * inverse), F(1.f));
   tilt_view(v);
 
   const F sin_t = v.sin_o / ior, cos_t = max(safe_sqrt(F(1.f - sin_t * sin_t)), F(1e-3f));
@@ -223,12 +223,12 @@ template <typename F>
 inline void Fibre<F>::eval(const View& v, const Vec3<F>& wi, Color<F>& f_cos, F& pdf) const {
   const F cos_i = sqrt(fma(wi.y, wi.y, F(wi.z * wi.z)));
   const F phi = atan2(fma(wi.y, v.z, F(-wi.z * v.y)), fma(wi.z, v.z, F(wi.y * v.y)));
-  const AboutFibre<F> about(scale);
+  const AzimuthalLobe<F> about(scale);
   f_cos = Color<F>(F(0.f));
   pdf = F(0.f);
   for (size_t p = 0; p < kLobes; ++p) {
     const F along =
-        AlongFibre<F>(variance_of(p)).density(wi.x, cos_i, v.sin_tilted[p], v.cos_tilted[p]);
+        LongitudinalLobe<F>(variance_of(p)).density(wi.x, cos_i, v.sin_tilted[p], v.cos_tilted[p]);
     const F d =
         p < 3 ? F(along * about.density(wrapped_angle(F(phi - v.turn[p])))) : F(along * kInv2Pi);
     f_cos = fma(v.passed[p], d, f_cos);
@@ -256,9 +256,9 @@ inline Vec3<F> Fibre<F>::sample(const View& v, const F& u_lobe, const F& u, cons
     sum += v.share[p];
   }
   const F again = clamp(F(F(u_lobe - below) / max(share, F(1e-20f))), F(0.f), F(kOneMinusEpsilon));
-  const F sin_i = AlongFibre<F>(spread).sample(sin_o, cos_o, u, again);
+  const F sin_i = LongitudinalLobe<F>(spread).sample(sin_o, cos_o, u, again);
   const F cos_i = safe_sqrt(fma(F(-sin_i), sin_i, F(1.f)));
-  const F offset = AboutFibre<F>(scale).sample(u_turn);
+  const F offset = AzimuthalLobe<F>(scale).sample(u_turn);
   const SinCos<F> a = sincos_2pi(F(select(is_rest, u_turn, F(F(turn + offset) * kInv2Pi))));
   return {sin_i, cos_i * fma(v.y, a.cos, F(v.z * a.sin)), cos_i * fma(v.z, a.cos, F(-v.y * a.sin))};
 }

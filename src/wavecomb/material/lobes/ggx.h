@@ -78,9 +78,9 @@ struct Ggx {
     const F r = safe_sqrt(F(v * cap * F(1.f + z)));
     const Vec3<F> h(alpha * fma(r, cos_phi, k.x), alpha * fma(r, sin_phi, k.y), n_z);
     const F len2 = length_squared(h);
-    const Mask<F> good = len2 > 1e-30f;
-    const F inv = 1.f / sqrt(select(good, len2, F(1.f)));
-    return select<F>(good, h * inv, Vec3<F>(F(0.f), F(0.f), F(1.f)));
+    const Mask<F> valid = len2 > 1e-30f;
+    const F inv = 1.f / sqrt(select(valid, len2, F(1.f)));
+    return select<F>(valid, h * inv, Vec3<F>(F(0.f), F(0.f), F(1.f)));
   }
 };
 

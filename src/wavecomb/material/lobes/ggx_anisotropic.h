@@ -34,7 +34,7 @@ struct AnisotropicGgx {
   }
   /// Alpha of an isotropic surface whose visible normals have about the same cosines to the viewer
   /// w: the root mean square of both alphas at z = 1, and the alpha along w's azimuth at z = 0.
-  F seen_alpha(const Vec3<F>& w) const {
+  F projected_alpha(const Vec3<F>& w) const {
     const F z2 = w.z * w.z;
     const F r2 = max(fma(w.x, w.x, F(w.y * w.y)), F(1e-20f));
     const F x2 = F(w.x * w.x) / r2, ax2 = ax * ax, ay2 = ay * ay;
@@ -52,9 +52,9 @@ struct AnisotropicGgx {
     const F r = safe_sqrt(F(v * cap * F(1.f + z)));
     const Vec3<F> h(ax * fma(r, cos_phi, k.x), ay * fma(r, sin_phi, k.y), n_z);
     const F len2 = length_squared(h);
-    const Mask<F> good = len2 > 1e-30f;
-    const F inv = 1.f / sqrt(select(good, len2, F(1.f)));
-    return select<F>(good, h * inv, Vec3<F>(F(0.f), F(0.f), F(1.f)));
+    const Mask<F> valid = len2 > 1e-30f;
+    const F inv = 1.f / sqrt(select(valid, len2, F(1.f)));
+    return select<F>(valid, h * inv, Vec3<F>(F(0.f), F(0.f), F(1.f)));
   }
 };
 

@@ -28,15 +28,15 @@ struct MaskedView {
 /// wo is not above the surface. Half-vector Jacobian: dh / dwi = 1 / (4 wo . h) (eq. 14). With unit
 /// directions wo . h = |wo + wi| / 2.
 template <typename F>
-inline MicrofacetEval<F> eval_microfacet(const Ggx<F>& ggx, const MaskedView<F>& seen,
+inline MicrofacetEval<F> eval_microfacet(const Ggx<F>& ggx, const MaskedView<F>& view,
                                          const Vec3<F>& wo, const Vec3<F>& wi) {
   const Mask<F> valid = (wo.z > 0.f) & (wi.z > 0.f);
   const Vec3<F> sum = wo + wi;
   const F length2 = length_squared(sum);
   const F d = ggx.d_along(sum, length2);
-  const F f_cos = F(0.5f * d * wi.z) / fma(wo.z, ggx.s(wi), F(wi.z * seen.s));
+  const F f_cos = F(0.5f * d * wi.z) / fma(wo.z, ggx.s(wi), F(wi.z * view.s));
   return {min(F(0.5f * sqrt(length2)), F(1.f)), select(valid, f_cos, F(0.f)),
-          select(valid, F(d * seen.share), F(0.f))};
+          select(valid, F(d * view.share), F(0.f))};
 }
 template <typename F>
 inline MicrofacetEval<F> eval_microfacet(const Ggx<F>& ggx, const Vec3<F>& wo, const Vec3<F>& wi) {

@@ -23,7 +23,7 @@ inline F importance(const Color<F>& c) {
 /// G2 / G1 for the reflected and the refracted direction of a microfacet; 1 where they are not
 /// needed.
 template <typename F>
-struct FacetWays {
+struct FacetMasking {
   F up = F(1.f), down = F(1.f);
 };
 
@@ -31,11 +31,11 @@ struct FacetWays {
 template <typename F>
 struct OpenPbrFacet {
   Color<F> reflect, transmit;
-  FacetWays<F> ways;
+  FacetMasking<F> masking;
 
   /// Probability of sampling reflection at this microfacet.
   F reflect_share() const {
-    const F up = importance(reflect) * ways.up, down = importance(transmit) * ways.down;
+    const F up = importance(reflect) * masking.up, down = importance(transmit) * masking.down;
     return select(down > 0.f, F(up / max(F(up + down), F(1e-20f))), F(1.f));
   }
 };
@@ -58,8 +58,8 @@ struct OpenPbrFacet {
 /// For anisotropic surfaces s = 1, without further compensation.
 template <typename F, uint32_t kParts = kAllParts>
 struct OpenPbrBase {
-  static constexpr bool kGlass = (kParts & kPasses) != 0, kFilm = (kParts & kFilms) != 0,
-                        kBrush = (kParts & kBrushes) != 0;
+  static constexpr bool kGlass = (kParts & kTransmissionPart) != 0,
+                        kFilm = (kParts & kFilmPart) != 0, kBrush = (kParts & kAnisotropyPart) != 0;
   F metal, opaque, glass;  ///< weights; their sum is 1
   F roughness;
   AnisotropicGgx<F> ggx;
@@ -84,7 +84,7 @@ struct OpenPbrBase {
     // A rough coat broadens the base's lobe (OpenPBR, "Coat roughening").
     const F r4 = sqr(F(p.roughness * p.roughness));
     roughness = p.roughness;
-    if constexpr ((kParts & kCoats) != 0) {
+    if constexpr ((kParts & kCoatPart) != 0) {
       const F c4 = sqr(F(p.clearcoat_roughness * p.clearcoat_roughness));
       const F rougher = sqrt(sqrt(min(fma(c4, F(2.f), r4), F(1.f))));
       roughness = select(coat > 0.f, fma(coat, F(rougher - p.roughness), p.roughness), p.roughness);
@@ -104,7 +104,7 @@ struct OpenPbrBase {
     glass_ior = scaled_ior(ior);
     glass_f0 = f0_from_ior(glass_ior);
     F under = ior;
-    if constexpr ((kParts & kCoats) != 0)
+    if constexpr ((kParts & kCoatPart) != 0)
       under = select(coat > 0.f, F(ior / fma(coat, F(p.coat_ior - 1.f), F(1.f))), ior);
     gloss_ior = scaled_ior(max(under, F(1.f / under)));
     metal_fresnel = F82Tint<F>(p.base_color, p.specular_color);
@@ -146,14 +146,14 @@ struct OpenPbrBase {
       v.by_facet = (v.brushed | (film.weight > 0.f) | (glass_ior != ior)) & (glass > 0.f) &
                    not_(thin) & not_(smooth);
     F alpha = sqrt(F(ggx.ax * ggx.ay));
-    if (kBrush && any(v.brushed)) alpha = select(v.brushed, ggx.seen_alpha(o), alpha);
-    const EnergyLookup<F> look(energy, z, sqrt(alpha));
-    F one_bounce = look.white(), glossy = look.reflected(gloss_ior);
+    if (kBrush && any(v.brushed)) alpha = select(v.brushed, ggx.projected_alpha(o), alpha);
+    const EnergyLookup<F> lookup(energy, z, sqrt(alpha));
+    F one_bounce = lookup.white(), glossy = lookup.reflected(gloss_ior);
     if (kBrush && any(v.brushed)) {
       // Add the difference between anisotropic and isotropic albedo at the tabulated index.
       const BrushedLookup<F> brush(energy, o, ggx.ax, ggx.ay);
       constexpr float kIndex = EnergyTables::kBrushedIndex;
-      const F more = brush.reflected() - look.reflected(F(kIndex));
+      const F more = brush.reflected() - lookup.reflected(F(kIndex));
       const F brushed = fma(more, F(F(1.f - f0_from_ior(gloss_ior)) * (1.f / 0.96f)), glossy);
       one_bounce = select(v.brushed, brush.white(), one_bounce);
       glossy = select(v.brushed, max(brushed, F(0.f)), glossy);
@@ -165,7 +165,7 @@ struct OpenPbrBase {
     v.gloss_scale = fma(f0_from_ior(gloss_ior), lost, F(1.f));
     v.glass_scale = F(1.f);
     if (kGlass && any(Mask<F>(glass > 0.f))) {
-      const F scattered = select(thin, white, max(look.scattered(v.eta), F(1e-3f)));
+      const F scattered = select(thin, white, max(lookup.scattered(v.eta), F(1e-3f)));
       v.glass_scale = select(smooth | (v.brushed & not_(thin)), F(1.f), F(1.f / scattered));
     }
     const F mirror = fresnel_dielectric(z, gloss_ior).reflectance;
@@ -173,7 +173,7 @@ struct OpenPbrBase {
     const F gloss = min(select(smooth, mirror, rough), F(1.f));
     v.gloss = Color<F>(gloss);
     if (kFilm && any(Mask<F>(film.weight > 0.f)))
-      v.gloss = lerp(v.gloss, filmed_gloss(v, z, look), film.weight);
+      v.gloss = lerp(v.gloss, filmed_gloss(v, z, lookup), film.weight);
     const OpenPbrFacet<F> f = facet(v, z);
     v.albedo = min(Color<F>(f.reflect + f.transmit), one);
     return v;
@@ -181,7 +181,7 @@ struct OpenPbrBase {
 
   /// Colours of a microfacet seen at cosine c, including compensation.
   OpenPbrFacet<F> facet(const View& v, const F& c,
-                        const FacetWays<F>& ways = FacetWays<F>()) const {
+                        const FacetMasking<F>& masking = FacetMasking<F>()) const {
     const Color<F> one(F(1.f));
     const Mask<F> filmed = film.weight > 0.f;
     Color<F> m = metal_fresnel(c);
@@ -192,11 +192,11 @@ struct OpenPbrBase {
     }
     const Color<F> metallic = m * v.metal_scale * F(metal * min(specular_weight, F(1.f)));
     OpenPbrFacet<F> f{metallic + specular_color * d * F(opaque * v.gloss_scale), Color<F>(F(0.f)),
-                      ways};
+                      masking};
     if (kGlass && any(Mask<F>(glass > 0.f))) {
-      const F bent = refracted_cos(c, v.eta);
-      const F outer = select(v.inside, bent, c);
-      const Mask<F> total = not_(thin) & not_(Mask<F>(bent > 0.f));
+      const F refracted = refracted_cos(c, v.eta);
+      const F outer = select(v.inside, refracted, c);
+      const Mask<F> total = not_(thin) & not_(Mask<F>(refracted > 0.f));
       Color<F> g(fresnel_dielectric(outer, glass_ior).reflectance);
       if (kFilm && any(filmed)) {
         // Keep reflection and transmission above 0, so that each microfacet has a direction to
@@ -212,10 +212,14 @@ struct OpenPbrBase {
       Color<F> scale(F(glass * v.glass_scale));
       if (kGlass && any(v.by_facet)) {
         const F bare = select(total, F(1.f), fresnel_dielectric(outer, ior).reflectance);
-        const auto sum = [&ways](const F& r) { return fma(r, ways.up, F(F(1.f - r) * ways.down)); };
+        const auto sum = [&masking](const F& r) {
+          return fma(r, masking.up, F(F(1.f - r) * masking.down));
+        };
         const F whole = select(v.brushed, F(1.f), sum(bare));
-        const auto kept = [&](const F& r) { return F(whole / max(sum(r), F(1e-7f))); };
-        scale = select<F>(v.by_facet, scale * Color<F>(kept(g.x), kept(g.y), kept(g.z)), scale);
+        const auto scale_factor = [&](const F& r) { return F(whole / max(sum(r), F(1e-7f))); };
+        scale = select<F>(v.by_facet,
+                          scale * Color<F>(scale_factor(g.x), scale_factor(g.y), scale_factor(g.z)),
+                          scale);
       }
       f.reflect += specular_color * g * scale;
       f.transmit = tint * Color<F>(one - g) * scale;
@@ -225,8 +229,8 @@ struct OpenPbrBase {
 
   /// G2 / G1 for a microfacet that reflects wo to `up` and, for transmission, refracts it to
   /// `down`.
-  FacetWays<F> ways_of(const View& v, const Vec3<F>& wo, const Vec3<F>& up,
-                       const Vec3<F>& down) const {
+  FacetMasking<F> masking_of(const View& v, const Vec3<F>& wo, const Vec3<F>& up,
+                             const Vec3<F>& down) const {
     const F g_up = select(up.z > 0.f, ggx.g2_over_g1(wo, up), F(0.f));
     const F g_down = select(down.z < 0.f, ggx.g2_over_g1(wo, down), F(0.f));
     return {select(v.by_facet, g_up, F(1.f)), select(v.by_facet, g_down, F(1.f))};
@@ -254,16 +258,16 @@ struct OpenPbrBase {
     const F base = select(valid, F(d * jacobian), F(0.f));
     const F g2 = ggx.g2_over_4cos(wo, v.s, i) * abs(wi.z);
     const F oc = clamp(oh, F(0.f), F(1.f));
-    FacetWays<F> ways;
+    FacetMasking<F> masking;
     if (kGlass && any(v.by_facet)) {
       const F t = refracted_cos(oc, v.eta);
       const Vec3<F> other = select<F>(up, refract(wo, h, oc, t, v.eta), reflect(wo, h));
       // refract is undefined under total internal reflection.
       const Vec3<F> none(F(0.f), F(0.f), F(1.f));
       const Vec3<F> down = select<F>(up, select<F>(t > 0.f, other, none), i);
-      ways = ways_of(v, wo, select<F>(up, i, other), down);
+      masking = masking_of(v, wo, select<F>(up, i, other), down);
     }
-    const OpenPbrFacet<F> f = facet(v, oc, ways);
+    const OpenPbrFacet<F> f = facet(v, oc, masking);
     const F share = f.reflect_share();
     const Color<F> color = select<F>(up, f.reflect, f.transmit * radiance_scale(v));
     return {color * F(base * g2), F(base * v.g1) * select(up, share, F(1.f - share))};
@@ -295,19 +299,19 @@ struct OpenPbrBase {
     if (!all(smooth)) h = select<F>(smooth, h, ggx.sample_visible(wo, u, w));
     const F c = clamp(dot(wo, h), F(0.f), F(1.f));
     const Vec3<F> mirrored = reflect(wo, h);
-    FacetWays<F> ways;
+    FacetMasking<F> masking;
     if (kGlass && any(v.by_facet)) {
       const F t = refracted_cos(c, v.eta);
       const Vec3<F> none(F(0.f), F(0.f), F(1.f));
-      ways = ways_of(v, wo, mirrored, select<F>(t > 0.f, refract(wo, h, c, t, v.eta), none));
+      masking = masking_of(v, wo, mirrored, select<F>(t > 0.f, refract(wo, h, c, t, v.eta), none));
     }
     Mask<F> crosses(false);
-    if constexpr (kGlass) crosses = not_(Mask<F>(choice < facet(v, c, ways).reflect_share()));
+    if constexpr (kGlass) crosses = not_(Mask<F>(choice < facet(v, c, masking).reflect_share()));
     Vec3<F> wi = mirrored;
     if (kGlass && any(crosses)) {
       const Vec3<F> straight(mirrored.x, mirrored.y, F(-mirrored.z));
-      const Vec3<F> bent = refract(wo, h, c, refracted_cos(c, v.eta), v.eta);
-      wi = select<F>(crosses, select<F>(thin, straight, bent), wi);
+      const Vec3<F> refracted = refract(wo, h, c, refracted_cos(c, v.eta), v.eta);
+      wi = select<F>(crosses, select<F>(thin, straight, refracted), wi);
     }
     // A microfacet may reflect below the surface or refract above it; such samples are invalid.
     const Mask<F> right = (wi.z > 0.f) ^ crosses;
@@ -329,13 +333,13 @@ struct OpenPbrBase {
   /// Albedo of the interface over the diffuse base with a thin film. Smooth: the reflectance.
   /// Rough: the albedo without film, plus the difference integrated over the cosines of the visible
   /// microfacets.
-  Color<F> filmed_gloss(const View& v, const F& z, const EnergyLookup<F>& look) const {
+  Color<F> filmed_gloss(const View& v, const F& z, const EnergyLookup<F>& lookup) const {
     const Color<F> mirror = film.over_dielectric(z, gloss_ior);
     const Mask<F> rough = (film.weight > 0.f) & (opaque > 0.f) & not_(smooth);
     if (none(rough)) return mirror;
     Color<F> more(F(0.f));
     for (uint32_t k = 0; k < EnergyTables::kRule; ++k) {
-      const auto [c, weight] = look.rule(k);
+      const auto [c, weight] = lookup.rule(k);
       const Color<F> bare(fresnel_dielectric(c, gloss_ior).reflectance);
       more += Color<F>(film.over_dielectric(c, gloss_ior) - bare) * weight;
     }

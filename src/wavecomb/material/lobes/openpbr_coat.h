@@ -41,10 +41,10 @@ struct OpenPbrCoat {
   };
   /// Computes the layer for a viewer at cosine `z`; `energy` is the table of energy_tables.h.
   Layer layer(const float* energy, const F& z) const {
-    const EnergyLookup<F> look(energy, z, roughness);
-    const F white = max(look.white(), F(1e-3f));
+    const EnergyLookup<F> lookup(energy, z, roughness);
+    const F white = max(lookup.white(), F(1e-3f));
     const F compensation = select(smooth, F(1.f), fma(f0, F(F(1.f - white) / white), F(1.f)));
-    const F rough = look.reflected(ior) * compensation;
+    const F rough = lookup.reflected(ior) * compensation;
     const F mirror = fresnel_dielectric(z, ior).reflectance;
     return {compensation, min(select(smooth, mirror, rough), F(1.f))};
   }

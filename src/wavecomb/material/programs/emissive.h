@@ -13,7 +13,7 @@ class EmissiveBsdf : public BsdfTraits {
   static constexpr ProgramId kProgram = ProgramId::kEmissive;
   static constexpr bool kEmits = true;
   static constexpr bool kHasNonDelta = false;
-  static constexpr bool kOnSplats = true;
+  static constexpr bool kOnGaussianSplats = true;
   static constexpr uint32_t kInputs = 0;
 
   EmissiveBsdf(const ShadingParams<F>& /*params*/, bool /*schlick*/) {}

@@ -32,10 +32,10 @@ class HairBsdf : public ViewedBsdf<HairBsdf<F>, F> {
   static constexpr uint32_t kInputs = input_bit(Input::kBaseColor) | input_bit(Input::kRoughness);
   using View = typename Fibre<F>::View;
 
-  HairBsdf(const OwnShadingParams<F>& p, bool /*schlick*/) : base_(p.base_color) {
+  HairBsdf(const SpecificShadingParams<F>& p, bool /*schlick*/) : base_(p.base_color) {
     enum Own : uint8_t { kAzimuthal, kScaleTt, kScaleTrt, kTilt, kTintR, kTintTt, kTintTrt };
-    const F about = max(p.own[kAzimuthal], F(kLeastRoughness));
-    const F v = fibre_variance(max(p.roughness, F(kLeastRoughness)));
+    const F about = max(p.own[kAzimuthal], F(kMinRoughness));
+    const F v = fibre_variance(max(p.roughness, F(kMinRoughness)));
     fibre_.ior = max(p.ior, F(1.f));
     fibre_.variance = {v, v * sqr(p.own[kScaleTt]), v * sqr(p.own[kScaleTrt])};
     fibre_.scale = fibre_scale(about);
@@ -68,10 +68,10 @@ class HairBsdf : public ViewedBsdf<HairBsdf<F>, F> {
     BsdfSample<F> s = empty_sample<F>();
     const Vec3<F> wi = normalize(fibre_.sample(view, u_lobe, u, v));
     const BsdfEval<F> e = eval(view, wi);
-    const Mask<F> there = (e.pdf > 1e-20f) & is_finite(e.pdf);
-    s.wi = select<F>(there, wi, s.wi);
-    s.pdf = select(there, e.pdf, F(0.f));
-    s.weight = select<F>(there, e.f_cos * F(1.f / select(there, e.pdf, F(1.f))), Color<F>(F(0.f)));
+    const Mask<F> valid = (e.pdf > 1e-20f) & is_finite(e.pdf);
+    s.wi = select<F>(valid, wi, s.wi);
+    s.pdf = select(valid, e.pdf, F(0.f));
+    s.weight = select<F>(valid, e.f_cos * F(1.f / select(valid, e.pdf, F(1.f))), Color<F>(F(0.f)));
     return s;
   }
 
@@ -79,7 +79,7 @@ class HairBsdf : public ViewedBsdf<HairBsdf<F>, F> {
 
  private:
   /// Minimum roughness; lobes below it are too narrow for float precision.
-  static constexpr float kLeastRoughness = 0.02f;
+  static constexpr float kMinRoughness = 0.02f;
   static constexpr float kDarkest = 1e-12f;
   Color<F> base_;
   Fibre<F> fibre_;

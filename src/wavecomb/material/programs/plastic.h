@@ -10,7 +10,7 @@
 
 namespace wavecomb {
 
-/// Plastic BSDF, f = coat + base_color / pi * seen_through_coat. Uses the albedos of the coat at
+/// Plastic BSDF, f = coat + base_color / pi * coat_transmission. Uses the albedos of the coat at
 /// its roughness, including multiple scattering, so a white base under a lossless coat keeps all
 /// energy.
 template <typename F>
@@ -95,7 +95,7 @@ class PlasticBsdf : public BsdfTraits {
 
   /// f |cos theta_i| of the base without its colour.
   F below_coat(const F& coat_o, const Vec3<F>& wi, const F& cosine) const {
-    return seen_through_coat(coat_o, coat_albedo(max(wi.z, F(0.f))), average_) * cosine;
+    return coat_transmission(coat_o, coat_albedo(max(wi.z, F(0.f))), average_) * cosine;
   }
 
   BsdfEval<F> eval_above(const Vec3<F>& wo, const Vec3<F>& wi, const F& coat_o, const F& p) const {

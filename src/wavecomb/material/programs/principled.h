@@ -33,16 +33,16 @@ namespace wavecomb {
 template <typename F, uint32_t kParts>
 class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
   using Viewed = ViewedBsdf<PrincipledBsdf<F, kParts>, F>;
-  static constexpr bool kMetal = (kParts & kMetals) != 0, kCoat = (kParts & kCoats) != 0,
-                        kStraight = (kParts & kPasses) != 0;
+  static constexpr bool kMetal = (kParts & kMetalPart) != 0, kCoat = (kParts & kCoatPart) != 0,
+                        kStraight = (kParts & kTransmissionPart) != 0;
   /// Specular reflectance: scalar in variants without metal, where it has no colour.
   using Tint = std::conditional_t<kMetal, Color<F>, F>;
 
  public:
   static constexpr ProgramId kProgram = ProgramId::kPrincipled;
   static constexpr bool kReadsIor = true;
-  static constexpr bool kEmits = (kParts & kGlows) != 0;
-  static constexpr bool kTextured = (kParts & kVaries) != 0;
+  static constexpr bool kEmits = (kParts & kEmissionPart) != 0;
+  static constexpr bool kTextured = (kParts & kTexturePart) != 0;
   /// All inputs or none, because one textured input suffices to align the frame with the texture.
   static constexpr uint32_t kInputs =
       !kTextured ? 0u
@@ -127,7 +127,7 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
     v.lost = lost_(z);
     v.lost_share = v.lost / lost_.average;
     v.specular = specular_albedo(z);
-    v.diffuse = diffuse_ * seen_below_coat(v.specular, average_);
+    v.diffuse = diffuse_ * coat_view_factor(v.specular, average_);
     v.masked = MaskedView<F>(ggx_, v.o);
     const F below = 1.f - v.coat;
     const Color<F> passed = Color<F>(F(1.f)) - Color<F>(v.specular);

@@ -14,7 +14,7 @@ namespace {
 
 /// Lower limit of transmission colours, which keeps their logarithm finite.
 constexpr float kDarkestTransmission = 1e-6f;
-constexpr float kMostInteriorCosine = 0.99f;
+constexpr float kMaxMediumCosine = 0.99f;
 
 struct Coefficients {
   float absorption, scattering;
@@ -33,7 +33,7 @@ Coefficients raw_coefficients(float color, float scatter, float depth) {
   return {extinction - scattering, scattering};
 }
 
-void set_medium(const OpenPbr& o, InteriorMedium<float>& out) {
+void set_medium(const OpenPbr& o, MeshMedium<float>& out) {
   if (!(o.transmission_depth > 0)) return;
   const Vec3<float>&c = o.transmission_color, &s = o.transmission_scatter;
   Coefficients k[3] = {raw_coefficients(c.x, s.x, o.transmission_depth),
@@ -44,7 +44,7 @@ void set_medium(const OpenPbr& o, InteriorMedium<float>& out) {
   out.absorption = {k[0].absorption - least, k[1].absorption - least, k[2].absorption - least};
   out.scattering = {k[0].scattering, k[1].scattering, k[2].scattering};
   out.anisotropy =
-      std::clamp(o.transmission_scatter_anisotropy, -kMostInteriorCosine, kMostInteriorCosine);
+      std::clamp(o.transmission_scatter_anisotropy, -kMaxMediumCosine, kMaxMediumCosine);
 }
 
 bool is_any(const Vec3<float>& v) {
@@ -71,35 +71,35 @@ bool is_glass(const Material& m, const GraphSet& graphs) {
 
 }  // namespace
 
-bool absorbs_inside(const Material& m) {
+bool is_absorbing_solid(const Material& m) {
   if (!is_solid(m) || !(m.openpbr.transmission_weight > 0) || m.graph != kNoGraph) return false;
-  InteriorMedium<float> medium{};
+  MeshMedium<float> medium{};
   set_medium(m.openpbr, medium);
   return is_any(medium.absorption);
 }
 
-bool asks_for_interiors(const Material& m, bool absorbing) {
+bool needs_medium_stack(const Material& m, bool absorbing) {
   if (!is_solid(m)) return false;
-  InteriorMedium<float> medium{};
+  MeshMedium<float> medium{};
   set_medium(m.openpbr, medium);
   if (m.openpbr.transmission_weight > 0 && is_any(medium.scattering)) return true;
-  if (absorbing && absorbs_inside(m)) return true;
+  if (absorbing && is_absorbing_solid(m)) return true;
   return m.openpbr.nested_priority != 0 || (is_clear(m) && is_any(medium.absorption));
 }
 
-std::vector<InteriorMedium<float>> make_interiors(std::span<const Material> materials,
-                                                  const GraphSet& graphs, bool absorbing) {
+std::vector<MeshMedium<float>> make_mesh_media(std::span<const Material> materials,
+                                               const GraphSet& graphs, bool absorbing) {
   if (std::ranges::none_of(materials,
-                           [&](const Material& m) { return asks_for_interiors(m, absorbing); }))
+                           [&](const Material& m) { return needs_medium_stack(m, absorbing); }))
     return {};
-  std::vector<InteriorMedium<float>> all(materials.size());
+  std::vector<MeshMedium<float>> all(materials.size());
   for (size_t i = 0; i < all.size(); ++i) {
     const Material& m = materials[i];
-    InteriorMedium<float>& out = all[i];
+    MeshMedium<float>& out = all[i];
     out = {};
     out.ior = 1;
     if (!is_glass(m, graphs)) continue;
-    const InteriorKind kind = is_clear(m) ? InteriorKind::kClear : InteriorKind::kRefracts;
+    const BoundaryKind kind = is_clear(m) ? BoundaryKind::kClear : BoundaryKind::kRefracts;
     out.kind = static_cast<uint32_t>(kind);
     out.ior = m.ior;
     if (!is_solid(m)) continue;

@@ -14,9 +14,9 @@ namespace wavecomb {
 namespace {
 
 /// Lower limit of mean free paths, which bounds the number of collisions inside an object.
-constexpr float kLeastFreePath = 1e-6f;
+constexpr float kMinFreePath = 1e-6f;
 /// Lower limit of the colours by which random walks select a channel.
-constexpr float kLeastColor = 0.05f;
+constexpr float kMinColor = 0.05f;
 /// Correction of van de Hulst's s, divided by s (1 - s), as a polynomial in s and in the mean
 /// cosine. Fitted to colours computed by adding and doubling (tests/python/test_walks.py), to 0.4 %
 /// of the colour.
@@ -27,7 +27,7 @@ constexpr float kOffSimilarity[4][5] = {{0.0153f, -0.0261f, -0.1611f, 0.0637f, 0
 
 }  // namespace
 
-WalkKind walk_kind(const Material& m, const GraphSet& graphs) {
+SubsurfaceKind subsurface_kind(const Material& m, const GraphSet& graphs) {
   const OpenPbr& o = m.openpbr;
   const auto driven = [&](const char* name) {
     return graphs.drives(m.graph, graph_parameter(name));
@@ -36,8 +36,8 @@ WalkKind walk_kind(const Material& m, const GraphSet& graphs) {
                         o.transmission_weight == 0 && !driven("transmission_weight");
   const bool is_below = o.subsurface_weight > 0 || driven("subsurface_weight");
   const Vec3<float>& r = o.subsurface_radius;
-  if (!is_solid || !is_below || std::max({r.x, r.y, r.z}) <= 0) return WalkKind::kNone;
-  return driven("subsurface_color") ? WalkKind::kTinted : WalkKind::kWhole;
+  if (!is_solid || !is_below || std::max({r.x, r.y, r.z}) <= 0) return SubsurfaceKind::kNone;
+  return driven("subsurface_color") ? SubsurfaceKind::kTinted : SubsurfaceKind::kWhole;
 }
 
 float single_albedo(float color, float anisotropy) {
@@ -59,12 +59,12 @@ double diffusion_length(double albedo, double anisotropy) {
   return std::clamp(1 / std::sqrt(std::max(1 - left, 1e-12)) / lost, 1.02, 100.0);
 }
 
-WalkMedium<float> make_walk_medium(const Material& m, WalkKind kind) {
+SubsurfaceMedium<float> make_subsurface_medium(const Material& m, SubsurfaceKind kind) {
   const OpenPbr& o = m.openpbr;
   const float g = std::clamp(o.subsurface_anisotropy, -0.95f, 0.95f);
-  const auto extinction = [](float radius) { return 1 / std::max(radius, kLeastFreePath); };
+  const auto extinction = [](float radius) { return 1 / std::max(radius, kMinFreePath); };
   const auto albedo = [&](float color) {
-    return kind == WalkKind::kTinted ? 1.f : single_albedo(color, g);
+    return kind == SubsurfaceKind::kTinted ? 1.f : single_albedo(color, g);
   };
   const Vec3<float>&r = o.subsurface_radius, &c = o.subsurface_color;
   const auto each = [](const Vec3<float>& of, const auto& f) {
@@ -76,7 +76,7 @@ WalkMedium<float> make_walk_medium(const Material& m, WalkKind kind) {
   return {each(r, extinction),
           albedos,
           g,
-          each(c, [](float x) { return std::max(x, kLeastColor); }),
+          each(c, [](float x) { return std::max(x, kMinColor); }),
           diffusion,
           each(diffusion, [](float nu) {
             return static_cast<float>(std::log((double{nu} + 1) / (double{nu} - 1)));

@@ -13,7 +13,7 @@ struct Material;
 struct GraphSet;
 
 /// How light enters a surface with a subsurface random walk; the value of OpenPbrRecord::walks.
-enum class WalkKind : uint8_t {
+enum class SubsurfaceKind : uint8_t {
   kNone,   ///< no random walk
   kWhole,  ///< all light enters, and the medium gives it its colour
   /// A graph drives the colour, which tints the light that enters; the medium does not absorb.
@@ -22,7 +22,7 @@ enum class WalkKind : uint8_t {
 
 /// Homogeneous medium for the subsurface random walk of a material.
 template <typename F>
-struct WalkMedium {
+struct SubsurfaceMedium {
   Color<F> extinction;     ///< per unit of length; 0 if the material has no random walk
   Color<F> albedo;         ///< single-scattering albedo
   F anisotropy;            ///< mean cosine of the scattering angle
@@ -31,12 +31,12 @@ struct WalkMedium {
   Color<F> log_diffusion;  ///< ln((nu + 1) / (nu - 1))
   WAVECOMB_FIELDS(extinction, albedo, anisotropy, color, diffusion, log_diffusion)
 };
-static_assert(sizeof(WalkMedium<float>) == 64);
+static_assert(sizeof(SubsurfaceMedium<float>) == 64);
 
 /// Returns the kind of random walk of a material.
-WalkKind walk_kind(const Material& material, const GraphSet& graphs);
+SubsurfaceKind subsurface_kind(const Material& material, const GraphSet& graphs);
 /// Makes the medium of a material whose kind is not kNone.
-WalkMedium<float> make_walk_medium(const Material& material, WalkKind kind);
+SubsurfaceMedium<float> make_subsurface_medium(const Material& material, SubsurfaceKind kind);
 
 /// Returns the single-scattering albedo, for mean cosine `anisotropy`, for which a half-space under
 /// uniform illumination has the colour `color`, within 0.4 %. It inverts van de Hulst's
@@ -53,8 +53,9 @@ float single_albedo(float color, float anisotropy);
 double diffusion_length(double albedo, double anisotropy);
 
 /// Device view of all media for subsurface random walks.
-struct WalkView {
-  const WalkMedium<float>* media = nullptr;  ///< by material; null if there are no random walks
+struct SubsurfaceView {
+  const SubsurfaceMedium<float>* media =
+      nullptr;                 ///< by material; null if there are no random walks
   uint32_t exit_material = 0;  ///< white diffuse material that shades exit points of random walks
 };
 

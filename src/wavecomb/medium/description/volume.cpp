@@ -24,24 +24,25 @@ WideMap bricks_to_world(const Volume& v, const VolumeField& field) {
   return WideMap(v.to_world).after(WideMap(box));
 }
 
-PlacedGrid placed_grid(const Volume& v, const VolumeField& field) {
-  PlacedGrid placed;
+TransformedGrid transform_grid(const Volume& v, const VolumeField& field) {
+  TransformedGrid transformed;
   if (field.grid) {
-    placed.grid = field.grid->view();
+    transformed.grid = field.grid->view();
   } else {
-    std::fill_n(placed.grid.size, 3, 1u);
+    std::fill_n(transformed.grid.size, 3, 1u);
   }
-  bricks_to_world(v, field).inverse().put(placed.to_bricks);
-  return placed;
+  bricks_to_world(v, field).inverse().put(transformed.to_bricks);
+  return transformed;
 }
 
 /// Packs the bounding cells of a moving field.
-PlacedGrid placed_cells(const Volume& v, const VolumeField& field, const MovedCells& cells) {
-  PlacedGrid placed;
-  placed.grid.most = cells.most.data();
-  std::copy_n(cells.size.begin(), 3, placed.grid.size);
-  bricks_to_world(v, field).after(cells.to_bricks()).inverse().put(placed.to_bricks);
-  return placed;
+TransformedGrid transform_cells(const Volume& v, const VolumeField& field,
+                                const MovedCells& cells) {
+  TransformedGrid transformed;
+  transformed.grid.most = cells.most.data();
+  std::copy_n(cells.size.begin(), 3, transformed.grid.size);
+  bricks_to_world(v, field).after(cells.to_bricks()).inverse().put(transformed.to_bricks);
+  return transformed;
 }
 
 /// Returns the maps for looking up a field from a space that `to_bricks` maps to its bricks.
@@ -56,15 +57,15 @@ FieldDrift drift_of(const Volume& v, const VolumeField& field, const WideMap& to
   return drift;
 }
 
-void put_motion(const Volume& v, VolumeRecord& r) {
+void pack_motion(const Volume& v, VolumeRecord& r) {
   r.moves = v.motion != nullptr;
   if (!r.moves) return;
   r.velocity = v.velocity.grid->view();
-  const VolumeField& glow = v.glow.grid ? v.glow : v.density;
-  r.density_cells = placed_cells(v, v.density, v.motion->density());
-  r.glow_cells = placed_cells(v, glow, v.motion->glow());
+  const VolumeField& emission_field = v.glow.grid ? v.glow : v.density;
+  r.density_cells = transform_cells(v, v.density, v.motion->density());
+  r.emission_cells = transform_cells(v, emission_field, v.motion->emission());
   r.density_drift = drift_of(v, v.density, v.motion->density().to_bricks());
-  r.glow_drift = drift_of(v, glow, v.motion->glow().to_bricks());
+  r.emission_drift = drift_of(v, emission_field, v.motion->emission().to_bricks());
   if (v.color.grid) r.color_drift = drift_of(v, v.color, bricks_to_world(v, v.color).inverse());
   r.seconds_open = v.seconds[0];
   r.seconds_span = v.seconds[1] - v.seconds[0];
@@ -136,9 +137,9 @@ void check_volume(const Volume& v) {
 
 VolumeRecord make_volume_record(const Volume& v) {
   VolumeRecord r{};
-  r.density = placed_grid(v, v.density);
-  if (v.color.grid) r.color = placed_grid(v, v.color);
-  r.glow = v.glow.grid ? placed_grid(v, v.glow) : r.density;
+  r.density = transform_grid(v, v.density);
+  if (v.color.grid) r.color = transform_grid(v, v.color);
+  r.emission_field = v.glow.grid ? transform_grid(v, v.glow) : r.density;
   const auto put = [](float* to, const Vec3<float>& c) {
     to[0] = c.x;
     to[1] = c.y;
@@ -147,11 +148,11 @@ VolumeRecord make_volume_record(const Volume& v) {
   put(r.extinction, v.extinction);
   put(r.albedo, v.albedo);
   put(r.emission, v.emission);
-  r.most_extinction = std::max({v.extinction.x, v.extinction.y, v.extinction.z});
+  r.max_extinction = std::max({v.extinction.x, v.extinction.y, v.extinction.z});
   r.is_grey = v.extinction.x == v.extinction.y && v.extinction.y == v.extinction.z;
   r.anisotropy = v.anisotropy;
   r.emits = v.emits();
-  put_motion(v, r);
+  pack_motion(v, r);
   return r;
 }
 

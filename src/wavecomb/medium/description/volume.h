@@ -116,7 +116,7 @@ struct Volume {
 
 /// Packed reference to a grid: x_bricks = A x_world + t, rows of A each followed by its component
 /// of t.
-struct PlacedGrid {
+struct TransformedGrid {
   GridView grid;
   float to_bricks[12] = {};
 };
@@ -131,26 +131,26 @@ struct FieldDrift {
 /// Packed volume. All lanes of a packet look up the same volume at a time, so records are read
 /// without gathers.
 struct VolumeRecord {
-  PlacedGrid density;  ///< a null table means 1 in its single cell
-  PlacedGrid color;    ///< a null table means 1 everywhere
-  PlacedGrid glow;     ///< emission field; equals density if there is none
+  TransformedGrid density;         ///< a null table means 1 in its single cell
+  TransformedGrid color;           ///< a null table means 1 everywhere
+  TransformedGrid emission_field;  ///< emission field; equals density if there is none
   float extinction[3], albedo[3], emission[3];
-  float most_extinction;  ///< maximum over the channels
+  float max_extinction;  ///< maximum over the channels
   float anisotropy;
   bool is_grey;  ///< extinction is the same in all channels
   bool emits;
   /// Tracked through separate cells, whose bounds include all values that move through them.
   bool moves;
 
-  PlacedGrid density_cells, glow_cells;  ///< without a table
+  TransformedGrid density_cells, emission_cells;  ///< without a table
   GridView velocity;
-  FieldDrift density_drift, glow_drift;  ///< from the spaces of these cells
-  FieldDrift color_drift;                ///< from world space
+  FieldDrift density_drift, emission_drift;  ///< from the spaces of these cells
+  FieldDrift color_drift;                    ///< from world space
   float seconds_open, seconds_span;
 };
 
 /// Maximum number of volumes of a scene; kernels visit them one after the other.
-inline constexpr size_t kMostVolumes = 65536;
+inline constexpr size_t kMaxVolumes = 65536;
 
 /// Device view of all volumes.
 struct VolumeView {

@@ -52,8 +52,8 @@ class BrickSource {
         : b_(source.b_), background_(value_bits(source.b_.background, !b_.halves.empty())) {
       for (uint32_t i = 0; i < 8; ++i) {
         const uint32_t x = cell[0] + (i & 1), y = cell[1] + (i >> 1 & 1), z = cell[2] + (i >> 2);
-        const bool there = x < source.size_[0] && y < source.size_[1] && z < source.size_[2];
-        near_[i] = there
+        const bool in_range = x < source.size_[0] && y < source.size_[1] && z < source.size_[2];
+        near_[i] = in_range
                        ? source.at_[x + size_t{source.size_[0]} * (y + size_t{source.size_[1]} * z)]
                        : kNoBrick;
       }
@@ -83,20 +83,20 @@ class BrickSource {
 };
 
 void check_values(const GridBricks& b) {
-  constexpr float kMost = std::numeric_limits<float>::max();
-  const float least = b.is_signed ? -kMost : 0.f;
+  constexpr float kMax = std::numeric_limits<float>::max();
+  const float least = b.is_signed ? -kMax : 0.f;
   const auto check = [&](const auto& values, const auto& as_float) {
-    const bool good = std::all_of(values.begin(), values.end(), [&](auto v) {
+    const bool valid = std::all_of(values.begin(), values.end(), [&](auto v) {
       const float x = as_float(v);
-      return x >= least && x <= kMost;
+      return x >= least && x <= kMax;
     });
-    if (!good)
+    if (!valid)
       throw Error("grid '" + b.name + "' has values that are " +
                   (b.is_signed ? "" : "negative or ") + "not finite; fix the file");
   };
   check(b.floats, [](float x) { return x; });
   check(b.halves, [](uint16_t x) { return half_to_float<float>(uint32_t{x}); });
-  if (!(b.background >= 0 && b.background <= kMost))
+  if (!(b.background >= 0 && b.background <= kMax))
     throw Error("grid '" + b.name +
                 "' has a background that is negative or not finite; fix the file");
 }

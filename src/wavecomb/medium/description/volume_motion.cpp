@@ -15,7 +15,7 @@ namespace wavecomb {
 namespace {
 
 /// Maximum number of bounding cells of a field; with more, cells are made larger.
-constexpr double kMostCells = 1 << 22;
+constexpr double kMaxCells = 1 << 22;
 /// Rounding tolerance of kernels, in bricks. It keeps the box of a cell without motion from
 /// reaching into neighbouring cells.
 constexpr double kBrickSlack = 1e-5;
@@ -51,16 +51,16 @@ class MaxPyramid {
     const std::array<uint32_t, 3>& size = levels_[0].size;
     std::array<uint32_t, 3> lo{}, hi{};
     uint32_t widest = 0;
-    bool beyond = false, meets = true;
+    bool beyond = false, overlaps = true;
     for (size_t k = 0; k < 3; ++k) {
       const double end = size[k];
       beyond = beyond || box.lo[k] < 0 || box.hi[k] > end;
-      meets = meets && box.hi[k] >= 0 && box.lo[k] <= end;
+      overlaps = overlaps && box.hi[k] >= 0 && box.lo[k] <= end;
       lo[k] = static_cast<uint32_t>(std::clamp(std::floor(box.lo[k]), 0.0, end - 1));
       hi[k] = static_cast<uint32_t>(std::clamp(std::floor(box.hi[k]), 0.0, end - 1));
       widest = std::max(widest, hi[k] - lo[k]);
     }
-    if (!meets) return outside_;
+    if (!overlaps) return outside_;
     uint32_t level = 0;
     while (widest >> level > 2 && level + 1 < levels_.size()) ++level;
     float most = levels_[level].most(lo, hi, level);
@@ -181,10 +181,10 @@ class MovedField {
           box.lo[k] = cells.first[k] + cells.edge * static_cast<double>(at[k]) + kBrickSlack;
           box.hi[k] = box.lo[k] + cells.edge - 2 * kBrickSlack;
         }
-        const WideBox way = drift_in(velocity_.within(image_of(to_velocity_, box)));
+        const WideBox displacement = drift_in(velocity_.within(image_of(to_velocity_, box)));
         for (size_t k = 0; k < 3; ++k) {
-          if (way.hi[k] > 0) box.lo[k] -= way.hi[k] + 2 * kBrickSlack;
-          if (way.lo[k] < 0) box.hi[k] -= way.lo[k] - 2 * kBrickSlack;
+          if (displacement.hi[k] > 0) box.lo[k] -= displacement.hi[k] + 2 * kBrickSlack;
+          if (displacement.lo[k] < 0) box.hi[k] -= displacement.lo[k] - 2 * kBrickSlack;
         }
         cells.most[z * layer + i] = values.most(box);
       }
@@ -208,24 +208,24 @@ class MovedField {
   /// Returns the cells of the space that the field can reach: its table, and the space beyond in
   /// which velocities are not 0.
   MovedCells space() const {
-    const WideBox way = drift_in(velocity_.within(velocity_.table()));
+    const WideBox displacement = drift_in(velocity_.within(velocity_.table()));
     const WideBox windy = image_of(from_velocity_, velocity_.table());
     WideBox beyond{};
-    bool meets = true;
+    bool overlaps = true;
     for (size_t k = 0; k < 3; ++k) {
-      beyond.lo[k] = std::max(way.lo[k], windy.lo[k]);
-      beyond.hi[k] = std::min(grid_.size[k] + way.hi[k], windy.hi[k]);
-      meets = meets && beyond.lo[k] < beyond.hi[k];
+      beyond.lo[k] = std::max(displacement.lo[k], windy.lo[k]);
+      beyond.hi[k] = std::min(grid_.size[k] + displacement.hi[k], windy.hi[k]);
+      overlaps = overlaps && beyond.lo[k] < beyond.hi[k];
     }
     MovedCells cells;
     std::array<double, 3> end{};
     for (size_t k = 0; k < 3; ++k) {
       const double size = grid_.size[k];
-      cells.first[k] = meets ? std::floor(std::min(0.0, beyond.lo[k])) : 0.0;
-      end[k] = meets ? std::ceil(std::max(size, beyond.hi[k])) : size;
+      cells.first[k] = overlaps ? std::floor(std::min(0.0, beyond.lo[k])) : 0.0;
+      end[k] = overlaps ? std::ceil(std::max(size, beyond.hi[k])) : size;
     }
     const auto count = [&](size_t k) { return std::ceil((end[k] - cells.first[k]) / cells.edge); };
-    while (count(0) * count(1) * count(2) > kMostCells) cells.edge *= 2;
+    while (count(0) * count(1) * count(2) > kMaxCells) cells.edge *= 2;
     for (size_t k = 0; k < 3; ++k) cells.size[k] = static_cast<uint32_t>(count(k));
     return cells;
   }
@@ -256,10 +256,10 @@ WideMap bricks_to_object(const VolumeField& field) {
 VolumeMotion::VolumeMotion(const Volume& v) {
   const VelocityBounds velocity(*v.velocity.grid);
   density_ = MovedField(v, v.density, velocity).cells();
-  if (v.glow.grid) glow_ = MovedField(v, v.glow, velocity).cells();
+  if (v.glow.grid) emission_ = MovedField(v, v.glow, velocity).cells();
 }
 
-bool moves_alike(const Volume& a, const Volume& b) {
+bool has_same_motion(const Volume& a, const Volume& b) {
   return a.seconds == b.seconds && is_same(a.velocity, b.velocity) &&
          is_same(a.density, b.density) && is_same(a.glow, b.glow);
 }

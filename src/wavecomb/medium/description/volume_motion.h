@@ -31,15 +31,15 @@ class VolumeMotion {
 
   const MovedCells& density() const { return density_; }
   /// Returns the bounds of the emission field, or of density if there is no emission field.
-  const MovedCells& glow() const { return glow_.most.empty() ? density_ : glow_; }
-  size_t bytes() const { return 4 * (density_.most.size() + glow_.most.size()); }
+  const MovedCells& emission() const { return emission_.most.empty() ? density_ : emission_; }
+  size_t bytes() const { return 4 * (density_.most.size() + emission_.most.size()); }
 
  private:
-  MovedCells density_, glow_;
+  MovedCells density_, emission_;
 };
 
 /// Returns whether the motion bounds of `a` are valid for `b` as well.
-bool moves_alike(const Volume& a, const Volume& b);
+bool has_same_motion(const Volume& a, const Volume& b);
 
 /// Maps bricks of a field to the volume's local space.
 WideMap bricks_to_object(const VolumeField& field);

@@ -11,163 +11,166 @@
 namespace wavecomb {
 
 /// Size of the stack. If it overflows, the first bound entered is forgotten.
-inline constexpr size_t kMostInside = 4;
+inline constexpr size_t kMaxMediumStack = 4;
 /// Material of an empty entry.
-inline constexpr uint32_t kNothing = 0xffffffffu;
+inline constexpr uint32_t kNoMaterial = 0xffffffffu;
 
 /// Bound of a medium.
 template <typename F>
-struct Bound {
-  UInt<F> place;     ///< placed_geometry() of the mesh
-  UInt<F> material;  ///< kNothing if there is no bound
+struct MediumBoundary {
+  UInt<F> object;    ///< instance_geometry() of the mesh
+  UInt<F> material;  ///< kNoMaterial if there is no bound
 };
 
 template <typename F>
-class Inside {
+class MediumStack {
   using U = UInt<F>;
 
  public:
   /// Creates an empty stack.
-  Inside() {
-    for (size_t k = 0; k < kMostInside; ++k) place_[k] = material_[k] = U(kNothing);
+  MediumStack() {
+    for (size_t k = 0; k < kMaxMediumStack; ++k) object_[k] = material_[k] = U(kNoMaterial);
   }
   template <typename Row>
-  explicit Inside(const Row& r)
-      : place_{r.place_0, r.place_1, r.place_2, r.place_3},
+  explicit MediumStack(const Row& r)
+      : object_{r.object_0, r.object_1, r.object_2, r.object_3},
         material_{r.material_0, r.material_1, r.material_2, r.material_3} {}
   template <typename Row>
   void store_in(Row& r) const {
-    r.place_0 = place_[0], r.place_1 = place_[1], r.place_2 = place_[2], r.place_3 = place_[3];
+    r.object_0 = object_[0], r.object_1 = object_[1], r.object_2 = object_[2],
+    r.object_3 = object_[3];
     r.material_0 = material_[0], r.material_1 = material_[1];
     r.material_2 = material_[2], r.material_3 = material_[3];
   }
 
   /// Updates the stack for the bound that the last vertex's ray, selected by `bit` (Crossing), has
   /// crossed.
-  void cross(const InteriorView& view, const UInt<F>& place, const UInt<F>& crossed, Crossing bit,
+  void cross(const MeshMediaView& view, const UInt<F>& object, const UInt<F>& crossed, Crossing bit,
              const Mask<F>& active) {
     const auto has = [&](Crossing b) { return Mask<F>((crossed & uint32_t{b}) != U(0u)); };
     Mask<F> crosses = active & has(bit);
     if (none(crosses)) return;
     const U material = crossed >> kCrossingBits;
-    const U kind = gather_field<F>(view.media, &InteriorMedium<float>::kind, material, crosses);
-    crosses = crosses & Mask<F>(kind != U(static_cast<uint32_t>(InteriorKind::kNone)));
-    enter({place, material}, crosses & has(kEnters));
-    leave(place, crosses & not_(has(kEnters)));
+    const U kind = gather_field<F>(view.media, &MeshMedium<float>::kind, material, crosses);
+    crosses = crosses & Mask<F>(kind != U(static_cast<uint32_t>(BoundaryKind::kNone)));
+    enter({object, material}, crosses & has(kEnters));
+    leave(object, crosses & not_(has(kEnters)));
   }
   /// Returns a packet with this stack in all lanes.
   template <typename G>
-  Inside<G> everywhere() const {
-    Inside<G> all;
-    for (size_t k = 0; k < kMostInside; ++k) {
-      all.place_[k] = UInt<G>(place_[k]);
+  MediumStack<G> broadcast() const {
+    MediumStack<G> all;
+    for (size_t k = 0; k < kMaxMediumStack; ++k) {
+      all.object_[k] = UInt<G>(object_[k]);
       all.material_[k] = UInt<G>(material_[k]);
     }
     return all;
   }
   /// Replaces the stacks of `lanes` by those of `other`.
-  void take(const Inside& other, const Mask<F>& lanes) {
-    for (size_t k = 0; k < kMostInside; ++k) {
-      place_[k] = select(Mask<U>(lanes), other.place_[k], place_[k]);
+  void assign(const MediumStack& other, const Mask<F>& lanes) {
+    for (size_t k = 0; k < kMaxMediumStack; ++k) {
+      object_[k] = select(Mask<U>(lanes), other.object_[k], object_[k]);
       material_[k] = select(Mask<U>(lanes), other.material_[k], material_[k]);
     }
   }
 
   /// Returns the bound that counts, the one with the highest priority.
-  Bound<F> top(const InteriorView& view, const Mask<F>& active) const {
-    Bound<F> best{U(kNothing), U(kNothing)};
+  MediumBoundary<F> top(const MeshMediaView& view, const Mask<F>& active) const {
+    MediumBoundary<F> best{U(kNoMaterial), U(kNoMaterial)};
     F most(-kInfinity);
-    for (size_t k = 0; k < kMostInside; ++k) {
-      const Mask<F> there = active & Mask<F>(material_[k] != U(kNothing));
+    for (size_t k = 0; k < kMaxMediumStack; ++k) {
+      const Mask<F> occupied = active & Mask<F>(material_[k] != U(kNoMaterial));
       const F priority =
-          gather_field<F>(view.media, &InteriorMedium<float>::priority, material_[k], there);
-      const Mask<F> wins = there & (priority >= most);
-      most = select(wins, priority, most);
-      best.place = select(Mask<U>(wins), place_[k], best.place);
-      best.material = select(Mask<U>(wins), material_[k], best.material);
+          gather_field<F>(view.media, &MeshMedium<float>::priority, material_[k], occupied);
+      const Mask<F> has_priority = occupied & (priority >= most);
+      most = select(has_priority, priority, most);
+      best.object = select(Mask<U>(has_priority), object_[k], best.object);
+      best.material = select(Mask<U>(has_priority), material_[k], best.material);
     }
     return best;
   }
 
-  /// Returns the lanes that have entered a bound of the geometry `place`.
-  Mask<F> holds(const U& place) const {
+  /// Returns the lanes that have entered a bound of the geometry `object`.
+  Mask<F> contains(const U& object) const {
     Mask<F> any_of(false);
-    for (size_t k = 0; k < kMostInside; ++k)
-      any_of = any_of | (Mask<F>(material_[k] != U(kNothing)) & Mask<F>(place_[k] == place));
+    for (size_t k = 0; k < kMaxMediumStack; ++k)
+      any_of = any_of | (Mask<F>(material_[k] != U(kNoMaterial)) & Mask<F>(object_[k] == object));
     return any_of;
   }
   /// Enters `bound` in `lanes`.
-  void enter(const Bound<F>& bound, const Mask<F>& lanes) {
-    Mask<U> left(lanes & Mask<F>(material_[kMostInside - 1] != U(kNothing)));
-    drop(0, left);
+  void enter(const MediumBoundary<F>& bound, const Mask<F>& lanes) {
+    Mask<U> left(lanes & Mask<F>(material_[kMaxMediumStack - 1] != U(kNoMaterial)));
+    remove(0, left);
     left = Mask<U>(lanes);
-    for (size_t k = 0; k < kMostInside; ++k) {
-      const Mask<U> here = left & Mask<U>(material_[k] == U(kNothing));
-      place_[k] = select(here, bound.place, place_[k]);
+    for (size_t k = 0; k < kMaxMediumStack; ++k) {
+      const Mask<U> here = left & Mask<U>(material_[k] == U(kNoMaterial));
+      object_[k] = select(here, bound.object, object_[k]);
       material_[k] = select(here, bound.material, material_[k]);
       left = left & Mask<U>(not_(Mask<F>(here)));
     }
   }
-  /// Leaves the last entered bound of the geometry `place` in `lanes`, if there is one.
-  void leave(const U& place, const Mask<F>& lanes) {
+  /// Leaves the last entered bound of the geometry `object` in `lanes`, if there is one.
+  void leave(const U& object, const Mask<F>& lanes) {
     Mask<F> left = lanes;
-    for (size_t k = kMostInside; k-- > 0;) {
+    for (size_t k = kMaxMediumStack; k-- > 0;) {
       const Mask<F> here =
-          left & Mask<F>(material_[k] != U(kNothing)) & Mask<F>(place_[k] == place);
-      drop(k, Mask<U>(here));
+          left & Mask<F>(material_[k] != U(kNoMaterial)) & Mask<F>(object_[k] == object);
+      remove(k, Mask<U>(here));
       left = left & not_(here);
     }
   }
 
  private:
   template <typename G>
-  friend class Inside;
+  friend class MediumStack;
 
   /// Removes entry k.
-  void drop(size_t k, const Mask<U>& lanes) {
-    for (; k < kMostInside; ++k) {
-      const bool last = k + 1 == kMostInside;
-      place_[k] = select(lanes, last ? U(kNothing) : place_[k + 1], place_[k]);
-      material_[k] = select(lanes, last ? U(kNothing) : material_[k + 1], material_[k]);
+  void remove(size_t k, const Mask<U>& lanes) {
+    for (; k < kMaxMediumStack; ++k) {
+      const bool last = k + 1 == kMaxMediumStack;
+      object_[k] = select(lanes, last ? U(kNoMaterial) : object_[k + 1], object_[k]);
+      material_[k] = select(lanes, last ? U(kNoMaterial) : material_[k + 1], material_[k]);
     }
   }
 
-  U place_[kMostInside], material_[kMostInside];
+  U object_[kMaxMediumStack], material_[kMaxMediumStack];
 };
 
 /// Bound that a ray hits.
 template <typename F>
-struct BoundMet {
-  Inside<F> after;  ///< medium stack on the other side
+struct BoundaryHit {
+  MediumStack<F> after;  ///< medium stack on the other side
   /// Whether the ray passes unchanged, since another bound has priority or this one has no effect.
   Mask<F> passes;
   F outer;  ///< index of refraction on the outer side
 };
 
-/// Returns the effect of `bound` on `lanes`, which hit it from outside where `enters`. `now` is the
-/// top of `before`.
+/// Returns the effect of `bound` on `lanes`, which hit it from outside where `enters`. `current` is
+/// the top of `before`.
 template <typename F>
-inline BoundMet<F> meet_bound(const InteriorView& view, const Inside<F>& before,
-                              const Bound<F>& now, const Bound<F>& bound, const Mask<F>& enters,
-                              const Mask<F>& lanes) {
+inline BoundaryHit<F> cross_boundary(const MeshMediaView& view, const MediumStack<F>& before,
+                                     const MediumBoundary<F>& current,
+                                     const MediumBoundary<F>& bound, const Mask<F>& enters,
+                                     const Mask<F>& lanes) {
   using U = UInt<F>;
-  BoundMet<F> met{before, Mask<F>(false), F(1.f)};
-  met.after.enter(bound, lanes & enters);
-  met.after.leave(bound.place, lanes & not_(enters));
-  const Bound<F> then = met.after.top(view, lanes);
-  const auto same = [](const Bound<F>& a, const Bound<F>& b) {
-    return Mask<F>(a.place == b.place) & Mask<F>(a.material == b.material);
+  BoundaryHit<F> hit{before, Mask<F>(false), F(1.f)};
+  hit.after.enter(bound, lanes & enters);
+  hit.after.leave(bound.object, lanes & not_(enters));
+  const MediumBoundary<F> top_after = hit.after.top(view, lanes);
+  const auto same = [](const MediumBoundary<F>& a, const MediumBoundary<F>& b) {
+    return Mask<F>(a.object == b.object) & Mask<F>(a.material == b.material);
   };
-  const U beside = select(Mask<U>(enters), now.material, then.material);
-  const Mask<F> filled = lanes & Mask<F>(beside != U(kNothing));
-  met.outer = select(
-      filled, gather_field<F>(view.media, &InteriorMedium<float>::ior, beside, filled), F(1.f));
-  const U kind = gather_field<F>(view.media, &InteriorMedium<float>::kind, bound.material, lanes);
+  const U outer_material = select(Mask<U>(enters), current.material, top_after.material);
+  const Mask<F> filled = lanes & Mask<F>(outer_material != U(kNoMaterial));
+  hit.outer = select(
+      filled, gather_field<F>(view.media, &MeshMedium<float>::ior, outer_material, filled), F(1.f));
+  const U kind = gather_field<F>(view.media, &MeshMedium<float>::kind, bound.material, lanes);
   const Mask<F> clear =
-      Mask<F>(kind == U(static_cast<uint32_t>(InteriorKind::kClear))) & (met.outer == 1.f);
+      Mask<F>(kind == U(static_cast<uint32_t>(BoundaryKind::kClear))) & (hit.outer == 1.f);
   // A bound that is left without having been entered stays visible.
-  met.passes = lanes & (clear | (same(now, then) & (enters | before.holds(bound.place))));
-  return met;
+  hit.passes =
+      lanes & (clear | (same(current, top_after) & (enters | before.contains(bound.object))));
+  return hit;
 }
 
 }  // namespace wavecomb

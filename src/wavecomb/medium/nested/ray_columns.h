@@ -10,19 +10,19 @@
 namespace wavecomb {
 
 /// Columns of rays, and the rows of their paths.
-struct InteriorRays {
+struct NestedRays {
   float *o[3], *d[3];    ///< updated if a path has scattered
   const uint32_t* slot;  ///< row of each path
   size_t size;
   const float* times;  ///< shutter times; null without motion
   float* paths;        ///< PathRow
-  float* inside;       ///< InsideRow
+  float* stacks;       ///< MediumStackRow
 };
 
 /// Results of the rays, as in Flights, and the transmittance of absorption. With `limited`, `t` and
 /// `material` initially hold the event in a volume that stops each ray. Such an event no longer
 /// applies to a ray that has scattered, whose hero becomes kNoHero.
-struct InteriorEvents {
+struct NestedEvents {
   bool limited;
   float* t;
   uint32_t* material;
@@ -33,19 +33,19 @@ struct InteriorEvents {
 /// Start of a ray through media: the hero channel, the random number of the first distance, and the
 /// seed for all other random numbers.
 template <typename F>
-struct InteriorStart {
+struct NestedRayStart {
   UInt<F> hero, seed;
   F first;
 };
 
-/// Mesh and material of a hit, and its object as placed_geometry().
+/// Mesh and material of a hit, and its object as instance_geometry().
 template <typename F>
-struct HitPlace {
+struct HitObject {
   UInt<F> mesh, material, object;
 };
 template <typename F>
-inline HitPlace<F> hit_place(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
-                             const UInt<F>& prim, const Mask<F>& active) {
+inline HitObject<F> hit_object(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
+                               const UInt<F>& prim, const Mask<F>& active) {
   using U = UInt<F>;
   const auto of_instance = [&](auto member) {
     return gather_member<F>(scene.instances, member, inst, active);
@@ -60,11 +60,11 @@ namespace detail {
 
 /// State of a ray in progress.
 template <typename F>
-struct InteriorState {
+struct NestedRayState {
   Vec3<F> o, d;
   Color<F> throughput;
   F start;  ///< length covered since the last collision
-  F first;  ///< Walk::first
+  F first;  ///< SubsurfaceWalk::first
   /// Distance to the next collision, or kFar. Until something scatters it is kFar (1 + u), which
   /// stores the random number u of the first distance; u is stratified over a pixel's samples. For
   /// shadow rays it is the remaining length.
@@ -74,33 +74,33 @@ struct InteriorState {
 };
 /// Medium stack of a ray, and its attenuation since the last collision.
 template <typename F>
-struct InteriorLoad {
-  UInt<F> place_0, place_1, place_2, place_3, material_0, material_1, material_2, material_3;
+struct NestedRayMedia {
+  UInt<F> object_0, object_1, object_2, object_3, material_0, material_1, material_2, material_3;
   Color<F> absorbed, ratio;
   F time;
-  WAVECOMB_FIELDS(place_0, place_1, place_2, place_3, material_0, material_1, material_2,
+  WAVECOMB_FIELDS(object_0, object_1, object_2, object_3, material_0, material_1, material_2,
                   material_3, absorbed, ratio, time)
 };
-static_assert(kRowWords<InteriorState> + kRowWords<InteriorLoad> == InteriorBuffers::kWords);
+static_assert(kRowWords<NestedRayState> + kRowWords<NestedRayMedia> == NestedMediaBuffers::kWords);
 template <typename F>
-struct InteriorHit {
+struct NestedRayHit {
   F t, u, v;
   UInt<F> prim, geom, inst;
 };
 /// Packet of rays.
 template <typename F>
-struct InteriorPacket {
-  UInt<F> who;  ///< index among all rays
+struct NestedRayPacket {
+  UInt<F> ray_index;  ///< index among all rays
   Mask<F> active;
-  InteriorState<F> s;
-  InteriorLoad<F> l;
-  InteriorHit<F> hit;
-  uint32_t kind = kSeenByAll;  ///< RayVisibility of the rays
-  UInt<F> shadow_set{0u};      ///< ShadowRow::set of shadow rays; 0 if all objects block them
+  NestedRayState<F> s;
+  NestedRayMedia<F> l;
+  NestedRayHit<F> hit;
+  uint32_t kind = kVisibleToAll;  ///< RayVisibility of the rays
+  UInt<F> shadow_set{0u};         ///< ShadowRow::set of shadow rays; 0 if all objects block them
 };
 /// Hits of a packet: surfaces, and which of them bound a medium or let the ray pass.
 template <typename F>
-struct InteriorMet {
+struct BoundaryHits {
   Mask<F> surface, passes, bound;
   F outer{1.f};
   UInt<F> object{0u};

@@ -24,21 +24,21 @@ struct WalkEnd {
 ///
 /// Contract: the random numbers of a walk depend only on that walk, so that neither order nor lane
 /// width has an effect.
-class Walkers {
+class WalkQueue {
  public:
   static constexpr size_t kColumns = 36;
-  explicit Walkers(const SoaBlock& block) : c_(block) {}
+  explicit WalkQueue(const SoaBlock& block) : c_(block) {}
 
   size_t size() const { return size_; }
 
   static constexpr uint32_t kNoMedium = 0xffffffffu;
 
-  /// Adds the walks in the active lanes. `who` is passed to `finish`, and `slot` is the path's
-  /// slot.
+  /// Adds the walks in the active lanes. `ray_index` is passed to `finish`, and `slot` is the
+  /// path's slot.
   template <typename F>
-  void add(const Walk<F>& w, const UInt<F>& who, const UInt<F>& slot, const F& time,
+  void add(const SubsurfaceWalk<F>& w, const UInt<F>& ray_index, const UInt<F>& slot, const F& time,
            const Mask<F>& active) {
-    size_ += put<F>(size_, {w, who, slot, UInt<F>(kNoMedium), time}, active);
+    size_ += put<F>(size_, {w, ray_index, slot, UInt<F>(kNoMedium), time}, active);
   }
 
   /// Starts the added walks. medium_of(inst, geom, prim, met) returns the material that they hit on
@@ -58,7 +58,7 @@ class Walkers {
           medium_of(inst, load<U>(c_.uints(kHitGeom) + i), load<U>(c_.uints(kHitPrim) + i),
                     Mask<F>(active & Mask<F>(inst != U(kNoHit))));
       const Mask<F> walks = active & Mask<F>(row.material != U(kNoMedium));
-      choose_technique<F>(walk_medium<F>(scene.walks, row.material, walks),
+      choose_technique<F>(subsurface_medium<F>(scene.subsurface, row.material, walks),
                           load<F>(c_.floats(kHitT) + i), row.walk);
       if (any(Mask<F>(active & not_(walks)))) leave(Mask<F>(active & not_(walks)), row.slot);
       left += put<F>(left, row, walks);
@@ -68,7 +68,7 @@ class Walkers {
 
   /// Runs all walks to their end. `keys` are indexed by path slot and specify the objects; their
   /// salt is that of the ray that entered. Calls finish(lanes, who, end, came) for walks that have
-  /// ended. Lanes in `came` have reached the surface.
+  /// ended. Lanes in `reached_surface` have reached the surface.
   template <typename F, typename Finish>
   void run(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
            PresenceKeys keys, uint64_t& steps, uint64_t& lanes, const Finish& finish) {
@@ -78,7 +78,7 @@ class Walkers {
       for (size_t i = 0; i < size_; i += kWidth<F>) {
         Row<F> row = get<F>(i);
         const Mask<F> active = first_lanes<F>(size_ - i);
-        begin_flight<F>(walk_medium<F>(scene.walks, row.material, active), row.walk);
+        begin_flight<F>(subsurface_medium<F>(scene.subsurface, row.material, active), row.walk);
         store(c_.floats(kRest) + i, row.walk.rest);
       }
       keys.salt = salt + 0x10000u * (step + 1);
@@ -89,16 +89,16 @@ class Walkers {
         lanes += kWidth<F>;
         const Mask<F> active = first_lanes<F>(size_ - i);
         Row<F> row = get<F>(i);
-        Walk<F>& w = row.walk;
+        SubsurfaceWalk<F>& w = row.walk;
         const U inst = load<U>(c_.uints(kHitInst) + i);
         const F hit_t = load<F>(c_.floats(kHitT) + i);
         const Mask<F> collides = active & Mask<F>(inst == U(kNoHit));
         const Mask<F> own = active & not_(collides);
-        Walk<F> after = w;
+        SubsurfaceWalk<F> after = w;
         const F t = select(own, hit_t, w.rest);
-        const Mask<F> goes_on =
-            end_flight<F>(walk_medium<F>(scene.walks, row.material, active), t, collides, after);
-        const Mask<F> ended = active & not_(goes_on);
+        const Mask<F> continues = end_flight<F>(
+            subsurface_medium<F>(scene.subsurface, row.material, active), t, collides, after);
+        const Mask<F> ended = active & not_(continues);
         if (any(ended)) {
           const WalkEnd<F> end{after.o,
                                after.d,
@@ -110,7 +110,7 @@ class Walkers {
                                inst,
                                row.material,
                                w.number};
-          finish(ended, row.who, end, Mask<F>(ended & own));
+          finish(ended, row.ray_index, end, Mask<F>(ended & own));
         }
         row.walk = after;
         left += put<F>(left, row, active & not_(ended));
@@ -125,8 +125,8 @@ class Walkers {
     kD = kO + 3,
     kThroughput = kD + 3,
     kFree = kThroughput + 3,
-    kLed = kFree + 3,
-    kFirst = kLed + 3,
+    kGuided = kFree + 3,
+    kFirst = kGuided + 3,
     kRest,
     kSeed,
     kNumber,
@@ -134,7 +134,7 @@ class Walkers {
     kChoice,
     kFlight,
     kTechnique,
-    kWho,
+    kRayIndex,
     kSlot,
     kMaterial,
     kTime,
@@ -160,8 +160,8 @@ class Walkers {
 
   template <typename F>
   struct Row {
-    Walk<F> walk;
-    UInt<F> who, slot, material;
+    SubsurfaceWalk<F> walk;
+    UInt<F> ray_index, slot, material;
     F time;
   };
 
@@ -175,8 +175,8 @@ class Walkers {
     };
     return {{three(kO), three(kD), three(kThroughput), real(kFirst), real(kRest), number(kSeed),
              number(kNumber), number(kNormal), real(kChoice), real(kFlight), number(kTechnique),
-             three(kFree), three(kLed)},
-            number(kWho),
+             three(kFree), three(kGuided)},
+            number(kRayIndex),
             number(kSlot),
             number(kMaterial),
             real(kTime)};
@@ -198,12 +198,12 @@ class Walkers {
       real(column + 1, x.y);
       real(column + 2, x.z);
     };
-    const Walk<F>& w = row.walk;
+    const SubsurfaceWalk<F>& w = row.walk;
     three(kO, w.o);
     three(kD, w.d);
     three(kThroughput, w.throughput);
     three(kFree, w.free);
-    three(kLed, w.led);
+    three(kGuided, w.guided);
     real(kFirst, w.first);
     real(kRest, w.rest);
     real(kChoice, w.choice);
@@ -213,7 +213,7 @@ class Walkers {
     number(kNumber, w.number);
     number(kNormal, w.normal);
     number(kTechnique, w.technique);
-    number(kWho, row.who);
+    number(kRayIndex, row.ray_index);
     number(kSlot, row.slot);
     number(kMaterial, row.material);
     return n;

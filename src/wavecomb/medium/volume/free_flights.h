@@ -22,7 +22,7 @@ struct Flights {
   float* scale[3];
 };
 /// Results that a pass through one volume computes.
-enum class FlightKeeps : uint8_t { kStops, kRatios, kBoth };
+enum class FlightResults : uint8_t { kStops, kRatios, kBoth };
 
 /// Selects the hero channel, in proportion to the throughput.
 template <typename F>

@@ -64,13 +64,13 @@ inline Color<F> grid_color(const GridView& grid, const Vec3<F>& p, const Mask<F>
   }
   const U brick = gather<U>(grid.table, cell[0] + grid.size[0] * (cell[1] + grid.size[1] * cell[2]),
                             Mask<U>(inside));
-  const Mask<F> there = inside & Mask<F>(brick != U(kNoBrick));
+  const Mask<F> stored = inside & Mask<F>(brick != U(kNoBrick));
   Color<F> out(F(grid.background));
-  if (none(there)) return out;
+  if (none(stored)) return out;
   const U first = in_brick[0] + kBrickRow * (in_brick[1] + kBrickRow * in_brick[2]);
   const auto component = [&](uint32_t c) {
     const auto voxel = [&](uint32_t step) {
-      return detail::voxel_value<F>(grid, brick, U((first + step) * grid.components + c), there);
+      return detail::voxel_value<F>(grid, brick, U((first + step) * grid.components + c), stored);
     };
     const auto lerp = [](const F& t, const F& a, const F& b) { return fma(t, F(b - a), a); };
     const auto along_x = [&](uint32_t step) {
@@ -84,7 +84,7 @@ inline Color<F> grid_color(const GridView& grid, const Vec3<F>& p, const Mask<F>
   const F x = component(0);
   const bool is_colour = grid.components == 3;
   const Color<F> value = is_colour ? Color<F>(x, component(1), component(2)) : Color<F>(x, x, x);
-  return select<F>(there, value, out);
+  return select<F>(stored, value, out);
 }
 
 /// Returns the value of a grid with one component.

@@ -12,12 +12,12 @@
 namespace wavecomb {
 
 /// Returns the cells for traversing a volume's density.
-inline const PlacedGrid& flown_cells(const VolumeRecord& v) {
+inline const TransformedGrid& extinction_cells(const VolumeRecord& v) {
   return v.moves ? v.density_cells : v.density;
 }
 /// Returns the cells for traversing a volume's emission.
-inline const PlacedGrid& glow_cells(const VolumeRecord& v) {
-  return v.moves ? v.glow_cells : v.glow;
+inline const TransformedGrid& emission_cells(const VolumeRecord& v) {
+  return v.moves ? v.emission_cells : v.emission_field;
 }
 
 /// Returns the seconds at a shutter time from 0 to 1.
@@ -31,11 +31,11 @@ template <typename F>
 inline Vec3<F> drifted(const FieldDrift& drift, const GridView& velocity, const Vec3<F>& p,
                        const F& seconds, const Mask<F>& active) {
   const Color<F> v = grid_color<F>(velocity, bricks_point<F>(drift.to_velocity, p), active);
-  const Vec3<F> way = bricks_vector<F>(drift.per_second, v) * seconds;
-  return bricks_point<F>(drift.to_bricks, p) - way;
+  const Vec3<F> displacement = bricks_vector<F>(drift.per_second, v) * seconds;
+  return bricks_point<F>(drift.to_bricks, p) - displacement;
 }
 
-/// Returns the density at `p`, in the space of `flown_cells`.
+/// Returns the density at `p`, in the space of `extinction_cells`.
 template <typename F>
 inline F density_at(const VolumeRecord& v, const Vec3<F>& p, const F& seconds,
                     const Mask<F>& active) {
@@ -43,13 +43,14 @@ inline F density_at(const VolumeRecord& v, const Vec3<F>& p, const F& seconds,
   return grid_value<F>(v.density.grid, drifted<F>(v.density_drift, v.velocity, p, seconds, active),
                        active);
 }
-/// Returns the emission field at `p`, in the space of `glow_cells`, at a shutter time.
+/// Returns the emission field at `p`, in the space of `emission_cells`, at a shutter time.
 template <typename F>
-inline Color<F> glow_at(const VolumeRecord& v, const Vec3<F>& p, const F& time,
-                        const Mask<F>& active) {
-  if (!v.moves) return grid_color<F>(v.glow.grid, p, active);
-  return grid_color<F>(
-      v.glow.grid, drifted<F>(v.glow_drift, v.velocity, p, seconds_at<F>(v, time), active), active);
+inline Color<F> emission_at(const VolumeRecord& v, const Vec3<F>& p, const F& time,
+                            const Mask<F>& active) {
+  if (!v.moves) return grid_color<F>(v.emission_field.grid, p, active);
+  return grid_color<F>(v.emission_field.grid,
+                       drifted<F>(v.emission_drift, v.velocity, p, seconds_at<F>(v, time), active),
+                       active);
 }
 /// Returns the colour field at a point in world space, at a shutter time.
 template <typename F>

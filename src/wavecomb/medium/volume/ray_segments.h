@@ -20,7 +20,7 @@ struct RaySegment {
 };
 
 /// Columns of ray segments: points o + x d with 0 < x < most.
-struct Ways {
+struct RaySegments {
   const float *ox, *oy, *oz, *dx, *dy, *dz;
   const float* most;
   const uint32_t* seed;  ///< seed for the random numbers of each segment
@@ -31,13 +31,13 @@ struct Ways {
 
 /// Random number sequence of a ray segment in one volume. Each lane has a separate counter.
 template <typename F>
-struct CollisionNumbers {
+struct CollisionSequence {
   UInt<F> seed{0u}, count{0u};
 
-  void start(const UInt<F>& way, uint32_t volume, const Mask<F>& lanes) {
+  void start(const UInt<F>& segment, uint32_t volume, const Mask<F>& lanes) {
     using U = UInt<F>;
     const Mask<U> on(lanes);
-    seed = select(on, hash_u32<U>(way, U(0x9c8f2d3bu + volume)), seed);
+    seed = select(on, hash_u32<U>(segment, U(0x9c8f2d3bu + volume)), seed);
     count = select(on, U(0u), count);
   }
   F next(const Mask<F>& lanes) {
@@ -80,76 +80,78 @@ inline UInt<F> ranks(const Mask<F>& lanes) {
 ///
 /// The result of a segment does not depend on other segments.
 template <typename F, typename Visitor>
-inline void each_collision(const PlacedGrid& placed, float scale, uint32_t volume, const Ways& ways,
-                           VolumeCounts& counts, Visitor& visitor) {
+inline void each_collision(const TransformedGrid& transformed, float scale, uint32_t volume,
+                           const RaySegments& segments, VolumeCounts& counts, Visitor& visitor) {
   using U = UInt<F>;
   constexpr auto kWide = static_cast<uint32_t>(kWidth<F>);
-  constexpr uint32_t kEnough = kWide < 4 ? 1 : 3 * kWide / 8;
+  constexpr uint32_t kMinFree = kWide < 4 ? 1 : 3 * kWide / 8;
   if (scale <= 0) return;
-  BrickWalk<F> walk(placed);
-  CollisionNumbers<F> numbers;
+  GridTraversal<F> traversal(transformed);
+  CollisionSequence<F> numbers;
   F left(0.f);  // optical depth until the next collision
-  U way(0u);
+  U segment(0u);
   Mask<F> busy(false);
   size_t next = 0;
   const auto depth = [](const F& number) { return F(-log(F(1.f - number))); };
   for (;;) {
-    const Mask<F> idle = not_(walk.on());
+    const Mask<F> idle = not_(traversal.on());
     const uint32_t free = count<F>(idle);
-    if (next < ways.count ? free >= kEnough : free == kWide) {
-      visitor.finish(way, Mask<F>(busy & idle));
-      if (next == ways.count) return;
-      const U mine = detail::ranks<F>(idle) + static_cast<uint32_t>(next);
-      const Mask<F> takes = idle & Mask<F>(mine < U(static_cast<uint32_t>(ways.count)));
-      next = std::min(ways.count, next + free);
-      busy = (busy & not_(idle)) | takes;
-      way = select(Mask<U>(takes), mine, way);
-      const auto column = [&](const float* values) { return gather<F>(values, way, takes); };
-      walk.start({column(ways.ox), column(ways.oy), column(ways.oz)},
-                 {column(ways.dx), column(ways.dy), column(ways.dz)}, column(ways.most), takes);
-      numbers.start(gather<U>(ways.seed, way, Mask<U>(takes)), volume, takes);
-      const F first = volume == 0 ? column(ways.first) : numbers.next(takes);
-      left = select(takes, depth(first), left);
-      visitor.start(way, takes);
+    if (next < segments.count ? free >= kMinFree : free == kWide) {
+      visitor.finish(segment, Mask<F>(busy & idle));
+      if (next == segments.count) return;
+      const U next_segment = detail::ranks<F>(idle) + static_cast<uint32_t>(next);
+      const Mask<F> starts =
+          idle & Mask<F>(next_segment < U(static_cast<uint32_t>(segments.count)));
+      next = std::min(segments.count, next + free);
+      busy = (busy & not_(idle)) | starts;
+      segment = select(Mask<U>(starts), next_segment, segment);
+      const auto column = [&](const float* values) { return gather<F>(values, segment, starts); };
+      traversal.start({column(segments.ox), column(segments.oy), column(segments.oz)},
+                      {column(segments.dx), column(segments.dy), column(segments.dz)},
+                      column(segments.most), starts);
+      numbers.start(gather<U>(segments.seed, segment, Mask<U>(starts)), volume, starts);
+      const F first = volume == 0 ? column(segments.first) : numbers.next(starts);
+      left = select(starts, depth(first), left);
+      visitor.start(segment, starts);
       continue;
     }
-    const F majorant = walk.most() * scale;
-    const F leave = walk.leave();
-    const F here = majorant * (leave - walk.x());
-    const Mask<F> collides = walk.on() & (left < here);
+    const F majorant = traversal.most() * scale;
+    const F leave = traversal.leave();
+    const F here = majorant * (leave - traversal.x());
+    const Mask<F> collides = traversal.on() & (left < here);
     counts.lanes += kWide;
     counts.steps += kWide - free;
-    const Mask<F> passes = walk.on() & not_(collides);
+    const Mask<F> passes = traversal.on() & not_(collides);
     if (any(collides)) {
       counts.collisions += count<F>(collides);
-      const F x = min(F(walk.x() + left / select(collides, majorant, F(1.f))), leave);
-      walk.move_to(x, collides);
-      const F again = depth(numbers.next(collides));
-      left = select(collides, again, F(left - here));
-      walk.stop(visitor.collide(collides, x, walk.at(x), majorant, numbers));
+      const F x = min(F(traversal.x() + left / select(collides, majorant, F(1.f))), leave);
+      traversal.move_to(x, collides);
+      const F next_depth = depth(numbers.next(collides));
+      left = select(collides, next_depth, F(left - here));
+      traversal.stop(visitor.collide(collides, x, traversal.at(x), majorant, numbers));
     } else {
       left = left - here;
     }
-    walk.next_cell(passes);
+    traversal.next_cell(passes);
   }
 }
 
 /// Ray segments of a single packet.
 template <typename F>
-class PacketWays {
+class PacketSegments {
   using U = UInt<F>;
   static constexpr size_t kLanes = kWidth<F>;
 
  public:
   /// Inactive lanes have a segment of length 0.
-  PacketWays(const Vec3<F>& o, const Vec3<F>& d, const F& most, const U& seed, const F& first,
-             const F& time, const Mask<F>& active) {
+  PacketSegments(const Vec3<F>& o, const Vec3<F>& d, const F& most, const U& seed, const F& first,
+                 const F& time, const Mask<F>& active) {
     const F* const columns[8] = {&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &first, &time};
     for (size_t k = 0; k < 8; ++k) store(columns_[k], *columns[k]);
     store(columns_[8], select(active, most, F(0.f)));
     store(seed_, seed);
   }
-  Ways ways() const {
+  RaySegments segments() const {
     return {columns_[0], columns_[1], columns_[2], columns_[3], columns_[4], columns_[5],
             columns_[8], seed_,       columns_[6], kLanes,      columns_[7]};
   }

@@ -21,7 +21,7 @@ class VolumeBsdf : public BsdfTraits {
   static constexpr bool kTransmits = true;
 
   VolumeBsdf(const Color<F>& albedo, const F& anisotropy)
-      : albedo_(albedo), g_(select(abs(anisotropy) < F(kLeastMeanCosine), F(0.f), anisotropy)) {}
+      : albedo_(albedo), g_(select(abs(anisotropy) < F(kMinMeanCosine), F(0.f), anisotropy)) {}
 
   Color<F> albedo() const { return albedo_; }
   Mask<F> has_non_delta() const { return max_component(albedo_) > 0.f; }
@@ -50,8 +50,8 @@ class VolumeBsdf : public BsdfTraits {
       return make_frame<F>(-v.path.dir);
     }
     template <uint32_t kFeatures>
-    void note(const Vertex<F, kFeatures>& v, const Frame<F>& /*frame*/) const {
-      if (!v.notes()) return;
+    void record_aovs(const Vertex<F, kFeatures>& v, const Frame<F>& /*frame*/) const {
+      if (!v.recorded_aovs()) return;
       v.aovs->albedo = bsdf.albedo();
       v.aovs->normal = -v.path.dir;
       v.aovs->is_clear = Mask<F>(false);
@@ -75,12 +75,12 @@ class VolumeBsdf : public BsdfTraits {
     Color<F> albedo(F(0.f));
     F g(0.f);
     Mask<F> in_mesh(false);
-    if (v.knows_inside()) {
+    if (v.has_medium_stack()) {
       // Absorption was applied before this step.
-      in_mesh = v.active & Mask<F>(v.material == U(v.scene.interiors.event_material));
+      in_mesh = v.active & Mask<F>(v.material == U(v.scene.nested_media.event_material));
       albedo = select<F>(in_mesh, Color<F>(F(1.f)), albedo);
       g = select(in_mesh,
-                 gather_field<F>(v.scene.interiors.media, &InteriorMedium<float>::anisotropy,
+                 gather_field<F>(v.scene.nested_media.media, &MeshMedium<float>::anisotropy,
                                  v.path.medium, in_mesh),
                  g);
     }

@@ -15,7 +15,7 @@ WAVECOMB_SHARED_KERNELS(extern, Lanes<WAVECOMB_LANES>);
 template <size_t W>
 void run_wave_in_volumes(Wave& wave, const WaveContext& context, const WaveTask& task) {
   run_wave_through<Lanes<W>>(wave, context, task,
-                             Volumes(context, wave.counts, wave.walks, wave.interiors));
+                             Volumes(context, wave.counts, wave.walks, wave.nested_media));
 }
 template void run_wave_in_volumes<WAVECOMB_LANES>(Wave&, const WaveContext&, const WaveTask&);
 

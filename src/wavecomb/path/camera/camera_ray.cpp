@@ -31,7 +31,7 @@ std::array<float, 3> rolling_of(const Camera& camera, float width, float height,
 CameraSetup::CameraSetup(const Camera& camera, uint32_t width, uint32_t height,
                          const FilterTable& table, uint32_t overscan)
     : Camera(camera),
-      places(camera.steps.begin(), camera.steps.end()),
+      transforms(camera.steps.begin(), camera.steps.end()),
       filter(table.offsets()),
       has_far(camera.far_clip < 1e29f || !camera.clip_planes.empty()) {
   const bool is_latlong = projection == Projection::kLatlong;
@@ -40,10 +40,10 @@ CameraSetup::CameraSetup(const Camera& camera, uint32_t width, uint32_t height,
   if (is_latlong) lens_radius = 0;
   const Vec3<float> z = to_world.axis(2);
   backward = z * (1.f / length(z));
-  const uint32_t shown_x = width - 2 * overscan, shown_y = height - 2 * overscan;
-  const FittedWindow window = fitted_window(camera, shown_x, shown_y);
-  step_x = 2 * window.half_x / static_cast<float>(shown_x);
-  step_y = 2 * window.half_y / static_cast<float>(shown_y);
+  const uint32_t visible_x = width - 2 * overscan, visible_y = height - 2 * overscan;
+  const FittedWindow window = fitted_window(camera, visible_x, visible_y);
+  step_x = 2 * window.half_x / static_cast<float>(visible_x);
+  step_y = 2 * window.half_y / static_cast<float>(visible_y);
   const auto beyond = static_cast<float>(overscan);
   x0 = window.centre_x - window.half_x - beyond * step_x;
   y1 = window.centre_y + window.half_y + beyond * step_y;

@@ -23,13 +23,14 @@ inline constexpr float kConeShare = 0.25f;
 /// Camera with its window fitted to an image of width x height pixels, including overscan. A
 /// latlong camera has no lens radius.
 struct CameraSetup : Camera {
-  std::vector<MatrixStep> places;  ///< transforms over the shutter interval, if the camera moves
-  Vec3<float> backward;            ///< unit vector along the camera's z axis
-  float x0, y1;                    ///< upper left corner of the window
-  float step_x, step_y;            ///< window size of a pixel
-  const float* filter;             ///< FilterTable::offsets()
-  bool has_far;                    ///< whether a far plane or a clipping plane limits rays
-  LensTable distortion;            ///< empty without lens distortion
+  std::vector<MatrixStep>
+      transforms;        ///< transforms over the shutter interval, if the camera moves
+  Vec3<float> backward;  ///< unit vector along the camera's z axis
+  float x0, y1;          ///< upper left corner of the window
+  float step_x, step_y;  ///< window size of a pixel
+  const float* filter;   ///< FilterTable::offsets()
+  bool has_far;          ///< whether a far plane or a clipping plane limits rays
+  LensTable distortion;  ///< empty without lens distortion
   /// Time at which a rolling shutter exposes pixel (x, y):
   ///   a + b (x + 1/2) + c (y + 1/2) + duration t.
   std::array<float, 3> rolling{};
@@ -38,7 +39,7 @@ struct CameraSetup : Camera {
   /// does not support it.
   CameraSetup(const Camera& camera, uint32_t width, uint32_t height, const FilterTable& table,
               uint32_t overscan = 0);
-  bool moves() const { return !places.empty(); }
+  bool moves() const { return !transforms.empty(); }
   /// Returns whether all rays start in one point and stay close to one direction.
   bool is_pinhole() const {
     return projection == Projection::kPerspective && lens_radius == 0 && clip_planes.empty() &&
@@ -58,13 +59,14 @@ inline F camera_time(const CameraSetup& camera, const F& x, const F& y, const F&
 
 /// Returns the camera-to-world transform at a shutter time.
 template <typename F>
-inline MatrixLanes<F> camera_place(const CameraSetup& camera, const F& time,
-                                   const Mask<F>& active) {
+inline MatrixLanes<F> camera_transform(const CameraSetup& camera, const F& time,
+                                       const Mask<F>& active) {
   const Affine& m = camera.to_world;
   if (!camera.moves())
     return {{Vec3<F>(m.row[0]), Vec3<F>(m.row[1]), Vec3<F>(m.row[2])}, Vec3<F>(m.t)};
-  const auto segments = static_cast<uint32_t>(camera.places.size() - 1);
-  return detail::MatrixPair<F>(camera.places.data(), UInt<F>(0u), UInt<F>(segments), time, active)
+  const auto segments = static_cast<uint32_t>(camera.transforms.size() - 1);
+  return detail::MatrixPair<F>(camera.transforms.data(), UInt<F>(0u), UInt<F>(segments), time,
+                               active)
       .matrix();
 }
 
@@ -74,10 +76,10 @@ template <typename F>
 inline F camera_depth(const CameraSetup& camera, const Vec3<F>& p, const F& time,
                       const Mask<F>& active) {
   if (camera.projection == Projection::kLatlong)
-    return length(Vec3<F>(p - camera_place<F>(camera, time, active).t));
+    return length(Vec3<F>(p - camera_transform<F>(camera, time, active).t));
   if (!camera.moves())
     return -dot(Vec3<F>(p - Vec3<F>(camera.to_world.t)), Vec3<F>(camera.backward));
-  const MatrixLanes<F> m = camera_place<F>(camera, time, active);
+  const MatrixLanes<F> m = camera_transform<F>(camera, time, active);
   return -dot(Vec3<F>(p - m.t), normalize(Vec3<F>(m.row[0].z, m.row[1].z, m.row[2].z)));
 }
 
@@ -85,7 +87,7 @@ inline F camera_depth(const CameraSetup& camera, const Vec3<F>& p, const F& time
 template <typename F>
 inline F camera_distance(const CameraSetup& camera, const Vec3<F>& p, const F& time,
                          const Mask<F>& active) {
-  return length(Vec3<F>(p - camera_place<F>(camera, time, active).t));
+  return length(Vec3<F>(p - camera_transform<F>(camera, time, active).t));
 }
 
 template <typename F>
@@ -178,7 +180,7 @@ inline CameraRay<F> ray_through(const CameraSetup& camera, const F& fx, const F&
   F near(camera.near_clip), far(camera.far_clip);
   if (!camera.clip_planes.empty()) detail::clip<F>(camera, local, near, far);
   const Vec3<F> o = fma(d, near, local.o);
-  const MatrixLanes<F> m = camera_place<F>(camera, time, active);
+  const MatrixLanes<F> m = camera_transform<F>(camera, time, active);
   const Vec3<F> world{dot(m.row[0], d), dot(m.row[1], d), dot(m.row[2], d)};
   const F len = length(world);
   const bool is_parallel = camera.projection == Projection::kOrthographic;

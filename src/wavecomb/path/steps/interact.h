@@ -25,19 +25,19 @@ inline constexpr uint32_t kVertexInputs =
 
 /// Hit point of a path. Computes texture coordinates only if a texture or an AOV needs them.
 template <typename Bsdf, typename F>
-struct SurfacePlace {
+struct SurfaceHitPoint {
   UInt<F> textured_inputs;  ///< MaterialRecord::textured_inputs
   Mask<F> reads_texture;    ///< lanes that need uv and a tangent along u
   bool textured;            ///< whether any lane does
   Surface<F> s;
 
   template <uint32_t kFeatures>
-  explicit SurfacePlace(const Vertex<F, kFeatures>& v);
+  explicit SurfaceHitPoint(const Vertex<F, kFeatures>& v);
 };
 
 /// Material lookup at a hit point.
 template <typename Bsdf, typename F>
-struct SurfaceLook {
+struct MaterialLookup {
   Bsdf bsdf;
   Color<F> throughput;  ///< throughput on arrival at the surface
   Color<F> emission;    ///< if the program emits
@@ -47,9 +47,9 @@ struct SurfaceLook {
 /// Shading point on a surface. Later steps use only `bsdf`, `throughput` and the member functions,
 /// which volume events also provide. The step `emit` is for surfaces only.
 template <typename Bsdf, typename F>
-struct SurfaceInteraction : SurfacePlace<Bsdf, F>, SurfaceLook<Bsdf, F> {
-  using SurfacePlace<Bsdf, F>::s;
-  using SurfaceLook<Bsdf, F>::bsdf;
+struct SurfaceInteraction : SurfaceHitPoint<Bsdf, F>, MaterialLookup<Bsdf, F> {
+  using SurfaceHitPoint<Bsdf, F>::s;
+  using MaterialLookup<Bsdf, F>::bsdf;
 
   template <uint32_t kFeatures>
   explicit SurfaceInteraction(const Vertex<F, kFeatures>& v);
@@ -60,14 +60,15 @@ struct SurfaceInteraction : SurfacePlace<Bsdf, F>, SurfaceLook<Bsdf, F> {
   /// Returns the shading frame for light subpaths, whose viewing direction is unknown: uses the
   /// normal without the view-dependent adjustment.
   template <uint32_t kFeatures>
-  Frame<F> unbent_frame(const Vertex<F, kFeatures>& v) const;
+  Frame<F> unadjusted_frame(const Vertex<F, kFeatures>& v) const;
   /// Returns the lanes whose shading normal is adjusted to the viewing direction `dir`. Only camera
   /// paths find light there.
   template <uint32_t kFeatures>
-  Mask<F> bends(const Vertex<F, kFeatures>& v, const Frame<F>& unbent, const Vec3<F>& dir) const;
+  Mask<F> is_adjusted(const Vertex<F, kFeatures>& v, const Frame<F>& unadjusted,
+                      const Vec3<F>& dir) const;
   /// Records albedo, normal and texture coordinates for AOVs that need them.
   template <uint32_t kFeatures>
-  void note(const Vertex<F, kFeatures>& v, const Frame<F>& frame) const;
+  void record_aovs(const Vertex<F, kFeatures>& v, const Frame<F>& frame) const;
   /// Returns the link class of the surface.
   template <uint32_t kFeatures>
   UInt<F> link_class(const Vertex<F, kFeatures>& v) const;
@@ -89,13 +90,13 @@ struct SurfaceInteraction : SurfacePlace<Bsdf, F>, SurfaceLook<Bsdf, F> {
 };
 
 /// Returns the footprint of a texture lookup `width` wide. Camera rays, and all rays with
-/// filters_textures_whole, filter the whole footprint, since single texels would be noise in the
+/// filters_all_lookups, filter the whole footprint, since single texels would be noise in the
 /// image. Other lookups after a bounce read one random texel, since the path is noisier than the
 /// texture.
 template <typename F, uint32_t kFeatures>
 WAVECOMB_INLINE Footprint<F> footprint_of(const Vertex<F, kFeatures>& v, const F& width) {
   using U = UInt<F>;
-  if (v.depth == 0 || v.settings.filters_textures_whole) return width;
+  if (v.depth == 0 || v.settings.filters_all_lookups) return width;
   const U path = hash_u32<U>(v.key.pixel_hash, v.key.sample);
   return {width, hash_u32<U>(path, U(0x7e3a15c1u + v.depth))};
 }
@@ -112,30 +113,30 @@ WAVECOMB_INLINE UInt<F> textured_inputs_of(const Vertex<F, kFeatures>& v) {
 /// Looks up the material and constructs the BSDF in one function, so that kernels keep no
 /// parameters that they do not read.
 template <typename Bsdf, typename F, uint32_t kFeatures>
-WAVECOMB_INLINE SurfaceLook<Bsdf, F> look_at(const Vertex<F, kFeatures>& v, const Surface<F>& s,
-                                             bool textured) {
+WAVECOMB_INLINE MaterialLookup<Bsdf, F> look_up_material(const Vertex<F, kFeatures>& v,
+                                                         const Surface<F>& s, bool textured) {
   const PathState<F>& path = v.path;
   Footprint<F> footprint(F(0.f));
   if (textured) {
-    const F cos_seen = max(abs(dot(path.dir, s.ng)), F(0.05f));
-    footprint = footprint_of<F>(v, F(path.cone_width * s.uv_per_length / sqrt(cos_seen)));
+    const F view_cosine = max(abs(dot(path.dir, s.ng)), F(0.05f));
+    footprint = footprint_of<F>(v, F(path.cone_width * s.uv_per_length / sqrt(view_cosine)));
   }
   const auto make_point = [&](const Mask<F>& lanes) {
     // Copies, so that the originals can stay in registers. Only value graphs use them.
     const MeshHit<F> at = v.hit;
     const Surface<F> surface = s;
     const Vec3<F> dir = path.dir;
-    const Footprint<F> seen = footprint;
-    return graph_point<F>(v.scene, at, surface, dir, seen, lanes);
+    const Footprint<F> lookup_footprint = footprint;
+    return graph_point<F>(v.scene, at, surface, dir, lookup_footprint, lanes);
   };
   const Vec2<F> uv = s.uv;
   auto params = fetch_for<Bsdf, kVertexInputs<Bsdf>, F>(v.scene.materials, v.material, uv,
                                                         footprint, make_point, v.active);
-  if constexpr (Bsdf::kOnSplats && Vertex<F, kFeatures>::has(kCurves))
+  if constexpr (Bsdf::kOnGaussianSplats && Vertex<F, kFeatures>::has(kCurves))
     if (v.scene.has_curves) [[unlikely]]
-      params.emission *= splat_radiance<F>(v.scene, v.hit, path.dir, v.active);
+      params.emission *= gaussian_splat_radiance<F>(v.scene, v.hit, path.dir, v.active);
   Color<F> throughput = path.throughput;
-  if (v.knows_inside()) [[unlikely]] {
+  if (v.has_medium_stack()) [[unlikely]] {
     if constexpr (Bsdf::kReadsIor && Bsdf::kTransmits)
       params.ior = clamp(F(params.ior / select(path.outer > 0.f, path.outer, F(1.f))),
                          F(1.f / kMaxIor), F(kMaxIor));
@@ -151,20 +152,21 @@ WAVECOMB_INLINE SurfaceLook<Bsdf, F> look_at(const Vertex<F, kFeatures>& v, cons
 
 template <typename Bsdf, typename F>
 template <uint32_t kFeatures>
-WAVECOMB_INLINE SurfacePlace<Bsdf, F>::SurfacePlace(const Vertex<F, kFeatures>& v)
+WAVECOMB_INLINE SurfaceHitPoint<Bsdf, F>::SurfaceHitPoint(const Vertex<F, kFeatures>& v)
     : textured_inputs(detail::textured_inputs_of<Bsdf, F>(v)),
       reads_texture(v.active & Mask<F>((textured_inputs & (kVertexInputs<Bsdf> | kReadsGraph)) !=
                                        UInt<F>(0u))),
       textured(Bsdf::kTextured && any(reads_texture)),
       s(setup_surface<F, Vertex<F, kFeatures>::has(kCurves), Vertex<F, kFeatures>::has(kMotion)>(
-          v.scene, v.hit, v.path.dir, textured || Bsdf::kOnFibre || (v.notes() && v.aovs->wants_uv),
+          v.scene, v.hit, v.path.dir,
+          textured || Bsdf::kOnFibre || (v.recorded_aovs() && v.aovs->wants_uv),
           Bsdf::kHasTerminator, v.active)) {}
 
 template <typename Bsdf, typename F>
 template <uint32_t kFeatures>
 WAVECOMB_INLINE SurfaceInteraction<Bsdf, F>::SurfaceInteraction(const Vertex<F, kFeatures>& v)
-    : SurfacePlace<Bsdf, F>(v),
-      SurfaceLook<Bsdf, F>(detail::look_at<Bsdf, F>(v, s, this->textured)) {}
+    : SurfaceHitPoint<Bsdf, F>(v),
+      MaterialLookup<Bsdf, F>(detail::look_up_material<Bsdf, F>(v, s, this->textured)) {}
 
 /// Returns the shading point or volume event of program `Bsdf`.
 template <typename Bsdf, typename F, uint32_t kFeatures>
@@ -199,18 +201,18 @@ WAVECOMB_INLINE Frame<F> SurfaceInteraction<Bsdf, F>::frame(const Vertex<F, kFea
   Vec3<F> n = s.ns;
   const Vec3<F> along = tangent();
   if (const Mask<F> by_map = mapped(v); any(by_map)) {
-    const Vec3<F> seen = facing_normal<F>(dir, s.ng, bumped(n, along));
-    n = select<F>(by_map, reflecting_normal<F>(dir, s.ng, seen), n);
+    const Vec3<F> facing = facing_normal<F>(dir, s.ng, bumped(n, along));
+    n = select<F>(by_map, reflecting_normal<F>(dir, s.ng, facing), n);
   }
   return make_frame<F>(n, along, s.handedness);
 }
 
 template <typename Bsdf, typename F>
 template <uint32_t kFeatures>
-WAVECOMB_INLINE Frame<F> SurfaceInteraction<Bsdf, F>::unbent_frame(
+WAVECOMB_INLINE Frame<F> SurfaceInteraction<Bsdf, F>::unadjusted_frame(
     const Vertex<F, kFeatures>& v) const {
-  if (!Bsdf::kTextured || !this->textured) return make_frame<F>(s.unbent);
-  Vec3<F> n = s.unbent;
+  if (!Bsdf::kTextured || !this->textured) return make_frame<F>(s.unadjusted);
+  Vec3<F> n = s.unadjusted;
   const Vec3<F> along = tangent();
   if (const Mask<F> by_map = mapped(v); any(by_map)) n = select<F>(by_map, bumped(n, along), n);
   return make_frame<F>(n, along, s.handedness);
@@ -218,26 +220,26 @@ WAVECOMB_INLINE Frame<F> SurfaceInteraction<Bsdf, F>::unbent_frame(
 
 template <typename Bsdf, typename F>
 template <uint32_t kFeatures>
-WAVECOMB_INLINE Mask<F> SurfaceInteraction<Bsdf, F>::bends(const Vertex<F, kFeatures>& v,
-                                                           const Frame<F>& unbent,
-                                                           const Vec3<F>& dir) const {
+WAVECOMB_INLINE Mask<F> SurfaceInteraction<Bsdf, F>::is_adjusted(const Vertex<F, kFeatures>& v,
+                                                                 const Frame<F>& unadjusted,
+                                                                 const Vec3<F>& dir) const {
   const auto differ = [](const Vec3<F>& a, const Vec3<F>& b) {
     return Mask<F>(a.x != b.x) | Mask<F>(a.y != b.y) | Mask<F>(a.z != b.z);
   };
-  Mask<F> bent = differ(facing_normal<F>(dir, s.ng, s.unbent), s.unbent);
-  if (!Bsdf::kTextured || !this->textured) return bent;
+  Mask<F> adjusted = differ(facing_normal<F>(dir, s.ng, s.unadjusted), s.unadjusted);
+  if (!Bsdf::kTextured || !this->textured) return adjusted;
   if (const Mask<F> by_map = mapped(v); any(by_map)) {
-    const Vec3<F> seen = facing_normal<F>(dir, s.ng, unbent.n);
-    bent = bent | (by_map & differ(reflecting_normal<F>(dir, s.ng, seen), unbent.n));
+    const Vec3<F> facing = facing_normal<F>(dir, s.ng, unadjusted.n);
+    adjusted = adjusted | (by_map & differ(reflecting_normal<F>(dir, s.ng, facing), unadjusted.n));
   }
-  return bent;
+  return adjusted;
 }
 
 template <typename Bsdf, typename F>
 template <uint32_t kFeatures>
-WAVECOMB_INLINE void SurfaceInteraction<Bsdf, F>::note(const Vertex<F, kFeatures>& v,
-                                                       const Frame<F>& frame) const {
-  if (!v.notes()) return;
+WAVECOMB_INLINE void SurfaceInteraction<Bsdf, F>::record_aovs(const Vertex<F, kFeatures>& v,
+                                                              const Frame<F>& frame) const {
+  if (!v.recorded_aovs()) return;
   v.aovs->albedo = bsdf.albedo();
   v.aovs->normal = select<F>(dot(v.path.dir, s.ng) > 0.f, -frame.n, frame.n);
   v.aovs->is_clear = not_(bsdf.has_non_delta());

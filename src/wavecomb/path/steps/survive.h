@@ -38,8 +38,8 @@ inline F cost_aware_survival(const SceneView& scene, const CostSnapshot& costs,
   const F t = max_component(path.throughput) * path.eta_scale * kRouletteGain;
   const U flags =
       gather_member<F>(scene.materials.materials, &MaterialRecord::flags, material, active);
-  const Mask<F> shines = Mask<F>((flags & static_cast<uint32_t>(kEmits)) != U(0u));
-  return select(active & not_(shines), clamp(F(t / sqrt(relative)), F(0.05f), F(1.f)), F(1.f));
+  const Mask<F> emits = Mask<F>((flags & static_cast<uint32_t>(kEmits)) != U(0u));
+  return select(active & not_(emits), clamp(F(t / sqrt(relative)), F(0.05f), F(1.f)), F(1.f));
 }
 
 /// Returns the random number to compare with cost_aware_survival(). It is independent of the
@@ -53,11 +53,11 @@ inline F cost_aware_number(const SampleKey<F>& key, uint32_t depth) {
 
 /// Records for AOVs a bounce that survives roulette with probability `q`.
 template <typename F, uint32_t kFeatures>
-WAVECOMB_INLINE void note_bounce(const Vertex<F, kFeatures>& v, const GuidePlace<F>& place,
-                                 const F& q, const VertexResult<F>& out) {
+WAVECOMB_INLINE void record_bounce(const Vertex<F, kFeatures>& v, const GuidingLookup<F>& guiding,
+                                   const F& q, const VertexResult<F>& out) {
   if (!v.wants_bounces()) [[likely]]
     return;
-  v.aovs->guided = select(place.guided, F(F(1.f) - place.bsdf_share), F(0.f));
+  v.aovs->guided = select(guiding.guided, F(F(1.f) - guiding.bsdf_share), F(0.f));
   v.aovs->survival = select(out.alive, q, F(-1.f));
 }
 
@@ -67,17 +67,17 @@ WAVECOMB_INLINE void note_bounce(const Vertex<F, kFeatures>& v, const GuidePlace
 /// contribution, since it is smallest in the directions that most light comes from. `arrived` is
 /// the luminance of the throughput at the vertex.
 template <typename F, uint32_t kFeatures>
-WAVECOMB_INLINE void survive(const Vertex<F, kFeatures>& v, const GuidePlace<F>& place,
+WAVECOMB_INLINE void survive(const Vertex<F, kFeatures>& v, const GuidingLookup<F>& guiding,
                              const F& arrived, const F& u, VertexResult<F>& out) {
   if (!v.settings.roulette || v.depth + 1 < v.settings.roulette_depth) {
-    note_bounce<F>(v, place, F(1.f), out);
+    record_bounce<F>(v, guiding, F(1.f), out);
     return;
   }
   const F largest = max_component(out.next.throughput);
   F q = min(F(largest * out.next.eta_scale * kRouletteGain), F(1.f));
   if (v.settings.efficient && v.guide && v.guide->tiles) [[unlikely]]
-    q = select(place.known, worthwhile_survival<F>(place, F(arrived * v.path.importance)), q);
-  note_bounce<F>(v, place, q, out);
+    q = select(guiding.known, efficient_survival<F>(guiding, F(arrived * v.path.importance)), q);
+  record_bounce<F>(v, guiding, q, out);
   out.alive = out.alive & (u < q);
   out.next.throughput *= F(1.f / max(q, F(1e-10f)));
 }

@@ -19,32 +19,33 @@ namespace wavecomb {
 
 /// Data that a render learned before its first pass. Does not change afterwards.
 struct Learned {
-  std::shared_ptr<const Scene> scene;              ///< the rendered scene
-  bool by_tree = false;                            ///< LightView::by_tree
-  std::shared_ptr<const LightCalibration> lights;  ///< null if lights are selected by power
-  std::shared_ptr<const GuideTraining> training;   ///< may have no field
+  std::shared_ptr<const Scene> scene;               ///< the rendered scene
+  bool by_tree = false;                             ///< LightView::by_tree
+  std::shared_ptr<const LightCalibration> lights;   ///< null if lights are selected by power
+  std::shared_ptr<const GuidingTraining> training;  ///< may have no field
 };
 
 /// Surface point at which learned data is looked up.
-struct SeenPlace {
+struct LearnedQuery {
   Vec3<float> p, n;       ///< n: unit normal on the viewer's side
   uint32_t material = 0;  ///< index into the scene's materials
 };
 
 /// Learned data at a surface point.
-struct LearnedPlace {
-  /// Axis that the surface faces (one of kGuideAxes), and whether the field has a region there.
+struct LearnedData {
+  /// Axis that the surface faces (one of kGuidingAxes), and whether the field has a region there.
   uint32_t axis = 0;
   bool known = false;
-  /// Density per steradian of the guiding distribution, if `known`: kGuideSide rows of kGuideSide
-  /// bins of the square map of directions (guiding/directions.h).
+  /// Density per steradian of the guiding distribution, if `known`: kGuidingSide rows of
+  /// kGuidingSide bins of the square map of directions (guiding/directions.h).
   std::vector<float> density;
   float guided_share = 0;  ///< fraction of bounces that sample the guiding field
   /// Survival probability of learned roulette for a throughput equal to the brightness of the
   /// image, before clamping (guiding/roulette.h), or 0 if unknown.
   float survival = 0;
   /// Names of lights and emissive meshes with their selection probability at the point, largest
-  /// first, without those of probability 0. Empty if there are no lights or more than kMostWeighed.
+  /// first, without those of probability 0. Empty if there are no lights or more than
+  /// kMaxCalibratedLights.
   std::vector<std::pair<std::string, float>> light_shares;
 };
 
@@ -52,6 +53,6 @@ struct LearnedPlace {
 inline constexpr uint32_t kCountedChoices = 4096;
 
 /// Looks up the learned data at `place`.
-LearnedPlace look_up(const Learned& learned, const SeenPlace& place);
+LearnedData look_up(const Learned& learned, const LearnedQuery& place);
 
 }  // namespace wavecomb

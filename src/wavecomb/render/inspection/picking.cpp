@@ -13,7 +13,7 @@ namespace wavecomb {
 namespace {
 
 /// Columns of a single hit, as the accelerator writes them.
-struct OneHit {
+struct SingleRayHit {
   float t, u, v;
   uint32_t prim, geom, inst;
 };
@@ -21,8 +21,8 @@ struct OneHit {
 /// Shutter time at which moving objects are picked: the middle.
 constexpr float kMiddle = 0.5f;
 
-OneHit trace(const EmbreeAccelerator& accel, const CameraRay<float>& ray) {
-  OneHit hit{};
+SingleRayHit trace(const EmbreeAccelerator& accel, const CameraRay<float>& ray) {
+  SingleRayHit hit{};
   const float time = kMiddle;
   const uint32_t path = 0;  // decides whether partly present surfaces are hit
   accel.intersect(
@@ -45,7 +45,7 @@ std::optional<Pick> pick(const Scene& scene, const EmbreeAccelerator& accel, flo
   sharp.lens_radius = 0;
   const CameraSetup camera(sharp, width, height, filter);
   const CameraRay<float> ray = ray_through<float>(camera, x, y, 0.5f, 0.5f, kMiddle, true);
-  const OneHit hit = trace(accel, ray);
+  const SingleRayHit hit = trace(accel, ray);
   if (hit.inst == kNoHit) return std::nullopt;
 
   Pick out;
@@ -72,15 +72,15 @@ std::optional<Pick> pick(const Scene& scene, const EmbreeAccelerator& accel, flo
   out.object = names.object(object);
   out.asset = names.asset(object);
   out.depth = camera_depth<float>(camera, out.position, kMiddle, true);
-  out.distance = length(out.position - camera_place<float>(camera, kMiddle, true).t);
+  out.distance = length(out.position - camera_transform<float>(camera, kMiddle, true).t);
   return out;
 }
 
-std::vector<Vec3<float>> seen_places(const Scene& scene, const EmbreeAccelerator& accel,
-                                     uint32_t width, uint32_t height, uint32_t side) {
+std::vector<Vec3<float>> visible_surface_points(const Scene& scene, const EmbreeAccelerator& accel,
+                                                uint32_t width, uint32_t height, uint32_t side) {
   const FilterTable filter(FilterKind::kBox, 1.f);
   const CameraSetup camera(scene.camera(), width, height, filter);
-  std::vector<Vec3<float>> places;
+  std::vector<Vec3<float>> points;
   const auto middle = [&](uint32_t cell, uint32_t pixels) {
     return (static_cast<float>(cell) + 0.5f) * static_cast<float>(pixels) /
            static_cast<float>(side);
@@ -88,10 +88,10 @@ std::vector<Vec3<float>> seen_places(const Scene& scene, const EmbreeAccelerator
   for (uint32_t i = 0; i < side * side; ++i) {
     const CameraRay<float> ray = ray_through<float>(
         camera, middle(i % side, width), middle(i / side, height), 0.5f, 0.5f, kMiddle, true);
-    const OneHit hit = trace(accel, ray);
-    if (hit.inst != kNoHit && hit.inst != kLightShape) places.push_back(fma(ray.d, hit.t, ray.o));
+    const SingleRayHit hit = trace(accel, ray);
+    if (hit.inst != kNoHit && hit.inst != kLightShape) points.push_back(fma(ray.d, hit.t, ray.o));
   }
-  return places;
+  return points;
 }
 
 }  // namespace wavecomb

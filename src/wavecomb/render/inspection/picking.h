@@ -34,7 +34,7 @@ std::optional<Pick> pick(const Scene& scene, const EmbreeAccelerator& accel, flo
 
 /// Returns the surface points hit by rays through the centres of side x side cells of such an
 /// image.
-std::vector<Vec3<float>> seen_places(const Scene& scene, const EmbreeAccelerator& accel,
-                                     uint32_t width, uint32_t height, uint32_t side);
+std::vector<Vec3<float>> visible_surface_points(const Scene& scene, const EmbreeAccelerator& accel,
+                                                uint32_t width, uint32_t height, uint32_t side);
 
 }  // namespace wavecomb

@@ -11,7 +11,7 @@
 namespace wavecomb {
 namespace {
 
-constexpr uint32_t kLeastPilot = 8, kMostPilot = 64, kTimedPilot = 16;
+constexpr uint32_t kMinPilot = 8, kMaxPilot = 64, kTimedPilot = 16;
 /// Fraction of the usual brightness of the image below which noise is not visible: darker pixels
 /// are weighted as if they were this bright.
 constexpr double kDarkShare = 0.25;
@@ -34,7 +34,7 @@ double light_of(const Film& film, size_t pixel) {
 
 /// Returns the usual brightness of the image: the squared mean of square roots, which a few bright
 /// pixels hardly change.
-double usual_light(const Film& film) {
+double typical_brightness(const Film& film) {
   double root = 0;
   for (size_t i = 0; i < film.pixel_count(); ++i) root += std::sqrt(light_of(film, i));
   root /= static_cast<double>(film.pixel_count());
@@ -42,7 +42,7 @@ double usual_light(const Film& film) {
 }
 
 Pilot measure(Film& film, bool with_cost) {
-  const double dark = kDarkShare * usual_light(film);
+  const double dark = kDarkShare * typical_brightness(film);
   const size_t count = film.pixel_count();
   Pilot pilot;
   pilot.error.resize(count, -1);
@@ -68,7 +68,7 @@ Pilot measure(Film& film, bool with_cost) {
 /// values.
 std::vector<double> means_around(const std::vector<double>& values, uint32_t width,
                                  uint32_t height) {
-  constexpr auto kSide = static_cast<int64_t>(kAllotWindow);
+  constexpr auto kSide = static_cast<int64_t>(kAllocationWindow);
   std::vector<double> out(values.size());
   for (int64_t y = 0; y < height; ++y)
     for (int64_t x = 0; x < width; ++x) {
@@ -93,7 +93,7 @@ void limit_weights(std::vector<double>& weights) {
   double mean = 0;
   for (const double w : weights) mean += w;
   mean /= static_cast<double>(weights.size());
-  for (double& w : weights) w = mean > 0 ? std::clamp(w / mean, kLeastWeight, kMostWeight) : 1.0;
+  for (double& w : weights) w = mean > 0 ? std::clamp(w / mean, kMinWeight, kMaxWeight) : 1.0;
 }
 
 /// Returns the samples of each pixel beyond the pilot, max(0, scale * weight - pilot), with the
@@ -150,11 +150,11 @@ std::vector<uint32_t> round_parts(const std::vector<double>& parts, uint64_t tot
 }
 
 double expected_gain(const std::vector<double>& errors, const std::vector<double>& costs,
-                     const Allotment& allotment) {
+                     const SampleAllocation& allocation) {
   double even_error = 0, even_cost = 0, error = 0, cost = 0;
   for (size_t i = 0; i < errors.size(); ++i) {
     const double squared = errors[i] * errors[i], c = costs.empty() ? 1.0 : costs[i];
-    const double n = allotment.counts[i], even = allotment.spp;
+    const double n = allocation.counts[i], even = allocation.spp;
     even_error += squared / even;
     even_cost += c * even;
     error += squared / n;
@@ -166,12 +166,13 @@ double expected_gain(const std::vector<double>& errors, const std::vector<double
 }  // namespace
 
 uint32_t pilot_samples(const Settings& settings) {
-  if (!settings.allots() || settings.spp < 2 * kLeastPilot) return 0;
-  const uint32_t quarter = std::clamp(std::bit_floor(settings.spp / 4), kLeastPilot, kMostPilot);
+  if (!settings.allocates_samples() || settings.spp < 2 * kMinPilot) return 0;
+  const uint32_t quarter = std::clamp(std::bit_floor(settings.spp / 4), kMinPilot, kMaxPilot);
   return settings.time_limit > 0 ? std::min(quarter, kTimedPilot) : quarter;
 }
 
-Allotment allot(Film& film, const Settings& settings, AllotmentFacts& facts) {
+SampleAllocation allocate_samples(Film& film, const Settings& settings,
+                                  AllocationStatistics& facts) {
   const bool by_cost = settings.allocate == Allocate::kEfficiency;
   const Pilot pilot = measure(film, by_cost);
   const std::vector<double> errors = means_around(pilot.error, film.width(), film.height());
@@ -183,7 +184,7 @@ Allotment allot(Film& film, const Settings& settings, AllotmentFacts& facts) {
       if (costs[i] > 0) weights[i] /= std::sqrt(costs[i]);
   limit_weights(weights);
 
-  Allotment out{pilot_samples(settings), settings.spp, {}};
+  SampleAllocation out{pilot_samples(settings), settings.spp, {}};
   const uint32_t more = out.spp - out.pilot;
   // Multiples of a quantum keep the samples of a pixel nets of the Sobol sequence, and give few
   // different counts, so that waves are full.

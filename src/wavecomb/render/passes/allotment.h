@@ -23,17 +23,17 @@
 namespace wavecomb {
 
 /// Pixels to each side in the window of these means.
-inline constexpr uint32_t kAllotWindow = 2;
+inline constexpr uint32_t kAllocationWindow = 2;
 /// Limits of a pixel's weight, relative to the mean weight. They keep a pixel that was dark by
 /// chance from getting too few samples, and a firefly from taking all of them.
-inline constexpr double kLeastWeight = 0.125, kMostWeight = 8;
+inline constexpr double kMinWeight = 0.125, kMaxWeight = 8;
 
 /// Returns the samples per pixel of the pilot. 0 means that all pixels get the same number, because
 /// the settings ask for it or because there are too few samples.
 uint32_t pilot_samples(const Settings& settings);
 
 /// Statistics of an allotment.
-struct AllotmentFacts {
+struct AllocationStatistics {
   uint32_t pilot = 0;            ///< samples per pixel of the pilot; 0 if pixels are sampled evenly
   uint32_t least = 0, most = 0;  ///< samples of a pixel at the end
   double gain = 0;               ///< predicted efficiency over even sampling; 0 if unknown
@@ -42,6 +42,7 @@ struct AllotmentFacts {
 /// Distributes samples so that the mean per pixel is exactly settings.spp and every pixel has at
 /// least the samples of the pilot. `film` holds the pilot's samples with error sums, and with costs
 /// for Allocate::kEfficiency. Writes statistics to `facts`.
-Allotment allot(Film& film, const Settings& settings, AllotmentFacts& facts);
+SampleAllocation allocate_samples(Film& film, const Settings& settings,
+                                  AllocationStatistics& facts);
 
 }  // namespace wavecomb

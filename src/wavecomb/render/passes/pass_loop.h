@@ -36,14 +36,14 @@ class PassLoop {
   RenderStatus status() const;
   /// State of the pass. Contract: while no worker runs.
   const PassState& pass() const { return pass_; }
-  const AllotmentFacts& allotment() const { return allotment_; }
+  const AllocationStatistics& allocation() const { return allocation_; }
 
  private:
   /// Plans the remaining light paths of the pass; empty if the render has none.
   PassPlan light_plan() const;
   /// Sets up the next pass. Returns false if the image is finished.
   bool begin_pass(std::span<const uint32_t> samples);
-  bool is_late() const;
+  bool is_past_deadline() const;
   double seconds() const;
 
   const Settings& settings_;
@@ -57,7 +57,7 @@ class PassLoop {
   std::function<void()> before_lights_;
   std::vector<uint32_t> order_;
   std::vector<uint32_t> light_order_;  ///< Morton order of light path numbers
-  AllotmentFacts allotment_;
+  AllocationStatistics allocation_;
   Clock::time_point start_ = Clock::now();
   uint64_t resumed_samples_ = 0;
   double samples_per_s_ = 0;  ///< speed of the last pass

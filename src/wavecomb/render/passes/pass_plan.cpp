@@ -60,7 +60,7 @@ PassPlan plan_pass(std::span<const uint32_t> order, const Region& window,
   std::map<FromTo, std::vector<uint32_t>> by_count;
   for (const uint32_t pixel : order) {
     const size_t i = window.index(pixel & 0xffffu, pixel >> 16);
-    const uint32_t target = pass.allotment.at(i, pass.target);
+    const uint32_t target = pass.allocation.at(i, pass.target);
     if (pass.is_active(i) && samples[i] < target) by_count[{samples[i], target}].push_back(pixel);
   }
   PassPlan plan;

@@ -17,7 +17,7 @@ namespace wavecomb {
 inline constexpr uint32_t kCheckSamples = 16;
 
 /// Target samples of each pixel if they differ (render/passes/allotment.h).
-struct Allotment {
+struct SampleAllocation {
   uint32_t pilot = 0;            ///< samples of the pilot; 0 if pixels are sampled evenly
   uint32_t spp = 0;              ///< final mean per pixel
   std::vector<uint32_t> counts;  ///< final samples by pixel; empty until the pilot is done
@@ -35,7 +35,7 @@ struct PassState {
   uint32_t target = 0;            ///< samples of each active pixel after the pass, or their mean
   uint32_t light_target = 0;      ///< samples of each light path after the pass
   std::vector<uint8_t> active{};  ///< by pixel, row by row: 1 if active; empty if all are
-  Allotment allotment{};
+  SampleAllocation allocation{};
 
   bool is_active(size_t pixel) const { return active.empty() || active[pixel] != 0; }
 };

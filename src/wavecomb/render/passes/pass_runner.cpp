@@ -37,11 +37,11 @@ void PassRunner::run(const PassPlan& plan, const std::function<bool()>& halted, 
   const auto run_groups = [&](const tbb::blocked_range<size_t>& range) {
     for (size_t g = range.begin(); g != range.end(); ++g) {
       const WaveGroup& group = groups[g];
-      const Clock::time_point begun = Clock::now();
+      const Clock::time_point start = Clock::now();
       for (uint32_t done = 0; done < group.samples && !halted(); done += group.wave_samples)
         run_wave({group.pixels, group.pixel_count, group.first_sample + done,
                   std::min(group.wave_samples, group.samples - done), from_lights});
-      group_s[g] = static_cast<float>(seconds_since(begun));
+      group_s[g] = static_cast<float>(seconds_since(start));
     }
   };
   integrator_.begin_pass();
@@ -49,7 +49,7 @@ void PassRunner::run(const PassPlan& plan, const std::function<bool()>& halted, 
   tbb::parallel_for(tbb::blocked_range<size_t>(0, groups.size(), 1), order.around(run_groups),
                     tbb::simple_partitioner());
   order.join();
-  sharing_.add_pass(group_s);
+  work_distribution_.add_pass(group_s);
   integrator_.end_pass();
 }
 

@@ -46,7 +46,7 @@ class PassRunner {
   /// Seconds from construction until the first wave was done.
   double first_samples_s() const { return first_samples_s_; }
   /// Work distribution of all passes.
-  const Sharing& sharing() const { return sharing_; }
+  const WorkDistribution& work_distribution() const { return work_distribution_; }
 
  private:
   void run_wave(const WaveTask& task);
@@ -57,7 +57,7 @@ class PassRunner {
   std::atomic<uint64_t> samples_{0}, rays_{0};
   Clock::time_point start_ = Clock::now();
   double first_samples_s_ = 0;
-  Sharing sharing_;
+  WorkDistribution work_distribution_;
 };
 
 }  // namespace wavecomb

@@ -23,9 +23,9 @@ namespace wavecomb {
 struct WaveContext;
 
 /// Statistics of the training.
-struct GuideStatistics {
-  GuideFacts facts;    ///< of the last field that was built
-  uint64_t paths = 0;  ///< training paths; 0 if nothing was learned
+struct GuidingStatistics {
+  GuidingFieldStatistics facts;  ///< of the last field that was built
+  uint64_t paths = 0;            ///< training paths; 0 if nothing was learned
   uint32_t rounds = 0;
   uint64_t field_bytes = 0;
   /// For Guiding::kAuto: efficiency with the field over efficiency without, measured in pilot
@@ -35,28 +35,28 @@ struct GuideStatistics {
   double survival = 1;
   bool used = false;  ///< whether the render uses the field for bounces or roulette
   double seconds = 0;
-  bool is_kept = false;  ///< taken over from an earlier render or a checkpoint
+  bool is_reused = false;  ///< taken over from an earlier render or a checkpoint
 };
 
 /// Result of the training.
-struct GuideTraining {
-  std::shared_ptr<const GuideField> field;  ///< null if nothing was learned
-  std::optional<PictureTiles> tiles;        ///< brightness of the image; set if there is a field
-  GuideStatistics statistics;
+struct GuidingTraining {
+  std::shared_ptr<const GuidingField> field;  ///< null if nothing was learned
+  std::optional<ImageTiles> tiles;            ///< brightness of the image; set if there is a field
+  GuidingStatistics statistics;
 };
 
 /// Returns the device layout of the field and of the tiles. Contract: valid as long as `training`.
-GuideView view_of(const GuideTraining& training);
+GuidingView view_of(const GuidingTraining& training);
 
 /// Returns the grid of a scene's guiding field.
-GuideGrid grid_of(const Scene& scene);
+GuidingGrid grid_of(const Scene& scene);
 
 /// Returns whether the settings ask for path guiding or learned roulette.
-bool is_taught(const Settings& settings);
+bool needs_training(const Settings& settings);
 
 /// Trains the field for a render with `context`, whose lights are calibrated. Gives up if `stopped`
 /// returns true; the result is then invalid.
-GuideTraining train_guide(const WaveContext& context, const Scene& scene, const WaveSetup& waves,
-                          const std::function<bool()>& stopped);
+GuidingTraining train_guiding(const WaveContext& context, const Scene& scene,
+                              const WaveSetup& waves, const std::function<bool()>& stopped);
 
 }  // namespace wavecomb

@@ -17,19 +17,19 @@ namespace {
 
 constexpr uint32_t kAimRounds = 4, kAimSeed = 0x9e3779b9u;
 /// Cells along each side of the image through which rays look for surface points.
-constexpr uint32_t kSeenCells = 48;
+constexpr uint32_t kVisibleCells = 48;
 /// Paths of a round: one for every kAimShare pixels of the image, within these limits.
-constexpr uint64_t kAimShare = 4, kLeastAimPaths = 8192, kMostAimPaths = 131'072;
+constexpr uint64_t kAimShare = 4, kMinAimPaths = 8192, kMaxAimPaths = 131'072;
 
 /// Returns spheres around the points that the camera sees. Their radii are doubled, to include
 /// objects that reflect or focus light onto these points.
-LightAim aim_at_seen(const Scene& scene, const EmbreeAccelerator& accel, const Settings& settings,
-                     float scene_radius) {
-  std::vector<AimLesson> seen;
+LightAim aim_at_visible(const Scene& scene, const EmbreeAccelerator& accel,
+                        const Settings& settings, float scene_radius) {
+  std::vector<AimSample> hits;
   for (const Vec3<float>& p :
-       seen_places(scene, accel, settings.width, settings.height, kSeenCells))
-    seen.push_back({p.x, p.y, p.z, 1.f});
-  LightAim aim = aim_targets(seen, scene_radius);
+       visible_surface_points(scene, accel, settings.width, settings.height, kVisibleCells))
+    hits.push_back({p.x, p.y, p.z, 1.f});
+  LightAim aim = aim_targets(hits, scene_radius);
   for (uint32_t k = 0; k < aim.count; ++k)
     aim.radius[k] = std::min(2 * aim.radius[k], scene_radius);
   return aim;
@@ -52,7 +52,7 @@ LightAiming learn_to_aim(const WaveContext& render, const Scene& scene, const Wa
                          const std::function<bool()>& stopped) {
   const Clock::time_point start = Clock::now();
   LightAiming out;
-  if (!render.scene.lights.sends_paths()) return out;
+  if (!render.scene.lights.emits_paths()) return out;
   Settings settings = *render.settings;
   settings.region.reset();
   settings.crop = false;
@@ -61,24 +61,25 @@ LightAiming learn_to_aim(const WaveContext& render, const Scene& scene, const Wa
   // Roulette would multiply the contribution of survivors, which adds noise.
   settings.roulette = RouletteKind::kOff;
   const FilterTable filter(settings.filter, settings.used_filter_width());
-  const SplatFilter splat_filter = splat_filter_of(*render.camera, filter, settings.rendered());
+  const LightSplatFilter light_splat_filter =
+      make_light_splat_filter(*render.camera, filter, settings.rendered());
   WaveContext context = render;
   context.settings = &settings;
-  context.splat_filter = &splat_filter;
+  context.light_splat_filter = &light_splat_filter;
   context.recorder = nullptr;
   const uint64_t numbers = uint64_t{settings.width} * settings.height;
-  const uint64_t count = std::clamp(numbers / kAimShare, kLeastAimPaths, kMostAimPaths);
+  const uint64_t count = std::clamp(numbers / kAimShare, kMinAimPaths, kMaxAimPaths);
   const std::unique_ptr<Integrator> integrator =
       make_integrator(settings.integrator, context, waves.lanes, waves.threads, waves.wave_size);
   PassRunner runner(*integrator, waves.threads, waves.wave_size);
-  out.aim = aim_at_seen(scene, *context.accel, settings, context.scene.lights.radius);
+  out.aim = aim_at_visible(scene, *context.accel, settings, context.scene.lights.radius);
   for (uint32_t round = 0; round < kAimRounds; ++round) {
-    AimLessons lessons(count);
-    context.lessons = &lessons;
+    AimSamples aim_samples(count);
+    context.aim_samples = &aim_samples;
     context.scene.lights.aim = out.aim.count > 0 ? &out.aim : nullptr;
     runner.run(first_paths(settings, count, round), stopped, true);
     if (stopped()) return {};
-    out.aim = aim_targets(lessons.rows(), context.scene.lights.radius);
+    out.aim = aim_targets(aim_samples.rows(), context.scene.lights.radius);
     out.paths += count;
   }
   out.seconds = seconds_since(start);

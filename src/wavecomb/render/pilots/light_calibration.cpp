@@ -20,19 +20,18 @@ namespace wavecomb {
 namespace {
 
 /// Calibration traces one path for every kPixelsOfPath pixels, within these limits.
-constexpr uint32_t kMostPaths = 16384, kLeastPaths = 1024, kPixelsOfPath = 4;
+constexpr uint32_t kMaxPaths = 16384, kMinPaths = 1024, kPixelsOfPath = 4;
 /// Vertices of a path at which a light is selected.
 constexpr uint32_t kVertices = 3;
 constexpr size_t kChunk = 128;
 /// Light tree nodes above this depth are balanced.
 constexpr uint32_t kTiltDepth = 6;
 /// Largest light tree whose nodes are balanced: the nodes are copied, 64 bytes for each light.
-constexpr size_t kMostTilted = size_t{1} << 20;
+constexpr size_t kMaxTilted = size_t{1} << 20;
 
 uint32_t path_count(const Settings& settings) {
   const uint64_t pixels = uint64_t{settings.width} * settings.height;
-  return static_cast<uint32_t>(
-      std::clamp<uint64_t>(pixels / kPixelsOfPath, kLeastPaths, kMostPaths));
+  return static_cast<uint32_t>(std::clamp<uint64_t>(pixels / kPixelsOfPath, kMinPaths, kMaxPaths));
 }
 
 /// Returns pixels spread over the whole image by M. Roberts' R2 sequence, in integer arithmetic.
@@ -57,13 +56,13 @@ std::vector<NodeTilt> balance_nodes(const LightTreeView& tree, const LightProbes
     for (uint32_t k = 0; k < probes.counts[path]; ++k) {
       const LightProbe& probe = probes.probes[path * probes.most + k];
       if (!(probe.value > 0) || probe.light == kNoLight) continue;
-      uint32_t way = tree.trails[probe.light];
-      if (way == kNoLight) continue;
+      uint32_t trail = tree.trails[probe.light];
+      if (trail == kNoLight) continue;
       uint32_t depth = 0, at = tree.root;
       const LightReceiver<float> to({probe.at[0], probe.at[1], probe.at[2]}, probe.normal);
       detail::descend<float>(tree, to, true, [&](float left, bool) {
-        const bool right = (way & 1u) != 0;
-        way >>= 1;
+        const bool right = (trail & 1u) != 0;
+        trail >>= 1;
         if (depth++ < kTiltDepth) {
           const auto [found, fresh] = index.try_emplace(at, nodes.size());
           if (fresh) nodes.push_back({at, {}});
@@ -82,7 +81,7 @@ std::vector<NodeTilt> balance_nodes(const LightTreeView& tree, const LightProbes
 }
 
 /// Returns whether a calibration for settings `a` is valid for `b`.
-bool alike(const Settings& a, const Settings& b) {
+bool is_valid_for(const Settings& a, const Settings& b) {
   return a.width == b.width && a.height == b.height && a.max_depth == b.max_depth &&
          a.filter == b.filter && a.used_filter_width() == b.used_filter_width() &&
          a.light_selection == b.light_selection && a.schlick_fresnel == b.schlick_fresnel &&
@@ -136,22 +135,22 @@ LightCalibration calibrate_lights(const Scene& scene, const EmbreeAccelerator& a
   if (parts.size() == 0) return out;
   const LightSet& set = scene.light_set();
   const LightTree& tree = parts.by_tree ? scene.light_tree(settings.threads) : set.tree;
-  const bool has_nodes = parts.by_tree && tree.nodes.size() > 1 && set.size() <= kMostTilted;
+  const bool has_nodes = parts.by_tree && tree.nodes.size() > 1 && set.size() <= kMaxTilted;
   if (parts.size() < 2 && !has_nodes) return out;
 
   // Mix with even probabilities, so that lights of little power are sampled too.
   std::vector<double> even(parts.size());
   for (size_t i = 0; i < parts.size(); ++i)
     even[i] = 0.5 * parts.power[i] + 0.5 / static_cast<double>(parts.size());
-  LightWeigher weigher(set, tree, parts);
-  const WeighedLights first = weigher.weigh(even, {});
+  LightTableBuilder table_builder(set, tree, parts);
+  const CalibratedLights first = table_builder.build_tables(even, {});
   SceneView probing = view;
   first.apply(probing.lights);
   const std::vector<uint32_t> pixels = spread_pixels(settings, path_count(settings));
   const LightProbes probes = trace_probes(scene, accel, probing, settings, pixels, stopped);
   if (stopped()) return out;
 
-  const PictureTiles tiles(settings, pixels, probes.luminance);
+  const ImageTiles tiles(settings, pixels, probes.luminance);
   std::vector<double> scales;
   if (tiles.is_lit())
     for (const uint32_t pixel : pixels) scales.push_back(tiles.inverse_scale(pixel));
@@ -167,7 +166,7 @@ LightCalibration calibrate_lights(const Scene& scene, const EmbreeAccelerator& a
   }
   std::vector<NodeTilt> tilts;
   if (has_nodes) tilts = balance_nodes(probing.lights.tree, probes, scales);
-  out.weighed = weigher.weigh(balance.shares(parts.power), tilts);
+  out.tables = table_builder.build_tables(balance.shares(parts.power), tilts);
   out.parts = std::move(parts);
   out.paths = static_cast<uint32_t>(pixels.size());
   out.tilted_nodes = static_cast<uint32_t>(tilts.size());
@@ -179,7 +178,7 @@ std::shared_ptr<const LightCalibration> LightCalibrationCache::get(
     const std::shared_ptr<const Scene>& scene, const EmbreeAccelerator& accel,
     const SceneView& view, const Settings& settings, const std::function<bool()>& stopped) {
   const bool is_off = settings.light_weights == LightWeights::kPower;
-  if (!last_ || is_off || scene_.lock() != scene || !alike(settings_, settings)) {
+  if (!last_ || is_off || scene_.lock() != scene || !is_valid_for(settings_, settings)) {
     last_ = std::make_shared<const LightCalibration>(
         calibrate_lights(*scene, accel, view, settings, stopped));
     settings_ = settings;

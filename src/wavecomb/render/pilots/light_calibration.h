@@ -20,8 +20,8 @@ namespace wavecomb {
 
 /// Lights calibrated for one camera, with statistics.
 struct LightCalibration {
-  LightParts parts;       ///< empty if there is nothing to calibrate
-  WeighedLights weighed;  ///< calibrated probabilities
+  LightParts parts;         ///< empty if there is nothing to calibrate
+  CalibratedLights tables;  ///< calibrated probabilities
   uint32_t paths = 0;
   uint32_t tilted_nodes = 0;  ///< light tree nodes with changed odds
   double seconds = 0;

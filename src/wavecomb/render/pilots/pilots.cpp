@@ -7,11 +7,11 @@ namespace wavecomb {
 namespace {
 
 /// Returns the training that a render uses: a new one, or that of an earlier render.
-std::shared_ptr<const GuideTraining> training_for(const PilotInput& input,
-                                                  const WaveContext& context, PilotCache& cache) {
+std::shared_ptr<const GuidingTraining> training_for(const PilotInput& input,
+                                                    const WaveContext& context, PilotCache& cache) {
   if (input.learned.empty())
     return cache.trainings.get(input.scene, context, input.plan.waves, input.stopped);
-  return std::make_shared<const GuideTraining>(
+  return std::make_shared<const GuidingTraining>(
       unpacked_training(input.learned, *input.scene, input.plan.settings));
 }
 
@@ -19,7 +19,7 @@ std::shared_ptr<const GuideTraining> training_for(const PilotInput& input,
 
 void PilotResults::apply(WaveContext& context) const {
   context.scene.lights = light_view;
-  if (training->field) context.guide = &guide_view;
+  if (training->field) context.guide = &guiding_view;
 }
 
 PilotResults run_pilots(const PilotInput& input, PilotCache& cache) {
@@ -29,7 +29,7 @@ PilotResults run_pilots(const PilotInput& input, PilotCache& cache) {
   PilotResults found;
   found.lights = cache.lights.get(input.scene, plan.accelerator, plan.view, input.light_settings,
                                   input.stopped);
-  found.lights->weighed.apply(view);
+  found.lights->tables.apply(view);
   if (context.joins_light()) send_paths(*input.scene, view);
   input.costs.start(context, plan.kernels, input.profile, input.halted);
   if (plan.settings.joins_light() && plan.settings.light_aim) {
@@ -41,7 +41,7 @@ PilotResults run_pilots(const PilotInput& input, PilotCache& cache) {
   }
   found.light_view = view;
   found.training = training_for(input, context, cache);
-  if (found.training->field) found.guide_view = view_of(*found.training);
+  if (found.training->field) found.guiding_view = view_of(*found.training);
   return found;
 }
 

@@ -30,7 +30,7 @@ namespace wavecomb {
 /// Contract: one thread at a time.
 struct PilotCache {
   LightCalibrationCache lights;
-  GuideTrainingCache trainings;
+  GuidingTrainingCache trainings;
 };
 
 /// Results of the pilots of one render.
@@ -38,9 +38,9 @@ struct PilotResults {
   std::shared_ptr<const LightCalibration> lights;  ///< null if not calibrated yet
   std::shared_ptr<const LightAiming> aiming;       ///< null if light paths are not aimed
   /// Never null; without a field before and unless it is trained.
-  std::shared_ptr<const GuideTraining> training = std::make_shared<const GuideTraining>();
-  LightView light_view;  ///< lights with calibrated weights, and aimed if they send paths
-  GuideView guide_view;  ///< of the field of `training`, if it has one
+  std::shared_ptr<const GuidingTraining> training = std::make_shared<const GuidingTraining>();
+  LightView light_view;      ///< lights with calibrated weights, and aimed if they send paths
+  GuidingView guiding_view;  ///< of the field of `training`, if it has one
 
   /// Makes the waves of `context` use these results. Contract: this object outlives the use of the
   /// context and does not change meanwhile.

@@ -12,7 +12,7 @@ namespace wavecomb {
 namespace {
 
 /// Version of the packed format. Increase it when the format changes.
-constexpr uint32_t kKeptFormat = 2;
+constexpr uint32_t kCacheFormat = 2;
 
 class ByteWriter {
  public:
@@ -58,8 +58,9 @@ class ByteReader {
   void end() const { check(left_.empty()); }
 
  private:
-  static void check(bool is_good) {
-    if (!is_good) throw Error("what was learned before is cut, or is of another build; start anew");
+  static void check(bool is_symbol) {
+    if (!is_symbol)
+      throw Error("what was learned before is cut, or is of another build; start anew");
   }
   void take(void* to, size_t size) {
     check(size <= left_.size());
@@ -98,7 +99,7 @@ void pass_parts(Archive& archive, Parts& parts) {
 }
 
 /// Returns the settings with those that do not affect training reset to their defaults.
-Settings that_teach(Settings settings) {
+Settings training_settings(Settings settings) {
   const Settings fresh;
   settings.seed = fresh.seed;
   settings.region.reset();
@@ -123,10 +124,10 @@ Settings that_teach(Settings settings) {
 
 }  // namespace
 
-std::vector<std::byte> packed_training(const GuideTraining& training) {
+std::vector<std::byte> packed_training(const GuidingTraining& training) {
   if (training.statistics.paths == 0) return {};
   ByteWriter writer;
-  writer.value(kKeptFormat);
+  writer.value(kCacheFormat);
   pass_statistics(writer, training.statistics);
   writer.value(static_cast<uint8_t>(training.field ? 1 : 0));
   if (training.field) {
@@ -136,47 +137,47 @@ std::vector<std::byte> packed_training(const GuideTraining& training) {
   return writer.take();
 }
 
-GuideTraining unpacked_training(std::span<const std::byte> bytes, const Scene& scene,
-                                const Settings& settings) {
+GuidingTraining unpacked_training(std::span<const std::byte> bytes, const Scene& scene,
+                                  const Settings& settings) {
   ByteReader reader(bytes);
   uint32_t format = 0;
   reader.value(format);
-  if (format != kKeptFormat)
+  if (format != kCacheFormat)
     throw Error("what was learned before is of another version; resume with that, or start anew");
-  GuideTraining out;
+  GuidingTraining out;
   pass_statistics(reader, out.statistics);
   uint8_t has_field = 0;
   reader.value(has_field);
   if (has_field != 0) {
-    GuideParts parts;
+    GuidingFieldArrays parts;
     std::vector<double> inverse_scales;
     pass_parts(reader, parts);
     reader.row(inverse_scales);
-    out.field = std::make_shared<const GuideField>(grid_of(scene), std::move(parts),
-                                                   out.statistics.facts, scene.materials().size());
+    out.field = std::make_shared<const GuidingField>(
+        grid_of(scene), std::move(parts), out.statistics.facts, scene.materials().size());
     out.tiles.emplace(settings, std::move(inverse_scales));
   }
   reader.end();
   out.statistics.used = out.field != nullptr;
-  out.statistics.is_kept = true;
+  out.statistics.is_reused = true;
   return out;
 }
 
-std::shared_ptr<const GuideTraining> GuideTrainingCache::get(
+std::shared_ptr<const GuidingTraining> GuidingTrainingCache::get(
     const std::shared_ptr<const Scene>& scene, const WaveContext& context, const WaveSetup& waves,
     const std::function<bool()>& stopped) {
-  const Settings settings = that_teach(*context.settings);
+  const Settings settings = training_settings(*context.settings);
   if (last_ && scene_.lock() == scene && settings_ == settings) {
-    if (!last_->statistics.is_kept) {
-      auto kept = std::make_shared<GuideTraining>(*last_);
-      kept->statistics.is_kept = true;
-      kept->statistics.seconds = 0;
-      last_ = std::move(kept);
+    if (!last_->statistics.is_reused) {
+      auto reused = std::make_shared<GuidingTraining>(*last_);
+      reused->statistics.is_reused = true;
+      reused->statistics.seconds = 0;
+      last_ = std::move(reused);
     }
     return last_;
   }
   auto trained =
-      std::make_shared<const GuideTraining>(train_guide(context, *scene, waves, stopped));
+      std::make_shared<const GuidingTraining>(train_guiding(context, *scene, waves, stopped));
   if (trained->statistics.paths > 0 && !stopped()) {
     last_ = trained;
     settings_ = settings;

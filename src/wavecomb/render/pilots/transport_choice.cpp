@@ -16,7 +16,7 @@ namespace {
 /// Samples per pixel of a pilot render, enough for the effects of the Sobol sequence and of
 /// roulette, and limits of its pixel count.
 constexpr uint32_t kTransportSamples = 8;
-constexpr uint64_t kLeastTransportPixels = 400, kMostTransportPixels = 16'384;
+constexpr uint64_t kMinTransportPixels = 400, kMaxTransportPixels = 16'384;
 /// A pilot render takes one of every kTransportShare samples of the render. With five images, of
 /// which three cost two or three times as much as the others, pilots take at most a fiftieth of the
 /// render.
@@ -25,7 +25,7 @@ constexpr std::array<uint32_t, 2> kTransportSeeds = {0x3c6ef372u, 0xa54ff53au};
 /// Costs in rays of a vertex: by kernels for camera paths only, and by kernels that support light
 /// paths.
 constexpr double kPathVertex = 0.7, kJointVertex = 0.8;
-/// With merging, additional costs in rays of a camera path (which may store a visible point) and of
+/// With merging, additional costs in rays of a camera path (which may store a merge point) and of
 /// a light vertex.
 constexpr double kMergedPath = 1, kMergedVertex = 1;
 /// Fraction of the noisiest pixels that are also left out for a second estimate. A single one may
@@ -33,19 +33,19 @@ constexpr double kMergedPath = 1, kMergedVertex = 1;
 constexpr double kNoisiest = 0.01;
 /// Light that is rarely found makes nearly all pixels black and the others far too bright. Its
 /// squared error is limited to this many squares of the light at the pixel.
-constexpr double kMostLost = 8;
+constexpr double kMaxLost = 8;
 /// Least predicted gain in efficiency for light paths to be used.
-constexpr double kWorthwhileLight = 1.3;
+constexpr double kMinLightPathGain = 1.3;
 /// Roughness below which a lobe is sharp enough for visible caustics.
 constexpr float kSharpRoughness = 0.4f;
 
 /// Returns the width and height of a pilot render for a render with settings `s`, or 0 if the
 /// render has too few samples.
-std::array<uint32_t, 2> trial_size(const Settings& s) {
+std::array<uint32_t, 2> pilot_size(const Settings& s) {
   const uint64_t samples = uint64_t{s.width} * s.height * s.spp;
   const uint64_t pixels = std::min({samples / kTransportShare / kTransportSamples,
-                                    kMostTransportPixels, uint64_t{s.width} * s.height});
-  if (pixels < kLeastTransportPixels) return {0, 0};
+                                    kMaxTransportPixels, uint64_t{s.width} * s.height});
+  if (pixels < kMinTransportPixels) return {0, 0};
   const double shrink = std::sqrt(static_cast<double>(pixels) / (double{1} * s.width * s.height));
   const auto side = [&](uint32_t full) {
     return std::max(1u, static_cast<uint32_t>(std::lround(full * shrink)));
@@ -79,25 +79,25 @@ std::vector<double> inverse_squares(const std::vector<double>& mean, uint32_t wi
 }
 
 /// Rays and shading records of a pilot render.
-struct TrialWork {
+struct PilotWork {
   double rays = 0, records = 0;
 
   double cost(double vertex) const { return rays + vertex * records; }
 };
-TrialWork work_of(const std::array<TransportTrial, 2>& trials) {
-  TrialWork work;
-  for (const TransportTrial& t : trials) {
+PilotWork work_of(const std::array<TransportPilot, 2>& pilots) {
+  PilotWork work;
+  for (const TransportPilot& t : pilots) {
     work.rays += 0.5 * static_cast<double>(t.rays);
     work.records += 0.5 * static_cast<double>(t.records);
   }
   return work;
 }
 /// Returns the work of camera paths alone, extrapolated from two ratios of light paths.
-TrialWork work_without(const TransportTrials& trials) {
-  const TrialWork few = work_of(trials.with[0]), many = work_of(trials.with[1]);
-  const double a = double{kTriedShares[0].paths()}, b = double{kTriedShares[1].paths()};
-  const auto at_none = [&](double x, double y) { return (b * x - a * y) / (b - a); };
-  return {at_none(few.rays, many.rays), at_none(few.records, many.records)};
+PilotWork work_without(const TransportPilots& pilots) {
+  const PilotWork few = work_of(pilots.with[0]), many = work_of(pilots.with[1]);
+  const double a = double{kCandidateShares[0].paths()}, b = double{kCandidateShares[1].paths()};
+  const auto without_light_paths = [&](double x, double y) { return (b * x - a * y) / (b - a); };
+  return {without_light_paths(few.rays, many.rays), without_light_paths(few.records, many.records)};
 }
 
 /// Squared relative noise by pixel.
@@ -122,15 +122,15 @@ bool is_sharp(float roughness, bool varies) {
 
 }  // namespace
 
-TransportGain transport_gain(const TransportTrials& trials, double longer) {
-  const std::array<TransportTrial, 2>& most = trials.with[kTriedShares.size() - 1];
+TransportGain transport_gain(const TransportPilots& pilots, double longer) {
+  const std::array<TransportPilot, 2>& most = pilots.with[kCandidateShares.size() - 1];
   const size_t pixels = most[0].beauty.size() / 3;
   std::vector<double> mean(pixels);
   for (size_t i = 0; i < pixels; ++i)
-    for (const auto& with : trials.with)
-      for (const TransportTrial& t : with)
-        mean[i] += 0.5 / kTriedShares.size() * double{brightness(t.beauty, i)};
-  const std::vector<double> scale = inverse_squares(mean, trials.width);
+    for (const auto& with : pilots.with)
+      for (const TransportPilot& t : with)
+        mean[i] += 0.5 / kCandidateShares.size() * double{brightness(t.beauty, i)};
+  const std::vector<double> scale = inverse_squares(mean, pilots.width);
   const auto squared = [](double d) { return d * d; };
   PixelNoise camera(pixels), left(pixels);
   for (size_t i = 0; i < pixels; ++i) {
@@ -138,30 +138,30 @@ TransportGain transport_gain(const TransportTrials& trials, double longer) {
     const double l1 = brightness(most[1].by_light_paths, i);
     const double c0 = brightness(most[0].beauty, i) - l0, c1 = brightness(most[1].beauty, i) - l1;
     camera[i] = 0.5 * squared(c0 - c1) * scale[i];
-    const double bound = kMostLost * std::max(0.0, l0 * l1) * longer;
-    left[i] = std::min(trials.variance[i] / kTransportSamples, bound) * scale[i];
+    const double bound = kMaxLost * std::max(0.0, l0 * l1) * longer;
+    left[i] = std::min(pilots.variance[i] / kTransportSamples, bound) * scale[i];
   }
-  const TrialWork without = work_without(trials);
+  const PilotWork without = work_without(pilots);
   const double path_cost = without.cost(kPathVertex);
   const double all_without = (sum(camera) + sum(left)) * path_cost;
   const double most_without =
       (sum_of_most(std::move(camera)) + sum_of_most(std::move(left))) * path_cost;
   TransportGain best;
-  for (size_t k = 0; k < kTriedShares.size(); ++k) {
-    const auto& with = trials.with[k];
+  for (size_t k = 0; k < kCandidateShares.size(); ++k) {
+    const auto& with = pilots.with[k];
     PixelNoise noise(pixels);
     for (size_t i = 0; i < pixels; ++i)
       noise[i] = 0.5 * scale[i] *
                  squared(double{brightness(with[0].beauty, i)} - brightness(with[1].beauty, i));
-    const TrialWork work = work_of(with);
+    const PilotWork work = work_of(with);
     double cost = work.cost(kJointVertex);
-    if (trials.merges)
+    if (pilots.merges)
       cost += kMergedPath * kTransportSamples * static_cast<double>(pixels) +
               kMergedVertex * (work.records - without.records);
     const double all = sum(noise) * cost, of_most = sum_of_most(std::move(noise)) * cost;
     const double gain =
         std::max(all > 0 ? all_without / all : 0, of_most > 0 ? most_without / of_most : 0);
-    if (gain > best.gain) best = {gain, kTriedShares[k]};
+    if (gain > best.gain) best = {gain, kCandidateShares[k]};
   }
   return best;
 }
@@ -180,18 +180,18 @@ bool focuses_light(const Scene& scene) {
 }
 
 TransportChoice choose_transport(const Scene& scene, const Settings& settings,
-                                 const RenderTrial& render, const std::function<bool()>& stopped) {
+                                 const RenderPilot& render, const std::function<bool()>& stopped) {
   const Clock::time_point start = Clock::now();
   TransportChoice choice;
-  const auto refused = [&](const LightPathRefusal& refusal) {
-    if (!refusal.what.empty()) choice.why = "light paths do not go with " + refusal.what;
-    return !refusal.what.empty();
+  const auto reject = [&](const LightPathConflict& conflict) {
+    if (!conflict.what.empty()) choice.why = "light paths do not go with " + conflict.what;
+    return !conflict.what.empty();
   };
   if (settings.max_depth == 0) {
     choice.why = "no light is scattered at a maximum depth of 0";
     return choice;
   }
-  if (refused(light_path_refusal(settings)) || refused(light_path_refusal(scene))) return choice;
+  if (reject(light_path_conflict(settings)) || reject(light_path_conflict(scene))) return choice;
   try {
     (void)BackwardAutomaton(PathAutomaton(settings.expressions, scene.light_groups()));
   } catch (const Error&) {
@@ -202,11 +202,11 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings,
     choice.why = "nothing in the stage is clear or glossy";
     return choice;
   }
-  if (!sends_paths(scene)) {
+  if (!emits_paths(scene)) {
     choice.why = "no light sends paths";
     return choice;
   }
-  const auto [width, height] = trial_size(settings);
+  const auto [width, height] = pilot_size(settings);
   if (width == 0) {
     choice.why = "too few samples to find out whether light paths pay";
     return choice;
@@ -226,28 +226,28 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings,
   small.aovs.bits = 0;
   small.light_groups.clear();
   small.expressions.clear();
-  TransportTrials trials;
-  trials.width = width;
-  trials.merges = settings.merge_radius > 0;
+  TransportPilots pilots;
+  pilots.width = width;
+  pilots.merges = settings.merge_radius > 0;
   small.seed = kTransportSeeds[0];
   small.transport = Transport::kLight;
   small.aovs.bits = static_cast<uint32_t>(Aov::kByLightPaths);
-  const TransportTrial squares = render(small, kTriedShares.back(), true);
-  for (size_t k = 0; k < kTriedShares.size(); ++k)
+  const TransportPilot squares = render(small, kCandidateShares.back(), true);
+  for (size_t k = 0; k < kCandidateShares.size(); ++k)
     for (size_t i = 0; i < kTransportSeeds.size(); ++i) {
       small.seed = kTransportSeeds[i];
-      if (!stopped()) trials.with[k][i] = render(small, kTriedShares[k], false);
+      if (!stopped()) pilots.with[k][i] = render(small, kCandidateShares[k], false);
     }
   if (stopped()) return choice;
   const double unit = scene_brightness(scene);
   for (size_t i = 0; i < squares.beauty.size() / 3; ++i)
-    trials.variance.push_back(unit * brightness(squares.by_light_paths, i));
+    pilots.variance.push_back(unit * brightness(squares.by_light_paths, i));
   const TransportGain found =
-      transport_gain(trials, static_cast<double>(settings.spp) / kTransportSamples);
+      transport_gain(pilots, static_cast<double>(settings.spp) / kTransportSamples);
   choice.gain = found.gain;
   choice.why =
       "by a trial of " + std::to_string(width) + " x " + std::to_string(height) + " pixels";
-  if (found.gain >= kWorthwhileLight) {
+  if (found.gain >= kMinLightPathGain) {
     choice.transport = Transport::kLight;
     choice.share = found.share;
   }

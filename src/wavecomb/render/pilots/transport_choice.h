@@ -38,18 +38,18 @@ struct TransportChoice {
 };
 
 /// Result of a small pilot render.
-struct TransportTrial {
+struct TransportPilot {
   std::vector<float> beauty;          ///< rgb
   std::vector<float> by_light_paths;  ///< the part of beauty from light paths; empty without them
   uint64_t rays = 0, records = 0;     ///< traced rays and shading records
 };
 /// Renders a small image with the given ratio of light paths. If the last argument is true,
 /// by_light_paths holds the variance of RenderOptions::wants_camera_squares.
-using RenderTrial = std::function<TransportTrial(const Settings&, LightPathShare, bool)>;
+using RenderPilot = std::function<TransportPilot(const Settings&, LightPathShare, bool)>;
 
 /// Candidate ratios of light paths. Near the better one, efficiency hardly depends on the ratio on
 /// stages with caustics, with and without merging.
-inline constexpr std::array<LightPathShare, 2> kTriedShares = {{{-3}, {0}}};
+inline constexpr std::array<LightPathShare, 2> kCandidateShares = {{{-3}, {0}}};
 
 /// Returns whether any material reflects or transmits light sharply enough for caustics.
 bool focuses_light(const Scene& scene);
@@ -57,13 +57,13 @@ bool focuses_light(const Scene& scene);
 /// Chooses the transport for `settings` from small images made by `render`. Gives up if `stopped`
 /// returns true; the result is then invalid.
 TransportChoice choose_transport(const Scene& scene, const Settings& settings,
-                                 const RenderTrial& render, const std::function<bool()>& stopped);
+                                 const RenderPilot& render, const std::function<bool()>& stopped);
 
 // Exposed for tests.
 
 /// Small pilot renders of `width` columns.
-struct TransportTrials {
-  std::array<TransportTrial, 2> with[kTriedShares.size()];  ///< by ratio, two seeds each
+struct TransportPilots {
+  std::array<TransportPilot, 2> with[kCandidateShares.size()];  ///< by ratio, two seeds each
   std::vector<double> variance;  ///< by pixel, per sample: of light left to camera paths
   uint32_t width = 0;
   bool merges = false;
@@ -73,6 +73,6 @@ struct TransportGain {
   LightPathShare share;
 };
 /// Returns the predicted gain for a render with `longer` times as many samples.
-TransportGain transport_gain(const TransportTrials& trials, double longer);
+TransportGain transport_gain(const TransportPilots& pilots, double longer);
 
 }  // namespace wavecomb

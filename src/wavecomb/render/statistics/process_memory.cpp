@@ -11,7 +11,7 @@
 
 namespace wavecomb {
 
-void give_back_memory() {
+void release_memory() {
 #ifdef __GLIBC__
   malloc_trim(0);
 #endif

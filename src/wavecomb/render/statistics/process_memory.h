@@ -8,6 +8,6 @@ namespace wavecomb {
 /// Returns the peak resident memory of this process in bytes.
 uint64_t peak_rss_bytes();
 /// Returns freed memory to the system. Call after loading; only glibc keeps such memory.
-void give_back_memory();
+void release_memory();
 
 }  // namespace wavecomb

@@ -50,8 +50,8 @@ RenderCosts::RenderCosts(const Scene& scene, std::span<const MaterialTraits> tra
 
 void RenderCosts::start(const WaveContext& context, const LaneKernels& kernels,
                         const CostProfile* profile, const std::function<bool()>& halted) {
-  const bool knows_all = profile && apply(*profile);
-  if (measures_ && !knows_all) {
+  const bool is_complete = profile && apply(*profile);
+  if (measures_ && !is_complete) {
     const DenormalsOff denormals_off;
     const auto begin = std::chrono::steady_clock::now();
     order = calibrate(scene_, context, kernels, halted);
@@ -88,24 +88,24 @@ bool RenderCosts::apply(const CostProfile& profile) {
   using Costs = std::unordered_map<std::string, float>;
   const Costs materials(profile.materials.begin(), profile.materials.end());
   const Costs textures(profile.textures.begin(), profile.textures.end());
-  bool knows_all = true;
+  bool is_complete = true;
   for (size_t m = 0; m < order.material_ns.size(); ++m) {
     const auto at = materials.find(scene_.materials()[m].name);
     const bool known = at != materials.end() && at->second > 0;
     if (known) order.material_ns[m] = at->second;
-    knows_all = knows_all && known;
+    is_complete = is_complete && known;
   }
   for (size_t t = 0; t < order.texture_ns.size(); ++t) {
     const auto at = textures.find(scene_.textures()[t]->name());
     // 0 means too little to be measured
     const bool known = at != textures.end() && at->second >= 0;
     if (known) order.texture_ns[t] = at->second;
-    knows_all = knows_all && known;
+    is_complete = is_complete && known;
   }
   double sum = 0;
   for (float ns : order.material_ns) sum += ns;
   order.mean_ns = static_cast<float>(sum / static_cast<double>(order.material_ns.size()));
-  return knows_all;
+  return is_complete;
 }
 
 }  // namespace wavecomb

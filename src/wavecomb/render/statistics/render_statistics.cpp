@@ -92,7 +92,7 @@ LightShares light_shares(const LightCalibration& calibration) {
       calibration.seconds, calibration.paths, calibration.kept, calibration.tilted_nodes, {}};
   const LightParts& parts = calibration.parts;
   for (size_t i = 0; i < parts.size(); ++i)
-    out.parts.push_back({parts.names[i], calibration.weighed.shares[i], parts.power[i]});
+    out.parts.push_back({parts.names[i], calibration.tables.shares[i], parts.power[i]});
   return out;
 }
 

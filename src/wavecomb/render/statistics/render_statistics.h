@@ -66,7 +66,7 @@ struct RenderStatistics {
   uint64_t walks = 0, walk_steps = 0, walk_lanes = 0;  ///< subsurface random walks; see Counts
   uint32_t threads = 0, wave_size = 0, lanes = 0;
   uint32_t passes = 0;  ///< begun
-  Sharing sharing;
+  WorkDistribution sharing;
   uint64_t resumed_samples = 0;  ///< from a checkpoint; not in `samples`
   double error = 0;              ///< mean relative error of the image; infinite if unknown
   SceneBytes scene_bytes;
@@ -81,8 +81,8 @@ struct RenderStatistics {
   std::vector<std::pair<std::string, uint64_t>> policy_uses;  ///< queues ordered by each policy
   double calibration_s = 0;
   LightShares light_calibration;
-  AllotmentFacts allotment;
-  GuideStatistics guiding;
+  AllocationStatistics allotment;
+  GuidingStatistics guiding;
   AimStatistics light_aiming;
   std::vector<std::string> lights_without_paths;  ///< names, if other lights send light paths
   std::optional<TransportChoice> transport;       ///< for Transport::kAuto

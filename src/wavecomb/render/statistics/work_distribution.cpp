@@ -24,11 +24,11 @@ double list_schedule(std::span<const float> group_s, uint32_t threads) {
 
 }  // namespace
 
-void Sharing::add_pass(std::span<const float> group_s) {
+void WorkDistribution::add_pass(std::span<const float> group_s) {
   groups_ += group_s.size();
   for (const float s : group_s) longest_s_ = std::max(longest_s_, static_cast<double>(s));
-  for (size_t i = 0; i < kSharedBy.size(); ++i)
-    passes_s_[i] += list_schedule(group_s, kSharedBy[i]);
+  for (size_t i = 0; i < kThreadCounts.size(); ++i)
+    passes_s_[i] += list_schedule(group_s, kThreadCounts[i]);
 }
 
 }  // namespace wavecomb

@@ -10,7 +10,7 @@
 namespace wavecomb {
 
 /// Numbers of threads for which times are predicted.
-inline constexpr std::array<uint32_t, 7> kSharedBy = {1, 2, 4, 8, 16, 32, 64};
+inline constexpr std::array<uint32_t, 7> kThreadCounts = {1, 2, 4, 8, 16, 32, 64};
 
 /// Work distribution, added up over the passes of a render.
 ///
@@ -19,20 +19,20 @@ inline constexpr std::array<uint32_t, 7> kSharedBy = {1, 2, 4, 8, 16, 32, 64};
 /// free thread takes the next group of the plan (Graham 1969: at most 2 - 1 / threads times the
 /// optimum). The prediction uses the measured durations of the groups, so it ignores that more
 /// threads share caches, memory bandwidth and clock.
-class Sharing {
+class WorkDistribution {
  public:
   /// Adds a pass whose groups took `group_s` seconds each, in the order of its plan.
   void add_pass(std::span<const float> group_s);
 
   uint64_t groups() const { return groups_; }
   double longest_s() const { return longest_s_; }
-  /// Returns the predicted seconds of all passes on kSharedBy[i] threads.
+  /// Returns the predicted seconds of all passes on kThreadCounts[i] threads.
   double passes_s(size_t i) const { return passes_s_[i]; }
 
  private:
   uint64_t groups_ = 0;
   double longest_s_ = 0;
-  std::array<double, kSharedBy.size()> passes_s_{};
+  std::array<double, kThreadCounts.size()> passes_s_{};
 };
 
 }  // namespace wavecomb

@@ -140,7 +140,7 @@ bool finite(const FourNumbers& four) {
   return true;
 }
 
-bool is_place(const Affine& m) {
+bool is_valid_transform(const Affine& m) {
   return finite(m) && std::abs(m.determinant()) >= 1e-30f;
 }
 
@@ -173,12 +173,12 @@ std::span<const CameraParameter> camera_table() {
 }
 
 void check_camera(const Camera& camera) {
-  if (!is_place(camera.to_world))
+  if (!is_valid_transform(camera.to_world))
     throw Error("the camera's transform is singular or not finite; give an invertible one");
-  if (camera.steps.size() == 1 || camera.steps.size() > kMostSteps)
-    throw Error("the camera's motion needs 2 to " + std::to_string(kMostSteps) + " steps");
+  if (camera.steps.size() == 1 || camera.steps.size() > kMaxSteps)
+    throw Error("the camera's motion needs 2 to " + std::to_string(kMaxSteps) + " steps");
   for (const Affine& step : camera.steps)
-    if (!is_place(step))
+    if (!is_valid_transform(step))
       throw Error(
           "the camera's motion has a singular or non-finite transform; give invertible ones");
   for (const CameraParameter& p : camera_table()) p.check(camera);

@@ -37,11 +37,11 @@ namespace wavecomb {
 
 /// Returns whether kernels of a kind are built in `lanes` lanes.
 constexpr bool has_kernels(std::string_view kind, size_t lanes) {
-  constexpr size_t kMost = WAVECOMB_MAX_LANES;
+  constexpr size_t kMax = WAVECOMB_MAX_LANES;
   const auto is_of = [&](std::string_view widths) {
     return widths == "every" || widths == "first" || (widths == "scalar" && lanes == 1) ||
-           (widths == "ends" && (lanes == 1 || lanes == kMost)) ||
-           (widths == "widest" && lanes > 1 && lanes == kMost);
+           (widths == "ends" && (lanes == 1 || lanes == kMax)) ||
+           (widths == "widest" && lanes > 1 && lanes == kMax);
   };
   constexpr bool kIsReduced = WAVECOMB_REDUCED_KERNELS;
 #define WAVECOMB_ROW(name, set, widths, reduced, gain) \

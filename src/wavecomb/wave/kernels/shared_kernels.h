@@ -17,8 +17,8 @@
 #define WAVECOMB_SHARED_KERNELS(KEYWORD, F)                                                        \
   KEYWORD template LightSample<F> sample_light<F>(const LightView&, const LightReceiver<F>&,       \
                                                   const F&, const F&, const F&, const Mask<F>&);   \
-  KEYWORD template UInt<F> chosen_light<F>(const LightView&, const LightReceiver<F>&, const F&,    \
-                                           const Mask<F>&);                                        \
+  KEYWORD template UInt<F> select_light_index<F>(const LightView&, const LightReceiver<F>&,        \
+                                                 const F&, const Mask<F>&);                        \
   KEYWORD template LightHit<F> light_hit<F>(const LightView&, const UInt<F>&,                      \
                                             const LightReceiver<F>&, const Vec3<F>&, const F&,     \
                                             const Mask<F>&);                                       \
@@ -29,18 +29,18 @@
                                                   const Mask<F>&);                                 \
   KEYWORD template F emission_density<F>(const LightView&, const UInt<F>&, const Vec3<F>&,         \
                                          const Vec3<F>&, const F&, const Mask<F>&);                \
-  KEYWORD template LightReach<F> light_reach<F>(const LightView&, const UInt<F>&,                  \
-                                                const LightReceiver<F>&, const Vec3<F>&, const F&, \
-                                                const Mask<F>&);                                   \
+  KEYWORD template CameraPathDensity<F> camera_path_density<F>(                                    \
+      const LightView&, const UInt<F>&, const LightReceiver<F>&, const Vec3<F>&, const F&,         \
+      const Mask<F>&);                                                                             \
   KEYWORD template Color<F> mesh_light_emission<F>(const SceneView&, const UInt<F>&,               \
                                                    const UInt<F>&, const Color<F>&,                \
                                                    const PathState<F>&, bool, const Mask<F>&);     \
-  KEYWORD template GuidePlace<F> find_guide<F>(const GuideView&, const Vec3<F>&, const UInt<F>&,   \
-                                               const UInt<F>&, const Mask<F>&);                    \
-  KEYWORD template F guide_pdf<F>(const GuideView&, const GuidePlace<F>&, const Vec3<F>&,          \
-                                  const Mask<F>&);                                                 \
-  KEYWORD template Vec3<F> sample_guide<F>(const GuideView&, const GuidePlace<F>&, const F&,       \
-                                           const F&, const Mask<F>&);                              \
+  KEYWORD template GuidingLookup<F> look_up_guiding<F>(                                            \
+      const GuidingView&, const Vec3<F>&, const UInt<F>&, const UInt<F>&, const Mask<F>&);         \
+  KEYWORD template F guiding_pdf<F>(const GuidingView&, const GuidingLookup<F>&, const Vec3<F>&,   \
+                                    const Mask<F>&);                                               \
+  KEYWORD template Vec3<F> sample_guiding<F>(const GuidingView&, const GuidingLookup<F>&,          \
+                                             const F&, const F&, const Mask<F>&);                  \
   KEYWORD template void run_graph<F>(const GraphView&, const GraphProgram&, const TextureView*,    \
                                      const GraphPoint<F>&, const Mask<F>&, F*);                    \
   KEYWORD template GraphPoint<F> graph_point<F>(const SceneView&, const MeshHit<F>&,               \

@@ -37,10 +37,10 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
                             path_time<F>(settings.sampler, key));
       scatter_field<F>(pool.cold, &PathColdRow<float>::time, slot, time, active);
     }
-    if (context.weighs_pixels())
+    if (context.uses_pixel_importance())
       scatter_field<F>(pool.cold, &PathColdRow<float>::importance, slot,
-                       picture_importance<F>(*context.guide, F(Int<F>(pixel & 0xffffu)),
-                                             F(Int<F>(pixel >> 16)), active),
+                       pixel_importance<F>(*context.guide, F(Int<F>(pixel & 0xffffu)),
+                                           F(Int<F>(pixel >> 16)), active),
                        active);
     const CameraRay<F> ray =
         camera_ray<F>(camera, F(Int<F>(pixel & 0xffffu)), F(Int<F>(pixel >> 16)), r, active, time);

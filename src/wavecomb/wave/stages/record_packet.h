@@ -28,8 +28,8 @@ struct RecordPacket {
   }
 
   /// Stores which paths continue along `next` and which have a shadow ray along `shadow`.
-  void note(const ShadingQueue& queue, const Mask<F>& alive, const Vec3<F>& next,
-            const Mask<F>& has_shadow, const Vec3<F>& shadow) const {
+  void store(const ShadingQueue& queue, const Mask<F>& alive, const Vec3<F>& next,
+             const Mask<F>& has_shadow, const Vec3<F>& shadow) const {
     using Q = ShadingQueue;
     const U outcome = select(Mask<U>(alive), U(uint32_t{Q::kAlive}), U(0u)) |
                       select(Mask<U>(has_shadow), U(uint32_t{Q::kShadowRay}), U(0u)) |

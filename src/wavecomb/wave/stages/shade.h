@@ -30,7 +30,7 @@ size_t batch_end(const ShadingQueue& queue, size_t begin) {
 }
 
 /// Returns the index of record i of the shading order in the queue's columns.
-inline size_t place_of_record(const ShadingQueue& queue, size_t i) {
+inline size_t record_index(const ShadingQueue& queue, size_t i) {
   return queue.ordered ? queue.sorted_indices[i] : i;
 }
 
@@ -42,7 +42,7 @@ inline void charge_batch(Wave& wave, size_t begin, size_t end,
   const ShadingQueue& queue = wave.shading;
   const uint32_t* material = queue.uints(ShadingQueue::kMaterial);
   std::array<uint32_t, kMaxBatch> materials;
-  for (size_t i = begin; i < end; ++i) materials[i - begin] = material[place_of_record(queue, i)];
+  for (size_t i = begin; i < end; ++i) materials[i - begin] = material[record_index(queue, i)];
   wave.costs.charge({materials.data(), end - begin}, ns);
 }
 
@@ -56,8 +56,8 @@ inline void spread_batch(Wave& wave, const WaveContext& context, size_t begin, s
   wave.aovs.spread_time(end - begin, start, slot);
   const uint32_t* material = queue.uints(ShadingQueue::kMaterial);
   for (size_t i = 0; wave.aovs.models_cost() && i < end - begin; ++i)
-    wave.aovs.add_cost(
-        slot(i), context.roulette_costs->material(material[place_of_record(queue, begin + i)]));
+    wave.aovs.add_cost(slot(i),
+                       context.roulette_costs->material(material[record_index(queue, begin + i)]));
 }
 
 /// Returns whether plain kernels have all features that the scene and the settings use.
@@ -85,7 +85,7 @@ void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings
   wave.costs.count({queue.uints(ShadingQueue::kMaterial), queue.size});
   for (size_t begin = 0; begin < queue.size;) {
     const size_t end = batch_end<F>(queue, begin);
-    const uint32_t program = queue.uints(ShadingQueue::kProgram)[place_of_record(queue, begin)];
+    const uint32_t program = queue.uints(ShadingQueue::kProgram)[record_index(queue, begin)];
     const bool timed = context.measures_costs && wave.costs.wants(end - begin);
     PhaseClock::Clock::time_point start;
     if (timed || wave.aovs.wants_time()) start = PhaseClock::Clock::now();
@@ -99,7 +99,7 @@ void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings
 /// Appends to `list`, which has `n` rays, the rays with outcome `what` of the packet of records at
 /// `i`.
 template <typename F, typename List>
-WAVECOMB_INLINE void keep_rays(const ShadingQueue& queue, size_t i, List& list, size_t& n,
+WAVECOMB_INLINE void list_rays(const ShadingQueue& queue, size_t i, List& list, size_t& n,
                                ShadingQueue::Outcome what, uint32_t shift) {
   using U = UInt<F>;
   const Mask<U> active(first_lanes<F>(queue.size - i));
@@ -114,7 +114,7 @@ template <typename F>
 void compact_shadows(Wave& wave) {
   size_t shadows = 0;
   for (size_t i = 0; i < wave.shading.size; i += kWidth<F>)
-    keep_rays<F>(wave.shading, i, wave.shadows, shadows, ShadingQueue::kShadowRay,
+    list_rays<F>(wave.shading, i, wave.shadows, shadows, ShadingQueue::kShadowRay,
                  ShadingQueue::kShadowKeyShift);
   wave.shadows.size = shadows;
 }
@@ -125,8 +125,8 @@ void compact(Wave& wave) {
   const ShadingQueue& queue = wave.shading;
   size_t rays = 0, shadows = 0;
   for (size_t i = 0; i < queue.size; i += kWidth<F>) {
-    keep_rays<F>(queue, i, wave.rays, rays, ShadingQueue::kAlive, ShadingQueue::kRayKeyShift);
-    keep_rays<F>(queue, i, wave.shadows, shadows, ShadingQueue::kShadowRay,
+    list_rays<F>(queue, i, wave.rays, rays, ShadingQueue::kAlive, ShadingQueue::kRayKeyShift);
+    list_rays<F>(queue, i, wave.shadows, shadows, ShadingQueue::kShadowRay,
                  ShadingQueue::kShadowKeyShift);
   }
   wave.rays.size = rays;

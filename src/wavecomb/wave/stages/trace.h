@@ -48,14 +48,14 @@ const float* fetch_times(Wave& wave, const Queue& q) {
 }
 
 /// Returns the presence keys of rays at `depth`. Shadow rays use different random numbers than path
-/// rays. With `linked`, each shadow ray hits only the geometry in its shadow set.
+/// rays. With `uses_linking`, each shadow ray hits only the geometry in its shadow set.
 inline PresenceKeys presence_keys(const PathPool& pool, uint32_t depth, bool shadow,
-                                  bool linked = false) {
+                                  bool uses_linking = false) {
   const auto* path = reinterpret_cast<const PathRow<float>*>(pool.paths);
   PresenceKeys keys{&path->key.pixel_hash, &path->key.sample, kRowWords<PathRow>,
                     2 * depth + (shadow ? 1u : 0u)};
   keys.ray_kind = ray_kind(depth, shadow);
-  if (linked) {
+  if (uses_linking) {
     keys.shadow_set = &reinterpret_cast<const ShadowRow<float>*>(pool.shadows)->set;
     keys.shadow_stride = kRowWords<ShadowRow>;
   }
@@ -79,16 +79,16 @@ inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const 
   wave.counts.add_rays(depth, q.size);
 }
 
-/// Tests the shadow rays for occlusion. `linked` is passed to presence_keys().
+/// Tests the shadow rays for occlusion. `uses_linking` is passed to presence_keys().
 template <typename F>
-void occlude(Wave& wave, const WaveContext& context, uint32_t depth, bool linked) {
+void occlude(Wave& wave, const WaveContext& context, uint32_t depth, bool uses_linking) {
   const ShadowQueue& q = wave.shadows;
   const RaySpan rays{q.ox, q.oy,   q.oz,   q.dx,   q.dy,
                      q.dz, q.tfar, q.slot, q.size, fetch_times<F>(wave, q)};
   if (context.recorder) context.recorder->occluded(&wave, rays, depth, false);
   const auto start = wave.aovs.start_time();
   context.accel->occluded(rays, q.occluded, context.traversal_width, false,
-                          presence_keys(wave.pool, depth, true, linked));
+                          presence_keys(wave.pool, depth, true, uses_linking));
   const auto slot_of = [&](size_t i) { return q.slot[i]; };
   wave.aovs.charge_rays(q.size, slot_of);
   wave.aovs.spread_time(q.size, start, slot_of);
@@ -103,7 +103,8 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
   using U = UInt<F>;
   const ShadowQueue& q = wave.shadows;
   occlude<F>(wave, context, depth, context.scene.lights.links.members != nullptr);
-  if constexpr (Media::kStreams) media.template pass_all<F>(wave, depth, context.settings->sampler);
+  if constexpr (Media::kStreams)
+    media.template attenuate_shadow_rays<F>(wave, depth, context.settings->sampler);
   const bool is_watched =
       wave.aovs.wants_lights() || wave.aovs.wants_light_samples() || wave.history;
   for (size_t i = 0; i < q.size; i += kWidth<F>) {
@@ -112,23 +113,23 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
     Color<F> c{load<F>(q.r + i), load<F>(q.g + i), load<F>(q.b + i)};
     if constexpr (Media::kAny) {
       if constexpr (Media::kStreams) {
-        c = c * media.template passed<F>(wave, i);
+        c = c * media.template shadow_transmittance<F>(wave, i);
       } else {
-        const Mask<F> asked = wave.pool.shades ? first_lanes<F>(q.size - i) : active;
-        const auto path = load_row<PathRow, F>(wave.pool.paths, slot, asked);
+        const Mask<F> tested = wave.pool.shadow_tints ? first_lanes<F>(q.size - i) : active;
+        const auto path = load_row<PathRow, F>(wave.pool.paths, slot, tested);
         const Vec3<F> o{load<F>(q.ox + i), load<F>(q.oy + i), load<F>(q.oz + i)};
         const Vec3<F> d{load<F>(q.dx + i), load<F>(q.dy + i), load<F>(q.dz + i)};
-        const F t = load<F>(q.tfar + i) * (1.f / kShadowReach);
+        const F t = load<F>(q.tfar + i) * (1.f / kShadowRayFraction);
         c = c * media.template transmittance<F>(
-                    {context.settings->sampler, path.key, depth, o, d, t}, asked);
+                    {context.settings->sampler, path.key, depth, o, d, t}, tested);
       }
     }
-    if (wave.pool.shades) [[unlikely]] {
+    if (wave.pool.shadow_tints) [[unlikely]] {
       // Coloured shadows: a blocked ray keeps a fraction of the light.
       const Mask<F> blocked = first_lanes<F>(q.size - i) & not_(active);
-      const Color<F> shade = load_row<RadianceRow, F>(wave.pool.shades, slot, blocked).sum;
-      c = select<F>(blocked, c * shade, c);
-      active = active | (blocked & (max_component(shade) > 0.f));
+      const Color<F> tint = load_row<RadianceRow, F>(wave.pool.shadow_tints, slot, blocked).sum;
+      c = select<F>(blocked, c * tint, c);
+      active = active | (blocked & (max_component(tint) > 0.f));
     }
     add_radiance<F>(wave.pool.radiance, slot, c, active);
     if (is_watched) {
