@@ -338,7 +338,7 @@ inline chi_square::Case light_case(std::string name, const LightView& view,
         h.pdf = is_dome ? detail::hit_dome_from<float>(view, r, to.p, dir, true).pdf
                         : detail::hit_distant<float>(detail::LightReader<float>(r, true), dir).pdf;
         // light weights do not change it
-        h.pdf *= view.by_tree ? view.tree.infinite_pdf[light] : r.pick_pdf;
+        h.pdf *= view.by_tree ? view.tree.infinite_pdf[light] : r.selection_pdf;
         h.radiance = infinite_light_radiance<float>(
             view, light, {.from = to.p, .dir = dir, .is_delta = true}, true);
       } else if (light < view.first_triangle) {
@@ -373,7 +373,7 @@ inline chi_square::Case light_case(std::string name, const LightView& view,
     const float pick = random(), u = random(), v = random();
     const auto s = sample_light<float>(seen->view, to, pick, u, v, true);
     if (!s.valid) return chi_square::Draw::nothing();
-    const uint32_t light = chosen_light<float>(seen->view, to, pick, true);
+    const uint32_t light = select_light_index<float>(seen->view, to, pick, true);
     if (s.is_delta) return chi_square::Draw::of_atom(light, double{s.pdf});
     bool agrees = true;
     if (check) {

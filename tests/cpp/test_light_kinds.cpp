@@ -54,13 +54,13 @@ struct KindWithoutEmission : FlatKind {
   template <typename F>
   static detail::KindSample<F> sample(const detail::LightQuery<F>& q);
   template <typename F>
-  static detail::KindHit<F> hit(const detail::LightMeeting<F>& m);
+  static detail::KindHit<F> hit(const detail::LightHitQuery<F>& m);
 };
 struct KindWithEmission : KindWithoutEmission {
   template <typename F>
   static detail::KindEmission<F> emit(const detail::EmissionQuery<F>& q);
   template <typename F>
-  static F emission_density(const detail::LightMeeting<F>& m);
+  static F emission_density(const detail::LightHitQuery<F>& m);
 };
 static_assert(!LightKindClass<KindWithoutEmission> && LightKindClass<KindWithEmission>);
 

@@ -39,7 +39,7 @@ TEST(Limits, scene_counts_end_where_words_do) {
       {&SceneCounts::materials, (1ull << 31) / (kInputCount * 16), "materials"},
       {&SceneCounts::instances, 134217727, "134,217,728 instances"},
       {&SceneCounts::grouped, 2147483648, "2,147,483,649 meshes in groups"},
-      {&SceneCounts::placed, 2147483648, "2,147,483,649 meshes in instances"},
+      {&SceneCounts::instanced_meshes, 2147483648, "2,147,483,649 meshes in instances"},
       {&SceneCounts::placements, 4294967295, "4,294,967,296 instances of groups"},
       {&SceneCounts::steps, 268435456, "268,435,457 transforms"},
       {&SceneCounts::lights, 44739242, "44,739,243 lights"},
@@ -107,7 +107,7 @@ TEST(Limits, texels_are_numbered_to_the_last) {
       EXPECT_EQ(lanes.offset, l.offset);
       EXPECT_EQ(read.offset, l.offset);
       const uint32_t x = l.width - 1, y = l.height - 1;
-      EXPECT_EQ(detail::texel_place<float>(lanes, x, y), texel_index(l, x, y));
+      EXPECT_EQ(detail::texel_offset<float>(lanes, x, y), texel_index(l, x, y));
     }
   }
 }
@@ -129,8 +129,8 @@ TEST(Limits, ids_of_layers_are_whole_numbers_of_a_float) {
   EXPECT_NE(last, static_cast<float>((1u << 24) - 2) + 1.f);
 }
 
-/// Makes 100 triangles, a rect and a dome; a table can select among at most `most_picked`.
-LightSet many_lights(size_t most_picked, float mean_scale = 1) {
+/// Makes 100 triangles, a rect and a dome; a table can select among at most `max_power_lights`.
+LightSet many_lights(size_t max_power_lights, float mean_scale = 1) {
   using namespace light_testing;
   std::vector<Light> lights{make_light(LightKind::kRect, translate(3, 3, 3)),
                             make_light(LightKind::kDome)};
@@ -145,12 +145,12 @@ LightSet many_lights(size_t most_picked, float mean_scale = 1) {
                        .triangle_count = 100,
                        .triangle = triangle,
                        .scene_radius = 20.f,
-                       .most_picked = most_picked});
+                       .max_power_lights = max_power_lights});
 }
 
 TEST(Limits, the_tree_alone_chooses_among_more_lights_than_a_table_can) {
   const LightSet all = many_lights(102), more = many_lights(101);
-  EXPECT_EQ(kMaxPicked, (1u << 24) - 1);
+  EXPECT_EQ(kMaxPowerLights, (1u << 24) - 1);
   LightView by_tree = all.view({}), alone = more.view({});
   for (const auto selection : {LightSelection::kAuto, LightSelection::kTree})
     EXPECT_TRUE(chooses_by_tree(selection, alone));
@@ -186,8 +186,8 @@ TEST(Limits, many_lights_that_are_dark_give_no_sample) {
 }
 
 TEST(Limits, lights_are_numbered_to_the_last) {
-  EXPECT_EQ(uint64_t{kMaxLights} * (sizeof(TriangleLight) / 4), kMostRowWords);
-  EXPECT_EQ(uint64_t{kMaxLights} * (sizeof(LightTreeNode) / 4), kMostRowWords);
+  EXPECT_EQ(uint64_t{kMaxLights} * (sizeof(TriangleLight) / 4), kMaxRowWords);
+  EXPECT_EQ(uint64_t{kMaxLights} * (sizeof(LightTreeNode) / 4), kMaxRowWords);
   EXPECT_LT(kMaxLights, kTreeLeaf);
   EXPECT_EQ(refusal([] { check_light_count(kMaxLights); }), "");
   EXPECT_EQ(refusal([] { check_light_count(uint64_t{kMaxLights} + 1); }),

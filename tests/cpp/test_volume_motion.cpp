@@ -38,8 +38,9 @@ TEST(VolumeMotion, FieldsAreReadWhereTheyCameFrom) {
       const Vec3<float> p{x + 0.5f * s, 0.5f + 0.25f * s, 0.5f - s};
       const Vec3<float> cell = bricks_point<float>(r.density_cells.to_bricks, p);
       EXPECT_NEAR(density_at<float>(r, cell, s, true), 1 + x, 1e-4f);
-      EXPECT_NEAR(glow_at<float>(r, bricks_point<float>(r.glow_cells.to_bricks, p), time, true).x,
-                  1 + x, 1e-4f);
+      EXPECT_NEAR(
+          emission_at<float>(r, bricks_point<float>(r.emission_cells.to_bricks, p), time, true).x,
+          1 + x, 1e-4f);
     }
   }
 }
@@ -60,10 +61,11 @@ TEST(VolumeMotion, TransmittanceIsThatOfThePlaceAtTheTime) {
     constexpr uint32_t kCount = 40000;
     for (uint32_t i = 0; i < kCount; ++i) {
       const auto key = make_sample_key<float>(i * 2654435761u, i, 17);
-      const Passage<float> p{SamplerKind::kIndependent, key, 2, o, d, o.x};
-      const double x = double{transmittance_through<float>(view, Way<float>(p, VertexSet::kShadow),
-                                                           {o, d, 9.f, time}, true, counts)
-                                  .y};
+      const MediumQuery<float> p{SamplerKind::kIndependent, key, 2, o, d, o.x};
+      const double x =
+          double{transmittance_through<float>(view, SegmentRandom<float>(p, VertexSet::kShadow),
+                                              {o, d, 9.f, time}, true, counts)
+                     .y};
       sum += x;
       squares += x * x;
     }
@@ -95,7 +97,7 @@ TEST(VolumeMotion, CellsBoundWhateverComesBy) {
     for (int i = 0; i < 40000; ++i) {
       const Vec3<float> p{at(rng), at(rng), at(rng)};
       const float time = value(rng);
-      const auto within = [&](const PlacedGrid& cells, float* most) {
+      const auto within = [&](const TransformedGrid& cells, float* most) {
         const Vec3<float> c = bricks_point<float>(cells.to_bricks, p);
         const uint32_t* size = cells.grid.size;
         if (!(c.x >= 0 && c.y >= 0 && c.z >= 0)) return false;
@@ -113,9 +115,9 @@ TEST(VolumeMotion, CellsBoundWhateverComesBy) {
       filled += density > 0 ? 1 : 0;
       bound += inside && most > 0 ? 1 : 0;
       float brightest = 0;
-      const bool glows = within(r.glow_cells, &brightest);
+      const bool glows = within(r.emission_cells, &brightest);
       const float glow =
-          glow_at<float>(r, bricks_point<float>(r.glow_cells.to_bricks, p), time, true).z;
+          emission_at<float>(r, bricks_point<float>(r.emission_cells.to_bricks, p), time, true).z;
       EXPECT_LE(glow, glows ? brightest * 1.0001f : 0.f);
     }
     EXPECT_GT(filled, 100);

@@ -194,10 +194,11 @@ TEST(VolumeTracking, TransmittanceIsTheExponential) {
       const auto depth = c.depth(std::min(double{t}, 10.0));
       expect_means(means_of(40000,
                             [&](const SampleKey<float>& key) {
-                              const Passage<float> p{SamplerKind::kIndependent, key, 2, o, d, t};
-                              const Way<float> way(p, VertexSet::kShadow);
-                              return transmittance_through<float>(r.view, way, {o, d, t}, true,
-                                                                  counts);
+                              const MediumQuery<float> p{
+                                  SamplerKind::kIndependent, key, 2, o, d, t};
+                              const SegmentRandom<float> distribution(p, VertexSet::kShadow);
+                              return transmittance_through<float>(r.view, distribution, {o, d, t},
+                                                                  true, counts);
                             }),
                    {std::exp(-depth[0]), std::exp(-depth[1]), std::exp(-depth[2])}, c.name);
     }
@@ -220,36 +221,39 @@ TEST(Equiangular, DrawsByItsDensity) {
   const auto scene = two_lamps();
   const Vec3<float> o{-1, 0.3f, 0.4f}, d{1, 0, 0};
   for (const float u : {0.1f, 0.9f}) {
-    const auto way =
-        lamp_way<float>(scene->view().lights, {o, d, 1, 3.4f, 0.5f}, {u, 0.3f, 0.8f, 0.f}, true);
-    ASSERT_GT(way.share, 0.f);
+    const auto distribution = equiangular_distribution<float>(
+        scene->view().lights, {o, d, 1, 3.4f, 0.5f}, {u, 0.3f, 0.8f, 0.f}, true);
+    ASSERT_GT(distribution.share, 0.f);
     double sum = 0;
     for (int i = 0; i < 4000; ++i)
-      sum += double{way.density(1 + 2.4f * (static_cast<float>(i) + 0.5f) / 4000)} * 2.4 / 4000;
+      sum += double{distribution.density(1 + 2.4f * (static_cast<float>(i) + 0.5f) / 4000)} * 2.4 /
+             4000;
     EXPECT_NEAR(sum, 1, 1e-3);
-    for (const float v : {0.f, 0.2f, 0.5f, 0.99f}) EXPECT_NEAR(way.before(way.draw(v)), v, 1e-4f);
-    EXPECT_NEAR(way.draw(0), 1, 1e-4f);
+    for (const float v : {0.f, 0.2f, 0.5f, 0.99f})
+      EXPECT_NEAR(distribution.before(distribution.draw(v)), v, 1e-4f);
+    EXPECT_NEAR(distribution.draw(0), 1, 1e-4f);
   }
-  const auto none = lamp_way<float>(scene->view().lights, {o, d, 2, 1, 0.5f}, {}, true);
+  const auto none =
+      equiangular_distribution<float>(scene->view().lights, {o, d, 2, 1, 0.5f}, {}, true);
   EXPECT_EQ(none.share, 0.f);
   // Where the medium absorbs most of the light, distances are sampled by density.
-  const auto thick =
-      lamp_way<float>(scene->view().lights, {o, d, 1, 2.4f, 50.f}, {0.9f, 0.3f, 0.8f, 0.f}, true);
+  const auto thick = equiangular_distribution<float>(scene->view().lights, {o, d, 1, 2.4f, 50.f},
+                                                     {0.9f, 0.3f, 0.8f, 0.f}, true);
   EXPECT_EQ(thick.share, 0.f);
 }
 
 TEST(VolumeTracking, FlightsPassAndStopAsOftenAsTheySay) {
   const Vec3<float> o{-1, 0.3f, 0.4f}, d{1, 0, 0};
   const auto scene = two_lamps();
-  const LightView lamps = scene->view().lights;
-  for (const LightView* lights : {static_cast<const LightView*>(nullptr), &lamps})
+  const LightView distance_lights = scene->view().lights;
+  for (const LightView* lights : {static_cast<const LightView*>(nullptr), &distance_lights})
     for (Case c : cases()) {
       if (lights) c.name += " by lamps";
       const Records r(c.volumes);
       const auto flight = [&](const SampleKey<float>& key, float t) {
-        return fly_through<float>(r.view,
-                                  Passage<float>{SamplerKind::kIndependent, key, 1, o, d, t},
-                                  {0.5f, 0.2f, 0.3f}, true, lights, counts);
+        return sample_flights<float>(r.view,
+                                     MediumQuery<float>{SamplerKind::kIndependent, key, 1, o, d, t},
+                                     {0.5f, 0.2f, 0.3f}, true, lights, counts);
       };
       for (const float t : {1.7f, 2.2f, kInf}) {
         const auto depth = c.depth(std::min(double{t}, 10.0));
@@ -310,8 +314,8 @@ TEST(VolumeTracking, EmissionIsTheIntegral) {
                             [&](const SampleKey<float>& key) {
                               return emission_of<float>(
                                   r.view, 0,
-                                  Way<float>({SamplerKind::kIndependent, key, 1, o, d, t},
-                                             VertexSet::kFlight),
+                                  SegmentRandom<float>({SamplerKind::kIndependent, key, 1, o, d, t},
+                                                       VertexSet::kFlight),
                                   {o, d, t}, true, counts);
                             }),
                    expected, c.name);

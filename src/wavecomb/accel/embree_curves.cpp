@@ -36,29 +36,30 @@ void for_hits(const Arguments& args, RTCRayN* rays, CurveQuery query, const Want
                         RTCRayN_dir_z(rays, n, i)};
     const float& tfar = RTCRayN_tfar(rays, n, i);
     if (!ray || !ray->is(o, d)) ray.emplace(o, d);
-    const auto meet = [&](const CurvePiece& piece) {
-      for (const CurveHit& hit : intersect_curve(*curves.mesh, piece, *ray, tfar, query,
+    const auto intersect = [&](const SubSegment& sub_segment) {
+      for (const CurveHit& hit : intersect_curve(*curves.mesh, sub_segment, *ray, tfar, query,
                                                  RTCRayN_time(rays, n, i), curves.is_fibre)) {
         if (curves.is_filtered && !is_met_by_embree_ids(*context, {.instance = inst,
                                                                    .geom = args.geomID,
                                                                    .mesh = curves.id,
-                                                                   .prim = piece.prim,
+                                                                   .prim = sub_segment.prim,
                                                                    .u = hit.u,
                                                                    .v = hit.v,
                                                                    .slot = RTCRayN_id(rays, n, i)}))
           continue;
-        found(i, piece.prim, hit);
+        found(i, sub_segment.prim, hit);
         break;
       }
     };
-    if (!curves.clumps) {
-      meet({args.primID});
+    if (!curves.nodes) {
+      intersect({args.primID});
       continue;
     }
     // tfar is negative after an occlusion hit.
-    uint32_t left = curves.clumps->may_meet(args.primID, *ray, tfar);
+    uint32_t left = curves.nodes->may_hit(args.primID, *ray, tfar);
     for (; left != 0 && tfar >= 0; left &= left - 1)
-      meet(curves.clumps->piece(args.primID, static_cast<uint32_t>(std::countr_zero(left))));
+      intersect(
+          curves.nodes->sub_segment(args.primID, static_cast<uint32_t>(std::countr_zero(left))));
   }
 }
 
@@ -89,11 +90,11 @@ void intersect_curves(const RTCIntersectFunctionNArguments* args) {
   };
   const auto found = [&](unsigned i, uint32_t prim, const CurveHit& hit) {
     if (hit.t > best->t[i]) return;
-    const auto mine = std::make_tuple(inst, args->geomID, prim);
+    const auto candidate = std::make_tuple(inst, args->geomID, prim);
     RTCHitN* at = const_cast<RTCHitN*>(known);
     if (hit.t == best->t[i] &&
-        mine >= std::make_tuple(RTCHitN_instID(at, n, i, 0), RTCHitN_geomID(at, n, i),
-                                RTCHitN_primID(at, n, i)))
+        candidate >= std::make_tuple(RTCHitN_instID(at, n, i, 0), RTCHitN_geomID(at, n, i),
+                                     RTCHitN_primID(at, n, i)))
       return;
     best->t[i] = hit.t;
     put(args, i, prim, hit, hit.t * kSlack);
@@ -118,16 +119,16 @@ void occlude_curves(const RTCOccludedFunctionNArguments* args) {
 
 void curve_box(const RTCBoundsFunctionArguments* args) {
   const CurveGeometry& curves = curves_of(args->geometryUserPtr);
-  put_bounds(curves.clumps ? curves.clumps->bounds(args->primID)
-                           : curve_bounds(*curves.mesh, args->primID, args->timeStep),
-             *args->bounds_o);
+  store_bounds(curves.nodes ? curves.nodes->bounds(args->primID)
+                            : curve_bounds(*curves.mesh, args->primID, args->timeStep),
+               *args->bounds_o);
 }
 
 }  // namespace
 
 RTCGeometry make_curve_geometry(RTCDevice device, const CurveGeometry& user, HitRule rule) {
   RTCGeometry g = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
-  const size_t count = user.clumps ? user.clumps->count() : user.mesh->primitive_count();
+  const size_t count = user.nodes ? user.nodes->count() : user.mesh->primitive_count();
   rtcSetGeometryUserPrimitiveCount(g, static_cast<unsigned>(count));
   rtcSetGeometryTimeStepCount(g, user.mesh->steps);
   rtcSetGeometryUserData(g, const_cast<CurveGeometry*>(&user));  // callbacks only read it

@@ -38,7 +38,7 @@ inline void keep_closest(const RTCFilterFunctionNArguments* args) {
 }
 
 /// Rejects hits on other objects than PresenceKeys::object.
-[[gnu::noinline, gnu::cold]] void drop_others(const RTCFilterFunctionNArguments& args) {
+[[gnu::noinline, gnu::cold]] void reject_other_objects(const RTCFilterFunctionNArguments& args) {
   const auto& context = *reinterpret_cast<const QueryContext*>(args.context);
   const SceneView& scene = *context.scene;
   for (unsigned i = 0; i < args.N; ++i) {
@@ -47,24 +47,24 @@ inline void keep_closest(const RTCFilterFunctionNArguments* args) {
     const unsigned geom = RTCHitN_geomID(args.hit, args.N, i);
     const bool instanced = inst != RTC_INVALID_GEOMETRY_ID;
     const uint32_t instance = instanced ? inst : 0;
-    bool is_own = instanced || geom < context.first_light;
-    if (is_own) {
+    bool is_specific = instanced || geom < context.first_light;
+    if (is_specific) {
       const uint32_t first = scene.instances[instance].geometry;
       const uint32_t mesh =
           scene.geometry_mesh[first + (instanced ? geom : geom - context.first_world)];
-      is_own = is_of_object(*context.keys, instance, mesh, RTCRayN_id(args.ray, args.N, i));
+      is_specific = is_of_object(*context.keys, instance, mesh, RTCRayN_id(args.ray, args.N, i));
     }
-    if (!is_own) args.valid[i] = 0;
+    if (!is_specific) args.valid[i] = 0;
   }
 }
 
 /// Intersects ray i of a packet with the light in a geometry's user pointer. Returns the distance,
 /// or 0 for a miss.
-float meet_light(const void* user, RTCRayN* ray, unsigned n, unsigned i) {
+float intersect_light_shape(const void* user, RTCRayN* ray, unsigned n, unsigned i) {
   const float o[3] = {RTCRayN_org_x(ray, n, i), RTCRayN_org_y(ray, n, i), RTCRayN_org_z(ray, n, i)};
   const float d[3] = {RTCRayN_dir_x(ray, n, i), RTCRayN_dir_y(ray, n, i), RTCRayN_dir_z(ray, n, i)};
-  const float t =
-      intersect_own_shape(*static_cast<const PlacedShape*>(user), o, d, RTCRayN_time(ray, n, i));
+  const float t = intersect_custom_shape(*static_cast<const LightGeometry*>(user), o, d,
+                                         RTCRayN_time(ray, n, i));
   return t > 0.f && t <= RTCRayN_tfar(ray, n, i) ? t : 0.f;
 }
 
@@ -76,7 +76,7 @@ bool is_met_by_embree_ids(const QueryContext& context, const PresenceQuery& at) 
     in_scene.instance = 0;
     in_scene.geom = at.geom - context.first_world;
   }
-  return is_met(*context.scene, in_scene, *context.keys);
+  return accepts_hit(*context.scene, in_scene, *context.keys);
 }
 
 void presence_filter(const RTCFilterFunctionNArguments* args) {
@@ -99,7 +99,7 @@ void presence_filter(const RTCFilterFunctionNArguments* args) {
 
 void closest_filter(const RTCFilterFunctionNArguments* args) {
   if (reinterpret_cast<const QueryContext*>(args->context)->keys->object) [[unlikely]]
-    drop_others(*args);
+    reject_other_objects(*args);
   switch (args->N) {
     case 16:
       return keep_closest<16>(args);
@@ -120,7 +120,7 @@ void intersect_lights(const RTCIntersectFunctionNArguments* args) {
   RTCHitN* hit = RTCRayHitN_HitN(args->rayhit, n);
   for (unsigned i = 0; i < n; ++i) {
     if (args->valid[i] == 0) continue;
-    const float t = meet_light(args->geometryUserPtr, ray, n, i);
+    const float t = intersect_light_shape(args->geometryUserPtr, ray, n, i);
     if (t == 0.f || t > best->t[i]) continue;
     // Ties go to the smaller instance id, and the world has the largest, then to the smaller
     // geometry.
@@ -142,7 +142,7 @@ void intersect_lights_bare(const RTCIntersectFunctionNArguments* args) {
   RTCHitN* hit = RTCRayHitN_HitN(args->rayhit, n);
   for (unsigned i = 0; i < n; ++i) {
     if (args->valid[i] == 0) continue;
-    const float t = meet_light(args->geometryUserPtr, ray, n, i);
+    const float t = intersect_light_shape(args->geometryUserPtr, ray, n, i);
     if (t == 0.f) continue;
     RTCRayN_tfar(ray, n, i) = t;
     RTCHitN_primID(hit, n, i) = 0;
@@ -153,11 +153,12 @@ void intersect_lights_bare(const RTCIntersectFunctionNArguments* args) {
 
 void occlude_lights(const RTCOccludedFunctionNArguments* args) {
   for (unsigned i = 0; i < args->N; ++i)
-    if (args->valid[i] != 0 && meet_light(args->geometryUserPtr, args->ray, args->N, i) > 0.f)
+    if (args->valid[i] != 0 &&
+        intersect_light_shape(args->geometryUserPtr, args->ray, args->N, i) > 0.f)
       RTCRayN_tfar(args->ray, args->N, i) = -std::numeric_limits<float>::infinity();
 }
 
-void put_bounds(const Bounds& b, RTCBounds& out) {
+void store_bounds(const Bounds& b, RTCBounds& out) {
   out.lower_x = b.lo.x;
   out.lower_y = b.lo.y;
   out.lower_z = b.lo.z;
@@ -167,8 +168,8 @@ void put_bounds(const Bounds& b, RTCBounds& out) {
 }
 
 void light_box(const RTCBoundsFunctionArguments* args) {
-  const Bounds b = own_shape_bounds(*static_cast<const PlacedShape*>(args->geometryUserPtr));
-  put_bounds(b, *args->bounds_o);
+  const Bounds b = custom_shape_bounds(*static_cast<const LightGeometry*>(args->geometryUserPtr));
+  store_bounds(b, *args->bounds_o);
 }
 
 }  // namespace wavecomb

@@ -40,9 +40,9 @@ void presence_filter(const RTCFilterFunctionNArguments* args);
 void closest_filter(const RTCFilterFunctionNArguments* args);
 
 /// Converts a bounding box to Embree's type.
-void put_bounds(const Bounds& b, RTCBounds& out);
+void store_bounds(const Bounds& b, RTCBounds& out);
 
-// Callbacks for light shapes other than parallelograms; the user pointer is a PlacedShape.
+// Callbacks for light shapes other than parallelograms; the user pointer is a LightGeometry.
 void light_box(const RTCBoundsFunctionArguments* args);
 /// Keeps the closest hit by the rule of closest_filter.
 void intersect_lights(const RTCIntersectFunctionNArguments* args);

@@ -13,20 +13,20 @@ namespace wavecomb {
 namespace {
 
 /// Marks meshes that are invisible to some kind of ray in some instance.
-void mark_unseen(const Scene& scene, std::vector<uint8_t>& filtered) {
+void mark_invisible(const Scene& scene, std::vector<uint8_t>& filtered) {
   const SceneGeometry& geometry = *scene.geometry();
   const SceneView view = scene.view();
   for (size_t i = 0; i < geometry.instance_records.size(); ++i) {
     const Group& group = geometry.groups[i == 0 ? 0 : geometry.instances[i - 1].group];
-    const uint32_t* seen = view.visibility + geometry.instance_records[i].emissive;
+    const uint32_t* visibility = view.visibility + geometry.instance_records[i].emissive;
     for (size_t g = 0; g < group.meshes.size(); ++g)
-      if ((seen[g] & kSeenByAll) != kSeenByAll) filtered[group.meshes[g]] = 1;
+      if ((visibility[g] & kVisibleToAll) != kVisibleToAll) filtered[group.meshes[g]] = 1;
   }
 }
 
 /// Returns whether a surface with this opacity is present, by the random number of path and
 /// primitive.
-bool is_drawn(float opacity, const PresenceQuery& at, const PresenceKeys& keys) {
+bool is_present_sample(float opacity, const PresenceQuery& at, const PresenceKeys& keys) {
   if (opacity >= 1.f) return true;
   if (!(opacity > 0.f)) return false;
   const uint32_t path =
@@ -35,8 +35,8 @@ bool is_drawn(float opacity, const PresenceQuery& at, const PresenceKeys& keys) 
   return unit_float<float>(hash_u32(hash_u32(path, keys.salt), where)) < opacity;
 }
 
-const SplatRow& splat_of(const SceneView& scene, uint32_t mesh, uint32_t prim) {
-  return reinterpret_cast<const SplatRow*>(scene.meshes[mesh].normals)[prim];
+const GaussianSplatRow& gaussian_splat_of(const SceneView& scene, uint32_t mesh, uint32_t prim) {
+  return reinterpret_cast<const GaussianSplatRow*>(scene.meshes[mesh].normals)[prim];
 }
 
 }  // namespace
@@ -46,13 +46,13 @@ std::vector<uint8_t> filtered_meshes(const Scene& scene) {
   std::vector<uint8_t> filtered(geometry.meshes.size(), 0);
   if (scene.view().lights.links.members) filtered.assign(filtered.size(), 1);  // shadow linking
   if (scene.view().lights.links.members) return filtered;
-  if (scene.view().visibility) mark_unseen(scene, filtered);
+  if (scene.view().visibility) mark_invisible(scene, filtered);
   for (size_t m = 0; m < filtered.size(); ++m)
-    if (geometry.meshes[m].primitive == Primitive::kSplat) filtered[m] = 1;
-  const InteriorView& interiors = scene.view().interiors;
-  if (!scene.view().has_presence && !interiors.media) return filtered;
+    if (geometry.meshes[m].primitive == Primitive::kGaussianSplat) filtered[m] = 1;
+  const MeshMediaView& nested_media = scene.view().nested_media;
+  if (!scene.view().has_presence && !nested_media.media) return filtered;
   const auto needs = [&](uint32_t m) {
-    return scene.material_part()->shaded[m].needs_presence() || interiors.is_bound(m);
+    return scene.material_part()->shaded[m].needs_presence() || nested_media.is_bound(m);
   };
   const auto& instances = geometry.instance_records;
   const bool inherited = std::any_of(instances.begin(), instances.end(),
@@ -75,16 +75,16 @@ std::vector<uint8_t> fibre_meshes(const Scene& scene) {
     return !has_trait(materials[m].program, program_trait::kFibre);
   };
   // Materials that meshes without one inherit from their instances; the world is instance 0.
-  std::vector<uint8_t> group_hands_on(geometry.groups.size(), 0), mesh_gets(fibres.size(), 0);
+  std::vector<uint8_t> group_inherits(geometry.groups.size(), 0), mesh_inherits(fibres.size(), 0);
   for (size_t i = 0; i < geometry.instance_records.size(); ++i)
     if (is_other(geometry.instance_records[i].material))
-      group_hands_on[i == 0 ? 0 : geometry.instances[i - 1].group] = 1;
-  for (size_t g = 0; g < group_hands_on.size(); ++g)
-    for (const uint32_t mesh : geometry.groups[g].meshes) mesh_gets[mesh] |= group_hands_on[g];
+      group_inherits[i == 0 ? 0 : geometry.instances[i - 1].group] = 1;
+  for (size_t g = 0; g < group_inherits.size(); ++g)
+    for (const uint32_t mesh : geometry.groups[g].meshes) mesh_inherits[mesh] |= group_inherits[g];
   for (uint32_t mesh = 0; mesh < fibres.size(); ++mesh)
     fibres[mesh] = geometry.meshes[mesh].is_curved() &&
                    !geometry.any_material(mesh, kInheritMaterial, [&](uint32_t m) {
-                     return m == kInheritMaterial ? mesh_gets[mesh] != 0 : is_other(m);
+                     return m == kInheritMaterial ? mesh_inherits[mesh] != 0 : is_other(m);
                    });
   return fibres;
 }
@@ -99,13 +99,14 @@ bool casts_shadow(const SceneView& scene, uint32_t instance, uint32_t geom, uint
 }
 
 bool is_present(const SceneView& scene, const PresenceQuery& at, const PresenceKeys& keys) {
-  if (scene.has_curves && (scene.meshes[at.mesh].flags & kIsSplat) != 0)
-    return is_drawn(splat_alpha(splat_of(scene, at.mesh, at.prim), at.u, at.v), at, keys);
+  if (scene.has_curves && (scene.meshes[at.mesh].flags & kIsGaussianSplat) != 0)
+    return is_present_sample(
+        gaussian_splat_alpha(gaussian_splat_of(scene, at.mesh, at.prim), at.u, at.v), at, keys);
   const uint32_t material =
       hit_material<float>(scene, scene.instances[at.instance].material, at.mesh, at.prim, true);
   // The transmittance of shadow rays handles medium boundaries separately
   // (medium/nested/nested_media.h).
-  if (keys.ray_kind == kSeenByShadowRays && scene.interiors.is_bound(material)) return false;
+  if (keys.ray_kind == kVisibleToShadowRays && scene.nested_media.is_bound(material)) return false;
   if (!has_presence<float>(scene.materials, material, true)) return true;
   const float opacity =
       opacity_at<float>(scene.materials, scene.meshes, scene.instances,
@@ -114,10 +115,10 @@ bool is_present(const SceneView& scene, const PresenceQuery& at, const PresenceK
                          .place = {at.mesh, at.prim, at.u, at.v},
                          .uv = hit_uv<float>(scene.meshes, at.mesh, at.prim, at.u, at.v, true)},
                         true);
-  return is_drawn(opacity, at, keys);
+  return is_present_sample(opacity, at, keys);
 }
 
-bool is_met(const SceneView& scene, const PresenceQuery& at, const PresenceKeys& keys) {
+bool accepts_hit(const SceneView& scene, const PresenceQuery& at, const PresenceKeys& keys) {
   if (!is_of_object(keys, at.instance, at.mesh, at.slot)) return false;
   if (scene.visibility &&
       (scene.visibility[scene.instances[at.instance].emissive + at.geom] & keys.ray_kind) == 0)

@@ -46,6 +46,6 @@ inline bool is_of_object(const PresenceKeys& keys, uint32_t instance, uint32_t m
 
 /// Returns whether the ray of a slot hits the point: the object and ray visibility match, it is
 /// present, and for shadow rays it casts a shadow from their light.
-bool is_met(const SceneView& scene, const PresenceQuery& at, const PresenceKeys& keys);
+bool accepts_hit(const SceneView& scene, const PresenceQuery& at, const PresenceKeys& keys);
 
 }  // namespace wavecomb

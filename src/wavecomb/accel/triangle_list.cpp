@@ -15,7 +15,7 @@
 namespace wavecomb {
 namespace {
 
-constexpr float kForever = std::numeric_limits<float>::infinity();
+constexpr float kUnbounded = std::numeric_limits<float>::infinity();
 
 /// Stores the first `n` lanes, or all if there are fewer.
 template <typename T>
@@ -55,7 +55,7 @@ struct ListTracer {
   template <typename F>
   struct Packet {
     Vec3<F> o, d;
-    std::array<F, TriangleList::kMostVertices> x, y;  ///< vertex coordinates in each ray's frame
+    std::array<F, TriangleList::kMaxVertices> x, y;  ///< vertex coordinates in each ray's frame
 
     Packet(const TriangleList& list, const RaySpan& rays, size_t base)
         : o(load<F>(rays.ox + base), load<F>(rays.oy + base), load<F>(rays.oz + base)),
@@ -88,33 +88,33 @@ struct ListTracer {
     }
   };
 
-  /// Returns the lanes whose hits on triangle `entry` are accepted by is_met().
+  /// Returns the lanes whose hits on triangle `entry` are accepted by accepts_hit().
   template <typename F>
-  Mask<F> met(const Mask<F>& in, uint32_t entry, const F& b, const F& c, const F& sum,
-              size_t base) const {
+  Mask<F> accepted(const Mask<F>& in, uint32_t entry, const F& b, const F& c, const F& sum,
+                   size_t base) const {
     const TriangleList::Triangle& t = list.triangles_[entry];
     const F u = b / sum, v = c / sum;
     std::array<uint32_t, kWidth<F>> keep{};
     for (uint32_t bits = lane_bits<F>(in); bits != 0; bits &= bits - 1) {
       const auto i = static_cast<size_t>(std::countr_zero(bits));
       const uint32_t slot = rays.slot ? rays.slot[base + i] : static_cast<uint32_t>(base + i);
-      keep[i] = is_met(scene,
-                       {.instance = list.ids_.inst[entry],
-                        .geom = list.ids_.geom[entry],
-                        .mesh = t.mesh,
-                        .prim = list.ids_.prim[entry],
-                        .u = lane(u, i),
-                        .v = lane(v, i),
-                        .slot = slot},
-                       keys);
+      keep[i] = accepts_hit(scene,
+                            {.instance = list.ids_.inst[entry],
+                             .geom = list.ids_.geom[entry],
+                             .mesh = t.mesh,
+                             .prim = list.ids_.prim[entry],
+                             .u = lane(u, i),
+                             .v = lane(v, i),
+                             .slot = slot},
+                            keys);
     }
     return in & Mask<F>(load<UInt<F>>(keep.data()) != UInt<F>(0u));
   }
 
   /// Returns distances to a light shape for lanes that pass near its bounding sphere; 0 for a miss.
   template <typename F>
-  F meet_shape(const TriangleList::Shape& shape, const Packet<F>& packet, const F& limit,
-               const Mask<F>& active) const {
+  F intersect_shape(const TriangleList::Shape& shape, const Packet<F>& packet, const F& limit,
+                    const Mask<F>& active) const {
     const Vec3<F> to(Vec3<float>{shape.centre[0], shape.centre[1], shape.centre[2]});
     const Vec3<F> p = to - packet.o;
     const F along = dot(p, packet.d), distance2 = length_squared(p);
@@ -127,7 +127,7 @@ struct ListTracer {
       const auto i = static_cast<size_t>(std::countr_zero(bits));
       const float o[3] = {lane(packet.o.x, i), lane(packet.o.y, i), lane(packet.o.z, i)};
       const float d[3] = {lane(packet.d.x, i), lane(packet.d.y, i), lane(packet.d.z, i)};
-      t[i] = intersect_own_shape(shape.placed, o, d, 0.f);
+      t[i] = intersect_custom_shape(shape.light_geometry, o, d, 0.f);
     }
     const F found = load<F>(t.data());
     return select(found < limit, found, F(0.f));
@@ -135,7 +135,7 @@ struct ListTracer {
 
   template <typename F>
   F limits(size_t base) const {
-    return rays.tfar ? load<F>(rays.tfar + base) : F(kForever);
+    return rays.tfar ? load<F>(rays.tfar + base) : F(kUnbounded);
   }
 
   template <typename F>
@@ -157,7 +157,7 @@ struct ListTracer {
         if (none(take)) continue;
         const F distance = plane.height / plane.slope;
         take = take & (distance < t);
-        if (triangle.filtered || keys.object) take = met<F>(take, i, at.b, at.c, at.sum, base);
+        if (triangle.filtered || keys.object) take = accepted<F>(take, i, at.b, at.c, at.sum, base);
         t = select(take, distance, t);
         b = select(take, at.b, b);
         c = select(take, at.c, c);
@@ -165,7 +165,7 @@ struct ListTracer {
         entry = select(Mask<U>(take), U(i), entry);
       }
       for (uint32_t i = 0; i < shapes && !keys.object; ++i) {
-        const F distance = meet_shape(list.shapes_[i], packet, t, active);
+        const F distance = intersect_shape(list.shapes_[i], packet, t, active);
         const Mask<F> take = distance > 0.f;
         t = select(take, distance, t);
         b = select(take, F(0.f), b);
@@ -173,7 +173,7 @@ struct ListTracer {
         entry = select(Mask<U>(take), U(count + i), entry);
       }
       const Mask<F> missed = Mask<F>(entry == U(count + shapes));
-      store_first(hits.t + base, F(select(missed, F(kForever), t)), rays.size - base);
+      store_first(hits.t + base, F(select(missed, F(kUnbounded), t)), rays.size - base);
       store_first(hits.u + base, F(b / sum), rays.size - base);
       store_first(hits.v + base, F(c / sum), rays.size - base);
       const Mask<U> all(true);
@@ -199,11 +199,11 @@ struct ListTracer {
         }
         const Crossing<F> at = packet.cross(triangle);
         Mask<F> take = at.in & (plane.height >= 0.f) & (plane.height < tfar * plane.slope) & open;
-        if (triangle.filtered && any(take)) take = met<F>(take, i, at.b, at.c, at.sum, base);
+        if (triangle.filtered && any(take)) take = accepted<F>(take, i, at.b, at.c, at.sum, base);
         open = open & not_(take);
       }
       for (const TriangleList::Shape& shape : list.shapes_)
-        open = open & not_(meet_shape(shape, packet, tfar, open) > 0.f);
+        open = open & not_(intersect_shape(shape, packet, tfar, open) > 0.f);
       store_first(out + base, U(select(Mask<U>(open), U(0u), U(1u))), rays.size - base);
     }
   }
@@ -227,10 +227,10 @@ void in_lanes(uint32_t width, const Trace& trace) {
 }
 
 /// Returns a light shape with its bounding sphere.
-TriangleList::Shape in_a_ball(const PlacedShape& placed) {
-  const Bounds box = own_shape_bounds(placed);
+TriangleList::Shape in_sphere(const LightGeometry& light_geometry) {
+  const Bounds box = custom_shape_bounds(light_geometry);
   const Vec3<float> centre = (box.lo + box.hi) * 0.5f, half = (box.hi - box.lo) * 0.5f;
-  return {placed, {centre.x, centre.y, centre.z}, std::sqrt(length_squared(half))};
+  return {light_geometry, {centre.x, centre.y, centre.z}, std::sqrt(length_squared(half))};
 }
 
 }  // namespace
@@ -238,17 +238,17 @@ TriangleList::Shape in_a_ball(const PlacedShape& placed) {
 std::unique_ptr<const TriangleList> TriangleList::make(const Scene& scene) {
   const SceneGeometry& geometry = *scene.geometry();
   uint64_t triangles = scene.instanced_triangles();
-  if (scene.view().has_motion || scene.view().has_curves || triangles > kMostTriangles)
+  if (scene.view().has_motion || scene.view().has_curves || triangles > kMaxTriangles)
     return nullptr;
-  const std::vector<PlacedShape> shapes = light_shapes(scene);
+  const std::vector<LightGeometry> shapes = light_shapes(scene);
   uint32_t own = 0;
-  for (const PlacedShape& placed : shapes) {
-    if (placed.shape == LightShape::kParallelogram)
+  for (const LightGeometry& light_geometry : shapes) {
+    if (light_geometry.shape == LightShape::kParallelogram)
       triangles += 2;
-    else if (placed.shape != LightShape::kNone)
+    else if (light_geometry.shape != LightShape::kNone)
       ++own;
   }
-  if (triangles > kMostTriangles || own > kMostShapes) return nullptr;
+  if (triangles > kMaxTriangles || own > kMaxShapes) return nullptr;
 
   auto list = std::make_unique<TriangleList>();
   const std::vector<uint8_t> filtered = filtered_meshes(scene);
@@ -281,13 +281,13 @@ std::unique_ptr<const TriangleList> TriangleList::make(const Scene& scene) {
   }
   for (uint32_t l = 0; l < shapes.size(); ++l)
     if (shapes[l].shape != LightShape::kNone && shapes[l].shape != LightShape::kParallelogram) {
-      list->shapes_.push_back(in_a_ball(shapes[l]));
+      list->shapes_.push_back(in_sphere(shapes[l]));
       list->ids_.prim.push_back(0);
       list->ids_.geom.push_back(l);
       list->ids_.inst.push_back(kLightShape);
     }
   for (auto* ids : {&list->ids_.prim, &list->ids_.geom, &list->ids_.inst}) ids->push_back(kNoHit);
-  if (list->vertices_.size() > kMostVertices) return nullptr;
+  if (list->vertices_.size() > kMaxVertices) return nullptr;
   return list;
 }
 

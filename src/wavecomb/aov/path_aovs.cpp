@@ -49,8 +49,8 @@ template <typename Put>
 void PathAovs::for_each_vertex_aov(AovKind kind, const Put& put) const {
   for (const AovRow& row : kAovs)
     if (row.kind == kind && row.source == AovSource::kVertex &&
-        vertex_at_[place_of(row.aov)] != kNotKept)
-      put(row.aov, vertex_.rows + vertex_at_[place_of(row.aov)]);
+        vertex_at_[aov_index(row.aov)] != kNoWords)
+      put(row.aov, vertex_.rows + vertex_at_[aov_index(row.aov)]);
 }
 
 void PathAovs::resolve_vertices(AovFilm& film, size_t pixel, const SlotRange& slots) const {
@@ -94,8 +94,8 @@ void PathAovs::resolve_light(AovFilm& film, size_t pixel, const SlotRange& slots
       add_difference(emission, emitted, none);
       add_difference(direct, with_direct, emitted);
       add_difference(indirect, radiance + row, with_direct);
-      if (!early_links_) return;
-      const float* links = early_links_.rows + row;
+      if (!early_connections_) return;
+      const float* links = early_connections_.rows + row;
       add_difference(direct, none, links);
       add_difference(indirect, links, none);
     });

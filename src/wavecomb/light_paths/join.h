@@ -35,11 +35,11 @@
 
 namespace wavecomb {
 
-inline constexpr float kMostRatio = 1e30f;
+inline constexpr float kMaxRatio = 1e30f;
 
 /// Returns the lanes whose delta transmission is not symmetric, as in layered materials.
 template <typename Bsdf, typename F>
-inline Mask<F> passes_one_way(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>& wi) {
+inline Mask<F> is_asymmetric(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>& wi) {
   if constexpr (requires { bsdf.is_layered(); })
     return (F(wo.z * wi.z) < 0.f) & bsdf.is_layered();
   else
@@ -51,10 +51,10 @@ inline Mask<F> passes_one_way(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>
 template <typename F>
 struct JointVertex {
   F ratio;
-  F inverse_cos;   ///< 1 / |g w|
-  F linked;        ///< E of the connection between the previous vertex and this one
-  Mask<F> merges;  ///< lanes where light paths may be merged (merge_point.h)
-  F radius2;       ///< squared merge radius
+  F inverse_cos;       ///< 1 / |g w|
+  F connection_ratio;  ///< E of the connection between the previous vertex and this one
+  Mask<F> merges;      ///< lanes where light paths may be merged (merge_point.h)
+  F radius2;           ///< squared merge radius
 
   /// Returns R including this vertex for a direction `world` to the light (`local` in the frame),
   /// as if light samples or bounces had density 1 there: R p<- |g l| / |g w|. Lanes outside
@@ -63,8 +63,8 @@ struct JointVertex {
   WAVECOMB_INLINE F towards(const Vertex<F, kFeatures>& v, const Interaction& at, const Vec3<F>& wo,
                             const Vec3<F>& world, const Vec3<F>& local,
                             const Mask<F>& wanted) const {
-    const F turn = abs(dot(at.s.ng, world)) * inverse_cos;
-    F r = ratio * turn;
+    const F cosine_ratio = abs(dot(at.s.ng, world)) * inverse_cos;
+    F r = ratio * cosine_ratio;
     if (v.depth > 0) {
       const Mask<F> bounces = wanted & not_(merges) & (r > 0.f);
       if (any(bounces)) {
@@ -72,7 +72,7 @@ struct JointVertex {
         r *= select(bounces, back, F(1.f));
       }
     }
-    return v.settings.connects ? fma(linked, turn, r) : r;
+    return v.settings.connects ? fma(connection_ratio, cosine_ratio, r) : r;
   }
 };
 
@@ -82,23 +82,24 @@ WAVECOMB_INLINE JointVertex<F> joint_vertex(const Vertex<F, kFeatures>& v, const
                                             const Frame<F>& frame) {
   if constexpr (Bsdf::kOnFibre) return {F(0.f), F(0.f), F(0.f), Mask<F>(false), F(0.f)};
   const Vec3<F>& dir = v.path.dir;
-  const F seen = dot(at.s.ng, dir);
-  const Frame<F> unbent = at.unbent_frame(v);
-  Mask<F> reached = not_(at.bends(v, unbent, dir)) & (seen != 0.f);
-  reached = reached & Mask<F>(frame.n.x == unbent.n.x) & Mask<F>(frame.n.y == unbent.n.y) &
-            Mask<F>(frame.n.z == unbent.n.z);
-  F linked(0.f);
+  const F view_cosine = dot(at.s.ng, dir);
+  const Frame<F> unadjusted = at.unadjusted_frame(v);
+  Mask<F> reached = not_(at.is_adjusted(v, unadjusted, dir)) & (view_cosine != 0.f);
+  reached = reached & Mask<F>(frame.n.x == unadjusted.n.x) & Mask<F>(frame.n.y == unadjusted.n.y) &
+            Mask<F>(frame.n.z == unadjusted.n.z);
+  F connection_ratio(0.f);
   if (v.settings.connects && v.depth > 0) {
-    Mask<F> links = reached & (v.path.pdf > 0.f);
-    if (Bsdf::kAbsorbs) links = links & (seen < 0.f);
-    linked = select(links, F(F(v.t * v.t) / select(links, v.path.pdf, F(1.f))), F(0.f));
+    Mask<F> can_connect = reached & (v.path.pdf > 0.f);
+    if (Bsdf::kAbsorbs) can_connect = can_connect & (view_cosine < 0.f);
+    connection_ratio =
+        select(can_connect, F(F(v.t * v.t) / select(can_connect, v.path.pdf, F(1.f))), F(0.f));
   }
   // For a viewer inside an absorbing material, light paths do not know the length of the absorbing
   // segment.
-  if (Bsdf::kAbsorbs && v.depth == 0) reached = reached & (seen < 0.f);
+  if (Bsdf::kAbsorbs && v.depth == 0) reached = reached & (view_cosine < 0.f);
   JointVertex<F> joint{select(reached, v.path.ratio, F(0.f)),
-                       F(1.f / select(seen != 0.f, abs(seen), F(1.f))), min(linked, F(kMostRatio)),
-                       Mask<F>(false), F(0.f)};
+                       F(1.f / select(view_cosine != 0.f, abs(view_cosine), F(1.f))),
+                       min(connection_ratio, F(kMaxRatio)), Mask<F>(false), F(0.f)};
   if (v.settings.merge_scale > 0.f) [[unlikely]] {
     const F radius = v.path.cone_width * v.settings.merge_scale;
     joint.radius2 = radius * radius;
@@ -107,18 +108,18 @@ WAVECOMB_INLINE JointVertex<F> joint_vertex(const Vertex<F, kFeatures>& v, const
       joint.merges = joint.merges & at.bsdf.has_non_delta();
     else
       joint.merges = Mask<F>(false);
-    joint.ratio =
-        select(joint.merges, F(joint.radius2 * F(abs(seen) * (kPi * v.settings.light_paths))),
-               joint.ratio);
+    joint.ratio = select(joint.merges,
+                         F(joint.radius2 * F(abs(view_cosine) * (kPi * v.settings.light_paths))),
+                         joint.ratio);
   }
   return joint;
 }
 
 /// Stores the vertex as a point where light paths may be merged.
 template <typename F, uint32_t kFeatures, typename Interaction>
-WAVECOMB_INLINE void leave_point(const Vertex<F, kFeatures>& v, const Interaction& at,
-                                 const JointVertex<F>& joint) {
-  v.visible->seen = v.active & joint.merges;
+WAVECOMB_INLINE void store_merge_point(const Vertex<F, kFeatures>& v, const Interaction& at,
+                                       const JointVertex<F>& joint) {
+  v.visible->stored = v.active & joint.merges;
   v.visible->row = {at.s.p,
                     sqrt(joint.radius2),
                     -v.path.dir,
@@ -142,12 +143,13 @@ WAVECOMB_INLINE void offer_connection(const VertexContext<Bsdf, F, kFeatures>& c
   const Vec3<F>& w = c.d;
   const Vec3<F> wi = context.frame.to_local(w);
   const BsdfEval<F> e = at.bsdf.eval(context.view, wi);
-  const Mask<F> shown = wanted & c.valid & at.is_consistent(w, wi);
+  const Mask<F> usable = wanted & c.valid & at.is_consistent(w, wi);
   const Color<F> light = at.throughput * e.f_cos * offer.vertices;
-  offer.row = {c.o, e.pdf, select<F>(shown, clean<F>(light, 0.f), Color<F>(F(0.f))),
-               context.joint.template towards<Bsdf>(v, at, context.wo, w, wi, shown)};
+  offer.row = {c.o, e.pdf, select<F>(usable, clean<F>(light, 0.f), Color<F>(F(0.f))),
+               context.joint.template towards<Bsdf>(v, at, context.wo, w, wi, usable)};
   if (v.wants_events()) [[unlikely]]
-    offer.note = note_event<std::remove_cvref_t<decltype(at.bsdf)>, F>(at.bsdf, context.wo, wi);
+    offer.scattering =
+        classify_event<std::remove_cvref_t<decltype(at.bsdf)>, F>(at.bsdf, context.wo, wi);
 }
 
 /// Sets R after the bounce `b` along `world`, and whether the path awaits a merge.
@@ -166,13 +168,14 @@ WAVECOMB_INLINE void next_ratio(const VertexContext<Bsdf, F, kFeatures>& c, cons
     const F z = abs(b.wi.z) * F(b.eta * b.eta);
     F by_angle = joint.ratio * F(abs(dot(at.s.ng, world)) * joint.inverse_cos) *
                  F(abs(wo.z) / select(z > 0.f, z, F(1.f)));
-    by_angle = select(passes_one_way<Bsdf, F>(at.bsdf, wo, b.wi), F(0.f), by_angle);
+    by_angle = select(is_asymmetric<Bsdf, F>(at.bsdf, wo, b.wi), F(0.f), by_angle);
     r = select(b.is_delta, v.depth == 0 ? F(0.f) : by_angle, r);
   }
-  r = min(max(r, F(0.f)), F(kMostRatio));
+  r = min(max(r, F(0.f)), F(kMaxRatio));
   if (v.settings.merge_scale > 0.f) [[unlikely]] {
-    const Mask<F> waits = v.depth == 0 ? b.is_delta : Mask<F>(b.is_delta & v.path.awaits_merge);
-    next.awaits_merge = waits & not_(joint.merges);
+    const Mask<F> waits_for_merge =
+        v.depth == 0 ? b.is_delta : Mask<F>(b.is_delta & v.path.awaits_merge);
+    next.awaits_merge = waits_for_merge & not_(joint.merges);
     r = select(next.awaits_merge | (b.is_delta & joint.merges), F(0.f), r);
   }
   next.ratio = r;

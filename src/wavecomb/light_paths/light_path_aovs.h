@@ -10,7 +10,7 @@
 ///
 ///   begin     a path starts at a light
 ///   shade     a vertex was shaded
-///   keep      camera paths connect to this vertex
+///   mark_stored        camera paths connect to this vertex
 ///   show      the camera sees the vertex: the contribution is added to the film
 ///   offer     a vertex of a camera path offers a connection
 ///   link      the vertex of the light path was shaded for the connection
@@ -33,24 +33,24 @@ namespace wavecomb {
 
 /// State of a light path for light path expressions.
 template <typename F>
-struct LightWayRow {
+struct LightPathStateRow {
   UInt<F> states;  ///< of the three colours, in the layout of ExpressionRow
   // Vertex that was shaded last: the states before it, and its scattering towards the camera.
-  UInt<F> shown_states, shown_event;
-  Color<F> shown_diffuse;
-  WAVECOMB_FIELDS(states, shown_states, shown_event, shown_diffuse)
+  UInt<F> splat_states, splat_event;
+  Color<F> splat_diffuse;
+  WAVECOMB_FIELDS(states, splat_states, splat_event, splat_diffuse)
 };
 
 /// Connection of a stored vertex of a light path with a vertex of a camera path. Both have the
 /// states before the vertex and the classification of its scattering along the connection; fields
-/// of the camera path start with `seen`.
+/// of the camera path start with `camera_`.
 template <typename F>
-struct LinkRow {
+struct ConnectionStateRow {
   UInt<F> states, event;
   Color<F> diffuse;
-  UInt<F> seen_states, seen_event;
-  Color<F> seen_diffuse;
-  WAVECOMB_FIELDS(states, event, diffuse, seen_states, seen_event, seen_diffuse)
+  UInt<F> camera_states, camera_event;
+  Color<F> camera_diffuse;
+  WAVECOMB_FIELDS(states, event, diffuse, camera_states, camera_event, camera_diffuse)
 };
 
 /// Contribution of a vertex of a light path to the film.
@@ -70,18 +70,18 @@ class LightPathAovs {
   LightPathAovs() = default;
   /// `tables` may be null if nothing in `layout` needs them.
   LightPathAovs(size_t capacity, const AovLayout& layout, const AovTables* tables, bool connects)
-      : places_(layout), tables_(tables) {
+      : layout_(layout), tables_(tables) {
     if (layout.expressions == 0) return;
     backward_ = &tables->backward;
-    ways_ = SlotRows(capacity, kRowWords<LightWayRow>);
-    if (connects) links_ = SlotRows(capacity, kRowWords<LinkRow>);
+    states_ = SlotRows(capacity, kRowWords<LightPathStateRow>);
+    if (connects) connections_ = SlotRows(capacity, kRowWords<ConnectionStateRow>);
   }
 
   /// Returns whether any AOV layer needs contributions of light paths.
-  explicit operator bool() const { return places_.count > 0; }
+  explicit operator bool() const { return layout_.count > 0; }
   /// Returns whether vertices must classify their scatterings.
   bool wants_events() const { return backward_ != nullptr; }
-  size_t bytes() const { return ways_.bytes() + links_.bytes(); }
+  size_t bytes() const { return states_.bytes() + connections_.bytes(); }
 
   /// Starts paths at lights `light`.
   template <typename F>
@@ -93,7 +93,8 @@ class LightPathAovs {
     const U state = gather<U>(backward_->begin.data(), end, on);
     U states(0u);
     for (uint32_t c = 0; c < 3; ++c) states = states | (state << (ColourStates::kBits * c));
-    store_row<LightWayRow, F>(ways_.rows, slot, {states, states, U(0u), Color<F>(F(0.f))}, active);
+    store_row<LightPathStateRow, F>(states_.rows, slot, {states, states, U(0u), Color<F>(F(0.f))},
+                                    active);
   }
 
   /// Records a shaded vertex, whose scatterings `v` classifies.
@@ -102,42 +103,44 @@ class LightPathAovs {
                                           const SampleKey<F>& key, const VertexAovs<F>& v,
                                           const Mask<F>& active) const {
     using U = UInt<F>;
-    const U before = load_row<LightWayRow, F>(ways_.rows, slot, active).states;
+    const U before = load_row<LightPathStateRow, F>(states_.rows, slot, active).states;
     const U path = hash_u32<U>(key.pixel_hash, key.sample);
     const F u = unit_float<F>(hash_u32<U>(path, U(0x51ed270bu + depth)));
     const U states = ColourStates::after<F>(backward_->next.data(), before, v.bounce, u, active);
-    store_row<LightWayRow, F>(ways_.rows, slot, {states, before, v.lit.event, v.lit.diffuse},
-                              active);
+    store_row<LightPathStateRow, F>(
+        states_.rows, slot, {states, before, v.light_scattering.event, v.light_scattering.diffuse},
+        active);
   }
 
   /// Marks the vertex that was shaded last as the one to connect to.
   template <typename F>
-  [[gnu::noinline, gnu::cold]] void keep(const UInt<F>& slot, const Mask<F>& active) const {
-    const UInt<F> states = load_row<LightWayRow, F>(ways_.rows, slot, active).shown_states;
-    scatter_field<F>(links_.rows, &LinkRow<float>::states, slot, states, active);
+  [[gnu::noinline, gnu::cold]] void mark_stored(const UInt<F>& slot, const Mask<F>& active) const {
+    const UInt<F> states = load_row<LightPathStateRow, F>(states_.rows, slot, active).splat_states;
+    scatter_field<F>(connections_.rows, &ConnectionStateRow<float>::states, slot, states, active);
   }
 
   /// Records the vertices of camera paths that offer a connection. `states` are their states before
   /// the vertex.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void offer(const UInt<F>& slot, const UInt<F>& states,
-                                          const ScatteringNote<F>& note,
+                                          const ScatteringEvent<F>& scattering,
                                           const Mask<F>& active) const {
-    LinkRow<F> row = load_row<LinkRow, F>(links_.rows, slot, active);
-    row.seen_states = states;
-    row.seen_event = note.event;
-    row.seen_diffuse = note.diffuse;
-    store_row<LinkRow, F>(links_.rows, slot, row, active);
+    ConnectionStateRow<F> row = load_row<ConnectionStateRow, F>(connections_.rows, slot, active);
+    row.camera_states = states;
+    row.camera_event = scattering.event;
+    row.camera_diffuse = scattering.diffuse;
+    store_row<ConnectionStateRow, F>(connections_.rows, slot, row, active);
   }
 
   /// Records the scattering at the stored vertices of light paths, shaded for the connection.
   template <typename F>
-  [[gnu::noinline, gnu::cold]] void link(const UInt<F>& slot, const ScatteringNote<F>& note,
-                                         const Mask<F>& active) const {
-    LinkRow<F> row = load_row<LinkRow, F>(links_.rows, slot, active);
-    row.event = note.event;
-    row.diffuse = note.diffuse;
-    store_row<LinkRow, F>(links_.rows, slot, row, active);
+  [[gnu::noinline, gnu::cold]] void record_connection(const UInt<F>& slot,
+                                                      const ScatteringEvent<F>& scattering,
+                                                      const Mask<F>& active) const {
+    ConnectionStateRow<F> row = load_row<ConnectionStateRow, F>(connections_.rows, slot, active);
+    row.event = scattering.event;
+    row.diffuse = scattering.diffuse;
+    store_row<ConnectionStateRow, F>(connections_.rows, slot, row, active);
   }
 
   /// Adds the contribution `c` of connections to the expressions of camera paths.
@@ -146,22 +149,24 @@ class LightPathAovs {
                                             const Color<F>& c, const Mask<F>& active) const {
     using U = UInt<F>;
     if (none(active)) return;
-    const LinkRow<F> row = load_row<LinkRow, F>(links_.rows, slot, active);
+    const ConnectionStateRow<F> row =
+        load_row<ConnectionStateRow, F>(connections_.rows, slot, active);
     const auto split = [](const Color<F>& all, const Color<F>& share, const auto& add) {
       const Color<F> diffuse = all * share;
       add(kDiffuseEvent, diffuse);
       add(kGlossyEvent, all - diffuse);
     };
-    split(c, row.diffuse, [&](uint32_t lobe, const Color<F>& shown) {
-      split(shown, row.seen_diffuse, [&](uint32_t seen_lobe, const Color<F>& part) {
+    split(c, row.diffuse, [&](uint32_t lobe, const Color<F>& light_part) {
+      split(light_part, row.camera_diffuse, [&](uint32_t camera_lobe, const Color<F>& part) {
         for_each_colour<F>(part, [&](uint32_t k, const F& value) {
           const U from =
               ColourStates::next<F>(backward_->next.data(), ColourStates::of<F>(row.states, k),
                                     row.event, U(lobe), active);
-          const U seen = to.next<F>(ColourStates::of<F>(row.seen_states, k), row.seen_event,
-                                    U(seen_lobe), active);
-          const U matched = gather<U>(backward_->matched.data(),
-                                      from * backward_->forward_states + seen, Mask<U>(active));
+          const U camera_state = to.next<F>(ColourStates::of<F>(row.camera_states, k),
+                                            row.camera_event, U(camera_lobe), active);
+          const U matched =
+              gather<U>(backward_->matched.data(), from * backward_->forward_states + camera_state,
+                        Mask<U>(active));
           to.add_matched<F>(slot, k, matched, value, active);
         });
       });
@@ -170,13 +175,13 @@ class LightPathAovs {
 
   /// Adds a light splat to the layers of the film. The sums are integers, so that the order does
   /// not matter.
-  void show(Film& film, const SplatFilter& filter, const LightSplat& splat) const;
+  void add_to_film(Film& film, const LightSplatFilter& filter, const LightSplat& splat) const;
 
  private:
-  SplatPlaces places_;
+  LightSplatLayout layout_;
   const AovTables* tables_ = nullptr;
   const BackwardAutomaton* backward_ = nullptr;  ///< null without expressions
-  SlotRows ways_, links_;
+  SlotRows states_, connections_;
 };
 
 }  // namespace wavecomb

@@ -30,7 +30,7 @@ struct HistoryRow {
   Color<F> radiance;    ///< R_j, including the light sample of this vertex
   UInt<F> material;
   // Only with a guiding field, or one in training (Vertex::guide):
-  UInt<F> axis;  ///< guide_axis of the surface
+  UInt<F> axis;  ///< guiding_axis of the surface
   F bsdf_pdf;    ///< solid angle density of wi by the BSDF alone
   WAVECOMB_FIELDS(p, wi, throughput, pdf, radiance, material, axis, bsdf_pdf)
 };
@@ -74,14 +74,15 @@ class PathHistory {
     if (depth >= most_) return;
     const PathState<F>& path = at.path;
     const VertexResult<F>& v = at.result;
-    const Color<F> brought = load_row<RadianceRow, F>(radiance, slot, active).sum;
+    const Color<F> contribution = load_row<RadianceRow, F>(radiance, slot, active).sum;
     const Vec3<F> none(F(0.f));
-    store_row<HistoryRow, F>(rows_.floats(0), slot * most_ + depth,
-                             {fma(path.dir, at.t, path.o), select<F>(v.alive, v.next.dir, none),
-                              select<F>(v.alive, v.next.throughput, none),
-                              select(v.alive & not_(v.next.enters_body), v.next.pdf, F(0.f)),
-                              brought, at.material, v.axis, select(v.alive, v.bsdf_pdf, F(0.f))},
-                             active);
+    store_row<HistoryRow, F>(
+        rows_.floats(0), slot * most_ + depth,
+        {fma(path.dir, at.t, path.o), select<F>(v.alive, v.next.dir, none),
+         select<F>(v.alive, v.next.throughput, none),
+         select(v.alive & not_(v.next.enters_body), v.next.pdf, F(0.f)), contribution, at.material,
+         v.axis, select(v.alive, v.bsdf_pdf, F(0.f))},
+        active);
     scatter<UInt<F>>(counts_.uints(0), UInt<F>(depth + 1), slot, Mask<UInt<F>>(active));
   }
 

@@ -160,7 +160,7 @@ class PathPool {
     radiance = shadows + capacity * kRowWords<ShadowRow>;
     this->cold = cold ? cold_.floats(0) : nullptr;
     ratio = joined ? ratios_.floats(0) : nullptr;
-    inside = nested ? medium_stacks_.floats(0) : nullptr;
+    medium_stacks = nested ? medium_stacks_.floats(0) : nullptr;
     shadow_tints = shaded ? shadow_tints_.floats(0) : nullptr;
     diffuse = split ? diffuse_.floats(0) : nullptr;
   }

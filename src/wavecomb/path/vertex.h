@@ -16,7 +16,7 @@
 
 namespace wavecomb {
 
-/// Returns InsideRow::crossed of a vertex whose bounce and shadow ray are in `out`.
+/// Returns MediumStackRow::crossed of a vertex whose bounce and shadow ray are in `out`.
 template <typename F, uint32_t kFeatures>
 inline UInt<F> crossed_at(const Vertex<F, kFeatures>& v, const Frame<F>& frame, const Vec3<F>& wo,
                           const VertexResult<F>& out) {
@@ -32,7 +32,7 @@ inline UInt<F> crossed_at(const Vertex<F, kFeatures>& v, const Frame<F>& frame, 
 
 /// Runs the steps of a vertex for the active lanes' paths, all with shading program `Bsdf`.
 template <typename Bsdf, typename F, uint32_t kFeatures>
-WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
+WAVECOMB_INLINE VertexResult<F> vertex_steps(const Vertex<F, kFeatures>& v) {
   using U = UInt<F>;
   using V = Vertex<F, kFeatures>;
   VertexResult<F> out;
@@ -41,13 +41,13 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
   out.has_shadow = Mask<F>(false);
   out.alive = Mask<F>(false);
   out.shadow_set = U(0u);
-  if constexpr (V::has(kMeshLights)) out.shade = Color<F>(F(0.f));
+  if constexpr (V::has(kMeshLights)) out.shadow_tint = Color<F>(F(0.f));
   out.next.link = U(0u);
   out.axis = U(0u);
   out.bsdf_pdf = F(0.f);
-  if constexpr (V::has(kInside)) out.crossed = U(0u);
+  if constexpr (V::has(kNestedMedia)) out.crossed = U(0u);
   if (v.wants_lights()) {
-    v.aovs->emitter = v.aovs->lit_by = U(kNoLight);
+    v.aovs->emitter = v.aovs->light_id = U(kNoLight);
     v.aovs->light_weight = F(-1.f);
   }
   if (v.wants_bounces()) v.aovs->survival = F(-1.f);
@@ -56,18 +56,18 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
   if constexpr (Bsdf::kEmits) out.emitted = emit<Bsdf, F>(v, at);
   const Frame<F> frame = at.frame(v);
   const Vec3<F> wo = frame.to_local(-v.path.dir);
-  at.note(v, frame);
+  at.record_aovs(v, frame);
   if (v.depth >= v.settings.max_depth) return out;
   if (v.has_links()) [[unlikely]]
     out.next.link = at.link_class(v);
 
   const auto view = at.bsdf.view(wo);
-  const GuidePlace<F> place = guide_place<Bsdf, F>(v, at, frame, wo);
+  const GuidingLookup<F> guiding = guiding_lookup<Bsdf, F>(v, at, frame, wo);
   JointVertex<F> joint{};
   if constexpr (V::has(kJoined) && Bsdf::kOnSurface)
     if (v.joins_light()) [[unlikely]] {
       joint = joint_vertex<Bsdf, F>(v, at, frame);
-      if (v.visible) leave_point<F>(v, at, joint);
+      if (v.visible) store_merge_point<F>(v, at, joint);
     }
 
   const Sample4<F> r_light =
@@ -78,7 +78,7 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
                                                   .frame = frame,
                                                   .wo = wo,
                                                   .view = view,
-                                                  .guide = place,
+                                                  .guide = guiding,
                                                   .joint = joint,
                                                   .receiver = receiver};
   sample_light(context, r_light, out);
@@ -88,19 +88,19 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
   const Sample4<F> r_bsdf =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kBsdf, v.depth));
   scatter(context, r_bsdf, out);
-  survive<F>(v, place, luminance(at.throughput), r_light.w, out);
+  survive<F>(v, guiding, luminance(at.throughput), r_light.w, out);
   if constexpr (Bsdf::kOnSurface && Bsdf::kTransmits)
-    if (v.knows_inside()) [[unlikely]]
+    if (v.has_medium_stack()) [[unlikely]]
       out.crossed = crossed_at<F>(v, frame, wo, out);
   if (v.wants_events()) [[unlikely]]
-    note_events(context, out);
+    classify_events(context, out);
   return out;
 }
 
-/// Runs take_steps() without inlining, for the reference integrator.
+/// Runs vertex_steps() without inlining, for the reference integrator.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 VertexResult<F> shade_vertex(const Vertex<F, kFeatures>& v) {
-  return take_steps<Bsdf, F>(v);
+  return vertex_steps<Bsdf, F>(v);
 }
 
 }  // namespace wavecomb

@@ -46,17 +46,17 @@ RenderRun::RenderRun(std::shared_ptr<const Scene> scene, const RenderPlan& plan,
                                   plan.waves.threads, plan.waves.wave_size)),
       runner_(*integrator_, plan.waves.threads, plan.waves.wave_size),
       loop_(plan, resume(), film_, runner_, costs_, watch, [this] {
-        if (plan_.settings.merges()) visible_.build(film_.visible_points());
+        if (plan_.settings.merges()) visible_.build(film_.merge_points());
       }) {}
 
 PassState RenderRun::resume() {
   PassState pass;
   if (options_.resume) learned_before_ = options_.resume(film_, pass);
-  if (learned_before_.empty() && is_taught(plan_.settings)) learned_before_ = options_.learned;
+  if (learned_before_.empty() && needs_training(plan_.settings)) learned_before_ = options_.learned;
   return pass;
 }
 
-void RenderRun::work(PilotCache& cache, const TrialShared& shared,
+void RenderRun::work(PilotCache& cache, const PilotShared& shared,
                      const std::function<void(const PilotResults&)>& learned) {
   const auto stopped = [this] { return watch_.stopped(); };
   pilots_ = run_pilots(
@@ -81,7 +81,7 @@ void RenderRun::work(PilotCache& cache, const TrialShared& shared,
   loop_.run();
 }
 
-void RenderRun::run(PilotCache& cache, const TrialShared& shared,
+void RenderRun::run(PilotCache& cache, const PilotShared& shared,
                     const std::function<void(const PilotResults&)>& learned) {
   const uint32_t threads = plan_.waves.threads;
   const tbb::global_control parallelism(
@@ -98,7 +98,7 @@ void RenderRun::run(PilotCache& cache, const TrialShared& shared,
       in_arena,
       [&] {
         check_textures();
-        return options_.progress ? options_.progress(loop_.status()) : Request::kGoOn;
+        return options_.progress ? options_.progress(loop_.status()) : Request::kContinue;
       },
       [&] { take_snapshot(false); });
   check_textures();
@@ -108,10 +108,10 @@ void RenderRun::run(PilotCache& cache, const TrialShared& shared,
 
 void RenderRun::take_snapshot(bool is_finished) {
   check_textures();
-  film_.note_light_paths();
+  film_.update_light_path_aovs();
   if (!options_.snapshot) return;
   options_.snapshot({film_, loop_.pass(), *pilots_.training, loop_.status(), is_finished,
-                     plan_.aovs.kept_names, [this] { return statistics(); }});
+                     plan_.aovs.layer_names, [this] { return statistics(); }});
 }
 
 void RenderRun::check_textures() const {
@@ -145,28 +145,28 @@ RenderStatistics RenderRun::statistics() const {
   return s;
 }
 
-Picture RenderRun::finish(RenderStatistics& statistics) {
-  Picture picture;
-  picture.width = plan_.window.width();
-  picture.height = plan_.window.height();
-  if (!options_.wants_picture) return picture;
+RenderedImage RenderRun::finish(RenderStatistics& statistics) {
+  RenderedImage image;
+  image.width = plan_.window.width();
+  image.height = plan_.window.height();
+  if (!options_.wants_picture) return image;
   ErrorMap error;
   error.mean_relative = std::numeric_limits<double>::infinity();
   if (film_.has_error()) error = measure_error(film_);
   statistics.error = error.mean_relative;
-  Film::Layers layers = std::move(film_).finish(plan_.aovs.kept_names);
+  Film::Layers layers = std::move(film_).finish(plan_.aovs.layer_names);
   statistics.peak_rss_bytes = peak_rss_bytes();
-  picture.beauty = std::move(layers.beauty);
-  picture.albedo = std::move(layers.albedo);
-  picture.normal = std::move(layers.normal);
-  picture.depth = std::move(layers.depth);
-  picture.samples = std::move(layers.samples);
-  picture.error = std::move(error.error);
-  picture.variance = std::move(layers.variance);
-  picture.aovs = std::move(layers.aovs);
-  picture.deep = std::move(layers.deep);
-  picture.manifests = crypto_manifests(*scene_, picture.aovs);
-  return picture;
+  image.beauty = std::move(layers.beauty);
+  image.albedo = std::move(layers.albedo);
+  image.normal = std::move(layers.normal);
+  image.depth = std::move(layers.depth);
+  image.samples = std::move(layers.samples);
+  image.error = std::move(error.error);
+  image.variance = std::move(layers.variance);
+  image.aovs = std::move(layers.aovs);
+  image.deep = std::move(layers.deep);
+  image.manifests = crypto_manifests(*scene_, image.aovs);
+  return image;
 }
 
 }  // namespace wavecomb

@@ -87,7 +87,7 @@ struct WaveContext {
 
   /// Returns whether the scene has volumes, nested dielectrics or subsurface scattering.
   bool has_media() const {
-    return scene.volumes.count > 0 || scene.walks.media != nullptr || has_medium_stack();
+    return scene.volumes.count > 0 || scene.subsurface.media != nullptr || has_medium_stack();
   }
   /// Returns whether paths keep a medium stack.
   bool has_medium_stack() const { return scene.nested_media.media != nullptr; }
@@ -121,7 +121,7 @@ struct Wave {
         shadows(capacity),
         columns(3, capacity),
         times(context.scene.has_motion ? SoaBlock(1, capacity) : SoaBlock()),
-        walks(context.scene.walks.media ? SoaBlock(kWalkColumns, capacity) : SoaBlock()),
+        walks(context.scene.subsurface.media ? SoaBlock(kWalkColumns, capacity) : SoaBlock()),
         segments(context.has_media() ? SoaBlock(kSegmentColumns, capacity) : SoaBlock()),
         nested_media(context.has_medium_stack() ? capacity : 0),
         sorter(capacity),

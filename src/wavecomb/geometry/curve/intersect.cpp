@@ -74,57 +74,59 @@ class SegmentTest {
     }
     const double r = *std::max_element(curve_.r, curve_.r + 4);
     bulge_ = 0.75 * std::sqrt(bend);
-    const double pieces4 = bulge_ / std::max(kStraight * r, 1e-300);  // sub-segments^2
+    const double sub_segments4 = bulge_ / std::max(kStraight * r, 1e-300);  // sub-segments^2
     int halvings = mesh_.is_ribbon() ? kRibbonHalvings : 0;
-    while (halvings < kMostHalvings && pieces4 > static_cast<double>(1u << (2 * halvings)))
+    while (halvings < kMaxHalvings && sub_segments4 > static_cast<double>(1u << (2 * halvings)))
       ++halvings;
     bulge_ /= static_cast<double>(1u << (2 * halvings));
     return halvings;
   }
 
   /// Returns whether the ray passes the convex hull of a sub-segment on either side of its chord.
-  static bool passes_by(const Bezier& piece, double r) {
-    const double x = piece.p[3].x - piece.p[0].x, y = piece.p[3].y - piece.p[0].y;
-    const auto beside = [&](int k) { return x * piece.p[k].y - y * piece.p[k].x; };
-    const double b0 = beside(0), b1 = beside(1), b2 = beside(2);  // beside(3) equals beside(0)
+  static bool passes_by(const Bezier& sub_segment, double r) {
+    const double x = sub_segment.p[3].x - sub_segment.p[0].x,
+                 y = sub_segment.p[3].y - sub_segment.p[0].y;
+    const auto cross_z = [&](int k) { return x * sub_segment.p[k].y - y * sub_segment.p[k].x; };
+    const double b0 = cross_z(0), b1 = cross_z(1), b2 = cross_z(2);  // cross_z(3) equals cross_z(0)
     const double least = std::min(b0, std::min(b1, b2)), most = std::max(b0, std::max(b1, b2));
     const double reach = r * r * (x * x + y * y) * (1 + 1e-9);
     return (least > 0 && least * least > reach) || (most < 0 && most * most > reach);
   }
 
-  /// Searches the sub-segment of a CurvePiece node, or an ancestor of it that is straight enough.
+  /// Searches the sub-segment of a SubSegment node, or an ancestor of it that is straight enough.
   void search_node(uint32_t node) {
     int halvings = depth();
-    Bezier piece = curve_;
+    Bezier sub_segment = curve_;
     double u0 = 0, u1 = 1;
     for (uint32_t bit = std::bit_floor(node) / 2; bit > 0 && halvings > 0; bit /= 2, --halvings) {
       const bool second = (node & bit) != 0;
-      Bezier::keep_half(piece.p, second);
-      Bezier::keep_half(piece.r, second);
+      Bezier::keep_half(sub_segment.p, second);
+      Bezier::keep_half(sub_segment.r, second);
       (second ? u0 : u1) = 0.5 * (u0 + u1);
     }
-    search(piece, u0, u1, halvings);
+    search(sub_segment, u0, u1, halvings);
   }
 
   /// Bisects a sub-segment recursively while the ray may hit its hull.
-  void search(const Bezier& piece, double u0, double u1, int halvings) {
-    const double r = *std::max_element(piece.r, piece.r + 4);
-    if (passes_by(piece, r)) return;
+  void search(const Bezier& sub_segment, double u0, double u1, int halvings) {
+    const double r = *std::max_element(sub_segment.r, sub_segment.r + 4);
+    if (passes_by(sub_segment, r)) return;
     const auto misses = [&](double V::* axis, double lo, double hi) {
-      double least = piece.p[0].*axis, most = least;
+      double least = sub_segment.p[0].*axis, most = least;
       for (int k = 1; k < 4; ++k) {
-        least = std::min(least, piece.p[k].*axis);
-        most = std::max(most, piece.p[k].*axis);
+        least = std::min(least, sub_segment.p[k].*axis);
+        most = std::max(most, sub_segment.p[k].*axis);
       }
       return least - r > hi || most + r < lo;
     };
     if (misses(&V::x, 0, 0) || misses(&V::y, 0, 0) || misses(&V::z, z_near_, z_far_)) return;
-    if (halvings == 0) return mesh_.is_ribbon() ? meet_ribbon(u0, u1) : meet_tube(u0, u1, side_);
-    if (halvings <= kLeafHalvings && !mesh_.is_ribbon())
-      return search_leaves(piece, r, u0, u1, halvings);
+    if (halvings == 0)
+      return mesh_.is_ribbon() ? intersect_ribbon(u0, u1) : intersect_tube(u0, u1, side_);
+    if (halvings <= kLaneHalvings && !mesh_.is_ribbon())
+      return search_sub_segments(sub_segment, r, u0, u1, halvings);
     Bezier a, b;
-    Bezier::split(piece.p, a.p, b.p);
-    Bezier::split(piece.r, a.r, b.r);
+    Bezier::split(sub_segment.p, a.p, b.p);
+    Bezier::split(sub_segment.r, a.r, b.r);
     const double middle = 0.5 * (u0 + u1);
     search(a, u0, middle, halvings - 1);
     if (query_ == CurveQuery::kAny && !hits_.empty()) return;
@@ -132,12 +134,13 @@ class SegmentTest {
   }
 
   /// Tests all straight sub-segments below a sub-segment of a tube at once.
-  void search_leaves(const Bezier& piece, double r, double u0, double u1, int halvings) {
-    uint32_t left = leaves_near(piece, halvings, r, bulge_, z_near_, z_far_);
+  void search_sub_segments(const Bezier& sub_segment, double r, double u0, double u1,
+                           int halvings) {
+    uint32_t left = sub_segments_near(sub_segment, halvings, r, bulge_, z_near_, z_far_);
     const double step = (u1 - u0) / (1 << halvings);
     for (; left != 0; left &= left - 1) {
       const double from = u0 + std::countr_zero(left) * step;
-      meet_tube(from, from + step, side_);
+      intersect_tube(from, from + step, side_);
       if (query_ == CurveQuery::kAny && !hits_.empty()) return;
     }
   }
@@ -172,14 +175,14 @@ class SegmentTest {
 
   /// Adds the extremum of `side` in [u0, u1] if the steps from both ends lead into the interval.
   /// The curve's own ends may be extrema as well.
-  void meet_tube(double u0, double u1, int side) {
+  void intersect_tube(double u0, double u1, int side) {
     const double s0 = step(u0, side), s1 = step(u1, side);
     if (s0 > 0 && s1 < 0)
-      meet_tube_at(extreme_between(u0, s0, u1, s1, side), side);
+      intersect_tube_at(extreme_between(u0, s0, u1, s1, side), side);
     else if (u0 == 0 && s0 <= 0)
-      meet_tube_at(0, side);
+      intersect_tube_at(0, side);
     else if (u1 == 1 && s1 >= 0)
-      meet_tube_at(1, side);
+      intersect_tube_at(1, side);
   }
 
   /// Returns the root of step() between u0, where it is s0 > 0, and u1, where it is s1 < 0, by a
@@ -203,15 +206,15 @@ class SegmentTest {
     return u;
   }
 
-  void meet_tube_at(double u, int side) {
+  void intersect_tube_at(double u, int side) {
     const V c = curve_.at(u);
     const double r = curve_.radius(u), h = r * r - c.x * c.x - c.y * c.y;
     if (!(h >= 0 && r > 0)) return;
     const double z = c.z + side * std::sqrt(h);
     const V n = V{-c.x, -c.y, z - c.z} * (1 / r);
     const bool is_inside =
-        (u == 0 && goes_on_at(n, kCurveGoesOnBefore, 0, first_ - 1)) ||
-        (u == 1 && goes_on_at(n, kCurveGoesOnAfter, 3, first_ + (cubic_ ? 4 : 2)));
+        (u == 0 && continues_at(n, kCurveContinuesBefore, 0, first_ - 1)) ||
+        (u == 1 && continues_at(n, kCurveContinuesAfter, 3, first_ + (cubic_ ? 4 : 2)));
     if (!(z > 0) || is_inside)
       may_be_inside_ = true;
     else if (z <= z_far_)
@@ -219,7 +222,7 @@ class SegmentTest {
   }
 
   /// Returns whether normal n of the end sphere points into the adjoining segment.
-  bool goes_on_at(const V& n, uint32_t flag, int end, uint32_t next) const {
+  bool continues_at(const V& n, uint32_t flag, int end, uint32_t next) const {
     if ((mesh_.indices[prim_] & flag) == 0) return false;
     const V d = ray_.point(widen(points_.position(next))) - curve_.p[end];
     const double dr = mesh_.radii[next] - curve_.r[end];
@@ -254,9 +257,9 @@ class SegmentTest {
     return c.x * b.y - c.y * b.x;
   }
 
-  void meet_ribbon(double u0, double u1) {
+  void intersect_ribbon(double u0, double u1) {
     const double f0 = across(u0), f1 = across(u1);
-    if ((f0 < 0) != (f1 < 0)) return meet_ribbon_between(u0, f0, u1, f1);
+    if ((f0 < 0) != (f1 < 0)) return intersect_ribbon_between(u0, f0, u1, f1);
     // A ribbon seen nearly edge-on may be hit twice. Tests whether the sign changes at the extremum
     // of the parabola through the ends and the midpoint.
     const double slope = f1 - f0, bend = 2 * (f0 + f1) - 4 * across(0.5 * (u0 + u1));
@@ -264,13 +267,13 @@ class SegmentTest {
     if (!(at > 0 && at < 1)) return;
     const double um = u0 + at * (u1 - u0), fm = across(um);
     if ((fm < 0) == (f0 < 0)) return;
-    meet_ribbon_between(u0, f0, um, fm);
-    meet_ribbon_between(um, fm, u1, f1);
+    intersect_ribbon_between(u0, f0, um, fm);
+    intersect_ribbon_between(um, fm, u1, f1);
   }
 
   /// Finds the hit between parameters where across() has different signs, by the Illinois method
   /// (regula falsi).
-  void meet_ribbon_between(double u0, double f0, double u1, double f1) {
+  void intersect_ribbon_between(double u0, double f0, double u1, double f1) {
     double u = u0;
     int kept = 0;  // end that the last step kept: -1 or 1
     for (int i = 0; i < kRibbonSteps && u1 - u0 > 1e-15; ++i) {
@@ -303,7 +306,7 @@ class SegmentTest {
   }
 
   static constexpr double kStraight = 0.025;  ///< fraction of the radius
-  static constexpr int kMostHalvings = 9, kRibbonHalvings = 3;
+  static constexpr int kMaxHalvings = 9, kRibbonHalvings = 3;
   static constexpr int kSteps = 40, kRibbonSteps = 100;
   static constexpr double kNear = 1e-9;  ///< smaller steps no longer change the extremum
   static constexpr double kFar = 2;      ///< a step beyond either end
@@ -352,7 +355,7 @@ Bounds curve_bounds(const Mesh& mesh, uint32_t prim, uint32_t step) {
   for (size_t k = first; k < first + n; ++k) {
     const float* p = &mesh.positions[3 * (step * mesh.vertex_count() + k)];
     const Vec3<float> r =
-        mesh.splats.empty() ? Vec3<float>(mesh.radii[k]) : splat_reach(mesh.splats[k]);
+        mesh.splats.empty() ? Vec3<float>(mesh.radii[k]) : gaussian_splat_extent(mesh.splats[k]);
     const auto reach = [](float x, float by) { return 1e-6f * std::abs(x) + 1.00001f * by; };
     const Vec3<float> by(reach(p[0], r.x), reach(p[1], r.y), reach(p[2], r.z));
     box.add({p[0] - by.x, p[1] - by.y, p[2] - by.z});
@@ -361,17 +364,19 @@ Bounds curve_bounds(const Mesh& mesh, uint32_t prim, uint32_t step) {
   return box;
 }
 
-CurveHits intersect_curve(const Mesh& mesh, const CurvePiece& piece, const CurveRay& of, float tfar,
-                          CurveQuery query, float time, bool outside) {
+CurveHits intersect_curve(const Mesh& mesh, const SubSegment& sub_segment, const CurveRay& of,
+                          float tfar, CurveQuery query, float time, bool outside) {
   const RaySpace& ray = of.space;
   const PointsAt points(mesh, time);
   CurveHits hits;
   if (mesh.primitive == Primitive::kSphere)
-    intersect_sphere(mesh, piece.prim, points, ray, tfar, outside, hits);
-  else if (mesh.primitive == Primitive::kSplat)
-    intersect_splat(mesh.splats[piece.prim], points.position(piece.prim), of, tfar, hits);
+    intersect_sphere(mesh, sub_segment.prim, points, ray, tfar, outside, hits);
+  else if (mesh.primitive == Primitive::kGaussianSplat)
+    intersect_gaussian_splat(mesh.splats[sub_segment.prim], points.position(sub_segment.prim), of,
+                             tfar, hits);
   else
-    SegmentTest(mesh, piece.prim, points, ray, tfar, query, hits).run(outside, piece.node);
+    SegmentTest(mesh, sub_segment.prim, points, ray, tfar, query, hits)
+        .run(outside, sub_segment.node);
   return hits;
 }
 

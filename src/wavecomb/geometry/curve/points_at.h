@@ -35,7 +35,7 @@ class PointsAt {
   }
 
   const Mesh& mesh_;
-  const BetweenSteps<float> place_;
+  const StepInterpolation<float> place_;
 };
 
 }  // namespace wavecomb

@@ -18,7 +18,7 @@ enum class LightKind : uint8_t;
 /// Kind of the lights that belong to meshes, LightKind::kTriangle.
 inline constexpr LightKind kMeshLight = LightKind{6};
 /// Maximum number of parameters specific to one kind of light.
-inline constexpr size_t kMaxOwnParameters = 4;
+inline constexpr size_t kMaxSpecificParameters = 4;
 inline constexpr uint32_t kNoLight = 0xffffffffu;
 inline constexpr uint32_t kNoShaping = 0xffffffffu;
 inline constexpr uint32_t kNoIes = 0xffffffffu;
@@ -43,7 +43,7 @@ struct Shaping {
 };
 
 /// UsdLuxShadowAPI: adjustments of a light's shadows that are not physically based.
-struct ShadowLook {
+struct ShadowAttributes {
   Vec3<float> color{0, 0, 0};  ///< fraction of the light that arrives in shadow
   /// Maximum world-space distance of an occluder from the shaded surface; less than 0: unlimited.
   float distance = -1;
@@ -127,7 +127,7 @@ struct Light {
   /// Ids of SceneBuilder::add_geometry_set: the objects that the light illuminates, and those that
   /// cast shadows from it.
   uint32_t light_link = kNoSet, shadow_link = kNoSet;
-  ShadowLook shadow;
+  ShadowAttributes shadow;
   /// Id of SceneBuilder::add_light_filter; ignored for infinite lights.
   uint32_t filter = kNoFilter;
   bool visible = true;  ///< whether camera and bounce rays can hit its shape
@@ -135,7 +135,7 @@ struct Light {
   /// dome is sampled. The -z side of a portal receives the light.
   std::vector<Affine> portals;
   /// Values of the parameters specific to the kind (LightKindInfo::own), if given.
-  std::array<std::optional<float>, kMaxOwnParameters> own;
+  std::array<std::optional<float>, kMaxSpecificParameters> own;
   /// For mesh lights (kind kMeshLight), whose `to_world` maps to the space of the mesh's group.
   MaterialSync sync = MaterialSync::kGlowTintsLight;
 };

@@ -16,12 +16,12 @@ namespace wavecomb {
 namespace {
 
 /// Makes a power finite and not negative, so that it can be compared with others.
-double sane_power(double power) {
-  const bool sane = std::isfinite(power) && power > 0;
-  return sane ? power : (power > 0 ? 1e300 : 0);
+double valid_power(double power) {
+  const bool is_valid = std::isfinite(power) && power > 0;
+  return is_valid ? power : (power > 0 ? 1e300 : 0);
 }
 
-void put_profiles(LightSet& set, std::span<const IesProfile> profiles) {
+void pack_profiles(LightSet& set, std::span<const IesProfile> profiles) {
   const auto append = [&](const std::vector<float>& values) {
     const auto first = static_cast<uint32_t>(set.ies_numbers.size());
     set.ies_numbers.insert(set.ies_numbers.end(), values.begin(), values.end());
@@ -51,11 +51,11 @@ void make_triangles(LightSet& set, size_t count, const TriangleSource& source, d
   parallel_for(chunks, [&](size_t chunk) {
     each(chunk, [&](size_t i) {
       const EmissiveTriangle t = source(i);
-      const MadeTriangle made = make_triangle(set, t);
-      set.triangles[i] = made.light;
-      powers[i] = sane_power(made.power);
+      const TriangleBuild out = make_triangle(set, t);
+      set.triangles[i] = out.light;
+      powers[i] = valid_power(out.power);
       if (t.mesh_light != kNoLight) set.mesh_lights[i] = set.record_count + t.mesh_light;
-      if (!made.light.varies()) return;
+      if (!out.light.varies()) return;
       uvs[chunk].push_back({{t.uv0[0], t.uv0[1]},
                             {t.uv1[0], t.uv1[1]},
                             {t.uv2[0], t.uv2[1]},
@@ -82,8 +82,8 @@ LightView LightSet::view(const MaterialView& materials) const {
   v.lights = records.data();
   v.triangles = triangles.data();
   v.triangle_uvs = triangle_uvs.data();
-  v.pick = pick;
-  v.pick.bins = pick_bins.empty() ? nullptr : pick_bins.data();
+  v.power_table = power_table;
+  v.power_table.bins = power_bins.empty() ? nullptr : power_bins.data();
   v.tree = tree.view();
   v.count = static_cast<uint32_t>(size());
   v.first_triangle = first_triangle();
@@ -122,7 +122,7 @@ void check_light_count(uint64_t count) {
 
 LightSet build_lights(const LightInputs& inputs) {
   const std::span<const Light> lights = inputs.lights;
-  const std::span<const PlacedMeshLight> mesh_lights = inputs.mesh_lights;
+  const std::span<const MeshLightInstance> mesh_lights = inputs.mesh_lights;
   const size_t triangle_count = inputs.triangle_count;
   check_light_count(lights.size() + triangle_count);
   SceneCounts counts{.lights = lights.size() + mesh_lights.size()};
@@ -137,39 +137,39 @@ LightSet build_lights(const LightInputs& inputs) {
   set.records.reserve(lights.size() + mesh_lights.size());
   powers.reserve(lights.size() + triangle_count);
   set.of_input.resize(lights.size());
-  put_profiles(set, inputs.profiles);
+  pack_profiles(set, inputs.profiles);
   for (const LightFilter& filter : inputs.filters) set.filters.push_back(make_light_filter(filter));
-  LightMaking making{set,           inputs.before, scene_radius, inputs.textures, inputs.profiles,
-                     inputs.filters};
+  LightBuildContext context{
+      set, inputs.before, scene_radius, inputs.textures, inputs.profiles, inputs.filters};
   for (const bool infinite : {true, false}) {
     for (size_t i = 0; i < lights.size(); ++i) {
       if (info_of(lights[i].kind).has(light_trait::kInfinite) != infinite) continue;
       set.of_input[i] = static_cast<uint32_t>(set.records.size());
-      const MadeLight made = make_light(lights[i], making);
-      set.records.push_back(made.record);
-      powers.push_back(sane_power(made.power));
+      const LightBuild out = make_light(lights[i], context);
+      set.records.push_back(out.record);
+      powers.push_back(valid_power(out.power));
     }
     if (infinite) set.infinite_count = static_cast<uint32_t>(set.records.size());
   }
   set.record_count = static_cast<uint32_t>(set.records.size());
   add_motions(set, lights);
-  for (const PlacedMeshLight& placed : mesh_lights)
-    set.records.push_back(make_mesh_light(placed, making));
+  for (const MeshLightInstance& placed : mesh_lights)
+    set.records.push_back(make_mesh_light(placed, context));
   powers.resize(lights.size() + triangle_count);
   make_triangles(set, triangle_count, inputs.triangle, powers.data() + lights.size());
 
   for (const double power : powers) set.total_power += power;
-  if (powers.size() <= inputs.most_picked) {
+  if (powers.size() <= inputs.max_power_lights) {
     std::vector<uint32_t> numbers;
-    set.pick = build_pick_table(powers, set.first_triangle(), set.pick_bins, numbers);
+    set.power_table = build_power_table(powers, set.first_triangle(), set.power_bins, numbers);
     const auto pdf = [&](size_t i) { return static_cast<float>(numbers[i]) * 0x1p-24f; };
-    for (size_t i = 0; i < set.record_count; ++i) set.records[i].pick_pdf = pdf(i);
+    for (size_t i = 0; i < set.record_count; ++i) set.records[i].selection_pdf = pdf(i);
     for (size_t i = 0; i < triangle_count; ++i)
-      set.triangles[i].pick_pdf = pdf(set.first_triangle() + i);
+      set.triangles[i].selection_pdf = pdf(set.first_triangle() + i);
   }
   set.tree = outline_light_tree(set, powers);
-  if (inputs.tree_time == TreeTime::kNow || set.pick_bins.empty() ||
-      pays_as_tree(set.tree.effective_lights))
+  if (inputs.tree_time == TreeTime::kNow || set.power_bins.empty() ||
+      prefers_tree(set.tree.effective_lights))
     set.tree = build_light_tree(set, powers);
   else
     set.powers = std::move(powers);

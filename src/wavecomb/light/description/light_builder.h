@@ -15,7 +15,7 @@
 namespace wavecomb {
 
 /// An instance of a mesh light.
-struct PlacedMeshLight {
+struct MeshLightInstance {
   const Light* light;
   Affine to_world;  ///< transform of the mesh's group
   double area;      ///< total one-sided area of the triangles in world space
@@ -31,7 +31,7 @@ struct EmissiveTriangle {
   uint32_t instance = 0, mesh = 0, prim = 0;  ///< identifies the triangle
   /// Emitted radiance on both sides, W / (m^2 sr). Kernels ignore it if `material` is set.
   float radiance[3] = {0, 0, 0};
-  uint32_t mesh_light = kNoLight;  ///< index of its PlacedMeshLight, or kNoLight
+  uint32_t mesh_light = kNoLight;  ///< index of its MeshLightInstance, or kNoLight
   /// Presence of the triangle in [0, 1], which scales its sampled emission. If the opacity varies,
   /// pass its expected value, which affects only light selection probabilities.
   float opacity = 1;
@@ -53,8 +53,8 @@ struct LightSet {
   std::vector<TriangleLight> triangles;
   std::vector<TriangleUvs> triangle_uvs;  ///< of triangles whose emission or opacity varies
   std::vector<uint32_t> mesh_lights;      ///< LightView::mesh_lights
-  std::vector<uint32_t> pick_bins;        ///< empty if only the light tree is used for selection
-  PickTable pick;                         ///< without its pointer
+  std::vector<uint32_t> power_bins;       ///< empty if only the light tree is used for selection
+  PowerTable power_table;                 ///< without its pointer
   LightTree tree;                         ///< an outline without nodes if the tree is built later
   std::vector<double> powers;  ///< powers of all lights in W, kept if the tree is built later
   std::vector<Distribution2D> distributions;
@@ -62,7 +62,7 @@ struct LightSet {
   std::vector<PortalGroup> portal_groups;
   std::vector<ShapingRecord> shapings;
   std::vector<FilterRecord> filters;
-  std::vector<ShadowLookRecord> shadows;
+  std::vector<ShadowRecord> shadows;
   std::vector<LightMotion> motions;  ///< by record; empty where no light moves
   std::vector<LightStep> motion_steps;
   std::vector<IesRecord> ies;
@@ -75,8 +75,8 @@ struct LightSet {
   /// Returns the index of the first triangle among all lights.
   uint32_t first_triangle() const { return record_count; }
   /// Returns the probability of selecting light `i` by power.
-  float pick_pdf(size_t i) const {
-    return i < record_count ? records[i].pick_pdf : triangles[i - record_count].pick_pdf;
+  float selection_pdf(size_t i) const {
+    return i < record_count ? records[i].selection_pdf : triangles[i - record_count].selection_pdf;
   }
 
   /// Returns the device view of these lights. Contract: it points into this set, which must not
@@ -86,7 +86,7 @@ struct LightSet {
 
 /// Maximum number of lights for selection by power, whose random number has 24 bits. With more
 /// lights, only the light tree is used.
-inline constexpr uint32_t kMaxPicked = (1u << 24) - 1;
+inline constexpr uint32_t kMaxPowerLights = (1u << 24) - 1;
 /// Maximum number of lights: kernels address triangle records of 16 32-bit words each with 32-bit
 /// indices.
 inline constexpr uint32_t kMaxLights = 1u << 28;
@@ -113,9 +113,9 @@ struct LightInputs {
   /// match; may be null.
   const LightSet* before = nullptr;
   std::span<const IesProfile> profiles = {};
-  std::span<const PlacedMeshLight> mesh_lights = {};  ///< each has passed check_mesh_light
+  std::span<const MeshLightInstance> mesh_lights = {};  ///< each has passed check_mesh_light
   /// For more lights no table for selection by power is built.
-  size_t most_picked = kMaxPicked;
+  size_t max_power_lights = kMaxPowerLights;
   /// The light tree takes as much memory as everything else. With kWhenChosen it is built only if
   /// LightSelection::kAuto selects by tree.
   TreeTime tree_time = TreeTime::kNow;
@@ -158,9 +158,9 @@ double image_solid_angle(const Distribution2D& d);
 /// before `first_triangle` are one group, the triangles another. `numbers` receives how many of the
 /// 2^24 random numbers select each light: none for weight 0, and at least a small number for every
 /// other light. If all weights are 0, no random number selects a light. There may be at most
-/// kMaxPicked lights. Alias tables in integers after M. Vose, "A Linear Algorithm for Generating
-/// Random Numbers with a Given Distribution", 1991.
-PickTable build_pick_table(std::span<const double> weights, size_t first_triangle,
-                           std::vector<uint32_t>& bins, std::vector<uint32_t>& numbers);
+/// kMaxPowerLights lights. Alias tables in integers after M. Vose, "A Linear Algorithm for
+/// Generating Random Numbers with a Given Distribution", 1991.
+PowerTable build_power_table(std::span<const double> weights, size_t first_triangle,
+                             std::vector<uint32_t>& bins, std::vector<uint32_t>& numbers);
 
 }  // namespace wavecomb

@@ -33,7 +33,7 @@ struct alignas(64) LightRecord {
   float area;
   float radius;
   float one_minus_cos;
-  float pick_pdf;  ///< probability of selection by power
+  float selection_pdf;  ///< probability of selection by power
   uint32_t kind;
   uint32_t texture;
   /// Index into LightView::distributions for a dome or rect with a texture; kNoDistribution for a
@@ -89,14 +89,14 @@ struct alignas(64) ShapingRecord {
 };
 static_assert(sizeof(ShapingRecord) == 128);
 
-/// Packed ShadowLook.
-struct alignas(32) ShadowLookRecord {
+/// Packed ShadowAttributes.
+struct alignas(32) ShadowRecord {
   float color[3];
   float distance;  ///< kFarAway if unlimited
   float falloff;
   float inverse_gamma;
 };
-static_assert(sizeof(ShadowLookRecord) == 32);
+static_assert(sizeof(ShadowRecord) == 32);
 
 /// Packed LightFilter.
 struct alignas(64) FilterRecord {
@@ -126,8 +126,8 @@ struct alignas(64) TriangleLight {
   /// kOpacity, which says what varies; the material that determines it; and the index of its
   /// TriangleUvs.
   float radiance[3];
-  float m[3];      ///< unit geometric normal times the area
-  float pick_pdf;  ///< probability of selection by power
+  float m[3];           ///< unit geometric normal times the area
+  float selection_pdf;  ///< probability of selection by power
   /// The emission and opacity of the material vary.
   static constexpr float kEmission = -1.f;
   /// Only the opacity of the material varies. It scales the radiance of a mesh light that ignores
@@ -153,8 +153,8 @@ static_assert(sizeof(TriangleUvs) == 48);
 /// stays in the cache, and one line of 32 values.
 struct Distribution2D {
   static constexpr uint32_t kCounts = 65536;
-  static constexpr uint32_t kLine = 32;             ///< values in a cache line
-  static constexpr uint32_t kMost = kLine * kLine;  ///< maximum number of intervals in a row
+  static constexpr uint32_t kLine = 32;            ///< values in a cache line
+  static constexpr uint32_t kMax = kLine * kLine;  ///< maximum number of intervals in a row
   /// Padding after the last value of a row. It is not less than any value, since kCounts itself is
   /// never stored.
   static constexpr uint16_t kPad = kCounts - 1;
@@ -178,7 +178,7 @@ struct Distribution2D {
 /// Integer alias tables that map a random number k in [0, 2^24) to a light. Numbers below `split`
 /// select a record, the others a triangle, so that looking up one of a few strong lights does not
 /// touch the table of millions of triangles. Each bin of a table covers 2^shift random numbers.
-struct PickTable {
+struct PowerTable {
   /// Bins of both groups. Random number r of the 2^shift of bin b selects light b of the group if r
   /// < bin mod 2^shift, and light bin >> shift otherwise.
   const uint32_t* bins = nullptr;
@@ -250,9 +250,9 @@ struct LightView {
   const LightRecord* lights = nullptr;
   const TriangleLight* triangles = nullptr;
   const TriangleUvs* triangle_uvs = nullptr;
-  PickTable pick;
+  PowerTable pick;
   /// Selection probability of each light if `pick` does not use those of the records; else null.
-  const float* pick_pdf = nullptr;
+  const float* selection_pdf = nullptr;
   LightTreeView tree;
   bool by_tree = false;  ///< select lights by `tree` instead of `pick`
   uint32_t count = 0;    ///< number of records and triangles
@@ -269,7 +269,7 @@ struct LightView {
   const FilterRecord* filters = nullptr;  ///< null if no light has a filter
   const LightMotion* motions = nullptr;   ///< by record; null if no light moves
   const LightStep* motion_steps = nullptr;
-  const ShadowLookRecord* shadows = nullptr;  ///< null if all shadows are plain
+  const ShadowRecord* shadows = nullptr;  ///< null if all shadows are plain
   /// Record of the mesh light of each triangle, or kNoLight. Null if there are no mesh lights.
   const uint32_t* mesh_lights = nullptr;
   bool has_effects = false;      ///< some record is sampled_only or has multipliers
@@ -281,7 +281,7 @@ struct LightView {
   /// `reach` before its centre, outside all light shapes. Radius 0 means that no light paths start.
   float centre[3] = {0, 0, 0};
   float radius = 0, reach = 0;
-  bool sends_paths() const { return radius > 0; }
+  bool emits_paths() const { return radius > 0; }
   const LightAim* aim = nullptr;  ///< target spheres of light paths; null for none
   // Geometry for opacity graphs that read positions; null for a light set without geometry.
   const MeshRecord* meshes = nullptr;

@@ -76,13 +76,13 @@ LightParameter row(const char* name, const char* label, const char* input, const
 }
 
 /// Limits a parameter to values of 0 or more.
-LightParameter positive(LightParameter p, double usual) {
+LightParameter positive(LightParameter p, double slider_max) {
   p.least = 0;
-  p.usual = usual;
+  p.slider_max = slider_max;
   return p;
 }
-LightParameter usually(LightParameter p, double usual) {
-  p.usual = usual;
+LightParameter with_slider_max(LightParameter p, double slider_max) {
+  p.slider_max = slider_max;
   return p;
 }
 LightParameter id(LightParameter p, LightRefers refers) {
@@ -105,7 +105,7 @@ LightParameter with(uint32_t trait, LightGroup group, LightParameter p) {
 }
 LightParameter choice(LightParameter p, std::vector<const char*> choices) {
   p.choices = std::move(choices);
-  p.is_own = true;
+  p.is_specific = true;
   return p;
 }
 
@@ -139,12 +139,12 @@ std::vector<LightParameter> shape_rows() {
            row<&L::normalize>("normalize", "normalize", "normalize",
                               "Divides radiance by the world-space area; for a distant light, by "
                               "UsdLux's sizeFactor.")),
-      with(kPictured, kEmission,
+      with(kTextured, kEmission,
            id(row<&L::texture>("texture", "texture", "texture:file",
                                "Texture that multiplies the colour: on a rect with u to the right "
                                "and v up as seen from the front, on a dome as latlong."),
               LightRefers::kTexture)),
-      with(kPlaced, kEmission,
+      with(kHasTransform, kEmission,
            id(row<&L::group>("group", "group", "", "Name of its light group, for AOVs."),
               LightRefers::kGroup)),
       all(kResponse,
@@ -168,15 +168,15 @@ std::vector<LightParameter> shaping_rows() {
   constexpr auto kS = &Light::shaping;
   return {
       with(kShaped, kShaping,
-           usually(row<kS, &S::focus>(
-                       "focus", "focus", "shaping:focus",
-                       "Exponent of the cosine to the axis, -z; 0 or less for no focus."),
-                   50)),
+           with_slider_max(row<kS, &S::focus>(
+                               "focus", "focus", "shaping:focus",
+                               "Exponent of the cosine to the axis, -z; 0 or less for no focus."),
+                           50)),
       with(kShaped, kShaping,
            row<kS, &S::focus_tint>("focus_tint", "focus tint", "shaping:focusTint",
                                    "Tint of the emission off the axis if there is a focus.")),
       with(kShaped, kShaping,
-           usually(
+           with_slider_max(
                row<kS, &S::cone_angle>(
                    "cone_angle", "cone angle", "shaping:cone:angle",
                    "Angle from the axis in degrees at which light ends; 180 or more for no cone."),
@@ -201,7 +201,7 @@ std::vector<LightParameter> shaping_rows() {
 /// Returns the parameters of linking and shadows.
 std::vector<LightParameter> shadow_rows() {
   using L = Light;
-  using H = ShadowLook;
+  using H = ShadowAttributes;
   using enum LightGroup;
   constexpr auto kH = &L::shadow;
   return {
@@ -216,16 +216,17 @@ std::vector<LightParameter> shadow_rows() {
       all(kResponse, positive(row<kH, &H::color>("shadow_color", "shadow colour", "shadow:color",
                                                  "Fraction of its light that arrives in shadow."),
                               1)),
+      all(kResponse, with_slider_max(row<kH, &H::distance>(
+                                         "shadow_distance", "shadow distance", "shadow:distance",
+                                         "Maximum world-space distance of an occluder from the "
+                                         "shaded surface; less than 0 for no limit."),
+                                     10)),
       all(kResponse,
-          usually(row<kH, &H::distance>("shadow_distance", "shadow distance", "shadow:distance",
-                                        "Maximum world-space distance of an occluder from the "
-                                        "shaded surface; less than 0 for no limit."),
-                  10)),
-      all(kResponse,
-          usually(row<kH, &H::falloff>("shadow_falloff", "shadow falloff", "shadow:falloff",
-                                       "Length before the shadow distance over which shadows fade; "
-                                       "0 or less for no fade."),
-                  10)),
+          with_slider_max(
+              row<kH, &H::falloff>("shadow_falloff", "shadow falloff", "shadow:falloff",
+                                   "Length before the shadow distance over which shadows fade; "
+                                   "0 or less for no fade."),
+              10)),
       all(kResponse,
           positive(row<kH, &H::gamma>("shadow_falloff_gamma", "shadow falloff gamma",
                                       "shadow:falloffGamma",
@@ -244,10 +245,10 @@ std::vector<LightParameter> other_rows() {
            id(row<&L::filter>("filter", "filter", "",
                               "Filter of add_light_filter that modifies its emission."),
               LightRefers::kFilter)),
-      with(kSeen, kShape,
+      with(kVisibleShape, kShape,
            row<&L::visible>("visible", "visible", "",
                             "Whether camera and bounce rays can hit its shape.")),
-      with(kPlaced, kShape,
+      with(kHasTransform, kShape,
            row<&L::motion>("motion", "motion", "",
                            "Transforms at equally spaced shutter times, (k, 4, 4), two or more. "
                            "Its size is that of the transform at mid-shutter.")),
@@ -294,7 +295,7 @@ bool in_range(const LightParameter& p, float v) {
 }
 
 void check_value(const std::string& of, const LightParameter& p, const LightValue& value,
-                 const LightReferences& there) {
+                 const LightReferences& references) {
   if (const auto* number = std::get_if<float>(&value); number && !in_range(p, *number))
     throw Error(of + p.name + " is " + text(double{*number}) + "; it must be " + limits(p));
   if (const auto* c = std::get_if<Vec3<float>>(&value))
@@ -306,21 +307,22 @@ void check_value(const std::string& of, const LightParameter& p, const LightValu
       if (!finite(map))
         throw Error(of + "a transform of " + p.name + " is not finite; give finite numbers");
   const auto* number = std::get_if<uint32_t>(&value);
-  const size_t counts[] = {kNone, there.textures, there.profiles, there.sets, kNone, there.filters};
+  const size_t counts[] = {kNone, references.textures, references.profiles, references.sets,
+                           kNone, references.filters};
   if (!number || *number < counts[static_cast<size_t>(p.refers)]) return;
   const std::string what = light_refers_name(p.refers);
   throw Error(of + p.name + " is " + what + " " + std::to_string(*number) +
               ", which was never added; add " + what + "s before lights");
 }
 
-void check(const Light& light, const LightReferences& there) {
+void check(const Light& light, const LightReferences& references) {
   const std::string of = quoted("light", light.name) + ": ";
   if (!finite(light.to_world)) throw Error(of + "its transform is not finite; mend it");
-  if (light.moves() && (light.motion.size() < 2 || light.motion.size() > kMostSteps))
+  if (light.moves() && (light.motion.size() < 2 || light.motion.size() > kMaxSteps))
     throw Error(of + "motion has " + std::to_string(light.motion.size()) +
-                " transforms; give from 2 to " + std::to_string(kMostSteps) + ", or none");
+                " transforms; give from 2 to " + std::to_string(kMaxSteps) + ", or none");
   for (const LightParameter& p : light_table())
-    if (!p.is_own || p.is_of(light.kind)) check_value(of, p, p.read(light), there);
+    if (!p.is_specific || p.is_of(light.kind)) check_value(of, p, p.read(light), references);
 }
 
 }  // namespace
@@ -349,24 +351,24 @@ LightKind light_kind(std::string_view name) {
   const std::span<const LightKindInfo> kinds = light_kinds();
   std::string known;
   for (size_t k = 0; k < kinds.size(); ++k) {
-    if (!kinds[k].has(light_trait::kPlaced)) continue;
+    if (!kinds[k].has(light_trait::kHasTransform)) continue;
     if (name == kinds[k].name) return static_cast<LightKind>(k);
     known += (known.empty() ? "" : ", ") + std::string(kinds[k].name);
   }
   throw Error("light kind is '" + std::string(name) + "'; it must be one of " + known);
 }
 
-void check_light(const Light& light, const LightReferences& there) {
+void check_light(const Light& light, const LightReferences& references) {
   const bool is_known = static_cast<size_t>(light.kind) < light_kinds().size();
-  if (!is_known || !info_of(light.kind).has(light_trait::kPlaced))
+  if (!is_known || !info_of(light.kind).has(light_trait::kHasTransform))
     throw Error(quoted("light", light.name) + ": its kind has no place of its own");
-  check(light, there);
+  check(light, references);
 }
 
-void check_mesh_light(const Light& light, const LightReferences& there) {
+void check_mesh_light(const Light& light, const LightReferences& references) {
   if (light.kind != kMeshLight)
     throw Error(quoted("light", light.name) + ": its kind is not a mesh light");
-  check(light, there);
+  check(light, references);
 }
 
 }  // namespace wavecomb

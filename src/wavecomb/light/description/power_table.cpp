@@ -18,20 +18,20 @@ constexpr size_t kBand = size_t{1} << 16;
 /// next.
 void fill_bins(std::span<const uint32_t> numbers, uint32_t shift, std::span<uint32_t> bins) {
   const uint32_t size = 1u << shift;
-  const auto given = [&](size_t bin) { return bin < numbers.size() ? numbers[bin] : 0u; };
+  const auto number_of = [&](size_t bin) { return bin < numbers.size() ? numbers[bin] : 0u; };
   for (uint32_t b = 0; b < bins.size(); ++b) bins[b] = b << shift;  // all full
-  size_t next = bins.size(), rich = bins.size();
-  uint32_t left = size;  // random numbers that bin `rich` has left
+  size_t next = bins.size(), overfull = bins.size();
+  uint32_t left = size;  // random numbers that bin `overfull` has left
   for (;;) {
-    while (next > 0 && given(next - 1) >= size) --next;
+    while (next > 0 && number_of(next - 1) >= size) --next;
     if (next == 0) return;
-    size_t poor = --next;
-    for (uint32_t has = given(poor); has < size;) {
-      while (left <= size) left = given(--rich);
-      bins[poor] = (static_cast<uint32_t>(rich) << shift) | has;
+    size_t underfull = --next;
+    for (uint32_t has = number_of(underfull); has < size;) {
+      while (left <= size) left = number_of(--overfull);
+      bins[underfull] = (static_cast<uint32_t>(overfull) << shift) | has;
       left -= size - has;
       if (left >= size) break;
-      poor = rich;
+      underfull = overfull;
       has = left;
     }
   }
@@ -61,20 +61,21 @@ void count_numbers(std::span<const double> weights, std::span<double> shares, si
 
 }  // namespace
 
-PickTable build_pick_table(std::span<const double> weights, size_t first_triangle,
-                           std::vector<uint32_t>& bins, std::vector<uint32_t>& numbers) {
+PowerTable build_power_table(std::span<const double> weights, size_t first_triangle,
+                             std::vector<uint32_t>& bins, std::vector<uint32_t>& numbers) {
   constexpr uint32_t kNumbers = 1u << 24;
   const size_t n = weights.size();
   const std::span<const double> groups[2] = {weights.first(first_triangle),
                                              weights.subspan(first_triangle)};
   bins.clear();
   numbers.assign(n, 0);
-  const auto count_lit = [](std::span<const double> of) {
+  const auto count_emitting = [](std::span<const double> of) {
     return static_cast<size_t>(std::count_if(of.begin(), of.end(), [](double w) { return w > 0; }));
   };
-  const size_t lit = count_lit(weights), lit_of[2] = {count_lit(groups[0]), count_lit(groups[1])};
-  PickTable table;
-  if (lit == 0) {  // no random number selects a light; any table will do
+  const size_t emitting = count_emitting(weights),
+               emitting_of[2] = {count_emitting(groups[0]), count_emitting(groups[1])};
+  PowerTable table;
+  if (emitting == 0) {  // no random number selects a light; any table will do
     table.split = first_triangle > 0 ? kNumbers : 0;
     table.shift[0] = table.shift[1] = 24;
     bins.assign(1, 0);
@@ -98,7 +99,7 @@ PickTable build_pick_table(std::span<const double> weights, size_t first_triangl
   parallel_bands(n, kBand, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i)
       shares[i] = weights[i] > 0 ? (1 - floor_share) * (shares[i] / total) +
-                                       floor_share / static_cast<double>(lit)
+                                       floor_share / static_cast<double>(emitting)
                                  : 0;
   });
 
@@ -106,7 +107,7 @@ PickTable build_pick_table(std::span<const double> weights, size_t first_triangl
   // large bins stay in the cache; 1024 bins for all numbers give enough resolution.
   const auto least = [&](size_t g, uint32_t shift) {
     const uint64_t units = (groups[g].size() + (size_t{1} << shift) - 1) >> shift;
-    return lit_of[g] > 0 ? units << shift : 0;
+    return emitting_of[g] > 0 ? units << shift : 0;
   };
   uint32_t unit = 14;
   while (unit > 0 && least(0, unit) + least(1, unit) > kNumbers) --unit;
@@ -114,9 +115,9 @@ PickTable build_pick_table(std::span<const double> weights, size_t first_triangl
   for (const double share : shares_of[0]) first_share += share;
   const auto wanted = static_cast<uint64_t>(std::nearbyint(first_share * kNumbers)) >> unit << unit;
   table.split = static_cast<uint32_t>(std::clamp<uint64_t>(
-      wanted, least(0, unit), lit_of[1] > 0 ? kNumbers - least(1, unit) : kNumbers));
-  if (lit_of[0] == 0) table.split = 0;
-  if (lit_of[1] == 0) table.split = kNumbers;
+      wanted, least(0, unit), emitting_of[1] > 0 ? kNumbers - least(1, unit) : kNumbers));
+  if (emitting_of[0] == 0) table.split = 0;
+  if (emitting_of[1] == 0) table.split = kNumbers;
 
   const uint32_t numbers_of[2] = {table.split, kNumbers - table.split};
   for (size_t g = 0; g < 2; ++g) {
@@ -124,7 +125,7 @@ PickTable build_pick_table(std::span<const double> weights, size_t first_triangl
     if (numbers_of[g] == 0) continue;
     const std::span<uint32_t> counts(numbers.data() + (g == 0 ? 0 : first_triangle),
                                      groups[g].size());
-    count_numbers(groups[g], shares_of[g], numbers_of[g] - lit_of[g], counts);
+    count_numbers(groups[g], shares_of[g], numbers_of[g] - emitting_of[g], counts);
 
     uint32_t shift = unit;
     while (numbers_of[g] >> shift < counts.size()) --shift;

@@ -22,7 +22,7 @@ struct EmissiveMesh {
   uint32_t mesh_id, instance_id;
   const InstanceRecord* instance;
   const Affine* to_world;
-  uint32_t mesh_light;  ///< index of its PlacedMeshLight, or kNoLight
+  uint32_t mesh_light;  ///< index of its MeshLightInstance, or kNoLight
 };
 
 uint64_t bytes_of(const LightTree& tree) {
@@ -103,7 +103,7 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
     return can_aim_at(materials.shaded[material], *materials.graphs);
   };
   const Affine identity{};
-  std::vector<PlacedMeshLight> placed;
+  std::vector<MeshLightInstance> light_instances;
   const bool any = materials.has_emission || !geometry.mesh_lights.empty();
   for (size_t i = 0; any && i < geometry.instance_records.size(); ++i) {
     const InstanceRecord& record = geometry.instance_records[i];
@@ -115,16 +115,17 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
       const bool moves = mesh.deforms() || (i > 0 && geometry.instances[i - 1].motion.moves());
       const Light* const light =
           mesh.mesh_light == kNoLight ? nullptr : &geometry.mesh_lights[mesh.mesh_light];
-      const bool glows = geometry.any_material(mesh_id, record.material, emits);
+      const bool is_emissive = geometry.any_material(mesh_id, record.material, emits);
       const bool independent = light && light->sync == MaterialSync::kIndependent;
-      const bool shines = !moves && mesh.triangle_count() > 0 && (glows || independent);
-      emissive.push_back(shines ? static_cast<uint32_t>(triangle_count) : kNoLight);
+      const bool emits_light = !moves && mesh.triangle_count() > 0 && (is_emissive || independent);
+      emissive.push_back(emits_light ? static_cast<uint32_t>(triangle_count) : kNoLight);
       const Affine& to_world = i == 0 ? identity : geometry.instances[i - 1].to_world;
       if (!geometry.mesh_lights.empty())
-        mesh_lights.push_back(light ? static_cast<uint32_t>(placed.size()) : kNoLight);
+        mesh_lights.push_back(light ? static_cast<uint32_t>(light_instances.size()) : kNoLight);
       const uint32_t mesh_light = light ? mesh_lights.back() : kNoLight;
-      if (light) placed.push_back({light, to_world, world_area(mesh, to_world), shines});
-      if (!shines) continue;
+      if (light)
+        light_instances.push_back({light, to_world, world_area(mesh, to_world), emits_light});
+      if (!emits_light) continue;
       sources.push_back({triangle_count, &mesh, mesh_id, static_cast<uint32_t>(i), &record,
                          &to_world, mesh_light});
       triangle_groups.push_back(
@@ -145,7 +146,7 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
                       .textures = geometry.textures,
                       .before = before ? &before->set : nullptr,
                       .profiles = geometry.profiles,
-                      .mesh_lights = placed,
+                      .mesh_lights = light_instances,
                       .tree_time = TreeTime::kWhenChosen,
                       .filters = geometry.filters});
   // So far entries count from the first triangle and the first mesh light; make them light ids.
@@ -157,14 +158,14 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
 const LightTree& SceneLights::tree(uint32_t threads) const {
   if (set.powers.empty()) return set.tree;
   std::call_once(grown_, [&] {
-    with_threads(threads, [&] { late_tree_ = build_light_tree(set, set.powers); });
-    late_bytes_ = bytes_of(late_tree_);
+    with_threads(threads, [&] { lazy_tree_ = build_light_tree(set, set.powers); });
+    lazy_bytes_ = bytes_of(lazy_tree_);
   });
-  return late_tree_;
+  return lazy_tree_;
 }
 
 uint64_t SceneLights::tree_bytes() const {
-  return bytes_of(set.tree) + late_bytes_;
+  return bytes_of(set.tree) + lazy_bytes_;
 }
 
 template <typename T, typename OfInput, typename OfRun>

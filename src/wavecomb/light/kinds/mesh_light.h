@@ -14,9 +14,9 @@ namespace detail {
 /// Returns the radiance of samples `s` on triangles `light`, with tint and shaping of their mesh
 /// lights. Constant radiance was tinted when the scene was built.
 template <typename F>
-inline Color<F> of_mesh_light(const LightView& view, const UInt<F>& light,
-                              const TriangleReader<F>& triangle, const KindSample<F>& s,
-                              const Mask<F>& active) {
+inline Color<F> mesh_light_sample_radiance(const LightView& view, const UInt<F>& light,
+                                           const TriangleReader<F>& triangle,
+                                           const KindSample<F>& s, const Mask<F>& active) {
   const UInt<F> record = record_of<F>(view, light, active);
   const Mask<F> known = active & (s.pdf > 0.f) & Mask<F>(record != UInt<F>(kNoLight));
   if (none(known)) return s.radiance;
@@ -29,17 +29,18 @@ inline Color<F> of_mesh_light(const LightView& view, const UInt<F>& light,
 
 /// Returns the factor for emission that a path hits, for a light with these multipliers. `share` is
 /// the diffuse fraction of the path's last bounce; the rest is specular. Cameras see the light
-/// without multipliers. `is_seen` marks paths that light sampling cannot produce.
+/// without multipliers. `is_specular_view` marks paths that light sampling cannot produce.
 template <typename F>
 inline Color<F> factor_of_hit(const F& diffuse, const F& specular, const Mask<F>& sampled_only,
-                              const Mask<F>& is_seen, bool from_camera, const Color<F>& share) {
+                              const Mask<F>& is_specular_view, bool from_camera,
+                              const Color<F>& share) {
   Color<F> factor(F(1.f));
   if (!from_camera) {
     const F more = diffuse - specular;
     factor = {fma(more, share.x, specular), fma(more, share.y, specular),
               fma(more, share.z, specular)};
   }
-  return select<F>(sampled_only & not_(is_seen), Color<F>(F(0.f)), factor);
+  return select<F>(sampled_only & not_(is_specular_view), Color<F>(F(0.f)), factor);
 }
 
 }  // namespace detail
@@ -68,19 +69,21 @@ inline Color<F> mesh_light_radiance(const LightView& view, const UInt<F>& record
   const U sync = light[&R::sync];
   const Mask<F> shows_material =
       ray.is_delta & Mask<F>(sync != U(static_cast<uint32_t>(MaterialSync::kNoResponse)));
-  const Mask<F> given = known & not_(shows_material);
-  if (none(given)) return emission;
+  const Mask<F> uses_light = known & not_(shows_material);
+  if (none(uses_light)) return emission;
   Color<F> radiance = emission * light.radiance();
-  if (view.shapings) radiance = detail::shaped<F>(view, light.shaping(), -ray.dir, radiance, given);
+  if (view.shapings)
+    radiance = detail::shaped<F>(view, light.shaping(), -ray.dir, radiance, uses_light);
   const Mask<F> sampled_only = Mask<F>(light[&R::sampled_only] != U(0u));
   radiance =
       radiance * detail::factor_of_hit<F>(light[&R::diffuse], light[&R::specular], sampled_only,
                                           ray.is_delta, ray.from_camera, ray.diffuse);
   if (view.links.members) {
     const U set = light[&R::light_link];
-    radiance = radiance * select(is_linked<F>(view.links, ray.link, set, given), F(1.f), F(0.f));
+    radiance =
+        radiance * select(is_linked<F>(view.links, ray.link, set, uses_light), F(1.f), F(0.f));
   }
-  return select<F>(given, radiance, emission);
+  return select<F>(uses_light, radiance, emission);
 }
 
 /// Kind of mesh lights in WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h). Records of mesh lights are
@@ -88,7 +91,7 @@ inline Color<F> mesh_light_radiance(const LightView& view, const UInt<F>& record
 struct TriangleKind : FlatKind {
   static LightKindInfo describe();
   template <typename F>
-  static detail::KindHit<F> hit(const detail::LightMeeting<F>& /*meeting*/) {
+  static detail::KindHit<F> hit(const detail::LightHitQuery<F>& /*query*/) {
     return detail::dark<F>();
   }
   template <typename F>
@@ -100,7 +103,7 @@ struct TriangleKind : FlatKind {
     return {};
   }
   template <typename F>
-  static F emission_density(const detail::LightMeeting<F>& /*meeting*/) {
+  static F emission_density(const detail::LightHitQuery<F>& /*query*/) {
     return F(0.f);
   }
 };

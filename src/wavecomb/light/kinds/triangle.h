@@ -16,8 +16,8 @@ struct TriangleRow {
   Vec3<F> p, u, v;
   Color<F> radiance;
   Vec3<F> m;
-  F pick_pdf;
-  WAVECOMB_FIELDS(p, u, v, radiance, m, pick_pdf)
+  F selection_pdf;
+  WAVECOMB_FIELDS(p, u, v, radiance, m, selection_pdf)
 };
 static_assert(sizeof(TriangleLight) == 4 * kRowWords<TriangleRow>);
 
@@ -30,7 +30,7 @@ struct TriangleReader : TriangleRow<F> {
 };
 
 /// Returns the varying radiance of triangles at barycentrics `b` and world position q: the emission
-/// of `material` (1 outside the lanes `glows`) times its opacity. `index` refers to TriangleUvs.
+/// of `material` (1 outside the lanes `emits`) times its opacity. `index` refers to TriangleUvs.
 /// Textures are read at their finest level.
 ///
 /// Presence is stochastic: a bounce hits the triangle with a probability equal to the opacity, and
@@ -40,25 +40,26 @@ struct TriangleReader : TriangleRow<F> {
 template <typename F>
 [[gnu::noinline]] Color<F> varying_radiance(const LightView& view, const UInt<F>& material,
                                             const UInt<F>& index, const Vec2<F>& b,
-                                            const Vec3<F>& q, const Mask<F>& glows,
+                                            const Vec3<F>& q, const Mask<F>& emits,
                                             const Mask<F>& active) {
   constexpr uint32_t kWords = sizeof(TriangleUvs) / 4;
   const auto row = load_rows<8, F>(view.triangle_uvs, index * kWords, active);
   // Vertex 2 goes first, since the order of float sums matters.
   const UvTriangle<F> corners({row[0], row[1]}, {row[4], row[5]}, {row[2], row[3]});
   const Vec2<F> uv = corners.at(b.y, b.x);
-  const MeshPlace<F> place{float_bits<F>(row[6]), float_bits<F>(row[7]), b.x, b.y};
+  const MeshPosition<F> mesh_position{float_bits<F>(row[6]), float_bits<F>(row[7]), b.x, b.y};
   Color<F> radiance(F(1.f));
-  if (any(glows)) {
+  if (any(emits)) {
     const auto point = [&](const Mask<F>& /*lanes*/) {
       GraphPoint<F> at;
       at.uv = uv;
-      at.place = place;
+      at.mesh_position = mesh_position;
       at.position = q;
       return at;
     };
-    const Color<F> glow = fetch_emission<F>(view.materials, material, uv, F(0.f), point, glows);
-    radiance = select<F>(glows, glow, radiance);
+    const Color<F> material_emission =
+        fetch_emission<F>(view.materials, material, uv, F(0.f), point, emits);
+    radiance = select<F>(emits, material_emission, radiance);
   }
   const Mask<F> partly = has_presence<F>(view.materials, material, active);
   if (any(partly)) {
@@ -66,7 +67,8 @@ template <typename F>
         gather_member<F>(view.triangle_uvs, &TriangleUvs::instance, index, partly);
     const F opacity = opacity_at<F>(
         view.materials, view.meshes, view.instances,
-        {.material = material, .instance = instance, .place = place, .uv = uv}, partly);
+        {.material = material, .instance = instance, .mesh_position = mesh_position, .uv = uv},
+        partly);
     radiance = radiance * select(partly, opacity, F(1.f));
   }
   return radiance;
@@ -82,9 +84,9 @@ inline Color<F> triangle_radiance(const TriangleReader<F>& light, const LightVie
   // Copies, so that the values that plain triangles use can stay in registers.
   const UInt<F> material = float_bits<F>(light.radiance.y), index = float_bits<F>(light.radiance.z);
   const Vec2<F> at = b;
-  const Vec3<F> place = q;
-  const Mask<F> glows = varies & (light.radiance.x == TriangleLight::kEmission), on = varies;
-  return select<F>(varies, varying_radiance<F>(view, material, index, at, place, glows, on),
+  const Vec3<F> point = q;
+  const Mask<F> emits = varies & (light.radiance.x == TriangleLight::kEmission), on = varies;
+  return select<F>(varies, varying_radiance<F>(view, material, index, at, point, emits, on),
                    light.radiance);
 }
 
@@ -102,7 +104,7 @@ inline KindEmission<F> emit_triangle(const TriangleReader<F>& light, const Light
   const F part =
       clamp(F(fma(s, F(2.f), select(back, F(-1.f), F(0.f)))), F(0.f), F(kOneMinusEpsilon));
   return emit_by_cosine<F>(q, n, part, t, triangle_radiance<F>(light, view, b, q, active),
-                           F(0.5f * even_emission_density<F>(area)));
+                           F(0.5f * uniform_emission_density<F>(area)));
 }
 
 /// Samples a point q = p + b1 u + b2 v with density 1 / area.
@@ -122,7 +124,7 @@ inline KindSample<F> sample_triangle(const TriangleReader<F>& light, const Light
 /// Solid angle density, and the probability of selecting the light by power.
 template <typename F>
 struct TriangleDensity {
-  F solid_angle, pick_pdf;
+  F solid_angle, selection_pdf;
 };
 
 /// Returns the densities for a hit at distance t along dir.

@@ -20,12 +20,12 @@ inline F infinite_emission_density(const LightView& view, uint32_t light, const 
   const LightRecord& record = view.lights[light];
   if (record.camera_only != 0) return F(0.f);
   const LightReader<F> reader(record, active);
-  const float pick = view.pick_pdf ? view.pick_pdf[light] : record.pick_pdf;
+  const float selection_pdf = view.selection_pdf ? view.selection_pdf[light] : record.selection_pdf;
   F density = visit(record.kind, [&]<typename Kind>(Kind) {
     return Kind::template emission_density<F>({view, reader, from, dir, F(0.f), active});
   });
-  if (view.aim) density = density * aim_from_afar<F>(view, from, dir);
-  return select(is_finite(density), F(density * pick), F(0.f));
+  if (view.aim) density = density * aim_density_infinite<F>(view, from, dir);
+  return select(is_finite(density), F(density * selection_pdf), F(0.f));
 }
 
 }  // namespace detail
@@ -49,20 +49,20 @@ template <typename F>
 inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light,
                                         const EscapedRay<F>& ray, const Mask<F>& active) {
   const LightRecord& record = view.lights[light];
-  Vec3<F> seen_from = ray.from, along = ray.dir;
+  Vec3<F> local_from = ray.from, along = ray.dir;
   if (view.motions) [[unlikely]] {
     const LightPose<F> pose = light_pose<F>(view, UInt<F>(light), ray.time, active);
-    seen_from = pose.point_to_rest(ray.from);
+    local_from = pose.point_to_rest(ray.from);
     along = pose.to_rest(ray.dir);
   }
   detail::KindHit<F> hit = visit(record.kind, [&]<typename Kind>(Kind) {
-    return Kind::template escape<F>({view, record, seen_from, along, active});
+    return Kind::template escape<F>({view, record, local_from, along, active});
   });
   if (record.shaping != kNoShaping) [[unlikely]]
     hit.radiance = detail::shaped<F>(view, UInt<F>(record.shaping), -along, hit.radiance, active);
-  const F light_pdf = hit.pdf * infinite_pick_pdf(view, light);
+  const F light_pdf = hit.pdf * infinite_selection_pdf(view, light);
   F weight = select(ray.is_delta, F(1.f), balance_weight<F>(ray.bsdf_pdf, light_pdf));
-  if (view.sends_paths()) [[unlikely]]
+  if (view.emits_paths()) [[unlikely]]
     weight = joint_bounce_weight<F>(ray.bsdf_pdf, light_pdf, ray.is_delta,
                                     F(ray.ratio * detail::infinite_emission_density<F>(
                                                       view, light, ray.from, ray.dir, active)));
@@ -70,7 +70,7 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light,
     hit.radiance = hit.radiance * LightEffect<F>(view, UInt<F>(light), active)
                                       .of_hit(ray.is_delta, ray.from_camera, ray.diffuse);
   if (view.links.members)
-    weight = select(shines_on<F>(view, ray.link, UInt<F>(light), active), weight, F(0.f));
+    weight = select(illuminates<F>(view, ray.link, UInt<F>(light), active), weight, F(0.f));
   return hit.radiance * weight;
 }
 

@@ -47,9 +47,9 @@ class LightTracer {
       const SingleHit hit = rays_.intersect(path.o, path.dir, kInfinity, depth);
       clock_.enter(Phase::kShade);
       if (hit.inst == kNoHit || hit.inst == kLightShape) return;
-      if (context_.lessons && depth == 0)
-        context_.lessons->begin(light_path_number(*context_.settings, pixel),
-                                fma(path.dir, hit.t, path.o));
+      if (context_.aim_samples && depth == 0)
+        context_.aim_samples->begin(light_path_number(*context_.settings, pixel),
+                                    fma(path.dir, hit.t, path.o));
       const uint32_t mesh = rays_.mesh_of(hit), material = rays_.material_of(hit, mesh);
       if (settings_.cost_aware && depth >= settings_.roulette_depth) {
         const F q = cost_aware_survival<F>(scene, *context_.roulette_costs, material, path, true);
@@ -61,11 +61,11 @@ class LightTracer {
       const LightVertexResult<F> out = shade(start.key, depth, hit, mesh, material, path, aovs);
       const VertexResult<F>& v = out.v;
       if (aovs.wants_events) light_aovs_.shade<F>(depth, kOnlySlot, start.key, aovs, true);
-      if (keeps) keep(start.key, depth, hit, mesh, material, path, out);
+      if (keeps) store_vertex(start.key, depth, hit, mesh, material, path, out);
       if (v.has_shadow) {
         clock_.enter(Phase::kShadow);
         if (!rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, nullptr))
-          bring(pixel, sample, depth, path.light, out);
+          add_contribution(pixel, sample, depth, path.light, out);
       }
       if (!v.alive) return;
       path = v.next;
@@ -73,31 +73,31 @@ class LightTracer {
   }
 
  private:
-  void bring(uint32_t pixel, uint32_t sample, uint32_t depth, uint32_t light,
-             const LightVertexResult<F>& out) {
-    if (context_.lessons) {
-      context_.lessons->bring(light_path_number(*context_.settings, pixel), depth, out.v.direct);
+  void add_contribution(uint32_t pixel, uint32_t sample, uint32_t depth, uint32_t light,
+                        const LightVertexResult<F>& out) {
+    if (context_.aim_samples) {
+      context_.aim_samples->add(light_path_number(*context_.settings, pixel), depth, out.v.direct);
       return;
     }
-    add_splat(context_, splats_, sample, out.x, out.y, out.v.direct);
+    add_light_splat(context_, splats_, sample, out.x, out.y, out.v.direct);
     if (light_aovs_)
-      light_aovs_.show(*context_.film, *context_.splat_filter,
-                       {.slot = kOnlySlot,
-                        .depth = depth,
-                        .light = light,
-                        .x = out.x,
-                        .y = out.y,
-                        .c = out.v.direct});
+      light_aovs_.add_to_film(*context_.film, *context_.light_splat_filter,
+                              {.slot = kOnlySlot,
+                               .depth = depth,
+                               .light = light,
+                               .x = out.x,
+                               .y = out.y,
+                               .c = out.v.direct});
   }
 
-  void keep(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit, uint32_t mesh,
-            uint32_t material, const PathState<F>& path, const LightVertexResult<F>& out) {
+  void store_vertex(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit, uint32_t mesh,
+                    uint32_t material, const PathState<F>& path, const LightVertexResult<F>& out) {
     const ShadingRecord<F> record{hit.t,    hit.u, hit.v,    hit.prim,
                                   hit.inst, mesh,  hit.geom, kOnlySlot};
-    if (keep_light_vertex<F>(vertices_, depth, light_path_row<F>(path, key), record, material,
-                             out.p, out.offered) &&
+    if (store_light_vertex<F>(vertices_, depth, light_path_row<F>(path, key), record, material,
+                              out.p, out.is_candidate) &&
         light_aovs_.wants_events())
-      light_aovs_.keep<F>(kOnlySlot, true);
+      light_aovs_.mark_stored<F>(kOnlySlot, true);
   }
 
   LightVertexResult<F> shade(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit,
@@ -120,7 +120,7 @@ class LightTracer {
   PhaseClock& clock_;
   Counts& counts_;
   SingleRays rays_;
-  SplatList& splats_;
+  LightSplatList& splats_;
   LightVertices& vertices_;
   LightPathAovs& light_aovs_;
 };
@@ -128,7 +128,7 @@ class LightTracer {
 /// Adds the contributions of a task's light paths to the film.
 inline void end_light_task(const WaveContext& context, ReferenceWorker& worker,
                            const WaveTask& task) {
-  if (!context.lessons) context.film->take(worker.splats);
+  if (!context.aim_samples) context.film->take(worker.splats);
   count_light_paths(context, task);
 }
 

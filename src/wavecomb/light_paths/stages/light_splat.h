@@ -11,12 +11,12 @@ namespace wavecomb {
 
 /// Adds a contribution of sample `sample` at position (x, y) of the film, in pixels, to the sums of
 /// the surrounding pixels. The sums are integers, so that the order does not matter.
-inline void add_splat(const WaveContext& context, SplatList& list, uint32_t sample, float x,
-                      float y, const Color<float>& c) {
+inline void add_light_splat(const WaveContext& context, LightSplatList& list, uint32_t sample,
+                            float x, float y, const Color<float>& c) {
   Film& film = *context.film;
-  context.splat_filter->spread(film, x, y, [&](size_t pixel, float weight) {
-    const SplatList::Splat splat{static_cast<uint32_t>(pixel), c.x * weight, c.y * weight,
-                                 c.z * weight, SplatLayer::is_in_half(sample)};
+  context.light_splat_filter->spread(film, x, y, [&](size_t pixel, float weight) {
+    const LightSplatList::LightSplat splat{static_cast<uint32_t>(pixel), c.x * weight, c.y * weight,
+                                           c.z * weight, LightSplatLayer::is_in_half(sample)};
     film.collect(list, splat);
   });
 }
@@ -27,18 +27,19 @@ inline uint32_t light_path_in(const WaveContext& context, const WaveTask& task, 
 }
 
 /// Records the first hits of the light paths in a wave as training samples.
-inline void note_first_places(const Wave& wave, const WaveContext& context, const WaveTask& task) {
+inline void record_first_hits(const Wave& wave, const WaveContext& context, const WaveTask& task) {
   const RayQueue& rays = wave.rays;
   for (size_t i = 0; i < rays.size; ++i) {
     if (wave.hits.inst[i] == kNoHit) continue;
     const Vec3<float> o{rays.ox[i], rays.oy[i], rays.oz[i]}, d{rays.dx[i], rays.dy[i], rays.dz[i]};
-    context.lessons->begin(light_path_in(context, task, rays.slot[i]), fma(d, wave.hits.t[i], o));
+    context.aim_samples->begin(light_path_in(context, task, rays.slot[i]),
+                               fma(d, wave.hits.t[i], o));
   }
 }
 
 /// Reports the finished light paths of a task to the film.
 inline void count_light_paths(const WaveContext& context, const WaveTask& task) {
-  if (context.lessons) return;
+  if (context.aim_samples) return;
   for (uint32_t p = 0; p < task.pixel_count; ++p)
     context.film->splats().done(light_path_number(*context.settings, task.pixels[p]),
                                 task.first_sample, task.samples);
@@ -52,24 +53,24 @@ void splat(Wave& wave, const WaveContext& context, const WaveTask& task, uint32_
   occlude<F>(wave, context, depth, false);
   for (size_t i = 0; i < q.size; ++i) {
     if (q.occluded[i] != 0) continue;
-    if (context.lessons) [[unlikely]] {
-      context.lessons->bring(light_path_in(context, task, q.slot[i]), depth,
-                             {q.r[i], q.g[i], q.b[i]});
+    if (context.aim_samples) [[unlikely]] {
+      context.aim_samples->add(light_path_in(context, task, q.slot[i]), depth,
+                               {q.r[i], q.g[i], q.b[i]});
       continue;
     }
     const auto row = load_row<ShadowRow, float>(wave.pool.shadows, q.slot[i], true);
     const float x = bits_float<float>(row.group), y = bits_float<float>(row.set);
     const Color<float> c{q.r[i], q.g[i], q.b[i]};
-    add_splat(context, wave.splats, task.first_sample + q.slot[i] % task.samples, x, y, c);
+    add_light_splat(context, wave.splats, task.first_sample + q.slot[i] % task.samples, x, y, c);
     if (wave.light_aovs) [[unlikely]] {
       const auto light =
           gather_field<float>(wave.pool.paths, &LightPathRow<float>::light, q.slot[i], true);
-      wave.light_aovs.show(
-          *context.film, *context.splat_filter,
+      wave.light_aovs.add_to_film(
+          *context.film, *context.light_splat_filter,
           {.slot = q.slot[i], .depth = depth, .light = light, .x = x, .y = y, .c = c});
     }
   }
-  if (context.lessons) return;
+  if (context.aim_samples) return;
   context.film->take(wave.splats);
 }
 

@@ -23,8 +23,9 @@ enum Part : uint32_t {
   kFilmPart = 128,        ///< thin film
   kAnisotropyPart = 256,  ///< anisotropy and its rotation
 };
-inline constexpr uint32_t kAllParts =
-    kVaries | kGlows | kMetals | kCoats | kPasses | kBacks | kFuzzes | kFilms | kBrushes;
+inline constexpr uint32_t kAllParts = kTexturePart | kEmissionPart | kMetalPart | kCoatPart |
+                                      kTransmissionPart | kBackDiffusePart | kFuzzPart | kFilmPart |
+                                      kAnisotropyPart;
 
 /// Reduced variants: X(name, program, parts), in ascending order of cost. A material uses the first
 /// variant that has all of its parts. CMake reads this list as well and makes a compile unit for

@@ -26,24 +26,24 @@ template <typename F>
 [[gnu::noinline, gnu::cold]] GraphPoint<F> point_at_rest(const MeshRecord* meshes,
                                                          const InstanceRecord* instances,
                                                          const UInt<F>& instance,
-                                                         const MeshPlace<F>& place,
+                                                         const MeshPosition<F>& mesh_position,
                                                          const Vec2<F>& uv, const Mask<F>& active) {
   using U = UInt<F>;
   GraphPoint<F> at;
   at.uv = uv;
-  at.place = place;
-  const detail::MeshReader<F> mesh(meshes, place.mesh, active);
+  at.mesh_position = mesh_position;
+  const detail::MeshReader<F> mesh(meshes, mesh_position.mesh, active);
   const Mask<F> flat = active & Mask<F>((mesh.flags & uint32_t{kIsCurved}) == U(0u));
   if (none(flat)) return at;
-  const auto corners = mesh.corners(place.prim, flat);
+  const auto corners = mesh.corners(mesh_position.prim, flat);
   const auto corner = [&](size_t k) { return mesh.vec3(&MeshRecord::positions, corners[k], flat); };
   const detail::InstanceMaps<F> maps(instances, instance, flat);
   const Vec3<F> p0 = corner(0), e1 = corner(1) - p0, e2 = corner(2) - p0;
-  const Vec3<F> p = fma(e2, place.v, fma(e1, place.u, p0)), n = cross(e1, e2);
+  const Vec3<F> p = fma(e2, mesh_position.v, fma(e1, mesh_position.u, p0)), n = cross(e1, e2);
   const auto unit = [&](const Vec3<F>& v, const Vec3<F>& otherwise) {
     const F size = length(v);
-    const Mask<F> good = flat & (size > 0.f);
-    return select<F>(good, v * F(1.f / select(good, size, F(1.f))), otherwise);
+    const Mask<F> valid = flat & (size > 0.f);
+    return select<F>(valid, v * F(1.f / select(valid, size, F(1.f))), otherwise);
   };
   at.local_position = select<F>(flat, p, at.local_position);
   at.position = select<F>(flat, maps.point(p), at.position);
@@ -61,7 +61,7 @@ template <typename F>
 struct OpacityQuery {
   UInt<F> material;
   UInt<F> instance;
-  MeshPlace<F> place;
+  MeshPosition<F> mesh_position;
   Vec2<F> uv;  ///< texture coordinates
 };
 
@@ -71,7 +71,7 @@ inline F opacity_at(const MaterialView& view, const MeshRecord* meshes,
                     const InstanceRecord* instances, const OpacityQuery<F>& at,
                     const Mask<F>& active) {
   const auto point = [&](const Mask<F>& lanes) {
-    return point_at_rest<F>(meshes, instances, at.instance, at.place, at.uv, lanes);
+    return point_at_rest<F>(meshes, instances, at.instance, at.mesh_position, at.uv, lanes);
   };
   return fetch_opacity<F>(view, at.material, at.uv, F(0.f), point, active);
 }

@@ -28,50 +28,58 @@ namespace wavecomb {
 ///
 /// Contract: the random numbers of a ray depend only on that ray, so that neither order nor lane
 /// width has an effect.
-class Interiors {
+class NestedMedia {
  public:
-  /// `counts` receives the number of traced rays, as steps of random walks. `by_lamps` selects
+  /// `counts` receives the number of traced rays, as steps of random walks. `equiangular` selects
   /// equiangular sampling of distances in fog (equiangular.h).
-  Interiors(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
-            const InteriorBuffers& buffers, Counts& counts, bool by_lamps)
+  NestedMedia(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
+              const NestedMediaBuffers& buffers, Counts& counts, bool equiangular)
       : scene_(scene),
         accel_(accel),
         width_(width),
-        by_lamps_(by_lamps),
+        equiangular_(equiangular),
         b_(buffers),
         counts_(counts) {}
 
   /// Returns the medium stack at a point. `keys` may be those of any path.
-  Inside<float> surround(Vec3<float> p, float time, PresenceKeys keys) const;
+  MediumStack<float> stack_at(Vec3<float> p, float time, PresenceKeys keys) const;
 
   /// Traces all rays to the event or surface that stops them. `hits` holds their first hits, and on
   /// return the hits of visible surfaces. `around` is the medium stack at the camera for new paths,
-  /// or null for paths that continue. start(i, path) returns the InteriorStart of the packet at i.
+  /// or null for paths that continue. start(i, path) returns the NestedRayStart of the packet at i.
   template <typename F, typename Start>
-  void fly(const InteriorRays& rays, const HitSpan& hits, const InteriorEvents& events,
-           const Inside<float>* around, PresenceKeys keys, const Start& start) const;
+  void sample_flight(const NestedRays& rays, const HitSpan& hits, const NestedEvents& events,
+                     const MediumStack<float>* around, PresenceKeys keys, const Start& start) const;
   /// Multiplies `product` by the transmittance of shadow rays of length `most`, where 0 skips a
   /// ray. `keys` include the shadow sets if lights are linked.
   template <typename F>
-  void pass(const InteriorRays& rays, const float* most, float* const (&product)[3],
-            PresenceKeys keys) const;
+  void attenuate(const NestedRays& rays, const float* most, float* const (&product)[3],
+                 PresenceKeys keys) const;
 
  private:
-  enum Column : size_t { kO, kD = kO + 3, kTfar = kD + 3, kSlot, kTime, kHit, kWho = kHit + 6 };
-  static_assert(kWho < InteriorBuffers::kColumns);
+  enum Column : size_t {
+    kO,
+    kD = kO + 3,
+    kTfar = kD + 3,
+    kSlot,
+    kTime,
+    kHit,
+    kRayIndex = kHit + 6
+  };
+  static_assert(kRayIndex < NestedMediaBuffers::kColumns);
   static constexpr float kFar = 1e30f;
-  static constexpr uint32_t kWalked = 1;
+  static constexpr uint32_t kHasScattered = 1;
 
   template <typename F>
-  using Rays = detail::InteriorPacket<F>;
+  using Rays = detail::NestedRayPacket<F>;
   template <typename F>
-  using Met = detail::InteriorMet<F>;
+  using BoundaryHits = detail::BoundaryHits<F>;
   template <typename F>
-  using Hit = detail::InteriorHit<F>;
+  using Hit = detail::NestedRayHit<F>;
 
   float* states() const { return b_.rows.floats(0); }
   float* loads(size_t capacity) const {
-    return states() + capacity * kRowWords<detail::InteriorState>;
+    return states() + capacity * kRowWords<detail::NestedRayState>;
   }
 
   template <typename F>
@@ -93,18 +101,18 @@ class Interiors {
     counts_.walk_steps += n;
   }
 
-  /// Returns the lanes of a packet whose rays see an object (placed_geometry): it is visible to
+  /// Returns the lanes of a packet whose rays see an object (instance_geometry): it is visible to
   /// their kind of ray, and linked to the light of a shadow ray. An object that a ray does not see
   /// neither stops nor attenuates it, but the ray still enters and leaves it.
   template <typename F>
-  Mask<F> sees(const Rays<F>& r, const UInt<F>& object, const Mask<F>& lanes) const;
+  Mask<F> is_visible(const Rays<F>& r, const UInt<F>& object, const Mask<F>& lanes) const;
   /// Returns the medium inside a bound, or none if the ray does not see the bound.
   template <typename F>
-  InteriorMedium<F> medium_of(const Rays<F>& r, const Bound<F>& bound,
-                              const Mask<F>& active) const {
-    const Mask<F> there = active & Mask<F>(bound.material != UInt<F>(kNothing));
-    return load_row<InteriorMedium, F>(reinterpret_cast<const float*>(scene_.interiors.media),
-                                       bound.material, sees<F>(r, bound.place, there));
+  MeshMedium<F> medium_of(const Rays<F>& r, const MediumBoundary<F>& bound,
+                          const Mask<F>& active) const {
+    const Mask<F> occupied = active & Mask<F>(bound.material != UInt<F>(kNoMaterial));
+    return load_row<MeshMedium, F>(reinterpret_cast<const float*>(scene_.nested_media.media),
+                                   bound.material, is_visible<F>(r, bound.object, occupied));
   }
   /// Event in a volume that stops a ray, and the distance to it.
   template <typename F>
@@ -113,13 +121,13 @@ class Interiors {
     UInt<F> material;
   };
   template <typename F>
-  Limit<F> limit_of(const InteriorEvents& events, const Rays<F>& r) const {
+  Limit<F> limit_of(const NestedEvents& events, const Rays<F>& r) const {
     using U = UInt<F>;
     if (!events.limited) return {F(kInfinity), U(uint32_t{Flights::kNoEvent})};
-    const Mask<F> may = r.active & Mask<F>((r.s.flags & U(kWalked)) == U(0u));
-    const F at = gather<F>(events.t, r.who, may);
+    const Mask<F> may = r.active & Mask<F>((r.s.flags & U(kHasScattered)) == U(0u));
+    const F at = gather<F>(events.t, r.ray_index, may);
     return {select(may, max(F(at - r.s.start), F(0.f)), F(kInfinity)),
-            gather<U>(events.material, r.who, Mask<U>(may))};
+            gather<U>(events.material, r.ray_index, Mask<U>(may))};
   }
   /// Returns the distance at which a ray continues past a hit at t that neither stops it nor bounds
   /// a medium. The step is just above rounding error, since a bound may follow closely. Hitting the
@@ -128,66 +136,69 @@ class Interiors {
   F past_hit(const F& t) const {
     return fma(t, F(1.f + 0x1p-20f), F(scene_.scale * 0x1p-21f));
   }
-  /// Returns what the rays of the packet hit. Where a ray passes, `s` and `inside` are moved to the
+  /// Returns what the rays of the packet hit. Where a ray passes, `s` and `stack` are moved to the
   /// other side.
   template <typename F>
-  Met<F> meet(Rays<F>& r, Inside<F>& inside, const Bound<F>& now, const Mask<F>& lanes) const;
+  BoundaryHits<F> intersect_boundary(Rays<F>& r, MediumStack<F>& stack,
+                                     const MediumBoundary<F>& current, const Mask<F>& lanes) const;
   /// Returns whether lights guide the distances in a medium.
   template <typename F>
-  static Mask<F> is_lit(const InteriorMedium<F>& m) {
-    return Mask<F>(m.kind == UInt<F>(static_cast<uint32_t>(InteriorKind::kClear))) &
+  static Mask<F> is_lit(const MeshMedium<F>& m) {
+    return Mask<F>(m.kind == UInt<F>(static_cast<uint32_t>(BoundaryKind::kClear))) &
            (max_component(m.scattering) > 0.f);
   }
   /// Samples the distance to the next collision with the random number `u`. A medium without
   /// scattering has no collision and keeps a stored number for the first distance. If lights guide
   /// the distance, stores `u` until the length of the segment is known.
   template <typename F>
-  void draw(Rays<F>& r, const Inside<F>& inside, const F& u, const Mask<F>& lanes) const;
+  void sample_distance(Rays<F>& r, const MediumStack<F>& stack, const F& u,
+                       const Mask<F>& lanes) const;
   /// Samples the distance by lights, with the stored number, in a medium that ends at `far`.
   template <typename F>
-  LampWay<F> draw_by_lamps(Rays<F>& r, const InteriorMedium<F>& medium, const F& far,
-                           const Mask<F>& lanes) const;
+  EquiangularDistribution<F> sample_equiangular(Rays<F>& r, const MeshMedium<F>& medium,
+                                                const F& far, const Mask<F>& lanes) const;
   /// Scatters at a collision. Returns the lanes whose path is terminated.
   template <typename F>
-  Mask<F> turn(const InteriorRays& all, Rays<F>& r, const InteriorMedium<F>& medium,
-               const F& length, const Mask<F>& lanes) const;
+  Mask<F> scatter_ray(const NestedRays& all, Rays<F>& r, const MeshMedium<F>& medium,
+                      const F& length, const Mask<F>& lanes) const;
   /// Advances rays to their next bound or collision, finishes those that end, and lists the others
   /// from `left` on. Returns the number of listed rays.
   template <typename F>
-  size_t advance(const InteriorRays& all, const HitSpan& hits, const InteriorEvents& events,
-                 Rays<F>& r, size_t left) const;
+  size_t advance(const NestedRays& all, const HitSpan& hits, const NestedEvents& events, Rays<F>& r,
+                 size_t left) const;
   /// State of rays that end, at a surface, at a collision or outside the scene.
   template <typename F>
   struct SegmentEnd {
-    InsideRow<F> inside;
+    MediumStackRow<F> stack;
     UInt<F> material;    ///< of the event, or Flights::kNoEvent
     Mask<F> terminated;  ///< lanes whose path ends here
   };
   /// Stores hit, event and path of the rays in the lanes `done`.
   template <typename F>
-  void finish(const InteriorRays& all, const HitSpan& hits, const InteriorEvents& events,
+  void finish(const NestedRays& all, const HitSpan& hits, const NestedEvents& events,
               const Rays<F>& r, const SegmentEnd<F>& end, const Mask<F>& done) const;
   /// Advances shadow rays.
   template <typename F>
-  size_t advance_shadow(const InteriorRays& all, float* const (&product)[3], Rays<F>& r,
+  size_t advance_shadow(const NestedRays& all, float* const (&product)[3], Rays<F>& r,
                         size_t left) const;
   template <typename F>
-  size_t put(const InteriorRays& all, const Rays<F>& r, const Mask<F>& goes_on, size_t left) const;
+  size_t store_active(const NestedRays& all, const Rays<F>& r, const Mask<F>& continues,
+                      size_t left) const;
   /// Advances the listed rays until none is left.
   template <typename F, typename Advance>
-  void run(const InteriorRays& all, size_t left, PresenceKeys keys, const Advance& advance) const;
+  void run(const NestedRays& all, size_t left, PresenceKeys keys, const Advance& advance) const;
 
   const SceneView& scene_;
   const EmbreeAccelerator& accel_;
   uint32_t width_;
-  bool by_lamps_;
-  const InteriorBuffers& b_;
+  bool equiangular_;
+  const NestedMediaBuffers& b_;
   Counts& counts_;
 };
 
 template <typename F, typename Advance>
-inline void Interiors::run(const InteriorRays& all, size_t left, PresenceKeys keys,
-                           const Advance& advance) const {
+inline void NestedMedia::run(const NestedRays& all, size_t left, PresenceKeys keys,
+                             const Advance& advance) const {
   using U = UInt<F>;
   const uint32_t salt = keys.salt;
   for (uint32_t step = 1; left > 0; ++step) {
@@ -198,9 +209,9 @@ inline void Interiors::run(const InteriorRays& all, size_t left, PresenceKeys ke
     for (size_t j = 0; j < n; j += kWidth<F>) {
       counts_.walk_lanes += kWidth<F>;
       const Mask<F> active = first_lanes<F>(n - j);
-      const U who = load<U>(b_.columns.uints(kWho) + j);
-      Rays<F> r{who, active, load_row<detail::InteriorState, F>(states(), who, active),
-                load_row<detail::InteriorLoad, F>(loads(all.size), who, active),
+      const U ray_index = load<U>(b_.columns.uints(kRayIndex) + j);
+      Rays<F> r{ray_index, active, load_row<detail::NestedRayState, F>(states(), ray_index, active),
+                load_row<detail::NestedRayMedia, F>(loads(all.size), ray_index, active),
                 hit_at<F>(traced(), j)};
       left += advance(r, left);
     }
@@ -208,9 +219,9 @@ inline void Interiors::run(const InteriorRays& all, size_t left, PresenceKeys ke
 }
 
 template <typename F, typename Start>
-inline void Interiors::fly(const InteriorRays& rays, const HitSpan& hits,
-                           const InteriorEvents& events, const Inside<float>* around,
-                           PresenceKeys keys, const Start& start) const {
+inline void NestedMedia::sample_flight(const NestedRays& rays, const HitSpan& hits,
+                                       const NestedEvents& events, const MediumStack<float>* around,
+                                       PresenceKeys keys, const Start& start) const {
   using U = UInt<F>;
   const uint32_t kind = keys.ray_kind;
   size_t left = 0;
@@ -218,39 +229,39 @@ inline void Interiors::fly(const InteriorRays& rays, const HitSpan& hits,
     const Mask<F> active = first_lanes<F>(rays.size - i);
     const U slot = load<U>(rays.slot + i);
     const PathRow<F> path = load_row<PathRow, F>(rays.paths, slot, active);
-    const InsideRow<F> row = load_row<InsideRow, F>(rays.inside, slot, active);
-    Inside<F> inside = around ? around->template everywhere<F>() : Inside<F>(row);
-    if (!around) inside.cross(scene_.interiors, row.place, row.crossed, kBounceCrosses, active);
-    const InteriorStart<F> begins = start(i, path);
+    const MediumStackRow<F> row = load_row<MediumStackRow, F>(rays.stacks, slot, active);
+    MediumStack<F> stack = around ? around->template broadcast<F>() : MediumStack<F>(row);
+    if (!around) stack.cross(scene_.nested_media, row.object, row.crossed, kBounceCrosses, active);
+    const NestedRayStart<F> ray_start = start(i, path);
     const auto three = [&](float* const(&k)[3]) {
       return Vec3<F>(load<F>(k[0] + i), load<F>(k[1] + i), load<F>(k[2] + i));
     };
     const Color<F>& sum = path.throughput;
     Rays<F> r;
-    r.who = lane_index<F>() + static_cast<uint32_t>(i);
+    r.ray_index = lane_index<F>() + static_cast<uint32_t>(i);
     r.active = active;
     r.s = {three(rays.o),
            three(rays.d),
            path.throughput,
            F(0.f),
            F(sum.x + sum.y + sum.z),
-           F(kFar * F(1.f + begins.first)),
-           begins.seed,
+           F(kFar * F(1.f + ray_start.first)),
+           ray_start.seed,
            U(0u),
-           begins.hero,
+           ray_start.hero,
            U(0u)};
-    inside.store_in(r.l);
+    stack.store_in(r.l);
     r.l.absorbed = r.l.ratio = Color<F>(F(1.f));
     r.l.time = rays.times ? load<F>(rays.times + i) : F(0.f);
     r.hit = hit_at<F>(hits, i);
     r.kind = kind;
-    draw<F>(r, inside, begins.first, active);
-    left +=
-        scene_.visibility ? put<F>(rays, r, active, left) : advance<F>(rays, hits, events, r, left);
+    sample_distance<F>(r, stack, ray_start.first, active);
+    left += scene_.visibility ? store_active<F>(rays, r, active, left)
+                              : advance<F>(rays, hits, events, r, left);
   }
   // The first hits leave out bounds that are invisible to these rays. The rays must still enter and
   // leave them.
-  if (scene_.visibility) keys.ray_kind = kSeenByAll;
+  if (scene_.visibility) keys.ray_kind = kVisibleToAll;
   run<F>(rays, left, keys, [&](Rays<F>& r, size_t at) {
     r.kind = kind;
     return advance<F>(rays, hits, events, r, at);
@@ -258,39 +269,40 @@ inline void Interiors::fly(const InteriorRays& rays, const HitSpan& hits,
 }
 
 template <typename F>
-inline void Interiors::pass(const InteriorRays& rays, const float* most, float* const (&product)[3],
-                            PresenceKeys keys) const {
+inline void NestedMedia::attenuate(const NestedRays& rays, const float* most,
+                                   float* const (&product)[3], PresenceKeys keys) const {
   using U = UInt<F>;
   // Rays also enter and leave bounds that do not attenuate them.
-  const PresenceKeys asked = keys;
-  keys.ray_kind = kSeenByAll;
+  const PresenceKeys requested = keys;
+  keys.ray_kind = kVisibleToAll;
   keys.shadow_set = nullptr;
   size_t left = 0;
   for (size_t i = 0; i < rays.size; i += kWidth<F>) {
     const F length = load<F>(most + i);
     const Mask<F> active = first_lanes<F>(rays.size - i) & (length > 0.f);
     const U slot = load<U>(rays.slot + i);
-    const InsideRow<F> row = load_row<InsideRow, F>(rays.inside, slot, active);
-    Inside<F> inside(row);
-    inside.cross(scene_.interiors, row.place, row.crossed, kShadowCrosses, active);
+    const MediumStackRow<F> row = load_row<MediumStackRow, F>(rays.stacks, slot, active);
+    MediumStack<F> stack(row);
+    stack.cross(scene_.nested_media, row.object, row.crossed, kShadowCrosses, active);
     const auto three = [&](float* const(&k)[3]) {
       return Vec3<F>(load<F>(k[0] + i), load<F>(k[1] + i), load<F>(k[2] + i));
     };
     Rays<F> r;
-    r.who = lane_index<F>() + static_cast<uint32_t>(i);
+    r.ray_index = lane_index<F>() + static_cast<uint32_t>(i);
     r.active = active;
     r.s = {three(rays.o), three(rays.d), Color<F>(F(0.f)), F(0.f), F(0.f), length, U(0u), U(0u),
            U(0u),         U(0u)};
-    inside.store_in(r.l);
+    stack.store_in(r.l);
     r.l.absorbed = r.l.ratio = Color<F>(F(1.f));
     r.l.time = rays.times ? load<F>(rays.times + i) : F(0.f);
-    left += put<F>(rays, r, active, left);
+    left += store_active<F>(rays, r, active, left);
   }
   run<F>(rays, left, keys, [&](Rays<F>& r, size_t at) {
-    r.kind = kSeenByShadowRays;
-    if (asked.shadow_set) {
-      const U slot = gather<U>(rays.slot, r.who, Mask<U>(r.active));
-      r.shadow_set = gather<U>(asked.shadow_set, slot * asked.shadow_stride, Mask<U>(r.active));
+    r.kind = kVisibleToShadowRays;
+    if (requested.shadow_set) {
+      const U slot = gather<U>(rays.slot, r.ray_index, Mask<U>(r.active));
+      r.shadow_set =
+          gather<U>(requested.shadow_set, slot * requested.shadow_stride, Mask<U>(r.active));
     }
     return advance_shadow<F>(rays, product, r, at);
   });
@@ -298,11 +310,12 @@ inline void Interiors::pass(const InteriorRays& rays, const float* most, float* 
 
 /// A ray in an arbitrary direction leaves the bounds that it has not entered. The first one that it
 /// leaves is the innermost.
-inline Inside<float> Interiors::surround(Vec3<float> p, float time, PresenceKeys keys) const {
-  keys.ray_kind = kSeenByAll;
-  Bound<float> left[kMostInside];
+inline MediumStack<float> NestedMedia::stack_at(Vec3<float> p, float time,
+                                                PresenceKeys keys) const {
+  keys.ray_kind = kVisibleToAll;
+  MediumBoundary<float> left[kMaxMediumStack];
   size_t count = 0;
-  Inside<float> entered;
+  MediumStack<float> entered;
   const SoaBlock& c = b_.columns;
   const Vec3<float> d = normalize(Vec3<float>(0.4834f, 0.6291f, 0.6087f));
   for (uint32_t i = 0; i < kLongWalk; ++i) {
@@ -316,24 +329,24 @@ inline Inside<float> Interiors::surround(Vec3<float> p, float time, PresenceKeys
     const float past = past_hit<float>(h.t);
     p = fma(d, past, p);
     if (h.inst == kLightShape) continue;
-    const HitPlace<float> place = hit_place<float>(scene_, h.inst, h.geom, h.prim, true);
-    if (!scene_.interiors.is_bound(place.material) ||
-        detail::is_curved<float>(scene_, place.mesh, true))
+    const HitObject<float> hit = hit_object<float>(scene_, h.inst, h.geom, h.prim, true);
+    if (!scene_.nested_media.is_bound(hit.material) ||
+        detail::is_curved<float>(scene_, hit.mesh, true))
       continue;
     const Surface<float> at = setup_surface<float>(
-        scene_, {h.inst, place.mesh, h.prim, h.u, h.v, time}, d, false, false, true);
+        scene_, {h.inst, hit.mesh, h.prim, h.u, h.v, time}, d, false, false, true);
     p = spawn_origin<float>(at, d);
-    const Bound<float> bound{place.object, place.material};
+    const MediumBoundary<float> bound{hit.object, hit.material};
     if (dot(d, at.ng) < 0)
       entered.enter(bound, true);
-    else if (entered.holds(bound.place))
-      entered.leave(bound.place, true);
-    else if (count < kMostInside)
+    else if (entered.contains(bound.object))
+      entered.leave(bound.object, true);
+    else if (count < kMaxMediumStack)
       left[count++] = bound;
   }
-  Inside<float> inside;
-  while (count > 0) inside.enter(left[--count], true);
-  return inside;
+  MediumStack<float> stack;
+  while (count > 0) stack.enter(left[--count], true);
+  return stack;
 }
 
 }  // namespace wavecomb

@@ -63,26 +63,26 @@ template <typename F>
 inline LampWay<F> lamp_way(const LightView& lights, const MediumSegment<F>& segment,
                            const Sample4<F>& r, const Mask<F>& active) {
   const auto& [o, d, begin, end, extinction] = segment;
-  LampWay<F> way;
+  LampWay<F> range;
   const Mask<F> some = active & (begin < end) & (end < F(kFarAway));
-  if (none(some)) return way;
+  if (none(some)) return range;
   const F middle = select(some, F(0.5f * (begin + end)), F(0.f));
   const LightReceiver<F> receiver(fma(d, middle, o));
   const LightSample<F> l = sample_light<F>(lights, receiver, r.x, r.y, r.z, some);
   const Mask<F> there = some & l.valid & (l.distance < kFarAway);
   const Vec3<F> to = fma(l.wi, select(there, l.distance, F(0.f)), receiver.p) - o;
-  way.nearest = dot(to, d);
-  const Vec3<F> across = to - d * way.nearest;
+  range.nearest = dot(to, d);
+  const Vec3<F> across = to - d * range.nearest;
   const F length = end - begin;
-  way.aside = max(F(sqrt(dot(across, across))), F(1e-4f * length));
-  way.from = atan2(F(begin - way.nearest), way.aside);
-  way.span = max(F(atan2(F(end - way.nearest), way.aside) - way.from), F(1e-6f));
+  range.aside = max(F(sqrt(dot(across, across))), F(1e-4f * length));
+  range.from = atan2(F(begin - range.nearest), range.aside);
+  range.span = max(F(atan2(F(end - range.nearest), range.aside) - range.from), F(1e-6f));
   // q grows with the angle that the segment subtends from the light, and with the transmittance of
   // the medium from `begin` to the closest point and on to the light.
-  const F before = clamp(F(way.nearest - begin), F(0.f), length);
-  const F q = F(kMostEquiangular / kPi) * way.span * exp(F(-extinction * (before + way.aside)));
-  way.share = select(there & (q > kLeastEquiangular), q, F(0.f));
-  return way;
+  const F before = clamp(F(range.nearest - begin), F(0.f), length);
+  const F q = F(kMostEquiangular / kPi) * range.span * exp(F(-extinction * (before + range.aside)));
+  range.share = select(there & (q > kLeastEquiangular), q, F(0.f));
+  return range;
 }
 
 /// Probabilities of the outcome of a segment through a homogeneous medium that ends after length

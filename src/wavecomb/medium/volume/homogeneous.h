@@ -11,32 +11,32 @@
 namespace wavecomb {
 
 /// Returns whether a volume is homogeneous within its box.
-inline bool is_even(const VolumeRecord& v) {
+inline bool is_homogeneous(const VolumeRecord& v) {
   return !v.density.grid.table;
 }
 
 /// Returns whether lights guide the distances in a volume (equiangular.h).
-inline bool is_drawn_by_lamps(const VolumeRecord& v) {
-  return is_even(v) && std::max({v.albedo[0], v.albedo[1], v.albedo[2]}) > 0;
+inline bool supports_equiangular(const VolumeRecord& v) {
+  return is_homogeneous(v) && std::max({v.albedo[0], v.albedo[1], v.albedo[2]}) > 0;
 }
 
 namespace detail {
 
 /// Packet of ray segments from index `k` on, clipped to the box of a homogeneous volume.
 template <typename F>
-struct EvenWays {
+struct HomogeneousSegments {
   Vec3<F> o, d;
   F begin, end;
-  Mask<F> meets;
+  Mask<F> hits_box;
 
-  EvenWays(const VolumeRecord& v, const Ways& ways, size_t k, const Mask<F>& lanes,
-           VolumeCounts& counts)
-      : o(load<F>(ways.ox + k), load<F>(ways.oy + k), load<F>(ways.oz + k)),
-        d(load<F>(ways.dx + k), load<F>(ways.dy + k), load<F>(ways.dz + k)) {
-    const BrickWalk<F> walk(v.density, o, d, load<F>(ways.most + k), lanes);
-    meets = walk.on();
-    begin = walk.x();
-    end = walk.leave();
+  HomogeneousSegments(const VolumeRecord& v, const RaySegments& segments, size_t k,
+                      const Mask<F>& lanes, VolumeCounts& counts)
+      : o(load<F>(segments.ox + k), load<F>(segments.oy + k), load<F>(segments.oz + k)),
+        d(load<F>(segments.dx + k), load<F>(segments.dy + k), load<F>(segments.dz + k)) {
+    const GridTraversal<F> traversal(v.density, o, d, load<F>(segments.most + k), lanes);
+    hits_box = traversal.on();
+    begin = traversal.x();
+    end = traversal.leave();
     counts.lanes += kWidth<F>;
     counts.steps += count<F>(lanes);
   }
@@ -45,65 +45,67 @@ struct EvenWays {
 }  // namespace detail
 
 /// Samples free flights through a homogeneous volume, including by lights (equiangular.h).
-/// `ways.most` is the original length of each segment, before any volume stopped it, so that
+/// `segments.most` is the original length of each segment, before any volume stopped it, so that
 /// repeated calls sample the lights for the same part. kStops samples where flights stop; kRatios
 /// computes the weights after all volumes were sampled.
 template <typename F>
-inline void fly_evenly(const VolumeView& volumes, uint32_t i, const Ways& ways,
-                       const Flights& flights, FlightKeeps keeps, const LightView& lamps,
-                       VolumeCounts& counts) {
+inline void sample_homogeneous_flights(const VolumeView& volumes, uint32_t i,
+                                       const RaySegments& segments, const Flights& flights,
+                                       FlightResults results, const LightView& distance_lights,
+                                       VolumeCounts& counts) {
   using U = UInt<F>;
   const VolumeRecord& v = volumes.volumes[i];
-  if (v.most_extinction <= 0) return;
-  const U mine(volumes.first_material + i);
+  if (v.max_extinction <= 0) return;
+  const U volume_material(volumes.first_material + i);
   const F extinction[3] = {F(v.extinction[0]), F(v.extinction[1]), F(v.extinction[2])};
   const F least = min(extinction[0], min(extinction[1], extinction[2]));
-  for (size_t k = 0; k < ways.count; k += kWidth<F>) {
+  for (size_t k = 0; k < segments.count; k += kWidth<F>) {
     const U hero = load<U>(flights.hero + k);
     const Mask<F> lanes =
-        first_lanes<F>(ways.count - k) & Mask<F>(hero != U(uint32_t{Flights::kNoHero}));
-    const detail::EvenWays<F> w(v, ways, k, lanes, counts);
-    if (none(w.meets)) continue;
+        first_lanes<F>(segments.count - k) & Mask<F>(hero != U(uint32_t{Flights::kNoHero}));
+    const detail::HomogeneousSegments<F> w(v, segments, k, lanes, counts);
+    if (none(w.hits_box)) continue;
     const auto of_hero = [&](const F(&x)[3]) {
       return select(hero == U(0u), x[0], select(hero == U(1u), x[1], x[2]));
     };
-    CollisionNumbers<F> numbers;
-    numbers.start(load<U>(ways.seed + k), i, lanes);
-    const F first = i == 0 ? load<F>(ways.first + k) : numbers.next(lanes);
+    CollisionSequence<F> numbers;
+    numbers.start(load<U>(segments.seed + k), i, lanes);
+    const F first = i == 0 ? load<F>(segments.first + k) : numbers.next(lanes);
     const F chooses = numbers.next(lanes), angle = numbers.next(lanes);
     const F x = numbers.next(lanes), y = numbers.next(lanes), z = numbers.next(lanes);
-    const LampWay<F> lamp = lamp_way<F>(
-        lamps, {.o = w.o, .d = w.d, .begin = w.begin, .end = w.end, .extinction = least},
-        {x, y, z, F(0.f)}, w.meets);
+    const EquiangularDistribution<F> distribution = equiangular_distribution<F>(
+        distance_lights, {.o = w.o, .d = w.d, .begin = w.begin, .end = w.end, .extinction = least},
+        {x, y, z, F(0.f)}, w.hits_box);
     const F stop = load<F>(flights.t + k);
-    if (keeps == FlightKeeps::kStops) {
+    if (results == FlightResults::kStops) {
       const F own = of_hero(extinction);
       F at = w.begin - log(F(1.f - first)) / select(own > 0.f, own, F(1e-30f));
-      const Mask<F> by_lamp = chooses < lamp.share;
-      at = select(by_lamp, clamp(lamp.draw(angle), w.begin, w.end), at);
-      const Mask<F> stops = w.meets & (at < w.end) & (at < stop);
+      const Mask<F> by_angle = chooses < distribution.share;
+      at = select(by_angle, clamp(distribution.sample_distance(angle), w.begin, w.end), at);
+      const Mask<F> stops = w.hits_box & (at < w.end) & (at < stop);
       counts.collisions += count<F>(stops);
       store(flights.t + k, select(stops, at, stop));
-      store(flights.material + k, select(Mask<U>(stops), mine, load<U>(flights.material + k)));
+      store(flights.material + k,
+            select(Mask<U>(stops), volume_material, load<U>(flights.material + k)));
       continue;
     }
-    const Mask<F> stopped = w.meets & Mask<F>(load<U>(flights.material + k) == mine);
+    const Mask<F> stopped = w.hits_box & Mask<F>(load<U>(flights.material + k) == volume_material);
     const F at = clamp(stop, w.begin, w.end);
-    F drawn[3], scale[3];
+    F sampled[3], scale[3];
     for (size_t c = 0; c < 3; ++c) {
-      const EvenChance<F> chance =
-          even_chance<F>(lamp, extinction[c], F(at - w.begin), at, stopped);
-      drawn[c] = chance.drawn;
-      scale[c] = chance.truth / select(chance.drawn > 0.f, chance.drawn, F(1.f));
+      const OutcomeDensity<F> density =
+          outcome_density<F>(distribution, extinction[c], F(at - w.begin), at, stopped);
+      sampled[c] = density.sampled;
+      scale[c] = density.exact / select(density.sampled > 0.f, density.sampled, F(1.f));
     }
-    const F by_hero = of_hero(drawn);
+    const F by_hero = of_hero(sampled);
     const F inverse = F(1.f) / select(by_hero > 0.f, by_hero, F(1.f));
     for (size_t c = 0; c < 3; ++c) {
       const auto times = [&](float* column, const F& factor) {
         const F before = load<F>(column + k);
-        store(column + k, select(w.meets, F(before * factor), before));
+        store(column + k, select(w.hits_box, F(before * factor), before));
       };
-      times(flights.ratio[c], drawn[c] * inverse);
+      times(flights.ratio[c], sampled[c] * inverse);
       times(flights.scale[c], scale[c]);
     }
   }
@@ -111,11 +113,12 @@ inline void fly_evenly(const VolumeView& volumes, uint32_t i, const Ways& ways,
 
 /// Multiplies each `product` by the transmittance of a ray segment through a homogeneous volume.
 template <typename F>
-inline void pass_evenly(const VolumeRecord& v, const Ways& ways, float* const (&product)[3],
-                        VolumeCounts& counts) {
-  for (size_t k = 0; k < ways.count; k += kWidth<F>) {
-    const detail::EvenWays<F> w(v, ways, k, first_lanes<F>(ways.count - k), counts);
-    const F length = select(w.meets, F(w.end - w.begin), F(0.f));
+inline void multiply_homogeneous_transmittance(const VolumeRecord& v, const RaySegments& segments,
+                                               float* const (&product)[3], VolumeCounts& counts) {
+  for (size_t k = 0; k < segments.count; k += kWidth<F>) {
+    const detail::HomogeneousSegments<F> w(v, segments, k, first_lanes<F>(segments.count - k),
+                                           counts);
+    const F length = select(w.hits_box, F(w.end - w.begin), F(0.f));
     for (size_t c = 0; c < 3; ++c)
       store(product[c] + k, load<F>(product[c] + k) * exp(F(length * -v.extinction[c])));
   }

@@ -46,9 +46,9 @@ class WaySeconds {
  public:
   /// `times` is Ways::times.
   WaySeconds(const VolumeRecord& v, const float* times) : v_(v), times_(times) {}
-  void start(const UInt<F>& way, const Mask<F>& lanes) {
+  void start(const UInt<F>& random, const Mask<F>& lanes) {
     if (v_.moves && times_)
-      seconds_ = select(lanes, seconds_at<F>(v_, gather<F>(times_, way, lanes)), seconds_);
+      seconds_ = select(lanes, seconds_at<F>(v_, gather<F>(times_, random, lanes)), seconds_);
   }
   const F& operator()() const { return seconds_; }
 
@@ -75,14 +75,14 @@ class FlightVisitor {
                 const float* times)
       : v_(v), seconds_(v, times), material_(material), flights_(flights), keeps_(keeps) {}
 
-  void start(const U& way, const Mask<F>& lanes) {
-    const U hero = gather<U>(flights_.hero, way, Mask<U>(lanes));
+  void start(const U& random, const Mask<F>& lanes) {
+    const U hero = gather<U>(flights_.hero, random, Mask<U>(lanes));
     const F own = select(hero == U(0u), F(v_.extinction[0]),
                          select(hero == U(1u), F(v_.extinction[1]), F(v_.extinction[2])));
     of_hero_ = select(lanes, own, of_hero_);
     ratio_ = select<F>(lanes, Color<F>(F(1.f)), ratio_);
     stopped_ = stopped_ & not_(lanes);
-    seconds_.start(way, lanes);
+    seconds_.start(random, lanes);
   }
   Mask<F> collide(const Mask<F>& lanes, const F& x, const Vec3<F>& p, const F& majorant,
                   CollisionNumbers<F>& numbers) {
@@ -102,17 +102,17 @@ class FlightVisitor {
     x_ = select(stops, x, x_);
     return stops;
   }
-  void finish(const U& way, const Mask<F>& lanes) {
+  void finish(const U& random, const Mask<F>& lanes) {
     if (none(lanes)) return;
     if (keeps_ != FlightKeeps::kRatios) {
       const Mask<F> stops = lanes & stopped_;
-      scatter<F>(flights_.t, x_, way, stops);
-      scatter<U>(flights_.material, U(material_), way, Mask<U>(stops));
+      scatter<F>(flights_.t, x_, random, stops);
+      scatter<U>(flights_.material, U(material_), random, Mask<U>(stops));
     }
     if (keeps_ == FlightKeeps::kStops || v_.is_grey) return;
     const F* const ratio[3] = {&ratio_.x, &ratio_.y, &ratio_.z};
     for (int k = 0; k < 3; ++k)
-      scatter<F>(flights_.ratio[k], F(gather<F>(flights_.ratio[k], way, lanes) * *ratio[k]), way,
+      scatter<F>(flights_.ratio[k], F(gather<F>(flights_.ratio[k], random, lanes) * *ratio[k]), random,
                  lanes);
   }
 
@@ -213,15 +213,15 @@ inline Flight<F> fly_through(const VolumeView& volumes, const Passage<F>& p,
                              const LightView* lamps, VolumeCounts& counts) {
   using U = UInt<F>;
   constexpr size_t kLanes = kWidth<F>;
-  const Way<F> way(p, VertexSet::kFlight);
-  const PacketWays<F> packet(p.o, p.d, p.t, way.seed, way.r.z, p.time, active);
+  const Way<F> random(p, VertexSet::kFlight);
+  const PacketWays<F> packet(p.o, p.d, p.t, random.seed, random.r.z, p.time, active);
   alignas(64) float t[kLanes], ratio[3][kLanes], scale[3][kLanes], scratch[2 * kLanes];
   alignas(64) uint32_t material[kLanes], hero[kLanes];
   Ways ways = packet.ways();
   std::copy_n(ways.most, kLanes, t);
   ways.most = t;
   store(material, U(uint32_t{Flights::kNoEvent}));
-  store(hero, hero_of<F>(way.r.y, throughput));
+  store(hero, hero_of<F>(random.r.y, throughput));
   for (auto& one : ratio) store(one, F(1.f));
   for (auto& one : scale) store(one, F(1.f));
   fly_through<F>(
@@ -251,10 +251,10 @@ class TransmittanceVisitor {
   TransmittanceVisitor(const VolumeRecord& v, float* const (&product)[3], const float* times)
       : v_(v), seconds_(v, times), columns_(product) {}
 
-  void start(const U& way, const Mask<F>& lanes) {
-    const auto column = [&](int k) { return gather<F>(columns_[k], way, lanes); };
+  void start(const U& random, const Mask<F>& lanes) {
+    const auto column = [&](int k) { return gather<F>(columns_[k], random, lanes); };
     product_ = select<F>(lanes, Color<F>(column(0), column(1), column(2)), product_);
-    seconds_.start(way, lanes);
+    seconds_.start(random, lanes);
   }
   Mask<F> collide(const Mask<F>& lanes, const F& /*x*/, const Vec3<F>& p, const F& majorant,
                   CollisionNumbers<F>& numbers) {
@@ -268,9 +268,9 @@ class TransmittanceVisitor {
     product_ = select<F>(lanes, select<F>(ends, Color<F>(F(0.f)), now), product_);
     return ends;
   }
-  void finish(const U& way, const Mask<F>& lanes) {
+  void finish(const U& random, const Mask<F>& lanes) {
     const F* const product[3] = {&product_.x, &product_.y, &product_.z};
-    for (int k = 0; k < 3; ++k) scatter<F>(columns_[k], *product[k], way, lanes);
+    for (int k = 0; k < 3; ++k) scatter<F>(columns_[k], *product[k], random, lanes);
   }
 
  private:
@@ -299,12 +299,12 @@ inline void transmittance_through(const VolumeView& volumes, const Ways& ways,
   }
 }
 
-/// Returns the transmittance of one ray segment in each lane, with the random numbers of `way`.
+/// Returns the transmittance of one ray segment in each lane, with the random numbers of `random`.
 template <typename F>
-inline Color<F> transmittance_through(const VolumeView& volumes, const Way<F>& way,
+inline Color<F> transmittance_through(const VolumeView& volumes, const Way<F>& random,
                                       const RaySegment<F>& segment, const Mask<F>& active,
                                       VolumeCounts& counts) {
-  const PacketWays<F> packet(segment.o, segment.d, segment.length, way.seed, way.r.z, segment.time,
+  const PacketWays<F> packet(segment.o, segment.d, segment.length, random.seed, random.r.z, segment.time,
                              active);
   alignas(64) float product[3][kWidth<F>];
   for (auto& one : product) store(one, F(1.f));

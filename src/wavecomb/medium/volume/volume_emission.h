@@ -10,7 +10,7 @@ namespace wavecomb {
 /// is sampled in proportion to the grid's largest value in each cell, and the estimate includes the
 /// transmittance of all volumes up to the point.
 template <typename F>
-inline Color<F> emission_of(const VolumeView& volumes, uint32_t index, const Way<F>& way,
+inline Color<F> emission_of(const VolumeView& volumes, uint32_t index, const Way<F>& random,
                             const RaySegment<F>& segment, const Mask<F>& active,
                             VolumeCounts& counts) {
   const VolumeRecord& v = volumes.volumes[index];
@@ -28,8 +28,8 @@ inline Color<F> emission_of(const VolumeView& volumes, uint32_t index, const Way
   const Mask<F> shines = active & (total > 0.f);
   if (none(shines)) return Color<F>(F(0.f));
   CollisionNumbers<F> numbers;
-  numbers.start(way.branch(kMostVolumes).seed, index, shines);
-  const F wanted = (index == 0 ? way.r.w : numbers.next(shines)) * total;
+  numbers.start(random.branch(kMostVolumes).seed, index, shines);
+  const F wanted = (index == 0 ? random.r.w : numbers.next(shines)) * total;
   F before(0.f), x(0.f), greatest(0.f);
   Vec3<F> p(F(0.f));
   each_cell([&](const BrickWalk<F>& walk, const F& share) {
@@ -48,7 +48,7 @@ inline Color<F> emission_of(const VolumeView& volumes, uint32_t index, const Way
   RaySegment<F> to_point = segment;
   to_point.length = x;
   const Color<F> through =
-      transmittance_through<F>(volumes, way.branch(index), to_point, shines, counts);
+      transmittance_through<F>(volumes, random.branch(index), to_point, shines, counts);
   return select<F>(shines, value * emission * weight * through, Color<F>(F(0.f)));
 }
 

@@ -19,58 +19,58 @@
 namespace wavecomb {
 
 /// Base of Volumes for subsurface scattering.
-class WalksBelow {
+class SubsurfaceScattering {
  public:
-  /// `counts` receives the statistics of walks. `walks` has Walkers::kColumns columns.
-  WalksBelow(const WaveContext& context, Counts& counts, const SoaBlock& walks)
+  /// `counts` receives the statistics of walks. `walks` has WalkQueue::kColumns columns.
+  SubsurfaceScattering(const WaveContext& context, Counts& counts, const SoaBlock& walks)
       : context_(context), counts_(counts), walks_(walks) {}
 
   /// Returns whether the scene has subsurface scattering.
-  bool has_walks() const { return context_.scene.walks.media != nullptr; }
+  bool has_subsurface() const { return context_.scene.subsurface.media != nullptr; }
   /// Runs the walk of the reference integrator for a path whose ray has entered a subsurface body
   /// and hit `hit`. The passage leads to the hit. `keys` are those of the ray and include the
-  /// object. If the walk leaves the body, sets `came_out`, and `path` and `hit` describe a ray that
-  /// views the exit point from outside. Returns false if the walk was terminated inside. If the ray
-  /// does not hit the object, returns true with `path` and `hit` unchanged, except that path.pdf
-  /// becomes 0, since no light sample competes with the path.
+  /// object. If the walk leaves the body, sets `left_body`, and `path` and `hit` describe a ray
+  /// that views the exit point from outside. Returns false if the walk was terminated inside. If
+  /// the ray does not hit the object, returns true with `path` and `hit` unchanged, except that
+  /// path.pdf becomes 0, since no light sample competes with the path.
   template <typename Hit>
-  bool walk(const Passage<float>& p, const PresenceKeys& keys, PathState<float>& path, Hit& hit,
-            bool& came_out) const {
-    Walkers walkers(walks_);
-    walkers.add<float>(begin_walk<float>(p.sampler, p.key, p.depth, path.o, path.dir,
-                                         path.throughput, path.entry.normal),
-                       0u, 0u, p.time, true);
-    enter<float>(walkers, keys, 1, [](bool, uint32_t) {});
-    if (walkers.size() == 0) {
+  bool walk(const MediumQuery<float>& p, const PresenceKeys& keys, PathState<float>& path, Hit& hit,
+            bool& left_body) const {
+    WalkQueue walk_queue(walks_);
+    walk_queue.add<float>(begin_walk<float>(p.sampler, p.key, p.depth, path.o, path.dir,
+                                            path.throughput, path.entry.normal),
+                          0u, 0u, p.time, true);
+    enter<float>(walk_queue, keys, 1, [](bool, uint32_t) {});
+    if (walk_queue.size() == 0) {
       path.pdf = 0.f;
       return true;
     }
-    walkers.run<float>(context_.scene, *context_.accel, 1, keys, counts_.walk_steps,
-                       counts_.walk_lanes,
-                       [&](bool, uint32_t, const WalkEnd<float>& end, bool came) {
-                         came_out = came;
-                         const Seen<float> seen = from_outside(end);
-                         path.o = seen.o;
-                         path.dir = seen.d;
-                         path.throughput = end.throughput;
-                         hit.t = seen.t;
-                         hit.u = end.u;
-                         hit.v = end.v;
-                         hit.prim = end.prim;
-                         hit.geom = end.geom;
-                         hit.inst = end.inst;
-                       });
-    return came_out;
+    walk_queue.run<float>(context_.scene, *context_.accel, 1, keys, counts_.walk_steps,
+                          counts_.walk_lanes,
+                          [&](bool, uint32_t, const WalkEnd<float>& end, bool reached_surface) {
+                            left_body = reached_surface;
+                            const ExitRay<float> exit_ray = make_exit_ray(end);
+                            path.o = exit_ray.o;
+                            path.dir = exit_ray.d;
+                            path.throughput = end.throughput;
+                            hit.t = exit_ray.t;
+                            hit.u = end.u;
+                            hit.v = end.v;
+                            hit.prim = end.prim;
+                            hit.geom = end.geom;
+                            hit.inst = end.inst;
+                          });
+    return left_body;
   }
   /// Returns the lanes of the rays at `i` that view the exit point of a walk.
   template <typename F>
-  Mask<F> came_out(const Wave& wave, size_t i) const {
-    return Mask<F>(load<UInt<F>>(wave.ways.uints(kExit) + i) != UInt<F>(0u));
+  Mask<F> left_body(const Wave& wave, size_t i) const {
+    return Mask<F>(load<UInt<F>>(wave.segments.uints(kExit) + i) != UInt<F>(0u));
   }
-  uint32_t exit_material() const { return context_.scene.walks.exit_material; }
+  uint32_t exit_material() const { return context_.scene.subsurface.exit_material; }
 
  protected:
-  /// Columns of Wave::ways.
+  /// Columns of Wave::segments.
   enum Column : size_t {
     kDistance,
     kMaterial,
@@ -82,35 +82,35 @@ class WalksBelow {
     kAbsorbed,
     kScratch = kAbsorbed + 3
   };
-  static_assert(kScratch + 2 == Wave::kWayColumns);
-  static_assert(Walkers::kColumns == Wave::kWalkColumns);
+  static_assert(kScratch + 2 == Wave::kSegmentColumns);
+  static_assert(WalkQueue::kColumns == Wave::kWalkColumns);
 
   /// Runs the walks of all rays of a wave that entered a subsurface body.
   template <typename F>
-  void walk_all(Wave& wave, uint32_t depth, SamplerKind sampler) const {
+  void run_subsurface_walks(Wave& wave, uint32_t depth, SamplerKind sampler) const {
     using U = UInt<F>;
-    if (!has_walks()) return;
+    if (!has_subsurface()) return;
     const SceneView& scene = context_.scene;
     const RayQueue& q = wave.rays;
-    uint32_t* const exits = wave.ways.uints(kExit);
-    Walkers walkers(walks_);
+    uint32_t* const exits = wave.segments.uints(kExit);
+    WalkQueue walk_queue(walks_);
     for (size_t i = 0; i < q.size; i += kWidth<F>) {
       const Mask<F> active = first_lanes<F>(q.size - i);
       const U slot = load<U>(q.slot + i);
       store(exits + i, U(0u));
       PathRow<F> path = load_row<PathRow, F>(wave.pool.paths, slot, active);
-      const Mask<F> below = active & path.enters_body();
-      if (none(below)) continue;
+      const Mask<F> entered = active & path.enters_body();
+      if (none(entered)) continue;
       const UInt<F> normal = path.take_entry().normal;
-      store_row<PathRow, F>(wave.pool.paths, slot, path, below);
+      store_row<PathRow, F>(wave.pool.paths, slot, path, entered);
       const F time = scene.has_motion
-                         ? gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot, below)
+                         ? gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot, entered)
                          : F(0.f);
-      walkers.add<F>(
+      walk_queue.add<F>(
           begin_walk<F>(sampler, path.key, depth, path.o, path.d, path.throughput, normal),
-          lane_index<F>() + static_cast<uint32_t>(i), slot, time, below);
+          lane_index<F>() + static_cast<uint32_t>(i), slot, time, entered);
     }
-    if (walkers.size() == 0) return;
+    if (walk_queue.size() == 0) return;
     PresenceKeys keys = presence_keys(wave.pool, depth, false);
     // Holds BodyEntry::body (PathRow::take_entry).
     keys.object = &reinterpret_cast<const PathRow<float>*>(wave.pool.paths)->receiver;
@@ -121,17 +121,17 @@ class WalksBelow {
       path.pdf = F(0.f);
       store_row<PathRow, F>(wave.pool.paths, slot, path, lanes);
     };
-    enter<F>(walkers, keys, context_.traversal_width, leave);
-    if (walkers.size() == 0) return;
+    enter<F>(walk_queue, keys, context_.traversal_width, leave);
+    if (walk_queue.size() == 0) return;
     const auto start = PhaseClock::Clock::now();
     if (context_.measures_costs) std::fill(wave.scratch.begin(), wave.scratch.end(), 0.f);
-    walkers.run<F>(
-        scene, *context_.accel, context_.traversal_width, keys, counts_.walk_steps,
-        counts_.walk_lanes,
-        [&](const Mask<F>& ended, const U& who, const WalkEnd<F>& end, const Mask<F>& came) {
-          finish_walks<F>(wave, ended, who, end, came);
-          if (context_.measures_costs) count_collisions<F>(wave.scratch, end, ended);
-        });
+    walk_queue.run<F>(scene, *context_.accel, context_.traversal_width, keys, counts_.walk_steps,
+                      counts_.walk_lanes,
+                      [&](const Mask<F>& ended, const U& ray_index, const WalkEnd<F>& end,
+                          const Mask<F>& reached_surface) {
+                        finish_walks<F>(wave, ended, ray_index, end, reached_surface);
+                        if (context_.measures_costs) count_collisions<F>(wave.scratch, end, ended);
+                      });
     if (context_.measures_costs)
       charge_walks(
           wave, std::chrono::duration<double, std::nano>(PhaseClock::Clock::now() - start).count());
@@ -142,28 +142,28 @@ class WalksBelow {
 
  private:
   template <typename F>
-  static Walk<F> begin_walk(SamplerKind sampler, const SampleKey<F>& key, uint32_t depth,
-                            const Vec3<F>& o, const Vec3<F>& d, const Color<F>& throughput,
-                            const UInt<F>& entry_normal) {
+  static SubsurfaceWalk<F> begin_walk(SamplerKind sampler, const SampleKey<F>& key, uint32_t depth,
+                                      const Vec3<F>& o, const Vec3<F>& d,
+                                      const Color<F>& throughput, const UInt<F>& entry_normal) {
     using U = UInt<F>;
-    const Way<F> way(sampler, key, depth, VertexSet::kFlight);
+    const SegmentRandom<F> segment(sampler, key, depth, VertexSet::kFlight);
     const Color<F> none(F(0.f));
-    return {o,          d,
-            throughput, F(throughput.x + throughput.y + throughput.z),
-            F(0.f),     way.branch(0x51ee9u).seed,
-            U(0u),      entry_normal,
-            way.r.y,    way.r.z,
-            U(0u),      none,
+    return {o,           d,
+            throughput,  F(throughput.x + throughput.y + throughput.z),
+            F(0.f),      segment.branch(0x51ee9u).seed,
+            U(0u),       entry_normal,
+            segment.r.y, segment.r.z,
+            U(0u),       none,
             none};
   }
   /// Ray that views the exit point of a walk from outside.
   template <typename F>
-  struct Seen {
+  struct ExitRay {
     Vec3<F> o, d;
     F t;
   };
   template <typename F>
-  Seen<F> from_outside(const WalkEnd<F>& end) const {
+  ExitRay<F> make_exit_ray(const WalkEnd<F>& end) const {
     const F t(1e-3f * context_.scene.scale);
     return {fma(end.d, t, end.p), -end.d, t};
   }
@@ -171,19 +171,22 @@ class WalksBelow {
   /// Starts walks inside the objects of `keys`. Calls leave(lanes, slot) for paths that hit none of
   /// them, or whose material has no subsurface medium.
   template <typename F, typename Leave>
-  void enter(Walkers& walkers, const PresenceKeys& keys, uint32_t width, const Leave& leave) const {
+  void enter(WalkQueue& walk_queue, const PresenceKeys& keys, uint32_t width,
+             const Leave& leave) const {
     using U = UInt<F>;
-    walkers.enter<F>(
+    walk_queue.enter<F>(
         context_.scene, *context_.accel, width, keys,
-        [&](const U& inst, const U& geom, const U& prim, const Mask<F>& met) {
-          const U material = hit_place<F>(context_.scene, inst, geom, prim, met).material;
+        [&](const U& inst, const U& geom, const U& prim, const Mask<F>& has_hit) {
+          const U material = hit_object<F>(context_.scene, inst, geom, prim, has_hit).material;
           const Mask<F> walks =
-              met & (walk_medium<F>(context_.scene.walks, material, met).extinction.x > 0.f);
-          return select(Mask<U>(walks), material, U(Walkers::kNoMedium));
+              has_hit &
+              (subsurface_medium<F>(context_.scene.subsurface, material, has_hit).extinction.x >
+               0.f);
+          return select(Mask<U>(walks), material, U(WalkQueue::kNoMedium));
         },
         leave);
-    counts_.walks += walkers.size();
-    counts_.walk_steps += walkers.size();
+    counts_.walks += walk_queue.size();
+    counts_.walk_steps += walk_queue.size();
   }
   /// Adds the collisions of ended walks to their materials.
   template <typename F>
@@ -204,40 +207,40 @@ class WalksBelow {
     for (const float steps : wave.scratch) all += double{steps};
     for (size_t m = 0; m < wave.scratch.size(); ++m)
       if (wave.scratch[m] > 0)
-        wave.costs.charge_beside(static_cast<uint32_t>(m), ns * double{wave.scratch[m]} / all);
+        wave.costs.charge_untimed(static_cast<uint32_t>(m), ns * double{wave.scratch[m]} / all);
   }
   template <typename F>
-  void finish_walks(Wave& wave, const Mask<F>& ended, const UInt<F>& who, const WalkEnd<F>& end,
-                    const Mask<F>& came) const {
+  void finish_walks(Wave& wave, const Mask<F>& ended, const UInt<F>& ray_index,
+                    const WalkEnd<F>& end, const Mask<F>& reached_surface) const {
     using U = UInt<F>;
     const RayQueue& q = wave.rays;
     const HitBuffer& hits = wave.hits;
-    const Seen<F> seen = from_outside(end);
-    const U slot = gather<U>(q.slot, who, Mask<U>(ended));
+    const ExitRay<F> exit_ray = make_exit_ray(end);
+    const U slot = gather<U>(q.slot, ray_index, Mask<U>(ended));
     PathRow<F> path = load_row<PathRow, F>(wave.pool.paths, slot, ended);
-    path.o = seen.o;
-    path.d = seen.d;
-    path.throughput = select<F>(came, end.throughput, Color<F>(F(0.f)));
+    path.o = exit_ray.o;
+    path.d = exit_ray.d;
+    path.throughput = select<F>(reached_surface, end.throughput, Color<F>(F(0.f)));
     path.receiver = U(0u);
     store_row<PathRow, F>(wave.pool.paths, slot, path, ended);
-    const auto real = [&](float* column, const F& x) { scatter<F>(column, x, who, ended); };
+    const auto real = [&](float* column, const F& x) { scatter<F>(column, x, ray_index, ended); };
     const auto number = [&](uint32_t* column, const U& x) {
-      scatter<U>(column, x, who, Mask<U>(ended));
+      scatter<U>(column, x, ray_index, Mask<U>(ended));
     };
     const auto three = [&](float* x, float* y, float* z, const Vec3<F>& v) {
       real(x, v.x);
       real(y, v.y);
       real(z, v.z);
     };
-    three(q.ox, q.oy, q.oz, seen.o);
-    three(q.dx, q.dy, q.dz, seen.d);
-    real(hits.t, seen.t);
+    three(q.ox, q.oy, q.oz, exit_ray.o);
+    three(q.dx, q.dy, q.dz, exit_ray.d);
+    real(hits.t, exit_ray.t);
     real(hits.u, end.u);
     real(hits.v, end.v);
     number(hits.prim, end.prim);
     number(hits.geom, end.geom);
-    number(hits.inst, select(Mask<U>(came), end.inst, U(kNoHit)));
-    number(wave.ways.uints(kExit), select(Mask<U>(came), U(1u), U(0u)));
+    number(hits.inst, select(Mask<U>(reached_surface), end.inst, U(kNoHit)));
+    number(wave.segments.uints(kExit), select(Mask<U>(reached_surface), U(1u), U(0u)));
   }
 
   const SoaBlock& walks_;

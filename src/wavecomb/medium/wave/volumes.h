@@ -52,19 +52,19 @@ class Volumes : public WalksBelow {
   }
   template <typename F>
   Color<F> transmittance(const Passage<F>& p, const Mask<F>& active) const {
-    const Way<F> way(p, VertexSet::kShadow);
-    return transmittance_through<F>(volumes_, way, segment_of(p), active, counts_.volumes);
+    const Way<F> random(p, VertexSet::kShadow);
+    return transmittance_through<F>(volumes_, random, segment_of(p), active, counts_.volumes);
   }
 
   bool shines() const { return volumes_.emits; }
   template <typename F>
   Color<F> emission(const Passage<F>& p, const Mask<F>& active) const {
     Color<F> sum(F(0.f));
-    const Way<F> way(p, VertexSet::kFlight);
+    const Way<F> random(p, VertexSet::kFlight);
     const RaySegment<F> segment = segment_of(p);
     for (uint32_t i = 0; i < volumes_.count; ++i)
       if (volumes_.volumes[i].emits)
-        sum += emission_of<F>(volumes_, i, way, segment, active, counts_.volumes);
+        sum += emission_of<F>(volumes_, i, random, segment, active, counts_.volumes);
     return sum;
   }
 
@@ -78,15 +78,15 @@ class Volumes : public WalksBelow {
     const bool knows_inside = context_.knows_inside();
     for (size_t i = 0; i < q.size; i += kWidth<F>) {
       const PathRow<F> path = path_at<F>(wave, q.slot, i, q.size);
-      const Way<F> way(sampler, path.key, depth, VertexSet::kFlight);
-      put_numbers<F>(wave, i, way);
+      const Way<F> random(sampler, path.key, depth, VertexSet::kFlight);
+      put_numbers<F>(wave, i, random);
       store(flights.t + i, knows_inside ? F(kInfinity) : load<F>(wave.hits.t + i));
       store(flights.material + i, UInt<F>(uint32_t{Flights::kNoEvent}));
       for (size_t c = 0; c < 3; ++c) {
         store(flights.ratio[c] + i, F(1.f));
         store(flights.scale[c] + i, F(1.f));
       }
-      store(wave.ways.uints(kHero) + i, hero_of<F>(way.r.y, path.throughput));
+      store(wave.ways.uints(kHero) + i, hero_of<F>(random.r.y, path.throughput));
     }
     const Ways ways = ways_of(wave, q, flights.t);
     float* const scratch = wave.ways.floats(kScratch);
@@ -186,10 +186,10 @@ class Volumes : public WalksBelow {
   template <typename F>
   InteriorStart<F> begin_inside(SamplerKind sampler, const SampleKey<F>& key, uint32_t depth,
                                 const Color<F>& throughput) const {
-    const Way<F> way(sampler, key, depth, VertexSet::kFlight);
-    const UInt<F> seed = way.branch(0x1d3a7u).seed;
-    const F first = volumes_.count == 0 ? way.r.z : walk_numbers<F>(seed, UInt<F>(0u)).x;
-    return {hero_of<F>(way.r.y, throughput), seed, first};
+    const Way<F> random(sampler, key, depth, VertexSet::kFlight);
+    const UInt<F> seed = random.branch(0x1d3a7u).seed;
+    const F first = volumes_.count == 0 ? random.r.z : walk_numbers<F>(seed, UInt<F>(0u)).x;
+    return {hero_of<F>(random.r.y, throughput), seed, first};
   }
   /// Returns the medium stack at the centre of the camera at the middle of the shutter interval.
   Inside<float> around_camera(const PresenceKeys& keys) const {
@@ -238,9 +238,9 @@ class Volumes : public WalksBelow {
                                 first_lanes<F>(size - i));
   }
   template <typename F>
-  static void put_numbers(Wave& wave, size_t i, const Way<F>& way) {
-    store(wave.ways.uints(kSeed) + i, way.seed);
-    store(wave.ways.floats(kFirst) + i, way.r.z);
+  static void put_numbers(Wave& wave, size_t i, const Way<F>& random) {
+    store(wave.ways.uints(kSeed) + i, random.seed);
+    store(wave.ways.floats(kFirst) + i, random.r.z);
   }
 
   const VolumeView volumes_;

@@ -28,9 +28,9 @@ template <typename F>
                                                const PathState<F>& path, bool from_camera,
                                                const Mask<F>& active) {
   using U = UInt<F>;
-  const U place = placed_geometry<F>(scene, inst, geom, active);
+  const U object = instance_geometry<F>(scene, inst, geom, active);
   const U record =
-      select(Mask<U>(active), gather<U>(scene.mesh_lights, place, Mask<U>(active)), U(kNoLight));
+      select(Mask<U>(active), gather<U>(scene.mesh_lights, object, Mask<U>(active)), U(kNoLight));
   return mesh_light_radiance<F>(scene.lights, record, emission,
                                 {.dir = path.dir,
                                  .link = path.link,
@@ -65,7 +65,7 @@ inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& sett
                                const PathState<F>& path, const Mask<F>& active) {
   LightHit<F> hit = light_hit<F>(scene.lights, light, path.vertex_before(), path.dir, t, active);
   F w = bounce_weight<F>(path.pdf, hit.pdf);
-  if (scene.lights.sends_paths()) [[unlikely]]
+  if (scene.lights.emits_paths()) [[unlikely]]
     w = joint_bounce_weight<F>(
         path.pdf, hit.pdf, not_(Mask<F>(path.pdf > 0.f)),
         F(path.ratio * emission_density<F>(scene.lights, light, path.o, path.dir, t, active)));
@@ -73,7 +73,7 @@ inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& sett
     hit.radiance = hit.radiance * LightEffect<F>(scene.lights, light, active)
                                       .of_hit(not_(path.pdf > 0.f), depth == 0, path.diffuse);
   if (scene.lights.links.members)
-    w = select(shines_on<F>(scene.lights, path.link, light, active), w, F(0.f));
+    w = select(illuminates<F>(scene.lights, path.link, light, active), w, F(0.f));
   return clean<F>(path.throughput * hit.radiance * w, clamp_limit(settings, depth));
 }
 
@@ -102,8 +102,8 @@ WAVECOMB_INLINE Color<F> emit(const Vertex<F, kFeatures>& v,
   if (none(emits)) return Color<F>(F(0.f));
   F light_pdf(0.f), others(0.f);
   if (scene.has_emissive_meshes) {
-    const U place = placed_geometry<F>(scene, v.hit.inst, v.geom, emits);
-    const U base = gather<U>(scene.emissive_lights, place, Mask<U>(emits));
+    const U object = instance_geometry<F>(scene, v.hit.inst, v.geom, emits);
+    const U base = gather<U>(scene.emissive_lights, object, Mask<U>(emits));
     if (v.wants_lights())
       v.aovs->emitter = select(Mask<U>(base == U(kNoLight)), base, U(base + v.hit.prim));
     const Mask<F> sampled = emits & Mask<F>(base != U(kNoLight)) & (v.path.pdf > 0.f);

@@ -20,18 +20,20 @@ namespace detail {
 /// Classifies the scattering between `wo` and `wi`. The light's contribution to the diffuse and the
 /// other lobes is scaled by `diffuse` and `specular`.
 template <typename Bsdf, typename F>
-inline ScatteringNote<F> note_scattering(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>& wi,
-                                         const F& diffuse, const F& specular) {
+inline ScatteringEvent<F> classify_scattering(const Bsdf& bsdf, const Vec3<F>& wo,
+                                              const Vec3<F>& wi, const F& diffuse,
+                                              const F& specular) {
   using U = UInt<F>;
   const Color<F> one(F(1.f));
   if constexpr (!Bsdf::kOnSurface)
     return {U(static_cast<uint32_t>(PathEvent::kVolume)), one, Mask<F>(false)};
-  const auto seen = bsdf.view(wo);
-  const Color<F> all = bsdf.eval(seen, wi).f_cos, part = bsdf.diffuse_f_cos(seen, wi);
+  const auto view = bsdf.view(wo);
+  const Color<F> all = bsdf.eval(view, wi).f_cos, part = bsdf.diffuse_f_cos(view, wi);
   const auto share = [&](const F& f, const F& d) {
-    const F shown = d * diffuse;
-    const F whole = fma(max(F(f - d), F(0.f)), specular, shown);
-    return select(whole > 0.f, min(F(shown / select(whole > 0.f, whole, F(1.f))), F(1.f)), F(0.f));
+    const F weighted_diffuse = d * diffuse;
+    const F whole = fma(max(F(f - d), F(0.f)), specular, weighted_diffuse);
+    return select(whole > 0.f,
+                  min(F(weighted_diffuse / select(whole > 0.f, whole, F(1.f))), F(1.f)), F(0.f));
   };
   const U side = select(Mask<U>(Mask<F>(F(wo.z * wi.z) < 0.f)),
                         U(static_cast<uint32_t>(PathEvent::kTransmission)),
@@ -44,9 +46,9 @@ inline ScatteringNote<F> note_scattering(const Bsdf& bsdf, const Vec3<F>& wo, co
 /// Classifies the scattering from `l` to `w` at a vertex of a light path, or of a connection at a
 /// vertex of a camera path. All lobes count fully, since such lights have no multipliers.
 template <typename Bsdf, typename F>
-[[gnu::noinline, gnu::cold]] ScatteringNote<F> note_event(const Bsdf bsdf, const Vec3<F> w,
-                                                          const Vec3<F> l) {
-  return detail::note_scattering<Bsdf, F>(bsdf, w, l, F(1.f), F(1.f));
+[[gnu::noinline, gnu::cold]] ScatteringEvent<F> classify_event(const Bsdf bsdf, const Vec3<F> w,
+                                                               const Vec3<F> l) {
+  return detail::classify_scattering<Bsdf, F>(bsdf, w, l, F(1.f), F(1.f));
 }
 
 namespace detail {
@@ -71,20 +73,21 @@ template <typename Bsdf, typename F>
                                                   VertexAovs<F>& aovs) {
   F diffuse(1.f), specular(1.f);
   if (lights.has_effects && any(at.has_shadow)) {
-    const LightEffect<F> effect(lights, aovs.lit_by, at.has_shadow);
+    const LightEffect<F> effect(lights, aovs.light_id, at.has_shadow);
     diffuse = select(effect.applies, effect.diffuse, diffuse);
     specular = select(effect.applies, effect.specular, specular);
   }
   const F all(1.f);
-  aovs.lit =
-      note_scattering<Bsdf, F>(at.bsdf, at.wo, at.frame.to_local(at.to_light), diffuse, specular);
-  aovs.bounce = note_scattering<Bsdf, F>(at.bsdf, at.wo, at.frame.to_local(at.bounce), all, all);
+  aovs.light_scattering = classify_scattering<Bsdf, F>(
+      at.bsdf, at.wo, at.frame.to_local(at.to_light), diffuse, specular);
+  aovs.bounce =
+      classify_scattering<Bsdf, F>(at.bsdf, at.wo, at.frame.to_local(at.bounce), all, all);
   aovs.bounce.is_delta = not_(Mask<F>(at.bounce_pdf > 0.f));
-  if constexpr (Bsdf::kWalks) {
+  if constexpr (Bsdf::kHasSubsurface) {
     using U = UInt<F>;
     const Mask<F> enters = at.bsdf.enters(at.wo, at.frame.to_local(at.bounce));
-    aovs.bounce.event =
-        select(Mask<U>(enters), U(static_cast<uint32_t>(PathEvent::kBelow)), aovs.bounce.event);
+    aovs.bounce.event = select(Mask<U>(enters), U(static_cast<uint32_t>(PathEvent::kSubsurface)),
+                               aovs.bounce.event);
   }
 }
 
@@ -92,8 +95,8 @@ template <typename Bsdf, typename F>
 
 /// Records in the AOVs of the vertex how its light sample and its bounce in `out` scatter.
 template <typename Bsdf, typename F, uint32_t kFeatures>
-WAVECOMB_INLINE void note_events(const VertexContext<Bsdf, F, kFeatures>& c,
-                                 const VertexResult<F>& out) {
+WAVECOMB_INLINE void classify_events(const VertexContext<Bsdf, F, kFeatures>& c,
+                                     const VertexResult<F>& out) {
   using Scattering = typename VertexContext<Bsdf, F, kFeatures>::Scattering;
   detail::note_directions<Scattering, F>(c.vertex.scene.lights,
                                          {.bsdf = c.at.bsdf,

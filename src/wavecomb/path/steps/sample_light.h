@@ -50,14 +50,14 @@ WAVECOMB_INLINE F joint_light_weight(const VertexContext<Bsdf, F, kFeatures>& c,
   const LightSample<F>& l = to_light.light;
   const F pdf = select(l.pdf > 0.f, l.pdf, F(1.f));
   const F by_bounce = select(l.is_delta, F(0.f), F(p_bounce / pdf));
-  if (!lights.sends_paths()) return 1.f / F(1.f + by_bounce);
+  if (!lights.emits_paths()) return 1.f / F(1.f + by_bounce);
   const F density =
       emission_density<F>(lights, l.light, to_light.origin, l.wi, l.distance, l.valid);
   const Mask<F> point = l.is_delta & (l.distance < kFarAway);
   const F nee = select(point, F(pdf * F(l.distance * l.distance)), pdf);
   const F by_path =
       F(c.joint.template towards<Bsdf>(c.vertex, c.at, c.wo, l.wi, wi, l.valid) * density) / nee;
-  return 1.f / F(F(1.f + by_bounce) + min(by_path, F(kMostRatio)));
+  return 1.f / F(F(1.f + by_bounce) + min(by_path, F(kMaxRatio)));
 }
 
 namespace detail {
@@ -72,22 +72,22 @@ struct LightCandidate {
   F w;            ///< MIS weight, included in c
   Mask<F> valid;  ///< whether the contribution may be non-zero; otherwise c is undefined
   UInt<F> light;
-  UInt<F> shadow_set;    ///< for linked lights
-  ShadowReach<F> reach;  ///< for lights with shadow attributes
+  UInt<F> shadow_set;      ///< for linked lights
+  ShadowExtent<F> extent;  ///< for lights with shadow attributes
 };
 
-/// Returns the light sample for the sample values `r` in the lanes `lit`. `receiver` is that of the
-/// context with its position, and `link` the link class of the surface.
+/// Returns the light sample for the sample values `r` in the lanes `active_lights`. `receiver` is
+/// that of the context with its position, and `link` the link class of the surface.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE LightCandidate<F> light_candidate(const VertexContext<Bsdf, F, kFeatures>& c,
                                                   const LightReceiver<F>& receiver,
                                                   const Sample4<F>& r, const UInt<F>& link,
-                                                  const Mask<F>& lit) {
+                                                  const Mask<F>& active_lights) {
   using U = UInt<F>;
   const Vertex<F, kFeatures>& v = c.vertex;
   const auto& at = c.at;
   const LightView& lights = v.scene.lights;
-  const LightConnection<F> to_light = connect_to_light<Bsdf, F>(v, at, receiver, r, lit);
+  const LightConnection<F> to_light = connect_to_light<Bsdf, F>(v, at, receiver, r, active_lights);
   const LightSample<F>& l = to_light.light;
   const Vec3<F> wi = c.frame.to_local(l.wi);
   const BsdfEval<F> e = at.bsdf.eval(c.view, wi);
@@ -101,26 +101,26 @@ WAVECOMB_INLINE LightCandidate<F> light_candidate(const VertexContext<Bsdf, F, k
   if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface)
     if (v.joins_light()) [[unlikely]]
       w = joint_light_weight(c, to_light, wi, p_bounce);
-  ShadowReach<F> reach{F(kFarAway), Color<F>(F(0.f))};
+  ShadowExtent<F> extent{F(kFarAway), Color<F>(F(0.f))};
   if (has_effects) [[unlikely]] {
-    const LightEffect<F> effect(lights, light, lit);
+    const LightEffect<F> effect(lights, light, active_lights);
     const Color<F> diffuse = at.bsdf.diffuse_f_cos(c.view, wi);
     f_cos = select<F>(effect.applies,
                       fma(f_cos - diffuse, effect.specular, diffuse * effect.diffuse), f_cos);
     w = select(effect.sampled_only, F(1.f), w);
     if (lights.shadows) [[unlikely]]
-      reach = shadow_reach<F>(lights, effect.shadow, r.w, lit);
+      extent = shadow_extent<F>(lights, effect.shadow, r.w, active_lights);
   }
   if (v.has_links()) [[unlikely]] {
-    w = select(shines_on<F>(lights, link, light, lit), w, F(0.f));
-    set = shadow_set<F>(lights, light, lit);
+    w = select(illuminates<F>(lights, link, light, active_lights), w, F(0.f));
+    set = shadow_set<F>(lights, light, active_lights);
   }
-  Mask<F> valid = lit & l.valid & at.is_consistent(l.wi, wi);
+  Mask<F> valid = active_lights & l.valid & at.is_consistent(l.wi, wi);
   // The random walk finds light that enters a subsurface body (medium/subsurface/random_walk.h).
-  if constexpr ((kFeatures & kBelow) != 0 && Bsdf::kWalks)
+  if constexpr ((kFeatures & kSubsurface) != 0 && Bsdf::kHasSubsurface)
     valid = valid & not_(at.bsdf.enters(c.wo, wi));
   return {to_light.origin, l.wi, l.distance, at.throughput * f_cos * l.weight * w, w, valid,
-          light,           set,  reach};
+          light,           set,  extent};
 }
 
 /// Number of light samples that a vertex on a fibre evaluates.
@@ -148,7 +148,7 @@ WAVECOMB_INLINE LightCandidate<F> resample(const LightCandidate<F>& first, const
     const F y = x + (by - std::floor(by));
     return select(y < 1.f, y, F(y - 1.f));
   };
-  LightCandidate<F> kept = first;
+  LightCandidate<F> chosen_candidate = first;
   F g = brightness(first), sum = g;
   for (uint32_t k = 1; k < kFibreCandidates; ++k) {
     const auto n = static_cast<float>(k);
@@ -158,22 +158,25 @@ WAVECOMB_INLINE LightCandidate<F> resample(const LightCandidate<F>& first, const
     sum += h;
     // One random number serves all selections: after rescaling it is uniform again.
     const F q = select(h > 0.f, F(h / select(h > 0.f, sum, F(1.f))), F(0.f));
-    const Mask<F> takes = u < q;
-    u = select(takes, F(u / max(q, F(1e-20f))), F((u - q) / max(F(1.f - q), F(1e-20f))));
-    g = select(takes, h, g);
-    kept.origin = select<F>(takes, other.origin, kept.origin);
-    kept.wi = select<F>(takes, other.wi, kept.wi);
-    kept.distance = select(takes, other.distance, kept.distance);
-    kept.c = select<F>(takes, other.c, kept.c);
-    kept.w = select(takes, other.w, kept.w);
-    kept.valid = (takes & other.valid) | (not_(takes) & kept.valid);
-    kept.light = select(Mask<U>(takes), other.light, kept.light);
-    kept.shadow_set = select(Mask<U>(takes), other.shadow_set, kept.shadow_set);
-    kept.reach.distance = select(takes, other.reach.distance, kept.reach.distance);
-    kept.reach.color = select<F>(takes, other.reach.color, kept.reach.color);
+    const Mask<F> replaces = u < q;
+    u = select(replaces, F(u / max(q, F(1e-20f))), F((u - q) / max(F(1.f - q), F(1e-20f))));
+    g = select(replaces, h, g);
+    chosen_candidate.origin = select<F>(replaces, other.origin, chosen_candidate.origin);
+    chosen_candidate.wi = select<F>(replaces, other.wi, chosen_candidate.wi);
+    chosen_candidate.distance = select(replaces, other.distance, chosen_candidate.distance);
+    chosen_candidate.c = select<F>(replaces, other.c, chosen_candidate.c);
+    chosen_candidate.w = select(replaces, other.w, chosen_candidate.w);
+    chosen_candidate.valid = (replaces & other.valid) | (not_(replaces) & chosen_candidate.valid);
+    chosen_candidate.light = select(Mask<U>(replaces), other.light, chosen_candidate.light);
+    chosen_candidate.shadow_set =
+        select(Mask<U>(replaces), other.shadow_set, chosen_candidate.shadow_set);
+    chosen_candidate.extent.distance =
+        select(replaces, other.extent.distance, chosen_candidate.extent.distance);
+    chosen_candidate.extent.color =
+        select<F>(replaces, other.extent.color, chosen_candidate.extent.color);
   }
-  kept.c = kept.c * F(sum / select(g > 0.f, F(g * kN), F(1.f)));
-  return kept;
+  chosen_candidate.c = chosen_candidate.c * F(sum / select(g > 0.f, F(g * kN), F(1.f)));
+  return chosen_candidate;
 }
 
 }  // namespace detail
@@ -185,12 +188,12 @@ WAVECOMB_INLINE void sample_light(const VertexContext<Bsdf, F, kFeatures>& c, co
   const Vertex<F, kFeatures>& v = c.vertex;
   const auto& at = c.at;
   const LightView& lights = v.scene.lights;
-  const Mask<F> lit = v.active & at.bsdf.has_non_delta();
-  if (!Bsdf::kHasNonDelta || lights.count == 0 || none(lit)) return;
+  const Mask<F> active_lights = v.active & at.bsdf.has_non_delta();
+  if (!Bsdf::kHasNonDelta || lights.count == 0 || none(active_lights)) return;
   LightReceiver<F> receiver = c.receiver;
   receiver.p = at.origin(-v.path.dir);
   const auto candidate = [&](const Sample4<F>& u) {
-    return detail::light_candidate(c, receiver, u, out.next.link, lit);
+    return detail::light_candidate(c, receiver, u, out.next.link, active_lights);
   };
   detail::LightCandidate<F> one = candidate(r);
   if constexpr (Bsdf::kOnFibre)
@@ -201,16 +204,16 @@ WAVECOMB_INLINE void sample_light(const VertexContext<Bsdf, F, kFeatures>& c, co
   if (v.has_links()) [[unlikely]]
     out.shadow_set = one.shadow_set;
   if (v.wants_lights()) {
-    v.aovs->lit_by = one.light;
-    v.aovs->lit_at = one.origin;
+    v.aovs->light_id = one.light;
+    v.aovs->light_position = one.origin;
     v.aovs->light_weight = one.w;
   }
   out.shadow_o = one.origin;
   out.shadow_d = one.wi;
-  out.shadow_tfar = one.distance * kShadowReach;
+  out.shadow_tfar = one.distance * kShadowRayFraction;
   if (v.has(kMeshLights) && lights.has_effects) [[unlikely]] {
-    out.shadow_tfar = min(out.shadow_tfar, one.reach.distance);
-    out.shade = one.reach.color;
+    out.shadow_tfar = min(out.shadow_tfar, one.extent.distance);
+    out.shadow_tint = one.extent.color;
   }
 }
 

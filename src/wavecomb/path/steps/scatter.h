@@ -17,12 +17,12 @@ namespace wavecomb {
 
 /// Returns the diffuse fraction of the bounce `b`, by colour; 0 for specular bounces.
 template <typename F, typename Bsdf, typename View>
-WAVECOMB_INLINE Color<F> diffuse_share(const Bsdf& bsdf, const View& seen, const BsdfSample<F>& b) {
-  const Color<F> diffuse = bsdf.diffuse_f_cos(seen, b.wi);
+WAVECOMB_INLINE Color<F> diffuse_share(const Bsdf& bsdf, const View& view, const BsdfSample<F>& b) {
+  const Color<F> diffuse = bsdf.diffuse_f_cos(view, b.wi);
   const auto share = [&](const F& part, const F& weight) {
     const F whole = weight * b.pdf;
-    const Mask<F> good = not_(b.is_delta) & (whole > 0.f);
-    return select(good, clamp(F(part / select(good, whole, F(1.f))), F(0.f), F(1.f)), F(0.f));
+    const Mask<F> valid = not_(b.is_delta) & (whole > 0.f);
+    return select(valid, clamp(F(part / select(valid, whole, F(1.f))), F(0.f), F(1.f)), F(0.f));
   };
   return {share(diffuse.x, b.weight.x), share(diffuse.y, b.weight.y), share(diffuse.z, b.weight.z)};
 }
@@ -35,7 +35,7 @@ WAVECOMB_INLINE void scatter(const VertexContext<Bsdf, F, kFeatures>& c, const S
   const auto& at = c.at;
   const PathState<F>& path = v.path;
   BsdfSample<F> b = sample_bounce<Bsdf, F>(v, at.bsdf, c.wo, c.view, r);
-  guide_bounce(c, r, b, out);
+  guided_bounce(c, r, b, out);
   const Vec3<F> d = normalize(c.frame.to_world(b.wi));
   out.next.dir = d;
   out.next.throughput = at.throughput * b.weight;
@@ -45,7 +45,7 @@ WAVECOMB_INLINE void scatter(const VertexContext<Bsdf, F, kFeatures>& c, const S
   out.next.cone_width = path.cone_width;
   if (v.has(kMeshLights) && v.scene.lights.has_multipliers) [[unlikely]]
     out.next.diffuse = diffuse_share<F>(at.bsdf, c.view, b);
-  if constexpr ((kFeatures & kBelow) != 0 && Bsdf::kWalks) {
+  if constexpr ((kFeatures & kSubsurface) != 0 && Bsdf::kHasSubsurface) {
     // For medium/subsurface/random_walk.h.
     out.next.enters_body = at.bsdf.enters(c.wo, b.wi) & (out.next.pdf > 0.f);
     out.next.entry = {object_of(v.hit.inst, v.hit.mesh),

@@ -12,10 +12,10 @@ namespace wavecomb {
 template <typename F>
 struct JointVertex;
 
-/// Context of the steps after `interact`: references to values that take_steps() (path/vertex.h)
+/// Context of the steps after `interact`: references to values that vertex_steps() (path/vertex.h)
 /// has computed once for the vertex.
 ///
-/// Contract: valid only within take_steps(). Steps read it and write VertexResult and the outputs
+/// Contract: valid only within vertex_steps(). Steps read it and write VertexResult and the outputs
 /// of Vertex. They are inlined, so that no reference costs a memory access.
 template <typename Bsdf, typename F, uint32_t kFeatureSet>
 struct VertexContext {
@@ -32,7 +32,7 @@ struct VertexContext {
   const Frame<F>& frame;             ///< of the BSDF's local directions
   const Vec3<F>& wo;                 ///< direction to the viewer, in `frame`
   const View& view;                  ///< of the BSDF from `wo`
-  const GuidePlace<F>& guide;        ///< lookup in the guiding field
+  const GuidingLookup<F>& guide;     ///< lookup in the guiding field
   const JointVertex<F>& joint;       ///< ratio R of light paths; zero without light paths
   const LightReceiver<F>& receiver;  ///< for light sampling, without a position
 };

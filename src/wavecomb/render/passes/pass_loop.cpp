@@ -37,12 +37,12 @@ PassLoop::PassLoop(const RenderPlan& plan, PassState pass, Film& film, PassRunne
       before_lights_(std::move(before_lights)),
       order_(morton_pixel_order(plan.settings.rendered())) {
   const Settings& settings = plan.settings;
-  if (!pass_.allotment.counts.empty()) {
-    const auto& counts = pass_.allotment.counts;
+  if (!pass_.allocation.counts.empty()) {
+    const auto& counts = pass_.allocation.counts;
     const auto [least, most] = std::minmax_element(counts.begin(), counts.end());
     if (rules_.pilot == 0 || *least < rules_.pilot || counts.size() != film.pixel_count())
       throw Error("the counts of samples to resume from are not of such a render");
-    allotment_ = {rules_.pilot, *least, *most, 0};
+    allocation_ = {rules_.pilot, *least, *most, 0};
   }
   // A render of a region also needs the light paths of the whole image.
   if (settings.joins_light())
@@ -52,24 +52,24 @@ PassLoop::PassLoop(const RenderPlan& plan, PassState pass, Film& film, PassRunne
     std::erase_if(light_order_, [region = settings.rendered()](uint32_t pixel) {
       return region.contains(pixel & 0xffffu, pixel >> 16);
     });
-  pass_.allotment.pilot = rules_.pilot;
-  pass_.allotment.spp = rules_.spp;
+  pass_.allocation.pilot = rules_.pilot;
+  pass_.allocation.spp = rules_.spp;
   const std::vector<uint32_t> samples = film.samples();
   resumed_samples_ = std::accumulate(samples.begin(), samples.end(), uint64_t{0});
   const uint32_t target =
       rules_.adaptive ? std::max(pass_.target, next_check(0, rules_)) : rules_.spp;
-  bool all_begun = true;
+  bool all_started = true;
   for (const uint32_t pixel : order_) {
     const size_t i = film.index(pixel & 0xffffu, pixel >> 16);
     const bool active = pass_.is_active(i);
     active_pixels_ += active ? 1 : 0;
-    expected_samples_ += active ? std::max(samples[i], pass_.allotment.at(i, target)) : samples[i];
-    all_begun &= samples[i] > 0;
+    expected_samples_ += active ? std::max(samples[i], pass_.allocation.at(i, target)) : samples[i];
+    all_started &= samples[i] > 0;
   }
-  may_be_cut_ = all_begun;
+  may_be_cut_ = all_started;
   // An interrupted pass of a render without a time limit may be long. One sample for each pixel
   // comes first.
-  if (rules_.timed && !all_begun) pass_.target = std::min(pass_.target, 1u);
+  if (rules_.timed && !all_started) pass_.target = std::min(pass_.target, 1u);
   if (!rules_.adaptive || pass_.light_target == 0)
     pass_.light_target = light_share_.samples(pass_.target);
 }
@@ -85,19 +85,19 @@ void PassLoop::run() {
     }
     const uint64_t before = runner_.samples_done();
     const double begin = seconds();
-    const auto halted = [this] { return watch_.halted() || is_late(); };
+    const auto halted = [this] { return watch_.halted() || is_past_deadline(); };
     runner_.run(plan, halted);
     if (!from_lights.batches.empty()) {
       if (before_lights_) before_lights_();
       runner_.run(from_lights, halted, true);
     }
-    film_.note_light_paths();
+    film_.update_light_path_aovs();
     samples_per_s_ =
         static_cast<double>(runner_.samples_done() - before) / std::max(1e-9, seconds() - begin);
     for (uint32_t i = 0; i < runner_.threads(); ++i)
       if (CostTracker* costs = runner_.integrator().worker(i).costs) costs_.take(*costs);
     costs_.merge();
-    if (watch_.stopped() || is_late()) return;
+    if (watch_.stopped() || is_past_deadline()) return;
     watch_.rest();
   }
 }
@@ -122,8 +122,8 @@ bool PassLoop::begin_pass(std::span<const uint32_t> samples) {
       expected_samples_ = check.expected_samples;
     }
   }
-  if (rules_.pilot > 0 && done == rules_.pilot && pass_.allotment.counts.empty())
-    pass_.allotment = allot(film_, settings_, allotment_);
+  if (rules_.pilot > 0 && done == rules_.pilot && pass_.allocation.counts.empty())
+    pass_.allocation = allocate_samples(film_, settings_, allocation_);
   const uint64_t active = active_pixels_;
   if (active == 0 || (done >= rules_.spp && !rules_.adaptive)) return false;
   const TimeLeft left{settings_.time_limit - seconds(), samples_per_s_};
@@ -139,7 +139,7 @@ bool PassLoop::begin_pass(std::span<const uint32_t> samples) {
   return true;
 }
 
-bool PassLoop::is_late() const {
+bool PassLoop::is_past_deadline() const {
   return rules_.timed && may_be_cut_ && seconds() >= settings_.time_limit;
 }
 

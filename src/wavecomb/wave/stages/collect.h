@@ -34,33 +34,36 @@ template <typename F>
 
 /// Returns the volume events that stopped the flights of a packet.
 template <typename F>
-VolumeSeen<F> volume_seen(const Wave& wave, const WaveContext& context, const UInt<F>& slot,
-                          const Flight<F>& flight) {
+VolumeHit<F> volume_hit(const Wave& wave, const WaveContext& context, const UInt<F>& slot,
+                        const Flight<F>& flight) {
   using U = UInt<F>;
   const SceneView& scene = context.scene;
-  VolumeSeen<F> seen{flight.material - scene.volumes.first_material, U(0u), flight.material,
-                     Mask<F>(false)};
-  if (!context.knows_inside()) return seen;
-  seen.in_mesh = flight.stopped & Mask<F>(flight.material == U(scene.interiors.event_material));
+  VolumeHit<F> volume_event{flight.material - scene.volumes.first_material, U(0u), flight.material,
+                            Mask<F>(false)};
+  if (!context.has_medium_stack()) return volume_event;
+  volume_event.in_mesh =
+      flight.stopped & Mask<F>(flight.material == U(scene.nested_media.event_material));
   const auto of_path = [&](auto member) {
-    return gather_field<F>(wave.pool.inside, member, slot, seen.in_mesh);
+    return gather_field<F>(wave.pool.medium_stacks, member, slot, volume_event.in_mesh);
   };
-  seen.place = of_path(&InsideRow<float>::place);
-  seen.material = select(Mask<U>(seen.in_mesh), of_path(&InsideRow<float>::medium), seen.material);
-  return seen;
+  volume_event.object = of_path(&MediumStackRow<float>::object);
+  volume_event.material = select(Mask<U>(volume_event.in_mesh),
+                                 of_path(&MediumStackRow<float>::medium), volume_event.material);
+  return volume_event;
 }
 
 /// Records for AOVs how paths passed through volumes and media. `throughput` is the throughput
 /// after the flight.
 template <typename F>
-void note_way(Wave& wave, uint32_t depth, const UInt<F>& slot, const Flight<F>& flight,
-              const Color<F>& throughput, const Mask<F>& active) {
+void record_segment(Wave& wave, uint32_t depth, const UInt<F>& slot, const Flight<F>& flight,
+                    const Color<F>& throughput, const Mask<F>& active) {
   if (depth == 0 && wave.aovs.wants_transmittance())
-    wave.aovs.pass<F>(slot, select<F>(flight.stopped | flight.walked, Color<F>(F(0.f)), throughput),
-                      active);
-  const Mask<F> walked = active & flight.walked;
-  if (wave.aovs.expressions() && any(walked))
-    wave.aovs.expressions().template walk<F>(slot, walked);
+    wave.aovs.pass<F>(
+        slot, select<F>(flight.stopped | flight.has_scattered, Color<F>(F(0.f)), throughput),
+        active);
+  const Mask<F> has_scattered = active & flight.has_scattered;
+  if (wave.aovs.expressions() && any(has_scattered))
+    wave.aovs.expressions().template walk<F>(slot, has_scattered);
 }
 
 /// Reads the ray queue and the hit buffer, and fills the shading queue in the order of the rays.
@@ -94,8 +97,8 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     if (any(wanted)) {
       path = load_row<PathRow, F>(wave.pool.paths, slot, wanted);
       if constexpr (Media::kAny) {
-        if constexpr (Media::kShines)
-          if (media.shines()) {
+        if constexpr (Media::kHasEmission)
+          if (media.has_emission()) {
             const float* const times = wave.times.floats(0);
             const F when = times ? load<F>(times + i) : F(0.f);
             const Color<F> c = clean<F>(
@@ -104,19 +107,19 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
                 clamp_limit(settings, depth));
             const Mask<F> bright = active & not_(is_black(c));
             add_radiance<F>(wave.pool.radiance, slot, c, bright);
-            if (wave.aovs.wants_lights()) wave.aovs.add_glow<F>(slot, c, bright);
+            if (wave.aovs.wants_lights()) wave.aovs.add_volume_emission<F>(slot, c, bright);
           }
         if constexpr (Media::kStreams)
           flight = media.template flight<F>(wave, i, path.throughput);
         else
-          flight = media.template fly<F>({settings.sampler, path.key, depth, o, d, t},
-                                         path.throughput, active);
+          flight = media.template sample_flight<F>({settings.sampler, path.key, depth, o, d, t},
+                                                   path.throughput, active);
         flight.stopped = active & flight.stopped;
         t = select(flight.stopped, flight.t, t);
         path.throughput = path.throughput * flight.weight;
         store_row<PathRow, F>(wave.pool.paths, slot, path, active);
         const Mask<F> through = not_(flight.stopped);
-        note_way<F>(wave, depth, slot, flight, path.throughput, active);
+        record_segment<F>(wave, depth, slot, flight, path.throughput, active);
         missed = missed & through;
         shape = shape & through;
         surface = surface & through;
@@ -133,7 +136,7 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     }
     if (const Mask<F> ended = missed | shape; !kFromLights && any(ended)) {
       Color<F> c(F(0.f));
-      const bool is_lit = any(missed) && settings.sees_sky(depth);
+      const bool is_lit = any(missed) && settings.adds_environment(depth);
       if (is_lit)
         c = select<F>(missed, environment_emission<F>(scene, settings, depth, state, missed), c);
       if (any(shape)) {
@@ -149,17 +152,17 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     if (!kFromLights && context.joins_light() && depth == 0) [[unlikely]]
       begin_ratios<F>(wave, context, slot, o, d, t, surface);
     if (!kFromLights && depth == 0 && scene.visibility) [[unlikely]]
-      surface = surface & not_(held_out<F>(scene, inst, load<U>(hits.geom + i), surface));
-    const bool notes_hits = !kFromLights && depth == 0 && wave.aovs.wants_hits();
+      surface = surface & not_(is_holdout<F>(scene, inst, load<U>(hits.geom + i), surface));
+    const bool records_hits = !kFromLights && depth == 0 && wave.aovs.wants_hits();
     const auto time = [&] {
       return context.camera->moves()
                  ? gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot, active)
                  : F(0.f);
     };
-    if (notes_hits && any(shape))
+    if (records_hits && any(shape))
       wave.aovs.hit_light<F>(*context.camera, slot, fma(d, t, o), time(), load<U>(hits.geom + i),
                              shape);
-    if (notes_hits && wave.aovs.wants_motion() && any(shape)) [[unlikely]]
+    if (records_hits && wave.aovs.wants_motion() && any(shape)) [[unlikely]]
       wave.aovs.move<F>(
           slot,
           screen_motion_of_light<F>(scene.lights, *context.camera, load<U>(hits.geom + i),
@@ -174,9 +177,9 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     if (!kFromLights && depth == 0 && wave.aovs.wants_alpha())
       wave.aovs.cover<F>(slot, shape | recorded());
     if constexpr (Media::kAny)
-      if (notes_hits)
+      if (records_hits)
         wave.aovs.hit_volume<F>(*context.camera, slot, fma(d, t, o), time(),
-                                volume_seen<F>(wave, context, slot, flight), flight.stopped);
+                                volume_hit<F>(wave, context, slot, flight), flight.stopped);
     if (none(recorded())) continue;
 
     const U prim = load<U>(hits.prim + i);
@@ -190,16 +193,16 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     U material = hit_material<F>(scene, inherited, mesh, prim, surface);
     if constexpr (Media::kAny) {
       if constexpr (Media::kStreams)
-        if (media.has_walks())
-          material = select(Mask<U>(media.template came_out<F>(wave, i)), U(media.exit_material()),
+        if (media.has_subsurface())
+          material = select(Mask<U>(media.template left_body<F>(wave, i)), U(media.exit_material()),
                             material);
       material = select(Mask<U>(flight.stopped), flight.material, material);
     }
     const U program = gather<U>(scene.material_variant, material, Mask<U>(recorded()));
-    if (notes_hits)
+    if (records_hits)
       wave.aovs.hit_surface<F>(*context.camera, slot, fma(d, t, o), time(),
                                {.inst = inst, .geom = geom, .material = material}, surface);
-    if (notes_hits && wave.aovs.wants_motion()) [[unlikely]]
+    if (records_hits && wave.aovs.wants_motion()) [[unlikely]]
       wave.aovs.move<F>(
           slot,
           screen_motion_of_hit<F>(

@@ -81,7 +81,7 @@ inline PacketEstimate estimate_packets(std::span<const uint32_t> program, size_t
 }
 
 /// Largest number of policies between which a render chooses.
-inline constexpr size_t kMostPolicies = 16;
+inline constexpr size_t kMaxPolicies = 16;
 
 /// Policy that was used, as feedback for the chooser.
 struct OrderChoice {
@@ -105,7 +105,7 @@ OrderChoice order_records(Wave& wave, const WaveContext& context, uint32_t depth
   if (chooses) {
     start = Clock::now();
     const PacketEstimate packets = estimate_packets(program, kWidth<F>);
-    std::array<Work, kMostPolicies> work;
+    std::array<Work, kMaxPolicies> work;
     const auto records = static_cast<double>(queue.size);
     for (size_t arm = 0; arm < context.policies.size(); ++arm)
       work[arm] = {context.policies[arm]->keeps_arrival_order() ? packets.arrival : packets.grouped,
