@@ -19,7 +19,7 @@ struct ReferenceWorker {
         light_aovs(context.joins_light() ? LightPathAovs(1, context.film->aovs().layout(),
                                                          context.aovs, context.connects())
                                          : LightPathAovs()),
-        walks(context.scene.walks.media ? SoaBlock(Wave::kWalkColumns, 1) : SoaBlock()),
+        walks(context.scene.subsurface.media ? SoaBlock(Wave::kWalkColumns, 1) : SoaBlock()),
         nested_media(context.has_medium_stack() ? 1 : 0) {}
   PhaseClock clock;
   Counts counts;

@@ -250,11 +250,11 @@ struct LightView {
   const LightRecord* lights = nullptr;
   const TriangleLight* triangles = nullptr;
   const TriangleUvs* triangle_uvs = nullptr;
-  PowerTable pick;
-  /// Selection probability of each light if `pick` does not use those of the records; else null.
+  PowerTable power_table;
+  /// Selection probability of each light if `power_table` does not use those of the records; else null.
   const float* selection_pdf = nullptr;
   LightTreeView tree;
-  bool by_tree = false;  ///< select lights by `tree` instead of `pick`
+  bool by_tree = false;  ///< select lights by `tree` instead of `power_table`
   uint32_t count = 0;    ///< number of records and triangles
   uint32_t first_triangle = 0;
   uint32_t infinite_count = 0;

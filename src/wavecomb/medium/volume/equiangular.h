@@ -19,33 +19,33 @@
 namespace wavecomb {
 
 /// Largest probability of equiangular sampling.
-inline constexpr float kMostEquiangular = 0.5f;
+inline constexpr float kMaxEquiangular = 0.5f;
 /// Below this probability equiangular sampling is not used.
-inline constexpr float kLeastEquiangular = 0.02f;
+inline constexpr float kMinEquiangular = 0.02f;
 
 /// Returns whether a scene has finite lights.
-inline bool has_lamps(const LightView& lights) {
+inline bool has_finite_lights(const LightView& lights) {
   return lights.count > lights.infinite_count;
 }
 
 /// Equiangular distribution of distances along a ray segment, for one light.
 template <typename F>
-struct LampWay {
+struct EquiangularDistribution {
   F share{0.f};  ///< q, or 0 without equiangular sampling
-  F nearest{0.f}, aside{1.f}, from{0.f}, span{1.f};
+  F nearest{0.f}, height{1.f}, from{0.f}, span{1.f};
 
   /// Samples a distance with a random number in [0, 1).
-  F draw(const F& u) const {
+  F sample_distance(const F& u) const {
     const SinCos<F> turn = sincos_2pi(F(fma(u, span, from) * (0.5f / kPi)));
-    return nearest + aside * turn.sin / max(turn.cos, F(1e-6f));
+    return nearest + height * turn.sin / max(turn.cos, F(1e-6f));
   }
   F density(const F& x) const {
     const F along = x - nearest;
-    return aside / F(span * fma(aside, aside, F(along * along)));
+    return height / F(span * fma(height, height, F(along * along)));
   }
   /// Returns the probability of distances below `x`.
   F before(const F& x) const {
-    return clamp(F((atan2(F(x - nearest), aside) - from) / span), F(0.f), F(1.f));
+    return clamp(F((atan2(F(x - nearest), height) - from) / span), F(0.f), F(1.f));
   }
 };
 
@@ -60,28 +60,28 @@ struct MediumSegment {
 /// Returns the distribution for a segment. The sample values `r` select the light and the point on
 /// it.
 template <typename F>
-inline LampWay<F> lamp_way(const LightView& lights, const MediumSegment<F>& segment,
+inline EquiangularDistribution<F> equiangular_distribution(const LightView& lights, const MediumSegment<F>& segment,
                            const Sample4<F>& r, const Mask<F>& active) {
   const auto& [o, d, begin, end, extinction] = segment;
-  LampWay<F> range;
+  EquiangularDistribution<F> range;
   const Mask<F> some = active & (begin < end) & (end < F(kFarAway));
   if (none(some)) return range;
   const F middle = select(some, F(0.5f * (begin + end)), F(0.f));
   const LightReceiver<F> receiver(fma(d, middle, o));
   const LightSample<F> l = sample_light<F>(lights, receiver, r.x, r.y, r.z, some);
-  const Mask<F> there = some & l.valid & (l.distance < kFarAway);
-  const Vec3<F> to = fma(l.wi, select(there, l.distance, F(0.f)), receiver.p) - o;
+  const Mask<F> usable = some & l.valid & (l.distance < kFarAway);
+  const Vec3<F> to = fma(l.wi, select(usable, l.distance, F(0.f)), receiver.p) - o;
   range.nearest = dot(to, d);
   const Vec3<F> across = to - d * range.nearest;
   const F length = end - begin;
-  range.aside = max(F(sqrt(dot(across, across))), F(1e-4f * length));
-  range.from = atan2(F(begin - range.nearest), range.aside);
-  range.span = max(F(atan2(F(end - range.nearest), range.aside) - range.from), F(1e-6f));
+  range.height = max(F(sqrt(dot(across, across))), F(1e-4f * length));
+  range.from = atan2(F(begin - range.nearest), range.height);
+  range.span = max(F(atan2(F(end - range.nearest), range.height) - range.from), F(1e-6f));
   // q grows with the angle that the segment subtends from the light, and with the transmittance of
   // the medium from `begin` to the closest point and on to the light.
   const F before = clamp(F(range.nearest - begin), F(0.f), length);
-  const F q = F(kMostEquiangular / kPi) * range.span * exp(F(-extinction * (before + range.aside)));
-  range.share = select(there & (q > kLeastEquiangular), q, F(0.f));
+  const F q = F(kMaxEquiangular / kPi) * range.span * exp(F(-extinction * (before + range.height)));
+  range.share = select(usable & (q > kMinEquiangular), q, F(0.f));
   return range;
 }
 
@@ -89,16 +89,16 @@ inline LampWay<F> lamp_way(const LightView& lights, const MediumSegment<F>& segm
 /// `x` in it, at distance `at`: the true one, and the one it was sampled with if this channel is
 /// the hero. They are densities where the segment was `stopped`.
 template <typename F>
-struct EvenChance {
-  F truth, drawn;
+struct OutcomeDensity {
+  F exact, sampled;
 };
 template <typename F>
-inline EvenChance<F> even_chance(const LampWay<F>& lamp, const F& extinction, const F& x,
+inline OutcomeDensity<F> outcome_density(const EquiangularDistribution<F>& distribution, const F& extinction, const F& x,
                                  const F& at, const Mask<F>& stopped) {
   const F through = exp(F(-extinction * x));
-  const F truth = select(stopped, F(through * extinction), through);
-  const F other = select(stopped, lamp.density(at), F(1.f - lamp.before(at)));
-  return {truth, fma(lamp.share, F(other - truth), truth)};
+  const F exact = select(stopped, F(through * extinction), through);
+  const F other = select(stopped, distribution.density(at), F(1.f - distribution.before(at)));
+  return {exact, fma(distribution.share, F(other - exact), exact)};
 }
 
 }  // namespace wavecomb

@@ -22,17 +22,17 @@ namespace wavecomb {
 /// volume uses directly, since they are stratified over a pixel's samples, and a seed for all other
 /// numbers.
 template <typename F>
-struct Way {
+struct SegmentRandom {
   Sample4<F> r;
   UInt<F> seed;
 
-  Way(SamplerKind sampler, const SampleKey<F>& key, uint32_t depth, VertexSet set)
+  SegmentRandom(SamplerKind sampler, const SampleKey<F>& key, uint32_t depth, VertexSet set)
       : r(sample_4d<F>(sampler, key, vertex_set(set, depth))),
         seed(float_bits<F>(r.x) ^ hash_u32<UInt<F>>(key.pixel_hash, key.sample)) {}
-  Way(const Passage<F>& p, VertexSet set) : Way(p.sampler, p.key, p.depth, set) {}
+  SegmentRandom(const MediumQuery<F>& p, VertexSet set) : SegmentRandom(p.sampler, p.key, p.depth, set) {}
   /// Returns a copy with independent random numbers.
-  Way branch(uint32_t number) const {
-    Way other = *this;
+  SegmentRandom branch(uint32_t number) const {
+    SegmentRandom other = *this;
     other.seed = hash_u32<UInt<F>>(seed, UInt<F>(0x2545f491u + number));
     return other;
   }
@@ -42,10 +42,10 @@ namespace detail {
 
 /// Time in seconds, by lane, at which a visitor reads a moving volume.
 template <typename F>
-class WaySeconds {
+class SegmentSeconds {
  public:
-  /// `times` is Ways::times.
-  WaySeconds(const VolumeRecord& v, const float* times) : v_(v), times_(times) {}
+  /// `times` is RaySegments::times.
+  SegmentSeconds(const VolumeRecord& v, const float* times) : v_(v), times_(times) {}
   void start(const UInt<F>& random, const Mask<F>& lanes) {
     if (v_.moves && times_)
       seconds_ = select(lanes, seconds_at<F>(v_, gather<F>(times_, random, lanes)), seconds_);
@@ -70,10 +70,10 @@ class FlightVisitor {
   using U = UInt<F>;
 
  public:
-  /// `times` is Ways::times.
-  FlightVisitor(const VolumeRecord& v, uint32_t material, const Flights& flights, FlightKeeps keeps,
+  /// `times` is RaySegments::times.
+  FlightVisitor(const VolumeRecord& v, uint32_t material, const Flights& flights, FlightResults results,
                 const float* times)
-      : v_(v), seconds_(v, times), material_(material), flights_(flights), keeps_(keeps) {}
+      : v_(v), seconds_(v, times), material_(material), flights_(flights), results_(results) {}
 
   void start(const U& random, const Mask<F>& lanes) {
     const U hero = gather<U>(flights_.hero, random, Mask<U>(lanes));
@@ -85,7 +85,7 @@ class FlightVisitor {
     seconds_.start(random, lanes);
   }
   Mask<F> collide(const Mask<F>& lanes, const F& x, const Vec3<F>& p, const F& majorant,
-                  CollisionNumbers<F>& numbers) {
+                  CollisionSequence<F>& numbers) {
     const F density = density_at<F>(v_, p, seconds_(), lanes) / select(lanes, majorant, F(1.f));
     const F real = min(F(density * of_hero_), F(1.f));
     const Mask<F> stops = lanes & (numbers.next(lanes) < real);
@@ -104,12 +104,12 @@ class FlightVisitor {
   }
   void finish(const U& random, const Mask<F>& lanes) {
     if (none(lanes)) return;
-    if (keeps_ != FlightKeeps::kRatios) {
+    if (results_ != FlightResults::kRatios) {
       const Mask<F> stops = lanes & stopped_;
       scatter<F>(flights_.t, x_, random, stops);
       scatter<U>(flights_.material, U(material_), random, Mask<U>(stops));
     }
-    if (keeps_ == FlightKeeps::kStops || v_.is_grey) return;
+    if (results_ == FlightResults::kStops || v_.is_grey) return;
     const F* const ratio[3] = {&ratio_.x, &ratio_.y, &ratio_.z};
     for (int k = 0; k < 3; ++k)
       scatter<F>(flights_.ratio[k], F(gather<F>(flights_.ratio[k], random, lanes) * *ratio[k]), random,
@@ -118,10 +118,10 @@ class FlightVisitor {
 
  private:
   const VolumeRecord& v_;
-  WaySeconds<F> seconds_;
+  SegmentSeconds<F> seconds_;
   uint32_t material_;
   const Flights& flights_;
-  FlightKeeps keeps_;
+  FlightResults results_;
   F of_hero_{0.f}, x_{0.f};
   Color<F> ratio_{F(1.f)};
   Mask<F> stopped_{false};
@@ -133,11 +133,11 @@ namespace detail {
 
 /// Samples free flights through one volume.
 template <typename F>
-inline void fly_in(const VolumeView& volumes, uint32_t i, const Ways& ways, const Flights& flights,
-                   FlightKeeps keeps, VolumeCounts& counts) {
+inline void sample_flights_in(const VolumeView& volumes, uint32_t i, const RaySegments& segments, const Flights& flights,
+                   FlightResults results, VolumeCounts& counts) {
   const VolumeRecord& v = volumes.volumes[i];
-  FlightVisitor<F> visitor(v, volumes.first_material + i, flights, keeps, ways.times);
-  each_collision<F>(flown_cells(v), v.most_extinction, i, ways, counts, visitor);
+  FlightVisitor<F> visitor(v, volumes.first_material + i, flights, results, segments.times);
+  each_collision<F>(extinction_cells(v), v.max_extinction, i, segments, counts, visitor);
 }
 
 }  // namespace detail
@@ -147,87 +147,87 @@ inline bool are_grey(const VolumeView& volumes) {
   return std::all_of(volumes.volumes, volumes.volumes + volumes.count,
                      [](const VolumeRecord& v) { return v.is_grey; });
 }
-/// Returns whether flights have weights other than 1. `lamps` holds the lights that guide distances
+/// Returns whether flights have weights other than 1. `distance_lights` holds the lights that guide distances
 /// in homogeneous volumes, or is null.
-inline bool weigh_anything(const VolumeView& volumes, const LightView* lamps) {
-  return lamps || !are_grey(volumes);
+inline bool has_flight_weights(const VolumeView& volumes, const LightView* distance_lights) {
+  return distance_lights || !are_grey(volumes);
 }
 
 /// Samples only where flights stop, in all volumes. `scratch` receives the original lengths of the
-/// segments, which are `ways.most` and `flights.t`.
+/// segments, which are `segments.most` and `flights.t`.
 template <typename F>
-inline void stop_flights(const VolumeView& volumes, const Ways& ways, const Flights& flights,
-                         float* scratch, const LightView* lamps, VolumeCounts& counts) {
-  std::copy_n(flights.t, ways.count, scratch);
-  Ways original = ways;
+inline void sample_stops(const VolumeView& volumes, const RaySegments& segments, const Flights& flights,
+                         float* scratch, const LightView* distance_lights, VolumeCounts& counts) {
+  std::copy_n(flights.t, segments.count, scratch);
+  RaySegments original = segments;
   original.most = scratch;
   for (uint32_t i = 0; i < volumes.count; ++i)
-    if (lamps && is_drawn_by_lamps(volumes.volumes[i]))
-      fly_evenly<F>(volumes, i, original, flights, FlightKeeps::kStops, *lamps, counts);
+    if (distance_lights && supports_equiangular(volumes.volumes[i]))
+      sample_homogeneous_flights<F>(volumes, i, original, flights, FlightResults::kStops, *distance_lights, counts);
     else
-      detail::fly_in<F>(volumes, i, ways, flights, FlightKeeps::kStops, counts);
+      detail::sample_flights_in<F>(volumes, i, segments, flights, FlightResults::kStops, counts);
 }
 
 /// Computes the ratios after all stops are known. Flights through the first volumes went further
 /// than the final stop, so they are repeated up to it with the same random numbers. A flight that
 /// its own volume stopped keeps its original length and repeats exactly.
 template <typename F>
-inline void weigh_flights(const VolumeView& volumes, const Ways& ways, const Flights& flights,
-                          float* scratch, const LightView* lamps, VolumeCounts& counts) {
-  Ways original = ways, once_more = ways;
+inline void compute_flight_ratios(const VolumeView& volumes, const RaySegments& segments, const Flights& flights,
+                          float* scratch, const LightView* distance_lights, VolumeCounts& counts) {
+  RaySegments original = segments, once_more = segments;
   original.most = scratch;
-  once_more.most = scratch + ways.count;
+  once_more.most = scratch + segments.count;
   for (uint32_t i = 0; i < volumes.count; ++i) {
-    if (lamps && is_drawn_by_lamps(volumes.volumes[i])) {
-      fly_evenly<F>(volumes, i, original, flights, FlightKeeps::kRatios, *lamps, counts);
+    if (distance_lights && supports_equiangular(volumes.volumes[i])) {
+      sample_homogeneous_flights<F>(volumes, i, original, flights, FlightResults::kRatios, *distance_lights, counts);
       continue;
     }
     if (volumes.volumes[i].is_grey) continue;
-    for (size_t k = 0; k < ways.count; ++k) {
-      scratch[ways.count + k] =
+    for (size_t k = 0; k < segments.count; ++k) {
+      scratch[segments.count + k] =
           flights.material[k] == volumes.first_material + i ? scratch[k] : flights.t[k];
-      if (flights.hero[k] == Flights::kNoHero) scratch[ways.count + k] = 0;
+      if (flights.hero[k] == Flights::kNoHero) scratch[segments.count + k] = 0;
     }
-    detail::fly_in<F>(volumes, i, once_more, flights, FlightKeeps::kRatios, counts);
+    detail::sample_flights_in<F>(volumes, i, once_more, flights, FlightResults::kRatios, counts);
   }
 }
 
-/// Runs stop_flights() and weigh_flights(). `ways.most` is `flights.t`, and `scratch` has room for
+/// Runs sample_stops() and compute_flight_ratios(). `segments.most` is `flights.t`, and `scratch` has room for
 /// two numbers per segment.
 template <typename F>
-inline void fly_through(const VolumeView& volumes, const Ways& ways, const Flights& flights,
-                        float* scratch, const LightView* lamps, VolumeCounts& counts) {
-  if (lamps || (volumes.count > 1 && !are_grey(volumes))) {
-    stop_flights<F>(volumes, ways, flights, scratch, lamps, counts);
-    weigh_flights<F>(volumes, ways, flights, scratch, lamps, counts);
+inline void sample_flights(const VolumeView& volumes, const RaySegments& segments, const Flights& flights,
+                        float* scratch, const LightView* distance_lights, VolumeCounts& counts) {
+  if (distance_lights || (volumes.count > 1 && !are_grey(volumes))) {
+    sample_stops<F>(volumes, segments, flights, scratch, distance_lights, counts);
+    compute_flight_ratios<F>(volumes, segments, flights, scratch, distance_lights, counts);
     return;
   }
   for (uint32_t i = 0; i < volumes.count; ++i)
-    detail::fly_in<F>(volumes, i, ways, flights, FlightKeeps::kBoth, counts);
+    detail::sample_flights_in<F>(volumes, i, segments, flights, FlightResults::kBoth, counts);
 }
 
 /// Samples one flight in each lane.
 template <typename F>
-inline Flight<F> fly_through(const VolumeView& volumes, const Passage<F>& p,
+inline Flight<F> sample_flights(const VolumeView& volumes, const MediumQuery<F>& p,
                              const Color<F>& throughput, const Mask<F>& active,
-                             const LightView* lamps, VolumeCounts& counts) {
+                             const LightView* distance_lights, VolumeCounts& counts) {
   using U = UInt<F>;
   constexpr size_t kLanes = kWidth<F>;
-  const Way<F> random(p, VertexSet::kFlight);
-  const PacketWays<F> packet(p.o, p.d, p.t, random.seed, random.r.z, p.time, active);
+  const SegmentRandom<F> random(p, VertexSet::kFlight);
+  const PacketSegments<F> packet(p.o, p.d, p.t, random.seed, random.r.z, p.time, active);
   alignas(64) float t[kLanes], ratio[3][kLanes], scale[3][kLanes], scratch[2 * kLanes];
   alignas(64) uint32_t material[kLanes], hero[kLanes];
-  Ways ways = packet.ways();
-  std::copy_n(ways.most, kLanes, t);
-  ways.most = t;
+  RaySegments segments = packet.segments();
+  std::copy_n(segments.most, kLanes, t);
+  segments.most = t;
   store(material, U(uint32_t{Flights::kNoEvent}));
   store(hero, hero_of<F>(random.r.y, throughput));
   for (auto& one : ratio) store(one, F(1.f));
   for (auto& one : scale) store(one, F(1.f));
-  fly_through<F>(
-      volumes, ways,
+  sample_flights<F>(
+      volumes, segments,
       {t, material, {ratio[0], ratio[1], ratio[2]}, hero, {scale[0], scale[1], scale[2]}}, scratch,
-      lamps, counts);
+      distance_lights, counts);
   const U stopped_by = load<U>(material);
   const auto three = [](const float (&columns)[3][kLanes]) {
     return Color<F>(load<F>(columns[0]), load<F>(columns[1]), load<F>(columns[2]));
@@ -247,7 +247,7 @@ class TransmittanceVisitor {
   static constexpr float kLittle = 0.1f;
 
  public:
-  /// `times` is Ways::times.
+  /// `times` is RaySegments::times.
   TransmittanceVisitor(const VolumeRecord& v, float* const (&product)[3], const float* times)
       : v_(v), seconds_(v, times), columns_(product) {}
 
@@ -257,11 +257,11 @@ class TransmittanceVisitor {
     seconds_.start(random, lanes);
   }
   Mask<F> collide(const Mask<F>& lanes, const F& /*x*/, const Vec3<F>& p, const F& majorant,
-                  CollisionNumbers<F>& numbers) {
+                  CollisionSequence<F>& numbers) {
     const F density = density_at<F>(v_, p, seconds_(), lanes) / select(lanes, majorant, F(1.f));
-    const auto kept = [&](float extinction) { return max(F(1.f - density * extinction), F(0.f)); };
+    const auto transmitted = [&](float extinction) { return max(F(1.f - density * extinction), F(0.f)); };
     Color<F> now =
-        product_ * Color<F>(kept(v_.extinction[0]), kept(v_.extinction[1]), kept(v_.extinction[2]));
+        product_ * Color<F>(transmitted(v_.extinction[0]), transmitted(v_.extinction[1]), transmitted(v_.extinction[2]));
     const F q = min(F(max_component(now) * (1.f / kLittle)), F(1.f));
     const Mask<F> ends = lanes & not_(numbers.next(lanes) < q);
     now = now * F(F(1.f) / select(q > 0.f, q, F(1.f)));
@@ -275,7 +275,7 @@ class TransmittanceVisitor {
 
  private:
   const VolumeRecord& v_;
-  WaySeconds<F> seconds_;
+  SegmentSeconds<F> seconds_;
   float* const (&columns_)[3];
   Color<F> product_{F(0.f)};
 };
@@ -286,30 +286,30 @@ class TransmittanceVisitor {
 /// volumes, and otherwise by ratio tracking (Novak, Selle and Jarosz, "Residual Ratio Tracking",
 /// 2014, eq. 9) with Russian roulette at low transmittance.
 template <typename F>
-inline void transmittance_through(const VolumeView& volumes, const Ways& ways,
+inline void transmittance_through(const VolumeView& volumes, const RaySegments& segments,
                                   float* const (&product)[3], VolumeCounts& counts) {
   for (uint32_t i = 0; i < volumes.count; ++i) {
     const VolumeRecord& v = volumes.volumes[i];
-    if (is_even(v)) {
-      pass_evenly<F>(v, ways, product, counts);
+    if (is_homogeneous(v)) {
+      multiply_homogeneous_transmittance<F>(v, segments, product, counts);
       continue;
     }
-    detail::TransmittanceVisitor<F> visitor(v, product, ways.times);
-    each_collision<F>(flown_cells(v), v.most_extinction, i, ways, counts, visitor);
+    detail::TransmittanceVisitor<F> visitor(v, product, segments.times);
+    each_collision<F>(extinction_cells(v), v.max_extinction, i, segments, counts, visitor);
   }
 }
 
 /// Returns the transmittance of one ray segment in each lane, with the random numbers of `random`.
 template <typename F>
-inline Color<F> transmittance_through(const VolumeView& volumes, const Way<F>& random,
+inline Color<F> transmittance_through(const VolumeView& volumes, const SegmentRandom<F>& random,
                                       const RaySegment<F>& segment, const Mask<F>& active,
                                       VolumeCounts& counts) {
-  const PacketWays<F> packet(segment.o, segment.d, segment.length, random.seed, random.r.z, segment.time,
+  const PacketSegments<F> packet(segment.o, segment.d, segment.length, random.seed, random.r.z, segment.time,
                              active);
   alignas(64) float product[3][kWidth<F>];
   for (auto& one : product) store(one, F(1.f));
   float* const columns[3] = {product[0], product[1], product[2]};
-  transmittance_through<F>(volumes, packet.ways(), columns, counts);
+  transmittance_through<F>(volumes, packet.segments(), columns, counts);
   return {load<F>(product[0]), load<F>(product[1]), load<F>(product[2])};
 }
 
