@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from wavecomb._core import Scene, SceneBuilder, Settings
     from wavecomb.api import load, render
     from wavecomb.errors import WavecombError
-    from wavecomb.picture import cryptomatte
-    from wavecomb.picture.compare import Comparison, compare
-    from wavecomb.picture.rendered import Picture
+    from wavecomb.image import cryptomatte
+    from wavecomb.image.compare.comparison import Comparison, compare
+    from wavecomb.image.rendered import Picture
     from wavecomb.run.sequence import render_frames
     from wavecomb.scheduling import SchedulingPolicy
     from wavecomb.window import Window, view
@@ -48,15 +48,15 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Comparison": "wavecomb.picture.compare",
-    "Picture": "wavecomb.picture.rendered",
+    "Comparison": "wavecomb.image.compare.comparison",
+    "Picture": "wavecomb.image.rendered",
     "Scene": "wavecomb._core",
     "SceneBuilder": "wavecomb._core",
     "SchedulingPolicy": "wavecomb.scheduling",
     "Settings": "wavecomb._core",
     "WavecombError": "wavecomb.errors",
     "Window": "wavecomb.window",
-    "compare": "wavecomb.picture.compare",
+    "compare": "wavecomb.image.compare.comparison",
     "load": "wavecomb.api",
     "render": "wavecomb.api",
     "render_frames": "wavecomb.run.sequence",
@@ -70,7 +70,7 @@ def __getattr__(name: str) -> Any:
 
         value: Any = version()
     elif name == "cryptomatte":
-        from wavecomb.picture import cryptomatte as value
+        from wavecomb.image import cryptomatte as value
     elif name in _HOMES:
         from importlib import import_module
 

@@ -10,17 +10,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.errors import WavecombError
+from wavecomb.image.rendered import Picture, picture_of
 from wavecomb.load_options import LoadOptions, split
-from wavecomb.picture.rendered import Picture, picture_of
 from wavecomb.run import aovs as aov_names
-from wavecomb.run import catchers, live
-from wavecomb.run.learned import check_taught, learned_of
+from wavecomb.run import catchers, live_view
+from wavecomb.run.callbacks import CheckpointSink, Sink, Watcher
+from wavecomb.run.guiding_file import check_taught, learned_of
 from wavecomb.run.settings import DEFAULT_SIZE, check_memory, check_options, prepare
-from wavecomb.run.watcher import CheckpointSink, Sink, Watcher
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Scene, Settings
-    from wavecomb.run.live import Shown
+    from wavecomb.run.live_view import Shown
     from wavecomb.scheduling import SchedulingPolicy
     from wavecomb.usd import LoadedStage
 
@@ -181,7 +181,7 @@ def render(
     again = loaded if loaded is source else None
     told, asked = (progress, False) if callable(progress) else (None, progress)
     space = "rec709" if loaded is None else loaded.working_space
-    with live.watching(asked, space) as shown:
+    with live_view.watching(asked, space) as shown:
         watcher, state = _keeping(scene, chosen, names, stage, checkpoint, every, resume, shown)
         result, is_built = _render(
             scene, again, chosen, told, own, profile, watcher, state, learned

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from wavecomb import vdb_writer
 from wavecomb.errors import WavecombError
-from wavecomb.run.isolate import memory
+from wavecomb.run.isolation import memory
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

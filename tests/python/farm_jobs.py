@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from wavecomb.farm import Folder
-from wavecomb.farm.assemble import finish_image
+from wavecomb.farm.assembly import finish_image
 from wavecomb.farm.rendering import Renderer
-from wavecomb.picture.image import read_layers, read_metadata
+from wavecomb.image.files.image import read_layers, read_metadata
 
 TIMES = ("wavecomb:render_seconds", "DateTime")
 """Header entries that differ between any two renders."""

@@ -6,7 +6,7 @@ import pytest
 from usd_recorder import load, said
 
 import wavecomb
-from wavecomb.usd.geometry.bad_points import steadied
+from wavecomb.usd.geometry.invalid_points import steadied
 
 NAN = float("nan")
 

@@ -13,7 +13,7 @@ from usd_recorder import write
 
 import wavecomb
 from wavecomb.cli import main
-from wavecomb.picture.image import read_layers
+from wavecomb.image.files.image import read_layers
 
 SIZE, SPP = (80, 60), 16
 STAGE = """#usda 1.0

@@ -19,7 +19,7 @@ from fake_core import Error, Fake, install
 from parts import needs
 
 from wavecomb.cli import main
-from wavecomb.picture.image import read_layers, read_metadata, write_exr
+from wavecomb.image.files.image import read_layers, read_metadata, write_exr
 
 
 @pytest.fixture

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wavecomb.picture.colour_maps import colour_map, signed_colour_map
-from wavecomb.picture.compare import compare, luminance
-from wavecomb.picture.heatmap import LEAST_WIDTH, heat_map, write_heat_map
-from wavecomb.picture.image import read_image, srgb_from_linear, write_exr
+from wavecomb.image.colour_maps import colour_map, signed_colour_map
+from wavecomb.image.compare.comparison import compare, luminance
+from wavecomb.image.compare.heatmap import LEAST_WIDTH, heat_map, write_heat_map
+from wavecomb.image.files.image import read_image, srgb_from_linear, write_exr
 
 
 @pytest.fixture
@@ -108,7 +108,7 @@ def test_sizes_must_agree() -> None:
 
 
 def test_is_exported() -> None:
-    import wavecomb.picture.heatmap
+    import wavecomb.image.compare.heatmap
 
     assert wavecomb.compare is compare
     assert callable(wavecomb.compare)

@@ -18,11 +18,11 @@ from parts import needs
 import wavecomb
 from wavecomb.errors import WavecombError
 from wavecomb.farm import Folder, status, submit
-from wavecomb.farm.assemble import NarrowBorder, check_cover, finish_image, is_finished, join
+from wavecomb.farm.assembly import NarrowBorder, check_cover, finish_image, is_finished, join
 from wavecomb.farm.job import Job, Task
-from wavecomb.farm.part import DamagedPart, has_part, load_part, read_part
 from wavecomb.farm.planning import refresh, with_files
 from wavecomb.farm.rendering import Renderer
+from wavecomb.farm.tile_file import DamagedPart, has_part, load_part, read_part
 from wavecomb.farm.tiling import (
     border,
     choose_tiles,
@@ -33,7 +33,7 @@ from wavecomb.farm.tiling import (
     parse_tile,
     tiles_of,
 )
-from wavecomb.picture.image import read_layers
+from wavecomb.image.files.image import read_layers
 from wavecomb.run.aovs import names
 
 pytestmark = needs("wavecomb._core")

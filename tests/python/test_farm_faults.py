@@ -23,7 +23,7 @@ from parts import needs, not_here
 
 from wavecomb import farm
 from wavecomb.errors import WavecombError
-from wavecomb.farm.assemble import Outcome
+from wavecomb.farm.assembly import Outcome
 from wavecomb.farm.client import Run, _Batch
 from wavecomb.farm.clusters import Cluster
 from wavecomb.farm.folder import Folder

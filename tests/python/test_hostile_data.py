@@ -22,11 +22,11 @@ from test_usd_mtlx import GOLD, write
 import wavecomb
 from wavecomb import WavecombError
 from wavecomb.cli import main
-from wavecomb.picture.archive import ArchiveError, read_archive
-from wavecomb.picture.exr import write_exr
+from wavecomb.image.files.archive import ArchiveError, read_archive
+from wavecomb.image.files.exr import write_exr
 from wavecomb.run.checkpoint import load_checkpoint, save_checkpoint
-from wavecomb.scenes import meshfile
-from wavecomb.scenes.meshfile import load_dragon
+from wavecomb.scenes.models import mesh_file
+from wavecomb.scenes.models.mesh_file import load_dragon
 from wavecomb.usd import load_stage
 from wavecomb.usd.lights.ies import IesTable
 from wavecomb.usd.materialx.files import MtlxError, read_document
@@ -407,7 +407,7 @@ def test_a_mesh_without_properties(tmp_path: Path) -> None:
 
 
 def test_a_mesh_that_unpacks_without_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(meshfile, "MAX_UNPACKED", 1 << 20)
+    monkeypatch.setattr(mesh_file, "MAX_UNPACKED", 1 << 20)
     file = tmp_path / "a.obj.gz"
     file.write_bytes(gzip.compress(bytes(1 << 24)))
     with pytest.raises(WavecombError, match=r"a\.obj\.gz.* unpacks to more than 1 MB"):

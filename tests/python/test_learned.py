@@ -14,8 +14,8 @@ from click.testing import CliRunner
 import wavecomb
 from wavecomb.cli import main
 from wavecomb.errors import WavecombError
-from wavecomb.picture.image import read_image
-from wavecomb.run.learned import load_learned, save_learned
+from wavecomb.image.files.image import read_image
+from wavecomb.run.guiding_file import load_learned, save_learned
 from wavecomb.scenes import write_scene
 
 pytest.importorskip("wavecomb._core")

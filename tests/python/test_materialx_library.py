@@ -16,8 +16,8 @@ import pytest
 from materialx_nodes import Node, patterns, points, run
 
 from wavecomb.usd.materialx.library import WIDTHS, definition_of, flat_graph, library
-from wavecomb.usd.materialx.nodes.body import Body
 from wavecomb.usd.materialx.nodes.network import PER_COMPONENT, primitive, support_of
+from wavecomb.usd.materialx.nodes.node_graphs import Body
 from wavecomb.usd.materialx.nodes.table import CATEGORIES
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "material-graphs.md"

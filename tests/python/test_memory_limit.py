@@ -18,7 +18,7 @@ from pxr import Usd, UsdGeom, Vt
 
 import wavecomb
 from wavecomb import WavecombError
-from wavecomb.run.isolate import memory
+from wavecomb.run.isolation import memory
 
 pytestmark = only_where(sys.platform == "linux", "the limit is Linux's")
 

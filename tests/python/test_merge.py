@@ -15,9 +15,9 @@ from click.testing import CliRunner
 import wavecomb
 from wavecomb.cli import main
 from wavecomb.errors import WavecombError
-from wavecomb.picture import cryptomatte
-from wavecomb.picture.image import read_layers, read_metadata, write_exr
-from wavecomb.picture.merge import merge
+from wavecomb.image import cryptomatte
+from wavecomb.image.files.image import read_layers, read_metadata, write_exr
+from wavecomb.image.merge import merge
 
 _core = pytest.importorskip("wavecomb._core")
 

@@ -20,10 +20,10 @@ from parts import needs
 import wavecomb
 from wavecomb import window
 from wavecomb.errors import WavecombError
-from wavecomb.picture.embedded import encoded, smaller
-from wavecomb.picture.image import display, read_codes
-from wavecomb.picture.rendered import Picture
-from wavecomb.run import live
+from wavecomb.image.embedded import encoded, smaller
+from wavecomb.image.files.image import display, read_codes
+from wavecomb.image.rendered import Picture
+from wavecomb.run import live_view
 
 
 def picture(width: int = 40, height: int = 24, **more: Any) -> Picture:
@@ -121,7 +121,7 @@ def notebook(monkeypatch: pytest.MonkeyPatch) -> Handle:
     ipython.get_ipython = lambda: SimpleNamespace(kernel=object())  # type: ignore[attr-defined]
     for name, module in (("IPython", ipython), ("IPython.display", outputs), ("ipywidgets", None)):
         monkeypatch.setitem(sys.modules, name, module)
-    monkeypatch.setattr(live, "FIRST_S", 0.0)
+    monkeypatch.setattr(live_view, "FIRST_S", 0.0)
     return handle
 
 
@@ -166,8 +166,8 @@ def test_widgets_are_taken_where_they_are(
     widgets = SimpleNamespace(**dict.fromkeys(kinds, widget))
     monkeypatch.setitem(sys.modules, "ipywidgets", widgets)
     monkeypatch.setattr(sys.modules["IPython.display"], "display", lambda what: None)
-    view = live.make_view()
-    assert isinstance(view, live.Widgets)
+    view = live_view.make_view()
+    assert isinstance(view, live_view.Widgets)
     view.bar(0.25, "25 %")
     view.picture(b"png")
     bar, text, image, _, everything = made
@@ -177,11 +177,11 @@ def test_widgets_are_taken_where_they_are(
 
 
 def test_no_notebook_no_progress(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert not live.in_notebook()
-    with live.watching(None) as shown:
+    assert not live_view.in_notebook()
+    with live_view.watching(None) as shown:
         assert shown is None
-    monkeypatch.setattr(live, "progress_console", lambda: None)
-    with live.watching(True) as shown:
+    monkeypatch.setattr(live_view, "progress_console", lambda: None)
+    with live_view.watching(True) as shown:
         assert shown is None
 
 

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from fake_core import install
 
 from wavecomb.cli import main
-from wavecomb.picture.image import read_image
+from wavecomb.image.files.image import read_image
 from wavecomb.run.progress import (
     Interrupt,
     ProgressBar,

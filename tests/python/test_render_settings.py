@@ -14,8 +14,8 @@ from usd_recorder import load, said, write
 
 import wavecomb
 from wavecomb.cli import main
-from wavecomb.picture.image import read_layers, read_metadata
-from wavecomb.usd.stage.render_settings import RenderChoice, aov_of, read_choices
+from wavecomb.image.files.image import read_layers, read_metadata
+from wavecomb.usd.render_settings.reader import RenderChoice, aov_of, read_choices
 from wavecomb.usd.stage.report import LoadReport
 
 WORLD = """

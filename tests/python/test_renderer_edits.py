@@ -315,7 +315,7 @@ def test_regions_that_cannot_be(
 
 
 def test_a_checkpoint_is_of_its_region(cornell: Path, tmp_path: Path) -> None:
-    from wavecomb.picture.image import read_layers
+    from wavecomb.image.files.image import read_layers
 
     out, state = tmp_path / "part.exr", tmp_path / "part.ckpt"
     given = ["render", str(cornell), "-o", str(out), "--quiet", "--size", "16", "16"]

@@ -13,8 +13,8 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
 import wavecomb
 from wavecomb.scenes import write_scene
-from wavecomb.scenes.room_looks import LOOKS, ROOM_TEXTURES
-from wavecomb.scenes.shapes import disc, pillow, rounded_box, tube, turned
+from wavecomb.scenes.models.shapes import disc, pillow, rounded_box, tube, turned
+from wavecomb.scenes.room.materials import LOOKS, ROOM_TEXTURES
 
 SMALL: dict[str, Any] = {"triangles": 12_000, "teapot_level": 4, "texture_size": 64}
 ROOM = ((0.0, 0.0, 0.0), (5.0, 2.7, 4.0))
@@ -211,7 +211,7 @@ def test_the_picture_is_neither_dark_nor_burnt(room: Path) -> None:
     ids=["box", "cushioned box", "turned", "tube", "pillow"],
 )
 def test_shapes_are_closed_and_face_outwards(mesh: Any) -> None:
-    from wavecomb.scenes.mesh import face_areas, signed_volume
+    from wavecomb.scenes.models.mesh import face_areas, signed_volume
 
     assert face_areas(mesh.points, mesh.faces).min() > 0.0
     assert signed_volume(mesh.points, mesh.faces) > 0.0

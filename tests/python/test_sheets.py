@@ -15,10 +15,10 @@ import pytest
 from click.testing import CliRunner, Result
 
 from wavecomb.cli import main
-from wavecomb.picture.collect import collect, pictures_of
-from wavecomb.picture.compare_folders import pair_up
-from wavecomb.picture.image import display, read_codes, write_exr, write_png
-from wavecomb.picture.thumbnails import Look, contact_sheet, fitted, wipe
+from wavecomb.image.compare.folders import pair_up
+from wavecomb.image.files.collection import collect, pictures_of
+from wavecomb.image.files.image import display, read_codes, write_exr, write_png
+from wavecomb.image.thumbnails import Look, contact_sheet, fitted, wipe
 from wavecomb.run.frame_names import matching
 
 RED, GREEN, BLUE = ((1, 0, 0), (0, 1, 0), (0, 0, 1))

@@ -8,8 +8,8 @@ from usd_recorder import QUAD, Recorder, load, said, write
 
 from wavecomb import WavecombError, _core
 from wavecomb.usd import load_stage
-from wavecomb.usd.looks.colour_space import halve
-from wavecomb.usd.looks.texture_limit import pyramid_bytes
+from wavecomb.usd.materials.colour_space import halve
+from wavecomb.usd.materials.texture_limit import pyramid_bytes
 
 
 class NoStore:

@@ -13,7 +13,7 @@ from parts import asset
 from pxr import Sdf, Usd, UsdShade
 from usd_recorder import Recorder
 
-from wavecomb.picture.image import write_png
+from wavecomb.image.files.image import write_png
 from wavecomb.usd import LoadReport, load_stage, mtlx, open_stage
 from wavecomb.usd.materialx.files import MAX_DEPTH, MtlxError
 from wavecomb.usd.materialx.references import translate

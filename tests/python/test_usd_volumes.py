@@ -437,7 +437,7 @@ def test_torus_of_arnold(tmp_path: Path) -> None:
 
 
 def test_files_of_volumes_are_listed(tmp_path: Path) -> None:
-    from wavecomb.usd.stage.dependencies import dependencies
+    from wavecomb.usd.layers.dependencies import dependencies
 
     (tmp_path / "a.vdb").write_bytes(b"x")
     times = "asset filePath.timeSamples = { 1: @./a.vdb@, 2: @./gone.vdb@ }"

@@ -20,8 +20,8 @@ from wavecomb.bench.suite_model import (
     with_folder,
 )
 from wavecomb.errors import WavecombError
+from wavecomb.image.files.output_file import check_regular, reason
 from wavecomb.options import settings
-from wavecomb.picture.files import check_regular, reason
 
 
 class Table:

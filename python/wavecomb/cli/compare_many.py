@@ -9,11 +9,11 @@ import os
 import click
 
 from wavecomb.errors import WavecombError
-from wavecomb.picture.compare import Comparison
-from wavecomb.picture.compare_folders import Folders, PairResult, as_plain, pair_up
-from wavecomb.picture.files import replacing
-from wavecomb.picture.heatmap import KINDS, Kind
-from wavecomb.picture.thumbnails import Look
+from wavecomb.image.compare.comparison import Comparison
+from wavecomb.image.compare.folders import Folders, PairResult, as_plain, pair_up
+from wavecomb.image.compare.heatmap import KINDS, Kind
+from wavecomb.image.files.output_file import replacing
+from wavecomb.image.thumbnails import Look
 
 
 def compare_many(
@@ -72,7 +72,7 @@ def write_page(
     tolerance: float | None, kind: str, look: Look,
 ) -> None:  # fmt: skip
     """Writes an HTML page of compared pairs, replacing the file only when complete."""
-    from wavecomb.picture.compare_folders import compare_page
+    from wavecomb.image.compare.folders import compare_page
 
     chosen: Kind = next((one for one in KINDS if one == kind), "absolute")
     text = compare_page(
@@ -94,8 +94,8 @@ def write_wipe(file: str, a: str, b: str, at: float, look: Look) -> None:
     Raises:
         WavecombError: The images differ in size.
     """
-    from wavecomb.picture.image import write_png_codes
-    from wavecomb.picture.thumbnails import wipe
+    from wavecomb.image.files.image import write_png_codes
+    from wavecomb.image.thumbnails import wipe
 
     shown = look.codes(a), look.codes(b)
     if shown[0].shape != shown[1].shape:

@@ -98,7 +98,7 @@ def resume_command(
 @AS_JSON
 def status_command(job: str, maps: tuple[str, ...], as_json: bool) -> None:
     """Report how many tiles and images of JOB are finished. Reads and verifies each file."""
-    from wavecomb.farm.assemble import status
+    from wavecomb.farm.assembly import status
 
     folder = opened(job, maps)
     out = status(folder)

@@ -16,7 +16,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.run.progress import Interrupt, progress_console, time_text
 
 if TYPE_CHECKING:
-    from wavecomb.farm.assemble import Outcome
+    from wavecomb.farm.assembly import Outcome
     from wavecomb.farm.clusters import Where
     from wavecomb.farm.folder import Folder
 

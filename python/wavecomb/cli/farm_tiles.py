@@ -17,7 +17,7 @@ import click
 from wavecomb.cli.options import warn
 from wavecomb.cli.planning import Asked, Prepared
 from wavecomb.errors import WavecombError
-from wavecomb.run.learned import BEFORE
+from wavecomb.run.guiding_file import BEFORE
 
 if TYPE_CHECKING:
     from wavecomb.farm.job import Job
@@ -124,7 +124,7 @@ def render_tile(prepared: Prepared, asked: Asked, tile: tuple[int, int]) -> list
     from wavecomb.farm.planning import complete
     from wavecomb.farm.rendering import Renderer
     from wavecomb.farm.tiling import layout
-    from wavecomb.picture.files import replacing
+    from wavecomb.image.files.output_file import replacing
 
     index, count = tile
     learned = prepared.learning.given
@@ -154,9 +154,9 @@ def assemble_tiles(output: str) -> list[str]:
     Raises:
         WavecombError: Tiles are missing or damaged, or differ in settings, files or machines.
     """
-    from wavecomb.farm.assemble import NarrowBorder, join, write_image
+    from wavecomb.farm.assembly import NarrowBorder, join, write_image
     from wavecomb.farm.job import Job, Task
-    from wavecomb.farm.part import DamagedPart, read_part
+    from wavecomb.farm.tile_file import DamagedPart, read_part
 
     names = tile_names(output)
     if not names:

@@ -16,7 +16,7 @@ from wavecomb.cli.reporting import Done
 from wavecomb.cli.setting_options import add_options, option
 from wavecomb.cli.shots import FrameShot
 from wavecomb.errors import WavecombError
-from wavecomb.run.faults import describe
+from wavecomb.run.error_messages import describe
 from wavecomb.run.frame_names import frame_text, has_place, parse_frames
 
 if TYPE_CHECKING:

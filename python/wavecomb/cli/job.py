@@ -16,11 +16,11 @@ from wavecomb.cli.reporting import Done
 from wavecomb.cli.shots import Shot
 from wavecomb.run import aovs as aov_names
 from wavecomb.run.frame_names import fill
-from wavecomb.run.learned import Learning
+from wavecomb.run.guiding_file import Learning
 
 if TYPE_CHECKING:
     from wavecomb.cli.reporting import Reporter
-    from wavecomb.picture.rendered import Picture
+    from wavecomb.image.rendered import Picture
     from wavecomb.run.checkpoint import Checkpoint
     from wavecomb.usd import LoadedStage
 
@@ -76,11 +76,11 @@ class Job:
         ``keeps_stopped`` says whether an image in bands is still written if the render is stopped
         after its first sample.
         """
-        from wavecomb.picture.rendered import picture_of
+        from wavecomb.image.rendered import picture_of
         from wavecomb.run.bands import band_rows
+        from wavecomb.run.callbacks import Watcher
         from wavecomb.run.progress import Interrupt
         from wavecomb.run.settings import check_memory
-        from wavecomb.run.watcher import Watcher
 
         with self.reporter.loading(self.stage) as progress:
             loaded = shot.load(progress)
@@ -128,7 +128,7 @@ class Job:
     ) -> Picture:
         """Adds the shadows on catchers to an image; leaves them out if the render was stopped."""
         from wavecomb.run import catchers
-        from wavecomb.run.watcher import Watcher
+        from wavecomb.run.callbacks import Watcher
 
         def render(how: Mapping[str, str]) -> Any:
             shot.load(None, **how)
@@ -148,13 +148,13 @@ class Job:
 
         If stopped, fills the rest with empty bands.
         """
-        from wavecomb.picture.growing import GrowingFiles
-        from wavecomb.picture.rendered import picture_of, window_of
+        from wavecomb.image.files.band_writer import GrowingFiles
+        from wavecomb.image.rendered import picture_of, window_of
         from wavecomb.run.bands import render_bands, sum_stats, without_samples
+        from wavecomb.run.callbacks import Watcher
         from wavecomb.run.progress import Interrupt
         from wavecomb.run.settings import picture_size
         from wavecomb.run.stats import write_stats
-        from wavecomb.run.watcher import Watcher
 
         settings, height = self.settings.to_dict(), picture_size(self.settings)[1]
         parts: list[dict[str, Any]] = []
@@ -229,7 +229,7 @@ class Job:
         Returns:
             The sinks that save them, the state to resume or None, and its render time in seconds.
         """
-        from wavecomb.run.watcher import CheckpointSink, PreviewSink, Sink
+        from wavecomb.run.callbacks import CheckpointSink, PreviewSink, Sink
 
         sinks: list[Sink] = []
         state, seconds = None, 0.0

@@ -19,11 +19,11 @@ from wavecomb.errors import WavecombError
 from wavecomb.options import settings as known_settings
 from wavecomb.run import aovs as aov_names
 from wavecomb.run.frame_names import fill, has_place
-from wavecomb.run.learned import BEFORE, ENDING, Learning, check_taught, learned_of
+from wavecomb.run.guiding_file import BEFORE, ENDING, Learning, check_taught, learned_of
 
 if TYPE_CHECKING:
     from wavecomb.run.checkpoint import Checkpoint
-    from wavecomb.usd.stage.choice import RenderChoice
+    from wavecomb.usd.render_settings.values import RenderChoice
 
 Peek = Callable[[StageOptions, str], "tuple[list[RenderChoice], Any]"]
 """Type of ``StageOptions.peek``: reads the render settings of a stage."""
@@ -215,7 +215,7 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
     if asked.output is not None:
         checked(replace(beside, output=asked.output))
     if purpose.denoise:
-        from wavecomb.picture.denoise import check_denoiser
+        from wavecomb.image.denoise import check_denoiser
 
         check_denoiser()
     resumed = purpose.load()
@@ -315,7 +315,7 @@ def _without_overscan(settings: dict[str, Any]) -> dict[str, Any]:
 
 def _check_outputs(asked: Asked, names: Names, purpose: PurposeOptions) -> None:
     """Raises WavecombError if an output file cannot be written or is named twice."""
-    from wavecomb.picture.files import check_writable
+    from wavecomb.image.files.output_file import check_writable
 
     outputs = [
         (names.output, "-o", ".exr"),
@@ -350,6 +350,6 @@ def _read_costs(costs_file: str | None) -> dict[str, dict[str, float]] | None:
     """Returns the cost profile in a file, or None if the file does not exist yet."""
     if costs_file is None or not os.path.exists(costs_file):
         return None
-    from wavecomb.run.costs import load_costs
+    from wavecomb.run.cost_profile import load_costs
 
     return load_costs(costs_file)

@@ -19,7 +19,7 @@ from wavecomb.run.expressions import layer_of
 
 if TYPE_CHECKING:
     from wavecomb.run.sequence import Frames
-    from wavecomb.usd.stage.choice import RenderChoice
+    from wavecomb.usd.render_settings.values import RenderChoice
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Plan:
 
     def check_split(self, aovs: Sequence[str], frames: Sequence[float] | None) -> None:
         """Does ``check_place`` for the files of --split-aovs, one for each layer and frame."""
-        from wavecomb.picture.output import split_names
+        from wavecomb.image.files.render_output import split_names
 
         for names in [self.names] if frames is None else map(self.names.at, frames):
             for file in split_names(names.output, [layer_of(name) for name in aovs]).values():

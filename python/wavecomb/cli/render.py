@@ -18,7 +18,7 @@ from wavecomb.cli.reporting import Done
 from wavecomb.cli.sandbox import enter_to_render
 from wavecomb.cli.setting_options import SettingCommand, add_options, option, setting_options
 from wavecomb.cli.shots import Shot, Still
-from wavecomb.run.learned import save_learned
+from wavecomb.run.guiding_file import save_learned
 
 picture_options = add_options(
     option(
@@ -168,6 +168,6 @@ def render_command(part: str | None, **options: Any) -> None:
 
 
 def _save_costs(costs_file: str, done: Done) -> None:
-    from wavecomb.run.costs import save_costs
+    from wavecomb.run.cost_profile import save_costs
 
     save_costs(costs_file, done.costs)

@@ -24,7 +24,7 @@ from wavecomb.run.progress import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from wavecomb.picture.rendered import Picture
+    from wavecomb.image.rendered import Picture
     from wavecomb.usd import LoadReport
 
 TIMES = ("load", "build", "render")

@@ -34,8 +34,8 @@ def enter_to_render(
         split: Whether each layer gets a separate file.
         gpu: Whether denoising may use GPU devices.
     """
-    from wavecomb.run.isolate.outputs import Outputs
-    from wavecomb.run.isolate.supervisor import enter
+    from wavecomb.run.isolation.outputs import Outputs
+    from wavecomb.run.isolation.supervisor import enter
 
     given = [name for name in names if name is not None]
     single = () if frame is None else (frame,)
@@ -68,8 +68,8 @@ def enter_to_read(outputs: Iterable[str | None], *, split: str | None = None) ->
         outputs: Files to write.
         split: One of these that may become a file for each layer.
     """
-    from wavecomb.run.isolate.outputs import Outputs
-    from wavecomb.run.isolate.supervisor import enter
+    from wavecomb.run.isolation.outputs import Outputs
+    from wavecomb.run.isolation.supervisor import enter
 
     parts: tuple[tuple[str, str, str], ...] = ()
     if split is not None:

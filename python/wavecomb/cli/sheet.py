@@ -52,9 +52,9 @@ def sheet_command(pictures: tuple[str, ...], output: str, **options: Any) -> Non
     """
     enter_to_read((output,))
     from wavecomb.errors import WavecombError
-    from wavecomb.picture.collect import collect
-    from wavecomb.picture.files import check_writable
-    from wavecomb.picture.thumbnails import Look
+    from wavecomb.image.files.collection import collect
+    from wavecomb.image.files.output_file import check_writable
+    from wavecomb.image.thumbnails import Look
 
     ending = os.path.splitext(output)[1].lower()
     if ending not in (".png", ".html"):
@@ -74,8 +74,8 @@ def sheet_command(pictures: tuple[str, ...], output: str, **options: Any) -> Non
 
 def _write_sheet(found: dict[str, str], output: str, look: Any, options: dict[str, Any]) -> None:
     from wavecomb.errors import WavecombError
-    from wavecomb.picture.image import write_png_codes
-    from wavecomb.picture.thumbnails import MOST, contact_sheet
+    from wavecomb.image.files.image import write_png_codes
+    from wavecomb.image.thumbnails import MOST, contact_sheet
 
     if len(found) > MOST:
         raise WavecombError(f"{len(found)} images: a sheet holds at most {MOST}")
@@ -87,8 +87,8 @@ def _write_page(
     found: dict[str, str], output: str, look: Any, title: str, options: dict[str, Any]
 ) -> None:
     from wavecomb.errors import WavecombError
-    from wavecomb.picture.files import replacing
-    from wavecomb.picture.pages import MOST_FRAMES, sequence_page
+    from wavecomb.image.files.output_file import replacing
+    from wavecomb.image.pages import MOST_FRAMES, sequence_page
 
     if len(found) > MOST_FRAMES:
         raise WavecombError(f"{len(found)} images: a page holds at most {MOST_FRAMES}")

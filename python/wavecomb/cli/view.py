@@ -43,7 +43,7 @@ def view_command(stage: str | None, size: tuple[int, int], denoise: bool, **opti
     needed("PySide6.QtWidgets", "the window", extra="gui")
     needed("pyqtgraph", "the window", extra="gui")
     if denoise:
-        from wavecomb.picture.denoise import check_denoiser
+        from wavecomb.image.denoise import check_denoiser
 
         check_denoiser()
     from wavecomb.gui.setup import Setup

@@ -160,8 +160,8 @@ def render_task(folder: Folder, image: int, tile: str) -> list[str]:
     """
     from wavecomb.api import import_usd
     from wavecomb.farm.machine_class import machine_class
-    from wavecomb.farm.part import has_part
     from wavecomb.farm.rendering import Renderer, check_files, looks_for, use_job_maps
+    from wavecomb.farm.tile_file import has_part
 
     job = folder.job
     number, count = parse_tile(tile)
@@ -189,7 +189,7 @@ def assemble_job(folder: Folder) -> tuple[list[str], list[str]]:
     Returns:
         Files that were written, and a line for each image with missing tiles.
     """
-    from wavecomb.farm.assemble import finish_image, is_finished, machine_of
+    from wavecomb.farm.assembly import finish_image, is_finished, machine_of
 
     job, written, lacking = folder.job, [], []
     for image in range(len(job.images)):

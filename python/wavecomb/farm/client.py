@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from wavecomb.errors import WavecombError
-from wavecomb.farm.assemble import Outcome, is_finished, machine_of
+from wavecomb.farm.assembly import Outcome, is_finished, machine_of
 from wavecomb.farm.clusters import Cluster, Where, connected
 from wavecomb.farm.folder import Folder
 from wavecomb.farm.job import Task, hashed
 from wavecomb.farm.machine_class import PREFIX
-from wavecomb.farm.part import has_part
+from wavecomb.farm.tile_file import has_part
 
 _TURN_S = 0.2
 _LOOK_S = 1.0

@@ -9,15 +9,15 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.errors import WavecombError
-from wavecomb.farm.assemble import file_hash
+from wavecomb.farm.assembly import file_hash
 from wavecomb.farm.job import Job, Shot, StageFile, Task
 from wavecomb.farm.tiling import Rectangle, border, grown, most_looks
+from wavecomb.image.rendered import Picture, picture_of
 from wavecomb.path_maps import here, use_maps
-from wavecomb.picture.rendered import Picture, picture_of
 from wavecomb.run.bands import without_samples
+from wavecomb.run.callbacks import Reporter, Watcher
 from wavecomb.run.sequence import Frames
 from wavecomb.run.settings import check_memory
-from wavecomb.run.watcher import Reporter, Watcher
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -98,7 +98,7 @@ class Renderer:
             Stopped: ``is_stopped`` cancelled the render.
             WavecombError: The stage or the settings cannot be rendered.
         """
-        from wavecomb.farm.part import replacing_quickly, save_part
+        from wavecomb.farm.tile_file import replacing_quickly, save_part
 
         shot, tile = self.job.shot(task.image), self.job.rectangles(task.image)[task.tile]
         settings, rendered, looks = self._settings(task.image, shot, tile, looks)
@@ -228,7 +228,7 @@ def list_files(
     from wavecomb.api import import_usd
 
     import_usd()
-    from wavecomb.usd.stage.dependencies import dependencies
+    from wavecomb.usd.layers.dependencies import dependencies
 
     session = None if session_layer is None else Path(session_layer)
     found = dependencies(Path(stage), variants, session)

@@ -137,8 +137,8 @@ def render_tiles(
         or ""; ``warnings``, lines; ``seconds``, the time taken; ``worker``, its address.
     """
     from wavecomb.farm.job import Task
-    from wavecomb.farm.part import has_part
     from wavecomb.farm.rendering import Stopped
+    from wavecomb.farm.tile_file import has_part
 
     started = time.monotonic()
     out: dict[str, Any] = {"done": [], "failed": [], "full": "", "warnings": []}
@@ -181,7 +181,7 @@ def assemble_image(
         checks that their borders must allow for, or 0; ``full``, why nothing can be written here,
         or ""; ``worker``, its address.
     """
-    from wavecomb.farm.assemble import finish_image
+    from wavecomb.farm.assembly import finish_image
 
     out: dict[str, Any] = {"again": [], "looks": 0, "full": ""}
     out["worker"] = _begin()

@@ -11,7 +11,7 @@ from typing import Any
 from pxr import Sdf, Usd
 
 from wavecomb.usd import LoadedStage
-from wavecomb.usd.looks.texture import TextureCache
+from wavecomb.usd.materials.texture import TextureCache
 
 
 @dataclass(frozen=True)

@@ -16,13 +16,13 @@ import numpy as np
 
 from wavecomb.errors import WavecombError
 from wavecomb.run import aovs as aov_names
-from wavecomb.run.isolate.memory import machine_limit
+from wavecomb.run.isolation.memory import machine_limit
 from wavecomb.run.settings import check_memory, keeps_error, picture_bytes, picture_size
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Settings
-    from wavecomb.picture.rendered import Picture
-    from wavecomb.run.watcher import Reporter, Status
+    from wavecomb.image.rendered import Picture
+    from wavecomb.run.callbacks import Reporter, Status
 
 STEP = 64
 """Band heights are multiples of this, or of the tile height."""

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.errors import WavecombError
-from wavecomb.picture.working_space import LUMINANCE
+from wavecomb.image.working_space import LUMINANCE
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Settings
-    from wavecomb.picture.rendered import Picture
+    from wavecomb.image.rendered import Picture
 
 LAYER = "alpha"
 """The AOV that receives shadows."""

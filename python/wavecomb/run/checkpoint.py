@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wavecomb.errors import WavecombError
+from wavecomb.image.files.archive import ArchiveError, read_kind, write_archive
 from wavecomb.options import settings as known_settings
-from wavecomb.picture.archive import ArchiveError, read_kind, write_archive
 from wavecomb.run import aovs as aov_names
 from wavecomb.run.stats import plain
 from wavecomb.version import version

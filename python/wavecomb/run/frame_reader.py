@@ -15,20 +15,20 @@ from wavecomb.load_options import LoadOptions
 from wavecomb.usd import mtlx
 from wavecomb.usd.cameras.camera import camera_motion, read_camera
 from wavecomb.usd.geometry.shutter import find_motion
-from wavecomb.usd.stage.choice import RenderChoice
+from wavecomb.usd.layers.opening import open_stage
+from wavecomb.usd.render_settings.values import RenderChoice
+from wavecomb.usd.render_settings.view import check_view, seen_on
 from wavecomb.usd.stage.diagnostics import captured
 from wavecomb.usd.stage.frame_cache import FrameCache
 from wavecomb.usd.stage.load import load_stage
-from wavecomb.usd.stage.opening import open_stage
 from wavecomb.usd.stage.origin import find_origin, moved_to
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.stage.times import frame_number, time_code
-from wavecomb.usd.stage.view_options import check_view, seen_on
+from wavecomb.usd.stage.time_codes import frame_number, time_code
 
 if TYPE_CHECKING:
     from pxr import Usd
 
-    from wavecomb.usd.stage.loaded import LoadedStage
+    from wavecomb.usd.stage.load_result import LoadedStage
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wavecomb import _core
+from wavecomb.image.rendered import picture_of
 from wavecomb.load_options import LoadOptions, split
-from wavecomb.picture.rendered import picture_of
 from wavecomb.run.aovs import DEEP, with_others
 from wavecomb.run.catchers import LAYER, caught, of_catchers, with_alpha
 from wavecomb.run.catchers import check as check_catchers
@@ -22,7 +22,7 @@ from wavecomb.run.stats import make_stats
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Settings
-    from wavecomb.picture.rendered import Picture
+    from wavecomb.image.rendered import Picture
     from wavecomb.usd import LoadedStage
 
 

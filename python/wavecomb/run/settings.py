@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.run import aovs as aov_names
-from wavecomb.run.isolate.memory import machine_limit
+from wavecomb.run.isolation.memory import machine_limit
 
 if TYPE_CHECKING:
     from wavecomb._core import Settings
@@ -53,7 +53,7 @@ def prepare(
     if isinstance(costs, str):
         settings["costs"] = costs
     elif costs is not None:
-        from wavecomb.run.costs import check_costs
+        from wavecomb.run.cost_profile import check_costs
 
         profile = check_costs(costs)
     names = aov_names.DEFAULT if aovs is None else aov_names.expand(aovs)

@@ -11,14 +11,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wavecomb.image.files.output_file import replacing
+from wavecomb.image.working_space import header_of
 from wavecomb.machine import memory_bytes, usable_cores
-from wavecomb.picture.files import replacing
-from wavecomb.picture.working_space import header_of
 from wavecomb.version import version
 
 if TYPE_CHECKING:
     from wavecomb._core import Result
-    from wavecomb.usd.stage.loaded import LoadedStage
+    from wavecomb.usd.stage.load_result import LoadedStage
 
 SCHEMA = "wavecomb-statistics/1"
 PHASES = (

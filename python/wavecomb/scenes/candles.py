@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from wavecomb.scenes import materials as looks
+from wavecomb.scenes.authoring import materials as looks
+from wavecomb.scenes.authoring.material_network import Network
+from wavecomb.scenes.authoring.materials import Colour
+from wavecomb.scenes.authoring.stage import StageWriter
 from wavecomb.scenes.caustics import ball
-from wavecomb.scenes.materials import Colour
-from wavecomb.scenes.network import Network
+from wavecomb.scenes.models.shapes import placed, turned
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.shapes import placed, turned
-from wavecomb.scenes.stage import StageWriter
 
 _FLAME = (95.0, 48.0, 16.0)
 _CANDLES = (

@@ -10,11 +10,11 @@ import math
 
 import numpy as np
 
-from wavecomb.scenes import materials as looks
-from wavecomb.scenes.mesh import FloatArray, Mesh, grid_mesh, merge, normalized
+from wavecomb.scenes.authoring import materials as looks
+from wavecomb.scenes.authoring.stage import StageWriter
+from wavecomb.scenes.models.mesh import FloatArray, Mesh, grid_mesh, merge, normalized
+from wavecomb.scenes.models.shapes import placed, turn_about, turned
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.shapes import placed, turn_about, turned
-from wavecomb.scenes.stage import StageWriter
 
 _LAMP_RADIUS = 0.08
 _LAMP_RADIANCE = (900.0, 860.0, 780.0)

@@ -12,10 +12,10 @@ import math
 
 import numpy as np
 
-from wavecomb.scenes import materials as looks
+from wavecomb.scenes.authoring import materials as looks
+from wavecomb.scenes.authoring.stage import StageWriter
 from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.stage import StageWriter
 
 _WHITE = looks.diffuse((0.725, 0.71, 0.68))
 _RED = looks.diffuse((0.63, 0.065, 0.05))

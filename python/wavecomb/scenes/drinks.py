@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from wavecomb.scenes import materials as looks
-from wavecomb.scenes.materials import Colour
-from wavecomb.scenes.mesh import FloatArray
-from wavecomb.scenes.network import Network
+from wavecomb.scenes.authoring import materials as looks
+from wavecomb.scenes.authoring.material_network import Network
+from wavecomb.scenes.authoring.materials import Colour
+from wavecomb.scenes.authoring.stage import StageWriter
+from wavecomb.scenes.models.mesh import FloatArray
+from wavecomb.scenes.models.shapes import placed, turned
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.shapes import placed, turned
-from wavecomb.scenes.stage import StageWriter
 
 _RADIUS, _HEIGHT, _WALL, _FOOT = 3.0, 10.5, 0.32, 1.0
 _OVERLAP = 0.1

@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, UsdGeom, Vt
 
-from wavecomb.scenes import materials as looks
+from wavecomb.scenes.authoring import materials as looks
+from wavecomb.scenes.authoring.material_network import Network
+from wavecomb.scenes.authoring.stage import StageWriter
 from wavecomb.scenes.candles import below_surface
-from wavecomb.scenes.mesh import FloatArray, Mesh, grid_mesh, normalized, without_flat_faces
-from wavecomb.scenes.network import Network
+from wavecomb.scenes.models.mesh import FloatArray, Mesh, grid_mesh, normalized, without_flat_faces
+from wavecomb.scenes.models.relief import ramp
+from wavecomb.scenes.models.shapes import turned
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.relief import ramp
-from wavecomb.scenes.shapes import turned
-from wavecomb.scenes.stage import StageWriter
 
 HEAD_LEVEL = 96
 """Number of cells from pole to pole."""

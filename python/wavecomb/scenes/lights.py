@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, UsdGeom, UsdLux
 
-from wavecomb.scenes import materials as looks
+from wavecomb.scenes.authoring import materials as looks
+from wavecomb.scenes.authoring.stage import BOX, BOX_CORNERS, StageWriter
 from wavecomb.scenes.errors import SceneError
+from wavecomb.scenes.models.teapot import teapot
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.stage import BOX, BOX_CORNERS, StageWriter
-from wavecomb.scenes.teapot import teapot
 
 MAX_LIGHTS = 200_000
 _LENGTH, _HALF_WIDTH, _HEIGHT = 60.0, 5.0, 12.0

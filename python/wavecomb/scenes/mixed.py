@@ -10,11 +10,11 @@ import math
 
 import numpy as np
 
-from wavecomb.scenes import materials as looks
-from wavecomb.scenes.materials import MaterialInfo
+from wavecomb.scenes.authoring import materials as looks
+from wavecomb.scenes.authoring.materials import MaterialInfo
+from wavecomb.scenes.authoring.stage import StageWriter
+from wavecomb.scenes.models.teapot import teapot
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.stage import StageWriter
-from wavecomb.scenes.teapot import teapot
 
 _ROW_SIZES = (14, 13, 12, 11, 10, 9, 8, 7, 6)
 """Number of objects in each row, from the back: a fan of 90 that fills the camera's view."""

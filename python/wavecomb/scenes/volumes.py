@@ -17,12 +17,12 @@ from pxr import Gf, UsdLux, UsdVol
 
 from wavecomb import vdb
 from wavecomb.errors import WavecombError
-from wavecomb.scenes import materials as looks
+from wavecomb.scenes.authoring import materials as looks
+from wavecomb.scenes.authoring.material_network import Network
+from wavecomb.scenes.authoring.materials import Colour
+from wavecomb.scenes.authoring.stage import StageWriter
 from wavecomb.scenes.errors import SceneError
-from wavecomb.scenes.materials import Colour
-from wavecomb.scenes.network import Network
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.stage import StageWriter
 
 Points = NDArray[np.float32]
 

@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any
 from pxr import Usd, UsdShade
 
 from wavecomb.usd.graphs.values import Expressions, Value
-from wavecomb.usd.looks.network import shader_id, source_of
-from wavecomb.usd.stage.unread import unread_mtlx
+from wavecomb.usd.layers.unopened_materialx import unread_mtlx
+from wavecomb.usd.materials.network import shader_id, source_of
 
 if TYPE_CHECKING:
-    from wavecomb.usd.graphs.surface import Networks
-    from wavecomb.usd.looks.surface import InputDefinition, Surface
-    from wavecomb.usd.looks.texture import TextureTable
+    from wavecomb.usd.graphs.surface_parameters import Networks
+    from wavecomb.usd.materials.surface import InputDefinition, Surface
+    from wavecomb.usd.materials.texture import TextureTable
     from wavecomb.usd.stage.report import LoadReport
 
 ABSENT = "MaterialX without the Python package materialx (pip install materialx)"

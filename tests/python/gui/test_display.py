@@ -8,7 +8,8 @@ from wavecomb.errors import WavecombError
 from wavecomb.gui.swatch import to_qimage
 from wavecomb.gui.viewport import display, ocio
 from wavecomb.gui.viewport.display import Look
-from wavecomb.picture import image, layer_view
+from wavecomb.image import layer_view
+from wavecomb.image.files import image
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from pxr import Sdf
 from wavecomb.errors import WavecombError
 from wavecomb.farm import Folder, status
 from wavecomb.gui.farm_job import describe
-from wavecomb.picture.image import read_layers
+from wavecomb.image.files.image import read_layers
 
 
 def test_a_job_is_what_is_shown(cornell_window, tmp_path):

@@ -266,7 +266,7 @@ def test_digits_are_typed_where_they_were_begun(qtbot):
     field = NumberField("x", Range(0.0, 10.0, 0.0, 1.0))
     qtbot.addWidget(field)
     field.show()
-    from wavecomb.usd.looks.parameters import as_stored
+    from wavecomb.usd.materials.parameters import as_stored
 
     def back(value):
         if differs(field.value(), as_stored(value)):

@@ -17,9 +17,9 @@ from wavecomb.gui.compare.picture_sides import Side, pair, problem
 from wavecomb.gui.swatch import to_qimage
 from wavecomb.gui.viewport.display import Look, show
 from wavecomb.gui.worker import Worker
-from wavecomb.picture import image
-from wavecomb.picture.heatmap import Kind, Scale, scale_of, z_scale
-from wavecomb.picture.layer_view import Legend, Shown
+from wavecomb.image.compare.heatmap import Kind, Scale, scale_of, z_scale
+from wavecomb.image.files import image
+from wavecomb.image.layer_view import Legend, Shown
 
 
 @dataclass(frozen=True)

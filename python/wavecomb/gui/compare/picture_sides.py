@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.errors import WavecombError
-from wavecomb.picture.compare import layers_of
-from wavecomb.picture.files import reason
+from wavecomb.image.compare.comparison import layers_of
+from wavecomb.image.files.output_file import reason
 
 if TYPE_CHECKING:
     from wavecomb.gui.viewport.frames import Frame

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from wavecomb.gui.viewport import ocio
 from wavecomb.gui.viewport.frames import Frame
-from wavecomb.picture import image
-from wavecomb.picture.layer_view import Shown, show_layer
+from wavecomb.image.files import image
+from wavecomb.image.layer_view import Shown, show_layer
 
 LINEAR, NEUTRAL = "Linear", "Neutral"
 _NAN = (255, 0, 255)
@@ -49,7 +49,7 @@ def views() -> list[str]:
 def develop(rgb: NDArray[Any], exposure: float, view: str) -> NDArray[np.uint8]:
     """Converts linear Rec.709 to 8-bit values.
 
-    "Linear" and "Neutral" are ``wavecomb.picture.image.display`` with "clamp" and "neutral".
+    "Linear" and "Neutral" are ``wavecomb.image.files.image.display`` with "clamp" and "neutral".
 
     Raises:
         WavecombError: There is no such view.

@@ -35,7 +35,7 @@ def camera_pose(
 
     from wavecomb.usd.cameras.camera import read_camera
     from wavecomb.usd.stage.report import LoadReport
-    from wavecomb.usd.stage.times import time_code
+    from wavecomb.usd.stage.time_codes import time_code
 
     if not Sdf.Path.IsValidPathString(path):
         return None
@@ -83,7 +83,7 @@ def prim_bounds(usd: Usd.Stage, loaded: LoadedStage, path: str) -> NDArray[np.fl
     """
     from pxr import Gf, Sdf, UsdGeom
 
-    from wavecomb.usd.stage.times import code_of
+    from wavecomb.usd.stage.time_codes import code_of
 
     plain = path.partition("[")[0]
     if not Sdf.Path.IsValidPathString(plain):

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom, UsdRender
 
 from wavecomb.errors import WavecombError
+from wavecomb.image.files.render_output import fitted_window
 from wavecomb.load_options import PROJECTIONS
-from wavecomb.picture.output import fitted_window
 from wavecomb.usd.cameras.framing import corners, fit, fit_flat, planes
 from wavecomb.usd.cameras.lens import lens_values, read_map
 from wavecomb.usd.geometry.shutter import Motion
-from wavecomb.usd.looks.network import number, pair, word
-from wavecomb.usd.stage.choice import CONFORMS
-from wavecomb.usd.stage.population import every
+from wavecomb.usd.layers.population import every
+from wavecomb.usd.materials.network import number, pair, word
+from wavecomb.usd.render_settings.values import CONFORMS
 from wavecomb.usd.stage.report import LoadReport
 
 Matrix = NDArray[np.float64]

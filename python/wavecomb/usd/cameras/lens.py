@@ -12,7 +12,7 @@ from pxr import Usd
 
 from wavecomb.camera_table import camera_parameters
 from wavecomb.errors import WavecombError
-from wavecomb.picture.image import read_layers
+from wavecomb.image.files.image import read_layers
 from wavecomb.usd.stage.report import LoadReport
 
 _ARNOLD = "primvars:arnold:"

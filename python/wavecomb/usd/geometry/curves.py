@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Usd
 
-from wavecomb.usd.geometry.bad_points import WHY, bad_points, steadied
+from wavecomb.usd.geometry.invalid_points import WHY, bad_points, steadied
 from wavecomb.usd.geometry.mesh_arrays import (
     IDENTITY,
     UV_NAMES,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Tf, Usd
 
-from wavecomb.run.isolate import memory, patience, trail
+from wavecomb.run.isolation import memory, progress_notes, time_limit
 from wavecomb.usd.geometry.curves import CurveArrays, CurveReader, over_shutter
 from wavecomb.usd.geometry.mesh import MeshReader
 from wavecomb.usd.geometry.mesh_arrays import UV_NAMES, MeshArrays
@@ -16,9 +16,9 @@ from wavecomb.usd.geometry.nurbs_patch import PatchReader
 from wavecomb.usd.geometry.skeleton import Skeletons, deforms
 from wavecomb.usd.geometry.splats import PointReader, SplatArrays, SplatReader
 from wavecomb.usd.geometry.strands import StrandDetail
-from wavecomb.usd.geometry.surfaces import Surfaces
+from wavecomb.usd.geometry.subdivision import Surfaces
 from wavecomb.usd.geometry.triangulate import MeshError
-from wavecomb.usd.looks.assign import Draw
+from wavecomb.usd.materials.assignment import Draw
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.frame_cache import MeshCache
 from wavecomb.usd.stage.origin import problem_of
@@ -88,14 +88,14 @@ class GprimReader:
                 well.
         """
         kind, path = draw.kind, str(draw.prim.GetPath())
-        trail.note("reading", path)
+        progress_notes.note("reading", path)
         try:
             shape = self._read(kind, draw, names, detail if kind == "curves" else None)
         except MeshError as error:
             self.report.warn(f"{WORDS[kind]} left out: {error}", path)
             return None
         except (Tf.ErrorException, MemoryError) as error:
-            if memory.ran_out(error, lambda: patience.loaded_layers()[1]):
+            if memory.ran_out(error, lambda: time_limit.loaded_layers()[1]):
                 raise MemoryError from error
             what = "out of memory" if isinstance(error, MemoryError) else "USD cannot read it"
             self.report.warn(f"{WORDS[kind]} left out: {what}", path)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
-from wavecomb.usd.geometry.bad_points import bad_points, steadied, without_bad
 from wavecomb.usd.geometry.cage import SCHEMES, Cage, read_rules, sharp_edges
+from wavecomb.usd.geometry.invalid_points import bad_points, steadied, without_bad
 from wavecomb.usd.geometry.mesh_arrays import (
     IDENTITY,
     TETRAHEDRA,
@@ -59,7 +59,7 @@ from wavecomb.usd.geometry.triangulate import (
     smooth_normals,
     triangulate,
 )
-from wavecomb.usd.looks.network import word
+from wavecomb.usd.materials.network import word
 from wavecomb.usd.stage.report import LoadReport
 
 

@@ -25,7 +25,7 @@ from wavecomb.usd.geometry.primvar import PrimvarError, as_array, first_primvar
 from wavecomb.usd.geometry.shutter import Motion
 from wavecomb.usd.geometry.skeleton import points_at, points_now, step_times
 from wavecomb.usd.geometry.triangulate import MeshError, Topology, smooth_normals
-from wavecomb.usd.looks.network import number, word
+from wavecomb.usd.materials.network import number, word
 from wavecomb.usd.stage.report import LoadReport
 
 PARTS = 8

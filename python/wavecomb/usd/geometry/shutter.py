@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from pxr import Gf, Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
-from wavecomb.usd.looks.network import number
+from wavecomb.usd.materials.network import number
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.stage.times import frame_number
+from wavecomb.usd.stage.time_codes import frame_number
 
 Matrices = NDArray[np.float64]
 

@@ -11,9 +11,9 @@ from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 
 from wavecomb.usd.geometry.primvar import as_array
 from wavecomb.usd.geometry.shutter import Motion
-from wavecomb.usd.stage.population import holders
+from wavecomb.usd.layers.population import holders
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.stage.times import frame_number
+from wavecomb.usd.stage.time_codes import frame_number
 
 if TYPE_CHECKING:
     from pxr import UsdSkel  # takes 8 ms; functions import it for stages with skeletons

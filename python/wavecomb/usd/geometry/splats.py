@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Usd
 
-from wavecomb.usd.geometry.bad_points import bad_points
 from wavecomb.usd.geometry.curves import (
     Array,
     CurveArrays,
@@ -21,6 +20,7 @@ from wavecomb.usd.geometry.curves import (
     thick_extent,
     uniform_scale,
 )
+from wavecomb.usd.geometry.invalid_points import bad_points
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY, bake, check_matrix
 from wavecomb.usd.geometry.primvar import as_array
 from wavecomb.usd.geometry.strands import lay_out_points

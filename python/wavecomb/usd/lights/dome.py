@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
-from wavecomb.usd.looks.colour_space import LINEAR, OCIO_NAMES, RAW, SRGB, canonical, convert
-from wavecomb.usd.looks.network import number, word
-from wavecomb.usd.looks.pixels import Image, read_image
-from wavecomb.usd.looks.texture import TextureTable
+from wavecomb.usd.instances.point_instancer import sound
+from wavecomb.usd.materials.colour_space import LINEAR, OCIO_NAMES, RAW, SRGB, canonical, convert
+from wavecomb.usd.materials.network import number, word
+from wavecomb.usd.materials.pixels import Image, read_image
+from wavecomb.usd.materials.texture import TextureTable
 from wavecomb.usd.stage.context import LoadContext
-from wavecomb.usd.stage.instancing import sound
 
 Matrices = NDArray[np.float64]
 

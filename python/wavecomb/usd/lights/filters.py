@@ -26,8 +26,8 @@ from wavecomb.usd.lights.filter_inputs import (
     kind_of,
     plain_kind,
 )
-from wavecomb.usd.looks.network import asset_file, number, space_of
-from wavecomb.usd.looks.texture import TextureTable
+from wavecomb.usd.materials.network import asset_file, number, space_of
+from wavecomb.usd.materials.texture import TextureTable
 from wavecomb.usd.stage.collections import Collections
 from wavecomb.usd.stage.context import LoadContext
 

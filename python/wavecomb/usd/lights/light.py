@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
+from wavecomb.image.working_space import LUMINANCE, from_rec709
 from wavecomb.light_table import (
     EDITABLE,
     MESH,
@@ -19,12 +20,11 @@ from wavecomb.light_table import (
     light_parameters,
     of_kind,
 )
-from wavecomb.picture.working_space import LUMINANCE, from_rec709
 from wavecomb.usd.lights.dome import DomeReader
 from wavecomb.usd.lights.filter_inputs import Gel, gel_of
 from wavecomb.usd.lights.filters import Filter, FilterReader
-from wavecomb.usd.looks.colour_space import Colour
-from wavecomb.usd.looks.network import (
+from wavecomb.usd.materials.colour_space import Colour
+from wavecomb.usd.materials.network import (
     UDIM,
     asset_file,
     colour,
@@ -33,8 +33,8 @@ from wavecomb.usd.looks.network import (
     space_of,
     tile_files,
 )
-from wavecomb.usd.looks.pixels import Image
-from wavecomb.usd.looks.texture import TextureTable
+from wavecomb.usd.materials.pixels import Image
+from wavecomb.usd.materials.texture import TextureTable
 from wavecomb.usd.stage.collections import Collections, Rules
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.identity import LightGroups

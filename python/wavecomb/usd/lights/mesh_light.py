@@ -9,10 +9,10 @@ import numpy as np
 from pxr import Sdf, UsdLux
 
 from wavecomb.usd.lights.light import LightReader
-from wavecomb.usd.looks.assign import Draw
-from wavecomb.usd.looks.material import MaterialTable
-from wavecomb.usd.looks.network import word
-from wavecomb.usd.looks.surface import Surface
+from wavecomb.usd.materials.assignment import Draw
+from wavecomb.usd.materials.material import MaterialTable
+from wavecomb.usd.materials.network import word
+from wavecomb.usd.materials.surface import Surface
 from wavecomb.usd.stage.context import LoadContext
 
 NO_RESPONSE = "noMaterialResponse"

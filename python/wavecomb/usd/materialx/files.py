@@ -12,8 +12,8 @@ from xml.parsers import expat
 
 from pxr import Ar, UsdShade
 
+from wavecomb.image.files.output_file import kind_of
 from wavecomb.path_maps import mapped, own_maps
-from wavecomb.picture.files import kind_of
 from wavecomb.usd.materialx.library import library
 
 MAX_DEPTH = 64

@@ -16,13 +16,13 @@ from typing import Any
 
 from pxr import Ar, Sdf, Tf, Usd
 
-from wavecomb.run.isolate import trail
+from wavecomb.run.isolation import progress_notes
+from wavecomb.usd.layers.unopened_materialx import unread_mtlx
 from wavecomb.usd.materialx.files import MtlxError, read_document
 from wavecomb.usd.materialx.graphs import Graphs
-from wavecomb.usd.materialx.looks import Materials, write_looks
+from wavecomb.usd.materialx.materials import Materials, write_looks
 from wavecomb.usd.materialx.prims import Prims
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.stage.unread import unread_mtlx
 
 MAX_ROUNDS = 16
 """Most passes over a stage, since a translated file may refer to further files."""
@@ -154,7 +154,7 @@ def _translated(file: str) -> _Translation:
     known = _translations.get(file)
     if known is not None and known.stamp == stamp:
         return known
-    trail.note("translating", file)
+    progress_notes.note("translating", file)
     try:
         layer, report = translate(file)
         error = ""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdShade
 
-from wavecomb.usd.looks.network import colour, word
+from wavecomb.usd.materials.network import colour, word
 from wavecomb.usd.stage.report import LoadReport
 
 MODES = ("origin", "bounds", "cards")

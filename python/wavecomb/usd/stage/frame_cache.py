@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Gf, Sdf, Usd
 
-from wavecomb.usd.looks.texture import TextureCache
+from wavecomb.usd.materials.texture import TextureCache
 from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:

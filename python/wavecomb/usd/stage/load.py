@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from pxr import Tf, Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
+from wavecomb.image.working_space import from_rec709
 from wavecomb.load_options import LoadOptions
 from wavecomb.machine import give_back_memory
-from wavecomb.picture.working_space import from_rec709
-from wavecomb.run.isolate import trail
-from wavecomb.run.isolate.memory import describe_limit
+from wavecomb.run.isolation import progress_notes
+from wavecomb.run.isolation.memory import describe_limit
 from wavecomb.usd import mtlx
 from wavecomb.usd.cameras.camera import (
     View,
@@ -29,32 +29,32 @@ from wavecomb.usd.cameras.camera import (
 )
 from wavecomb.usd.cameras.framing import corners, joined
 from wavecomb.usd.geometry.gprims import COUNTS
+from wavecomb.usd.geometry.screen_size import ViewSize
 from wavecomb.usd.geometry.shutter import find_motion
 from wavecomb.usd.geometry.strands import StrandDetail
-from wavecomb.usd.geometry.surfaces import Surfaces, parse_level
-from wavecomb.usd.geometry.view_size import ViewSize
+from wavecomb.usd.geometry.subdivision import Surfaces, parse_level
+from wavecomb.usd.instances.group import Group, changes_size, light_what_is_drawn, placed_lights
+from wavecomb.usd.instances.group_builder import GroupBuilder, LoadProgress
+from wavecomb.usd.instances.volumes import add_volumes, say_cloudy, say_room
+from wavecomb.usd.layers.opening import open_stage, select_variants, survey
+from wavecomb.usd.layers.population import tell_unloaded
 from wavecomb.usd.lights.dome import Y_TO_Z, soft_dome
 from wavecomb.usd.lights.filters import add_filters
 from wavecomb.usd.lights.ies import IesTable
 from wavecomb.usd.lights.light import LightReader, LinkTable
-from wavecomb.usd.looks.material import MaterialTable
-from wavecomb.usd.looks.texture import MEGABYTE, TextureCache, TextureTable, texture_store
+from wavecomb.usd.materials.material import MaterialTable
+from wavecomb.usd.materials.texture import MEGABYTE, TextureCache, TextureTable, texture_store
+from wavecomb.usd.render_settings.view import Seen, check_view, seen_on
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.diagnostics import NOT_TEXT, captured, commentary
 from wavecomb.usd.stage.frame_cache import FrameCache
-from wavecomb.usd.stage.group import Group, changes_size, light_what_is_drawn, placed_lights
-from wavecomb.usd.stage.groups import GroupBuilder, LoadProgress
 from wavecomb.usd.stage.identity import LightGroups
-from wavecomb.usd.stage.loaded import LoadedStage
-from wavecomb.usd.stage.opening import open_stage, select_variants, survey
+from wavecomb.usd.stage.load_result import LoadedStage
 from wavecomb.usd.stage.origin import WORLD, Origin, find_origin, moved_to
-from wavecomb.usd.stage.population import tell_unloaded
 from wavecomb.usd.stage.ray_visibility import IGNORED, RayVisibility, check_there, set_catchers
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.stage.times import frame_number, time_code
-from wavecomb.usd.stage.traverse import Traversal
-from wavecomb.usd.stage.view_options import Seen, check_view, seen_on
-from wavecomb.usd.stage.volumes import add_volumes, say_cloudy, say_room
+from wavecomb.usd.stage.time_codes import frame_number, time_code
+from wavecomb.usd.stage.traversal import Traversal
 
 if TYPE_CHECKING:
     from wavecomb import _core
@@ -125,12 +125,12 @@ def load_stage(
             raise WavecombError(
                 f"{file}: out of memory while it was read{describe_limit()}"
             ) from None
-        trail.note("building the scene of", file)
+        progress_notes.note("building the scene of", file)
         try:
             scene = builder.build()
         except ValueError as error:
             raise WavecombError(f"{file}: {error}") from error
-        trail.note("rendering", file)
+        progress_notes.note("rendering", file)
     if cache is not None:
         cache.textures = textures.cache(scene)
         cache.end_frame()
@@ -285,7 +285,7 @@ class _Load:
 
     def _limit_textures(self, seen: Seen) -> None:
         """Chooses the mip levels that textures leave out."""
-        from wavecomb.usd.looks.texture_limit import plan_levels
+        from wavecomb.usd.materials.texture_limit import plan_levels
 
         c = self._context
         view = self._camera_view(seen, WORLD, LoadReport())

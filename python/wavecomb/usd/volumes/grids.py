@@ -15,11 +15,11 @@ from pxr import Usd, UsdVol
 
 from wavecomb import vdb
 from wavecomb.errors import WavecombError
-from wavecomb.picture.files import kind_of
-from wavecomb.picture.working_space import from_rec709
-from wavecomb.run.isolate import trail
+from wavecomb.image.files.output_file import kind_of
+from wavecomb.image.working_space import from_rec709
+from wavecomb.run.isolation import progress_notes
 from wavecomb.usd.lights.light import blackbody
-from wavecomb.usd.looks.network import asset_file, word
+from wavecomb.usd.materials.network import asset_file, word
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.volumes.info import GridFacts
@@ -102,7 +102,7 @@ class GridTable:
         """
         key = (field.file, field.grid or field.name, field.index, use, kelvin)
         if key not in self._known:
-            trail.note("reading", field.file)
+            progress_notes.note("reading", field.file)
             try:
                 self._known[key] = self._read(field, use, kelvin)
             except WavecombError as error:

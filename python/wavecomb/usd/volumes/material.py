@@ -7,10 +7,10 @@ import math
 
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
 
-from wavecomb.usd.looks.network import shader_id
-from wavecomb.usd.looks.surface import Surface
+from wavecomb.usd.materials.network import shader_id
+from wavecomb.usd.materials.surface import Surface
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.volumes.look import DEFAULT_LOOK, WHITE, Colour, VolumeLook
+from wavecomb.usd.volumes.optical_properties import DEFAULT_LOOK, WHITE, Colour, VolumeLook
 from wavecomb.usd.volumes.shaders import (
     CLOSURES,
     STANDARD,

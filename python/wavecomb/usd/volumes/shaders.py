@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from pxr import Usd, UsdShade
 
-from wavecomb.usd.looks.network import (
+from wavecomb.usd.materials.network import (
     MAX_DEPTH,
     colour,
     holds_colour,
@@ -23,7 +23,7 @@ from wavecomb.usd.looks.network import (
     word,
 )
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.volumes.look import (
+from wavecomb.usd.volumes.optical_properties import (
     BLACK,
     DENSITY,
     WHITE,

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdGeom, UsdVol
 
 from wavecomb import vdb
-from wavecomb.picture.working_space import from_rec709
-from wavecomb.usd.looks.assign import Draw
-from wavecomb.usd.looks.network import number
+from wavecomb.image.working_space import from_rec709
+from wavecomb.usd.materials.assignment import Draw
+from wavecomb.usd.materials.network import number
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.volumes.grids import Field, Grid, GridTable, read_fields
 from wavecomb.usd.volumes.info import GridFacts
-from wavecomb.usd.volumes.look import BLACK, Colour, VolumeLook
 from wavecomb.usd.volumes.material import VolumeLooks
+from wavecomb.usd.volumes.optical_properties import BLACK, Colour, VolumeLook
 
 GLOW = 1e-4
 """Emission times size from which a volume counts as a light."""

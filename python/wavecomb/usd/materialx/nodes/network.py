@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdShade
 
-from wavecomb.picture.working_space import from_rec709
-from wavecomb.usd.graphs.surface import COLOURS, NORMAL
+from wavecomb.image.working_space import from_rec709
+from wavecomb.usd.graphs.surface_parameters import COLOURS, NORMAL
 from wavecomb.usd.graphs.values import Expressions, Value, fit, numbers
-from wavecomb.usd.looks.network import Source, holds_colour, read_colour, shader_id, source_of
+from wavecomb.usd.materials.network import Source, holds_colour, read_colour, shader_id, source_of
 from wavecomb.usd.materialx.library import WIDTHS, FlatGraph, definition_of, flat_graph
 from wavecomb.usd.materialx.nodes import arnold
-from wavecomb.usd.materialx.nodes.body import Body
-from wavecomb.usd.materialx.nodes.call import OF_MATRICES, Handler, NodeCall
+from wavecomb.usd.materialx.nodes.node import OF_MATRICES, Handler, NodeCall
+from wavecomb.usd.materialx.nodes.node_graphs import Body
 from wavecomb.usd.materialx.nodes.table import CATEGORIES, PRIMITIVES
 from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:
-    from wavecomb.usd.looks.texture import TextureTable
+    from wavecomb.usd.materials.texture import TextureTable
 
 MAX_DEPTH = 100
 """Longest chain of connected nodes."""

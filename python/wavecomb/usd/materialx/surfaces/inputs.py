@@ -10,7 +10,7 @@ import functools
 import math
 from typing import Any
 
-from wavecomb.usd.looks.surface import COLOUR, NUMBER, SWITCH, InputDefinition
+from wavecomb.usd.materials.surface import COLOUR, NUMBER, SWITCH, InputDefinition
 from wavecomb.usd.materialx.surfaces.openpbr import MODELS, LayerInputs, layers_of
 
 _KINDS = {"float": NUMBER, "color3": COLOUR, "boolean": SWITCH}

@@ -1,0 +1,403 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Builds groups of the scene from traversed prims, and instances groups in other groups."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
+
+from wavecomb.usd.geometry.attributes import on_shape
+from wavecomb.usd.geometry.curves import CurveArrays, uniform_scale
+from wavecomb.usd.geometry.gprims import COUNTS, WORDS, GprimReader, add_shape
+from wavecomb.usd.geometry.mesh_arrays import IDENTITY, UV_NAMES, MeshArrays, is_translation
+from wavecomb.usd.geometry.strands import StrandDetail
+from wavecomb.usd.geometry.subdivision import Surfaces
+from wavecomb.usd.instances.group import Group, Matrices, Scope, emitter_of
+from wavecomb.usd.instances.instance_materials import InstanceLooks, InstanceMaterials, Look
+from wavecomb.usd.instances.placement import GroupPlacer, outline_of
+from wavecomb.usd.instances.point_instancer import moved_instances, read_instances
+from wavecomb.usd.instances.volumes import VolumePlacer
+from wavecomb.usd.lights.mesh_light import MeshLights
+from wavecomb.usd.materials.assignment import Assigner, Draw, Worn
+from wavecomb.usd.materials.material import (
+    INHERIT_MATERIAL,
+    BindingScan,
+    MaterialTable,
+    bound_materials,
+)
+from wavecomb.usd.stage.context import LoadContext
+from wavecomb.usd.stage.frame_cache import MeshCache
+from wavecomb.usd.stage.identity import LightGroups
+from wavecomb.usd.stage.memory_check import Room
+from wavecomb.usd.stage.origin import around
+from wavecomb.usd.stage.traversal import STRANDS, Gathered, Placed, Traversal
+
+LoadProgress = Callable[[int, int], None]
+"""Progress callback: progress(prims drawn, prims found so far)."""
+STEP = 512
+"""Prims between two calls of the progress callback."""
+
+_ANY = Usd.PrimIsActive & Usd.PrimIsLoaded
+"""Predicate for prototypes of point instancers, which may be overs or classes."""
+
+MAX_NESTING = 100
+"""Deepest nesting of instances; each level is a recursive call of ``GroupBuilder``."""
+
+
+class GroupBuilder:
+    """Builder of the scene's groups from prims."""
+
+    def __init__(
+        self,
+        context: LoadContext,
+        traversal: Traversal,
+        materials: MaterialTable,
+        light_groups: LightGroups,
+        surfaces: Surfaces,
+        cache: MeshCache | None = None,
+        progress: LoadProgress | None = None,
+        detail: StrandDetail | None = None,
+        notes_emitters: bool = False,
+    ) -> None:
+        """Creates a builder for one load.
+
+        ``cache`` stores mesh arrays between frames. ``progress`` is the progress callback.
+        ``detail`` simplifies curves that are in the world group. ``notes_emitters`` makes groups
+        collect their emissive meshes; ``emits_otherwise`` then says whether there is emission from
+        curves, points or materials of instances, which are not collected.
+        """
+        self.notes_emitters = notes_emitters
+        self.emits_otherwise = False
+        self.context = context
+        self.builder, self.report = context.builder, context.report
+        self.traversal = traversal
+        self.materials = materials
+        self.light_groups = light_groups
+        self.surfaces = surfaces
+        self.gprims = GprimReader(context, surfaces, traversal.skeletons, cache)
+        self.room = Room(context.stage, context.time)
+        self.progress = progress
+        self.detail = detail
+        self.found, self.drawn = 0, 0
+        self.assigner = Assigner(context, materials)
+        self.mesh_lights = MeshLights(context, traversal.lights, materials)
+        self.bindings = BindingScan()
+        self.placer = GroupPlacer(context, self.mesh_lights)
+        self.worn = InstanceMaterials(context, materials)
+        self.looks = InstanceLooks(context, materials)
+        self.volumes = VolumePlacer(context)
+        self._groups: dict[Hashable, Group] = {}
+        self._known: dict[Sdf.Path, UsdShade.Material] = {}
+        self._building: set[Hashable] = set()
+
+    def world(self) -> Group:
+        """Reads the whole stage into group 0."""
+        group = Group("world", number=0)
+        roots = list(self.context.stage.GetPseudoRoot().GetChildren())
+        self._fill(group, roots, Scope(), "default", base=around(self.context.origin))
+        return group
+
+    def _fill(
+        self,
+        group: Group,
+        roots: Sequence[Usd.Prim],
+        scope: Scope,
+        purpose: str,
+        predicate: Any = None,
+        base: Gf.Matrix4d = IDENTITY,
+    ) -> None:
+        """Reads prims and their descendants into a group; ``base`` transforms to its space."""
+        found = self.traversal.walk(roots, purpose, predicate, scope.brings, base)
+        group.lights += found.lights
+        self.room.check(found.draws)
+        self._bind(found, scope)
+        if scope.worn is not None:
+            for draw in found.draws:
+                if scope.override or draw.material is None:
+                    draw.material = scope.worn
+        for draw in found.volumes:
+            self.volumes.add(group, draw, scope)
+        group.holds_placed = group.holds_placed or bool(group.lights or group.volumes)
+        self.found += len(found.draws)
+        for draw in found.stand_ins:
+            for material in draw.subset_materials:
+                if material is not None:
+                    self.materials.expect(material)
+            self._draw(group, draw, scope)
+        for draw in found.draws:
+            self._draw(group, draw, scope)
+            self.drawn += 1
+            if self.progress is not None and self.drawn % STEP == 0:
+                self.progress(self.drawn, self.found)
+        self._place_instances(group, found.instances, scope)
+        for placed in found.instancers:
+            self._place_instancer(group, placed, scope)
+
+    def _bind(self, found: Gathered, scope: Scope) -> None:
+        """Resolves all material bindings of a group together."""
+        if scope.override:
+            return
+        prims = found.binding_prims()
+        if scope.alias is not None:
+            prims = [self._proxy(prim, scope.alias) for prim in prims]
+        # Use one object per material, since tables find it faster by identity than by path.
+        known = self._known
+        bound = found.bind(
+            None if material is None else known.setdefault(material.GetPath(), material)
+            for material in bound_materials(prims, self.context.binding_purposes)
+        )
+        used = {id(material): material for material in bound if material is not None}
+        for material in used.values():
+            self.materials.expect(material)
+
+    def _proxy(self, prim: Usd.Prim, alias: tuple[Sdf.Path, Sdf.Path]) -> Usd.Prim:
+        path = prim.GetPath().ReplacePrefix(*alias)
+        return self.context.stage.GetPrimAtPath(path) or prim
+
+    def _draw(self, group: Group, draw: Draw, scope: Scope) -> None:
+        """Adds one gprim to a group."""
+        kind = draw.kind
+        baked = kind == "mesh" and self.gprims.deforms(kind, draw.prim)
+        if draw.track is not None and not baked:
+            steps = draw.track.steps()
+            still = replace(draw, matrix=draw.matrix if steps is None else IDENTITY, track=None)
+            if steps is None:
+                return self._draw(group, still, scope)
+            return self._draw_alone(group, still, draw.matrix, scope, steps)
+        is_turned = kind == "splats" and not is_translation(draw.matrix)
+        if is_turned or (kind in STRANDS.values() and uniform_scale(draw.matrix) is None):
+            own = replace(draw, matrix=IDENTITY)
+            return self._draw_alone(group, own, draw.matrix, scope)
+        if kind == "splats":
+            if draw.material is not None:
+                self.report.missing("materials of splats (they have colours)", draw.prim.GetPath())
+            draw = replace(draw, material=None, subsets=(), subset_materials=[])
+        if scope.override:
+            draw.subsets = ()
+        lamp = self.mesh_lights.of(draw, kind)
+        if lamp is not None and lamp.material is not None:
+            draw = replace(draw, material=None, subsets=(), subset_materials=[])
+        names = self.assigner.uv_names(draw)
+        if scope.inside and draw.material is None and not names:
+            names = UV_NAMES
+        path = str(draw.prim.GetPath())
+        in_world = group.number == 0
+        shape = self.gprims.read(draw, names, in_world, self.detail if in_world else None)
+        if shape is None:
+            return
+        if lamp is not None and lamp.material is not None:
+            worn = Worn(lamp.material)
+        elif kind == "splats":
+            worn = Worn(self.materials.splats())
+        else:
+            worn = self._materials(draw, shape, scope)
+        material, faces = worn.material, None
+        if worn.by_face is not None and isinstance(shape, MeshArrays) and shape.topology:
+            faces = worn.by_face[shape.topology.face_ids()]
+        name = self.report.place(path)
+        emits = self.materials.any_emits(material, faces)
+        may_shine = lamp is not None or material == INHERIT_MATERIAL or emits
+        if self.notes_emitters and emits:
+            if isinstance(shape, MeshArrays):
+                group.emitters.append(emitter_of(shape, material, faces))
+                group.holds_placed = True
+            else:
+                self.emits_otherwise = True
+        options: dict[str, Any] = {
+            "material": material,
+            "name": name,
+            "asset_length": self.placer.asset_length(draw.prim, path, name, draw.parent),
+        }
+        if faces is not None:
+            options["face_materials"] = faces
+        if worn.reads:
+            mirrored = draw.matrix.GetDeterminant3() < 0
+            options["attributes"] = on_shape(worn.reads, shape, mirrored)
+        if may_shine:
+            options["light_group"] = self.light_groups.of(draw.prim, draw.inherited)
+        if lamp is not None:
+            options["mesh_light"] = lamp.number
+            if lamp.is_sampled_only:
+                group.sampled_lamp = draw.prim.GetPath()
+                if kind == "mesh" and self.gprims.deforms(kind, draw.prim):
+                    self.mesh_lights.say_moving(group.sampled_lamp)
+        try:
+            number = add_shape(self.builder, shape, options)
+        except ValueError as error:
+            self.report.warn(f"{WORDS[kind]} left out: {error}")
+            return
+        self.builder.add_to_group(self.placer.number(group), number)
+        group.grow(shape.bounds)
+        if self.context.framed is not None:
+            more = self.context.framed if group.number == 0 else None
+            group.reach(outline_of(shape, self.surfaces, more), more)
+        if isinstance(shape, MeshArrays) and shape.cage is not None:
+            self.surfaces.add(group, number, draw, shape, worn)
+        self.report.tally(COUNTS[kind])
+
+    def _draw_alone(
+        self,
+        group: Group,
+        draw: Draw,
+        matrix: Gf.Matrix4d,
+        scope: Scope,
+        steps: Matrices | None = None,
+    ) -> None:
+        """Adds a gprim as a separate instance with the transform ``matrix``.
+
+        Used for rigid motion with transforms ``steps`` (s, 4, 4), for curves or points under
+        non-uniform scale, and for rotated splats, whose colours depend on direction.
+        """
+        path = draw.prim.GetPath()
+        child = Group(str(path), self.report.place(path))
+        self._draw(child, draw, scope)
+        if child.empty:
+            return
+        inherit = np.array([INHERIT_MATERIAL], np.uint32)
+        motion = None if steps is None else steps[None]
+        self.placer.add(group, child, np.array(matrix)[None], inherit, [draw.prim], motion=motion)
+
+    def _materials(self, draw: Draw, mesh: MeshArrays | CurveArrays, scope: Scope) -> Worn:
+        inherits = draw.material is None and scope.bound and not any(draw.subset_materials)
+        if (scope.override and scope.worn is None) or inherits:
+            return Worn(INHERIT_MATERIAL)
+        return self.assigner.assign(draw, mesh, INHERIT_MATERIAL if scope.inside else None)
+
+    def _group(
+        self,
+        key: Hashable,
+        name: str,
+        root: Sdf.Path,
+        roots: Sequence[Usd.Prim],
+        scope: Scope,
+        purpose: str,
+        predicate: Any = None,
+    ) -> Group | None:
+        """Returns the group of some prims, built once.
+
+        Warns and returns None if it contains itself.
+        """
+        known = self._groups.get(key)
+        if known is not None:
+            return known
+        if key in self._building:
+            self.report.warn("prototype contains itself: left out", name)
+            return None
+        if len(self._building) == MAX_NESTING:
+            what = f"instances in instances, more than {MAX_NESTING} deep: left out"
+            self.report.warn(what, name)
+            return None
+        self._building.add(key)
+        try:
+            group = Group(name, self.report.place(root))
+            self._fill(group, roots, scope, purpose, predicate)
+        finally:
+            self._building.discard(key)
+        self._groups[key] = group
+        return group
+
+    def _place_instances(self, parent: Group, instances: Sequence[Placed], scope: Scope) -> None:
+        """Adds native instances, grouped by prototype."""
+        batches: dict[tuple[int, int], tuple[Group, list[tuple[Any, ...]]]] = {}
+        for placed in instances:
+            child = self._instance_group(placed, scope)
+            if child is None:
+                continue
+            material = self.worn.of_instance(placed, scope)
+            if self.materials.any_emits(material, None):
+                self.emits_otherwise = True
+            steps = None if placed.track is None else placed.track.steps()
+            count = 0 if steps is None else len(steps)
+            _, batch = batches.setdefault((id(child), count), (child, []))
+            batch.append((np.array(placed.matrix), material, placed.prim, steps))
+        for (_, count), (child, batch) in batches.items():
+            matrices, materials, prims, moves = zip(*batch, strict=True)
+            ids = np.array(materials, np.uint32)
+            motion = np.stack(moves) if count else None
+            self.placer.add(parent, child, np.stack(matrices), ids, prims, motion=motion)
+        self.report.tally("instances", len(instances))
+
+    def _instance_group(self, placed: Placed, scope: Scope) -> Group | None:
+        prim = placed.prim
+        prototype = prim.GetPrototype()
+        path = prototype.GetPath()
+        proxy = self._proxy(prim, scope.alias) if scope.alias else prim
+        strong, collections = self.bindings.above(proxy)
+        override = scope.override or (strong and not collections)
+        alias, exact = None, None
+        if not override and (collections or scope.alias is not None):
+            alias = (path, proxy.GetPath())
+            exact = self.worn.of_proxies(proxy)
+        bound = placed.material is not None or (scope.bound and not override)
+        look = self.looks.of_instance(placed, proxy, scope)
+        inner = look.on(Scope(True, bound and alias is None, override, alias, path))
+        key = ("native", path, inner.bound, override, placed.purpose, exact, look.key)
+        roots = list(prototype.GetChildren())
+        return self._group(key, str(prim.GetPath()), path, roots, inner, placed.purpose)
+
+    def _place_instancer(self, parent: Group, placed: Placed, scope: Scope) -> None:
+        """Adds a point instancer, grouped by prototype."""
+        prim = placed.prim
+        path = prim.GetPath()
+        targets = UsdGeom.PointInstancer(prim).GetPrototypesRel().GetForwardedTargets()
+        self.report.tally("point instancers")
+        instances = read_instances(prim, self.context.time, len(targets), self.report)
+        if instances is None or len(instances.kept) == 0:
+            return
+        materials = self.worn.of_instancer(placed, instances.authored, scope)[instances.kept]
+        order = np.argsort(instances.prototypes, kind="stable")
+        ranked = instances.prototypes[order]
+        outer = None if placed.matrix == IDENTITY else np.array(placed.matrix)
+        moved, shutter = None, self.context.motion
+        if shutter is not None:
+            moved = moved_instances(prim, shutter, placed.track, outer, instances, self.report)
+        for index, target in enumerate(targets):
+            first, last = np.searchsorted(ranked, [index, index + 1])
+            if first == last:
+                continue
+            root = self.context.stage.GetPrimAtPath(target)
+            if not root:
+                self.report.warn(f"point instancer prototype {target} is not there", path)
+                continue
+            of_root = order[first:last]
+            for which, look in self.looks.of_points(
+                placed, root, instances.kept[of_root], instances.authored, _ANY
+            ):
+                child = self._prototype_group(root, placed, scope, look)
+                if child is None:
+                    continue
+                chosen = of_root[which]
+                transforms = instances.transforms[chosen]
+                if outer is not None:
+                    transforms = transforms @ outer
+                numbers = instances.kept[chosen].astype(np.uint32)
+                motion = None if moved is None else np.ascontiguousarray(moved[chosen])
+                ids = materials[chosen]
+                self.placer.add(parent, child, transforms, ids, [prim], numbers, motion)
+        self.report.tally("point instances", len(instances.kept))
+
+    def _prototype_group(
+        self, root: Usd.Prim, placed: Placed, scope: Scope, look: Look
+    ) -> Group | None:
+        """Returns the group of a point instancer's prototype."""
+        path = root.GetPath()
+        within = path.HasPrefix(scope.root) and scope.inside
+        inner = look.on(
+            Scope(
+                True,
+                scope.bound and within,
+                scope.override and within,
+                scope.alias if within else None,
+                scope.root if within else path,
+                scope.worn if within else None,
+            )
+        )
+        worn = None if inner.worn is None else inner.worn.GetPath()
+        key = (
+            "point", path, inner.bound, inner.override, placed.purpose, inner.alias, look.key, worn,
+        )  # fmt: skip
+        return self._group(key, str(path), path, [root], inner, placed.purpose, _ANY)

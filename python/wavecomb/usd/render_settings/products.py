@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads the render settings of a file before it is loaded."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from pxr import Usd
+
+from wavecomb.usd.layers.opening import open_render_settings
+from wavecomb.usd.render_settings.reader import read_choices
+from wavecomb.usd.render_settings.values import RenderChoice
+from wavecomb.usd.stage.diagnostics import captured
+from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.stage.time_codes import frame_number, time_code
+
+
+def peek_products(
+    file: str | Path,
+    render_settings: str | None = None,
+    product: str | None = None,
+    session_layer: str | Path | None = None,
+) -> tuple[list[RenderChoice], Usd.Stage]:
+    """Reads the render settings of a file; returns one choice per product, at least one.
+
+    Composes nothing else and reports nothing, since loading the stage repeats all messages. Keeping
+    the returned stage alive until then avoids reading its layers twice.
+
+    Args:
+        file: .usd, .usda, .usdc or .usdz.
+        render_settings: Path or name of a RenderSettings prim.
+        product: Path or name of the only product to render.
+        session_layer: File with opinions that are stronger than the stage's.
+
+    Raises:
+        WavecombError: A file cannot be read, or the settings or product do not exist.
+    """
+    unread = LoadReport()
+    with captured(unread):
+        layer = None if session_layer is None else Path(session_layer)
+        stage = open_render_settings(Path(file), render_settings, layer)
+        choices = read_choices(stage, render_settings, product, unread)
+        start = frame_number(time_code(stage, None))
+        return [replace(choice, start=start) for choice in choices], stage
