@@ -3,8 +3,8 @@
 
 ``layers`` opens stages, ``render_settings`` reads their settings, ``stage`` loads them into a
 scene, and ``instances`` builds groups. ``geometry``, ``lights``, ``cameras`` and ``volumes`` read
-one kind of prim each; ``materials``, ``graphs`` and ``materialx`` convert shader networks to programs with
-parameters.
+one kind of prim each; ``materials``, ``graphs`` and ``materialx`` convert shader networks to
+programs with parameters.
 
 Names are imported on first use, since most of them load OpenUSD.
 """
