@@ -16,8 +16,8 @@ import pytest
 from bench_results import everything, policy_rows, runs_of, write_folder
 
 from wavecomb.bench.analysis.data import load
-from wavecomb.bench.report.page import LARGEST_PNG, LARGEST_SVG, build, equality, warnings_of
-from wavecomb.bench.report.parts import number, table
+from wavecomb.bench.reports.page import LARGEST_PNG, LARGEST_SVG, build, equality, warnings_of
+from wavecomb.bench.reports.parts import number, table
 from wavecomb.image.files.image import read_image
 
 HTML = "{http://www.w3.org/1999/xhtml}"

@@ -10,7 +10,7 @@ import pytest
 from pxr import Usd, UsdGeom, UsdShade
 
 from wavecomb.scenes import write_scene
-from wavecomb.scenes.kitchen.materials import LOOKS
+from wavecomb.scenes.rooms.kitchen_materials import LOOKS
 
 TOP = 0.92
 

@@ -14,7 +14,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
 import wavecomb
 from wavecomb.scenes import write_scene
 from wavecomb.scenes.models.shapes import disc, pillow, rounded_box, tube, turned
-from wavecomb.scenes.room.materials import LOOKS, ROOM_TEXTURES
+from wavecomb.scenes.rooms.room_materials import LOOKS, ROOM_TEXTURES
 
 SMALL: dict[str, Any] = {"triangles": 12_000, "teapot_level": 4, "texture_size": 64}
 ROOM = ((0.0, 0.0, 0.0), (5.0, 2.7, 4.0))

@@ -184,7 +184,7 @@ def report_command(folder: str, markdown: str | None) -> None:
     if not (Path(folder) / "runs.csv").is_file():
         raise WavecombError(f"{folder}: holds no runs.csv; `wavecomb bench run` makes it")
     try:
-        build = import_module("wavecomb.bench.report.page").build
+        build = import_module("wavecomb.bench.reports.page").build
     except ImportError as error:
         raise WavecombError(
             f"bench report: {error.name} is missing; run `{install_command('bench')}`"

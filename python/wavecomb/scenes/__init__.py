@@ -26,11 +26,11 @@ from wavecomb.scenes.drinks import build_drinks
 from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.hair import build_fur, build_head
 from wavecomb.scenes.heavy import build_heavy
-from wavecomb.scenes.kitchen.kitchen import build_kitchen
 from wavecomb.scenes.lights import build_lights, build_studio
 from wavecomb.scenes.mixed import build_dragon, build_mixed
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.room.room import build_room
+from wavecomb.scenes.rooms.kitchen import build_kitchen
+from wavecomb.scenes.rooms.room import build_room
 from wavecomb.scenes.splats import build_splats
 from wavecomb.scenes.spread import build_spread
 from wavecomb.scenes.volumes import build_clouds, build_fog, build_smoke

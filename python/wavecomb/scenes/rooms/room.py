@@ -17,9 +17,9 @@ from wavecomb.scenes.models.groups import Part, add_instance, add_object, add_pr
 from wavecomb.scenes.models.shapes import placed, rounded_box
 from wavecomb.scenes.models.teapot import teapot
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.room import furniture, tableware, wall
-from wavecomb.scenes.room.materials import write_looks
-from wavecomb.scenes.room.shell import DEPTH, HEIGHT, WIDTH, build_shell
+from wavecomb.scenes.rooms import furniture, tableware, wall
+from wavecomb.scenes.rooms.room_materials import write_looks
+from wavecomb.scenes.rooms.shell import DEPTH, HEIGHT, WIDTH, build_shell
 
 COLUMNS_A_LEVEL = 4
 """Cells around a body of revolution, for each unit of ``SceneOptions.teapot_level``."""

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 from wavecomb.scenes.authoring.materials import Colour, MaterialInfo, preview
-from wavecomb.scenes.room.materials import LOOKS as ROOM_LOOKS
-from wavecomb.scenes.room.materials import coated
+from wavecomb.scenes.rooms.room_materials import LOOKS as ROOM_LOOKS
+from wavecomb.scenes.rooms.room_materials import coated
 
 MARBLE_METRES = 0.9
 """Edge of the area that the image ``marble`` covers in this scene, in metres."""

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 from wavecomb.bench.analysis.data import SETTINGS, load
 from wavecomb.bench.figures.style import style
-from wavecomb.bench.report import images
-from wavecomb.bench.report.experiment import experiment, suite
-from wavecomb.bench.report.parts import (
+from wavecomb.bench.reports import images
+from wavecomb.bench.reports.experiment import experiment, suite
+from wavecomb.bench.reports.parts import (
     Code,
     Facts,
     Figure,

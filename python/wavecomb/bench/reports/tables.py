@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from wavecomb.bench.analysis.data import BOUNDS
 from wavecomb.bench.figures.style import count_words, fixed
-from wavecomb.bench.report.parts import Cell, Table, interval, number, table
+from wavecomb.bench.reports.parts import Cell, Table, interval, number, table
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -23,7 +23,7 @@ from wavecomb.scenes.models.shapes import (
     turn_about,
     turned,
 )
-from wavecomb.scenes.room.textures import RUG_METRES
+from wavecomb.scenes.rooms.textures import RUG_METRES
 
 TABLE_TOP = 0.74
 """Height of the table."""

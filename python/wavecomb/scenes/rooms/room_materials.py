@@ -7,7 +7,7 @@ from wavecomb.scenes.authoring.materials import Colour, MaterialInfo, preview
 from wavecomb.scenes.authoring.stage import StageWriter
 from wavecomb.scenes.authoring.textures import TextureInfo
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.room import textures as images
+from wavecomb.scenes.rooms import textures as images
 
 MARBLE_METRES = 0.45
 """Edge of the area that the image ``marble`` covers in this scene, in metres."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from wavecomb.bench.analysis.data import in_order
 from wavecomb.bench.figures.forest import difference_figure
 from wavecomb.bench.figures.style import Drawn
-from wavecomb.bench.report.parts import Viewer, key_of
+from wavecomb.bench.reports.parts import Viewer, key_of
 from wavecomb.errors import WavecombError
 from wavecomb.image.embedded import data_uri, smaller
 from wavecomb.image.files.image import display, read_image

@@ -14,8 +14,8 @@ from wavecomb.bench.columns import COUNTER_COLUMNS
 from wavecomb.bench.figures import forest, runs
 from wavecomb.bench.figures.style import count_words, fixed
 from wavecomb.bench.oracle import BEST, COSTS, WORST
-from wavecomb.bench.report.parts import Text, Writer, interval, key_of
-from wavecomb.bench.report.tables import (
+from wavecomb.bench.reports.parts import Text, Writer, interval, key_of
+from wavecomb.bench.reports.tables import (
     calibration_table,
     effects_table,
     mean_table,
