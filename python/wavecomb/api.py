@@ -15,12 +15,12 @@ from wavecomb.load_options import LoadOptions, split
 from wavecomb.run import aovs as aov_names
 from wavecomb.run import catchers, live_view
 from wavecomb.run.callbacks import CheckpointSink, Sink, Watcher
-from wavecomb.run.guiding_file import check_taught, learned_of
+from wavecomb.run.guiding_file import check_trains_field, learned_of
 from wavecomb.run.settings import DEFAULT_SIZE, check_memory, check_options, prepare
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Scene, Settings
-    from wavecomb.run.live_view import Shown
+    from wavecomb.run.live_view import ProgressDisplays
     from wavecomb.scheduling import SchedulingPolicy
     from wavecomb.usd import LoadedStage
 
@@ -177,7 +177,7 @@ def render(
         names = aov_names.with_others(names, [catchers.LAYER])
     learned = learned_of(learn_from)
     if learned is not None:
-        check_taught(chosen, "learn_from")
+        check_trains_field(chosen, "learn_from")
     again = loaded if loaded is source else None
     told, asked = (progress, False) if callable(progress) else (None, progress)
     space = "rec709" if loaded is None else loaded.working_space
@@ -233,7 +233,7 @@ def _keeping(
     checkpoint: str | os.PathLike[str] | None,
     every: float,
     resume: str | os.PathLike[str] | None,
-    shown: Shown | None,
+    shown: ProgressDisplays | None,
 ) -> tuple[Watcher | None, dict[str, Any] | None]:
     """Returns a watcher for checkpoints and progress, and the state from which to continue."""
     sinks: list[Sink] = [] if shown is None else list(shown.sinks)

@@ -6,7 +6,7 @@ import pytest
 from usd_recorder import load, said
 
 import wavecomb
-from wavecomb.usd.geometry.invalid_points import steadied
+from wavecomb.usd.geometry.invalid_points import replace_invalid_steps
 
 NAN = float("nan")
 
@@ -130,11 +130,11 @@ def test_points_that_are_bad_at_a_step_of_the_shutter():
     middle = np.full((3, 3), 0.5, np.float32)
     first[1, 0] = middle[1, 1] = np.nan
     last[2] = first[2] = middle[2] = np.inf
-    found = steadied([first, middle, last])
+    found = replace_invalid_steps([first, middle, last])
     assert [shape[1].tolist() for shape in found] == [[1, 1, 1]] * 3
     assert [shape[2].tolist() for shape in found] == [[0] * 3, [0.5] * 3, [1] * 3]
     same = [np.zeros((2, 3), np.float32)] * 2
-    assert steadied(same)[0] is same[0]
+    assert replace_invalid_steps(same)[0] is same[0]
 
 
 def test_the_picture_has_the_other_faces(tmp_path):

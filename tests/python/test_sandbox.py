@@ -368,7 +368,7 @@ def test_required_and_not_there(place: Path, monkeypatch: pytest.MonkeyPatch) ->
     result = CliRunner().invoke(main, words)
     assert result.exit_code == 2 and "there is no child process" in result.stderr
     monkeypatch.setattr(sandbox, "obstacle", lambda: "bubblewrap is not installed")
-    monkeypatch.setattr(supervisor, "is_wise", lambda: True)
+    monkeypatch.setattr(supervisor, "can_fork", lambda: True)
     result = CliRunner().invoke(main, words)
     assert result.exit_code == 2
     assert result.stderr == "error: --sandbox on: bubblewrap is not installed\n"

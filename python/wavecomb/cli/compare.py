@@ -114,11 +114,11 @@ def compare_command(
     from wavecomb.errors import WavecombError
     from wavecomb.image.compare.comparison import compare
     from wavecomb.image.files.output_file import check_writable
-    from wavecomb.image.thumbnails import Look
+    from wavecomb.image.thumbnails import DisplayOptions
 
     # Pages and wipes show the beauty, not the denoised layer, because the metrics compare the
     # beauty.
-    look = Look(denoised=False, exposure=exposure, tone_map=tone_map)
+    look = DisplayOptions(denoised=False, exposure=exposure, tone_map=tone_map)
     for name, file, ending in (("--page", page, ".html"), ("--wipe", wipe, ".png")):
         if file is not None and not file.lower().endswith(ending):
             raise WavecombError(f"{name} {file}: the name must end in {ending}")

@@ -148,7 +148,7 @@ class Job:
 
         If stopped, fills the rest with empty bands.
         """
-        from wavecomb.image.files.band_writer import GrowingFiles
+        from wavecomb.image.files.band_writer import BandFiles
         from wavecomb.image.rendered import picture_of, window_of
         from wavecomb.run.bands import render_bands, sum_stats, without_samples
         from wavecomb.run.callbacks import Watcher
@@ -160,7 +160,7 @@ class Job:
         parts: list[dict[str, Any]] = []
         costs: Any = None
         broken = 0
-        files = GrowingFiles(
+        files = BandFiles(
             names.output,
             names.png,
             height=height,

@@ -19,7 +19,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.options import settings as known_settings
 from wavecomb.run import aovs as aov_names
 from wavecomb.run.frame_names import fill, has_place
-from wavecomb.run.guiding_file import BEFORE, ENDING, Learning, check_taught, learned_of
+from wavecomb.run.guiding_file import BEFORE, ENDING, Learning, check_trains_field, learned_of
 
 if TYPE_CHECKING:
     from wavecomb.run.checkpoint import Checkpoint
@@ -138,7 +138,7 @@ class Asked:
         """Raises WavecombError if path guiding learns nothing with such settings."""
         for option, given in (("--learn-from", self.learn_from), ("--learn-to", self.learn_to)):
             if given is not None:
-                check_taught(settings, f"{option} {given}")
+                check_trains_field(settings, f"{option} {given}")
 
     def check_deep(self) -> None:
         """Raises WavecombError if --aov requests deep samples, which are not a layer."""

@@ -54,7 +54,7 @@ def sheet_command(pictures: tuple[str, ...], output: str, **options: Any) -> Non
     from wavecomb.errors import WavecombError
     from wavecomb.image.files.collection import collect
     from wavecomb.image.files.output_file import check_writable
-    from wavecomb.image.thumbnails import Look
+    from wavecomb.image.thumbnails import DisplayOptions
 
     ending = os.path.splitext(output)[1].lower()
     if ending not in (".png", ".html"):
@@ -63,7 +63,9 @@ def sheet_command(pictures: tuple[str, ...], output: str, **options: Any) -> Non
     if os.path.realpath(output) in map(os.path.realpath, found.values()):
         raise WavecombError(f"-o {output}: is one of the pictures")
     check_writable(output)
-    look = Look(options["layer"], exposure=options["exposure"], tone_map=options["tone_map"])
+    look = DisplayOptions(
+        options["layer"], exposure=options["exposure"], tone_map=options["tone_map"]
+    )
     if ending == ".png":
         _write_sheet(found, output, look, options)
     else:

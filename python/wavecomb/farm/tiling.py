@@ -193,17 +193,17 @@ def needs_whole(settings: Mapping[str, Any]) -> str:
     return ""
 
 
-def is_better_whole(settings: Mapping[str, Any], is_taught: bool = False) -> bool:
+def is_better_whole(settings: Mapping[str, Any], has_guiding_field: bool = False) -> bool:
     """Returns whether each tile has a high cost in addition to its pixels.
 
     This is the case for a border, for training a guiding field, and for tracing all light paths.
-    ``is_taught`` says that the guiding field is already trained.
+    ``has_guiding_field`` says that the guiding field is already trained.
     """
     learns = settings.get("guiding", "off") != "off" or settings.get("roulette") == "efficient"
     return (
         bool(settings.get("adaptive"))
         or settings.get("transport") in ("light", "bdpt", "auto")
-        or (learns and not is_taught)
+        or (learns and not has_guiding_field)
     )
 
 

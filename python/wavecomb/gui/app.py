@@ -72,7 +72,7 @@ def run(
     """Shows the window until it is closed, and returns the exit code."""
     application = make_application()
     from wavecomb.gui.main_window import MainWindow
-    from wavecomb.usd.stage.diagnostics import Listening
+    from wavecomb.usd.stage.diagnostics import DiagnosticListener
 
     window = MainWindow(setup)
     theme.apply(str(window.settings.value("theme", theme.SYSTEM)))
@@ -85,7 +85,7 @@ def run(
     beat = QTimer(window)
     beat.start(200)
     # USD also reports problems during edits and when panels read the stage. Add them to the notes.
-    listening = Listening()
+    listening = DiagnosticListener()
     beat.timeout.connect(lambda: window.session.note_words(listening.take()))
     window.show()
     if stage is not None:

@@ -72,7 +72,7 @@ class Legend:
 
 
 @dataclass(frozen=True)
-class Shown:
+class DisplayLayer:
     """A layer converted for display.
 
     Attributes:
@@ -96,7 +96,7 @@ def show_layer(
     *,
     low: float | None = None,
     high: float | None = None,
-) -> Shown:
+) -> DisplayLayer:
     """Converts a layer for display.
 
     Args:
@@ -108,25 +108,27 @@ def show_layer(
     """
     array = np.asarray(layer)
     if is_light(name):
-        return Shown(develop(array))
+        return DisplayLayer(develop(array))
     if name in _COLOURS:
-        return Shown(image.display(array))
+        return DisplayLayer(image.display(array))
     if name in _NORMALS:
-        return Shown(_codes(0.5 * array + 0.5))
+        return DisplayLayer(_codes(0.5 * array + 0.5))
     if name in _IDS:
-        return Shown(id_colours(array.reshape(array.shape[:2])))
+        return DisplayLayer(id_colours(array.reshape(array.shape[:2])))
     if name.startswith(_CRYPTO):
-        return Shown(id_colours(np.ascontiguousarray(array[:, :, 0], np.float32).view(np.uint32)))
+        return DisplayLayer(
+            id_colours(np.ascontiguousarray(array[:, :, 0], np.float32).view(np.uint32))
+        )
     if name == "uv":
         wide = np.zeros((*array.shape[:2], 3), np.float32)
         wide[:, :, :2] = array - np.floor(array)
-        return Shown(_codes(wide))
+        return DisplayLayer(_codes(wide))
     if name == "motion":
         wide = np.zeros((*array.shape[:2], 3), np.float32)
         wide[:, :, :2] = array / max(float(np.abs(array).max()), 1e-6)
-        return Shown(_codes(0.5 * wide + 0.5))
+        return DisplayLayer(_codes(0.5 * wide + 0.5))
     if name == "position":
-        return Shown(_codes(_stretched(array)))
+        return DisplayLayer(_codes(_stretched(array)))
     if array.ndim == 3:
         # A variance is infinite while it is unknown.
         with np.errstate(invalid="ignore"):
@@ -139,7 +141,7 @@ def heat(
     name: str,
     low: float | None = None,
     high: float | None = None,
-) -> Shown:
+) -> DisplayLayer:
     """Converts values to false colours; values that are not finite become cyan.
 
     Args:
@@ -171,7 +173,7 @@ def heat(
     index = (np.clip(position, 0.0, 1.0) * (len(table) - 1) + 0.5).astype(np.intp)
     pixels = table[index]
     pixels[~finite] = NOT_FINITE
-    return Shown(pixels, Legend(_UNITS.get(name, name), least, most, logarithmic))
+    return DisplayLayer(pixels, Legend(_UNITS.get(name, name), least, most, logarithmic))
 
 
 def ramp(width: int) -> NDArray[np.uint8]:

@@ -38,7 +38,7 @@ def _counted() -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Merged:
+class MergedImage:
     """The merged image.
 
     Attributes:
@@ -66,7 +66,7 @@ class _Source:
     seeds: tuple[int, ...]
 
 
-def merge(paths: Sequence[str | os.PathLike[str]]) -> Merged:
+def merge(paths: Sequence[str | os.PathLike[str]]) -> MergedImage:
     """Merges images pixel by pixel, weighted by their sample counts.
 
     Sums sample counts and costs. Combines variances and errors to those of the merged image.
@@ -119,7 +119,7 @@ def merge(paths: Sequence[str | os.PathLike[str]]) -> Merged:
     metadata, beyond = _metadata(sources, all_seeds), _overscan(first)
     height, width = sums["samples"].shape[:2]
     window = (-beyond, -beyond, width - 2 * beyond, height - 2 * beyond) if beyond else None
-    return Merged(_means(sums, pairs), metadata, names, all_seeds, window)
+    return MergedImage(_means(sums, pairs), metadata, names, all_seeds, window)
 
 
 def _overscan(source: _Source) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.image.embedded import Kind, data_uri
-from wavecomb.image.thumbnails import Look, fitted
+from wavecomb.image.thumbnails import DisplayOptions, fitted
 
 MOST_FRAMES = 1000
 """Most images of a page."""
@@ -50,8 +50,8 @@ def document(title: str, facts: str, body: str) -> str:
 
 
 def sequence_page(
-    pictures: Mapping[str, str], look: Look, *, title: str, fps: float = 24.0, width: int = 960,
-    kind: Kind = "jpeg",
+    pictures: Mapping[str, str], look: DisplayOptions, *, title: str, fps: float = 24.0,
+    width: int = 960, kind: Kind = "jpeg",
 ) -> str:  # fmt: skip
     """Returns a page that plays images, with a contact sheet of all images below.
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Look:
+class DisplayOptions:
     """Display options of image files.
 
     Attributes:
@@ -111,7 +111,7 @@ _SHAPE = 1.6
 
 
 def contact_sheet(
-    pictures: Mapping[str, str], look: Look, *, width: int = 240, columns: int = 0
+    pictures: Mapping[str, str], look: DisplayOptions, *, width: int = 240, columns: int = 0
 ) -> Codes:
     """Arranges small images in a grid, each with its name below.
 

@@ -50,7 +50,7 @@ class Learning:
             self.given = result.learned
 
 
-def check_taught(settings: Settings, option: str) -> None:
+def check_trains_field(settings: Settings, option: str) -> None:
     """Raises WavecombError if a render with these settings trains no guiding field."""
     chosen = settings.to_dict()
     if chosen["guiding"] == "off" and chosen["roulette"] != "efficient":

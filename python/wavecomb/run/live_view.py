@@ -28,7 +28,7 @@ BAR_EVERY_S = 0.25
 
 
 @dataclass(frozen=True)
-class Shown:
+class ProgressDisplays:
     """Progress displays of a render, for ``Watcher``."""
 
     reporter: Silent
@@ -36,7 +36,7 @@ class Shown:
 
 
 @contextlib.contextmanager
-def watching(asked: bool | None, space: str = "rec709") -> Iterator[Shown | None]:
+def watching(asked: bool | None, space: str = "rec709") -> Iterator[ProgressDisplays | None]:
     """Shows a render inside the block; yields None if there is no display.
 
     Args:
@@ -47,9 +47,9 @@ def watching(asked: bool | None, space: str = "rec709") -> Iterator[Shown | None
     if asked is not False:
         if in_notebook():
             view = make_view()
-            shown = Shown(LiveProgress(view), [LivePicture(view, space)])
+            shown = ProgressDisplays(LiveProgress(view), [LivePicture(view, space)])
         elif asked and (console := progress_console()) is not None:
-            shown = Shown(ProgressBar(console))
+            shown = ProgressDisplays(ProgressBar(console))
     if shown is None:
         yield None
         return

@@ -80,7 +80,7 @@ class Frames:
         # Different renders of a stage with catchers see different prims.
         is_same = self._renderer is not None and options.catch == self._caught
         self._caught = options.catch
-        loaded = self._seen_anew(options) if is_same else None
+        loaded = self._with_camera(options) if is_same else None
         if loaded is None:
             # Release these first, since two sets of acceleration structures would double the
             # memory.
@@ -91,17 +91,17 @@ class Frames:
         self._loaded = replace(loaded, seconds=seconds, stage_path=self._path)
         return self._loaded
 
-    def _seen_anew(self, options: LoadOptions) -> LoadedStage | None:
+    def _with_camera(self, options: LoadOptions) -> LoadedStage | None:
         """Returns the current scene with its camera at a frame.
 
         Returns None if more than the camera changes.
         """
         before, renderer = self._loaded, self._renderer
         assert before is not None and renderer is not None
-        seen = self._reader.look(options)
-        if seen is None:
+        update = self._reader.read_camera(options)
+        if update is None:
             return None
-        found = seen.as_dict()
+        found = update.as_dict()
         camera = found.pop("camera")
         if camera is not None:
             renderer.edit(camera=camera)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from pxr import Usd, UsdShade
 
 from wavecomb.usd.graphs.values import Expressions, Value
-from wavecomb.usd.layers.unopened_materialx import unread_mtlx
+from wavecomb.usd.layers.unopened_materialx import unopened_materialx
 from wavecomb.usd.materials.network import shader_id, source_of
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
         everywhere: Whether to include unselected variants, which takes a pass over all layers.
             Selecting them later, on any thread, then changes no layer.
     """
-    if (everywhere or any(True for _ in unread_mtlx(stage))) and is_there():
+    if (everywhere or any(True for _ in unopened_materialx(stage))) and is_there():
         from wavecomb.usd.materialx import references
 
         references.resolve(stage, everywhere=everywhere)
@@ -80,14 +80,14 @@ def reload(stage: Usd.Stage) -> None:
 def tell(stage: Usd.Stage, report: LoadReport) -> None:
     """Reports MaterialX files that are missing, and problems of translated ones."""
     read_none = "wavecomb.usd.materialx.references" not in sys.modules
-    if read_none and not any(True for _ in unread_mtlx(stage)):
+    if read_none and not any(True for _ in unopened_materialx(stage)):
         return
     if is_there():
         from wavecomb.usd.materialx import references
 
         references.tell(stage, report)
         return
-    for error, _ in unread_mtlx(stage):
+    for error, _ in unopened_materialx(stage):
         report.warn(f"{ABSENT}: files left out", str(error.rootSite.path))
 
 

@@ -19,7 +19,7 @@ from wavecomb.bench.figures.style import (
     INTERVALS,
     MOST_PANELS,
     WIDTH,
-    Drawn,
+    CaptionedFigure,
     clipped,
     colour,
     count_words,
@@ -112,7 +112,7 @@ def forest(
     log: bool = True,
     percent: bool = False,
     columns: int = 2,
-) -> Drawn:
+) -> CaptionedFigure:
     """Draws panels of rows on one scale, with a line at the value that means "no difference"."""
     columns = 1 if len(panels) == 1 else columns
     sizes = [len(panel.rows) for panel in panels]
@@ -139,7 +139,7 @@ def forest(
     for ax in axes[max(0, len(panels) - columns) : len(panels)]:
         ax.set_xlabel(x_label)
         ax.tick_params(labelbottom=True)
-    return Drawn(name, title, caption, made)
+    return CaptionedFigure(name, title, caption, made)
 
 
 def _panel(
@@ -202,7 +202,7 @@ _FACTORS = {
 }
 
 
-def order_figure(table: pd.DataFrame, name: str, metric_words: str) -> Drawn | None:
+def order_figure(table: pd.DataFrame, name: str, metric_words: str) -> CaptionedFigure | None:
     """Draws the ratio of each policy to the placebo, with the oracle, in a panel per stratum."""
     if table.empty or table["placebo_ratio"].isna().all():
         return None
@@ -220,7 +220,7 @@ def order_figure(table: pd.DataFrame, name: str, metric_words: str) -> Drawn | N
     return forest(name, "Gain of an order beyond grouping", caption, "to placebo", panels)
 
 
-def regret_figure(table: pd.DataFrame, name: str) -> Drawn | None:
+def regret_figure(table: pd.DataFrame, name: str) -> CaptionedFigure | None:
     """Draws the regret of each policy, in a panel per cell."""
     if table.empty or table["cell"].nunique() > MOST_PANELS:
         return None
@@ -235,7 +235,7 @@ def regret_figure(table: pd.DataFrame, name: str) -> Drawn | None:
     return forest(name, title, caption, "regret", panels, centre=0.0, log=False, percent=True)
 
 
-def effects_figure(table: pd.DataFrame, name: str, metric_words: str) -> Drawn | None:
+def effects_figure(table: pd.DataFrame, name: str, metric_words: str) -> CaptionedFigure | None:
     """Draws the main effects by factor, and the interactions that are furthest from 1."""
     if table.empty:
         return None
@@ -272,7 +272,7 @@ def _effect_row(row: Any, name: str) -> Row:
 
 def cost_figure(
     costs: pd.DataFrame, lines: Mapping[str, Mapping[str, Any]], name: str
-) -> Drawn | None:
+) -> CaptionedFigure | None:
     """Draws measured over predicted cost of each material, in a panel per prediction."""
     kept = [(column, line) for column, line in lines.items() if line]
     if costs.empty or not kept:
@@ -320,12 +320,12 @@ def cost_figure(
         f"A point is a material ({kept[0][1]['materials']} of them), mean over "
         f"{kept[0][1]['runs']} runs. Dashed: measured = predicted. Line: weighted least squares."
     )
-    return Drawn(name, "Predicted and measured cost", caption, made)
+    return CaptionedFigure(name, "Predicted and measured cost", caption, made)
 
 
 def difference_figure(
     pictures: Sequence[tuple[str, NDArray[Any]]], golden: NDArray[Any], name: str, title: str
-) -> Drawn:
+) -> CaptionedFigure:
     """Draws relative luminance differences to a golden image, on one scale."""
     from wavecomb.image.compare.comparison import luminance
 
@@ -354,4 +354,4 @@ def difference_figure(
         f"Scale to ±{limit:.2g}, the 99th percentile of all maps shown. Equal patterns in all "
         "maps are noise of the same random numbers."
     )
-    return Drawn(name, title, caption, made)
+    return CaptionedFigure(name, title, caption, made)

@@ -30,7 +30,7 @@ from wavecomb.bench.figures.style import (
     PURPLE,
     RED,
     SKY,
-    Drawn,
+    CaptionedFigure,
     clipped,
     colour,
     count_words,
@@ -64,7 +64,7 @@ COHERENCE = (
 
 def ratio_figure(
     table: pd.DataFrame, name: str, title: str, x_label: str, factor: str
-) -> Drawn | None:
+) -> CaptionedFigure | None:
     """Draws ``ratios`` as forest plots, one panel per cell; None if there are too many cells."""
     if table.empty or table["cell"].nunique() > MOST_PANELS:
         return None
@@ -81,7 +81,7 @@ def ratio_figure(
     return forest(name, title, caption, x_label, panels)
 
 
-def pipeline(runs: pd.DataFrame, name: str) -> Drawn | None:
+def pipeline(runs: pd.DataFrame, name: str) -> CaptionedFigure | None:
     """Draws stacked phases of each policy, in a panel per cell."""
     groups = list(cells(runs.dropna(subset=["shade_s"]), "policy"))
     if not groups or len(groups) > MOST_PANELS:
@@ -117,10 +117,10 @@ def pipeline(runs: pd.DataFrame, name: str) -> Drawn | None:
         "Exclusive phases, which add up to threads x render time; means over "
         f"{count_words(runs.groupby('config').size())} runs."
     )
-    return Drawn(name, "Where the time goes", caption, made)
+    return CaptionedFigure(name, "Where the time goes", caption, made)
 
 
-def coherence(runs: pd.DataFrame, name: str) -> Drawn | None:
+def coherence(runs: pd.DataFrame, name: str) -> CaptionedFigure | None:
     """Draws four measures of coherence by policy, with a series for each cell."""
     groups = list(cells(runs.dropna(subset=["run_length_coherence"]), "policy"))
     if not groups or len(groups) > 6:
@@ -156,7 +156,7 @@ def coherence(runs: pd.DataFrame, name: str) -> Drawn | None:
     caption = (
         "Means over runs. Run length is logarithmic; all other values are fractions of neighbours."
     )
-    return Drawn(name, "Effect of an order on coherence", caption, made)
+    return CaptionedFigure(name, "Effect of an order on coherence", caption, made)
 
 
 def curve(
@@ -167,7 +167,7 @@ def curve(
     title: str,
     x_label: str,
     series: str = "policy",
-) -> Drawn | None:
+) -> CaptionedFigure | None:
     """Draws metrics over a numeric column, with a line for each series and logarithmic axes.
 
     Args:
@@ -206,10 +206,10 @@ def curve(
         f"Means over {count_words(runs.groupby('config').size())} runs. {INTERVALS}. "
         "Both axes are logarithmic."
     )
-    return Drawn(name, title, caption, made)
+    return CaptionedFigure(name, title, caption, made)
 
 
-def error_over_time(runs: pd.DataFrame, name: str) -> Drawn | None:
+def error_over_time(runs: pd.DataFrame, name: str) -> CaptionedFigure | None:
     """Draws relMSE over render time.
 
     A line for each policy or renderer connects its sample counts.
@@ -265,7 +265,7 @@ def error_over_time(runs: pd.DataFrame, name: str) -> Drawn | None:
         f"{count_words(runs.groupby('config').size())} runs, bars: two standard errors. Along the "
         "dashed line error x time is constant; lower and to the left is better."
     )
-    return Drawn(name, "Error against time", caption, made)
+    return CaptionedFigure(name, "Error against time", caption, made)
 
 
 def intervals(runs: pd.DataFrame, x: str, metric: str) -> list[tuple[float, float, float, float]]:

@@ -49,7 +49,7 @@ _STYLE = Path(__file__).parent / "report.mplstyle"
 
 
 @dataclass(frozen=True)
-class Drawn:
+class CaptionedFigure:
     """A figure with its title and caption.
 
     Attributes:
@@ -182,13 +182,13 @@ def plain_logarithm(axis: Axis, subs: Sequence[float] = (1.0, 2.0, 5.0)) -> None
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.6g}"))
 
 
-def lay_out(drawn: Drawn) -> None:
+def lay_out(drawn: CaptionedFigure) -> None:
     """Computes the layout once, so that saving in two formats does not repeat it."""
     drawn.figure.draw_without_rendering()
     drawn.figure.set_layout_engine("none")
 
 
-def svg(drawn: Drawn) -> str:
+def svg(drawn: CaptionedFigure) -> str:
     """Returns the figure as an <svg> element, with the text colour of the page and unique ids."""
     buffer = io.StringIO()
     blank = dict.fromkeys(("Creator", "Date", "Format", "Type"))
@@ -204,7 +204,7 @@ def svg(drawn: Drawn) -> str:
     return re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1)
 
 
-def save(drawn: Drawn, drawing: str, folder: Path) -> None:
+def save(drawn: CaptionedFigure, drawing: str, folder: Path) -> None:
     """Writes NAME.svg and NAME.png on white, never partially.
 
     ``drawing`` is the result of ``svg``.

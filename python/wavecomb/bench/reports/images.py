@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from wavecomb.bench.analysis.data import in_order
 from wavecomb.bench.figures.forest import difference_figure
-from wavecomb.bench.figures.style import Drawn
+from wavecomb.bench.figures.style import CaptionedFigure
 from wavecomb.bench.reports.parts import Viewer, key_of
 from wavecomb.errors import WavecombError
 from wavecomb.image.embedded import data_uri, smaller
@@ -29,7 +29,7 @@ LARGEST = 720
 
 
 @dataclass(frozen=True)
-class Kept:
+class RunImage:
     """An image that one or more runs rendered.
 
     Attributes:
@@ -47,7 +47,7 @@ class Shot:
 
     stage: str
     golden: NDArray[Any] | None
-    kept: Sequence[Kept]
+    kept: Sequence[RunImage]
 
 
 def shots(results: Results) -> list[Shot]:
@@ -84,7 +84,7 @@ def _titled(row: dict[str, Any], frames: Iterable[list[tuple[dict[str, Any], Pat
     return ", ".join(parts)
 
 
-def _distinct(pictures: Sequence[tuple[dict[str, Any], Path]]) -> list[Kept]:
+def _distinct(pictures: Sequence[tuple[dict[str, Any], Path]]) -> list[RunImage]:
     kept: list[tuple[NDArray[Any], list[dict[str, Any]]]] = []
     for row, path in pictures:
         pixels = _read(path)
@@ -94,7 +94,7 @@ def _distinct(pictures: Sequence[tuple[dict[str, Any], Path]]) -> list[Kept]:
             kept.append((pixels, [row]))
         else:
             rows.append(row)
-    return [Kept(_name(rows, pictures), pixels) for pixels, rows in kept[:MOST_PICTURES]]
+    return [RunImage(_name(rows, pictures), pixels) for pixels, rows in kept[:MOST_PICTURES]]
 
 
 def _name(rows: Sequence[dict[str, Any]], everything: Sequence[tuple[dict[str, Any], Path]]) -> str:
@@ -120,7 +120,7 @@ def viewer(shot: Shot) -> Viewer | None:
     return Viewer(shot.stage, images) if len(images) > 1 else None
 
 
-def differences(shot: Shot) -> Drawn | None:
+def differences(shot: Shot) -> CaptionedFigure | None:
     """Draws maps of the differences to the golden image."""
     if shot.golden is None or not shot.kept:
         return None

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-from wavecomb.bench.figures.style import Drawn, fixed, lay_out, save, svg
+from wavecomb.bench.figures.style import CaptionedFigure, fixed, lay_out, save, svg
 
 MOST_ROWS = 60
 """Largest number of rows of a table that is not folded."""
@@ -180,7 +180,7 @@ class Writer:
         """Adds parts to the section, skipping None."""
         self.sections[-1].parts += [part for part in parts if part is not None]
 
-    def draw(self, drawn: Drawn | None) -> None:
+    def draw(self, drawn: CaptionedFigure | None) -> None:
         """Adds a figure to the section, if there is one."""
         if drawn is not None:
             lay_out(drawn)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from wavecomb.gui.viewport import ocio
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.image.files import image
-from wavecomb.image.layer_view import Shown, show_layer
+from wavecomb.image.layer_view import DisplayLayer, show_layer
 
 LINEAR, NEUTRAL = "Linear", "Neutral"
 _NAN = (255, 0, 255)
@@ -65,7 +65,7 @@ def develop(rgb: NDArray[Any], exposure: float, view: str) -> NDArray[np.uint8]:
     return pixels
 
 
-def show(layer: NDArray[Any], look: Look) -> Shown:
+def show(layer: NDArray[Any], look: Look) -> DisplayLayer:
     """Converts a layer to screen pixels.
 
     Args:
@@ -86,7 +86,7 @@ class Developed:
 
     frame: Frame
     look: Look
-    shown: Shown
+    shown: DisplayLayer
 
 
 def develop_frame(frame: Frame, look: Look) -> Developed:

@@ -14,7 +14,7 @@ from wavecomb.image.compare.heatmap import Kind, heat_map
 from wavecomb.image.files.collection import is_many, pictures_of
 from wavecomb.image.files.image import display
 from wavecomb.image.pages import Cell, Pair, document, figure_text, pair_section, table
-from wavecomb.image.thumbnails import Look, fitted
+from wavecomb.image.thumbnails import DisplayOptions, fitted
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class PairResult:
 
 
 @dataclass(frozen=True)
-class Folders:
+class FolderPair:
     """Images of two folders or sequences.
 
     Attributes:
@@ -66,7 +66,7 @@ class Folders:
                 yield PairResult(name, a, b, None, " ".join(str(error).split()))
 
 
-def pair_up(a: str, b: str) -> Folders:
+def pair_up(a: str, b: str) -> FolderPair:
     """Pairs images of two folders by their paths, or of two sequences by their frames.
 
     Args:
@@ -85,7 +85,7 @@ def pair_up(a: str, b: str) -> Folders:
         raise WavecombError(f"{a} and {b} have no picture of one name, or of one frame")
     only_a = tuple(name for name in in_a if name not in in_b)
     only_b = tuple(name for name in in_b if name not in in_a)
-    return Folders(pairs, only_a, only_b)
+    return FolderPair(pairs, only_a, only_b)
 
 
 def as_plain(pair: PairResult, tolerance: float | None) -> dict[str, Any]:
@@ -106,10 +106,10 @@ _HEAD = ("picture", "", "differ", "RMSE", "relMSE", "largest", "at")
 
 def compare_page(
     results: Sequence[PairResult],
-    look: Look,
+    look: DisplayOptions,
     *,
     sources: tuple[str, str],
-    folders: Folders | None = None,
+    folders: FolderPair | None = None,
     tolerance: float | None = None,
     kind: Kind = "absolute",
     width: int = 1600,
@@ -162,7 +162,7 @@ def _rmse(one: PairResult) -> float:
     return 0.0 if one.result is None else one.result.rmse
 
 
-def _pair(one: PairResult, look: Look, kind: Kind, width: int) -> Pair:
+def _pair(one: PairResult, look: DisplayOptions, kind: Kind, width: int) -> Pair:
     a, b = (fitted(look.codes(file), width, 4 * width) for file in (one.a, one.b))
     assert one.result is not None
     difference = None
@@ -192,7 +192,7 @@ def _facts(found: Comparison) -> list[str]:
 
 def _overview(
     results: Sequence[PairResult],
-    folders: Folders,
+    folders: FolderPair,
     shown: dict[str, str],
     tolerance: float | None,
 ) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.image.files.exr import RowFile, Sheet, Window
+from wavecomb.image.files.exr import ExrLayout, RowFile, Window
 from wavecomb.image.files.image import Transfer, display, png_spec
 from wavecomb.image.files.output_file import replacing
 from wavecomb.image.files.render_output import by_aov, compression_for, split_names
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from wavecomb.image.rendered import Picture
 
 
-class GrowingFiles:
+class BandFiles:
     """The EXR file of an image, or one file per AOV, and its PNG.
 
     A context manager: the files are renamed on success and removed on an exception.
@@ -62,10 +62,10 @@ class GrowingFiles:
         self._split = bool(self._options.pop("split", False))
         self._exposure, self._tone_map = exposure, tone_map
         self._parts = contextlib.ExitStack()
-        self._sheets: dict[str, tuple[Sheet, RowFile]] = {}
+        self._sheets: dict[str, tuple[ExrLayout, RowFile]] = {}
         self._display: RowFile | None = None
 
-    def __enter__(self) -> GrowingFiles:
+    def __enter__(self) -> BandFiles:
         """Returns itself; files are opened with the first band."""
         return self
 
@@ -119,7 +119,7 @@ class GrowingFiles:
             options = dict(self._options)
             if self._split:
                 options["compression"] = compression_for(its_layers, options["compression"])
-            sheet = Sheet(
+            sheet = ExrLayout(
                 name, its_layers, metadata=metadata, window=self._window, height=self._height,
                 **options,
             )  # fmt: skip

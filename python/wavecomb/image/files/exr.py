@@ -124,7 +124,7 @@ def write_exr(
         called: Name of the file in messages if ``path`` is temporary.
     """
     name = os.fspath(path if called is None else called)
-    sheet = Sheet(
+    sheet = ExrLayout(
         name, layers, half=half, compression=compression, tile=tile, metadata=metadata,
         window=window,
     )  # fmt: skip
@@ -132,7 +132,7 @@ def write_exr(
     write_bands(path, sheet.spec, bands, called=name)
 
 
-class Sheet:
+class ExrLayout:
     """Layout of layers in an EXR file: its header, and pixel values by rows.
 
     Attributes:

@@ -72,7 +72,7 @@ _NO_MEMORY = (
 """Texts in library messages that mean lack of memory or threads."""
 
 
-def obituary(number: int, where: str, words: str, limit: str = "") -> str:
+def crash_message(number: int, where: str, words: str, limit: str = "") -> str:
     """Returns the message about a process that a signal terminated.
 
     Args:

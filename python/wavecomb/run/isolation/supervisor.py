@@ -80,7 +80,7 @@ choices = Choices()
 _is_child = False
 
 
-def is_wise() -> bool:
+def can_fork() -> bool:
     """Returns whether a fork is safe: on Linux, with one thread and the standard streams.
 
     Returns False for programs that call the command line in-process, and with ``WAVECOMB_DEBUG``,
@@ -110,7 +110,7 @@ def enter(outputs: Outputs, *, gpu: bool = False) -> None:
         WavecombError: ``--sandbox on`` or ``--memory-limit`` cannot be applied.
     """
     if not _is_child:
-        with_child = choices.isolate == "on" or (choices.isolate == "auto" and is_wise())
+        with_child = choices.isolate == "on" or (choices.isolate == "auto" and can_fork())
         if not with_child and choices.sandbox == "on":
             raise WavecombError("--sandbox on: there is no child process; leave --isolate off out")
         if with_child and choices.sandbox != "off":
@@ -274,7 +274,7 @@ def become_child(given: str) -> None:
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _WATCHED)
     progress_notes.follow(found["page"])
     sys.excepthook = _print_exception
-    _say_on(found["stderr"])
+    _redirect_stderr(found["stderr"])
 
 
 def _become_expendable(parent: int, page: int, words: int) -> None:
@@ -286,10 +286,10 @@ def _become_expendable(parent: int, page: int, words: int) -> None:
     sys.excepthook = _print_exception
     own = os.dup(2)
     os.dup2(words, 2)
-    _say_on(own)
+    _redirect_stderr(own)
 
 
-def _say_on(descriptor: int) -> None:
+def _redirect_stderr(descriptor: int) -> None:
     """Redirects Python's stderr to the descriptor.
 
     Output of libraries to descriptor 2 is captured.
@@ -349,7 +349,7 @@ def _end(code: int, sent: set[int], page: int, words: int) -> None:
         os.kill(os.getpid(), -code)
     if code < 0:
         seen = progress_notes.open_page(page)
-        line = progress_notes.obituary(
+        line = progress_notes.crash_message(
             -code, progress_notes.read(seen), text, memory.limit_of(seen)
         )
         terminal.write_error(f"error: {' '.join(line.split())}\n")

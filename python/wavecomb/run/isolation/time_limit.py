@@ -35,14 +35,14 @@ def allowed_s(layer_bytes: int) -> float:
     return BASE_S + layer_bytes / BYTES_PER_S if limit_s is None else limit_s
 
 
-def _say_and_end(message: str) -> None:
+def _end_with_message(message: str) -> None:
     if sys.stderr is not None:
         sys.stderr.write(f"error: {' '.join(message.split())}\n")
         sys.stderr.flush()
     os._exit(2)
 
 
-on_end: Callable[[str], None] = _say_and_end
+on_end: Callable[[str], None] = _end_with_message
 """Ends this expendable process with a message."""
 
 

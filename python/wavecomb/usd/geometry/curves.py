@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Usd
 
-from wavecomb.usd.geometry.invalid_points import WHY, bad_points, steadied
+from wavecomb.usd.geometry.invalid_points import WHY, bad_points, replace_invalid_steps
 from wavecomb.usd.geometry.mesh_arrays import (
     IDENTITY,
     UV_NAMES,
@@ -246,7 +246,7 @@ def over_shutter(
     layout = shape.topology
     if found is None or len(found[0]) != layout.sizes["vertex"]:
         return shape
-    found = steadied(found)
+    found = replace_invalid_steps(found)
     if all(np.array_equal(points, found[0]) for points in found):
         return shape
     steps, normals = [], []

@@ -18,7 +18,7 @@ from wavecomb.usd.geometry.splats import PointReader, SplatArrays, SplatReader
 from wavecomb.usd.geometry.strands import StrandDetail
 from wavecomb.usd.geometry.subdivision import Surfaces
 from wavecomb.usd.geometry.triangulate import MeshError
-from wavecomb.usd.materials.assignment import Draw
+from wavecomb.usd.materials.assignment import DrawItem
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.frame_cache import MeshCache
 from wavecomb.usd.stage.origin import problem_of
@@ -31,12 +31,12 @@ WORDS = {
     "mesh": "mesh", "patch": "NURBS patch", "shape": "mesh", "curves": "curves", "points": "points",
     "splats": "splats",
 }  # fmt: skip
-"""Names of gprims in messages, by ``Draw.kind``."""
+"""Names of gprims in messages, by ``DrawItem.kind``."""
 COUNTS = {
     "mesh": "meshes", "patch": "patches", "shape": "shapes", "curves": "curves", "points": "points",
     "splats": "splats",
 }  # fmt: skip
-"""Names of gprim counts in ``LoadReport``, by ``Draw.kind``."""
+"""Names of gprim counts in ``LoadReport``, by ``DrawItem.kind``."""
 
 
 class GprimReader:
@@ -71,7 +71,11 @@ class GprimReader:
         return kind not in ("shape", "splats") and deforms(prim, self.skeletons.of(prim))
 
     def read(
-        self, draw: Draw, names: Sequence[str], in_world: bool, detail: StrandDetail | None = None
+        self,
+        draw: DrawItem,
+        names: Sequence[str],
+        in_world: bool,
+        detail: StrandDetail | None = None,
     ) -> MeshArrays | CurveArrays | None:
         """Reads a gprim in the space of its group; reports and returns None if nothing is drawn.
 
@@ -110,7 +114,7 @@ class GprimReader:
         return shape
 
     def _read(
-        self, kind: str, draw: Draw, names: Sequence[str], detail: StrandDetail | None
+        self, kind: str, draw: DrawItem, names: Sequence[str], detail: StrandDetail | None
     ) -> MeshArrays | CurveArrays | None:
         displaced = kind == "mesh" and self.surfaces.is_displaced(draw)
 

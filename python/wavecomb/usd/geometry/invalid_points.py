@@ -99,7 +99,7 @@ def filled(points: Array, bad: Mask, counts: Ints, indices: Ints) -> Array:
     return out
 
 
-def steadied(shapes: Sequence[Array]) -> list[Array]:
+def replace_invalid_steps(shapes: Sequence[Array]) -> list[Array]:
     """Replaces invalid points at shutter steps by their value at the nearest valid step.
 
     Points that are never valid become the first valid point. Equal arrays remain the same objects.

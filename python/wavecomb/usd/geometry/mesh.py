@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
 from wavecomb.usd.geometry.cage import SCHEMES, Cage, read_rules, sharp_edges
-from wavecomb.usd.geometry.invalid_points import bad_points, steadied, without_bad
+from wavecomb.usd.geometry.invalid_points import bad_points, replace_invalid_steps, without_bad
 from wavecomb.usd.geometry.mesh_arrays import (
     IDENTITY,
     TETRAHEDRA,
@@ -230,7 +230,7 @@ class MeshReader:
         shapes = points_at(prim, skin, times, motion.frame, self.report)
         if shapes is None or len(shapes[0]) != len(mesh.positions):
             return mesh
-        shapes = steadied(shapes)
+        shapes = replace_invalid_steps(shapes)
         matrices = [matrix_at(track, matrix, time) for time in times]
         if track is None and all(np.array_equal(shape, shapes[0]) for shape in shapes):
             return mesh

@@ -117,7 +117,7 @@ class PatchReader:
         if weights is not None and weights.shape != (len(points), 1):
             raise MeshError(f"{len(points)} points have {len(weights)} pointWeights")
         heavy = np.ones((len(points), 1)) if weights is None else weights.astype(np.float64)
-        self._say_what_is_missing(prim, uv_names)
+        self._report_unsupported(prim, uv_names)
         flip = word(prim.GetAttribute("orientation").Get(self.time)) == "leftHanded"
         topology = _triangles(*axes, flip)
         shapes = [points]
@@ -162,7 +162,7 @@ class PatchReader:
         u, v = (_axis(s, c, parts) for s, c in zip(splines, closed, strict=True))
         return u, v
 
-    def _say_what_is_missing(self, prim: Usd.Prim, uv_names: Sequence[str]) -> None:
+    def _report_unsupported(self, prim: Usd.Prim, uv_names: Sequence[str]) -> None:
         trims = as_array(prim.GetAttribute("trimCurve:counts").Get(self.time))
         if trims is not None and len(trims):
             what = "trim curves of NURBS patches (drawn whole)"

@@ -21,7 +21,7 @@ from wavecomb.usd.geometry.mesh_arrays import MeshArrays
 from wavecomb.usd.geometry.primvar import as_integers, spread
 from wavecomb.usd.geometry.screen_size import ViewSize
 from wavecomb.usd.instances.group import placements
-from wavecomb.usd.materials.assignment import Draw, Worn
+from wavecomb.usd.materials.assignment import BoundMaterials, DrawItem
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.report import LoadReport
 
@@ -79,7 +79,7 @@ class Surface:
         draw: Its prim and bindings.
         cage: Its polygons.
         bounds: (2, 3) bounds in the space of its group.
-        worn: Material ids and the primvars that the materials read.
+        materials: Material ids and the primvars that the materials read.
         group: Its group.
         moves: Displacements: lengths or texture uses.
         face_moves: (faces,) index into ``moves`` of each face; -1 means no displacement.
@@ -87,10 +87,10 @@ class Surface:
     """
 
     number: int
-    draw: Draw
+    draw: DrawItem
     cage: Cage
     bounds: NDArray[Any]
-    worn: Worn
+    materials: BoundMaterials
     group: Group
     moves: list[Any] = field(default_factory=list)
     face_moves: NDArray[np.int32] | None = None
@@ -99,7 +99,7 @@ class Surface:
     @property
     def is_plain(self) -> bool:
         """Whether the result depends only on cage and level, not on materials."""
-        return not self.moves and not self.worn.reads
+        return not self.moves and not self.materials.reads
 
     @property
     def lowest(self) -> int:
@@ -123,7 +123,7 @@ class Surfaces:
         """Whether subdivision is enabled."""
         return self.choice != "off"
 
-    def is_displaced(self, draw: Draw) -> bool:
+    def is_displaced(self, draw: DrawItem) -> bool:
         """Returns whether a material that is bound to a mesh displaces its points."""
         # Nearly all meshes have no subsets.
         if not draw.subsets:
@@ -136,15 +136,15 @@ class Surfaces:
         self,
         group: Group,
         number: int,
-        draw: Draw,
+        draw: DrawItem,
         mesh: MeshArrays,
-        worn: Worn,
+        materials: BoundMaterials,
     ) -> None:
         """Records a mesh that was added as polygons."""
         cage = mesh.cage
         if cage is None:
             return
-        surface = Surface(number, draw, cage, mesh.bounds, worn, group)
+        surface = Surface(number, draw, cage, mesh.bounds, materials, group)
         self._displacements(surface)
         if surface.moves or (cage.scheme != "none" and self.choice != 0):
             group.has_surfaces = True
@@ -339,7 +339,7 @@ class Surfaces:
         }
         if surface.moves:
             out |= {"displacements": surface.moves, "face_displacement": surface.face_moves}
-        out["primvars"] = RefinedAttributes(surface.worn.reads).described(cage, surface.level)
+        out["primvars"] = RefinedAttributes(surface.materials.reads).described(cage, surface.level)
         if surface.level == 0:
             return out | self._polygons(cage)
         out |= {"scheme": cage.scheme, **cage.rules}
@@ -368,16 +368,17 @@ class Surfaces:
         return out
 
     def _replace(self, surface: Surface, refined: dict[str, Any]) -> None:
-        worn, faces, normals = surface.worn, None, refined["normals"]
-        if worn.by_face is not None:
-            faces = worn.by_face[refined["faces"]]
+        materials, faces, normals = surface.materials, None, refined["normals"]
+        if materials.by_face is not None:
+            faces = materials.by_face[refined["faces"]]
         if surface.level == 0 and not surface.cage.smooth:
             normals = None
         try:
             self.builder.replace_mesh(
                 surface.number, refined["positions"], refined["triangles"],
-                normals=normals, uvs=refined["uvs"], face_materials=faces, material=worn.material,
-                attributes=RefinedAttributes(worn.reads).of(refined),
+                normals=normals, uvs=refined["uvs"], face_materials=faces,
+                material=materials.material,
+                attributes=RefinedAttributes(materials.reads).of(refined),
             )  # fmt: skip
         except ValueError as error:
             path = surface.draw.prim.GetPath()

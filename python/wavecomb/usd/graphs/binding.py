@@ -89,7 +89,7 @@ def bound(
     )
 
 
-def at_other_sets(surface: Surface, sets: Mapping[str, str], own: str) -> Surface:
+def with_uv_sets(surface: Surface, sets: Mapping[str, str], own: str) -> Surface:
     """Returns the surface for a mesh whose own texture coordinates are not those that it reads.
 
     Args:

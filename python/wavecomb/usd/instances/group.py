@@ -32,7 +32,7 @@ _MOST_SHOWN = 2048
 
 
 @dataclass(frozen=True)
-class Place:
+class AnimatedTransform:
     """A transform that may be animated.
 
     Attributes:
@@ -43,20 +43,20 @@ class Place:
     middle: Matrices
     steps: Matrices | None = None
 
-    def within(self, outer: Place) -> Place:
+    def within(self, outer: AnimatedTransform) -> AnimatedTransform:
         """Returns the concatenation of this transform with an outer one."""
         inner, outside = self.steps, outer.steps
         middle = self.middle @ outer.middle
         if inner is None and outside is None:
-            return Place(middle)
+            return AnimatedTransform(middle)
         if inner is None or outside is None:
             left = self.middle if inner is None else inner
-            return Place(middle, left @ (outer.middle if outside is None else outside))
+            return AnimatedTransform(middle, left @ (outer.middle if outside is None else outside))
         segments = math.lcm(len(inner) - 1, len(outside) - 1)
         if segments >= MOST_STEPS:
             segments = max(len(inner), len(outside)) - 1
         count = segments + 1
-        return Place(middle, _resampled(inner, count) @ _resampled(outside, count))
+        return AnimatedTransform(middle, _resampled(inner, count) @ _resampled(outside, count))
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Group:
         children: Instanced groups that contain lights, volumes or emitters, with their transforms.
         surfaced: Instanced groups that contain meshes to be refined, with their transforms.
         holds_placed: Whether it or its child groups contain lights, volumes or emitters.
-        sampled_lamp: Path of a mesh light in it that must not move.
+        sampled_light: Path of a mesh light in it that must not move.
         emitters: Emissive meshes in it; only collected for stages without lights.
         shown: The first boxes, which are never merged.
     """
@@ -95,13 +95,13 @@ class Group:
     root: str = ""
     number: int | None = None
     boxes: list[NDArray[Any]] = field(default_factory=list)
-    lights: list[tuple[Light, Place]] = field(default_factory=list)
+    lights: list[tuple[Light, AnimatedTransform]] = field(default_factory=list)
     volumes: list[tuple[Volume, Matrices]] = field(default_factory=list)
-    children: list[tuple[Group, list[Place]]] = field(default_factory=list)
+    children: list[tuple[Group, list[AnimatedTransform]]] = field(default_factory=list)
     surfaced: list[tuple[Group, Matrices]] = field(default_factory=list)
     holds_placed: bool = False
     has_surfaces: bool = False
-    sampled_lamp: Sdf.Path | None = None
+    sampled_light: Sdf.Path | None = None
     outlines: list[NDArray[np.float64]] = field(default_factory=list)
     outlined: int = 0
     emitters: list[Emitter] = field(default_factory=list)
@@ -148,8 +148,8 @@ class Scope:
         override: Whether a binding above is stronger than all bindings in the group.
         alias: (prototype, instance) paths if bindings are resolved on the instance's proxies.
         root: Path of the native prototype that the group comes from.
-        worn: Material for prims without a binding, if it reads primvars of these prims.
-        brings: Constant primvars of the instances.
+        material: Material for prims without a binding, if it reads primvars of these prims.
+        inherited: Constant primvars of the instances.
     """
 
     inside: bool = False
@@ -157,11 +157,11 @@ class Scope:
     override: bool = False
     alias: tuple[Sdf.Path, Sdf.Path] | None = None
     root: Sdf.Path = Sdf.Path.absoluteRootPath
-    worn: UsdShade.Material | None = None
-    brings: tuple[Any, ...] = ()
+    material: UsdShade.Material | None = None
+    inherited: tuple[Any, ...] = ()
 
 
-def middle_of(motion: Matrices) -> Matrices:
+def middle_transforms(motion: Matrices) -> Matrices:
     """Returns (k, 4, 4) transforms at the middle of steps (k, s, 4, 4)."""
     last = motion.shape[1] - 1
     middle: Matrices = 0.5 * (motion[:, last // 2] + motion[:, (last + 1) // 2])
@@ -183,25 +183,27 @@ def _resampled(steps: Matrices, count: int) -> Matrices:
     return mixed
 
 
-def placed_lights(group: Group, limit: int) -> list[tuple[Light, Place]]:
+def placed_lights(group: Group, limit: int) -> list[tuple[Light, AnimatedTransform]]:
     """Returns at most ``limit`` lights of a group and its child groups, with transforms."""
     return _placed(group, limit, lambda one: one.lights)
 
 
 def placed_volumes(group: Group, limit: int) -> list[tuple[Volume, Matrices]]:
     """Returns at most ``limit`` volumes of a group and its child groups, with transforms."""
-    found = _placed(group, limit, lambda one: [(v, Place(m)) for v, m in one.volumes])
+    found = _placed(group, limit, lambda one: [(v, AnimatedTransform(m)) for v, m in one.volumes])
     return [(volume, place.middle) for volume, place in found]
 
 
-def placed_emitters(group: Group, limit: int) -> list[tuple[Emitter, Place]]:
+def placed_emitters(group: Group, limit: int) -> list[tuple[Emitter, AnimatedTransform]]:
     """Returns at most ``limit`` emitters of a group and its child groups, with transforms."""
-    return _placed(group, limit, lambda one: [(e, Place(np.eye(4))) for e in one.emitters])
+    return _placed(
+        group, limit, lambda one: [(e, AnimatedTransform(np.eye(4))) for e in one.emitters]
+    )
 
 
 def _placed(
-    group: Group, limit: int, of: Callable[[Group], list[tuple[T, Place]]]
-) -> list[tuple[T, Place]]:
+    group: Group, limit: int, of: Callable[[Group], list[tuple[T, AnimatedTransform]]]
+) -> list[tuple[T, AnimatedTransform]]:
     out = list(of(group)[:limit])
     for child, places in group.children:
         inner = _placed(child, limit, of)
@@ -234,7 +236,7 @@ def emitter_of(shape: MeshArrays, material: int, faces: NDArray[np.uint32] | Non
     return Emitter(centre, {int(one): float(areas[faces == one].sum()) for one in used})
 
 
-def light_what_is_drawn(world: Group, materials: MaterialTable) -> bool:
+def is_lit_by_emitters(world: Group, materials: MaterialTable) -> bool:
     """Returns whether emitters light at least half of the objects with irradiance ``LEAST``.
 
     Treats an emitter as a point light at its centre, at the distance of the object's centre but no
@@ -243,7 +245,7 @@ def light_what_is_drawn(world: Group, materials: MaterialTable) -> bool:
     agree.
     """
     boxes = np.array(world.shown[:MOST], np.float64)
-    powers, centres = _placed_powers(world, materials)
+    powers, centres = _emitter_powers(world, materials)
     if len(boxes) == 0 or len(powers) == 0:
         return False
     middles = boxes.mean(axis=1)
@@ -254,7 +256,7 @@ def light_what_is_drawn(world: Group, materials: MaterialTable) -> bool:
     return bool((irradiance >= LEAST).mean() >= 0.5)
 
 
-def _placed_powers(
+def _emitter_powers(
     world: Group, materials: MaterialTable
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Returns the power (n,) of each emitter and its centre (n, 3) in world space."""
@@ -281,7 +283,7 @@ def placements(world: Group) -> dict[int, Matrices]:
     Limits each group to ``_MOST_PLACED`` transforms, since nested instancing can multiply them.
     """
     order: list[Group] = []
-    _after_its_users(world, set(), order)
+    _append_in_order(world, set(), order)
     found: dict[int, Matrices] = {id(world): np.eye(4)[None]}
     for group in reversed(order):
         placed = found[id(group)]
@@ -294,10 +296,10 @@ def placements(world: Group) -> dict[int, Matrices]:
     return found
 
 
-def _after_its_users(group: Group, met: set[int], order: list[Group]) -> None:
+def _append_in_order(group: Group, met: set[int], order: list[Group]) -> None:
     """Appends groups in topological order, each one before the groups that instance it."""
     met.add(id(group))
     for child, _ in group.surfaced:
         if id(child) not in met:
-            _after_its_users(child, met, order)
+            _append_in_order(child, met, order)
     order.append(group)

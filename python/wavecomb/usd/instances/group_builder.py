@@ -17,12 +17,16 @@ from wavecomb.usd.geometry.mesh_arrays import IDENTITY, UV_NAMES, MeshArrays, is
 from wavecomb.usd.geometry.strands import StrandDetail
 from wavecomb.usd.geometry.subdivision import Surfaces
 from wavecomb.usd.instances.group import Group, Matrices, Scope, emitter_of
-from wavecomb.usd.instances.instance_materials import InstanceLooks, InstanceMaterials, Look
-from wavecomb.usd.instances.placement import GroupPlacer, outline_of
+from wavecomb.usd.instances.instance_materials import (
+    InstanceBinding,
+    InstanceBindings,
+    InstanceMaterials,
+)
+from wavecomb.usd.instances.placement import GroupInstancer, outline_of
 from wavecomb.usd.instances.point_instancer import moved_instances, read_instances
-from wavecomb.usd.instances.volumes import VolumePlacer
+from wavecomb.usd.instances.volumes import VolumeInstancer
 from wavecomb.usd.lights.mesh_light import MeshLights
-from wavecomb.usd.materials.assignment import Assigner, Draw, Worn
+from wavecomb.usd.materials.assignment import Assigner, BoundMaterials, DrawItem
 from wavecomb.usd.materials.material import (
     INHERIT_MATERIAL,
     BindingScan,
@@ -32,9 +36,9 @@ from wavecomb.usd.materials.material import (
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.frame_cache import MeshCache
 from wavecomb.usd.stage.identity import LightGroups
-from wavecomb.usd.stage.memory_check import Room
-from wavecomb.usd.stage.origin import around
-from wavecomb.usd.stage.traversal import STRANDS, Gathered, Placed, Traversal
+from wavecomb.usd.stage.memory_check import MemoryCheck
+from wavecomb.usd.stage.origin import world_to_scene
+from wavecomb.usd.stage.traversal import STRANDS, CollectedPrims, InstancePrim, Traversal
 
 LoadProgress = Callable[[int, int], None]
 """Progress callback: progress(prims drawn, prims found so far)."""
@@ -67,11 +71,11 @@ class GroupBuilder:
 
         ``cache`` stores mesh arrays between frames. ``progress`` is the progress callback.
         ``detail`` simplifies curves that are in the world group. ``notes_emitters`` makes groups
-        collect their emissive meshes; ``emits_otherwise`` then says whether there is emission from
-        curves, points or materials of instances, which are not collected.
+        collect their emissive meshes; ``has_other_emission`` then says whether there is emission
+        from curves, points or materials of instances, which are not collected.
         """
         self.notes_emitters = notes_emitters
-        self.emits_otherwise = False
+        self.has_other_emission = False
         self.context = context
         self.builder, self.report = context.builder, context.report
         self.traversal = traversal
@@ -79,17 +83,17 @@ class GroupBuilder:
         self.light_groups = light_groups
         self.surfaces = surfaces
         self.gprims = GprimReader(context, surfaces, traversal.skeletons, cache)
-        self.room = Room(context.stage, context.time)
+        self.memory_check = MemoryCheck(context.stage, context.time)
         self.progress = progress
         self.detail = detail
         self.found, self.drawn = 0, 0
         self.assigner = Assigner(context, materials)
         self.mesh_lights = MeshLights(context, traversal.lights, materials)
         self.bindings = BindingScan()
-        self.placer = GroupPlacer(context, self.mesh_lights)
-        self.worn = InstanceMaterials(context, materials)
-        self.looks = InstanceLooks(context, materials)
-        self.volumes = VolumePlacer(context)
+        self.instancer = GroupInstancer(context, self.mesh_lights)
+        self.instance_materials = InstanceMaterials(context, materials)
+        self.bindings_of_instances = InstanceBindings(context, materials)
+        self.volumes = VolumeInstancer(context)
         self._groups: dict[Hashable, Group] = {}
         self._known: dict[Sdf.Path, UsdShade.Material] = {}
         self._building: set[Hashable] = set()
@@ -98,7 +102,7 @@ class GroupBuilder:
         """Reads the whole stage into group 0."""
         group = Group("world", number=0)
         roots = list(self.context.stage.GetPseudoRoot().GetChildren())
-        self._fill(group, roots, Scope(), "default", base=around(self.context.origin))
+        self._fill(group, roots, Scope(), "default", base=world_to_scene(self.context.origin))
         return group
 
     def _fill(
@@ -111,14 +115,14 @@ class GroupBuilder:
         base: Gf.Matrix4d = IDENTITY,
     ) -> None:
         """Reads prims and their descendants into a group; ``base`` transforms to its space."""
-        found = self.traversal.walk(roots, purpose, predicate, scope.brings, base)
+        found = self.traversal.walk(roots, purpose, predicate, scope.inherited, base)
         group.lights += found.lights
-        self.room.check(found.draws)
+        self.memory_check.check(found.draws)
         self._bind(found, scope)
-        if scope.worn is not None:
+        if scope.material is not None:
             for draw in found.draws:
                 if scope.override or draw.material is None:
-                    draw.material = scope.worn
+                    draw.material = scope.material
         for draw in found.volumes:
             self.volumes.add(group, draw, scope)
         group.holds_placed = group.holds_placed or bool(group.lights or group.volumes)
@@ -137,7 +141,7 @@ class GroupBuilder:
         for placed in found.instancers:
             self._place_instancer(group, placed, scope)
 
-    def _bind(self, found: Gathered, scope: Scope) -> None:
+    def _bind(self, found: CollectedPrims, scope: Scope) -> None:
         """Resolves all material bindings of a group together."""
         if scope.override:
             return
@@ -158,7 +162,7 @@ class GroupBuilder:
         path = prim.GetPath().ReplacePrefix(*alias)
         return self.context.stage.GetPrimAtPath(path) or prim
 
-    def _draw(self, group: Group, draw: Draw, scope: Scope) -> None:
+    def _draw(self, group: Group, draw: DrawItem, scope: Scope) -> None:
         """Adds one gprim to a group."""
         kind = draw.kind
         baked = kind == "mesh" and self.gprims.deforms(kind, draw.prim)
@@ -178,8 +182,8 @@ class GroupBuilder:
             draw = replace(draw, material=None, subsets=(), subset_materials=[])
         if scope.override:
             draw.subsets = ()
-        lamp = self.mesh_lights.of(draw, kind)
-        if lamp is not None and lamp.material is not None:
+        mesh_light = self.mesh_lights.of(draw, kind)
+        if mesh_light is not None and mesh_light.material is not None:
             draw = replace(draw, material=None, subsets=(), subset_materials=[])
         names = self.assigner.uv_names(draw)
         if scope.inside and draw.material is None and not names:
@@ -189,60 +193,60 @@ class GroupBuilder:
         shape = self.gprims.read(draw, names, in_world, self.detail if in_world else None)
         if shape is None:
             return
-        if lamp is not None and lamp.material is not None:
-            worn = Worn(lamp.material)
+        if mesh_light is not None and mesh_light.material is not None:
+            assigned = BoundMaterials(mesh_light.material)
         elif kind == "splats":
-            worn = Worn(self.materials.splats())
+            assigned = BoundMaterials(self.materials.splats())
         else:
-            worn = self._materials(draw, shape, scope)
-        material, faces = worn.material, None
-        if worn.by_face is not None and isinstance(shape, MeshArrays) and shape.topology:
-            faces = worn.by_face[shape.topology.face_ids()]
+            assigned = self._materials(draw, shape, scope)
+        material, faces = assigned.material, None
+        if assigned.by_face is not None and isinstance(shape, MeshArrays) and shape.topology:
+            faces = assigned.by_face[shape.topology.face_ids()]
         name = self.report.place(path)
         emits = self.materials.any_emits(material, faces)
-        may_shine = lamp is not None or material == INHERIT_MATERIAL or emits
+        may_emit = mesh_light is not None or material == INHERIT_MATERIAL or emits
         if self.notes_emitters and emits:
             if isinstance(shape, MeshArrays):
                 group.emitters.append(emitter_of(shape, material, faces))
                 group.holds_placed = True
             else:
-                self.emits_otherwise = True
+                self.has_other_emission = True
         options: dict[str, Any] = {
             "material": material,
             "name": name,
-            "asset_length": self.placer.asset_length(draw.prim, path, name, draw.parent),
+            "asset_length": self.instancer.asset_length(draw.prim, path, name, draw.parent),
         }
         if faces is not None:
             options["face_materials"] = faces
-        if worn.reads:
+        if assigned.reads:
             mirrored = draw.matrix.GetDeterminant3() < 0
-            options["attributes"] = on_shape(worn.reads, shape, mirrored)
-        if may_shine:
+            options["attributes"] = on_shape(assigned.reads, shape, mirrored)
+        if may_emit:
             options["light_group"] = self.light_groups.of(draw.prim, draw.inherited)
-        if lamp is not None:
-            options["mesh_light"] = lamp.number
-            if lamp.is_sampled_only:
-                group.sampled_lamp = draw.prim.GetPath()
+        if mesh_light is not None:
+            options["mesh_light"] = mesh_light.number
+            if mesh_light.is_sampled_only:
+                group.sampled_light = draw.prim.GetPath()
                 if kind == "mesh" and self.gprims.deforms(kind, draw.prim):
-                    self.mesh_lights.say_moving(group.sampled_lamp)
+                    self.mesh_lights.report_motion(group.sampled_light)
         try:
             number = add_shape(self.builder, shape, options)
         except ValueError as error:
             self.report.warn(f"{WORDS[kind]} left out: {error}")
             return
-        self.builder.add_to_group(self.placer.number(group), number)
+        self.builder.add_to_group(self.instancer.number(group), number)
         group.grow(shape.bounds)
         if self.context.framed is not None:
             more = self.context.framed if group.number == 0 else None
             group.reach(outline_of(shape, self.surfaces, more), more)
         if isinstance(shape, MeshArrays) and shape.cage is not None:
-            self.surfaces.add(group, number, draw, shape, worn)
+            self.surfaces.add(group, number, draw, shape, assigned)
         self.report.tally(COUNTS[kind])
 
     def _draw_alone(
         self,
         group: Group,
-        draw: Draw,
+        draw: DrawItem,
         matrix: Gf.Matrix4d,
         scope: Scope,
         steps: Matrices | None = None,
@@ -259,12 +263,16 @@ class GroupBuilder:
             return
         inherit = np.array([INHERIT_MATERIAL], np.uint32)
         motion = None if steps is None else steps[None]
-        self.placer.add(group, child, np.array(matrix)[None], inherit, [draw.prim], motion=motion)
+        self.instancer.add(
+            group, child, np.array(matrix)[None], inherit, [draw.prim], motion=motion
+        )
 
-    def _materials(self, draw: Draw, mesh: MeshArrays | CurveArrays, scope: Scope) -> Worn:
+    def _materials(
+        self, draw: DrawItem, mesh: MeshArrays | CurveArrays, scope: Scope
+    ) -> BoundMaterials:
         inherits = draw.material is None and scope.bound and not any(draw.subset_materials)
-        if (scope.override and scope.worn is None) or inherits:
-            return Worn(INHERIT_MATERIAL)
+        if (scope.override and scope.material is None) or inherits:
+            return BoundMaterials(INHERIT_MATERIAL)
         return self.assigner.assign(draw, mesh, INHERIT_MATERIAL if scope.inside else None)
 
     def _group(
@@ -300,16 +308,18 @@ class GroupBuilder:
         self._groups[key] = group
         return group
 
-    def _place_instances(self, parent: Group, instances: Sequence[Placed], scope: Scope) -> None:
+    def _place_instances(
+        self, parent: Group, instances: Sequence[InstancePrim], scope: Scope
+    ) -> None:
         """Adds native instances, grouped by prototype."""
         batches: dict[tuple[int, int], tuple[Group, list[tuple[Any, ...]]]] = {}
         for placed in instances:
             child = self._instance_group(placed, scope)
             if child is None:
                 continue
-            material = self.worn.of_instance(placed, scope)
+            material = self.instance_materials.of_instance(placed, scope)
             if self.materials.any_emits(material, None):
-                self.emits_otherwise = True
+                self.has_other_emission = True
             steps = None if placed.track is None else placed.track.steps()
             count = 0 if steps is None else len(steps)
             _, batch = batches.setdefault((id(child), count), (child, []))
@@ -318,10 +328,10 @@ class GroupBuilder:
             matrices, materials, prims, moves = zip(*batch, strict=True)
             ids = np.array(materials, np.uint32)
             motion = np.stack(moves) if count else None
-            self.placer.add(parent, child, np.stack(matrices), ids, prims, motion=motion)
+            self.instancer.add(parent, child, np.stack(matrices), ids, prims, motion=motion)
         self.report.tally("instances", len(instances))
 
-    def _instance_group(self, placed: Placed, scope: Scope) -> Group | None:
+    def _instance_group(self, placed: InstancePrim, scope: Scope) -> Group | None:
         prim = placed.prim
         prototype = prim.GetPrototype()
         path = prototype.GetPath()
@@ -331,15 +341,15 @@ class GroupBuilder:
         alias, exact = None, None
         if not override and (collections or scope.alias is not None):
             alias = (path, proxy.GetPath())
-            exact = self.worn.of_proxies(proxy)
+            exact = self.instance_materials.of_proxies(proxy)
         bound = placed.material is not None or (scope.bound and not override)
-        look = self.looks.of_instance(placed, proxy, scope)
-        inner = look.on(Scope(True, bound and alias is None, override, alias, path))
-        key = ("native", path, inner.bound, override, placed.purpose, exact, look.key)
+        binding = self.bindings_of_instances.of_instance(placed, proxy, scope)
+        inner = binding.on(Scope(True, bound and alias is None, override, alias, path))
+        key = ("native", path, inner.bound, override, placed.purpose, exact, binding.key)
         roots = list(prototype.GetChildren())
         return self._group(key, str(prim.GetPath()), path, roots, inner, placed.purpose)
 
-    def _place_instancer(self, parent: Group, placed: Placed, scope: Scope) -> None:
+    def _place_instancer(self, parent: Group, placed: InstancePrim, scope: Scope) -> None:
         """Adds a point instancer, grouped by prototype."""
         prim = placed.prim
         path = prim.GetPath()
@@ -348,7 +358,9 @@ class GroupBuilder:
         instances = read_instances(prim, self.context.time, len(targets), self.report)
         if instances is None or len(instances.kept) == 0:
             return
-        materials = self.worn.of_instancer(placed, instances.authored, scope)[instances.kept]
+        materials = self.instance_materials.of_instancer(placed, instances.authored, scope)[
+            instances.kept
+        ]
         order = np.argsort(instances.prototypes, kind="stable")
         ranked = instances.prototypes[order]
         outer = None if placed.matrix == IDENTITY else np.array(placed.matrix)
@@ -364,10 +376,10 @@ class GroupBuilder:
                 self.report.warn(f"point instancer prototype {target} is not there", path)
                 continue
             of_root = order[first:last]
-            for which, look in self.looks.of_points(
+            for which, binding in self.bindings_of_instances.of_points(
                 placed, root, instances.kept[of_root], instances.authored, _ANY
             ):
-                child = self._prototype_group(root, placed, scope, look)
+                child = self._prototype_group(root, placed, scope, binding)
                 if child is None:
                     continue
                 chosen = of_root[which]
@@ -377,27 +389,28 @@ class GroupBuilder:
                 numbers = instances.kept[chosen].astype(np.uint32)
                 motion = None if moved is None else np.ascontiguousarray(moved[chosen])
                 ids = materials[chosen]
-                self.placer.add(parent, child, transforms, ids, [prim], numbers, motion)
+                self.instancer.add(parent, child, transforms, ids, [prim], numbers, motion)
         self.report.tally("point instances", len(instances.kept))
 
     def _prototype_group(
-        self, root: Usd.Prim, placed: Placed, scope: Scope, look: Look
+        self, root: Usd.Prim, placed: InstancePrim, scope: Scope, binding: InstanceBinding
     ) -> Group | None:
         """Returns the group of a point instancer's prototype."""
         path = root.GetPath()
         within = path.HasPrefix(scope.root) and scope.inside
-        inner = look.on(
+        inner = binding.on(
             Scope(
                 True,
                 scope.bound and within,
                 scope.override and within,
                 scope.alias if within else None,
                 scope.root if within else path,
-                scope.worn if within else None,
+                scope.material if within else None,
             )
         )
-        worn = None if inner.worn is None else inner.worn.GetPath()
+        path_of_material = None if inner.material is None else inner.material.GetPath()
         key = (
-            "point", path, inner.bound, inner.override, placed.purpose, inner.alias, look.key, worn,
+            "point", path, inner.bound, inner.override, placed.purpose, inner.alias, binding.key,
+            path_of_material,
         )  # fmt: skip
         return self._group(key, str(path), path, [root], inner, placed.purpose, _ANY)

@@ -27,7 +27,7 @@ from wavecomb.usd.materials.material import (
 )
 from wavecomb.usd.materials.network import colour
 from wavecomb.usd.stage.context import LoadContext
-from wavecomb.usd.stage.traversal import Placed, inherit
+from wavecomb.usd.stage.traversal import InstancePrim, inherit
 
 MAX_COLOURS = 256
 """Most materials that a varying colour is quantised to."""
@@ -72,7 +72,7 @@ class InstanceMaterials:
         bound = bound_materials(prims, self.binding_purposes)
         return tuple(str(m.GetPath()) if m else "" for m in bound)
 
-    def of_instance(self, placed: Placed, scope: Scope) -> int:
+    def of_instance(self, placed: InstancePrim, scope: Scope) -> int:
         """Returns the material id for meshes of an instance that have no binding."""
         surface = None if placed.material is None else self.materials.surface(placed.material)
         if surface is not None and not surface.stand_in:
@@ -87,7 +87,7 @@ class InstanceMaterials:
                     return self.materials.plain(colour(value.values[0], DEFAULT_COLOUR))
         return INHERIT_MATERIAL if scope.inside else self.materials.plain()
 
-    def of_instancer(self, placed: Placed, count: int, scope: Scope) -> NDArray[np.uint32]:
+    def of_instancer(self, placed: InstancePrim, count: int, scope: Scope) -> NDArray[np.uint32]:
         """Returns material ids (count,) of a point instancer's instances from displayColor."""
         if scope.bound or scope.override:
             return np.full(count, INHERIT_MATERIAL, np.uint32)
@@ -118,7 +118,7 @@ class InstanceMaterials:
         return np.full(count, default, np.uint32)
 
 
-MOST_LOOKS = 256
+MAX_VARIATIONS = 256
 """Most variations of a prototype; primvars of further instances are ignored."""
 
 _ARRAYS = {
@@ -131,30 +131,30 @@ _OF_INSTANCES = ("vertex", "varying", "uniform")
 
 
 @dataclass(frozen=True)
-class Look:
+class InstanceBinding:
     """Material and primvars that instances pass to their prototype.
 
     Attributes:
         key: Equal for equal appearance; None if there are none.
         inherited: Constant primvars.
-        worn: Material for prims without a binding, which reads primvars of the meshes.
+        material: Material for prims without a binding, which reads primvars of the meshes.
     """
 
     key: Hashable = None
     inherited: tuple[Any, ...] = ()
-    worn: UsdShade.Material | None = None
+    material: UsdShade.Material | None = None
 
     def on(self, scope: Scope) -> Scope:
         """Returns the scope of the prototype with these values."""
         if self.key is None:
             return scope
-        return replace(scope, worn=self.worn or scope.worn, brings=self.inherited)
+        return replace(scope, material=self.material or scope.material, inherited=self.inherited)
 
 
-PLAIN = Look()
+PLAIN = InstanceBinding()
 
 
-class InstanceLooks:
+class InstanceBindings:
     """The materials and primvars that instances pass to their prototypes."""
 
     def __init__(self, context: LoadContext, materials: MaterialTable) -> None:
@@ -166,25 +166,30 @@ class InstanceLooks:
         self._made: dict[Hashable, Any] = {}
         self._values = Usd.Stage.CreateInMemory()
 
-    def of_instance(self, placed: Placed, proxy: Usd.Prim, scope: Scope) -> Look:
-        """Returns the look of a native instance.
+    def of_instance(self, placed: InstancePrim, proxy: Usd.Prim, scope: Scope) -> InstanceBinding:
+        """Returns the binding of a native instance.
 
         ``proxy`` is the prim on which bindings are resolved.
         """
-        worn = placed.material or (scope.worn if scope.bound or scope.override else None)
-        if worn is not None and is_alike(self._materials.surface(worn)):
-            worn = None
-        if worn is None and not placed.inherited:
+        material = placed.material or (scope.material if scope.bound or scope.override else None)
+        if material is not None and is_alike(self._materials.surface(material)):
+            material = None
+        if material is None and not placed.inherited:
             return PLAIN
         prototype = placed.prim.GetPrototype().GetPath()
         inside = Usd.PrimRange(proxy, Usd.TraverseInstanceProxies())
-        reads = self._read_by((prototype, scope.alias and proxy.GetPath()), inside, worn)
-        return self._look(prototype, reads, placed.inherited, worn)
+        reads = self._read_by((prototype, scope.alias and proxy.GetPath()), inside, material)
+        return self._binding(prototype, reads, placed.inherited, material)
 
     def of_points(
-        self, placed: Placed, root: Usd.Prim, chosen: NDArray[np.intp], count: int, predicate: Any
-    ) -> Iterator[tuple[NDArray[np.bool_] | slice, Look]]:
-        """Yields groups of instances of a prototype, with the look of each group.
+        self,
+        placed: InstancePrim,
+        root: Usd.Prim,
+        chosen: NDArray[np.intp],
+        count: int,
+        predicate: Any,
+    ) -> Iterator[tuple[NDArray[np.bool_] | slice, InstanceBinding]]:
+        """Yields groups of instances of a prototype, with the binding of each group.
 
         Args:
             placed: The point instancer.
@@ -210,7 +215,7 @@ class InstanceLooks:
             if values is not None:
                 columns[name] = values[chosen]
         if not columns:
-            yield slice(None), self._look(root.GetPath(), reads, inherited, None)
+            yield slice(None), self._binding(root.GetPath(), reads, inherited, None)
             return
         rows = np.concatenate(list(columns.values()), axis=1)
         _, first, which = np.unique(rows, axis=0, return_index=True, return_inverse=True)
@@ -218,32 +223,34 @@ class InstanceLooks:
         for number, at in enumerate(first):
             own = tuple(self._constant(name, v[at]) for name, v in columns.items())
             rest = [p for p in inherited if p.GetPrimvarName() not in columns]
-            yield which == number, self._look(root.GetPath(), reads, (*rest, *own), None)
+            yield which == number, self._binding(root.GetPath(), reads, (*rest, *own), None)
 
-    def _look(
+    def _binding(
         self,
         prototype: Sdf.Path,
         reads: frozenset[str],
         inherited: Sequence[Any],
-        worn: UsdShade.Material | None,
-    ) -> Look:
-        brought = tuple(p for p in inherited if str(p.GetPrimvarName()) in reads)
-        if not brought and worn is None:
+        material: UsdShade.Material | None,
+    ) -> InstanceBinding:
+        passed = tuple(p for p in inherited if str(p.GetPrimvarName()) in reads)
+        if not passed and material is None:
             return PLAIN
-        values = tuple((str(p.GetPrimvarName()), self._bytes(p)) for p in brought)
-        key = (values, None if worn is None else worn.GetPath())
+        values = tuple((str(p.GetPrimvarName()), self._bytes(p)) for p in passed)
+        key = (values, None if material is None else material.GetPath())
         known = self._known.setdefault(prototype, set())
-        if key not in known and len(known) >= MOST_LOOKS:
-            what = f"primvars of instances in more than {MOST_LOOKS} ways (left out of the rest)"
+        if key not in known and len(known) >= MAX_VARIATIONS:
+            what = (
+                f"primvars of instances in more than {MAX_VARIATIONS} ways (left out of the rest)"
+            )
             self._report.missing(what, prototype)
             return PLAIN
         known.add(key)
-        return Look(key, brought, worn)
+        return InstanceBinding(key, passed, material)
 
     def _read_by(
-        self, key: Hashable, inside: Any, worn: UsdShade.Material | None
+        self, key: Hashable, inside: Any, material: UsdShade.Material | None
     ) -> frozenset[str]:
-        """Returns names of primvars that materials of the prims and the material ``worn`` read."""
+        """Returns names of primvars that ``material`` and materials of the prims read."""
         known = self._reads.get(key)
         if known is None:
             prims = [p for p in inside if p.IsA(UsdGeom.Gprim) or p.IsA(UsdGeom.Subset)]
@@ -251,7 +258,7 @@ class InstanceLooks:
             by_path = {m.GetPath(): m for m in found if m is not None}
             names = (self._names(m) for m in by_path.values())
             known = self._reads[key] = frozenset().union(*names)
-        return known if worn is None else known | self._names(worn)
+        return known if material is None else known | self._names(material)
 
     def _names(self, material: UsdShade.Material) -> frozenset[str]:
         surface = self._materials.surface(material)

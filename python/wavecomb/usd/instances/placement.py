@@ -14,15 +14,15 @@ from wavecomb.usd.cameras import framing
 from wavecomb.usd.geometry.curves import CurveArrays
 from wavecomb.usd.geometry.mesh_arrays import MeshArrays
 from wavecomb.usd.geometry.subdivision import Surfaces
-from wavecomb.usd.instances.group import Group, Matrices, Place, middle_of
-from wavecomb.usd.instances.point_instancer import sound
+from wavecomb.usd.instances.group import AnimatedTransform, Group, Matrices, middle_transforms
+from wavecomb.usd.instances.point_instancer import are_valid
 from wavecomb.usd.lights.mesh_light import MeshLights
 from wavecomb.usd.materials.assignment import Parent
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.identity import Assets
 
 
-class GroupPlacer:
+class GroupInstancer:
     """Factory of the scene's groups that also instances them."""
 
     def __init__(self, context: LoadContext, mesh_lights: MeshLights) -> None:
@@ -62,9 +62,9 @@ class GroupPlacer:
 
         ``motion`` holds (k, s, 4, 4) transforms at equal steps over the shutter.
         """
-        usable = sound(transforms)
+        usable = are_valid(transforms)
         if motion is not None:
-            usable &= sound(motion.reshape(-1, 4, 4)).reshape(motion.shape[:2]).all(axis=1)
+            usable &= are_valid(motion.reshape(-1, 4, 4)).reshape(motion.shape[:2]).all(axis=1)
         if not usable.all():
             what = "instances left out: transform without an inverse"
             self.report.warn(what, prims[0].GetPath(), int((~usable).sum()))
@@ -76,14 +76,14 @@ class GroupPlacer:
                 numbers = numbers[usable]
         if len(transforms) == 0:
             return
-        if child.sampled_lamp is not None:
-            parent.sampled_lamp = child.sampled_lamp
+        if child.sampled_light is not None:
+            parent.sampled_light = child.sampled_light
             if motion is not None:
-                self.mesh_lights.say_moving(child.sampled_lamp)
+                self.mesh_lights.report_motion(child.sampled_light)
         if child.holds_placed:
-            middle = transforms if motion is None else middle_of(motion)
+            middle = transforms if motion is None else middle_transforms(motion)
             places = [
-                Place(matrix, None if motion is None else motion[k])
+                AnimatedTransform(matrix, None if motion is None else motion[k])
                 for k, matrix in enumerate(middle)
             ]
             parent.children.append((child, places))

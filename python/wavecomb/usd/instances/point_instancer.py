@@ -56,7 +56,7 @@ def rotations(quaternions: NDArray[Any]) -> Matrices:
     return out
 
 
-def sound(transforms: Matrices) -> NDArray[np.bool_]:
+def are_valid(transforms: Matrices) -> NDArray[np.bool_]:
     """Returns a mask (k,) of the transforms (k, 4, 4) that are finite and invertible."""
     linear = transforms[:, :3, :3]
     finite: NDArray[np.bool_] = np.asarray((np.abs(transforms) < 1e18).all(axis=(1, 2)))
@@ -190,7 +190,7 @@ def _linear(
     scales = as_array(instancer.GetScalesAttr().Get(time))
     if scales is not None and len(scales):
         if scales.shape == (count, 3):
-            # ``sound`` removes instances with invalid scales.
+            # ``are_valid`` removes instances with invalid scales.
             with np.errstate(invalid="ignore"):
                 out = out * scales.astype(np.float64)[:, :, None]
         else:

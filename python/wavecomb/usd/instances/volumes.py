@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.usd.instances.group import Group, Scope, placed_volumes
-from wavecomb.usd.instances.point_instancer import sound
-from wavecomb.usd.materials.assignment import Draw
+from wavecomb.usd.instances.point_instancer import are_valid
+from wavecomb.usd.materials.assignment import DrawItem
 from wavecomb.usd.materials.texture import MEGABYTE
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.report import LoadReport
@@ -19,7 +19,7 @@ MAX_VOLUMES = 4096
 """Most volumes in a scene, since instancing can multiply them."""
 
 
-class VolumePlacer:
+class VolumeInstancer:
     """Reader of volumes that adds them to groups."""
 
     def __init__(self, context: LoadContext) -> None:
@@ -27,11 +27,11 @@ class VolumePlacer:
         self._report, self._framed = context.report, context.framed
 
     @property
-    def glow(self) -> bool:
+    def may_light(self) -> bool:
         """Whether a volume may emit light."""
-        return self._reader.glow
+        return self._reader.may_light
 
-    def add(self, group: Group, draw: Draw, scope: Scope) -> None:
+    def add(self, group: Group, draw: DrawItem, scope: Scope) -> None:
         """Adds a prim's volume to a group; reports volumes that are left out.
 
         Raises:
@@ -45,7 +45,7 @@ class VolumePlacer:
         if volume is None:
             return
         matrix = np.array(draw.matrix)
-        if not bool(sound(matrix[None])[0]):
+        if not bool(are_valid(matrix[None])[0]):
             self._report.warn("volume left out: its transform has no inverse", path)
             return
         corners = volume.corners @ matrix[:3, :3] + matrix[3, :3]
@@ -67,7 +67,7 @@ def add_volumes(world: Group, context: LoadContext) -> tuple[VolumeFacts, ...]:
     grids: dict[str, tuple[GridFacts, ...]] = {}
     for volume, transform in volumes:
         name = volume.options["name"]
-        if not bool(sound(transform[None])[0]):
+        if not bool(are_valid(transform[None])[0]):
             report.warn("volume left out: its transform has no inverse", name)
             continue
         context.builder.add_volume(**volume.options, to_world=transform)
@@ -77,7 +77,9 @@ def add_volumes(world: Group, context: LoadContext) -> tuple[VolumeFacts, ...]:
     return tuple(_facts(name, corners, grids[name]) for name, corners in places.items())
 
 
-def say_room(volumes: tuple[VolumeFacts, ...], limit: float | None, report: LoadReport) -> None:
+def report_grid_memory(
+    volumes: tuple[VolumeFacts, ...], limit: float | None, report: LoadReport
+) -> None:
     """Reports if grids alone exceed ``--texture-limit`` (in MB)."""
     taken = sum(grid.bytes for grid in {grid for volume in volumes for grid in volume.grids})
     if limit is not None and taken > limit * MEGABYTE:
@@ -87,9 +89,11 @@ def say_room(volumes: tuple[VolumeFacts, ...], limit: float | None, report: Load
         )
 
 
-def say_cloudy(volumes: tuple[VolumeFacts, ...], cloudy: list[str], report: LoadReport) -> None:
+def report_ignored_volumes(
+    volumes: tuple[VolumeFacts, ...], materials: list[str], report: LoadReport
+) -> None:
     """Reports that light scattered inside these materials does not interact with volumes there."""
-    for name in cloudy if volumes else ():
+    for name in materials if volumes else ():
         what = (
             "volumes inside of what refracts and scatters: unseen by light that was scattered there"
         )

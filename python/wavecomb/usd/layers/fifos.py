@@ -22,7 +22,7 @@ _IDLE = 0.1
 
 
 @contextmanager
-def refused_fifos() -> Iterator[None]:
+def abort_on_fifo() -> Iterator[None]:
     """Aborts a block that opens layers if USD waits for a FIFO.
 
     While the process is idle, a thread checks the files that loaded layers name. An expendable
@@ -32,7 +32,7 @@ def refused_fifos() -> Iterator[None]:
     Raises:
         WavecombError: A layer names a FIFO that USD waited for.
     """
-    done, found = threading.Event(), _Found()
+    done, found = threading.Event(), _BlockingFifo()
     thread = threading.Thread(target=_watch, args=(done, found), daemon=True)
     thread.start()
     try:
@@ -48,7 +48,7 @@ def refused_fifos() -> Iterator[None]:
         raise WavecombError(found.line)
 
 
-class _Found:
+class _BlockingFifo:
     """The first FIFO that USD waited for.
 
     Attributes:
@@ -58,7 +58,7 @@ class _Found:
     line: str | None = None
 
 
-def _watch(done: threading.Event, found: _Found) -> None:
+def _watch(done: threading.Event, found: _BlockingFifo) -> None:
     clock, computed = time.monotonic(), time.process_time()
     while not done.wait(_TICK_S):
         now, so_far = time.monotonic(), time.process_time()
@@ -84,7 +84,7 @@ def _fifos() -> Iterator[tuple[str, str]]:
                 yield path, name
 
 
-def _release(path: str, layer: str, found: _Found) -> None:
+def _release(path: str, layer: str, found: _BlockingFifo) -> None:
     line = f"{layer}: names the layer {path}, which is a FIFO, not a regular file; name a file"
     if progress_notes.is_expendable():
         time_limit.on_end(line)

@@ -16,10 +16,10 @@ from wavecomb.image.files.output_file import check_name, check_regular
 from wavecomb.path_maps import mapped, own_maps
 from wavecomb.run.isolation import progress_notes, time_limit
 from wavecomb.usd import mtlx
-from wavecomb.usd.layers.fifos import refused_fifos
+from wavecomb.usd.layers.fifos import abort_on_fifo
 from wavecomb.usd.layers.population import every, load_payloads, populate
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
-from wavecomb.usd.stage.diagnostics import captured, commentary
+from wavecomb.usd.stage.diagnostics import captured, first_message
 from wavecomb.usd.stage.report import LoadReport
 
 MAX_SURVEYED = 4096
@@ -27,7 +27,7 @@ MAX_SURVEYED = 4096
 
 
 @dataclass(frozen=True)
-class Survey:
+class StageContents:
     """Cameras and lights of a stage in stage order, including invisible and instanced ones.
 
     Attributes:
@@ -39,7 +39,7 @@ class Survey:
     lights: tuple[str, ...] = ()
 
 
-def survey(stage: Usd.Stage) -> Survey:
+def list_contents(stage: Usd.Stage) -> StageContents:
     """Lists cameras and lights in one pass over the stage."""
     cameras: list[str] = []
     lights: list[str] = []
@@ -56,7 +56,7 @@ def survey(stage: Usd.Stage) -> Survey:
         found = kind(prim)
         if found is not None:
             found.append(str(prim.GetPath()))
-    return Survey(tuple(cameras), tuple(lights))
+    return StageContents(tuple(cameras), tuple(lights))
 
 
 _RENDER_RELATIONS = ("products", "orderedVars", "camera")
@@ -78,7 +78,7 @@ def open_render_settings(
     Raises:
         WavecombError: A file does not exist or cannot be read.
     """
-    with refused_fifos(), _layers(file, session_layer) as (root, session):
+    with abort_on_fifo(), _layers(file, session_layer) as (root, session):
         paths = {"/Render", wanted or "", _settings_path(root), _settings_path(session)}
         kept = {path for path in map(_prim_path, paths) if path is not None}
         mask = Usd.StagePopulationMask(sorted(kept))
@@ -120,7 +120,7 @@ def _layers(
             change_layers((root, session))
             yield root, session
     except Tf.ErrorException as error:
-        raise WavecombError(f"{file}: cannot be read as USD: {commentary(error)}") from None
+        raise WavecombError(f"{file}: cannot be read as USD: {first_message(error)}") from None
 
 
 def _named_by(stage: Usd.Stage) -> set[Sdf.Path]:
@@ -172,7 +172,7 @@ def open_stage(
         WavecombError: A file cannot be read, or a variant, prim or payload does not exist.
     """
     rule = Usd.Stage.LoadNone if payloads else Usd.Stage.LoadAll
-    with refused_fifos():
+    with abort_on_fifo():
         with _layers(file, session_layer, overrides) as (root, session):
             stage = Usd.Stage.Open(root, session, rule)
         if not stage:
@@ -227,7 +227,7 @@ def _session(file: Path) -> Sdf.Layer:
     try:
         layer = Sdf.Layer.FindOrOpen(str(file))
     except Tf.ErrorException as error:
-        raise WavecombError(f"{file}: cannot be read as USD: {commentary(error)}") from None
+        raise WavecombError(f"{file}: cannot be read as USD: {first_message(error)}") from None
     if not layer:
         raise WavecombError(f"{file}: cannot be read as USD")
     return layer

@@ -159,7 +159,7 @@ def load_payloads(stage: Usd.Stage, wanted: Sequence[str]) -> None:
             raise WavecombError(f"payloads {text}: the stage has no such payload")
 
 
-def tell_unloaded(stage: Usd.Stage, report: LoadReport) -> None:
+def report_unloaded_payloads(stage: Usd.Stage, report: LoadReport) -> None:
     """Reports payloads that are not loaded."""
     if stage.GetLoadRules() == Usd.StageLoadRules.LoadAll():
         return

@@ -13,7 +13,7 @@ _NAMED = re.compile(r"@([^@]*\.mtlx\]*)@", re.IGNORECASE)
 """Name of a MaterialX file in USD's message about a layer that cannot be opened."""
 
 
-def unread_mtlx(stage: Usd.Stage) -> Iterator[tuple[Any, str]]:
+def unopened_materialx(stage: Usd.Stage) -> Iterator[tuple[Any, str]]:
     """Yields composition errors about MaterialX files, with the files' names."""
     for error in stage.GetCompositionErrors():
         found = _NAMED.search(str(error))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
-from wavecomb.usd.instances.point_instancer import sound
+from wavecomb.usd.instances.point_instancer import are_valid
 from wavecomb.usd.materials.colour_space import LINEAR, OCIO_NAMES, RAW, SRGB, canonical, convert
 from wavecomb.usd.materials.network import number, word
 from wavecomb.usd.materials.pixels import Image, read_image
@@ -93,7 +93,7 @@ class DomeReader:
             size = [abs(number(side, 1.0)) for side in sides]
             place = np.array(cache.GetLocalToWorldTransform(portal))
             square = np.diag((*size, 1.0, 1.0)) @ place
-            if not sound(np.stack([dome, square])).all():
+            if not are_valid(np.stack([dome, square])).all():
                 self.report.warn("portal left out: its transform has no inverse", path)
                 continue
             found.append(square @ np.linalg.inv(dome))

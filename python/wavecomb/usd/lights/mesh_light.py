@@ -9,7 +9,7 @@ import numpy as np
 from pxr import Sdf, UsdLux
 
 from wavecomb.usd.lights.light import LightReader
-from wavecomb.usd.materials.assignment import Draw
+from wavecomb.usd.materials.assignment import DrawItem
 from wavecomb.usd.materials.material import MaterialTable
 from wavecomb.usd.materials.network import word
 from wavecomb.usd.materials.surface import Surface
@@ -49,10 +49,10 @@ class MeshLights:
         self._lights = lights
         self._materials = materials
 
-    def of(self, draw: Draw, kind: str) -> MeshLight | None:
+    def of(self, draw: DrawItem, kind: str) -> MeshLight | None:
         """Returns the mesh light of a gprim; None if it is not a light.
 
-        ``draw`` holds the gprim and its transform to its group; ``kind`` is ``Draw.kind``.
+        ``draw`` holds the gprim and its transform to its group; ``kind`` is ``DrawItem.kind``.
         """
         if not draw.prim.HasAPI(UsdLux.LightAPI):
             return None
@@ -75,7 +75,7 @@ class MeshLights:
         kept = {"shadow_link", "shadow_color", "shadow_distance"} & options.keys()
         return MeshLight(number, material, sync == "independent" or bool(kept))
 
-    def say_moving(self, path: Sdf.Path) -> None:
+    def report_motion(self, path: Sdf.Path) -> None:
         """Reports features that do not work for a moving light that only light sampling finds."""
         what = "shadow settings and the sync mode independent of moving mesh lights"
         self._report.missing(what, path)

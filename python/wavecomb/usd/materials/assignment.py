@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd, UsdShade, Vt
 
-from wavecomb.usd.geometry.attributes import MAX_WIDTH, Wanted, check_fit
+from wavecomb.usd.geometry.attributes import MAX_WIDTH, PrimvarRequest, check_fit
 from wavecomb.usd.geometry.curves import CurveArrays
 from wavecomb.usd.geometry.mesh_arrays import MeshArrays
 from wavecomb.usd.geometry.primvar import PrimvarError, as_integers, find_primvar, in_linear
 from wavecomb.usd.geometry.shutter import Track
 from wavecomb.usd.geometry.triangulate import Topology
-from wavecomb.usd.graphs.binding import at_other_sets, bound
+from wavecomb.usd.graphs.binding import bound, with_uv_sets
 from wavecomb.usd.graphs.values import PARAMETERS, GraphTooLarge
 from wavecomb.usd.materials.material import DEFAULT_COLOUR, MaterialTable
 from wavecomb.usd.materials.network import colour, number
@@ -42,7 +42,7 @@ class Parent:
 
 
 @dataclass(slots=True)
-class Draw:
+class DrawItem:
     """A gprim to draw.
 
     Attributes:
@@ -71,7 +71,7 @@ class Draw:
 
 
 @dataclass
-class Worn:
+class BoundMaterials:
     """The materials that are bound to a gprim.
 
     Attributes:
@@ -82,7 +82,7 @@ class Worn:
 
     material: int
     by_face: FaceIds | None = None
-    reads: dict[str, Wanted] = field(default_factory=dict)
+    reads: dict[str, PrimvarRequest] = field(default_factory=dict)
 
 
 class Assigner:
@@ -91,10 +91,10 @@ class Assigner:
     def __init__(self, context: LoadContext, table: MaterialTable) -> None:
         self.time, self.report = context.time, context.report
         self.table = table
-        self._last: tuple[Draw, dict[Sdf.Path, Surface]] | None = None
+        self._last: tuple[DrawItem, dict[Sdf.Path, Surface]] | None = None
         self._bound_graphs: dict[tuple[Any, ...], tuple[Surface, Surface]] = {}
 
-    def uv_names(self, draw: Draw) -> tuple[str, ...]:
+    def uv_names(self, draw: DrawItem) -> tuple[str, ...]:
         """Returns names of the UV sets that the bound materials read, in order of first use."""
         if not draw.subsets:
             own = () if draw.material is None else self._surface(draw, draw.material).uv_names
@@ -106,7 +106,9 @@ class Assigner:
                 names += self._surface(draw, material).uv_names
         return tuple(dict.fromkeys(names))
 
-    def assign(self, draw: Draw, mesh: MeshArrays | CurveArrays, otherwise: int | None) -> Worn:
+    def assign(
+        self, draw: DrawItem, mesh: MeshArrays | CurveArrays, otherwise: int | None
+    ) -> BoundMaterials:
         """Returns the materials of a gprim.
 
         Args:
@@ -116,24 +118,24 @@ class Assigner:
                 grey.
         """
         surface = None if draw.material is None else self._surface(draw, draw.material)
-        self._tell_of_hair(draw, mesh)
+        self._report_hair(draw, mesh)
         if surface is not None and not draw.subsets and is_alike(surface):
-            return Worn(self.table.add(surface))
+            return BoundMaterials(self.table.add(surface))
         primvars = _Primvars(draw, mesh, self.time, self.report)
         sets = self.uv_names(draw)
         # The mesh's texture coordinates are the first set that exists.
         if len(sets) > 1:
             primvars.own_uv = next((n for n in sets if primvars.find(n, 2) is not None), "")
         if surface is None or surface.stand_in:
-            worn = Worn(self._display(primvars, otherwise))
+            assigned = BoundMaterials(self._display(primvars, otherwise))
         else:
-            worn = Worn(self._bound(primvars, surface))
+            assigned = BoundMaterials(self._bound(primvars, surface))
         if draw.subsets and isinstance(mesh, MeshArrays) and mesh.topology is not None:
-            worn.by_face = self._subsets(draw, mesh.topology, worn.material, primvars)
-        worn.reads = primvars.read
-        return worn
+            assigned.by_face = self._subsets(draw, mesh.topology, assigned.material, primvars)
+        assigned.reads = primvars.read
+        return assigned
 
-    def _surface(self, draw: Draw, material: UsdShade.Material) -> Surface:
+    def _surface(self, draw: DrawItem, material: UsdShade.Material) -> Surface:
         """Returns the surface of a material on a gprim."""
         surface = self.table.surface(material)
         if not surface.object_reads:
@@ -146,7 +148,7 @@ class Assigner:
         return known[path]
 
     def _surface_of_object(
-        self, draw: Draw, material: UsdShade.Material, surface: Surface
+        self, draw: DrawItem, material: UsdShade.Material, surface: Surface
     ) -> Surface:
         values: dict[str, Any] = {}
         # A primvar may name another primvar; two rounds resolve one such level.
@@ -159,7 +161,7 @@ class Assigner:
             surface = self.table.surface_of_object(material, given)
         return surface
 
-    def _one_value(self, draw: Draw, name: str) -> Any:
+    def _one_value(self, draw: DrawItem, name: str) -> Any:
         """Returns the value of a primvar on a gprim.
 
         Reports a varying primvar and uses its mean.
@@ -181,10 +183,10 @@ class Assigner:
             return _plain(values.mean(axis=0, dtype=np.float64))
         return _plain(values[0])
 
-    def _tell_of_hair(self, draw: Draw, mesh: MeshArrays | CurveArrays) -> None:
+    def _report_hair(self, draw: DrawItem, mesh: MeshArrays | CurveArrays) -> None:
         """Reports hair materials on geometry other than tubes."""
-        worn = (draw.material, *draw.subset_materials)
-        if not any(m is not None and self.table.surface(m).program == "hair" for m in worn):
+        materials = (draw.material, *draw.subset_materials)
+        if not any(m is not None and self.table.surface(m).program == "hair" for m in materials):
             return
         if isinstance(mesh, MeshArrays):
             what = "hair on a mesh (as tubes along its texture's u)"
@@ -195,7 +197,7 @@ class Assigner:
         self.report.missing(what, draw.prim.GetPath())
 
     def _subsets(
-        self, draw: Draw, topology: Topology, base: int, primvars: _Primvars
+        self, draw: DrawItem, topology: Topology, base: int, primvars: _Primvars
     ) -> FaceIds | None:
         per_face = np.full(topology.face_count, base, np.uint32)
         bound = False
@@ -218,7 +220,7 @@ class Assigner:
         if surface.graph is not None and surface.graph.depends_on_mesh:
             surface = self._with_graph(primvars, surface)
         if primvars.own_uv:
-            surface = self._at_other_sets(primvars, surface)
+            surface = self._with_uv_sets(primvars, surface)
         varying: list[str] = []
         brightest = primvars.highest(surface.emission_attributes())
         for parameter, name in surface.primvars.items():
@@ -264,7 +266,7 @@ class Assigner:
             self._bound_graphs[key] = (surface, made)
         return self._bound_graphs[key][1]
 
-    def _at_other_sets(self, primvars: _Primvars, surface: Surface) -> Surface:
+    def _with_uv_sets(self, primvars: _Primvars, surface: Surface) -> Surface:
         """Returns the surface with textures that read further UV sets of the mesh as primvars."""
         first = surface.uv_names[0] if surface.uv_names else ""
         named = {p: surface.texture_uvs.get(p, first) for p in surface.textures}
@@ -278,7 +280,7 @@ class Assigner:
         if key not in self._bound_graphs:
             sets = {p: name for p, name in named.items() if name in there}
             try:
-                made = at_other_sets(surface, sets, first if first in there else "")
+                made = with_uv_sets(surface, sets, first if first in there else "")
             except GraphTooLarge:
                 made = surface
             self._bound_graphs[key] = (surface, made)
@@ -315,16 +317,16 @@ class _Primvars:
     """The primvars of a gprim; each is read once, and invalid ones are reported."""
 
     def __init__(
-        self, draw: Draw, mesh: MeshArrays | CurveArrays, time: Usd.TimeCode, report: LoadReport
+        self, draw: DrawItem, mesh: MeshArrays | CurveArrays, time: Usd.TimeCode, report: LoadReport
     ) -> None:
-        self.read: dict[str, Wanted] = {}
+        self.read: dict[str, PrimvarRequest] = {}
         # The primvar that the mesh has as its texture coordinates, if materials read several sets.
         self.own_uv = ""
         self._draw = draw
         self._mesh = mesh
         self._time = time
         self._report = report
-        self._found: dict[tuple[str, int], Wanted | None] = {}
+        self._found: dict[tuple[str, int], PrimvarRequest | None] = {}
 
     @property
     def path(self) -> Sdf.Path:
@@ -336,7 +338,7 @@ class _Primvars:
         """(4, 4) transform from the gprim to its group."""
         return np.array(self._draw.matrix, np.float64)
 
-    def find(self, name: str, width: int) -> Wanted | None:
+    def find(self, name: str, width: int) -> PrimvarRequest | None:
         """Returns a primvar with at least ``width`` components; None if there is no valid one.
 
         A ``width`` of 0 accepts any number of components, at most ``MAX_WIDTH``.
@@ -344,7 +346,7 @@ class _Primvars:
         key = name, width
         if key not in self._found:
             try:
-                self._found[key] = self._look(name, width)
+                self._found[key] = self._lookup(name, width)
             except PrimvarError as error:
                 self._report.warn(f"{error}: ignored", self.path)
                 self._found[key] = None
@@ -354,14 +356,14 @@ class _Primvars:
         """Returns the largest component of those named primvars that are read at hits, else 0."""
         return max((self.read[name].highest for name in names if name in self.read), default=0.0)
 
-    def keep(self, wanted: Wanted) -> None:
+    def keep(self, wanted: PrimvarRequest) -> None:
         """Records that a material reads the primvar at hits."""
         name = wanted.primvar.name
         known = self.read.get(name)
         if known is None or known.width < wanted.width:
             self.read[name] = wanted
 
-    def _look(self, name: str, width: int) -> Wanted | None:
+    def _lookup(self, name: str, width: int) -> PrimvarRequest | None:
         primvar = find_primvar(self._draw.prim, name, self._draw.inherited, self._time)
         if primvar is None or len(primvar.values) == 0:
             return None
@@ -375,10 +377,10 @@ class _Primvars:
             what = f"primvar {name!r} with values that are not finite: set to 0"
             self._report.warn(what, self.path)
             values = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
-        return Wanted(replace(primvar, values=values), width or values.shape[1])
+        return PrimvarRequest(replace(primvar, values=values), width or values.shape[1])
 
 
-def _text_of(draw: Draw, name: str, time: Usd.TimeCode) -> str | None:
+def _text_of(draw: DrawItem, name: str, time: Usd.TimeCode) -> str | None:
     """Returns the value of a constant string or token primvar; None for other primvars."""
     attribute = draw.prim.GetAttribute(f"primvars:{name}")
     if not attribute.HasAuthoredValue():

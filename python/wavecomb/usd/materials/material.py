@@ -44,7 +44,7 @@ DEFAULT_COLOUR = (0.5, 0.5, 0.5)
 PREVIEW = "preview"
 """Result of ``surface_source`` for UsdPreviewSurface."""
 
-LAMP = 1.0
+LEAST_EMISSION = 1.0
 """Emission from which a material counts as a light; then a stage without lights gets no dome."""
 
 _INSTEAD = "displayColor in its place"
@@ -138,11 +138,11 @@ class MaterialTable:
         self._surface_ids: dict[int, tuple[Surface, int]] = {}
         self._varied: dict[tuple[int, tuple[str, ...]], tuple[Surface, Surface]] = {}
         self._plain: dict[tuple[Any, ...], int] = {}
-        self.glows = False
-        """Whether a material in use emits ``LAMP`` or more and therefore counts as a light."""
+        self.emits = False
+        """Whether a material in use emits ``LEAST_EMISSION`` or more, like a light."""
         self._emitting: set[int] = set()
         self._emission: dict[int, tuple[Surface, float]] = {}
-        self.cloudy: list[str] = []
+        self.scattering_interiors: list[str] = []
         """Names of materials in use that refract light into a scattering medium."""
 
     @property
@@ -173,7 +173,7 @@ class MaterialTable:
                 surface = replace(surface, name=self._report.place(path))
             self._surfaces[path] = surface
             if is_cloudy(surface):
-                self.cloudy.append(surface.name)
+                self.scattering_interiors.append(surface.name)
             self._report.tally("materials")
         # The key is an id; storing the object keeps that id from being reused.
         self._by_object[id(material)] = material, surface
@@ -206,7 +206,7 @@ class MaterialTable:
         if brightest > 0:
             self._emitting.add(number)
             self._emission[number] = (surface, brightest)
-            self.glows = self.glows or brightest >= LAMP
+            self.emits = self.emits or brightest >= LEAST_EMISSION
         return number
 
     def varied(self, surface: Surface, varying: tuple[str, ...]) -> Surface:
@@ -235,7 +235,7 @@ class MaterialTable:
         if number is None:
             brightest = surface.brightest()
             parameters = self._in_working_space(surface.parameters)
-            self.glows = self.glows or brightest >= LAMP
+            self.emits = self.emits or brightest >= LEAST_EMISSION
             number = self._builder.add_material(
                 surface.program,
                 name=surface.name,
@@ -303,7 +303,7 @@ class MaterialTable:
         Textures contribute the mean of their files, primvars their highest value.
         """
         surface, highest = self._emission.get(material, (None, 0.0))
-        if surface is None or max(highest, surface.brightest()) < LAMP:
+        if surface is None or max(highest, surface.brightest()) < LEAST_EMISSION:
             return 0.0
         rgb = mean_emission(surface, self._textures)
         return max(float(rgb @ np.array(LUMINANCE)), highest)

@@ -51,7 +51,7 @@ class Prims:
         self.report = report
         self.layer = layer
         self.file = file
-        self.tell = tell
+        self.report_skipped = tell
 
     def define(self, path: Sdf.Path, kind: str = "") -> Sdf.PrimSpec:
         """Defines a prim with a type, and its ancestors; returns it if it exists."""
@@ -108,7 +108,9 @@ class Prims:
         if not text:
             return
         if port.typeName != (usd_type(kind) or Sdf.ValueTypeNames.Token):
-            self.tell(element, f"MaterialX value of type {kind} for {port.typeName} (left out)")
+            self.report_skipped(
+                element, f"MaterialX value of type {kind} for {port.typeName} (left out)"
+            )
             return
         space = element.getActiveColorSpace()
         if kind == "filename":
@@ -126,7 +128,7 @@ class Prims:
         try:
             port.default = usd_value(text, kind)
         except ValueError as error:
-            self.tell(element, f"MaterialX value {error} (left out)")
+            self.report_skipped(element, f"MaterialX value {error} (left out)")
 
 
 def connect(port: Sdf.AttributeSpec, source: Sdf.Path) -> None:

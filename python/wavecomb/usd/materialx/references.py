@@ -17,7 +17,7 @@ from typing import Any
 from pxr import Ar, Sdf, Tf, Usd
 
 from wavecomb.run.isolation import progress_notes
-from wavecomb.usd.layers.unopened_materialx import unread_mtlx
+from wavecomb.usd.layers.unopened_materialx import unopened_materialx
 from wavecomb.usd.materialx.files import MtlxError, read_document
 from wavecomb.usd.materialx.graphs import Graphs
 from wavecomb.usd.materialx.materials import Materials, write_looks
@@ -77,7 +77,7 @@ def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
     """
     tried: set[tuple[str, str]] = set()
     for turn in range(MAX_ROUNDS):
-        if not (everywhere and turn == 0) and not any(True for _ in unread_mtlx(stage)):
+        if not (everywhere and turn == 0) and not any(True for _ in unopened_materialx(stage)):
             return
         with _lock, Ar.ResolverContextBinder(stage.GetPathResolverContext()):
             changes = _changes(stage, tried)
@@ -106,7 +106,7 @@ def reload(stage: Usd.Stage) -> None:
 
 def tell(stage: Usd.Stage, report: LoadReport) -> None:
     """Reports MaterialX files that are missing, and problems of translated ones."""
-    for error, named in unread_mtlx(stage):
+    for error, named in unopened_materialx(stage):
         known = next((t for file, t in _translations.items() if _same(file, named)), None)
         why = known.error if known is not None and known.error else _why(named)
         place = str(error.rootSite.path)

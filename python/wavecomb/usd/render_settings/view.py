@@ -18,7 +18,7 @@ from wavecomb.usd.stage.report import LoadReport
 
 
 @dataclass(frozen=True)
-class Seen:
+class ViewSettings:
     """``LoadOptions`` combined with the render settings of a stage.
 
     Attributes:
@@ -45,7 +45,7 @@ def check_view(options: LoadOptions) -> None:
     _blur(options, True)
 
 
-def seen_on(stage: Usd.Stage, options: LoadOptions, report: LoadReport) -> Seen:
+def view_settings(stage: Usd.Stage, options: LoadOptions, report: LoadReport) -> ViewSettings:
     """Combines options with the stage's render settings; options take precedence.
 
     Raises:
@@ -60,7 +60,7 @@ def seen_on(stage: Usd.Stage, options: LoadOptions, report: LoadReport) -> Seen:
         options.projection, options.exposure, sharp, choice.conform, choice.pixel_aspect,
         options.lens_settings or {}, options.st_map,
     )  # fmt: skip
-    return Seen(
+    return ViewSettings(
         choice,
         find_camera(stage, options.camera or choice.camera),
         lens,

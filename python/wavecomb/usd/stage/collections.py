@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
 
-from wavecomb.usd.stage.diagnostics import commentary
+from wavecomb.usd.stage.diagnostics import first_message
 from wavecomb.usd.stage.report import LoadReport
 
 Rules = dict[str, str]
@@ -46,7 +46,7 @@ class Collections:
             if _has_expression(collection) and not query.GetAsPathExpansionRuleMap():
                 return self._of_expression(collection, query)
         except Tf.ErrorException as error:
-            what = f"{name}: its membershipExpression cannot be evaluated ({commentary(error)})"
+            what = f"{name}: its membershipExpression cannot be evaluated ({first_message(error)})"
             self._report.warn(f"{what}: it has no members", prim.GetPath())
             return {}
         self._warn_of_ignored(collection, query, name)

@@ -52,7 +52,7 @@ def _tell(report: LoadReport, text: str) -> None:
     report.warn(f"USD: {text}")
 
 
-def commentary(error: BaseException) -> str:
+def first_message(error: BaseException) -> str:
     """Returns the first message of a ``Tf.ErrorException``."""
     try:
         for item in error.args:
@@ -137,7 +137,7 @@ def _pass_on(trap: Any, report: LoadReport) -> None:
     trap.Clear()
 
 
-class Listening:
+class DiagnosticListener:
     """Capture of messages that USD's C++ code emits on this thread while the program runs.
 
     Does nothing with USD versions that have no ``Tf.DiagnosticTrap``.

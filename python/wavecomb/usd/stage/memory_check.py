@@ -9,7 +9,7 @@ from pxr import Usd
 
 from wavecomb.errors import WavecombError
 from wavecomb.run.isolation import memory, time_limit
-from wavecomb.usd.materials.assignment import Draw
+from wavecomb.usd.materials.assignment import DrawItem
 
 LEAST_BYTES = 20
 """Least memory per mesh point in bytes: half a triangle of 12 bytes plus about 32 bytes in the
@@ -21,7 +21,7 @@ _SHARE = 8
 """The check is skipped if layers are smaller than 1 / ``_SHARE`` of the available memory."""
 
 
-class Room:
+class MemoryCheck:
     """Memory check for the meshes of one stage.
 
     Points of a .usdc file stay in it until they are read.
@@ -31,11 +31,11 @@ class Room:
         layer = stage.GetRootLayer()
         self.file = layer.realPath or layer.identifier
         self.time = time
-        self.is_asked = time_limit.loaded_layers()[1] > memory.room() // _SHARE
+        self.is_enabled = time_limit.loaded_layers()[1] > memory.room() // _SHARE
 
-    def check(self, draws: Iterable[Draw]) -> None:
+    def check(self, draws: Iterable[DrawItem]) -> None:
         """Raises WavecombError if meshes that are not read yet need more memory than available."""
-        if not self.is_asked:
+        if not self.is_enabled:
             return
         points = 0
         for draw in draws:

@@ -93,7 +93,7 @@ def _snapped(place: NDArray[np.float64]) -> Origin:
     return float(x), float(y), float(z)
 
 
-def around(origin: Origin) -> Gf.Matrix4d:
+def world_to_scene(origin: Origin) -> Gf.Matrix4d:
     """Returns the transform from the world to the scene; ``IDENTITY`` itself for ``WORLD``."""
     if origin == WORLD:
         return IDENTITY

@@ -17,11 +17,11 @@ from wavecomb.usd.geometry.shapes import SHAPES
 from wavecomb.usd.geometry.shutter import Track
 from wavecomb.usd.geometry.skeleton import Skeletons
 from wavecomb.usd.geometry.splats import SPLATS
-from wavecomb.usd.instances.group import Place
-from wavecomb.usd.instances.point_instancer import sound
+from wavecomb.usd.instances.group import AnimatedTransform
+from wavecomb.usd.instances.point_instancer import are_valid
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.lights.light import Light, LightReader
-from wavecomb.usd.materials.assignment import Draw, Parent
+from wavecomb.usd.materials.assignment import DrawItem, Parent
 from wavecomb.usd.materials.network import word
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.draw_modes import DrawModes
@@ -38,7 +38,7 @@ DRAWN = frozenset(("mesh", "patch", "shape", "splats", *STRANDS.values()))
 
 
 @dataclass
-class Placed:
+class InstancePrim:
     """A native instance or a point instancer, which is expanded after bindings are resolved."""
 
     prim: Usd.Prim
@@ -50,15 +50,15 @@ class Placed:
 
 
 @dataclass
-class Gathered:
+class CollectedPrims:
     """Prims that a traversal collected for one group."""
 
-    draws: list[Draw] = field(default_factory=list)
-    volumes: list[Draw] = field(default_factory=list)
-    instances: list[Placed] = field(default_factory=list)
-    instancers: list[Placed] = field(default_factory=list)
-    lights: list[tuple[Light, Place]] = field(default_factory=list)
-    stand_ins: list[Draw] = field(default_factory=list)
+    draws: list[DrawItem] = field(default_factory=list)
+    volumes: list[DrawItem] = field(default_factory=list)
+    instances: list[InstancePrim] = field(default_factory=list)
+    instancers: list[InstancePrim] = field(default_factory=list)
+    lights: list[tuple[Light, AnimatedTransform]] = field(default_factory=list)
+    stand_ins: list[DrawItem] = field(default_factory=list)
 
     def binding_prims(self) -> list[Usd.Prim]:
         """Returns all prims with material bindings, in the order that ``bind`` expects."""
@@ -139,7 +139,7 @@ class Traversal:
         predicate: Any = None,
         inherited: Sequence[Any] = (),
         base: Gf.Matrix4d = IDENTITY,
-    ) -> Gathered:
+    ) -> CollectedPrims:
         """Collects the prims at and below some roots, in stage order.
 
         Args:
@@ -150,7 +150,7 @@ class Traversal:
             inherited: Constant primvars that the roots inherit.
             base: Transform of their parents and of prims that reset the transform stack.
         """
-        found = Gathered()
+        found = CollectedPrims()
         time, local = self.time, self.xforms.GetLocalTransformation
         proxies = Usd.TraverseInstanceProxies(
             Usd.PrimDefaultPredicate if predicate is None else predicate
@@ -209,7 +209,7 @@ class Traversal:
                 if self._shared(prototype) and not self.skeletons.keeps_apart(prim, prototype):
                     self.report.alias(prototype.GetPath(), prim.GetPath())
                     inherited = inherit(prim, inherited)
-                    placed = Placed(prim, matrix, purpose, inherited, track=track)
+                    placed = InstancePrim(prim, matrix, purpose, inherited, track=track)
                     found.instances.append(placed)
                     continue
                 pick = proxies
@@ -223,11 +223,13 @@ class Traversal:
                         self.report.missing("materials of parts of a TetMesh", prim.GetPath())
                         subsets = []
                     found.draws.append(
-                        Draw(prim, matrix, inherited, subsets, None, [], track, names, kind, parent)
+                        DrawItem(
+                            prim, matrix, inherited, subsets, None, [], track, names, kind, parent
+                        )
                     )
             elif kind == "instancer":
                 if shown:
-                    placed = Placed(prim, matrix, purpose, inherited, track=track)
+                    placed = InstancePrim(prim, matrix, purpose, inherited, track=track)
                     found.instancers.append(placed)
                 continue
             elif kind == "light":
@@ -241,7 +243,9 @@ class Traversal:
                     if track is not None and self.motion is not None:
                         self.report.note("moving volume: still, in mid-shutter", prim.GetPath())
                         matrix = track.at(self.motion.middle)
-                    found.volumes.append(Draw(prim, matrix, inherited, kind=kind, parent=parent))
+                    found.volumes.append(
+                        DrawItem(prim, matrix, inherited, kind=kind, parent=parent)
+                    )
             elif kind.startswith("unsupported"):
                 if shown:
                     self.report.missing(str(prim.GetTypeName()), prim.GetPath())
@@ -258,14 +262,21 @@ class Traversal:
         return found
 
     def _stand_in(
-        self, found: Gathered, prim: Usd.Prim, mode: str, matrix: Gf.Matrix4d, track: Track | None
+        self,
+        found: CollectedPrims,
+        prim: Usd.Prim,
+        mode: str,
+        matrix: Gf.Matrix4d,
+        track: Track | None,
     ) -> None:
         """Adds the stand-in geometry of a model with a draw mode."""
         made = self.modes.stand_in(prim, mode)
         if made is not None:
             names = authored_names(made.prim)
             looks: list[UsdShade.Material | None] = list(made.materials)
-            draw = Draw(made.prim, matrix, (), made.subsets, None, looks, track, names, made.kind)
+            draw = DrawItem(
+                made.prim, matrix, (), made.subsets, None, looks, track, names, made.kind
+            )
             found.stand_ins.append(draw)
 
     def _shared(self, prototype: Usd.Prim) -> bool:
@@ -280,18 +291,18 @@ class Traversal:
         return known > 1
 
     def _light(
-        self, found: Gathered, prim: Usd.Prim, matrix: Gf.Matrix4d, steps: Matrices | None
+        self, found: CollectedPrims, prim: Usd.Prim, matrix: Gf.Matrix4d, steps: Matrices | None
     ) -> None:
         scale = abs(matrix.GetDeterminant3()) ** (1.0 / 3.0)
         light = self.lights.read(prim, scale)
         transform = light.local @ np.array(matrix)
         if steps is not None:
             steps = light.local @ steps
-        if not sound(transform[None] if steps is None else np.stack([transform, *steps])).all():
+        if not are_valid(transform[None] if steps is None else np.stack([transform, *steps])).all():
             self.report.warn("light left out: its transform has no inverse", prim.GetPath())
             return
         self.report.tally("lights")
-        found.lights.append((light, Place(transform, steps)))
+        found.lights.append((light, AnimatedTransform(transform, steps)))
 
 
 def inherit(prim: Usd.Prim, inherited: Sequence[Any]) -> Sequence[Any]:

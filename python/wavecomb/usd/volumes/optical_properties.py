@@ -14,7 +14,7 @@ DENSITY = "density"
 
 
 @dataclass(frozen=True)
-class Driven:
+class FieldColour:
     """A colour that is multiplied by a field.
 
     Attributes:
@@ -30,24 +30,24 @@ class Driven:
         """Whether the colour is 0, so that the field does not matter."""
         return not any(self.colour)
 
-    def scaled(self, by: Colour) -> Driven:
+    def scaled(self, by: Colour) -> FieldColour:
         """Returns this value multiplied by a colour."""
         return replace(self, colour=product(self.colour, by))
 
 
 @dataclass(frozen=True)
-class VolumeLook:
+class OpticalProperties:
     """Absorption, scattering and emission of a volume.
 
     Attributes:
         extinction: Extinction coefficient per stage unit, multiplied by the field ``density``.
         albedo: Single-scattering albedo, multiplied by the field ``colour``.
         anisotropy: Mean cosine of the phase function, in (-1, 1).
-        emission: Emitted radiance per stage unit, multiplied by the field ``glow``.
+        emission: Emitted radiance per stage unit, multiplied by the field ``emission_field``.
         density: Name of a field; "" means the field named density, or the first scalar field.
         colour: Name of a field, or "".
-        glow: Name of a field; "" means the density field.
-        kelvin: Temperature of value 1 in ``glow``; 0 if ``glow`` does not hold temperatures.
+        emission_field: Name of a field; "" means the density field.
+        kelvin: Temperature of value 1 in ``emission_field``; 0 if it does not hold temperatures.
         name: Name for messages.
     """
 
@@ -57,13 +57,13 @@ class VolumeLook:
     emission: Colour = BLACK
     density: str = ""
     colour: str = ""
-    glow: str = ""
+    emission_field: str = ""
     kelvin: float = 0.0
     name: str = ""
 
 
-DEFAULT_LOOK = VolumeLook()
-"""Look of a volume without a material: white smoke, extinction 1 per unit at density 1."""
+DEFAULT_PROPERTIES = OpticalProperties()
+"""Properties of a volume without a material: white smoke, extinction 1 per unit at density 1."""
 
 
 def product(a: Colour, b: Colour) -> Colour:

@@ -10,7 +10,7 @@ from pxr import Sdf
 from wavecomb.usd.graphs.surface_parameters import NORMAL, NUMBER
 from wavecomb.usd.graphs.values import Value, numbers
 from wavecomb.usd.materials.network import Source
-from wavecomb.usd.materialx.library import WIDTHS, Feed, FlatGraph, Inner
+from wavecomb.usd.materialx.library import WIDTHS, FlatGraph, FlatNode, PortSource
 from wavecomb.usd.materialx.nodes.node import NodeCall
 
 NOT_NUMBERS = ("string", "filename", "geomname")
@@ -28,7 +28,7 @@ def _kind(category: str, name: str, kind: str) -> str:
     return NUMBER if name in _PLACES else kind
 
 
-class Body:
+class ExpandedGraph:
     """The expanded graph of one node."""
 
     def __init__(self, call: NodeCall, graph: FlatGraph, spread: int = 0) -> None:
@@ -47,9 +47,11 @@ class Body:
             self.call.inputs.find(interface, kind)
         for node, output, kind in nodes:
             self._node(node, output, kind)
-        return self.fed(result, self.call.kind)
+        return self.source_value(result, self.call.kind)
 
-    def _needed(self, result: Feed) -> tuple[list[tuple[str, str, str]], list[tuple[str, str]]]:
+    def _needed(
+        self, result: PortSource
+    ) -> tuple[list[tuple[str, str, str]], list[tuple[str, str]]]:
         """Returns the nodes (in evaluation order) and interface inputs of an output."""
         nodes: dict[tuple[str, str, str], None] = {}
         interfaces: dict[tuple[str, str], None] = {}
@@ -75,13 +77,13 @@ class Body:
             width = self._spread if self._spread and width == 1 else width
             networks = self.call.networks
             call = NodeCall(
-                networks, _Inside(self, inner), inner.category, inner.identifier, output, width,
-                kind,
+                networks, _LibraryInputs(self, inner), inner.category, inner.identifier, output,
+                width, kind,
             )  # fmt: skip
             self._done[key] = networks.compiled(call)
         return self._done[key]
 
-    def fed(self, feed: Feed, kind: str) -> Value | None:
+    def source_value(self, feed: PortSource, kind: str) -> Value | None:
         """Returns the value of a source."""
         if feed.node:
             return self._node(feed.node, feed.output, kind)
@@ -90,12 +92,12 @@ class Body:
             if outside is not None:
                 return outside
             default = self._graph.definition.inputs.get(feed.interface)
-            return None if default is None else self.fed(default, kind)
+            return None if default is None else self.source_value(default, kind)
         if feed.place:
             return self.call.at_place(feed.place, feed.space)
         return literal(feed)
 
-    def source(self, feed: Feed) -> Source | None:
+    def source(self, feed: PortSource) -> Source | None:
         """Returns the source of a text input."""
         if feed.interface:
             outside = self.call.inputs.source(feed.interface)
@@ -104,15 +106,15 @@ class Body:
         value = _word(feed)
         return None if value is None else Source(value=value)
 
-    def is_given(self, feed: Feed) -> bool:
+    def is_given(self, feed: PortSource) -> bool:
         """Returns whether a source is not a default."""
         return self.call.inputs.has(feed.interface) if feed.interface else True
 
 
-class _Inside:
+class _LibraryInputs:
     """Inputs of a node inside a library graph; implements ``call.Inputs``."""
 
-    def __init__(self, body: Body, node: Inner) -> None:
+    def __init__(self, body: ExpandedGraph, node: FlatNode) -> None:
         self._body = body
         self._node = node
 
@@ -124,7 +126,7 @@ class _Inside:
     def find(self, name: str, kind: str) -> Value | None:
         """Returns the value of an input; None if it is not set."""
         feed = self._node.inputs.get(name)
-        return None if feed is None else self._body.fed(feed, kind)
+        return None if feed is None else self._body.source_value(feed, kind)
 
     def source(self, name: str) -> Source | None:
         """Returns the source of a text input."""
@@ -141,7 +143,7 @@ class _Inside:
         return list(self._node.inputs)
 
 
-def literal(feed: Feed) -> Value | None:
+def literal(feed: PortSource) -> Value | None:
     """Parses the numbers of a source's value; returns None for text."""
     if not feed.value or feed.type in NOT_NUMBERS:
         return None
@@ -153,5 +155,5 @@ def literal(feed: Feed) -> Value | None:
         return None
 
 
-def _word(feed: Feed) -> Any:
+def _word(feed: PortSource) -> Any:
     return feed.value if feed.type in NOT_NUMBERS and feed.value else None
