@@ -191,15 +191,15 @@ def render(
     if not has_catchers or picture.cancelled:
         return picture
 
-    def of_catchers(how: Mapping[str, str]) -> Result:
+    def render_catchers(how: Mapping[str, str]) -> Result:
         size = chosen.width, chosen.height
         options = LoadOptions.of(None, {**loading, "size": size, "threads": chosen.threads, **how})
         scene = load(str(stage), options).scene
         return _render(
-            scene, None, catchers.of_catchers(chosen), None, own, None, None, None, learned
+            scene, None, catchers.catcher_settings(chosen), None, own, None, None, None, learned
         )[0]
 
-    return catchers.caught(picture, of_catchers)
+    return catchers.with_catcher_shadows(picture, render_catchers)
 
 
 def _asked_for(

@@ -31,11 +31,11 @@ MACHINE = "wavecomb-test"
 """Machine class in tests that render in this process."""
 
 
-def render_all(folder: Folder, image: int = 0, looks: int = 0) -> None:
+def render_all(folder: Folder, image: int = 0, checks: int = 0) -> None:
     """Renders all tiles of an image in this process."""
     renderer = Renderer(folder.job, threads=1, learned=folder.learned())
     for task in folder.job.tasks_of(image):
-        renderer.render(task, folder.part(task), MACHINE, looks)
+        renderer.render(task, folder.part(task), MACHINE, checks)
 
 
 def work(folder: Folder) -> None:

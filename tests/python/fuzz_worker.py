@@ -126,9 +126,9 @@ def main() -> None:
     if limit:
         resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
     answers = os.fdopen(os.dup(1), "w")
-    progress_notes.follow(progress_notes.new_page())
+    progress_notes.start(progress_notes.new_page())
     time_limit.limit_s = LOAD_LIMIT_S
-    time_limit.on_end = functools.partial(give_up, answers)
+    time_limit.end_process = functools.partial(give_up, answers)
     judge(sys.argv[2])  # imports everything, so that the first case takes no longer
     with tempfile.TemporaryFile() as spilt:
         written = watch_writes(os.path.realpath(os.path.dirname(sys.argv[2])))

@@ -25,7 +25,7 @@ from wavecomb.usd.stage.origin import (
     WORLD,
     around,
     find_origin,
-    moved_to,
+    to_scene_space,
 )
 
 pytestmark = needs("wavecomb._core")
@@ -351,7 +351,7 @@ def test_origins(x: float) -> None:
     if abs(x) < NEAR:
         assert found == WORLD and around(found) is IDENTITY
         matrices = np.eye(4)
-        assert moved_to(matrices, found) is matrices
+        assert to_scene_space(matrices, found) is matrices
     else:
         assert abs(found[0] - x) <= CELL / 2 and found[0] % CELL == 0 and found[1:] == (0, 0)
         moved = np.array(Gf.Matrix4d(1).SetTranslate((x, 5, 0)) * around(found))

@@ -312,7 +312,7 @@ def test_a_full_disk_on_one_worker(stage: Path, tmp_path: Path) -> None:
         folder, Cluster(client, "--on x"), Outcome(16, 1), show=lambda out: None,
         warn=lambda line: None, is_stopped=lambda: False,
     )  # fmt: skip
-    run._machine, run._looks[0], run._missing[0] = "wavecomb-x", 0, set(range(16))
+    run._machine, run._checks[0], run._missing[0] = "wavecomb-x", 0, set(range(16))
     full = {"done": [], "failed": [], "full": "p.exr: cannot be written: No space left",
             "warnings": [], "seconds": 0.1, "worker": "one"}  # fmt: skip
     future = _Future(full)

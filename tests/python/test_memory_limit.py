@@ -147,10 +147,10 @@ def test_a_damaged_value_is_not_taken_for_a_bomb(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(memory.trail, "is_expendable", lambda: True)
     monkeypatch.setattr(resource, "getrlimit", lambda _: (10**10, 10**10))
     error = ValueError("exception thrown unpacking a value, returning an empty VtValue")
-    assert not memory.ran_out(error, lambda: 100_000)
-    assert memory.ran_out(error, lambda: 2_000_000)
-    assert not memory.ran_out(ValueError("other"), lambda: 2_000_000)
-    assert memory.ran_out(MemoryError(), int)
+    assert not memory.is_exhausted(error, lambda: 100_000)
+    assert memory.is_exhausted(error, lambda: 2_000_000)
+    assert not memory.is_exhausted(ValueError("other"), lambda: 2_000_000)
+    assert memory.is_exhausted(MemoryError(), int)
 
 
 def test_meshes_that_cannot_fit_are_told_before_they_are_read(

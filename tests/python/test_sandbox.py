@@ -297,7 +297,7 @@ def test_shared_mappings_count_as_memory(place: Path) -> None:
         not_here("no control group may be made here")
     group.close()
     code = PARENT.replace(
-        "supervisor.choices.words", "memory.ask(300)\nsupervisor.choices.words", 1
+        "supervisor.choices.words", "memory.request_limit(300)\nsupervisor.choices.words", 1
     )
     done = subprocess.run(
         [sys.executable, "-c", code, str(place), "", CHILD + """

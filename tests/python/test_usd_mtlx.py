@@ -17,7 +17,7 @@ from wavecomb.image.files.image import write_png
 from wavecomb.usd import LoadReport, load_stage, mtlx, open_stage
 from wavecomb.usd.materialx.files import MAX_DEPTH, MtlxError
 from wavecomb.usd.materialx.references import translate
-from wavecomb.usd.stage.diagnostics import captured
+from wavecomb.usd.stage.diagnostics import capture_diagnostics
 
 GOLD = """<?xml version="1.0"?>
 <materialx version="1.38" colorspace="lin_rec709">
@@ -68,7 +68,7 @@ def value(stage: Usd.Stage, path: str, name: str) -> object:
 
 def said(stage: Usd.Stage) -> list[str]:
     report = LoadReport()
-    mtlx.tell(stage, report)
+    mtlx.report_problems(stage, report)
     return [finding.line() for finding in report.warnings]
 
 
@@ -88,7 +88,7 @@ def folder(tmp_path: Path) -> Path:
 
 def test_every_arc_composes(folder: Path) -> None:
     report = LoadReport()
-    with captured(report):
+    with capture_diagnostics(report):
         stage = open_stage(folder / "stage.usda")
     assert not report.warnings
     assert not said(stage)
@@ -155,9 +155,9 @@ def test_missing_and_broken_files_are_named(tmp_path: Path) -> None:
         'def "B" ( references = @./bad.mtlx@</MaterialX> ) {\n}\n',
     )
     report = LoadReport()
-    with captured(report):
+    with capture_diagnostics(report):
         stage = open_stage(file)
-    mtlx.tell(stage, report)
+    mtlx.report_problems(stage, report)
     lines = sorted(finding.line() for finding in report.warnings)
     assert len(lines) == 2
     assert "bad.mtlx cannot be read (it is <html>, not <materialx>): /B" in lines[0]
@@ -166,7 +166,7 @@ def test_missing_and_broken_files_are_named(tmp_path: Path) -> None:
 
 def test_a_stage_that_is_open_is_not_changed(folder: Path) -> None:
     report = LoadReport()
-    with captured(report):
+    with capture_diagnostics(report):
         stage = Usd.Stage.Open(str(folder / "inner.usda"))
     assert len(said(stage)) == 1
     assert "give Wavecomb its file instead" in said(stage)[0]

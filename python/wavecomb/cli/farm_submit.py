@@ -80,14 +80,14 @@ def submit_command(
     Takes the options of `wavecomb render`. Images equal those of one process bit for bit. Ctrl-C
     keeps finished tiles, and `wavecomb farm resume` continues. See docs/farm.md.
     """
-    from wavecomb.farm.clusters import parse_where
+    from wavecomb.farm.clusters import parse_cluster
     from wavecomb.farm.folder import Folder
     from wavecomb.farm.job import Job
     from wavecomb.farm.planning import default_folder
     from wavecomb.farm.tiling import parse_tiles
     from wavecomb.path_maps import parse_maps
 
-    where = parse_where(on)
+    where = parse_cluster(on)
     parse_tiles(options["tiles"])
     parse_maps(options["maps"])
     if options["isa"] is not None:

@@ -156,7 +156,7 @@ def assemble_tiles(output: str) -> list[str]:
     """
     from wavecomb.farm.assembly import NarrowBorder, join, write_image
     from wavecomb.farm.job import Job, Task
-    from wavecomb.farm.tile_file import DamagedPart, read_part
+    from wavecomb.farm.tile_file import InvalidTile, read_tile
 
     names = tile_names(output)
     if not names:
@@ -164,10 +164,10 @@ def assemble_tiles(output: str) -> list[str]:
             f"{output}: has no tiles beside it; `wavecomb render -o {output} --tile I/N` makes them"
         )
     try:
-        first = read_part(names[0])
+        first = read_tile(names[0])
         job = Job.of(first.job, names[0])
         same = [i for i in range(len(job.images))
-                if job.part_key(Task(i, first.number), first.machine) == first.key]  # fmt: skip
+                if job.tile_key(Task(i, first.number), first.machine) == first.key]  # fmt: skip
         if not same:
             raise WavecombError(f"{names[0]}: does not belong to the job in its header")
         image, count = same[0], job.tile_count(same[0])
@@ -179,8 +179,8 @@ def assemble_tiles(output: str) -> list[str]:
 
         def parts() -> Any:
             for index, name in enumerate(wanted):
-                part = read_part(name)
-                if part.key != job.part_key(Task(image, index), first.machine):
+                part = read_tile(name)
+                if part.key != job.tile_key(Task(image, index), first.machine):
                     raise WavecombError(
                         f"{name}: is of other settings, files or machines than {names[0]}: render "
                         "it again"
@@ -192,7 +192,7 @@ def assemble_tiles(output: str) -> list[str]:
         raise WavecombError(
             f"{error}: give --tile 1/1, or --on local to `wavecomb farm submit`, which does that"
         ) from None
-    except DamagedPart as error:
+    except InvalidTile as error:
         raise WavecombError(str(error)) from None
     where = os.path.dirname(os.path.abspath(output))
     if os.path.realpath(job.place(job.names(image)["output"])) != os.path.realpath(output):

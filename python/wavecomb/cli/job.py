@@ -134,11 +134,11 @@ class Job:
             shot.load(None, **how)
             watcher = Watcher(is_stopped=is_stopped, warn=lambda line: warn([line]))
             return shot.render(
-                catchers.of_catchers(settings), None, None, None, watcher=watcher,
+                catchers.catcher_settings(settings), None, None, None, watcher=watcher,
                 learned=self.learning.given,
             )  # fmt: skip
 
-        with_shadows = catchers.caught(picture, render)
+        with_shadows = catchers.with_catcher_shadows(picture, render)
         return replace(picture, cancelled=True) if is_stopped() else with_shadows
 
     def _run_bands(

@@ -42,7 +42,7 @@ def _limit_memory(context: click.Context, parameter: click.Parameter, value: flo
     from wavecomb.run.isolation import memory
 
     if not context.resilient_parsing:
-        memory.ask(value)
+        memory.request_limit(value)
 
 
 def _ask_sandbox(context: click.Context, parameter: click.Parameter, value: str) -> None:

@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 from wavecomb.errors import WavecombError
 from wavecomb.farm.folder import Folder, write_json
 from wavecomb.farm.job import Job, Shot, Task
-from wavecomb.farm.tile_file import AOV, DamagedPart, Part, has_part, load_part, read_part
+from wavecomb.farm.tile_file import AOV, InvalidTile, RenderedTile, has_tile, load_tile, read_tile
 from wavecomb.farm.tiling import Rectangle
 from wavecomb.image.rendered import Picture
 from wavecomb.run.bands import sum_stats
 from wavecomb.run.stats import write_stats
 
-_MORE_LOOKS = 4
+_MORE_CHECKS = 4
 """Error checks that new borders allow for beyond the largest number seen, after some were too
 narrow."""
 
@@ -44,11 +44,11 @@ class NarrowBorder(WavecombError):
         self.passes = passes
 
 
-def join(job: Job, image: int, parts: Iterable[Part]) -> Picture:
+def join(job: Job, image: int, parts: Iterable[RenderedTile]) -> Picture:
     """Joins tiles, reading one at a time, into an image without denoising.
 
     Raises:
-        DamagedPart: A tile is missing or damaged.
+        InvalidTile: A tile is missing or damaged.
         NarrowBorder: Borders of adaptive tiles were too narrow.
         WavecombError: The tiles do not cover each pixel of the image exactly once, or differ in
             their layers.
@@ -57,7 +57,7 @@ def join(job: Job, image: int, parts: Iterable[Part]) -> Picture:
     check_cover(shot.region, rectangles)
     x0, y0, _, _ = window = _window(shot)
     whole: dict[str, NDArray[Any]] = {}
-    kept: list[Part] = []
+    kept: list[RenderedTile] = []
     manifests: dict[str, dict[str, int]] = {}
     for part, rectangle in zip(parts, rectangles, strict=True):
         if part.tile != rectangle:
@@ -74,7 +74,7 @@ def join(job: Job, image: int, parts: Iterable[Part]) -> Picture:
             manifests.setdefault(level, {}).update(names)
         part.layers.clear()
         kept.append(part)
-    _check_looks(kept)
+    _verify_borders(kept)
     named: dict[str, Any] = {n: array for n, array in whole.items() if not n.startswith(AOV)}
     return Picture(
         **{"albedo": None, "normal": None, "depth": None, **named},
@@ -117,7 +117,7 @@ def _window(shot: Shot) -> Rectangle:
     return 0, 0, int(shot.settings["width"]), int(shot.settings["height"])
 
 
-def _room(part: Part, name: str, window: Rectangle) -> NDArray[Any]:
+def _room(part: RenderedTile, name: str, window: Rectangle) -> NDArray[Any]:
     """Allocates an array for the whole image, filled with the value of pixels without samples."""
     layer, empty = part.layers[name], part.empty.get(name)
     x0, y0, x1, y1 = window
@@ -127,7 +127,7 @@ def _room(part: Part, name: str, window: Rectangle) -> NDArray[Any]:
     return room
 
 
-def _check_looks(parts: Sequence[Part]) -> None:
+def _verify_borders(parts: Sequence[RenderedTile]) -> None:
     """Raises NarrowBorder if a tile took more passes than some border allows for.
 
     An adaptive tile decides about each of its pixels as the whole image would, as long as all
@@ -136,15 +136,15 @@ def _check_looks(parts: Sequence[Part]) -> None:
     """
     most = max(part.passes for part in parts)
     for part in parts:
-        if 0 < part.looks < most:
+        if 0 < part.checks < most:
             raise NarrowBorder(
-                f"{part.name}: its border is wide enough for {part.looks} error checks, and a "
+                f"{part.name}: its border is wide enough for {part.checks} error checks, and a "
                 f"tile took {most}: all tiles must be rendered again with wider borders",
                 most,
             )
 
 
-def _stats(job: Job, shot: Shot, parts: Sequence[Part]) -> dict[str, Any]:
+def _stats(job: Job, shot: Shot, parts: Sequence[RenderedTile]) -> dict[str, Any]:
     """Merges the statistics of tiles into statistics of one render."""
     out = sum_stats([part.stats for part in parts], shot.settings)
     del out["bands"]
@@ -237,10 +237,10 @@ def machine_of(folder: Folder, task: Task) -> str:
     if not file.exists():
         return ""
     try:
-        part = read_part(file)
-    except DamagedPart:
+        part = read_tile(file)
+    except InvalidTile:
         return ""
-    return part.machine if part.key == folder.job.part_key(task, part.machine) else ""
+    return part.machine if part.key == folder.job.tile_key(task, part.machine) else ""
 
 
 def finish_image(folder: Folder, image: int, machine: str, threads: int = 0) -> dict[str, Any]:
@@ -254,26 +254,26 @@ def finish_image(folder: Folder, image: int, machine: str, threads: int = 0) -> 
 
     Returns:
         A dictionary with ``files``, the files written. If tiles must be rendered first, it has
-        ``again``, their indices, and ``looks``, the number of error checks that their borders must
+        ``again``, their indices, and ``checks``, the number of error checks that their borders must
         allow for, or 0.
     """
     job = folder.job
     tasks = list(zip(job.tasks_of(image), job.rectangles(image), strict=True))
-    parts = (load_part(folder.part(t), job.part_key(t, machine), tile) for t, tile in tasks)
+    parts = (load_tile(folder.part(t), job.tile_key(t, machine), tile) for t, tile in tasks)
     try:
         picture = join(job, image, parts)
     except NarrowBorder as error:
         again = [task.tile for task, _ in tasks]
-        return {"again": again, "looks": error.passes + _MORE_LOOKS}
-    except DamagedPart:
+        return {"again": again, "checks": error.passes + _MORE_CHECKS}
+    except InvalidTile:
         if is_finished(folder, image):
             return {"files": []}  # another client finished it and removed the tiles
         again = [
             task.tile
             for task, tile in tasks
-            if not has_part(folder.part(task), job.part_key(task, machine), tile)
+            if not has_tile(folder.part(task), job.tile_key(task, machine), tile)
         ]
-        return {"again": again, "looks": 0}
+        return {"again": again, "checks": 0}
     files = write_image(job, image, picture, threads)
     write_record(folder, image, files)
     shutil.rmtree(folder.parts(image), ignore_errors=True)

@@ -13,11 +13,11 @@ from typing import Any
 
 from wavecomb.errors import WavecombError
 from wavecomb.farm.assembly import Outcome, is_finished, machine_of
-from wavecomb.farm.clusters import Cluster, Where, connected
+from wavecomb.farm.clusters import Cluster, ClusterSpec, connected
 from wavecomb.farm.folder import Folder
 from wavecomb.farm.job import Task, hashed
 from wavecomb.farm.machine_class import PREFIX
-from wavecomb.farm.tile_file import has_part
+from wavecomb.farm.tile_file import has_tile
 
 _TURN_S = 0.2
 _LOOK_S = 1.0
@@ -63,7 +63,7 @@ class Run:
         self._ready: deque[_Batch] = deque()
         self._tiles: deque[Task] = deque()
         self._missing: dict[int, set[int]] = {}
-        self._looks: dict[int, int] = {}
+        self._checks: dict[int, int] = {}
         self._flying: dict[Any, _Batch] = {}
         self._ended: queue.SimpleQueue[tuple[Any, dict[str, Any] | None]] = queue.SimpleQueue()
         self._attempts = 0
@@ -81,7 +81,7 @@ class Run:
 
     def work(self, images: list[int]) -> None:
         """Renders the missing tiles of these images and writes the images."""
-        from wavecomb.farm.rendering import looks_for
+        from wavecomb.farm.rendering import error_checks_for
         from wavecomb.farm.tasks import FarmPlugin, restart_stale
 
         self._cluster.client.register_plugin(FarmPlugin(self._job.isa, self._job.hang_s))
@@ -91,13 +91,13 @@ class Run:
         restart_stale(self._cluster.client, self._cluster.what, self._job)
         for image in images:
             shot, tiles = self._job.shot(image), self._job.rectangles(image)
-            self._looks[image] = looks_for(shot) if len(tiles) > 1 else 0
+            self._checks[image] = error_checks_for(shot) if len(tiles) > 1 else 0
             missing = {
                 task.tile
                 for task, tile in zip(self._job.tasks_of(image), tiles, strict=True)
-                if not has_part(
-                    self._folder.part(task), self._job.part_key(task, self._machine), tile,
-                    self._looks[image],
+                if not has_tile(
+                    self._folder.part(task), self._job.tile_key(task, self._machine), tile,
+                    self._checks[image],
                 )
             }  # fmt: skip
             self._missing[image] = missing
@@ -224,9 +224,9 @@ class Run:
         else:
             return False
         # Two clients of one scheduler must use the same key for the same work.
-        tiles = [(task.image, task.tile, self._looks[task.image]) for task in batch.tiles]
+        tiles = [(task.image, task.tile, self._checks[task.image]) for task in batch.tiles]
         name = hashed([self._common[0], self._job.id, self._machine, tiles, batch.image,
-                       batch.attempt, self._looks.get(batch.image)])  # fmt: skip
+                       batch.attempt, self._checks.get(batch.image)])  # fmt: skip
         what: Any = tiles if tiles else batch.image
         future = self._cluster.client.submit(
             render_tiles if tiles else assemble_image, *self._common, self._machine, what,
@@ -314,7 +314,7 @@ class Run:
             self._out.images_done += 1
             self._progressed = True
             return
-        self._looks[image] = max(result["looks"], self._looks[image])
+        self._checks[image] = max(result["checks"], self._checks[image])
         self._missing[image] |= set(result["again"])
         self._out.tasks_done -= len(result["again"])
         self._again([Task(image, tile) for tile in result["again"]])
@@ -355,7 +355,7 @@ class Run:
 
 def run(
     folder: Folder,
-    where: Where,
+    where: ClusterSpec,
     *,
     threads: int = 0,
     dashboard: int | None = None,

@@ -217,7 +217,7 @@ class Job:
         )  # fmt: skip
         return found
 
-    def part_key(self, task: Task, machine: str) -> str:
+    def tile_key(self, task: Task, machine: str) -> str:
         """Returns a hash of all inputs that determine the pixels of a tile."""
         tile = self.rectangles(task.image)[task.tile]
         return hashed({"image": self.image_key(task.image, machine), "tile": tile})

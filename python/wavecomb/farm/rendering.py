@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from wavecomb.errors import WavecombError
 from wavecomb.farm.assembly import file_hash
 from wavecomb.farm.job import Job, Shot, StageFile, Task
-from wavecomb.farm.tiling import Rectangle, border, grown, most_looks
+from wavecomb.farm.tiling import Rectangle, border, grown, max_error_checks
 from wavecomb.image.rendered import Picture, picture_of
 from wavecomb.path_maps import here, use_maps
 from wavecomb.run.bands import without_samples
@@ -76,7 +76,7 @@ class Renderer:
         task: Task,
         path: Path,
         machine: str,
-        looks: int = 0,
+        checks: int = 0,
         *,
         with_job: bool = False,
         replacing: Any = None,
@@ -87,9 +87,9 @@ class Renderer:
             task: The tile.
             path: File of the tile.
             machine: Class of this machine.
-            looks: Number of error checks that a border must allow for; 0 chooses a likely number.
+            checks: Number of error checks that a border must allow for; 0 chooses a likely number.
             with_job: Whether the file also stores the job.
-            replacing: As in ``save_part``.
+            replacing: As in ``save_tile``.
 
         Returns:
             Counts for the progress display.
@@ -98,15 +98,15 @@ class Renderer:
             Stopped: ``is_stopped`` cancelled the render.
             WavecombError: The stage or the settings cannot be rendered.
         """
-        from wavecomb.farm.tile_file import replacing_quickly, save_part
+        from wavecomb.farm.tile_file import replacing_quickly, save_tile
 
         shot, tile = self.job.shot(task.image), self.job.rectangles(task.image)[task.tile]
-        settings, rendered, looks = self._settings(task.image, shot, tile, looks)
+        settings, rendered, checks = self._settings(task.image, shot, tile, checks)
         check_memory(settings, shot.aovs)
         picture, frames = self._render(task, shot, settings)
-        save_part(
-            path, picture, key=self.job.part_key(task, machine), number=task.tile, tile=tile,
-            rendered=rendered, machine=machine, looks=looks,
+        save_tile(
+            path, picture, key=self.job.tile_key(task, machine), number=task.tile, tile=tile,
+            rendered=rendered, machine=machine, checks=checks,
             empty=self._empty(task, shot, frames, picture),
             job=self.job.as_json() if with_job else None,
             replacing=replacing or replacing_quickly,
@@ -114,7 +114,7 @@ class Renderer:
         return {"samples": picture.stats["counts"]["samples"]}
 
     def _settings(
-        self, image: int, shot: Shot, tile: Rectangle, looks: int
+        self, image: int, shot: Shot, tile: Rectangle, checks: int
     ) -> tuple[Settings, Rectangle, int]:
         """Returns a tile's settings, the rectangle to render and the error checks it allows for."""
         from wavecomb import _core
@@ -122,9 +122,9 @@ class Renderer:
         chosen = {**shot.settings, "threads": self._threads or shot.settings.get("threads", 0)}
         if self.job.tile_count(image) == 1:
             return _core.Settings(**chosen), _whole(shot), 0
-        looks = looks_for(shot, looks)
-        rendered = grown(tile, border(shot.settings, looks), shot.region)
-        return _core.Settings(**{**chosen, "region": rendered, "crop": True}), rendered, looks
+        checks = error_checks_for(shot, checks)
+        rendered = grown(tile, border(shot.settings, checks), shot.region)
+        return _core.Settings(**{**chosen, "region": rendered, "crop": True}), rendered, checks
 
     def _render(self, task: Task, shot: Shot, settings: Settings) -> tuple[Picture, Frames]:
         frames = self._frames(task, settings.threads)
@@ -202,14 +202,14 @@ def _whole(shot: Shot) -> Rectangle:
     return 0, 0, int(shot.settings["width"]), int(shot.settings["height"])
 
 
-def looks_for(shot: Shot, looks: int = 0) -> int:
+def error_checks_for(shot: Shot, checks: int = 0) -> int:
     """Returns the number of error checks that borders allow for.
 
-    This is ``looks`` or, if that is 0, a likely number. Renders that are not adaptive need 0.
+    This is ``checks`` or, if that is 0, a likely number. Renders that are not adaptive need 0.
     """
     if not shot.is_adaptive:
         return 0
-    return looks or most_looks(shot.settings)
+    return checks or max_error_checks(shot.settings)
 
 
 def list_files(

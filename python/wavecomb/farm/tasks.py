@@ -138,23 +138,23 @@ def render_tiles(
     """
     from wavecomb.farm.job import Task
     from wavecomb.farm.rendering import Stopped
-    from wavecomb.farm.tile_file import has_part
+    from wavecomb.farm.tile_file import has_tile
 
     started = time.monotonic()
     out: dict[str, Any] = {"done": [], "failed": [], "full": "", "warnings": []}
     out["worker"] = _begin()
     with progress:
         renderer, of = _renderer(folder, maps, job)
-        for image, number, looks in tiles:
+        for image, number, checks in tiles:
             progress.note()
             if _is_cancelled():
                 break
             task = Task(image, number)
-            path, key = of.part(task), of.job.part_key(task, machine)
+            path, key = of.part(task), of.job.tile_key(task, machine)
             tile = of.job.rectangles(image)[number]
             try:
-                if not has_part(path, key, tile, looks):
-                    renderer.render(task, path, machine, looks)
+                if not has_tile(path, key, tile, checks):
+                    renderer.render(task, path, machine, checks)
                 out["done"].append((image, number))
             except Stopped:
                 break
@@ -177,13 +177,13 @@ def assemble_image(
     """Joins the tiles of an image and writes its files; takes the arguments of ``render_tiles``.
 
     Returns:
-        A dictionary: ``again``, tiles that must be rendered first; ``looks``, the number of error
+        A dictionary: ``again``, tiles that must be rendered first; ``checks``, the number of error
         checks that their borders must allow for, or 0; ``full``, why nothing can be written here,
         or ""; ``worker``, its address.
     """
     from wavecomb.farm.assembly import finish_image
 
-    out: dict[str, Any] = {"again": [], "looks": 0, "full": ""}
+    out: dict[str, Any] = {"again": [], "checks": 0, "full": ""}
     out["worker"] = _begin()
     with progress:
         of = _folder(folder, maps, job)

@@ -3,7 +3,7 @@
 
 The channels hold all layers of the tile as floats, without loss. Attributes of the header:
 
-- ``wavecomb:part_key``: hash of all inputs that determine the pixels (``Job.part_key``);
+- ``wavecomb:part_key``: hash of all inputs that determine the pixels (``Job.tile_key``);
 - ``wavecomb:part_facts``: JSON with the layers of the channels and other data of the image;
 - ``wavecomb:part_checksum``: SHA-256 of the facts and the pixels.
 
@@ -39,7 +39,7 @@ _EXACT = 1 << 24
 it."""
 
 
-class DamagedPart(WavecombError):
+class InvalidTile(WavecombError):
     """Error that a tile's file is missing, damaged or has another key.
 
     The tile must be rendered again.
@@ -47,7 +47,7 @@ class DamagedPart(WavecombError):
 
 
 @dataclass(frozen=True)
-class Part:
+class RenderedTile:
     """A rendered tile.
 
     Attributes:
@@ -62,7 +62,7 @@ class Part:
         manifests: As in ``Picture.manifests``.
         costs: As in ``Picture.costs``.
         passes: Number of passes over the pixels; an adaptive render checks errors after each.
-        looks: Number of error checks that the border around the tile allows for.
+        checks: Number of error checks that the border around the tile allows for.
         machine: Class of the machine that rendered the tile.
         job: The job as JSON, for tiles outside of a job's folder.
         number: Index of the tile.
@@ -78,7 +78,7 @@ class Part:
     manifests: dict[str, dict[str, int]]
     costs: dict[str, dict[str, float]]
     passes: int
-    looks: int
+    checks: int
     machine: str
     job: dict[str, Any] | None
     number: int
@@ -114,7 +114,7 @@ def replacing_quickly(path: Path) -> Iterator[Path]:
             part.unlink()
 
 
-def save_part(
+def save_tile(
     path: Path,
     picture: Picture,
     *,
@@ -123,7 +123,7 @@ def save_part(
     tile: Rectangle,
     rendered: Rectangle,
     machine: str,
-    looks: int = 0,
+    checks: int = 0,
     empty: Picture | None = None,
     job: Mapping[str, Any] | None = None,
     replacing: Any = replacing_quickly,
@@ -133,12 +133,12 @@ def save_part(
     Args:
         path: File to write.
         picture: Rendered pixels.
-        key: Key from ``Job.part_key``.
+        key: Key from ``Job.tile_key``.
         number: Index of the tile.
         tile: Rectangle of the tile in the image, in pixels.
         rendered: Rectangle of ``picture`` in the image: the tile, perhaps with a border.
         machine: Class of this machine.
-        looks: Number of error checks that the border allows for.
+        checks: Number of error checks that the border allows for.
         empty: An image whose last pixel has no samples.
         job: The job as JSON, for a tile outside of a job's folder.
         replacing: Context manager that yields the temporary name.
@@ -149,7 +149,7 @@ def save_part(
         name: array[y : y + height, x : x + width] for name, array in layers_of(picture).items()
     }
     facts = {
-        "tile": list(tile), "number": number, "machine": machine, "looks": looks, "job": job,
+        "tile": list(tile), "number": number, "machine": machine, "looks": checks, "job": job,
         "layers": [[name, a.dtype.name, list(a.shape[2:])] for name, a in arrays.items()],
         "empty": {} if empty is None else {
             name: array[-1, -1].tobytes().hex() for name, array in layers_of(empty).items()
@@ -205,7 +205,7 @@ def _write(
         )
 
 
-def read_part(path: str | os.PathLike[str], size: tuple[int, int] | None = None) -> Part:
+def read_tile(path: str | os.PathLike[str], size: tuple[int, int] | None = None) -> RenderedTile:
     """Reads a tile and verifies its checksum.
 
     Args:
@@ -213,7 +213,7 @@ def read_part(path: str | os.PathLike[str], size: tuple[int, int] | None = None)
         size: Required width and height in pixels; None allows any.
 
     Raises:
-        DamagedPart: The file is missing or damaged.
+        InvalidTile: The file is missing or damaged.
     """
     name = os.fspath(path)
     try:
@@ -230,7 +230,7 @@ def read_part(path: str | os.PathLike[str], size: tuple[int, int] | None = None)
             k += count
         kinds = {layer: (kind, rest) for layer, kind, rest in facts["layers"]}
         x0, y0, x1, y1 = (int(edge) for edge in facts["tile"])
-        return Part(
+        return RenderedTile(
             name=name, key=str(attributes[_KEY]), tile=(x0, y0, x1, y1), layers=layers,
             empty={
                 layer: np.frombuffer(bytes.fromhex(data), kinds[layer][0]).reshape(kinds[layer][1])
@@ -238,43 +238,43 @@ def read_part(path: str | os.PathLike[str], size: tuple[int, int] | None = None)
             },
             stats=facts["stats"], metadata=_metadata_of(facts["metadata"]),
             manifests=facts["manifests"], costs=facts["costs"], passes=facts["passes"],
-            looks=facts["looks"], machine=facts["machine"], job=facts["job"],
+            checks=facts["looks"], machine=facts["machine"], job=facts["job"],
             number=facts["number"],
         )  # fmt: skip
     except FileNotFoundError:
-        raise DamagedPart(f"{name}: is missing; the tile must be rendered again") from None
+        raise InvalidTile(f"{name}: is missing; the tile must be rendered again") from None
     except (OSError, KeyError, TypeError, ValueError) as error:
         why = error.args[0] if error.args else type(error).__name__
-        raise DamagedPart(f"{name}: is damaged: {why}; the tile must be rendered again") from None
+        raise InvalidTile(f"{name}: is damaged: {why}; the tile must be rendered again") from None
 
 
-def load_part(path: Path, key: str, tile: Rectangle, looks: int = 0) -> Part:
+def load_tile(path: Path, key: str, tile: Rectangle, checks: int = 0) -> RenderedTile:
     """Reads a tile that must have a given key.
 
     Args:
         path: File to read.
-        key: Key from ``Job.part_key``.
+        key: Key from ``Job.tile_key``.
         tile: Rectangle of the tile in the image, in pixels.
-        looks: Number of error checks that its border must allow for.
+        checks: Number of error checks that its border must allow for.
 
     Raises:
-        DamagedPart: The tile is missing or damaged, has another key, or its border is too narrow.
+        InvalidTile: The tile is missing or damaged, has another key, or its border is too narrow.
     """
-    part = read_part(path, (tile[2] - tile[0], tile[3] - tile[1]))
+    part = read_tile(path, (tile[2] - tile[0], tile[3] - tile[1]))
     if part.key != key or part.tile != tile:
-        raise DamagedPart(f"{path}: is of other settings, files or machines than the job")
-    if part.looks < looks:
-        raise DamagedPart(f"{path}: its border is too narrow for {looks} error checks")
+        raise InvalidTile(f"{path}: is of other settings, files or machines than the job")
+    if part.checks < checks:
+        raise InvalidTile(f"{path}: its border is too narrow for {checks} error checks")
     return part
 
 
-def has_part(path: Path, key: str, tile: Rectangle, looks: int = 0) -> bool:
-    """Returns whether ``load_part`` would succeed."""
+def has_tile(path: Path, key: str, tile: Rectangle, checks: int = 0) -> bool:
+    """Returns whether ``load_tile`` would succeed."""
     if not path.exists():
         return False
     try:
-        load_part(path, key, tile, looks)
-    except DamagedPart:
+        load_tile(path, key, tile, checks)
+    except InvalidTile:
         return False
     return True
 

@@ -119,10 +119,10 @@ def choose_tiles(
     return columns, rows
 
 
-def looks(settings: Mapping[str, Any]) -> int:
+def error_checks(settings: Mapping[str, Any]) -> int:
     """Returns the number of error checks before all pixels of an adaptive render have all samples.
 
-    >>> looks({"spp": 64, "min_spp": 16})
+    >>> error_checks({"spp": 64, "min_spp": 16})
     3
     """
     spp = int(settings["spp"])
@@ -135,12 +135,12 @@ def looks(settings: Mapping[str, Any]) -> int:
     return count
 
 
-def most_looks(settings: Mapping[str, Any]) -> int:
+def max_error_checks(settings: Mapping[str, Any]) -> int:
     """Returns the number of error checks that the border of an adaptive tile allows for.
 
-    It is 4 more than ``looks``, because pixels that resume late take further checks.
+    It is 4 more than ``error_checks``, because pixels that resume late take further checks.
     """
-    return looks(settings) + 4
+    return error_checks(settings) + 4
 
 
 def border(settings: Mapping[str, Any], count: int) -> int:

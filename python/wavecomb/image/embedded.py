@@ -72,7 +72,7 @@ def smaller(pixels: NDArray[Any], most: int) -> NDArray[np.float32]:
     return np.asarray(blocks.mean(axis=(1, 3)), np.float32)
 
 
-def every_nth(pixels: NDArray[P], most: int) -> NDArray[P]:
+def subsample(pixels: NDArray[P], most: int) -> NDArray[P]:
     """Reduces an image by skipping pixels, for ids and values that are not finite."""
     step = max(1, -(-max(pixels.shape[:2]) // most))
     return np.ascontiguousarray(pixels[::step, ::step])

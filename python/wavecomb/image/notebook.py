@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.image.embedded import base64_text, data_uri, encoded, every_nth, smaller
+from wavecomb.image.embedded import base64_text, data_uri, encoded, smaller, subsample
 from wavecomb.image.files.image import display
 from wavecomb.image.layer_view import is_light, show_layer
 
@@ -106,7 +106,7 @@ def _layer(name: str, array: NDArray[Any]) -> str:
     if is_light(name):
         small, legend = display(smaller(values, LAYER_EDGE), tone_map="neutral"), None
     else:
-        shown = show_layer(every_nth(values, LAYER_EDGE), name)
+        shown = show_layer(subsample(values, LAYER_EDGE), name)
         small, legend = shown.pixels, shown.legend
     text = html.escape(name)
     if legend is not None:

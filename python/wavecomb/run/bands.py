@@ -111,7 +111,7 @@ def render_bands(
 
     x0, y0, x1, y1 = settings.region or (0, 0, settings.width, settings.height)
     total = (x1 - x0) * (y1 - y0) * settings.spp
-    shown = None if reporter is None else _Whole(reporter, total)
+    shown = None if reporter is None else _BandReporter(reporter, total)
     for row in range(y0, y1, rows):
         region = (x0, row, x1, min(row + rows, y1))
         band = _core.Settings(**{**settings.to_dict(), "region": region, "crop": True})
@@ -148,7 +148,7 @@ def without_samples(
     return replace(picture, aovs=aovs, **{name: empty(getattr(picture, name)) for name in names})
 
 
-class _Whole:
+class _BandReporter:
     """Reporter that combines the progress of bands."""
 
     def __init__(self, reporter: Reporter, samples: int) -> None:

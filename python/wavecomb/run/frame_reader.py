@@ -18,10 +18,10 @@ from wavecomb.usd.geometry.shutter import find_motion
 from wavecomb.usd.layers.opening import open_stage
 from wavecomb.usd.render_settings.values import RenderChoice
 from wavecomb.usd.render_settings.view import check_view, view_settings
-from wavecomb.usd.stage.diagnostics import captured
+from wavecomb.usd.stage.diagnostics import capture_diagnostics
 from wavecomb.usd.stage.frame_cache import FrameCache
 from wavecomb.usd.stage.load import load_stage
-from wavecomb.usd.stage.origin import find_origin, moved_to
+from wavecomb.usd.stage.origin import find_origin, to_scene_space
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.time_codes import frame_number, time_code
 
@@ -65,12 +65,12 @@ class FrameReader:
         check_view(options)
         opening = LoadReport()
         layer = None if options.session_layer is None else Path(options.session_layer)
-        with captured(opening):
+        with capture_diagnostics(opening):
             self._stage: Usd.Stage = open_stage(
                 path, options.variants, mask=options.mask, session_layer=layer,
                 payloads=options.payloads,
             )  # fmt: skip
-            mtlx.tell(self._stage, opening)
+            mtlx.report_problems(self._stage, opening)
             self._cache = FrameCache(self._stage, opening)
         self._before: LoadedStage | None = None
 
@@ -126,7 +126,7 @@ class FrameReader:
             # The scene would be built around another point.
             return None
         to_world = np.array(UsdGeom.XformCache(when).GetLocalToWorldTransform(settings.camera))
-        to_world = moved_to(to_world, origin)
+        to_world = to_scene_space(to_world, origin)
         view = read_camera(settings.camera, to_world, when, report, settings.lens)
         motion = find_motion(settings.camera, when, settings.blur, report)
         shutter = None if motion is None else motion.shutter

@@ -77,7 +77,7 @@ class View(Protocol):
         """Removes the view, which the final image replaces."""
 
 
-class Widgets:
+class WidgetView:
     """Live view made of ipywidgets."""
 
     def __init__(self) -> None:
@@ -105,7 +105,7 @@ class Widgets:
         self._all.close()
 
 
-class Plain:
+class IPythonView:
     """Live view made of IPython's updatable output."""
 
     def __init__(self) -> None:
@@ -143,8 +143,8 @@ class Plain:
 def make_view() -> View:
     """Returns the best view that is available."""
     with contextlib.suppress(ImportError):
-        return Widgets()
-    return Plain()
+        return WidgetView()
+    return IPythonView()
 
 
 class LiveProgress(Silent):

@@ -14,7 +14,7 @@ from wavecomb import _core
 from wavecomb.image.rendered import picture_of
 from wavecomb.load_options import LoadOptions, split
 from wavecomb.run.aovs import DEEP, with_others
-from wavecomb.run.catchers import LAYER, caught, of_catchers, with_alpha
+from wavecomb.run.catchers import LAYER, catcher_settings, with_alpha, with_catcher_shadows
 from wavecomb.run.catchers import check as check_catchers
 from wavecomb.run.frame_names import parse_frames
 from wavecomb.run.settings import check_memory, prepare
@@ -202,13 +202,15 @@ def _pictures(
         result = shots.render(settings, progress, policy, profile)
         picture = picture_of(result, shots.stats(result), scene=scene, aovs=names)
         if loaded.catchers and not picture.cancelled:
-            picture = _caught(shots, frame, settings, picture)
+            picture = _with_catcher_shadows(shots, frame, settings, picture)
         yield frame, picture
 
 
-def _caught(shots: Frames, frame: float, settings: Settings, picture: Picture) -> Picture:
+def _with_catcher_shadows(
+    shots: Frames, frame: float, settings: Settings, picture: Picture
+) -> Picture:
     def render(how: Mapping[str, str]) -> Result:
         shots.load(frame, **how)
-        return shots.render(of_catchers(settings))
+        return shots.render(catcher_settings(settings))
 
-    return caught(picture, render)
+    return with_catcher_shadows(picture, render)

@@ -12,14 +12,14 @@ import math
 
 import numpy as np
 
-from wavecomb.scenes.authoring import materials as looks
+from wavecomb.scenes.authoring import materials
 from wavecomb.scenes.authoring.stage import StageWriter
 from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.options import SceneOptions
 
-_WHITE = looks.diffuse((0.725, 0.71, 0.68))
-_RED = looks.diffuse((0.63, 0.065, 0.05))
-_GREEN = looks.diffuse((0.14, 0.45, 0.091))
+_WHITE = materials.diffuse((0.725, 0.71, 0.68))
+_RED = materials.diffuse((0.63, 0.065, 0.05))
+_GREEN = materials.diffuse((0.14, 0.45, 0.091))
 _RADIANCE = (17.0, 12.0, 4.0)
 _LIGHT_GAP = 0.5
 """Distance of the light from the ceiling, in mm. The original ceiling has a hole for the light."""
@@ -71,10 +71,10 @@ def build_cornell(writer: StageWriter, options: SceneOptions) -> None:
 
 
 DRAGON_MATERIALS = {
-    "gold": looks.metal((1.00, 0.71, 0.29), 0.32, (1.0, 0.94, 0.78)),
-    "copper": looks.COPPER,
-    "glass": looks.CLEAR_GLASS,
-    "jade": looks.JADE,
+    "gold": materials.metal((1.00, 0.71, 0.29), 0.32, (1.0, 0.94, 0.78)),
+    "copper": materials.COPPER,
+    "glass": materials.CLEAR_GLASS,
+    "jade": materials.JADE,
 }
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Vt
 
-from wavecomb.scenes.authoring import materials as looks
+from wavecomb.scenes.authoring import materials
 from wavecomb.scenes.authoring.stage import StageWriter
 from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.models.mesh import FloatArray, Mesh, face_areas, normalized
@@ -221,8 +221,8 @@ def build_splats(writer: StageWriter, options: SceneOptions) -> None:
         add_splats(writer, "/World/Objects/Capture", capture)
         return
     rng = np.random.default_rng([options.seed, 77])
-    writer.material("Floor", looks.diffuse((0.42, 0.41, 0.39)))
-    writer.material("Mirror", looks.MIRROR)
+    writer.material("Floor", materials.diffuse((0.42, 0.41, 0.39)))
+    writer.material("Mirror", materials.MIRROR)
     writer.floor("Floor", 14.0, "Floor")
     mirror = [[-2.2, 0.05, -1.9], [2.6, 0.05, -1.6], [2.6, 2.6, -1.7], [-2.2, 2.6, -2.0]]
     writer.quad("/World/Set/Mirror", mirror, "Mirror")

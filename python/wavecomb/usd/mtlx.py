@@ -54,7 +54,7 @@ def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
     """Makes a stage use the MaterialX files that its layers name.
 
     Changes the layers in memory, which then can no longer be saved. Unreadable files stay missing;
-    ``tell`` reports them. The call is fast if no such file is missing.
+    ``report_problems`` reports them. The call is fast if no such file is missing.
 
     Args:
         stage: The stage.
@@ -77,7 +77,7 @@ def reload(stage: Usd.Stage) -> None:
     references.reload(stage)
 
 
-def tell(stage: Usd.Stage, report: LoadReport) -> None:
+def report_problems(stage: Usd.Stage, report: LoadReport) -> None:
     """Reports MaterialX files that are missing, and problems of translated ones."""
     read_none = "wavecomb.usd.materialx.references" not in sys.modules
     if read_none and not any(True for _ in unopened_materialx(stage)):
@@ -85,7 +85,7 @@ def tell(stage: Usd.Stage, report: LoadReport) -> None:
     if is_there():
         from wavecomb.usd.materialx import references
 
-        references.tell(stage, report)
+        references.report_problems(stage, report)
         return
     for error, _ in unopened_materialx(stage):
         report.warn(f"{ABSENT}: files left out", str(error.rootSite.path))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from wavecomb.gui.viewport.engine import Edit
 from wavecomb.gui.viewport.navigate import Pose, pose_of
-from wavecomb.usd.stage.origin import WORLD, Origin, moved_to
+from wavecomb.usd.stage.origin import WORLD, Origin, to_scene_space
 
 if TYPE_CHECKING:
     from pxr import Usd
@@ -44,7 +44,7 @@ def camera_pose(
         return None
     code: Usd.TimeCode = time_code(usd, time)
     to_world = np.array(UsdGeom.XformCache(code).GetLocalToWorldTransform(prim))
-    view = read_camera(prim, moved_to(to_world, origin), code, LoadReport())
+    view = read_camera(prim, to_scene_space(to_world, origin), code, LoadReport())
     return None if view is None else pose_of(view.transform, view.options, path)
 
 

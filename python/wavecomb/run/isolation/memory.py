@@ -64,41 +64,41 @@ def _groups() -> list[tuple[Path, str]]:
     return found
 
 
-asked_mb: float | None = None
+requested_mb: float | None = None
 """Value of ``--memory-limit`` in units of 10^6 bytes; None uses the machine's memory."""
 
 
-def ask(megabytes: float | None) -> None:
-    """Stores the limit that ``limit`` applies later.
+def request_limit(megabytes: float | None) -> None:
+    """Stores the limit that ``apply_limit`` applies later.
 
     Raises:
         WavecombError: The limit is too small.
     """
-    global asked_mb
+    global requested_mb
     if megabytes is not None and megabytes < LEAST_MB:
         raise WavecombError(f"memory limit {megabytes:g} MB: give at least {LEAST_MB} MB")
-    asked_mb = megabytes
+    requested_mb = megabytes
 
 
-def wanted() -> int | None:
+def requested_limit() -> int | None:
     """Returns the limit in bytes; None without a limit."""
-    return machine_limit() if asked_mb is None else int(asked_mb * MEGABYTE)
+    return machine_limit() if requested_mb is None else int(requested_mb * MEGABYTE)
 
 
-def limit() -> None:
+def apply_limit() -> None:
     """Limits the memory of this supervised child process and records the limit for its parent.
 
     Raises:
         WavecombError: A limit is set but there is no child process.
     """
     if not progress_notes.is_expendable():
-        if asked_mb is None:
+        if requested_mb is None:
             return
         raise WavecombError(
-            f"memory limit {asked_mb:g} MB: is that of the child process, and there is none; "
+            f"memory limit {requested_mb:g} MB: is that of the child process, and there is none; "
             "leave --isolate off out"
         )
-    bytes_ = wanted()
+    bytes_ = requested_limit()
     if bytes_ is None:
         return
     hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
@@ -149,7 +149,7 @@ class Group:
             self._path.rmdir()
 
 
-def limit_of(page: mmap.mmap) -> str:
+def limit_text(page: mmap.mmap) -> str:
     """Returns the limit of a process for its crash message; "" without a limit."""
     megabytes = progress_notes.slot(page, "limit")
     return f"{megabytes} MB (--memory-limit)" if megabytes else ""
@@ -162,7 +162,7 @@ Integer coding stores 8 bytes in 2 bits, and LZ4 compresses up to 255 bytes to o
 """
 
 
-def ran_out(error: BaseException, layer_bytes: Callable[[], int]) -> bool:
+def is_exhausted(error: BaseException, layer_bytes: Callable[[], int]) -> bool:
     """Returns whether an error means that this expendable process reached its memory limit.
 
     USD reports the same error for lack of memory and for damaged values. The value counts as
@@ -190,7 +190,7 @@ def data_bytes() -> int:
     return 0
 
 
-def room() -> int:
+def available_bytes() -> int:
     """Returns the bytes that this process may still allocate."""
     bytes_ = resource.getrlimit(resource.RLIMIT_DATA)[0]
     if bytes_ == resource.RLIM_INFINITY:

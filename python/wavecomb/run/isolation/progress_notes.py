@@ -24,7 +24,7 @@ def open_page(descriptor: int) -> mmap.mmap:
     return mmap.mmap(descriptor, _SLOT * len(_SLOTS))
 
 
-def follow(descriptor: int) -> None:
+def start(descriptor: int) -> None:
     """Starts writing progress notes to a page; from here on this process is expendable."""
     global _page
     _page = open_page(descriptor)

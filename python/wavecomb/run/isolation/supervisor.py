@@ -121,7 +121,7 @@ def enter(outputs: Outputs, *, gpu: bool = False) -> None:
                 raise WavecombError(f"--sandbox on: {why_not}")
         if with_child:
             supervise()
-    memory.limit()
+    memory.apply_limit()
 
 
 def supervise() -> None:
@@ -166,7 +166,7 @@ def run_in_sandbox(outputs: Outputs, *, gpu: bool = False, program: str = COMMAN
     signal.pthread_sigmask(signal.SIG_BLOCK, _WATCHED)
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     folder = _private_folder(outputs)
-    group = memory.Group.make(memory.wanted())
+    group = memory.Group.make(memory.requested_limit())
     child = _Child(mine, Mover(outputs, folder.path), group)
     stderr = os.dup(2)
     given = {
@@ -272,7 +272,7 @@ def become_child(given: str) -> None:
     choices.words = tuple(found["words"])
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _WATCHED)
-    progress_notes.follow(found["page"])
+    progress_notes.start(found["page"])
     sys.excepthook = _print_exception
     _redirect_stderr(found["stderr"])
 
@@ -282,7 +282,7 @@ def _become_expendable(parent: int, page: int, words: int) -> None:
     # Outside of the terminal's foreground group, writing must not stop the process.
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
     end_with_parent(parent)
-    progress_notes.follow(page)
+    progress_notes.start(page)
     sys.excepthook = _print_exception
     own = os.dup(2)
     os.dup2(words, 2)
@@ -350,7 +350,7 @@ def _end(code: int, sent: set[int], page: int, words: int) -> None:
     if code < 0:
         seen = progress_notes.open_page(page)
         line = progress_notes.crash_message(
-            -code, progress_notes.read(seen), text, memory.limit_of(seen)
+            -code, progress_notes.read(seen), text, memory.limit_text(seen)
         )
         terminal.write_error(f"error: {' '.join(line.split())}\n")
         os._exit(2)

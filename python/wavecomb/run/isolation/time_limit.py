@@ -42,12 +42,12 @@ def _end_with_message(message: str) -> None:
     os._exit(2)
 
 
-on_end: Callable[[str], None] = _end_with_message
+end_process: Callable[[str], None] = _end_with_message
 """Ends this expendable process with a message."""
 
 
 @contextmanager
-def watched(file: Path) -> Iterator[None]:
+def limit_composition(file: Path) -> Iterator[None]:
     """Ends the process if the block, which composes a stage, takes too long.
 
     Counts only CPU time of this process, not waiting for a slow disk or a busy machine.
@@ -81,7 +81,7 @@ def _watch(file: Path, done: threading.Event) -> None:
         allowed = allowed_s(size)
         if busy >= allowed and not done.is_set():
             more = 10 * max(1, round(allowed))
-            on_end(
+            end_process(
                 f"{file}: USD has composed for {busy:.0f} s, and the size of its layers ({layers}, "
                 f"{size / 1e6:.3g} MB) does not explain it: prims refer to each other without end, "
                 f"or multiply; fix that, or allow more by --load-limit {more}"

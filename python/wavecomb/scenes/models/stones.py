@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import UsdGeom, Vt
 
-from wavecomb.scenes.authoring import materials as looks
+from wavecomb.scenes.authoring import materials
 from wavecomb.scenes.authoring.patterns import Image
 from wavecomb.scenes.authoring.stage import StageWriter
 from wavecomb.scenes.authoring.textures import marble, weave, wood
@@ -154,7 +154,7 @@ def _add(
 
 def _set(writer: StageWriter, width: float, aspect: float) -> None:
     """Adds ground, lights and camera for a field of a given width."""
-    writer.material("Ground", looks.CHALK)
+    writer.material("Ground", materials.CHALK)
     writer.floor("Ground", 30.0 * width, "Ground")
     writer.rect_light("Lamp", (0.0, 0.8 * width, 0.2 * width), 0.5 * width, 0.3 * width, (3, 3, 3))
     writer.dome_light("Sky", 0.0)

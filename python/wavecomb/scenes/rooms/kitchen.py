@@ -18,7 +18,7 @@ from wavecomb.scenes.models.shapes import placed, rounded_box, tube, turn_about
 from wavecomb.scenes.models.teapot import teapot
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.rooms import kitchen_ware, tableware
-from wavecomb.scenes.rooms.kitchen_materials import JARS, LOOKS, TILES
+from wavecomb.scenes.rooms.kitchen_materials import JARS, MATERIALS, TILES
 from wavecomb.scenes.rooms.room_materials import write_textures
 
 _WIDTH, _DEPTH, _HEIGHT = 3.8, 3.4, 2.6
@@ -56,7 +56,7 @@ def build_kitchen(writer: StageWriter, options: SceneOptions) -> None:
     rng = np.random.default_rng([options.seed, 7])
     columns = max(12, 4 * options.teapot_level)
     write_textures(writer, options)
-    for name, material in LOOKS.items():
+    for name, material in MATERIALS.items():
         writer.material(name, material)
     _walls(writer)
     _tiles(writer, rng)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from wavecomb.scenes.authoring.materials import Colour, MaterialInfo, preview
-from wavecomb.scenes.rooms.room_materials import LOOKS as ROOM_LOOKS
+from wavecomb.scenes.rooms.room_materials import MATERIALS as ROOM_MATERIALS
 from wavecomb.scenes.rooms.room_materials import coated
 
 MARBLE_METRES = 0.9
@@ -32,8 +32,8 @@ _OF_THE_ROOM = (
     "Tea",
 )  # fmt: skip
 
-LOOKS: dict[str, MaterialInfo] = {
-    **{name: ROOM_LOOKS[name] for name in _OF_THE_ROOM},
+MATERIALS: dict[str, MaterialInfo] = {
+    **{name: ROOM_MATERIALS[name] for name in _OF_THE_ROOM},
     "Wall": preview({"diffuseColor": (0.62, 0.58, 0.50), "roughness": 0.6}),
     "FloorLight": preview({"roughness": 0.12}, {"diffuseColor": "marble"}, 1.0 / MARBLE_METRES),
     "FloorDark": _gloss((0.055, 0.058, 0.062), 0.09),

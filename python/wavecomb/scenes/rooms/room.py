@@ -18,7 +18,7 @@ from wavecomb.scenes.models.shapes import placed, rounded_box
 from wavecomb.scenes.models.teapot import teapot
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.rooms import furniture, tableware, wall
-from wavecomb.scenes.rooms.room_materials import write_looks
+from wavecomb.scenes.rooms.room_materials import write_materials
 from wavecomb.scenes.rooms.shell import DEPTH, HEIGHT, WIDTH, build_shell
 
 COLUMNS_A_LEVEL = 4
@@ -37,7 +37,7 @@ def build_room(writer: StageWriter, options: SceneOptions) -> None:
     """Builds the room. ``teapot_level`` sets the resolution of bodies of revolution."""
     rng = np.random.default_rng([options.seed, 4])
     columns = max(12, COLUMNS_A_LEVEL * options.teapot_level)
-    write_looks(writer, options)
+    write_materials(writer, options)
     build_shell(writer, columns)
     _lamp(writer)
     _floor(writer, columns, rng)

@@ -59,7 +59,7 @@ def coated(
     return preview(values, textures, repeat)
 
 
-LOOKS: dict[str, MaterialInfo] = {
+MATERIALS: dict[str, MaterialInfo] = {
     "Plaster": preview(
         {"roughness": 0.9}, {"diffuseColor": "plaster", "normal": "plaster_normal"}, _PLASTER
     ),
@@ -122,8 +122,8 @@ def write_textures(writer: StageWriter, options: SceneOptions) -> None:
         writer.define_texture(name, scaled)
 
 
-def write_looks(writer: StageWriter, options: SceneOptions) -> None:
+def write_materials(writer: StageWriter, options: SceneOptions) -> None:
     """Adds all materials and the images that they read."""
     write_textures(writer, options)
-    for name, material in LOOKS.items():
+    for name, material in MATERIALS.items():
         writer.material(name, material)

@@ -19,7 +19,7 @@ from wavecomb.load_options import PROJECTIONS
 from wavecomb.usd.cameras.framing import corners, fit, fit_flat, planes
 from wavecomb.usd.cameras.lens import lens_values, read_map
 from wavecomb.usd.geometry.shutter import Motion
-from wavecomb.usd.layers.population import every
+from wavecomb.usd.layers.population import matching_prims
 from wavecomb.usd.materials.network import number, pair, word
 from wavecomb.usd.render_settings.values import CONFORMS
 from wavecomb.usd.stage.report import LoadReport
@@ -120,7 +120,7 @@ def find_camera(stage: Usd.Stage, wanted: str | None) -> Usd.Prim | None:
     for prim in Usd.PrimRange.Stage(stage):
         if prim.GetTypeName() == "Camera":
             return prim
-    return next(every(stage, _is_camera), None)
+    return next(matching_prims(stage, _is_camera), None)
 
 
 def _is_camera(prim: Usd.Prim) -> bool:
@@ -133,7 +133,7 @@ MAX_CAMERAS = 1000
 
 def all_cameras(stage: Usd.Stage) -> list[Usd.Prim]:
     """Returns the cameras of the stage in stage order, including those inside instances."""
-    return list(islice(every(stage, _is_camera), MAX_CAMERAS))
+    return list(islice(matching_prims(stage, _is_camera), MAX_CAMERAS))
 
 
 def _named(stage: Usd.Stage, wanted: str) -> Usd.Prim:

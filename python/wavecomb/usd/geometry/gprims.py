@@ -99,7 +99,7 @@ class GprimReader:
             self.report.warn(f"{WORDS[kind]} left out: {error}", path)
             return None
         except (Tf.ErrorException, MemoryError) as error:
-            if memory.ran_out(error, lambda: time_limit.loaded_layers()[1]):
+            if memory.is_exhausted(error, lambda: time_limit.loaded_layers()[1]):
                 raise MemoryError from error
             what = "out of memory" if isinstance(error, MemoryError) else "USD cannot read it"
             self.report.warn(f"{WORDS[kind]} left out: {what}", path)

@@ -18,13 +18,13 @@ Mask = NDArray[np.bool_]
 WHY = "they have points that are not finite or absurdly far away"
 
 
-def bad_points(points: Array, matrix: Gf.Matrix4d = IDENTITY) -> Mask:
+def invalid_point_mask(points: Array, matrix: Gf.Matrix4d = IDENTITY) -> Mask:
     """Returns a mask (n,) of the points (n, 3) that are invalid under a transform."""
     there = points if matrix == IDENTITY else bake(points, matrix)
     return np.asarray(~(np.abs(there) < LIMIT).all(axis=1))
 
 
-def without_bad(
+def remove_invalid_points(
     points: Array, matrix: Gf.Matrix4d, counts: Ints, indices: Ints, holes: Ints | None
 ) -> tuple[Array, Ints, str]:
     """Removes the faces of a mesh that use invalid points.
@@ -43,9 +43,9 @@ def without_bad(
     Raises:
         MeshError: No face remains, or counts and indices are inconsistent.
     """
-    bad = bad_points(points, matrix)
+    bad = invalid_point_mask(points, matrix)
     faces = faces_with(bad, counts, indices)
-    points = filled(points, bad, counts, indices)
+    points = fill_invalid(points, bad, counts, indices)
     words = f"{len(faces)} of {len(counts)} faces: {WHY}" if len(faces) else ""
     return points, faces if holes is None else np.concatenate([holes, faces]), words
 
@@ -73,7 +73,7 @@ def faces_with(bad: Mask, counts: Ints, indices: Ints) -> Ints:
     return np.flatnonzero(hit & drawn).astype(np.int32)
 
 
-def filled(points: Array, bad: Mask, counts: Ints, indices: Ints) -> Array:
+def fill_invalid(points: Array, bad: Mask, counts: Ints, indices: Ints) -> Array:
     """Replaces each invalid point by the mean of the valid points of its faces.
 
     There it distorts adjacent faces least when they are subdivided.
@@ -104,7 +104,7 @@ def replace_invalid_steps(shapes: Sequence[Array]) -> list[Array]:
 
     Points that are never valid become the first valid point. Equal arrays remain the same objects.
     """
-    masks = [bad_points(shape) for shape in shapes]
+    masks = [invalid_point_mask(shape) for shape in shapes]
     if not any(mask.any() for mask in masks):
         return list(shapes)
     out = []

@@ -12,7 +12,11 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
 from wavecomb.usd.geometry.cage import SCHEMES, Cage, read_rules, sharp_edges
-from wavecomb.usd.geometry.invalid_points import bad_points, replace_invalid_steps, without_bad
+from wavecomb.usd.geometry.invalid_points import (
+    invalid_point_mask,
+    remove_invalid_points,
+    replace_invalid_steps,
+)
 from wavecomb.usd.geometry.mesh_arrays import (
     IDENTITY,
     TETRAHEDRA,
@@ -49,7 +53,7 @@ from wavecomb.usd.geometry.skeleton import (
     SkinError,
     matrix_at,
     points_at,
-    points_now,
+    points_at_time,
     skinned_points,
     step_times,
 )
@@ -139,7 +143,7 @@ class MeshReader:
         get, time = prim.GetAttribute, self.time
         mirrored = check_matrix(matrix)
         skin = self._skin(prim)
-        value = points_now(prim, time) if "velocities" in names else get("points").Get(time)
+        value = points_at_time(prim, time) if "velocities" in names else get("points").Get(time)
         points = as_array(value)
         if skin is not None and points is not None and len(points):
             points = skinned_points(skin, value, time)
@@ -156,9 +160,9 @@ class MeshReader:
             placed = plain(points, counts, indices, matrix)
         has_bad = False
         if placed is None:
-            has_bad = bool(bad_points(points, matrix).any())
+            has_bad = bool(invalid_point_mask(points, matrix).any())
             if has_bad:
-                points, holes, what = without_bad(points, matrix, counts, indices, holes)
+                points, holes, what = remove_invalid_points(points, matrix, counts, indices, holes)
                 if what:
                     self.report.warn(f"mesh without {what}", prim.GetPath())
             placed = self._placed(prim, points, counts, indices, holes, flip, matrix)

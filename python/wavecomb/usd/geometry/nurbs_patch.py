@@ -23,7 +23,7 @@ from wavecomb.usd.geometry.mesh_arrays import (
 from wavecomb.usd.geometry.nurbs_curves import Floats, Spline
 from wavecomb.usd.geometry.primvar import PrimvarError, as_array, first_primvar
 from wavecomb.usd.geometry.shutter import Motion
-from wavecomb.usd.geometry.skeleton import points_at, points_now, step_times
+from wavecomb.usd.geometry.skeleton import points_at, points_at_time, step_times
 from wavecomb.usd.geometry.triangulate import MeshError, Topology, smooth_normals
 from wavecomb.usd.materials.network import number, word
 from wavecomb.usd.stage.report import LoadReport
@@ -107,7 +107,7 @@ class PatchReader:
             MeshError: The patch is invalid.
         """
         mirrored = check_matrix(matrix)
-        points = as_array(points_now(prim, self.time))
+        points = as_array(points_at_time(prim, self.time))
         if points is None or len(points) == 0:
             return None
         if points.shape[1] != 3:

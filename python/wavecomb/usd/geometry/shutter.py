@@ -118,7 +118,7 @@ class Motion:
             cache = self._caches[time] = UsdGeom.XformCache(Usd.TimeCode(time))
         return cache
 
-    def follow(self, prim: Usd.Prim, parent: Track | None, above: Gf.Matrix4d) -> Track | None:
+    def track_of(self, prim: Usd.Prim, parent: Track | None, above: Gf.Matrix4d) -> Track | None:
         """Returns the animated transform of a prim; None if the prim is static.
 
         Args:

@@ -20,7 +20,7 @@ from wavecomb.usd.geometry.curves import (
     thick_extent,
     uniform_scale,
 )
-from wavecomb.usd.geometry.invalid_points import bad_points
+from wavecomb.usd.geometry.invalid_points import invalid_point_mask
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY, bake, check_matrix
 from wavecomb.usd.geometry.primvar import as_array
 from wavecomb.usd.geometry.strands import lay_out_points
@@ -192,7 +192,7 @@ class PointReader:
         if positions is None:
             return None
         layout = lay_out_points(len(positions))
-        bad = bad_points(positions)
+        bad = invalid_point_mask(positions)
         if bad.all():
             raise MeshError("their positions are not finite or absurdly far away")
         if matrix != IDENTITY:

@@ -358,7 +358,7 @@ class StrandDetail:
         """
         share = np.clip(self._pixels(strands, points, widths, matrix) / self.target, 0.0, 1.0)
         share = np.maximum(share, LEAST_SHARE)
-        kept = even(strands.kept) < share
+        kept = hash_to_unit(strands.kept) < share
         if not kept.any():
             kept[np.argmax(share)] = True
         if not kept.all():
@@ -381,7 +381,7 @@ class StrandDetail:
         return np.asarray(wide / np.maximum(nearest, 1e-30), np.float64)
 
 
-def even(numbers: NDArray[np.intp]) -> NDArray[np.float64]:
+def hash_to_unit(numbers: NDArray[np.intp]) -> NDArray[np.float64]:
     """Maps integers to pseudo-random numbers in [0, 1) with the finaliser of SplitMix64."""
     with np.errstate(over="ignore"):
         x = numbers.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)

@@ -82,7 +82,7 @@ def substituted(make: Expressions, value: Value, replaced: Replaced) -> Value:
         operands = tuple(tuple(part_of(part) for part in one) for one in node.operands)
         new = replaced(node, operands)
         if new is None:
-            new = operands[0] if node.code == PRIMVAR else make.again(node, operands)
+            new = operands[0] if node.code == PRIMVAR else make.with_operands(node, operands)
         done[node] = fit(new, node.results)
     return tuple(part_of(part) for part in value)
 

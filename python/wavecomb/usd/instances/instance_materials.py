@@ -18,7 +18,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdShade, Vt
 
 from wavecomb.usd.geometry.primvar import PrimvarError, from_attribute, in_linear
 from wavecomb.usd.instances.group import Scope
-from wavecomb.usd.materials.assignment import is_alike
+from wavecomb.usd.materials.assignment import is_uniform
 from wavecomb.usd.materials.material import (
     DEFAULT_COLOUR,
     INHERIT_MATERIAL,
@@ -172,7 +172,7 @@ class InstanceBindings:
         ``proxy`` is the prim on which bindings are resolved.
         """
         material = placed.material or (scope.material if scope.bound or scope.override else None)
-        if material is not None and is_alike(self._materials.surface(material)):
+        if material is not None and is_uniform(self._materials.surface(material)):
             material = None
         if material is None and not placed.inherited:
             return PLAIN

@@ -13,7 +13,7 @@ from pxr import Ar, Sdf, Tf, Usd, UsdUtils
 from wavecomb.usd import mtlx
 from wavecomb.usd.layers.opening import open_stage
 from wavecomb.usd.materials.network import UDIM, asset_file, tile_files
-from wavecomb.usd.stage.diagnostics import captured
+from wavecomb.usd.stage.diagnostics import capture_diagnostics
 from wavecomb.usd.stage.report import LoadReport
 
 
@@ -40,9 +40,9 @@ def dependencies(
         WavecombError: The stage cannot be opened.
     """
     report = LoadReport()
-    with captured(report):
+    with capture_diagnostics(report):
         stage = open_stage(file, variants, session_layer=session_layer)
-        mtlx.tell(stage, report)
+        mtlx.report_problems(stage, report)
         found: dict[str, None] = dict.fromkeys(_layers(stage))
         for name in (file, session_layer):
             if name is not None:

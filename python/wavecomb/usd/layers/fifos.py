@@ -87,7 +87,7 @@ def _fifos() -> Iterator[tuple[str, str]]:
 def _release(path: str, layer: str, found: _BlockingFifo) -> None:
     line = f"{layer}: names the layer {path}, which is a FIFO, not a regular file; name a file"
     if progress_notes.is_expendable():
-        time_limit.on_end(line)
+        time_limit.end_process(line)
         return
     # Opening fails if there is no reader, which means that USD is not waiting for this FIFO.
     with contextlib.suppress(OSError):

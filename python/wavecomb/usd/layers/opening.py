@@ -17,9 +17,9 @@ from wavecomb.path_maps import mapped, own_maps
 from wavecomb.run.isolation import progress_notes, time_limit
 from wavecomb.usd import mtlx
 from wavecomb.usd.layers.fifos import abort_on_fifo
-from wavecomb.usd.layers.population import every, load_payloads, populate
+from wavecomb.usd.layers.population import load_payloads, matching_prims, populate
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
-from wavecomb.usd.stage.diagnostics import captured, first_message
+from wavecomb.usd.stage.diagnostics import capture_diagnostics, first_message
 from wavecomb.usd.stage.report import LoadReport
 
 MAX_SURVEYED = 4096
@@ -52,7 +52,7 @@ def list_contents(stage: Usd.Stage) -> StageContents:
             kinds[name] = lights if name in LIGHT_KINDS else camera
         return kinds[name]
 
-    for prim in islice(every(stage, lambda prim: kind(prim) is not None), MAX_SURVEYED):
+    for prim in islice(matching_prims(stage, lambda prim: kind(prim) is not None), MAX_SURVEYED):
         found = kind(prim)
         if found is not None:
             found.append(str(prim.GetPath()))
@@ -113,7 +113,7 @@ def _layers(
             session.TransferContent(overrides)
         if session_layer is not None:
             session.subLayerPaths.append(_session(session_layer).identifier)
-        with time_limit.watched(file):
+        with time_limit.limit_composition(file):
             root = Sdf.Layer.FindOrOpen(str(file))
             if not root:
                 raise WavecombError(f"{file}: cannot be read as USD")
@@ -202,7 +202,7 @@ def open_editable(
         variants: Variant selections (``select_variants``).
         report: Receives USD's messages; None discards them.
     """
-    with captured(LoadReport() if report is None else report):
+    with capture_diagnostics(LoadReport() if report is None else report):
         stage = open_stage(file, variants)
         mtlx.resolve(stage, everywhere=True)
         return stage

@@ -241,12 +241,12 @@ def _letters(text: str) -> str:
 Test = Callable[[Usd.Prim], bool]
 
 
-def every(stage: Usd.Stage, wanted: Test) -> Iterator[Usd.Prim]:
+def matching_prims(stage: Usd.Stage, wanted: Test) -> Iterator[Usd.Prim]:
     """Yields matching prims in stage order, as proxies once per instance inside instances.
 
     Skips instances that contain no match, since nested instancing may create billions of prims.
     """
-    holding = holders(stage, wanted)
+    holding = containing_prototypes(stage, wanted)
     walk = iter(Usd.PrimRange.Stage(stage, _PROXIES if holding else Usd.PrimDefaultPredicate))
     for prim in walk:
         if wanted(prim):
@@ -255,7 +255,7 @@ def every(stage: Usd.Stage, wanted: Test) -> Iterator[Usd.Prim]:
             walk.PruneChildren()
 
 
-def holders(stage: Usd.Stage, wanted: Test) -> set[Sdf.Path]:
+def containing_prototypes(stage: Usd.Stage, wanted: Test) -> set[Sdf.Path]:
     """Returns prototypes that contain a matching prim, also in nested instances."""
     holding: set[Sdf.Path] = set()
     users: dict[Sdf.Path, list[Sdf.Path]] = {}

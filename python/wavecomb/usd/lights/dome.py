@@ -150,14 +150,16 @@ def to_latlong(pixels: NDArray[Any], form: str) -> NDArray[np.float32]:
         x, y, z = np.broadcast_arrays(
             ring * np.sin(lon), np.sin(lat)[:, None], ring * np.cos(lon)
         )  # fmt: skip
-        u, v, low, high = _place(x, y, z, form)
+        u, v, low, high = _image_coordinates(x, y, z, form)
         values = _bilinear(source, u, v, low, high)
         fine = values.reshape(last - first, n, 2 * rows, n, channels)
         out[first:last] = fine.mean(axis=(1, 3))
     return out
 
 
-def _place(x: Floats, y: Floats, z: Floats, form: str) -> tuple[Floats, Floats, Any, Any]:
+def _image_coordinates(
+    x: Floats, y: Floats, z: Floats, form: str
+) -> tuple[Floats, Floats, Any, Any]:
     """Maps directions to image coordinates in [0, 1]: u to the right, v down.
 
     Also returns the lowest and highest (u, v) that bilinear samples may read.

@@ -110,7 +110,7 @@ class Gel:
     diffuse: float = 1.0
     specular: float = 1.0
 
-    def over(self, rgb: Colour) -> Colour:
+    def apply(self, rgb: Colour) -> Colour:
         """Applies the gel to a light's colour."""
         r, g, b = (c * t for c, t in zip(rgb, self.tint, strict=True))
         if self.saturation == 1:

@@ -216,7 +216,7 @@ class LightReader:
             kelvin = number(self._get(prim, "colorTemperature", 6500.0), 6500.0)
             tint = blackbody(kelvin)
         r, g, b = (float(c * t * power) for c, t in zip(base, tint, strict=True))
-        rgb = gel.over((r, g, b))
+        rgb = gel.apply((r, g, b))
         working = "rec709" if self.textures is None else self.textures.working
         r, g, b = (float(value) for value in from_rec709(np.array(rgb), working))
         # Colours outside the gamut of the working space are clipped.

@@ -67,7 +67,7 @@ class MeshLights:
         options = self._lights.read_mesh(draw.prim)
         material = None
         if sync == NO_RESPONSE:
-            material = self._lamp(self._lights.hidden)
+            material = self._light_material(self._lights.hidden)
             options["visible"] = not self._lights.hidden
         number = self._builder.add_mesh_light(np.array(draw.matrix), sync, **options)
         self.any = True
@@ -80,7 +80,7 @@ class MeshLights:
         what = "shadow settings and the sync mode independent of moving mesh lights"
         self._report.missing(what, path)
 
-    def _lamp(self, hidden: bool) -> int:
+    def _light_material(self, hidden: bool) -> int:
         """Returns the material of meshes without response: radiance 1, tinted in the core."""
         parameters = {"emission": (1.0, 1.0, 1.0)}
         if not hidden:

@@ -119,7 +119,7 @@ class Assigner:
         """
         surface = None if draw.material is None else self._surface(draw, draw.material)
         self._report_hair(draw, mesh)
-        if surface is not None and not draw.subsets and is_alike(surface):
+        if surface is not None and not draw.subsets and is_uniform(surface):
             return BoundMaterials(self.table.add(surface))
         primvars = _Primvars(draw, mesh, self.time, self.report)
         sets = self.uv_names(draw)
@@ -306,7 +306,7 @@ class Assigner:
         return self.table.plain(shown, opacity, tuple(varying))
 
 
-def is_alike(surface: Surface) -> bool:
+def is_uniform(surface: Surface) -> bool:
     """Returns whether a surface is the same on all gprims."""
     graph = surface.graph
     reads = surface.primvars or (graph and graph.depends_on_mesh) or surface.emission_attributes()

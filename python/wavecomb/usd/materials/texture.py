@@ -218,7 +218,7 @@ class TextureTable:
             try:
                 found = self._known(path) or self._ahead.read(path)
             except (TextureError, MemoryError, OSError, ValueError) as error:
-                if memory.ran_out(error, int):
+                if memory.is_exhausted(error, int):
                     raise
                 found = TextureError(str(error) or "out of memory")
             self._images[path] = found

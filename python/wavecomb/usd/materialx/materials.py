@@ -17,7 +17,7 @@ from wavecomb.usd.materialx.graphs import GRAPHS, Graphs, definition, implementa
 from wavecomb.usd.materialx.prims import (
     TERMINALS,
     Prims,
-    Tell,
+    ReportSkipped,
     child,
     connect,
     usd_type,
@@ -30,7 +30,7 @@ LOOKS = Sdf.Path("/MaterialX/Looks")
 MODEL = Sdf.Path("/ModelRoot")
 
 
-def write_looks(document: Document, layer: Sdf.Layer, tell: Tell) -> None:
+def write_looks(document: Document, layer: Sdf.Layer, tell: ReportSkipped) -> None:
     """Adds the looks of a document to the layer that contains its materials."""
     looks = document.root.getLooks()
     if not looks:
@@ -45,7 +45,7 @@ def write_looks(document: Document, layer: Sdf.Layer, tell: Tell) -> None:
 class _Looks:
     """Writer of collections and looks; each is written once."""
 
-    def __init__(self, root: Any, stage: Usd.Stage, tell: Tell) -> None:
+    def __init__(self, root: Any, stage: Usd.Stage, tell: ReportSkipped) -> None:
         self._root = root
         self._stage = stage
         self._tell = tell

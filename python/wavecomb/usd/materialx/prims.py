@@ -12,7 +12,7 @@ from pxr import Gf, Sdf, Tf, Vt
 from wavecomb.usd.materialx.files import image_file
 from wavecomb.usd.stage.report import LoadReport
 
-Tell = Callable[[Any, str], None]
+ReportSkipped = Callable[[Any, str], None]
 """Callback that receives a document element and a message about it."""
 
 TERMINALS = {
@@ -47,7 +47,9 @@ class Prims:
         report: Receives notes.
     """
 
-    def __init__(self, layer: Sdf.Layer, file: str, tell: Tell, report: LoadReport) -> None:
+    def __init__(
+        self, layer: Sdf.Layer, file: str, tell: ReportSkipped, report: LoadReport
+    ) -> None:
         self.report = report
         self.layer = layer
         self.file = file

@@ -68,7 +68,7 @@ def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
     """Makes a stage use the MaterialX files that its layers name.
 
     Changes the layers in memory, which then can no longer be saved. Unreadable files stay missing;
-    ``tell`` reports them. The call is fast if no such file is missing.
+    ``report_problems`` reports them. The call is fast if no such file is missing.
 
     Args:
         stage: The stage.
@@ -104,7 +104,7 @@ def reload(stage: Usd.Stage) -> None:
     resolve(stage, everywhere=True)
 
 
-def tell(stage: Usd.Stage, report: LoadReport) -> None:
+def report_problems(stage: Usd.Stage, report: LoadReport) -> None:
     """Reports MaterialX files that are missing, and problems of translated ones."""
     for error, named in unopened_materialx(stage):
         known = next((t for file, t in _translations.items() if _same(file, named)), None)

@@ -11,7 +11,7 @@ from pxr import Usd
 from wavecomb.usd.layers.opening import open_render_settings
 from wavecomb.usd.render_settings.reader import read_choices
 from wavecomb.usd.render_settings.values import RenderChoice
-from wavecomb.usd.stage.diagnostics import captured
+from wavecomb.usd.stage.diagnostics import capture_diagnostics
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.time_codes import frame_number, time_code
 
@@ -37,7 +37,7 @@ def peek_products(
         WavecombError: A file cannot be read, or the settings or product do not exist.
     """
     unread = LoadReport()
-    with captured(unread):
+    with capture_diagnostics(unread):
         layer = None if session_layer is None else Path(session_layer)
         stage = open_render_settings(Path(file), render_settings, layer)
         choices = read_choices(stage, render_settings, product, unread)

@@ -46,11 +46,11 @@ from wavecomb.usd.materials.material import MaterialTable
 from wavecomb.usd.materials.texture import MEGABYTE, TextureCache, TextureTable, texture_store
 from wavecomb.usd.render_settings.view import ViewSettings, check_view, view_settings
 from wavecomb.usd.stage.context import LoadContext
-from wavecomb.usd.stage.diagnostics import NOT_TEXT, captured, first_message
+from wavecomb.usd.stage.diagnostics import NOT_TEXT, capture_diagnostics, first_message
 from wavecomb.usd.stage.frame_cache import FrameCache
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.load_result import LoadedStage
-from wavecomb.usd.stage.origin import WORLD, Origin, find_origin, moved_to
+from wavecomb.usd.stage.origin import WORLD, Origin, find_origin, to_scene_space
 from wavecomb.usd.stage.ray_visibility import IGNORED, RayVisibility, check_exists, set_catchers
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.time_codes import frame_number, time_code
@@ -102,7 +102,7 @@ def load_stage(
     if cache is not None:
         reuse = cache.textures
     # Readers handle values that are not finite, so NumPy's warnings are disabled.
-    with captured(report), np.errstate(all="ignore"):
+    with capture_diagnostics(report), np.errstate(all="ignore"):
         store = None
         if builder_factory is None:
             from wavecomb import _core
@@ -198,7 +198,7 @@ class _Load:
     def _run(self, cache: FrameCache | None, progress: LoadProgress | None) -> dict[str, Any]:
         c, textures = self._context, self.textures
         if cache is None:
-            mtlx.tell(c.stage, c.report)
+            mtlx.report_problems(c.stage, c.report)
         report_unloaded_payloads(c.stage, c.report)
         found = list_contents(c.stage)
         settings = view_settings(c.stage, c.options, c.report)
@@ -260,7 +260,7 @@ class _Load:
             return None
         c = self._context
         to_world = np.array(UsdGeom.XformCache(c.time).GetLocalToWorldTransform(settings.camera))
-        moved = moved_to(to_world, origin)
+        moved = to_scene_space(to_world, origin)
         return read_camera(settings.camera, moved, c.time, report, settings.lens)
 
     def _set_camera(

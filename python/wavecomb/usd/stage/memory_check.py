@@ -31,7 +31,7 @@ class MemoryCheck:
         layer = stage.GetRootLayer()
         self.file = layer.realPath or layer.identifier
         self.time = time
-        self.is_enabled = time_limit.loaded_layers()[1] > memory.room() // _SHARE
+        self.is_enabled = time_limit.loaded_layers()[1] > memory.available_bytes() // _SHARE
 
     def check(self, draws: Iterable[DrawItem]) -> None:
         """Raises WavecombError if meshes that are not read yet need more memory than available."""
@@ -41,7 +41,7 @@ class MemoryCheck:
         for draw in draws:
             if draw.kind == "mesh":
                 points += len(draw.prim.GetAttribute("points").Get(self.time) or ())
-        needed, there = points * LEAST_BYTES, memory.room()
+        needed, there = points * LEAST_BYTES, memory.available_bytes()
         if needed > there:
             raise WavecombError(
                 f"{self.file}: meshes of {points:,} points need at least "

@@ -100,7 +100,7 @@ def world_to_scene(origin: Origin) -> Gf.Matrix4d:
     return Gf.Matrix4d(1.0).SetTranslate(-Gf.Vec3d(*origin))
 
 
-def moved_to(matrices: NDArray[np.float64], origin: Origin) -> NDArray[np.float64]:
+def to_scene_space(matrices: NDArray[np.float64], origin: Origin) -> NDArray[np.float64]:
     """Converts transforms (..., 4, 4) to the world into transforms to the scene."""
     if origin == WORLD:
         return matrices

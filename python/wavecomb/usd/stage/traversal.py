@@ -192,7 +192,7 @@ class Traversal:
                     own, resets = local(prim)
                     if self.motion is not None:
                         above = base if resets else matrix
-                        track = self.motion.follow(prim, None if resets else track, above)
+                        track = self.motion.track_of(prim, None if resets else track, above)
                     if resets:
                         matrix = own if base is IDENTITY else own * base
                     elif own != IDENTITY:
@@ -206,7 +206,9 @@ class Traversal:
                 continue
             if has_instances and prim.IsInstance():
                 prototype = prim.GetPrototype()
-                if self._shared(prototype) and not self.skeletons.keeps_apart(prim, prototype):
+                if self._shared(prototype) and not self.skeletons.needs_own_prototype(
+                    prim, prototype
+                ):
                     self.report.alias(prototype.GetPath(), prim.GetPath())
                     inherited = inherit(prim, inherited)
                     placed = InstancePrim(prim, matrix, purpose, inherited, track=track)
