@@ -67,7 +67,7 @@ def test_a_bad_point_that_no_face_uses_costs_nothing(tmp_path):
 
 def test_a_mesh_of_bad_faces_alone_is_left_out(tmp_path):
     scene, loaded = load(tmp_path, grid(2, 4))
-    assert "mesh left out: its points are not finite or absurdly far away: /M" in said(loaded)
+    assert "mesh left out: its points are not finite or too far away: /M" in said(loaded)
     assert not scene.meshes
 
 
@@ -118,7 +118,7 @@ def test_bad_points_of_particles_are_left_out(tmp_path):
             int64[] ids = [7, 8, 9]
         }""",
     )
-    what = "warning: 2 of 3 points left out: they are not finite or absurdly far away: /P"
+    what = "warning: 2 of 3 points left out: they are not finite or too far away: /P"
     assert what in said(loaded)
     (points,) = scene.meshes
     assert points["radii"].tolist() == [0, 1, 0]

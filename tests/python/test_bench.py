@@ -118,7 +118,7 @@ def test_variants_of_a_renderer_share_a_golden_picture() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("[golden]", "[golden", "is no TOML"),
+        ("[golden]", "[golden", "is not TOML"),
         ("repetitions = 2", "repetitions = 0", "repetitions: must be at least 1"),
         ("repetitions = 2", "repetitions = 'x'", "must be a whole number"),
         ("warm_up = 0", "warmup = 0", "warmup: no such key; there are stage, golden"),

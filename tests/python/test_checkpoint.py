@@ -253,7 +253,7 @@ def test_damaged_files_are_refused(cornell: Any, tmp_path: Path) -> None:
     }.items():
         broken = tmp_path / f"{name}.ckpt"
         broken.write_bytes(content)
-        with pytest.raises(WavecombError, match=f"{name}.ckpt: is no checkpoint, or is damaged"):
+        with pytest.raises(WavecombError, match=f"{name}.ckpt: is not a checkpoint, or is damaged"):
             load_checkpoint(broken)
     with pytest.raises(FileNotFoundError, match="no such file"):
         load_checkpoint(tmp_path / "none.ckpt")

@@ -256,12 +256,12 @@ def test_cost_profile_is_written_and_read(fake: Fake, stage: str, tmp_path: Path
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("", "is no cost profile"),
-        ("[" * 100_000, "is no cost profile"),
-        ("\x00\xff", "is no cost profile"),
+        ("", "is not a cost profile"),
+        ("[" * 100_000, "is not a cost profile"),
+        ("\x00\xff", "is not a cost profile"),
         ("[]", "no schema wavecomb-costs/1"),
         ('{"materials": {}, "textures": {}}', "no schema wavecomb-costs/1"),
-        ('{"schema": "wavecomb-costs/1", "materials": {}}', "textures is no table"),
+        ('{"schema": "wavecomb-costs/1", "materials": {}}', "textures is not a table"),
         ('{"schema": "wavecomb-costs/1", "materials": [1], "textures": {}}', "materials is no"),
         *(
             (
@@ -415,11 +415,11 @@ def test_compare(tmp_path: Path) -> None:
     assert document["mean_signed"] == pytest.approx([0.25 / 24] * 3)
     assert run("compare", b, a, "--tolerance", 0.3).exit_code == 0
     assert run("compare", b, a, "--tolerance", 0.2).exit_code == 1
-    assert "only pictures of one size" in error_line(run("compare", a, other))
+    assert "only images of the same size" in error_line(run("compare", a, other))
     assert "no such file" in error_line(run("compare", a, tmp_path / "no.exr"))
     assert "must end in .png" in error_line(run("compare", a, b, "--heatmap", "h.exr"))
     other.write_text("no picture")
-    assert "cannot be read as a picture" in error_line(run("compare", a, other))
+    assert "cannot be read as an image" in error_line(run("compare", a, other))
 
 
 @pytest.mark.parametrize("command", [[], ["render"], ["info"], ["scene"], ["compare"]])

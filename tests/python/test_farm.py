@@ -109,7 +109,7 @@ def test_a_folder_is_whole_or_absent(stage: Path, tmp_path: Path) -> None:
     folder = job(stage, tmp_path)
     assert Folder(folder.path).job == folder.job
     assert len(list(folder.job.tasks())) == folder.job.task_count() == 6
-    with pytest.raises(WavecombError, match="is there already"):
+    with pytest.raises(WavecombError, match="already exists"):
         job(stage, tmp_path)
     assert sorted(os.listdir(tmp_path)) == ["a.farm"] and os.listdir(folder.path) == ["job.json"]
     with pytest.raises(WavecombError, match="is no folder of a job"):
@@ -183,7 +183,7 @@ def test_a_job_reads_back_as_it_is(stage: Path, tmp_path: Path) -> None:
 def test_what_a_farm_refuses(stage: Path, tmp_path: Path) -> None:
     for options, said in (
         ({"time_limit": 5.0}, "--time-limit"),
-        ({"noise": 0.1, "spp": 64}, "--noise 0.1: is of the whole picture"),
+        ({"noise": 0.1, "spp": 64}, "--noise 0.1: applies to the whole image"),
         ({"allocate": "error", "spp": 64}, "--allocate error"),
         ({"roulette": "cost-aware", "costs": "measured"}, "--costs measured"),
     ):

@@ -429,4 +429,4 @@ def test_slurm_that_refuses(stage: Path, tmp_path: Path, slurm: Path) -> None:
     assert done.returncode == 2 and "sbatch gave no job number: 'hello'" in done.stderr
     (slurm / "sbatch").unlink()
     done = forks.wavecomb(*words)
-    assert done.returncode == 2 and "the command sbatch is not here" in done.stderr
+    assert done.returncode == 2 and "the command sbatch is not installed" in done.stderr

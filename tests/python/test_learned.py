@@ -107,7 +107,7 @@ def test_what_is_no_good_ends_in_a_line(
     done = run("render", stage, "-o", out, "--guiding", "on", "--learn-from", tmp_path / "gone")
     assert done.exit_code == 2 and "no such file" in done.output and not out.exists()
     done = run("render", stage, "-o", out, "--guiding", "on", "--learn-from", "before")
-    assert done.exit_code == 2 and "give --frames, too" in done.output
+    assert done.exit_code == 2 and "also give --frames" in done.output
     done = run("render", stage, "-o", out, "--learn-to", tmp_path / "b.learned")
     assert done.exit_code == 2 and "this render trains no guiding field" in done.output
 

@@ -141,13 +141,16 @@ def test_samples_that_an_ending_asks_for(
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (["--min-spp", 4], "--min-spp is for adaptive renders: give --adaptive or --noise, too"),
+        (
+            ["--min-spp", 4],
+            "--min-spp applies to adaptive renders: also give --adaptive or --noise",
+        ),
         (["--max-spp", 4], "--max-spp is for adaptive renders"),
         (["--noise", 0.1, "--spp", 4, "--max-spp", 5], "--spp is 4 and --max-spp 5"),
         (["--noise", 0], "must be above 0"),
         (["--time-limit", -1], "must be above 0"),
-        (["--every", 5], "--every is for checkpoints: give --checkpoint or --resume, too"),
-        (["--preview-every", 5], "--preview-every is for previews: give --preview, too"),
+        (["--every", 5], "--every applies to checkpoints: also give --checkpoint or --resume"),
+        (["--preview-every", 5], "--preview-every applies to previews: also give --preview"),
         (["--preview", "a.exr"], "--preview a.exr: the name must end in .png"),
         (["--resume", "none.ckpt"], "none.ckpt: no such file"),
         (["--checkpoint", "no/such/a.ckpt"], "does not exist"),

@@ -95,7 +95,7 @@ def test_what_is_no_good_is_named_and_left_out(tmp_path):
     lines = "\n".join(report.lines())
     for name in ("resolution", "pixelAspectRatio", "dataWindowNDC", "aspectRatioConformPolicy"):
         assert f"{name} of render settings is invalid: left out: /Render/S" in lines
-    assert "render settings name /Ball, which is no camera: /Render/S" in lines
+    assert "render settings name /Ball, which is not a camera: /Render/S" in lines
     assert "no purpose 'odd'" in lines
 
 
@@ -114,7 +114,7 @@ def test_data_windows(window, region):
 
 def test_data_window_without_a_pixel():
     choice = RenderChoice("/Render/S", data_window=(0.01, 0, 0.02, 1))
-    with pytest.raises(wavecomb.WavecombError, match="/Render/S: dataWindowNDC holds no pixel"):
+    with pytest.raises(wavecomb.WavecombError, match="/Render/S: dataWindowNDC contains no pixel"):
         choice.region(20, 10)
 
 

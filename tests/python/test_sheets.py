@@ -78,7 +78,7 @@ def test_pictures_of_folders_and_files(frames: Path, tmp_path: Path) -> None:
         "sheet", frames / "other.####.exr", "-o", tmp_path / "a.png"
     )
     (tmp_path / "empty").mkdir()
-    assert "no picture in it" in failed("sheet", tmp_path / "empty", "-o", tmp_path / "a.png")
+    assert "no image in it" in failed("sheet", tmp_path / "empty", "-o", tmp_path / "a.png")
 
 
 # ---- sheets and pages ----------------------------------------------------------------------------
@@ -180,7 +180,7 @@ def test_folders_and_sequences(frames: Path, others: Path, tmp_path: Path, patte
     lines = result.stdout.splitlines()
     assert lines[0] == f"{name(8)}: equal, bit for bit"
     assert lines[1].startswith(f"{name(9)}: different: 0.0772 % of pixels")
-    assert "only pictures of one size" in lines[2]
+    assert "only images of the same size" in lines[2]
     assert lines[3:] == [f"{name(11)}: only in A", f"{name(12)}: only in B",
                          "1 of 3 pairs pass; 2 have no other"]  # fmt: skip
     text = page.read_text()
@@ -230,8 +230,8 @@ def test_compare_refuses(frames: Path, others: Path, tmp_path: Path) -> None:
     assert "must end in .html" in failed("compare", one, one, "--page", tmp_path / "a.txt")
     (tmp_path / "elsewhere").mkdir()
     write_png(tmp_path / "elsewhere" / "a.png", flat(RED))
-    assert "no picture of one name" in failed("compare", frames, tmp_path / "elsewhere")
-    assert "is one picture, and" in failed("compare", frames, one)
+    assert "no images with the same name" in failed("compare", frames, tmp_path / "elsewhere")
+    assert "is one image, but" in failed("compare", frames, one)
 
 
 def test_both_work_in_their_sandbox(frames: Path, others: Path, tmp_path: Path) -> None:

@@ -155,7 +155,7 @@ def test_what_lights_ask_for_and_do_not_get(tmp_path):
         "light filter PortalLight",
         "curves as lights (only their materials emit)",
     ]
-    assert len(scene.lights) == 2 and "/Glow is no PortalLight" in said(loaded)
+    assert len(scene.lights) == 2 and "/Glow is not a PortalLight" in said(loaded)
     assert scene.lights[0]["portals"].shape == (1, 4, 4)
 
 

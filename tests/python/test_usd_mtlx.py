@@ -269,7 +269,7 @@ def test_graphs_and_includes(tmp_path: Path) -> None:
     assert image.GetInput("file").Get().path == f"{tmp_path}/tex/a.png"
     assert image.GetInput("file").GetAttr().GetColorSpace() == "acescg"
     assert sorted(finding.what for finding in report.warnings) == [
-        "MaterialX connection leads nowhere (left out)",
+        "MaterialX connection has no target (left out)",
         "MaterialX value 'much' is no float (left out)",
     ]
 
@@ -307,7 +307,7 @@ def test_looks(tmp_path: Path) -> None:
     assert value(stage, "/MaterialX/Looks/plain/Materials/mb", "specular_roughness") is None
     assert sorted(finding.what for finding in report.warnings) == [
         "MaterialX geometry /d* is no path of a prim (left out)",
-        "MaterialX material None is not there (not assigned)",
+        "MaterialX material None does not exist (not assigned)",
     ]
     stage = open_stage(tmp_path / "s.usda")
     bound, _ = UsdShade.MaterialBindingAPI(stage.GetPrimAtPath("/M/world/a")).ComputeBoundMaterial()
@@ -320,7 +320,10 @@ def test_looks(tmp_path: Path) -> None:
     ("text", "why"),
     [
         ("", "not XML"),
-        ("<materialx>" + "<a>" * MAX_DEPTH + "</a>" * MAX_DEPTH + "</materialx>", "inside of each"),
+        (
+            "<materialx>" + "<a>" * MAX_DEPTH + "</a>" * MAX_DEPTH + "</materialx>",
+            "elements are nested",
+        ),
         ('<!DOCTYPE x [<!ENTITY a "b">]><materialx/>', "entities"),
         (
             '<materialx xmlns:xi="http://www.w3.org/2001/XInclude">'
@@ -330,7 +333,7 @@ def test_looks(tmp_path: Path) -> None:
         (
             '<materialx xmlns:xi="http://www.w3.org/2001/XInclude">'
             '<xi:include href="none.mtlx"/></materialx>',
-            "which is not there",
+            "which does not exist",
         ),
     ],
 )

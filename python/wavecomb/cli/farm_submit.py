@@ -99,7 +99,7 @@ def submit_command(
     path = job or default_folder(options["output"], options["stage"], options["output_dir"])
     if os.path.lexists(path):
         raise WavecombError(
-            f"{path}: is there already: `wavecomb farm resume` continues a job, and --job names "
+            f"{path}: already exists: `wavecomb farm resume` continues a job, and --job names "
             "another folder"
         )
     told = ask_plan({**options, "workers": where.workers})

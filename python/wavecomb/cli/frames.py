@@ -40,7 +40,7 @@ def check_frames(
     """Returns the frames of a sequence, or None for a single image. Raises WavecombError."""
     if text is None:
         if skip:
-            raise WavecombError("--skip-existing is for sequences: give --frames, too")
+            raise WavecombError("--skip-existing applies to sequences: also give --frames")
         return None
     if source.frame is not None:
         raise WavecombError("--frame is one frame and --frames are several; give one of them")

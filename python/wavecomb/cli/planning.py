@@ -131,7 +131,7 @@ class Asked:
         if self.learn_from != BEFORE:
             return Learning(learned_of(self.learn_from))
         if self.frames is None:
-            raise WavecombError("--learn-from before: is for sequences: give --frames, too")
+            raise WavecombError("--learn-from before: applies to sequences: also give --frames")
         return Learning(follows=True)
 
     def check_learning(self, settings: Any) -> None:
@@ -155,7 +155,7 @@ class Asked:
         if had and self.deep is None:
             raise WavecombError(
                 f"{self.purpose.resume}: is of a render with a deep picture: "
-                "give --deep FILE.exr, too"
+                "also give --deep FILE.exr"
             )
         if self.deep is not None and not had:
             raise WavecombError(

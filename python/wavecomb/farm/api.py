@@ -85,7 +85,7 @@ def submit(
         aov_names.with_others(tuple(aovs or aov_names.DEFAULT), guides), settings,
     )  # fmt: skip
     if own is not None:
-        raise WavecombError("policy: a farm needs a name, not an object of this process")
+        raise WavecombError("policy: a farm needs the name of a policy, not an object")
     LoadOptions.of(None, loading).check()
     kept = names if not denoise else aov_names.expand(tuple(aovs or aov_names.DEFAULT))
     done = Job(

@@ -338,7 +338,7 @@ def _ask(*words: str) -> str:
             words, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_ANSWER_S
         )
     except FileNotFoundError:
-        raise WavecombError(f"--on slurm: the command {words[0]} is not here") from None
+        raise WavecombError(f"--on slurm: the command {words[0]} is not installed") from None
     except (OSError, subprocess.TimeoutExpired) as error:
         raise WavecombError(f"--on slurm: {words[0]}: {error}") from None
     if done.returncode:

@@ -52,7 +52,7 @@ class Folder:
             folder.mkdir(parents=True)
         except FileExistsError:
             raise WavecombError(
-                f"{os.fspath(path)}: is there already: `wavecomb farm resume` continues a job, "
+                f"{os.fspath(path)}: already exists: `wavecomb farm resume` continues a job, "
                 "and --job names another folder"
             ) from None
         if learned is not None:

@@ -246,7 +246,7 @@ class Job:
                 with ``name``.
         """
         if not isinstance(value, Mapping) or value.get("kind") != KIND:
-            raise WavecombError(f"{name}: is no job of `wavecomb farm submit`")
+            raise WavecombError(f"{name}: is not a job of `wavecomb farm submit`")
         if value.get("format") != FORMAT:
             raise WavecombError(
                 f"{name}: is a job of format {value.get('format')!s:.20}, and this version of "

@@ -262,7 +262,7 @@ def load_tile(path: Path, key: str, tile: Rectangle, checks: int = 0) -> Rendere
     """
     part = read_tile(path, (tile[2] - tile[0], tile[3] - tile[1]))
     if part.key != key or part.tile != tile:
-        raise InvalidTile(f"{path}: is of other settings, files or machines than the job")
+        raise InvalidTile(f"{path}: has settings, files or a machine other than the job's")
     if part.checks < checks:
         raise InvalidTile(f"{path}: its border is too narrow for {checks} error checks")
     return part
@@ -284,7 +284,7 @@ def _read(name: str, size: tuple[int, int] | None) -> tuple[dict[str, Any], NDAr
 
     with open(name, "rb") as file:  # errors of open have an errno, which errors of OpenImageIO lack
         if file.read(4) != b"\x76\x2f\x31\x01":
-            raise ValueError("it is no OpenEXR file")
+            raise ValueError("it is not an OpenEXR file")
     source = oiio.ImageInput.open(name)
     if source is None:
         raise ValueError(one_line(problem_of(oiio), name))

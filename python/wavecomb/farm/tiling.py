@@ -185,9 +185,9 @@ def _costs_matter(settings: Mapping[str, Any]) -> bool:
 def needs_whole(settings: Mapping[str, Any]) -> str:
     """Returns why images cannot be divided into tiles, or "" if they can."""
     if settings.get("noise"):
-        return f"--noise {settings['noise']:g}: is of the whole picture"
+        return f"--noise {settings['noise']:g}: applies to the whole image"
     if settings.get("allocate", "even") != "even":
-        return f"--allocate {settings['allocate']}: shares samples out over the whole picture"
+        return f"--allocate {settings['allocate']}: distributes samples over the whole image"
     if settings.get("firefly", "keep") != "keep":
         return f"--firefly {settings['firefly']}: depends on neighbouring pixels"
     return ""

@@ -85,7 +85,7 @@ def merge(paths: Sequence[str | os.PathLike[str]]) -> MergedImage:
         OSError: A file cannot be read.
     """
     if len(paths) < 2:
-        raise WavecombError("merge needs two pictures or more")
+        raise WavecombError("merge needs at least two images")
     sources = [_source(os.fspath(path)) for path in paths]
     first = sources[0]
     seeds: dict[int, str] = {}
@@ -142,7 +142,7 @@ def _source(name: str) -> _Source:
         return _Source(name, attributes, settings, tuple(int(seed) for seed in seeds))
     except (KeyError, ValueError, TypeError, OverflowError, RecursionError):
         raise WavecombError(
-            f"{name}: does not say what settings made it; merge takes EXR files of wavecomb render"
+            f"{name}: has no render settings in its metadata; give EXR files of wavecomb render"
         ) from None
 
 
@@ -217,7 +217,7 @@ def _check_layers(
     known = {layer for layer in sums if not layer.startswith("_")} | set(pairs)
     for layer in sorted(there ^ known):
         lacking = name if layer in known else first
-        raise WavecombError(f"{lacking}: has no layer {layer}, which the other picture has")
+        raise WavecombError(f"{lacking}: has no layer {layer}, which the other image has")
 
 
 def _add(

@@ -125,7 +125,7 @@ class Picture:
         normal = self.aovs.get("guide_normal", self.normal)
         if albedo is None or normal is None:
             raise WavecombError(
-                "denoising needs the AOVs guide_albedo and guide_normal: render with them, too"
+                "denoising needs the AOVs guide_albedo and guide_normal: also render them"
             )
         start = time.perf_counter()
         denoised = denoise(self.beauty, albedo, normal, threads=threads)
@@ -183,7 +183,7 @@ class Picture:
             alpha = self.aovs["alpha"] if self.has_alpha else None
             write_png(path, self.shown(), exposure=exposure, tone_map=tone_map, alpha=alpha)
             return [Path(path)]
-        raise ValueError(f"{os.fspath(path)}: pictures are saved as .exr or .png")
+        raise ValueError(f"{os.fspath(path)}: images are saved as .exr or .png")
 
     def save_deep(self, path: str | os.PathLike[str], *, half: bool = False) -> Path:
         """Writes the deep image (.exr) atomically.
@@ -201,7 +201,7 @@ class Picture:
         from wavecomb.errors import WavecombError
 
         if self.deep is None:
-            raise WavecombError("the picture has no deep samples: render with the AOV deep, too")
+            raise WavecombError("the image has no deep samples: also render the AOV deep")
         metadata = self.file_metadata()
         return self.deep.save(path, half=half, metadata=metadata, window=self.window())
 

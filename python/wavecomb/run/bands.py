@@ -64,7 +64,7 @@ def band_rows(
         whole = _needs_all(settings, aovs)
     if whole and megabytes is not None:
         raise WavecombError(
-            f"--film-memory {megabytes:g}: the picture takes {needed / 1e6:.0f} MB and {whole} "
+            f"--film-memory {megabytes:g}: the image takes {needed / 1e6:.0f} MB and {whole} "
             "needs all of it at once: leave that out, or give more memory"
         )
     if whole:
@@ -85,7 +85,7 @@ def _needs_all(settings: Settings, aovs: Sequence[str]) -> str:
     if settings.firefly != "keep":
         return f"--firefly {settings.firefly}"
     if keeps_error(settings):
-        return "a picture with errors (--adaptive, --noise, --aov error, --aov variance)"
+        return "an image with errors (--adaptive, --noise, --aov error, --aov variance)"
     if any(name in aov_names.of_kind("coverage") for name in aovs):
         return "a Cryptomatte"
     if settings.region is not None and not settings.crop:

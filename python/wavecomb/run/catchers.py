@@ -46,8 +46,8 @@ def check(settings: Settings, given: Mapping[str, Any]) -> None:
     for option, value in {**refused, **given}.items():
         if value:
             raise WavecombError(
-                f"shadow catchers do not go with {option}: three renders make the picture; leave "
-                "one of them out"
+                f"shadow catchers cannot be combined with {option}, since the image combines three "
+                "renders; leave one of them out"
             )
 
 

@@ -136,7 +136,7 @@ def load_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
         _check_header(header)
         state["pass.target"] = _check_state(state)
     except ArchiveError as error:
-        raise WavecombError(f"{name}: is no checkpoint, or is damaged; start anew") from error
+        raise WavecombError(f"{name}: is not a checkpoint, or is damaged; start again") from error
     return Checkpoint(name, header, state)
 
 
@@ -245,7 +245,7 @@ def build_note(checkpoint: Checkpoint, header: Mapping[str, Any]) -> str | None:
         if checkpoint.header[key] != header[key]:
             return (
                 f"{checkpoint.path}: was made by another build ({key} "
-                f"{checkpoint.header[key]}, now {header[key]}); the picture may differ in last bits"
+                f"{checkpoint.header[key]}, now {header[key]}); the image may differ in last bits"
             )
     return None
 

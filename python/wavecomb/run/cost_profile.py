@@ -32,9 +32,9 @@ def load_costs(path: str | os.PathLike[str]) -> Profile:
     except OSError as error:
         raise WavecombError(f"{name}: cannot be read: {reason(error)}") from error
     except (ValueError, RecursionError) as error:
-        raise WavecombError(f"{name}: is no cost profile: {error}") from error
+        raise WavecombError(f"{name}: is not a cost profile: {error}") from error
     if not isinstance(document, dict) or document.get("schema") != SCHEMA:
-        raise WavecombError(f"{name}: is no cost profile: no schema {SCHEMA}")
+        raise WavecombError(f"{name}: is not a cost profile: no schema {SCHEMA}")
     return check_costs(document, name)
 
 
@@ -48,13 +48,13 @@ def check_costs(profile: Mapping[str, Any], name: str = "costs") -> Profile:
     for kind in ("materials", "textures"):
         entries = profile.get(kind)
         if not isinstance(entries, Mapping):
-            raise WavecombError(f"{name}: is no cost profile: {kind} is no table")
+            raise WavecombError(f"{name}: is not a cost profile: {kind} is not a table")
         checked[kind] = {}
         for key, value in entries.items():
             good = isinstance(value, (int, float)) and not isinstance(value, bool)
             if not (good and math.isfinite(value) and 0.0 <= value <= 1e12):
                 raise WavecombError(
-                    f"{name}: is no cost profile: cost of {key!s:.80} is {value!r:.80}; "
+                    f"{name}: is not a cost profile: cost of {key!s:.80} is {value!r:.80}; "
                     "it must be nanoseconds, from 0 to 1e12"
                 )
             checked[kind][str(key)] = float(value)

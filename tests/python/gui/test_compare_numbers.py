@@ -46,7 +46,7 @@ def test_files_are_read_with_all_layers(tmp_path: Path) -> None:
     ("name", "content", "says"),
     [
         ("missing.exr", None, "no such file"),
-        ("bad.exr", b"nonsense", "cannot be read as a picture"),
+        ("bad.exr", b"nonsense", "cannot be read as an image"),
         ("bad.npy", b"nonsense", "bad.npy"),
         ("flat.npy", "array", "has the shape"),
     ],

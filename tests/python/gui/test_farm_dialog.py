@@ -62,7 +62,7 @@ def test_sent_and_watched(cornell_window, qtbot, tmp_path):
     # The dialog reports what cannot be sent.
     dialog.begin()
     qtbot.waitUntil(lambda: dialog.send.isEnabled(), timeout=60000)
-    assert "is there already" in dialog.state.text()
+    assert "already exists" in dialog.state.text()
     dialog.close()
 
 

@@ -252,7 +252,7 @@ WORDS = {
         "the fastest and the slowest order of material runs, by recorded true costs."
     ),
     "run length": "Mean number of consecutive records of one material.",
-    "relMSE": "Mean of (x − r)² / (r² + 0.01) to the golden picture r.",
+    "relMSE": "Mean of (x − r)² / (r² + 0.01) to the golden image r.",
     "efficiency": "1 / (relMSE × render time).",
     "regret": "Time beyond the best fixed policy, as a fraction of its time.",
     "interval": "95 %; rounds are resampled whole. docs/bench-report.md has the formulas.",

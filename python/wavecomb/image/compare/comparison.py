@@ -119,9 +119,7 @@ def layers_of(source: Source) -> dict[str, NDArray[Any]]:
         array = np.asarray(pixels, dtype=np.float32)
         array = array[:, :, None] if array.ndim == 2 else array
         if array.ndim != 3 or array.size == 0:
-            raise ValueError(
-                f"a picture has the shape (height, width, channels), not {array.shape}"
-            )
+            raise ValueError(f"an image has the shape (height, width, channels), not {array.shape}")
         result[name] = array
     return result
 
@@ -152,7 +150,7 @@ def _colour_pair(
     if colour_a.shape != colour_b.shape:
         raise ValueError(
             f"{names[0]} is {_size(colour_a)}, {names[1]} is {_size(colour_b)}: "
-            "only pictures of one size can be compared"
+            "only images of the same size can be compared"
         )
     return colour_a, colour_b
 

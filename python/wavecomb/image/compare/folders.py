@@ -78,11 +78,11 @@ def pair_up(a: str, b: str) -> FolderPair:
     """
     for one, other in ((a, b), (b, a)):
         if not is_many(one):
-            raise WavecombError(f"{one} is one picture, and {other} stands for many")
+            raise WavecombError(f"{one} is one image, but {other} names several")
     in_a, in_b = pictures_of(a), pictures_of(b)
     pairs = {name: (file, in_b[name]) for name, file in in_a.items() if name in in_b}
     if not pairs:
-        raise WavecombError(f"{a} and {b} have no picture of one name, or of one frame")
+        raise WavecombError(f"{a} and {b} have no images with the same name or frame")
     only_a = tuple(name for name in in_a if name not in in_b)
     only_b = tuple(name for name in in_b if name not in in_a)
     return FolderPair(pairs, only_a, only_b)
@@ -142,7 +142,7 @@ def compare_page(
         missing = len(folders.only_a) + len(folders.only_b)
         facts += f"; {good} of {len(results)} pairs pass"
         if missing:
-            facts += f", {missing} {'picture has' if missing == 1 else 'pictures have'} no other"
+            facts += f", {missing} {'image has' if missing == 1 else 'images have'} no counterpart"
     title = f"{_short(sources)[0]} and {_short(sources)[1]}"
     return document(title, facts, overview + "".join(sections))
 

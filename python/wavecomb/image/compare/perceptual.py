@@ -65,7 +65,7 @@ def ssim(a: Source, b: Source, exposure: float = 0.0) -> float:
     ndimage = needed("scipy.ndimage", "SSIM")
     pixels_a, pixels_b = colour_pair(a, b)
     if min(pixels_a.shape[:2]) < 2 * _SSIM_RADIUS + 1:
-        raise ValueError("SSIM needs pictures of at least 11 x 11 pixels")
+        raise ValueError("SSIM needs images of at least 11 x 11 pixels")
     x, y = (shown(p, exposure).astype(np.float64) @ LUMINANCE for p in (pixels_a, pixels_b))
 
     def window(values: NDArray[np.float64]) -> NDArray[np.float64]:

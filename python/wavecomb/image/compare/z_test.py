@@ -100,7 +100,7 @@ def z_test(
     """
     special = needed("scipy.special", "the z-test")
     if variance_a is None and variance_b is None:
-        raise ValueError("the z-test needs a variance picture of A or of B")
+        raise ValueError("the z-test needs a variance image of A or B")
     if tile < 1:
         raise ValueError(f"a tile has a side of at least 1 pixel, not {tile}")
     pixels_a, pixels_b = (p.astype(np.float64) for p in colour_pair(a, b))
@@ -144,7 +144,7 @@ def _variance(source: Source | None, like: Array, name: str) -> Array:
     variance = colour_layer(layers_of(source), f"the variance of {name}").astype(np.float64)
     if variance.shape != like.shape:
         raise ValueError(
-            f"the variance of {name} has the shape {variance.shape}, the picture {like.shape}"
+            f"the variance of {name} has the shape {variance.shape}, the image {like.shape}"
         )
     if not (np.isfinite(variance).all() and (variance >= 0).all()):
         raise ValueError(f"the variance of {name} has values that are negative or not finite")

@@ -126,7 +126,7 @@ def _check_sizes(file: Any) -> None:
         if any(part.compress_type != zipfile.ZIP_STORED for part in parts):
             raise ArchiveError("it is compressed")
         if sum(part.file_size for part in parts) > size:
-            raise ArchiveError("it says that it holds more than it does")
+            raise ArchiveError("it declares more data than it holds")
         for part in parts:
             with archive.open(part) as member:
                 _check_shape(member, part.file_size)
@@ -146,4 +146,4 @@ def _check_shape(member: Any, size: int) -> None:
     for edge in shape:
         count *= edge
     if min(shape, default=1) < 0 or dtype.hasobject or count * dtype.itemsize > size:
-        raise ArchiveError("it says that it holds more than it does")
+        raise ArchiveError("it declares more data than it holds")

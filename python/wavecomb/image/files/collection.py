@@ -41,7 +41,7 @@ def pictures_of(source: str) -> dict[str, str]:
     except OSError as error:
         raise WavecombError(f"{source}: {error.strerror or error}") from error
     if not found:
-        what = "picture in it" if os.path.isdir(source) else "such file"
+        what = "image in it" if os.path.isdir(source) else "such file"
         raise WavecombError(f"{source}: there is no {what}")
     return found
 

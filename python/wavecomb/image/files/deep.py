@@ -74,7 +74,7 @@ class DeepPicture:
         """
         name = os.fspath(path)
         if Path(name).suffix.lower() != ".exr":
-            raise WavecombError(f"{name}: the name of a deep picture must end in .exr")
+            raise WavecombError(f"{name}: the name of a deep image must end in .exr")
         spec = self._spec(half, metadata or {}, window)
         with replacing(path) as part:
             self._write(str(part), spec, name)

@@ -94,7 +94,7 @@ def png_spec(height: int, width: int, *, has_alpha: bool = False) -> Any:
 def _colours(rgb: NDArray[Any]) -> NDArray[Any]:
     pixels = np.asarray(rgb)
     if pixels.ndim != 3 or pixels.shape[2] != 3:
-        raise ValueError(f"a colour picture has the shape (height, width, 3), not {pixels.shape}")
+        raise ValueError(f"a colour image has the shape (height, width, 3), not {pixels.shape}")
     return pixels
 
 
@@ -219,13 +219,13 @@ def _open(name: str) -> Any:
     if not Path(name).exists():
         raise FileNotFoundError(f"{name}: no such file")
     if Path(name).is_dir():
-        raise IsADirectoryError(f"{name}: is a folder, not a picture")
+        raise IsADirectoryError(f"{name}: is a folder, not an image")
     check_regular(name)
     hints = oiio.ImageSpec()
     hints.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(name, hints)
     if source is None:
-        raise OSError(f"{name}: cannot be read as a picture: {one_line(problem_of(oiio), name)}")
+        raise OSError(f"{name}: cannot be read as an image: {one_line(problem_of(oiio), name)}")
     return source
 
 

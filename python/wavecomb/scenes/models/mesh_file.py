@@ -98,14 +98,14 @@ def _check(raw: RawMesh) -> None:
     if not len(raw.points) or not len(raw.faces):
         raise ValueError("it has no triangles")
     if raw.faces.min() < 0 or raw.faces.max() >= len(raw.points):
-        raise ValueError("a face refers to a vertex that is not there")
+        raise ValueError("a face refers to a vertex that does not exist")
     if not np.isfinite(raw.points).all():
         raise ValueError("a vertex is not a finite number")
     if raw.uv is not None and not np.isfinite(raw.uv).all():
         raise ValueError("a texture coordinate is not a finite number")
     extent = np.ptp(raw.points, axis=0)
     if not 1e-30 < float(extent.max()) < 1e30:
-        raise ValueError("its size is zero or absurd")
+        raise ValueError("its size is 0 or too large")
 
 
 def _cylinder(points: np.ndarray) -> FloatArray:
@@ -149,9 +149,9 @@ def _read_obj(data: bytes) -> RawMesh:
     texture = np.array([int(s[1]) for s in split])
     texture = np.where(texture < 0, len(uv) + texture, texture - 1)
     if min(vertex.min(), texture.min()) < 0 or vertex.max() >= len(points):
-        raise ValueError("a face refers to a vertex that is not there")
+        raise ValueError("a face refers to a vertex that does not exist")
     if texture.max() >= len(uv):
-        raise ValueError("a face refers to a texture coordinate that is not there")
+        raise ValueError("a face refers to a texture coordinate that does not exist")
     pairs, shared = np.unique(vertex * len(uv) + texture, return_inverse=True)
     return RawMesh(
         points[pairs // len(uv)], fans(np.array(counts), shared.ravel()), uv[pairs % len(uv)]
@@ -185,7 +185,7 @@ def _read_usd(path: Path) -> RawMesh:
         if not len(local) or not len(counts):
             continue
         if len(indices) and not 0 <= indices.min() <= indices.max() < len(local):
-            raise ValueError(f"{prim.GetPath()}: a face refers to a vertex that is not there")
+            raise ValueError(f"{prim.GetPath()}: a face refers to a vertex that does not exist")
         matrix = np.array(cache.GetLocalToWorldTransform(prim) * turn)
         triangles = fans(counts, indices) + offset
         mirrored = np.linalg.det(matrix[:3, :3]) < 0.0

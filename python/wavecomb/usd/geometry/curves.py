@@ -152,7 +152,7 @@ class CurveReader:
         """Returns the layout without curves that use an invalid point."""
         kept = strands.over_each(np.maximum, bad) == 0
         if not kept.any():
-            raise MeshError("their points are not finite or absurdly far away")
+            raise MeshError("their points are not finite or too far away")
         if not kept.all():
             what = f"{int((~kept).sum())} of {len(kept)} curves left out: {WHY}"
             self.report.warn(what, prim.GetPath())

@@ -15,7 +15,7 @@ from wavecomb.usd.geometry.triangulate import MeshError
 Ints = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 
-WHY = "they have points that are not finite or absurdly far away"
+WHY = "they have points that are not finite or too far away"
 
 
 def invalid_point_mask(points: Array, matrix: Gf.Matrix4d = IDENTITY) -> Mask:
@@ -69,7 +69,7 @@ def faces_with(bad: Mask, counts: Ints, indices: Ints) -> Ints:
     hit[owner[bad[indices]]] = True
     drawn = counts >= 3
     if (hit | ~drawn).all():
-        raise MeshError("its points are not finite or absurdly far away")
+        raise MeshError("its points are not finite or too far away")
     return np.flatnonzero(hit & drawn).astype(np.int32)
 
 
@@ -115,7 +115,7 @@ def replace_invalid_steps(shapes: Sequence[Array]) -> list[Array]:
             made[found] = shapes[other][found]
             left &= ~found
         if left.all():
-            raise MeshError("its points are not finite or absurdly far away")
+            raise MeshError("its points are not finite or too far away")
         made[left] = made[np.flatnonzero(~left)[0]]
         out.append(made)
     return out

@@ -27,7 +27,7 @@ UV_NAMES = ("st", "UVMap", "st0", "st1", "uv", "map1")
 _CHUNK = 1 << 18
 _NO_TURN = Gf.Matrix3d(1.0)
 
-_NOWHERE = "a point is not finite or absurdly far away"
+_NOWHERE = "a point is not finite or too far away"
 
 
 @dataclass
@@ -183,7 +183,7 @@ def _surface(prim: Usd.Prim, time: Usd.TimeCode) -> Ints:
             return np.empty(0, np.int32)
         points = prim.GetAttribute("points").Get(time)
         if tetrahedra.min() < 0 or tetrahedra.max() >= len(points or ()):
-            raise MeshError("tetVertexIndices name points that are not there")
+            raise MeshError("tetVertexIndices name points that do not exist")
         values = as_array(UsdGeom.TetMesh.ComputeSurfaceFaces(UsdGeom.TetMesh(prim), time))
     if values is None or values.shape != (len(values), 3):
         return np.empty(0, np.int32)

@@ -85,7 +85,7 @@ class SplatReader:
         with np.errstate(over="ignore", invalid="ignore"):
             sizes = np.einsum("ij,ij->i", turns, turns)
         bad = {
-            "middles that are not finite or absurdly far away": ~(np.abs(positions) < 1e18).all(1),
+            "middles that are not finite or too far away": ~(np.abs(positions) < 1e18).all(1),
             f"scales that are not from {LEAST_SCALE:g} to {MOST_SCALE:g}": ~(
                 (scales >= LEAST_SCALE) & (scales <= MOST_SCALE)
             ).all(1),
@@ -194,7 +194,7 @@ class PointReader:
         layout = lay_out_points(len(positions))
         bad = invalid_point_mask(positions)
         if bad.all():
-            raise MeshError("their positions are not finite or absurdly far away")
+            raise MeshError("their positions are not finite or too far away")
         if matrix != IDENTITY:
             positions = bake(positions, matrix)
         widths, _ = read_widths(prim, layout, self.time, self.report)
@@ -204,7 +204,7 @@ class PointReader:
         if bad.any():
             what = f"{int(bad.sum())} of {len(bad)} points left out"
             where = prim.GetPath()
-            self.report.warn(f"{what}: they are not finite or absurdly far away", where)
+            self.report.warn(f"{what}: they are not finite or too far away", where)
             positions, radii = positions.copy(), radii.copy()
             positions[bad], radii[bad] = positions[np.flatnonzero(~bad)[0]], 0.0
         bounds = thick_extent(positions, radii)

@@ -373,7 +373,7 @@ class GroupBuilder:
                 continue
             root = self.context.stage.GetPrimAtPath(target)
             if not root:
-                self.report.warn(f"point instancer prototype {target} is not there", path)
+                self.report.warn(f"point instancer prototype {target} does not exist", path)
                 continue
             of_root = order[first:last]
             for which, binding in self.bindings_of_instances.of_points(

@@ -94,9 +94,7 @@ def report_ignored_volumes(
 ) -> None:
     """Reports that light scattered inside these materials does not interact with volumes there."""
     for name in materials if volumes else ():
-        what = (
-            "volumes inside of what refracts and scatters: unseen by light that was scattered there"
-        )
+        what = "volumes inside refracting, scattering materials: light scattered there ignores them"
         report.note(what, name)
 
 

@@ -97,7 +97,7 @@ def _add(
     if path and os.path.isfile(path):
         found[path] = None
     elif not _is_library(value.path):
-        missing[f"file {value.path} is not there: {attribute.GetPath()}"] = None
+        missing[f"file {value.path} does not exist: {attribute.GetPath()}"] = None
 
 
 def _is_library(path: str) -> bool:

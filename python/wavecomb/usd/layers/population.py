@@ -137,7 +137,7 @@ def load_payloads(stage: Usd.Stage, wanted: Sequence[str]) -> None:
     """
     if NONE in wanted:
         if len(wanted) > 1:
-            raise WavecombError(f"payloads: {NONE} goes with no pattern")
+            raise WavecombError(f"payloads: {NONE} cannot be combined with a pattern")
         return
     patterns = [PathPattern(text, "payloads") for text in wanted]
     met: set[str] = set()

@@ -85,7 +85,7 @@ class DomeReader:
         for path in relation.GetForwardedTargets() if relation else ():
             portal = prim.GetStage().GetPrimAtPath(path)
             if not portal or portal.GetTypeName() != "PortalLight":
-                self.report.warn(f"portal {path} is no PortalLight: left out", prim.GetPath())
+                self.report.warn(f"portal {path} is not a PortalLight: left out", prim.GetPath())
                 continue
             cache = UsdGeom.XformCache(self.time)
             dome = local @ np.array(cache.GetLocalToWorldTransform(prim))

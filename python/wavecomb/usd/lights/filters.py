@@ -112,7 +112,7 @@ class FilterReader:
         found = [self._flaps(doors, light, "barndoor")] if has_doors else []
         for path, prim in prims:
             if prim is None:
-                self._report.warn(f"light filter {path} is not there", light.GetPath())
+                self._report.warn(f"light filter {path} does not exist", light.GetPath())
                 continue
             reader = self._readers.get(plain_kind(prim))
             if reader is None:

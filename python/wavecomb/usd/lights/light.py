@@ -241,14 +241,14 @@ class LightReader:
         options["radius"] = 0.0
         options["color"] = tuple(area * value for value in options["color"])
         if radius == 0 and not normalize:
-            self.report.note("sphere light of radius 0: taken as normalized", prim.GetPath())
+            self.report.note("sphere light of radius 0: treated as normalized", prim.GetPath())
 
     def _cylinder(self, prim: Usd.Prim, options: dict[str, Any], normalize: bool) -> bool:
         """Replaces a radius of 0 by a thin cylinder; returns whether the light is normalised."""
         length: float = options["length"]
         if options["radius"] == 0 and length > 0:
             self.report.note(
-                "cylinder light of radius 0: taken for a thin one, normalized", prim.GetPath()
+                "cylinder light of radius 0: treated as thin and normalized", prim.GetPath()
             )
             options["radius"], normalize = 1e-3 * length, True
         return normalize

@@ -207,7 +207,7 @@ class TextureTable:
                 folder, name = os.path.split(path)
                 why = f"no tile {name} is in the folder {folder or os.curdir}"
                 if folder and not os.path.isdir(folder):
-                    why = f"the folder of its tiles, {folder}, is not there"
+                    why = f"the folder of its tiles, {folder}, does not exist"
                 self._report.warn(f"texture {path} cannot be read ({why})", prim)
             return None
         return self._image(self._twin(path), prim)

@@ -157,7 +157,7 @@ def plan_levels(context: LoadContext, view: ViewSize, limit_bytes: float) -> dic
         short = sum(entry.wanted is not None and entry.surplus() < 1 for entry in reduced)
         report.note(
             f"texture limit {limit_bytes / MEGABYTE:g} MB: {len(reduced)} of {len(entries)} "
-            f"textures without their finest levels, {short} of them coarser than the picture shows "
+            f"textures without their finest levels, {short} of them coarser than the image shows "
             f"({before / MEGABYTE:.1f} MB become {total / MEGABYTE:.1f} MB)"
         )
     if total > limit_bytes:

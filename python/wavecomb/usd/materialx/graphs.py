@@ -216,7 +216,7 @@ class Graphs:
                 return self.source(output, graph, container)
         else:
             return None
-        self._prims.report_skipped(item, "MaterialX connection leads nowhere (left out)")
+        self._prims.report_skipped(item, "MaterialX connection has no target (left out)")
         return None
 
 

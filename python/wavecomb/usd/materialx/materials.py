@@ -99,7 +99,7 @@ class _Looks:
             collection = self._root.getCollection(assign.getCollectionString())
             if collection is not None:
                 return self.collection(collection, ())
-            self._tell(assign, "MaterialX collection is not there (material not assigned)")
+            self._tell(assign, "MaterialX collection does not exist (material not assigned)")
             return ""
         if not assign.getGeom():
             return None
@@ -151,7 +151,9 @@ class _Looks:
         """Binds a material to a collection of a look, or to the whole look."""
         material = child(MATERIALS, item.getMaterial())
         if not self._stage.GetPrimAtPath(material):
-            self._tell(item, f"MaterialX material {item.getMaterial()} is not there (not assigned)")
+            self._tell(
+                item, f"MaterialX material {item.getMaterial()} does not exist (not assigned)"
+            )
             return None
         scope = binding.GetPath().AppendChild("Materials")
         name = valid(item.getName())

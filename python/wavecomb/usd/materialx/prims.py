@@ -118,7 +118,7 @@ class Prims:
         if kind == "filename":
             text, is_bare = image_file(element, self.file)
             if is_bare:
-                self.report.note("MaterialX fileprefix leads nowhere (left out)", self.file)
+                self.report.note("MaterialX fileprefix is not a folder (left out)", self.file)
             # Like OpenUSD, do not apply a document-wide linear Rec. 709 to images.
             is_said = space not in _PLAIN_SPACES or element.hasColorSpace()
             if makes_colour and is_said:

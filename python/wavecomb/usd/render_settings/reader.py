@@ -134,7 +134,7 @@ def _read(
         window = tuple(float(edge) for edge in window)
         if min(window[:2]) < 0 or max(window[2:]) > 1:
             where = product if product is not None else settings
-            report.missing("overscan: dataWindowNDC beyond the picture is cut", where.GetPath())
+            report.missing("overscan: dataWindowNDC beyond the image is cropped", where.GetPath())
     off = {
         name: bool(value(name, _is_switch))
         for name in ("disableMotionBlur", "instantaneousShutter", "disableDepthOfField")
@@ -182,7 +182,7 @@ def _camera(stage: Usd.Stage, prims: Sequence[Usd.Prim], report: LoadReport) -> 
             camera = stage.GetPrimAtPath(path)
             if camera and camera.IsA(UsdGeom.Camera):
                 return str(path)
-            report.warn(f"render settings name {path}, which is no camera", prim.GetPath())
+            report.warn(f"render settings name {path}, which is not a camera", prim.GetPath())
     return None
 
 

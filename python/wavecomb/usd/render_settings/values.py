@@ -75,7 +75,7 @@ class RenderChoice:
         x0, y0, x1, y1 = max(x0, 0), max(y0, 0), min(x1, width), min(y1, height)
         if x0 >= x1 or y0 >= y1:
             raise WavecombError(
-                f"{self.product or self.settings}: dataWindowNDC holds no pixel of the picture; "
+                f"{self.product or self.settings}: dataWindowNDC contains no pixel of the image; "
                 "fix it or give --region"
             )
         return None if (x0, y0, x1, y1) == (0, 0, width, height) else (x0, y0, x1, y1)

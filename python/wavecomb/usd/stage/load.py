@@ -234,7 +234,7 @@ class _Load:
         report_grid_memory(volumes, c.options.texture_limit, c.report)
         report_ignored_volumes(volumes, self._materials.scattering_interiors, c.report)
         if not any(c.report.counts.get(kind) for kind in (*COUNTS.values(), "volumes")):
-            c.report.note("nothing to draw: the picture shows the environment only")
+            c.report.note("nothing to draw: the image shows the environment only")
         camera_path = (
             None if view is None or settings.camera is None else str(settings.camera.GetPath())
         )
@@ -284,7 +284,7 @@ class _Load:
         if c.options.strand_pixels <= 0:
             return None
         if view is None:
-            what = "strands are not thinned out: their width in pixels is unknown without a camera"
+            what = "strands are not simplified: their width in pixels is unknown without a camera"
             c.report.note(what)
             return None
         return StrandDetail(ViewSize(view, c.options.size), c.options.strand_pixels, c.report)

@@ -58,7 +58,7 @@ class VolumeMaterials:
             try:
                 properties = self._read(material, volume)
             except (Tf.ErrorException, RecursionError):
-                what = "volume network cannot be read: default taken"
+                what = "volume network cannot be read: default used"
                 self._report.warn(what, path)
                 properties = DEFAULT_PROPERTIES
             self._known[path] = properties
@@ -77,9 +77,9 @@ class VolumeMaterials:
                 return ClosureReader(inputs, self._metres).read(shader)
             unknown = unknown or kind
         if unknown:
-            self._report.missing(f"volume shader {unknown} (default taken)", material.GetPath())
+            self._report.missing(f"volume shader {unknown} (default used)", material.GetPath())
         else:
-            what = "volume with a material without a volume shader: default taken"
+            what = "volume with a material without a volume shader: default used"
             self._report.warn(what, volume.GetPath())
         return DEFAULT_PROPERTIES
 
@@ -97,7 +97,7 @@ def filling(material: UsdShade.Material, time: Usd.TimeCode, report: LoadReport)
     if any(properties.emission):
         report.missing("emission of a volume in a mesh (left out)", prim.GetPath())
     if properties.density or properties.colour:
-        report.missing("fields of a volume in a mesh (taken for 1)", prim.GetPath())
+        report.missing("fields of a volume in a mesh (1 is used)", prim.GetPath())
     most = max(properties.extinction)
     depth = 1.0 / most if most > 0 else 1.0
     red, green, blue = (math.exp(-e * depth) for e in properties.extinction)

@@ -91,7 +91,7 @@ class ClosureReader:
         if two.is_black:
             return one
         if one.field != two.field:
-            what = "volume coefficients that read several fields (one taken for all)"
+            what = "volume coefficients that read several fields (one is used for all)"
             self._inputs.report.missing(what, self._inputs.material.GetPath())
         return FieldColour(total(one.colour, two.colour), two.field or one.field)
 
@@ -137,7 +137,7 @@ class ClosureReader:
 
     def _driven_by(self, one: FieldColour, by: FieldColour) -> FieldColour:
         if one.field and by.field and not one.is_black:
-            what = "products of fields in a volume (the first taken)"
+            what = "products of fields in a volume (the first is used)"
             self._inputs.report.missing(what, self._inputs.material.GetPath())
         return FieldColour(one.scaled(by.colour).colour, one.field or by.field)
 
@@ -323,4 +323,4 @@ class Inputs:
 
     def _left_out(self, node: UsdShade.Shader, name: str) -> None:
         kind = shader_id(node) or "a node without an id"
-        self.report.missing(f"{kind} in {name} of a volume shader (default taken)", node.GetPath())
+        self.report.missing(f"{kind} in {name} of a volume shader (default used)", node.GetPath())

@@ -129,7 +129,7 @@ class VolumeReader:
         field = self._grids.find(fields, properties.density) if properties.density else None
         if field is None:
             if properties.density and properties.density != "density":
-                what = f"volume without the field {properties.density}: its density taken"
+                what = f"volume without the field {properties.density}: its density used"
                 self._report.warn(what, prim.GetPath())
             field = fields.get("density") or self._grids.densest(fields)
         return None if field is None else self._grids.get(field, "density")
@@ -155,7 +155,7 @@ class VolumeReader:
     def _anisotropy(self, properties: OpticalProperties, prim: Usd.Prim) -> float:
         limited = min(max(properties.anisotropy, -_MOST_ANISOTROPY), _MOST_ANISOTROPY)
         if limited != properties.anisotropy:
-            what = f"anisotropy {properties.anisotropy:g} of a volume: {limited:g} taken"
+            what = f"anisotropy {properties.anisotropy:g} of a volume: {limited:g} used"
             self._report.warn(what, properties.name or prim.GetPath())
         return limited
 
