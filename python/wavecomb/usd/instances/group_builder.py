@@ -62,6 +62,7 @@ class GroupBuilder:
         materials: MaterialTable,
         light_groups: LightGroups,
         surfaces: Surfaces,
+        *,
         cache: MeshCache | None = None,
         progress: LoadProgress | None = None,
         detail: StrandDetail | None = None,
@@ -344,7 +345,15 @@ class GroupBuilder:
             exact = self.instance_materials.of_proxies(proxy)
         bound = placed.material is not None or (scope.bound and not override)
         binding = self.bindings_of_instances.of_instance(placed, proxy, scope)
-        inner = binding.on(Scope(True, bound and alias is None, override, alias, path))
+        inner = binding.on(
+            Scope(
+                inside=True,
+                bound=bound and alias is None,
+                override=override,
+                alias=alias,
+                root=path,
+            )
+        )
         key = ("native", path, inner.bound, override, placed.purpose, exact, binding.key)
         roots = list(prototype.GetChildren())
         return self._group(key, str(prim.GetPath()), path, roots, inner, placed.purpose)
@@ -400,12 +409,12 @@ class GroupBuilder:
         within = path.HasPrefix(scope.root) and scope.inside
         inner = binding.on(
             Scope(
-                True,
-                scope.bound and within,
-                scope.override and within,
-                scope.alias if within else None,
-                scope.root if within else path,
-                scope.material if within else None,
+                inside=True,
+                bound=scope.bound and within,
+                override=scope.override and within,
+                alias=scope.alias if within else None,
+                root=scope.root if within else path,
+                material=scope.material if within else None,
             )
         )
         path_of_material = None if inner.material is None else inner.material.GetPath()

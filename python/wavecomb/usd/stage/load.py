@@ -218,7 +218,7 @@ class _Load:
         self._surfaces.cache = None if cache is None else cache.refined
         group_builder = GroupBuilder(
             c, Traversal(c, lights, rays), self._materials, groups, self._surfaces,
-            None if cache is None else cache.meshes, progress,
+            cache=None if cache is None else cache.meshes, progress=progress,
             detail=self._strand_detail(view), notes_emitters=not found.lights,
         )  # fmt: skip
         world = group_builder.world()
