@@ -8,7 +8,7 @@ import pytest
 
 from wavecomb.image.colour_maps import colour_map, signed_colour_map
 from wavecomb.image.compare.comparison import compare, luminance
-from wavecomb.image.compare.heatmap import LEAST_WIDTH, heat_map, write_heat_map
+from wavecomb.image.compare.heatmap import MIN_WIDTH, heat_map, write_heat_map
 from wavecomb.image.files.image import read_image, srgb_from_linear, write_exr
 
 
@@ -170,5 +170,5 @@ def test_small_heat_maps(shape: tuple[int, int, int], kind: str) -> None:
     a = np.zeros(shape, np.float32)
     for b in (a, a + 1):
         heat = heat_map(a, b, kind)
-        assert heat.shape[1] == LEAST_WIDTH
+        assert heat.shape[1] == MIN_WIDTH
         assert (heat[shape[0] :] == 1).all(axis=2).any()

@@ -320,7 +320,7 @@ def test_predicates_of_expressions(tmp_path, predicate, rules, words):
 
 def test_expressions_are_evaluated_at_so_many_prims(tmp_path, monkeypatch):
     """The number of visited prims is limited, since nested instances can be billions."""
-    monkeypatch.setattr("wavecomb.usd.stage.collections.MOST_PRIMS", 5)
+    monkeypatch.setattr("wavecomb.usd.stage.collections.MAX_PRIMS", 5)
     scene, loaded = load(tmp_path, _EXPRESSIONS)
     assert "membershipExpression beyond 5 prims (cut there)" in said(loaded)
     first = {"/Set/heroBox", "/Set/heroBox/Inner"}

@@ -77,10 +77,10 @@ def sheet_command(pictures: tuple[str, ...], output: str, **options: Any) -> Non
 def _write_sheet(found: dict[str, str], output: str, look: Any, options: dict[str, Any]) -> None:
     from wavecomb.errors import WavecombError
     from wavecomb.image.files.image import write_png_codes
-    from wavecomb.image.thumbnails import MOST, contact_sheet
+    from wavecomb.image.thumbnails import MAX_IMAGES, contact_sheet
 
-    if len(found) > MOST:
-        raise WavecombError(f"{len(found)} images: a sheet holds at most {MOST}")
+    if len(found) > MAX_IMAGES:
+        raise WavecombError(f"{len(found)} images: a sheet holds at most {MAX_IMAGES}")
     columns, width = options["columns"] or 0, options["width"] or 240
     write_png_codes(output, contact_sheet(found, look, width=width, columns=columns))
 
@@ -90,10 +90,10 @@ def _write_page(
 ) -> None:
     from wavecomb.errors import WavecombError
     from wavecomb.image.files.output_file import replacing
-    from wavecomb.image.pages import MOST_FRAMES, sequence_page
+    from wavecomb.image.pages import MAX_FRAMES, sequence_page
 
-    if len(found) > MOST_FRAMES:
-        raise WavecombError(f"{len(found)} images: a page holds at most {MOST_FRAMES}")
+    if len(found) > MAX_FRAMES:
+        raise WavecombError(f"{len(found)} images: a page holds at most {MAX_FRAMES}")
     text = sequence_page(
         found, look, title=title, fps=options["fps"], width=options["width"] or 960,
         kind="png" if options["lossless"] else "jpeg",

@@ -24,7 +24,7 @@ _LOOK_S = 1.0
 """Time between queries of the list of workers, in seconds."""
 _BATCH_S = 0.5
 """Time that a batch of small tiles should take, in seconds."""
-_LEAST_BATCHES = 4
+_MIN_BATCHES = 4
 """Smallest number of batches for each worker, so that workers end at about the same time."""
 _RETRY_S = 5.0
 """Time between rescheduling of tasks that wait for a worker, in seconds."""
@@ -240,7 +240,7 @@ class Run:
 
     def _batch_size(self) -> int:
         wanted = _BATCH_S / self._seconds if self._seconds else 1
-        most = len(self._tiles) / (_LEAST_BATCHES * max(1, self._capacity()))
+        most = len(self._tiles) / (_MIN_BATCHES * max(1, self._capacity()))
         return max(1, int(min(wanted, most)))
 
     def _again(self, tiles: list[Task]) -> None:

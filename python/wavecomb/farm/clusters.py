@@ -28,7 +28,7 @@ from wavecomb.extras import needed
 from wavecomb.farm.worker import write_certificates
 from wavecomb.machine import usable_cores
 
-MOST_WORKERS = 1024
+MAX_WORKERS = 1024
 DASK_WAIT_S = 60.0
 """Time to wait for the first worker of an existing Dask cluster, in seconds."""
 _SLURM_WORKERS = 4
@@ -37,7 +37,7 @@ _ANSWER_S = 60.0
 """Time limit for sbatch, squeue and scancel, in seconds."""
 _ASK_S = 10.0
 """Time between calls of squeue, in seconds."""
-_MOST_STARTS = 5
+_MAX_STARTS = 5
 """Largest number of worker starts in a row without any progress."""
 _END_S = 5.0
 _SCRIPT = '#!/bin/sh\nexec "$@" --nthreads "${SLURM_CPUS_PER_TASK:-1}"\n'
@@ -70,7 +70,7 @@ def parse_cluster(text: str) -> ClusterSpec:
     if kind == "none" and not colon:
         return ClusterSpec("none")
     if kind in ("local", "slurm") and (
-        not colon or (re.fullmatch(r"[0-9]{1,4}", rest) and 1 <= int(rest) <= MOST_WORKERS)
+        not colon or (re.fullmatch(r"[0-9]{1,4}", rest) and 1 <= int(rest) <= MAX_WORKERS)
     ):
         return ClusterSpec(kind, int(rest or (_SLURM_WORKERS if kind == "slurm" else 1)))
     raise WavecombError(
@@ -162,7 +162,7 @@ class _LocalWorkers(Cluster):
         self._starts = 1 if progressed else self._starts
         if self._process.poll() is None:
             return
-        if self._starts >= _MOST_STARTS:
+        if self._starts >= _MAX_STARTS:
             said = self._log.read_text(errors="replace").strip().splitlines() or ["no reason given"]
             raise WavecombError(f"{self.what}: workers ended {self._starts} times: {said[-1]}")
         self._start()
@@ -216,7 +216,7 @@ class _SlurmWorkers(Cluster):
             there = 0
         if there >= self._count:
             return
-        if self._starts >= _MOST_STARTS:
+        if self._starts >= _MAX_STARTS:
             raise WavecombError(f"{self.what}: Slurm's jobs end without finishing anything")
         self._submit(self._count - there)
 

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 from wavecomb.errors import WavecombError
-from wavecomb.farm.tiling import MOST_TILES, Rectangle, tiles_of
+from wavecomb.farm.tiling import MAX_TILES, Rectangle, tiles_of
 from wavecomb.path_maps import Pair, here, mapped
 from wavecomb.run.frame_names import fill, frame_text
 from wavecomb.version import version
@@ -272,7 +272,7 @@ def _checked(cls: type[Job], value: Mapping[str, Any]) -> Job:
     for shot, frame in _list(given["images"], "images"):
         _whole(shot, 0, len(shots) - 1, "an image's shot")
         images.append((shot, None if frame is None else _real(frame, "an image's frame")))
-    columns, rows = (_whole(n, 1, MOST_TILES, "tiles") for n in given["tiles"])
+    columns, rows = (_whole(n, 1, MAX_TILES, "tiles") for n in given["tiles"])
     files = tuple(StageFile(**one) for one in given["files"])
     for one in files:
         if not (isinstance(one.path, str) and isinstance(one.sha256, str)):

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 _ABSENT = re.compile(r"(texture|MaterialX file|IES profile) .* cannot be read|cannot open layer")
 """Warnings about missing files of the stage."""
-_MOST_NAMED = 3
+_MAX_NAMED = 3
 
 
 class Stopped(Exception):
@@ -259,6 +259,6 @@ def check_files(job: Job) -> None:
         except OSError as error:
             lines.append(f"{name} is not on this machine: {error.strerror}")
     if lines:
-        more = len(lines) - _MOST_NAMED
-        lines = lines[:_MOST_NAMED] + [f"and {more} more files"] * (more > 0)
+        more = len(lines) - _MAX_NAMED
+        lines = lines[:_MAX_NAMED] + [f"and {more} more files"] * (more > 0)
         raise WavecombError("; ".join(lines))

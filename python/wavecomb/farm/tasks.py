@@ -24,7 +24,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.path_maps import VARIABLE, Pair, here, mapped, use_maps
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-_LEAST_FREE = 1 << 16
+_MIN_FREE = 1 << 16
 """Free bytes below which a disk counts as full, because libraries do not report why a write
 failed."""
 _LOOK_S = 1.0
@@ -244,7 +244,7 @@ def is_full(error: OSError, path: Path) -> bool:
         found = os.statvfs(path.parent)
     except OSError:
         return False
-    return found.f_bavail * found.f_frsize < _LEAST_FREE
+    return found.f_bavail * found.f_frsize < _MIN_FREE
 
 
 def _begin() -> str:

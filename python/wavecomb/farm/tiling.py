@@ -16,9 +16,9 @@ from wavecomb.errors import WavecombError
 Rectangle = tuple[int, int, int, int]
 """Rectangle (x0, y0, x1, y1) in pixels of the whole image, without column x1 and row y1."""
 
-MOST_TILES = 9999
+MAX_TILES = 9999
 """Largest number of columns or rows of an image."""
-LEAST_EDGE = 64
+MIN_EDGE = 64
 """Smallest edge of tiles that ``choose_tiles`` chooses, in pixels."""
 TILES_OF_A_WORKER = 4
 """Number of tiles of an image for each worker, so that workers end at about the same time."""
@@ -86,7 +86,7 @@ def layout(count: int, region: Rectangle) -> tuple[int, int]:
     fits = [
         (n, count // n)
         for n in range(1, count + 1)
-        if count % n == 0 and n <= min(width, MOST_TILES) and count // n <= min(height, MOST_TILES)
+        if count % n == 0 and n <= min(width, MAX_TILES) and count // n <= min(height, MAX_TILES)
     ]
     if not fits:
         raise WavecombError(
@@ -114,8 +114,8 @@ def choose_tiles(
     width = min(x1 - x0 for x0, _, x1, _ in regions)
     height = min(y1 - y0 for _, y0, _, y1 in regions)
     wanted = TILES_OF_A_WORKER * workers
-    columns = max(1, min(width // LEAST_EDGE, round((wanted * width / height) ** 0.5)))
-    rows = max(1, min(height // LEAST_EDGE, -(-wanted // columns)))
+    columns = max(1, min(width // MIN_EDGE, round((wanted * width / height) ** 0.5)))
+    rows = max(1, min(height // MIN_EDGE, -(-wanted // columns)))
     return columns, rows
 
 

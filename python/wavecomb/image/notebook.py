@@ -14,7 +14,7 @@ from wavecomb.image.embedded import base64_text, data_uri, encoded, smaller, sub
 from wavecomb.image.files.image import display
 from wavecomb.image.layer_view import is_light, show_layer
 
-MOST_EDGE = 1600
+MAX_EDGE = 1600
 """Longer edge of an image in a notebook in pixels; larger images are reduced by averaging."""
 LAYER_EDGE = 360
 
@@ -51,7 +51,7 @@ class Rendered(Protocol):
 
 def codes(picture: Rendered) -> NDArray[np.uint8]:
     """Returns the image as 8-bit sRGB codes, with the tone mapping "neutral"."""
-    return display(smaller(picture.shown(), MOST_EDGE), tone_map="neutral")
+    return display(smaller(picture.shown(), MAX_EDGE), tone_map="neutral")
 
 
 def mime_bundle(

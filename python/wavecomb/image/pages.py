@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from wavecomb.image.embedded import Kind, data_uri
 from wavecomb.image.thumbnails import DisplayOptions, fitted
 
-MOST_FRAMES = 1000
+MAX_FRAMES = 1000
 """Most images of a page."""
 SPEEDS = (6, 12, 24, 25, 30, 60)
 """Selectable playback speeds in frames per second, besides the requested one."""

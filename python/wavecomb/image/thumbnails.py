@@ -100,7 +100,7 @@ def fitted(codes: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint
 
 Codes = NDArray[np.uint8]
 
-MOST = 2000
+MAX_IMAGES = 2000
 """Most images of a contact sheet."""
 _PAPER = 24
 _GAP = 12

@@ -21,7 +21,7 @@ PREDICTIONS = {
     "calibrated_ns": "calibration, before the first pass",
     "predicted_ns": "moving average, after the last pass",
 }
-LEAST_RECORDS = 256
+MIN_RECORDS = 256
 """Smallest number of timed records with which a material enters the comparison."""
 
 
@@ -47,7 +47,7 @@ def material_costs(results: Results) -> pd.DataFrame:
     numbers = ["timed_records", "measured_ns", *PREDICTIONS]
     found[numbers] = found[numbers].astype(np.float64)
     found[[*PREDICTIONS]] = found[[*PREDICTIONS]].replace(0.0, np.nan)
-    timed = (found["timed_records"] >= LEAST_RECORDS) & (found["measured_ns"] > 0)
+    timed = (found["timed_records"] >= MIN_RECORDS) & (found["measured_ns"] > 0)
     return found[timed].reset_index(drop=True)
 
 

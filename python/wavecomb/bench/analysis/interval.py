@@ -25,7 +25,7 @@ LEVEL = 0.95
 RESAMPLES = 4000
 SEED = 20260117
 SAME_WITHIN = 0.01
-LEAST_FOR_BOOTSTRAP = 8
+MIN_ROUNDS_FOR_BOOTSTRAP = 8
 """Smallest number of rounds for a bootstrap. Resamples of n values stay within their range, which
 covers the mean with a probability of at most 1 - 2^(1 - n)."""
 
@@ -59,7 +59,7 @@ class Estimate:
 def bootstrap(rounds: Array, statistic: Statistic, *, positive: bool = False) -> list[Estimate]:
     """Computes statistics of the columns' means with intervals, by resampling rows.
 
-    Below ``LEAST_FOR_BOOTSTRAP`` rows the interval is value +- t(n - 1) times the jackknife's
+    Below ``MIN_ROUNDS_FOR_BOOTSTRAP`` rows the interval is value +- t(n - 1) times the jackknife's
     standard error (Tukey 1958), of the logarithm if ``positive``. From there on it is SciPy's BCa
     bootstrap (Efron 1987) whose level is widened for small n: t(n - 1) sqrt(n / (n - 1)) replaces
     the normal quantile (Hesterberg 2015), because resampling alone is too narrow by
@@ -84,7 +84,7 @@ def bootstrap(rounds: Array, statistic: Statistic, *, positive: bool = False) ->
     value = of_rows(np.arange(n))
     if n < 2:
         low = high = np.full(value.shape, np.nan)
-    elif n < LEAST_FOR_BOOTSTRAP:
+    elif n < MIN_ROUNDS_FOR_BOOTSTRAP:
         low, high = _jackknife(value, of_rows, n, positive)
     else:
         low, high = bca(of_rows, n, widened=True)

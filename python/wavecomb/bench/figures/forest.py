@@ -17,7 +17,7 @@ from wavecomb.bench.figures.style import (
     FAINT,
     INK,
     INTERVALS,
-    MOST_PANELS,
+    MAX_PANELS,
     WIDTH,
     CaptionedFigure,
     clipped,
@@ -195,7 +195,7 @@ def _panel(
 # ---------------
 
 
-MOST_INTERACTIONS = 14
+MAX_INTERACTIONS = 14
 _FACTORS = {
     **{"policy": "policy", "lanes": "lanes", "wave_size": "wave size", "roulette": "roulette"},
     **{"ray_order": "order of rays", "shadow_order": "order of shadow rays"},
@@ -210,7 +210,7 @@ def order_figure(table: pd.DataFrame, name: str, metric_words: str) -> Captioned
         table, "stratum", "policy", "placebo_ratio", "placebo_",
         colour=lambda row: policy_colour(row.policy), hollow=lambda row: row.policy in BOUNDS,
     )  # fmt: skip
-    if len(panels) > MOST_PANELS:
+    if len(panels) > MAX_PANELS:
         return None
     caption = (
         f"{metric_words.capitalize()}: ratio to random-runs, which has the runs of a material in "
@@ -222,7 +222,7 @@ def order_figure(table: pd.DataFrame, name: str, metric_words: str) -> Captioned
 
 def regret_figure(table: pd.DataFrame, name: str) -> CaptionedFigure | None:
     """Draws the regret of each policy, in a panel per cell."""
-    if table.empty or table["cell"].nunique() > MOST_PANELS:
+    if table.empty or table["cell"].nunique() > MAX_PANELS:
         return None
     panels = panels_of(
         table, "cell", "policy", "regret", colour=lambda row: policy_colour(row.policy)
@@ -250,7 +250,7 @@ def effects_figure(table: pd.DataFrame, name: str, metric_words: str) -> Caption
     if not mixed.empty:
         rows = [
             _effect_row(row, row.name)
-            for row in mixed.head(MOST_INTERACTIONS).itertuples(index=False)
+            for row in mixed.head(MAX_INTERACTIONS).itertuples(index=False)
         ]
         panels.append(Panel("strongest interactions", rows))
     caption = (

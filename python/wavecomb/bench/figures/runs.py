@@ -25,7 +25,7 @@ from wavecomb.bench.figures.style import (
     FAINT,
     GREEN,
     INTERVALS,
-    MOST_PANELS,
+    MAX_PANELS,
     ORANGE,
     PURPLE,
     RED,
@@ -66,7 +66,7 @@ def ratio_figure(
     table: pd.DataFrame, name: str, title: str, x_label: str, factor: str
 ) -> CaptionedFigure | None:
     """Draws ``ratios`` as forest plots, one panel per cell; None if there are too many cells."""
-    if table.empty or table["cell"].nunique() > MOST_PANELS:
+    if table.empty or table["cell"].nunique() > MAX_PANELS:
         return None
     panels = panels_of(
         table, "cell", "level", "ratio",
@@ -84,7 +84,7 @@ def ratio_figure(
 def pipeline(runs: pd.DataFrame, name: str) -> CaptionedFigure | None:
     """Draws stacked phases of each policy, in a panel per cell."""
     groups = list(cells(runs.dropna(subset=["shade_s"]), "policy"))
-    if not groups or len(groups) > MOST_PANELS:
+    if not groups or len(groups) > MAX_PANELS:
         return None
     names = varying([cell for cell, _ in groups])
     columns = 1 if len(groups) == 1 else 2

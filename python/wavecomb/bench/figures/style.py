@@ -30,7 +30,7 @@ FAINT = "#8a8d93"
 WHISKERS = 4.0
 """Largest extent of a logarithmic axis beyond the points, as a factor."""
 INTERVALS = "Whiskers: 95 % intervals"
-MOST_PANELS = 12
+MAX_PANELS = 12
 """Largest number of panels. Figures with more are left out."""
 WIDTH = 7.4
 """Width of a figure in inches, equal to a column of text in print."""

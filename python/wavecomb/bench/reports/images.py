@@ -22,8 +22,8 @@ from wavecomb.image.files.image import display, read_image
 if TYPE_CHECKING:
     from wavecomb.bench.analysis.data import Results
 
-MOST_STAGES = 12
-MOST_PICTURES = 8
+MAX_STAGES = 12
+MAX_IMAGES = 8
 LARGEST = 720
 """Largest width or height of an image in the page, in pixels. Larger images are averaged down."""
 
@@ -64,7 +64,7 @@ def shots(results: Results) -> list[Shot]:
             frame = golden or f"{row['stage']} {row['width']}x{row['height']}"
             found.setdefault(frame, []).append((row, results.folder / image))
     made = []
-    for frame, pictures in list(found.items())[:MOST_STAGES]:
+    for frame, pictures in list(found.items())[:MAX_STAGES]:
         golden_file = results.folder / frame
         golden = _read(golden_file) if golden_file.is_file() else None
         first_seed = min(row["seed"] for row, _ in pictures)
@@ -94,7 +94,7 @@ def _distinct(pictures: Sequence[tuple[dict[str, Any], Path]]) -> list[RunImage]
             kept.append((pixels, [row]))
         else:
             rows.append(row)
-    return [RunImage(_name(rows, pictures), pixels) for pixels, rows in kept[:MOST_PICTURES]]
+    return [RunImage(_name(rows, pictures), pixels) for pixels, rows in kept[:MAX_IMAGES]]
 
 
 def _name(rows: Sequence[dict[str, Any]], everything: Sequence[tuple[dict[str, Any], Path]]) -> str:

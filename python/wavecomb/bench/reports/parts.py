@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 from wavecomb.bench.figures.style import CaptionedFigure, fixed, lay_out, save, svg
 
-MOST_ROWS = 60
+MAX_ROWS = 60
 """Largest number of rows of a table that is not folded."""
 
 
@@ -114,7 +114,7 @@ def table(
 ) -> Table:
     """Makes a table of cells and plain texts. Always folds a long one."""
     filled = [[c if isinstance(c, Cell) else Cell(c) for c in row] for row in rows]
-    if not summary and len(rows) > MOST_ROWS:
+    if not summary and len(rows) > MAX_ROWS:
         summary = f"{caption} ({len(rows)} rows)"
     return Table(caption, head, filled, note, summary=summary)
 

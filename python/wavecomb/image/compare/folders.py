@@ -99,7 +99,7 @@ def as_plain(pair: PairResult, tolerance: float | None) -> dict[str, Any]:
 # ---- Page with pairs of images under a wipe line, difference maps and figures --------------------
 
 
-MOST_PAIRS = 60
+MAX_PAIRS = 60
 """Most pairs whose images are in a page, those with the largest differences; its table has all."""
 _HEAD = ("picture", "", "differ", "RMSE", "relMSE", "largest", "at")
 
@@ -129,7 +129,7 @@ def compare_page(
     ranked.sort(key=lambda one: -_rmse(one))
     if folders is None:
         ranked = list(results)
-    shown = {one.name: f"pair-{k}" for k, one in enumerate(ranked[:MOST_PAIRS])}
+    shown = {one.name: f"pair-{k}" for k, one in enumerate(ranked[:MAX_PAIRS])}
     sections = [
         pair_section(_pair(one, look, kind, width), shown[one.name], _short(sources))
         for one in results

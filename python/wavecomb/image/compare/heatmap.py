@@ -22,7 +22,7 @@ Kind = Literal["absolute", "signed", "flip-ldr", "flip-hdr"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 DECADES = 4
 Z_RANGE = 5.0
-LEAST_WIDTH = 340
+MIN_WIDTH = 340
 """Smallest width in pixels, for title and labels; narrower images are padded with black."""
 
 _NOT_FINITE = (0.0, 1.0, 1.0)
@@ -76,7 +76,7 @@ def heat_map(
     Equal pixels are black; pixels with a NaN or an infinity are cyan.
 
     Returns:
-        Linear Rec.709, (height + bar, width, 3), at least ``LEAST_WIDTH`` wide.
+        Linear Rec.709, (height + bar, width, 3), at least ``MIN_WIDTH`` wide.
     """
     return _draw(scale_of(a, b, kind, exposure=exposure))
 
@@ -183,7 +183,7 @@ def _decades(size: NDArray[np.float64], peak: float) -> NDArray[np.float64]:
 def _draw(scale: Scale) -> NDArray[np.float32]:
     colours = scale.pixels()
     height, width = colours.shape[:2]
-    result = np.zeros((height + _BAR_HEIGHT, max(width, LEAST_WIDTH), 3), np.float32)
+    result = np.zeros((height + _BAR_HEIGHT, max(width, MIN_WIDTH), 3), np.float32)
     result[:height, :width] = colours
     result[height:] = _bar(result.shape[1], scale)
     return result

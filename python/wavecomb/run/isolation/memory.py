@@ -20,7 +20,7 @@ from wavecomb.machine import memory_bytes
 from wavecomb.run.isolation import progress_notes
 
 MEGABYTE = 1_000_000
-LEAST_MB = 256
+MIN_MB = 256
 
 _CGROUP = Path("/sys/fs/cgroup")
 
@@ -75,8 +75,8 @@ def request_limit(megabytes: float | None) -> None:
         WavecombError: The limit is too small.
     """
     global requested_mb
-    if megabytes is not None and megabytes < LEAST_MB:
-        raise WavecombError(f"memory limit {megabytes:g} MB: give at least {LEAST_MB} MB")
+    if megabytes is not None and megabytes < MIN_MB:
+        raise WavecombError(f"memory limit {megabytes:g} MB: give at least {MIN_MB} MB")
     requested_mb = megabytes
 
 

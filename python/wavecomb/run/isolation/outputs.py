@@ -22,7 +22,7 @@ from wavecomb.image.files import output_file
 from wavecomb.image.files.private_folder import remove_abandoned
 
 _HEAD = struct.Struct("=I")
-_MOST_BYTES = 1 << 20
+_MAX_BYTES = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def _receive(channel: socket.socket) -> Any:
     if size is None:
         return None
     (count,) = _HEAD.unpack(size)
-    data = None if count > _MOST_BYTES else _exactly(channel, count)
+    data = None if count > _MAX_BYTES else _exactly(channel, count)
     return None if data is None else json.loads(data.decode("utf-8", "surrogatepass"))
 
 

@@ -12,7 +12,7 @@ from wavecomb.scenes.rooms import textures as images
 MARBLE_METRES = 0.45
 """Edge of the area that the image ``marble`` covers in this scene, in metres."""
 _FULL_SIZE = 2048
-_LEAST_SIZE = 16
+_MIN_SIZE = 16
 
 ROOM_TEXTURES = {
     "plaster": TextureInfo(images.plaster, 1024, True),
@@ -117,7 +117,7 @@ MATERIALS: dict[str, MaterialInfo] = {
 def write_textures(writer: StageWriter, options: SceneOptions) -> None:
     """Registers the room's images, so that materials can use them."""
     for name, info in ROOM_TEXTURES.items():
-        size = max(_LEAST_SIZE, info.size * options.texture_size // _FULL_SIZE)
+        size = max(_MIN_SIZE, info.size * options.texture_size // _FULL_SIZE)
         scaled = TextureInfo(info.make, size, info.colour, info.channels, info.normal)
         writer.define_texture(name, scaled)
 

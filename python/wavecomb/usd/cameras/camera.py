@@ -32,7 +32,7 @@ _TENTH = 0.1
 _MAX_WINDOW = 1e30
 """Largest coordinate of a camera's window on the plane z = -1."""
 
-_LEAST_OF_WINDOW = 2.0**-16
+_MIN_WINDOW = 2.0**-16
 """Smallest size of a camera's window relative to its largest coordinate: 128 float32 steps."""
 
 ALL_ROUND = (-math.pi, math.pi, -0.5 * math.pi, 0.5 * math.pi)
@@ -216,7 +216,7 @@ def _is_window(window: tuple[float, ...]) -> bool:
     """Returns whether float32 can represent the window to about one pixel."""
     x0, x1, y0, y1 = window
     largest, smallest = max(map(abs, window)), min(x1 - x0, y1 - y0)
-    return largest <= _MAX_WINDOW and smallest >= max(_LEAST_OF_WINDOW * largest, 1.0 / _MAX_WINDOW)
+    return largest <= _MAX_WINDOW and smallest >= max(_MIN_WINDOW * largest, 1.0 / _MAX_WINDOW)
 
 
 def _exposure_scale(camera: UsdGeom.Camera, time: Usd.TimeCode, report: LoadReport) -> float:

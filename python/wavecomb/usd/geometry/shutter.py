@@ -19,7 +19,7 @@ from wavecomb.usd.stage.time_codes import frame_number
 
 Matrices = NDArray[np.float64]
 
-MOST_STEPS = 64
+MAX_STEPS = 64
 """Most motion steps that the user may request."""
 
 _CHOICES = (2, 3, 4, 5, 8)
@@ -56,8 +56,8 @@ class Blur:
                     f"shutter {' '.join(map(str, shutter))}: must be two numbers, when it opens "
                     "and when it closes, in time codes from the frame"
                 )
-        if steps is not None and not 2 <= steps <= MOST_STEPS:
-            raise WavecombError(f"motion steps {steps}: must be from 2 to {MOST_STEPS}")
+        if steps is not None and not 2 <= steps <= MAX_STEPS:
+            raise WavecombError(f"motion steps {steps}: must be from 2 to {MAX_STEPS}")
         return cls(shutter, steps, not motion_blur)
 
 

@@ -152,7 +152,7 @@ class Skin:
         return xforms.GetLocalToWorldTransform(self.skeleton.GetPrim()) * inverse
 
 
-MOST_APART = 100_000
+MAX_SKINNED_INSTANCES = 100_000
 """Most instances that are read separately, since nested instancing can multiply them."""
 
 
@@ -204,8 +204,11 @@ class Skeletons:
         if not apart:
             return False
         self._apart += 1
-        if self._apart > MOST_APART:
-            what = f"more than {MOST_APART} skeletal instances: the rest use the first one's pose"
+        if self._apart > MAX_SKINNED_INSTANCES:
+            what = (
+                f"more than {MAX_SKINNED_INSTANCES} skeletal instances: the rest use the pose of "
+                "the first one"
+            )
             self.report.warn(what, instance.GetPath())
             return False
         return True

@@ -30,10 +30,10 @@ from wavecomb.usd.stage.report import LoadReport
 SPLATS = "ParticleField3DGaussianSplat"
 """Type name of Gaussian splat prims."""
 
-LEAST_SCALE, MOST_SCALE = 1e-9, 1e9
+MIN_SCALE, MAX_SCALE = 1e-9, 1e9
 """Range of scales that the core accepts."""
 
-_MOST_DEGREE = 3
+_MAX_DEGREE = 3
 _REACH = 3.0
 _SH = "radiance:sphericalHarmonics"
 
@@ -86,8 +86,8 @@ class SplatReader:
             sizes = np.einsum("ij,ij->i", turns, turns)
         bad = {
             "middles that are not finite or too far away": ~(np.abs(positions) < 1e18).all(1),
-            f"scales that are not from {LEAST_SCALE:g} to {MOST_SCALE:g}": ~(
-                (scales >= LEAST_SCALE) & (scales <= MOST_SCALE)
+            f"scales that are not from {MIN_SCALE:g} to {MAX_SCALE:g}": ~(
+                (scales >= MIN_SCALE) & (scales <= MAX_SCALE)
             ).all(1),
             "orientations of length zero or not finite": ~((sizes > 1e-20) & (sizes < 1e20)),
             "opacities that are negative or not finite": ~((opacities >= 0) & (opacities < np.inf)),
@@ -159,10 +159,10 @@ class SplatReader:
         if values is None:
             return np.zeros((count, 1, 3), np.float32)
         harmonics = values[:wanted].reshape(count, -1, 3)
-        if degree > _MOST_DEGREE:
-            what = f"spherical harmonics of splats above degree {_MOST_DEGREE}"
+        if degree > _MAX_DEGREE:
+            what = f"spherical harmonics of splats above degree {_MAX_DEGREE}"
             self.report.missing(what, prim.GetPath())
-        return _plain(harmonics[:, : (_MOST_DEGREE + 1) ** 2])
+        return _plain(harmonics[:, : (_MAX_DEGREE + 1) ** 2])
 
 
 def _plain(values: NDArray[Any]) -> Array:

@@ -320,7 +320,7 @@ def lay_out_points(count: int) -> Strands:
     return Strands("linear", "periodic", every, one, every, one, every, sizes)
 
 
-LEAST_SHARE = 1.0 / 256.0
+MIN_SHARE = 1.0 / 256.0
 """Smallest fraction of strands that is kept, however thin they are."""
 
 
@@ -357,7 +357,7 @@ class StrandDetail:
             matrix: Transform from the prim to the world.
         """
         share = np.clip(self._pixels(strands, points, widths, matrix) / self.target, 0.0, 1.0)
-        share = np.maximum(share, LEAST_SHARE)
+        share = np.maximum(share, MIN_SHARE)
         kept = hash_to_unit(strands.kept) < share
         if not kept.any():
             kept[np.argmax(share)] = True

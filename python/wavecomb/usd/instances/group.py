@@ -21,13 +21,13 @@ from wavecomb.usd.volumes.volume import Volume
 Matrices = NDArray[np.float64]
 T = TypeVar("T")
 
-MOST_STEPS = 64
+MAX_STEPS = 64
 """Most motion steps of an animated transform inside another animated one."""
 
 _MANY_BOXES = 1024
 """Number of boxes above which they are merged."""
 
-_MOST_SHOWN = 2048
+_MAX_SHOWN = 2048
 """Number of boxes that are kept separately."""
 
 
@@ -53,7 +53,7 @@ class AnimatedTransform:
             left = self.middle if inner is None else inner
             return AnimatedTransform(middle, left @ (outer.middle if outside is None else outside))
         segments = math.lcm(len(inner) - 1, len(outside) - 1)
-        if segments >= MOST_STEPS:
+        if segments >= MAX_STEPS:
             segments = max(len(inner), len(outside)) - 1
         count = segments + 1
         return AnimatedTransform(middle, _resampled(inner, count) @ _resampled(outside, count))
@@ -115,7 +115,7 @@ class Group:
     def grow(self, bounds: NDArray[Any]) -> None:
         """Extends the bounds by a box (2, 3)."""
         self.boxes.append(bounds)
-        if len(self.shown) < _MOST_SHOWN:
+        if len(self.shown) < _MAX_SHOWN:
             self.shown.append(bounds)
         whole = self.bounds if len(self.boxes) > _MANY_BOXES else None
         if whole is not None:
@@ -214,10 +214,10 @@ def _placed(
     return out[:limit]
 
 
-LEAST = 0.02
+MIN_IRRADIANCE = 0.02
 """Irradiance from which an object counts as lit: a hundredth of that from the default dome."""
 
-MOST = 2048
+MAX_SAMPLED_EMITTERS = 2048
 """Most objects and most emitters that are considered."""
 
 
@@ -237,14 +237,14 @@ def emitter_of(shape: MeshArrays, material: int, faces: NDArray[np.uint32] | Non
 
 
 def is_lit_by_emitters(world: Group, materials: MaterialTable) -> bool:
-    """Returns whether emitters light at least half of the objects with irradiance ``LEAST``.
+    """Returns whether emitters light at least half of the objects with ``MIN_IRRADIANCE``.
 
     Treats an emitter as a point light at its centre, at the distance of the object's centre but no
     closer than the object's radius. Ignores shadows and indirect light. The result does not depend
     on the camera or on the frame's samples, so that all frames of a shot and all tasks of a farm
     agree.
     """
-    boxes = np.array(world.shown[:MOST], np.float64)
+    boxes = np.array(world.shown[:MAX_SAMPLED_EMITTERS], np.float64)
     powers, centres = _emitter_powers(world, materials)
     if len(boxes) == 0 or len(powers) == 0:
         return False
@@ -253,7 +253,7 @@ def is_lit_by_emitters(world: Group, materials: MaterialTable) -> bool:
     apart = np.linalg.norm(middles[:, None] - centres[None], axis=2)
     distances = np.maximum(np.maximum(apart, sizes[:, None]), 1e-30)
     irradiance = (powers / (4.0 * math.pi * distances * distances)).sum(axis=1)
-    return bool((irradiance >= LEAST).mean() >= 0.5)
+    return bool((irradiance >= MIN_IRRADIANCE).mean() >= 0.5)
 
 
 def _emitter_powers(
@@ -262,7 +262,7 @@ def _emitter_powers(
     """Returns the power (n,) of each emitter and its centre (n, 3) in world space."""
     powers: list[float] = []
     centres: list[Any] = []
-    for emitter, place in placed_emitters(world, MOST):
+    for emitter, place in placed_emitters(world, MAX_SAMPLED_EMITTERS):
         radiance_area = sum(
             materials.mean_emission(material) * area for material, area in emitter.areas.items()
         )
@@ -273,14 +273,14 @@ def _emitter_powers(
     return np.array(powers, np.float64), np.array(centres, np.float64).reshape(-1, 3)
 
 
-_MOST_PLACED = 1 << 20
+_MAX_PLACED = 1 << 20
 """Most transforms of a group that are considered."""
 
 
 def placements(world: Group) -> dict[int, Matrices]:
     """Returns world transforms of groups with meshes to refine: id of a group -> (k, 4, 4).
 
-    Limits each group to ``_MOST_PLACED`` transforms, since nested instancing can multiply them.
+    Limits each group to ``_MAX_PLACED`` transforms, since nested instancing can multiply them.
     """
     order: list[Group] = []
     _append_in_order(world, set(), order)
@@ -288,11 +288,11 @@ def placements(world: Group) -> dict[int, Matrices]:
     for group in reversed(order):
         placed = found[id(group)]
         for child, transforms in group.surfaced:
-            some = transforms[: max(1, _MOST_PLACED // len(placed))]
+            some = transforms[: max(1, _MAX_PLACED // len(placed))]
             every = (some[:, None] @ placed[None]).reshape(-1, 4, 4)
             known = found.get(id(child))
             both = every if known is None else np.concatenate([known, every])
-            found[id(child)] = both[:_MOST_PLACED]
+            found[id(child)] = both[:_MAX_PLACED]
     return found
 
 

@@ -16,9 +16,9 @@ from wavecomb.usd.stage.context import LoadContext
 
 Floats = NDArray[np.float64]
 
-MOST_BYTES = 1 << 26
+MAX_BYTES = 1 << 26
 """Largest size of a profile in bytes."""
-_MOST_VALUES = 1 << 24
+_MAX_VALUES = 1 << 24
 _WORDS = re.compile(r"[^\s,]+")
 _TYPES = {1: "C", 2: "B", 3: "A"}
 
@@ -67,7 +67,7 @@ def parse_ies(text: str) -> IesProfile:
     if kind is None:
         raise IesError("its photometric type is not 1, 2 or 3")
     _, _, _, _, ballast, lamp, _ = _take(numbers, 7, "head")
-    if rows * columns > _MOST_VALUES:
+    if rows * columns > _MAX_VALUES:
         raise IesError(f"it declares {rows} x {columns} values")
     vertical = _ascending(_take(numbers, rows, "vertical angles"), "vertical")
     horizontal = _ascending(_take(numbers, columns, "horizontal angles"), "horizontal")
@@ -104,7 +104,7 @@ def _take(numbers: Iterator[float], n: int, what: str) -> Floats:
 
 def _count(numbers: Iterator[float], what: str) -> int:
     n = _take(numbers, 1, "head")[0]
-    if not 0 < n <= _MOST_VALUES or n != int(n):
+    if not 0 < n <= _MAX_VALUES or n != int(n):
         raise IesError(f"it declares {n:g} {what}")
     return int(n)
 
@@ -222,10 +222,10 @@ class IesTable:
         try:
             if not os.path.isfile(path) and os.path.exists(path):
                 raise IesError("it is not a regular file")
-            if os.path.getsize(path) > MOST_BYTES:
+            if os.path.getsize(path) > MAX_BYTES:
                 raise IesError("it is too large")
             with open(path, encoding="latin-1") as file:
-                profile = parse_ies(file.read(MOST_BYTES))
+                profile = parse_ies(file.read(MAX_BYTES))
         except IesError as error:
             return error
         except (OSError, ValueError, MemoryError) as error:

@@ -44,7 +44,7 @@ DEFAULT_COLOUR = (0.5, 0.5, 0.5)
 PREVIEW = "preview"
 """Result of ``surface_source`` for UsdPreviewSurface."""
 
-LEAST_EMISSION = 1.0
+MIN_EMISSION = 1.0
 """Emission from which a material counts as a light; then a stage without lights gets no dome."""
 
 _INSTEAD = "displayColor in its place"
@@ -139,7 +139,7 @@ class MaterialTable:
         self._varied: dict[tuple[int, tuple[str, ...]], tuple[Surface, Surface]] = {}
         self._plain: dict[tuple[Any, ...], int] = {}
         self.emits = False
-        """Whether a material in use emits ``LEAST_EMISSION`` or more, like a light."""
+        """Whether a material in use emits ``MIN_EMISSION`` or more, like a light."""
         self._emitting: set[int] = set()
         self._emission: dict[int, tuple[Surface, float]] = {}
         self.scattering_interiors: list[str] = []
@@ -206,7 +206,7 @@ class MaterialTable:
         if brightest > 0:
             self._emitting.add(number)
             self._emission[number] = (surface, brightest)
-            self.emits = self.emits or brightest >= LEAST_EMISSION
+            self.emits = self.emits or brightest >= MIN_EMISSION
         return number
 
     def varied(self, surface: Surface, varying: tuple[str, ...]) -> Surface:
@@ -235,7 +235,7 @@ class MaterialTable:
         if number is None:
             brightest = surface.brightest()
             parameters = self._in_working_space(surface.parameters)
-            self.emits = self.emits or brightest >= LEAST_EMISSION
+            self.emits = self.emits or brightest >= MIN_EMISSION
             number = self._builder.add_material(
                 surface.program,
                 name=surface.name,
@@ -303,7 +303,7 @@ class MaterialTable:
         Textures contribute the mean of their files, primvars their highest value.
         """
         surface, highest = self._emission.get(material, (None, 0.0))
-        if surface is None or max(highest, surface.brightest()) < LEAST_EMISSION:
+        if surface is None or max(highest, surface.brightest()) < MIN_EMISSION:
             return 0.0
         rgb = mean_emission(surface, self._textures)
         return max(float(rgb @ np.array(LUMINANCE)), highest)

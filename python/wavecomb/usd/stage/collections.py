@@ -11,7 +11,7 @@ from wavecomb.usd.stage.report import LoadReport
 Rules = dict[str, str]
 """Rule for each path: exclude, explicit (only that path) or expand (the path and all below it)."""
 
-MOST_PRIMS = 1 << 20
+MAX_PRIMS = 1 << 20
 """Most prims at which an expression is evaluated; nested instancing may create billions."""
 
 _RULES = {
@@ -70,7 +70,7 @@ class Collections:
         if expression not in self._by_expression:
             rules, is_whole = _evaluated(collection.GetPrim().GetStage(), query)
             if not is_whole:
-                what = f"membershipExpression beyond {MOST_PRIMS} prims (cut there)"
+                what = f"membershipExpression beyond {MAX_PRIMS} prims (cut there)"
                 self._report.missing(what, collection.GetPath())
             self._by_expression[expression] = rules
         return self._by_expression[expression]
@@ -117,7 +117,7 @@ def _evaluated(
     prims = Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
     walk = iter(prims)
     for count, prim in enumerate(walk):
-        if count >= MOST_PRIMS:
+        if count >= MAX_PRIMS:
             return rules, False
         # Materials are never members.
         if prim.IsA(UsdShade.NodeGraph):

@@ -11,7 +11,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.run.isolation import memory, time_limit
 from wavecomb.usd.materials.assignment import DrawItem
 
-LEAST_BYTES = 20
+MIN_BYTES = 20
 """Least memory per mesh point in bytes: half a triangle of 12 bytes plus about 32 bytes in the
 
 acceleration structure.
@@ -41,7 +41,7 @@ class MemoryCheck:
         for draw in draws:
             if draw.kind == "mesh":
                 points += len(draw.prim.GetAttribute("points").Get(self.time) or ())
-        needed, there = points * LEAST_BYTES, memory.available_bytes()
+        needed, there = points * MIN_BYTES, memory.available_bytes()
         if needed > there:
             raise WavecombError(
                 f"{self.file}: meshes of {points:,} points need at least "

@@ -24,7 +24,7 @@ from wavecomb.usd.volumes.optical_properties import BLACK, Colour, OpticalProper
 GLOW = 1e-4
 """Emission times size from which a volume counts as a light."""
 
-_MOST_ANISOTROPY = 0.999
+_MAX_ANISOTROPY = 0.999
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ class VolumeReader:
         return (r, g, b)
 
     def _anisotropy(self, properties: OpticalProperties, prim: Usd.Prim) -> float:
-        limited = min(max(properties.anisotropy, -_MOST_ANISOTROPY), _MOST_ANISOTROPY)
+        limited = min(max(properties.anisotropy, -_MAX_ANISOTROPY), _MAX_ANISOTROPY)
         if limited != properties.anisotropy:
             what = f"anisotropy {properties.anisotropy:g} of a volume: {limited:g} used"
             self._report.warn(what, properties.name or prim.GetPath())
