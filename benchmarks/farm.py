@@ -82,7 +82,7 @@ def small_tasks(stage: Path, workers: int, count: int) -> dict[str, float]:
             if (done >= workers and not started) or (done == len(tasks) and len(started) == 1):
                 started.append((time.perf_counter(), done))
 
-        where = client.Where("local", workers)
+        where = client.ClusterSpec("local", workers)
         client.run(jobs[1], where, threads=1, show=show)
         (begin, first), (end, last) = started
         found["wall_ms"] = 1e3 * (end - begin) / (last - first)

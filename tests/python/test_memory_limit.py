@@ -144,7 +144,7 @@ def test_the_machine_s_limit_is_that_of_its_group(
 
 
 def test_a_damaged_value_is_not_taken_for_a_bomb(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(memory.trail, "is_expendable", lambda: True)
+    monkeypatch.setattr(memory.progress_notes, "is_expendable", lambda: True)
     monkeypatch.setattr(resource, "getrlimit", lambda _: (10**10, 10**10))
     error = ValueError("exception thrown unpacking a value, returning an empty VtValue")
     assert not memory.is_exhausted(error, lambda: 100_000)
@@ -164,6 +164,6 @@ def test_meshes_that_cannot_fit_are_told_before_they_are_read(
     stage.Save()
     file = tmp_path / "large.usdc"
     wavecomb.load(file)
-    monkeypatch.setattr(memory, "room", lambda: 1_000_000)
+    monkeypatch.setattr(memory, "available_bytes", lambda: 1_000_000)
     with pytest.raises(WavecombError, match=r"large.usdc: .*100,000 points .* 2 MB where 1 MB"):
         wavecomb.load(file)

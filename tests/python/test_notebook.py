@@ -167,7 +167,7 @@ def test_widgets_are_taken_where_they_are(
     monkeypatch.setitem(sys.modules, "ipywidgets", widgets)
     monkeypatch.setattr(sys.modules["IPython.display"], "display", lambda what: None)
     view = live_view.make_view()
-    assert isinstance(view, live_view.Widgets)
+    assert isinstance(view, live_view.WidgetView)
     view.bar(0.25, "25 %")
     view.picture(b"png")
     bar, text, image, _, everything = made

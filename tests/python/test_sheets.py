@@ -18,7 +18,7 @@ from wavecomb.cli import main
 from wavecomb.image.compare.folders import pair_up
 from wavecomb.image.files.collection import collect, pictures_of
 from wavecomb.image.files.image import display, read_codes, write_exr, write_png
-from wavecomb.image.thumbnails import Look, contact_sheet, fitted, wipe
+from wavecomb.image.thumbnails import DisplayOptions, contact_sheet, fitted, wipe
 from wavecomb.run.frame_names import matching
 
 RED, GREEN, BLUE = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
@@ -99,13 +99,13 @@ def test_contact_sheet_has_each_picture_in_its_place(frames: Path, tmp_path: Pat
 
 def test_sheet_is_as_the_layer_is_shown(frames: Path) -> None:
     files = {"a": str(frames / "shot.0008.exr")}
-    plain = contact_sheet(files, Look(), width=48)
-    dark = contact_sheet(files, Look(exposure=-1.0), width=48)
+    plain = contact_sheet(files, DisplayOptions(), width=48)
+    dark = contact_sheet(files, DisplayOptions(exposure=-1.0), width=48)
     assert plain[20, 20].tolist() == [255, 0, 0] and dark[20, 20].tolist() == [188, 0, 0]
-    depth = contact_sheet(files, Look("depth"), width=48)
+    depth = contact_sheet(files, DisplayOptions("depth"), width=48)
     assert len(set(depth[20, 20].tolist())) > 1  # false colours
     with pytest.raises(Exception, match="has no layer normal; there are beauty, depth"):
-        contact_sheet(files, Look("normal"), width=48)
+        contact_sheet(files, DisplayOptions("normal"), width=48)
 
 
 def test_pictures_are_made_smaller_in_linear_light() -> None:
