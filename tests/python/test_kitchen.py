@@ -74,7 +74,8 @@ def test_most_materials_are_glossy_and_all_are_worn(kitchen: Usd.Stage) -> None:
     assert not unworn
     glossy = [
         name for name in worn
-        if "roughness" in MATERIALS[name].textures or float(MATERIALS[name].inputs["roughness"]) <= 0.46
+        if "roughness" in MATERIALS[name].textures
+        or float(MATERIALS[name].inputs["roughness"]) <= 0.46
     ]  # fmt: skip
     assert len(glossy) >= 25
 
