@@ -20,7 +20,7 @@ from parts import needs
 import wavecomb
 from wavecomb import window
 from wavecomb.errors import WavecombError
-from wavecomb.image.embedded import encoded, smaller
+from wavecomb.image.embedded import encode_image, shrink
 from wavecomb.image.files.image import display, read_codes
 from wavecomb.image.rendered import Picture
 from wavecomb.run import live_view
@@ -85,16 +85,16 @@ def test_it_says_what_it_is_in_a_line() -> None:
 def test_large_pictures_are_made_smaller() -> None:
     wide = np.zeros((10, 4001, 3), np.float32)
     wide[:, ::2] = 2.0
-    small = smaller(wide, 1600)
+    small = shrink(wide, 1600)
     assert small.shape == (3, 1333, 3)
     assert small.mean() == pytest.approx(1.0, rel=1e-3)
-    assert smaller(wide[:, :100], 1600).shape == (10, 100, 3)
-    assert smaller(np.ones((1, 5000, 3)), 100).shape == (1, 100, 3)
+    assert shrink(wide[:, :100], 1600).shape == (10, 100, 3)
+    assert shrink(np.ones((1, 5000, 3)), 100).shape == (1, 100, 3)
 
 
 def test_jpeg_is_close_and_small() -> None:
     codes = np.tile(np.linspace(0, 255, 256).astype(np.uint8)[None, :, None], (64, 1, 3))
-    jpeg = encoded(codes, "jpeg")
+    jpeg = encode_image(codes, "jpeg")
     assert jpeg[:2] == b"\xff\xd8" and len(jpeg) < codes.size / 8
 
 

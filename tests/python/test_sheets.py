@@ -18,7 +18,7 @@ from wavecomb.cli import main
 from wavecomb.image.compare.folders import pair_up
 from wavecomb.image.files.collection import collect, pictures_of
 from wavecomb.image.files.image import display, read_codes, write_exr, write_png
-from wavecomb.image.thumbnails import DisplayOptions, contact_sheet, fitted, wipe
+from wavecomb.image.thumbnails import DisplayOptions, contact_sheet, fit_image, wipe
 from wavecomb.run.frame_names import matching
 
 RED, GREEN, BLUE = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
@@ -111,10 +111,10 @@ def test_sheet_is_as_the_layer_is_shown(frames: Path) -> None:
 def test_pictures_are_made_smaller_in_linear_light() -> None:
     stripes = np.zeros((40, 80, 3), np.uint8)
     stripes[:, ::2] = 255
-    small = fitted(stripes, 20, 100)
+    small = fit_image(stripes, 20, 100)
     assert small.shape == (10, 20, 3)
     assert abs(int(small[5, 10, 0]) - 188) <= 2  # half of the linear light
-    assert fitted(stripes, 100, 100) is stripes
+    assert fit_image(stripes, 100, 100) is stripes
 
 
 def test_page_holds_all_pictures_and_fetches_nothing(frames: Path, tmp_path: Path) -> None:

@@ -673,7 +673,7 @@ def test_cages_go_as_soon_as_they_are_refined(tmp_path, monkeypatch):
     int[] faceVertexIndices = [0,1,2,3]
 """
     cages, alive = [], []
-    add, refine = subdivision.Surfaces.add, subdivision.Surfaces._refine
+    add, refine = subdivision.SubdivisionSurfaces.add, subdivision.SubdivisionSurfaces._refine
 
     def noted_add(self, group, number, draw, mesh, worn):
         cages.append(weakref.ref(mesh.cage))
@@ -683,8 +683,8 @@ def test_cages_go_as_soon_as_they_are_refined(tmp_path, monkeypatch):
         alive.append(sum(cage() is not None for cage in cages))
         refine(self, batch)
 
-    monkeypatch.setattr(subdivision.Surfaces, "add", noted_add)
-    monkeypatch.setattr(subdivision.Surfaces, "_refine", noted_refine)
+    monkeypatch.setattr(subdivision.SubdivisionSurfaces, "add", noted_add)
+    monkeypatch.setattr(subdivision.SubdivisionSurfaces, "_refine", noted_refine)
     monkeypatch.setattr(subdivision, "_BATCH_TRIANGLES", 1)
     text = "".join(f'def Mesh "M{k}" {{ {body} }}\n' for k in range(4))
     load(tmp_path, text, subdivision=1)

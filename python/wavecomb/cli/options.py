@@ -14,7 +14,7 @@ from wavecomb.load_options import Row, given, rows
 
 if TYPE_CHECKING:
     from wavecomb.usd import LoadedStage
-    from wavecomb.usd.render_settings.values import RenderChoice
+    from wavecomb.usd.render_settings.values import ProductSettings
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -214,7 +214,7 @@ class StageOptions:
         options.pop("frame", None)
         return options if size is None else {**options, "size": size}
 
-    def peek(self, stage: str) -> tuple[list[RenderChoice], Any]:
+    def peek(self, stage: str) -> tuple[list[ProductSettings], Any]:
         """Reads the stage's render settings.
 
         Returns:

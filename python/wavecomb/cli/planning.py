@@ -23,9 +23,9 @@ from wavecomb.run.guiding_file import BEFORE, ENDING, Learning, check_trains_fie
 
 if TYPE_CHECKING:
     from wavecomb.run.checkpoint import Checkpoint
-    from wavecomb.usd.render_settings.values import RenderChoice
+    from wavecomb.usd.render_settings.values import ProductSettings
 
-Peek = Callable[[StageOptions, str], "tuple[list[RenderChoice], Any]"]
+Peek = Callable[[StageOptions, str], "tuple[list[ProductSettings], Any]"]
 """Type of ``StageOptions.peek``: reads the render settings of a stage."""
 
 

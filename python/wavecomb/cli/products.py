@@ -19,14 +19,14 @@ from wavecomb.run.expressions import layer_of
 
 if TYPE_CHECKING:
     from wavecomb.run.sequence import Frames
-    from wavecomb.usd.render_settings.values import RenderChoice
+    from wavecomb.usd.render_settings.values import ProductSettings
 
 
 @dataclass(frozen=True)
 class Plan:
     """One render product, with the choices of the stage and its output files."""
 
-    choice: RenderChoice
+    choice: ProductSettings
     names: Names
     folder: str | None = None
     """Folder that the image must stay in if the stage chose its name; None if the user did."""
@@ -105,7 +105,7 @@ class Plan:
 
 
 def plan_products(
-    choices: Sequence[RenderChoice],
+    choices: Sequence[ProductSettings],
     output: str | None,
     beside: Names,
     purpose: PurposeOptions,

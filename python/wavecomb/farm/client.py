@@ -20,7 +20,7 @@ from wavecomb.farm.machine_class import PREFIX
 from wavecomb.farm.tile_file import has_tile
 
 _TURN_S = 0.2
-_LOOK_S = 1.0
+_QUERY_S = 1.0
 """Time between queries of the list of workers, in seconds."""
 _BATCH_S = 0.5
 """Time that a batch of small tiles should take, in seconds."""
@@ -70,7 +70,7 @@ class Run:
         self._seconds = 0.0
         self._warned: set[str] = set()
         self._workers: dict[str, Any] = {}
-        self._next_look = 0.0
+        self._next_query = 0.0
         self._progressed = False
         self._alone_since: float | None = None
         self._next_retry = 0.0
@@ -120,15 +120,15 @@ class Run:
             if until is not None and time.monotonic() > until:
                 raise WavecombError(f"{self._cluster.what}: no workers came in {limit:.0f} s")
             self._cluster.check(False)
-            self._look(0.0)
+            self._query_workers(0.0)
             time.sleep(_TURN_S)
         return True
 
-    def _look(self, every: float = _LOOK_S) -> None:
+    def _query_workers(self, every: float = _QUERY_S) -> None:
         """Queries the scheduler for its workers, at most every ``every`` seconds."""
-        if time.monotonic() < self._next_look:
+        if time.monotonic() < self._next_query:
             return
-        self._next_look = time.monotonic() + every
+        self._next_query = time.monotonic() + every
         info = self._cluster.client.scheduler_info(n_workers=-1)
         self._workers = {} if info is None else dict(info.get("workers", {}))
 
@@ -150,7 +150,7 @@ class Run:
         """Chooses the machine class of this run: most finished tiles first, then most workers."""
         # lets workers that start together all register
         time.sleep(_TURN_S if self._cluster.wait_s else 0.0)
-        self._look(0.0)
+        self._query_workers(0.0)
         found = self._classes()
         parts = dict.fromkeys(found, 0)
         if len(found) > 1:
@@ -177,7 +177,7 @@ class Run:
                 self._out.stopped = True
                 client.cancel(list(self._flying), reason="wavecomb farm was stopped")
                 return
-            self._look()
+            self._query_workers()
             while len(self._flying) < self._capacity() and self._submit():
                 pass
             try:
@@ -344,7 +344,7 @@ class Run:
     def _leave_out(self, worker: str, why: str) -> None:
         """Withdraws queued tasks from a worker whose disk is full."""
         self._full = why
-        self._next_look = 0.0
+        self._next_query = 0.0
         client = self._cluster.client
         held = set(client.processing(workers=[worker]).get(worker, ()))
         for future in [one for one in self._flying if one.key in held]:

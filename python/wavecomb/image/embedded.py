@@ -21,7 +21,7 @@ P = TypeVar("P", bound=np.generic)
 _QUALITY = "jpeg:90"
 
 
-def encoded(codes: NDArray[np.uint8], kind: Kind = "png") -> bytes:
+def encode_image(codes: NDArray[np.uint8], kind: Kind = "png") -> bytes:
     """Encodes 8-bit sRGB codes (height, width, 3) as the bytes of an image file.
 
     Args:
@@ -50,17 +50,17 @@ def base64_text(data: bytes) -> str:
 
 def data_uri(codes: NDArray[np.uint8], kind: Kind = "png") -> str:
     """Encodes an image as a data URI."""
-    return f"data:image/{kind};base64,{base64_text(encoded(codes, kind))}"
+    return f"data:image/{kind};base64,{base64_text(encode_image(codes, kind))}"
 
 
-def smaller(pixels: NDArray[Any], most: int) -> NDArray[np.float32]:
+def shrink(pixels: NDArray[Any], most: int) -> NDArray[np.float32]:
     """Reduces an image to at most ``most`` pixels per edge by averaging square blocks.
 
     Args:
         pixels: Linear (height, width, channels).
         most: Largest length of the longer edge in pixels.
 
-    >>> smaller(np.ones((100, 50, 3)), 40).shape
+    >>> shrink(np.ones((100, 50, 3)), 40).shape
     (33, 16, 3)
     """
     step = max(1, -(-max(pixels.shape[:2]) // most))

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.image.embedded import base64_text, data_uri, encoded, smaller, subsample
+from wavecomb.image.embedded import base64_text, data_uri, encode_image, shrink, subsample
 from wavecomb.image.files.image import display
 from wavecomb.image.layer_view import is_light, show_layer
 
@@ -51,7 +51,7 @@ class Rendered(Protocol):
 
 def codes(picture: Rendered) -> NDArray[np.uint8]:
     """Returns the image as 8-bit sRGB codes, with the tone mapping "neutral"."""
-    return display(smaller(picture.shown(), MAX_EDGE), tone_map="neutral")
+    return display(shrink(picture.shown(), MAX_EDGE), tone_map="neutral")
 
 
 def mime_bundle(
@@ -68,7 +68,7 @@ def mime_bundle(
     """
     made = {
         "text/html": lambda: page(picture),
-        "image/png": lambda: base64_text(encoded(codes(picture))),
+        "image/png": lambda: base64_text(encode_image(codes(picture))),
         "text/plain": lambda: repr(picture),
     }
     wanted = [kind for kind in made if include is None or kind in include]
@@ -104,7 +104,7 @@ def page(picture: Rendered) -> str:
 def _layer(name: str, array: NDArray[Any]) -> str:
     values = np.asarray(array)
     if is_light(name):
-        small, legend = display(smaller(values, LAYER_EDGE), tone_map="neutral"), None
+        small, legend = display(shrink(values, LAYER_EDGE), tone_map="neutral"), None
     else:
         shown = show_layer(subsample(values, LAYER_EDGE), name)
         small, legend = shown.pixels, shown.legend

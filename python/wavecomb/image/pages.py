@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.image.embedded import Kind, data_uri
-from wavecomb.image.thumbnails import DisplayOptions, fitted
+from wavecomb.image.thumbnails import DisplayOptions, fit_image
 
 MAX_FRAMES = 1000
 """Most images of a page."""
@@ -73,7 +73,7 @@ def sequence_page(
     for name, file in pictures.items():
         codes = look.codes(file)
         size = size or f"{codes.shape[1]} x {codes.shape[0]}"
-        shown = fitted(codes, width, 4 * width)
+        shown = fit_image(codes, width, 4 * width)
         cells.append(f"<li>{_image(shown, name, kind)}{escape(name)}</li>")
     speeds = "".join(
         f"<option{' selected' if one == fps else ''}>{one:g}</option>"

@@ -229,10 +229,10 @@ class Picture:
 
     def _repr_png_(self) -> bytes:
         """Returns the image for a notebook, with highlights rolled off towards white."""
-        from wavecomb.image.embedded import encoded
+        from wavecomb.image.embedded import encode_image
         from wavecomb.image.notebook import codes
 
-        return encoded(codes(self))
+        return encode_image(codes(self))
 
     def _repr_mimebundle_(
         self, include: Collection[str] | None = None, exclude: Collection[str] | None = None

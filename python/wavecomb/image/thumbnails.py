@@ -70,7 +70,7 @@ class DisplayOptions:
         return display(pixels, exposure=self.exposure, tone_map=self.tone_map)
 
 
-def fitted(codes: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
+def fit_image(codes: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
     """Reduces an image in linear light to fit into a rectangle; never enlarges it.
 
     Args:
@@ -129,7 +129,7 @@ def contact_sheet(
         OSError: A file cannot be read.
     """
     names = list(pictures)
-    small = [fitted(look.codes(file), width, 4 * width) for file in pictures.values()]
+    small = [fit_image(look.codes(file), width, 4 * width) for file in pictures.values()]
     high = max(one.shape[0] for one in small)
     columns = min(columns or _columns(len(small), width, high), len(small))
     rows = -(-len(small) // columns)

@@ -16,7 +16,7 @@ from wavecomb.usd import mtlx
 from wavecomb.usd.cameras.camera import camera_motion, read_camera
 from wavecomb.usd.geometry.shutter import find_motion
 from wavecomb.usd.layers.opening import open_stage
-from wavecomb.usd.render_settings.values import RenderChoice
+from wavecomb.usd.render_settings.values import ProductSettings
 from wavecomb.usd.render_settings.view import check_view, view_settings
 from wavecomb.usd.stage.diagnostics import capture_diagnostics
 from wavecomb.usd.stage.frame_cache import FrameCache
@@ -46,7 +46,7 @@ class CameraUpdate:
     camera: dict[str, Any] | None
     camera_path: str | None
     shutter: tuple[float, float] | None
-    render: RenderChoice
+    render: ProductSettings
     frame: float | None
 
     def as_dict(self) -> dict[str, Any]:

@@ -181,9 +181,9 @@ class LivePicture(Sink):
         """Shows the image unless the render has finished, since the final image follows."""
         if snapshot.finished:
             return
-        from wavecomb.image.embedded import encoded, smaller
+        from wavecomb.image.embedded import encode_image, shrink
         from wavecomb.image.files.image import display
         from wavecomb.image.working_space import to_rec709
 
-        small = to_rec709(smaller(snapshot.beauty(), PICTURE_EDGE), self._working)
-        self._view.picture(encoded(display(small, tone_map="neutral")))
+        small = to_rec709(shrink(snapshot.beauty(), PICTURE_EDGE), self._working)
+        self._view.picture(encode_image(display(small, tone_map="neutral")))

@@ -16,7 +16,7 @@ from wavecomb.bench.figures.forest import difference_figure
 from wavecomb.bench.figures.style import CaptionedFigure
 from wavecomb.bench.reports.parts import Viewer, key_of
 from wavecomb.errors import WavecombError
-from wavecomb.image.embedded import data_uri, smaller
+from wavecomb.image.embedded import data_uri, shrink
 from wavecomb.image.files.image import display, read_image
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ def viewer(shot: Shot) -> Viewer | None:
     entries = [(kept.name, kept.pixels) for kept in shot.kept]
     if shot.golden is not None:
         entries.append(("golden (converged)", shot.golden))
-    images = [(name, data_uri(display(smaller(pixels, LARGEST)))) for name, pixels in entries]
+    images = [(name, data_uri(display(shrink(pixels, LARGEST)))) for name, pixels in entries]
     return Viewer(shot.stage, images) if len(images) > 1 else None
 
 

@@ -14,7 +14,7 @@ from wavecomb.image.compare.heatmap import Kind, heat_map
 from wavecomb.image.files.collection import is_many, pictures_of
 from wavecomb.image.files.image import display
 from wavecomb.image.pages import Cell, Pair, document, figure_text, pair_section, table
-from wavecomb.image.thumbnails import DisplayOptions, fitted
+from wavecomb.image.thumbnails import DisplayOptions, fit_image
 
 
 @dataclass(frozen=True)
@@ -163,12 +163,12 @@ def _rmse(one: PairResult) -> float:
 
 
 def _pair(one: PairResult, look: DisplayOptions, kind: Kind, width: int) -> Pair:
-    a, b = (fitted(look.codes(file), width, 4 * width) for file in (one.a, one.b))
+    a, b = (fit_image(look.codes(file), width, 4 * width) for file in (one.a, one.b))
     assert one.result is not None
     difference = None
     if not one.result.equal:
         made = heat_map(one.a, one.b, kind, exposure=look.exposure)
-        difference = fitted(display(made), max(width, a.shape[1]), 8 * width)
+        difference = fit_image(display(made), max(width, a.shape[1]), 8 * width)
     return Pair(one.name, _facts(one.result), a, b, difference)
 
 

@@ -16,7 +16,7 @@ from wavecomb.usd.geometry.nurbs_patch import PatchReader
 from wavecomb.usd.geometry.skeleton import Skeletons, deforms
 from wavecomb.usd.geometry.splats import PointReader, SplatArrays, SplatReader
 from wavecomb.usd.geometry.strands import StrandDetail
-from wavecomb.usd.geometry.subdivision import Surfaces
+from wavecomb.usd.geometry.subdivision import SubdivisionSurfaces
 from wavecomb.usd.geometry.triangulate import MeshError
 from wavecomb.usd.materials.assignment import DrawItem
 from wavecomb.usd.stage.context import LoadContext
@@ -45,7 +45,7 @@ class GprimReader:
     def __init__(
         self,
         context: LoadContext,
-        surfaces: Surfaces,
+        surfaces: SubdivisionSurfaces,
         skeletons: Skeletons,
         cache: MeshCache | None = None,
     ) -> None:

@@ -71,7 +71,7 @@ def parse_level(text: str | int) -> str | int:
 
 
 @dataclass
-class Surface:
+class SubdivisionSurface:
     """A mesh to be refined.
 
     Attributes:
@@ -107,7 +107,7 @@ class Surface:
         return 1 if self.moves and self.cage.scheme != "none" else 0
 
 
-class Surfaces:
+class SubdivisionSurfaces:
     """The subdivision surfaces and displaced meshes of a stage."""
 
     def __init__(self, context: LoadContext, materials: MaterialTable) -> None:
@@ -116,7 +116,7 @@ class Surfaces:
         self.size, self.threads = context.options.size, context.options.threads
         self.materials = materials
         self.cache: RefinedCache | None = None
-        self._all: list[Surface] = []
+        self._all: list[SubdivisionSurface] = []
 
     @property
     def subdivide(self) -> bool:
@@ -144,7 +144,7 @@ class Surfaces:
         cage = mesh.cage
         if cage is None:
             return
-        surface = Surface(number, draw, cage, mesh.bounds, materials, group)
+        surface = SubdivisionSurface(number, draw, cage, mesh.bounds, materials, group)
         self._displacements(surface)
         if surface.moves or (cage.scheme != "none" and self.choice != 0):
             group.has_surfaces = True
@@ -171,7 +171,7 @@ class Surfaces:
         points = [one["positions"] for one in made if not isinstance(one, str)]
         return np.concatenate(points) if points else None
 
-    def _displacements(self, surface: Surface) -> None:
+    def _displacements(self, surface: SubdivisionSurface) -> None:
         """Finds the displacement of each face."""
         draw, count = surface.draw, len(surface.cage.counts)
         which = np.full(count, -1, np.int32)
@@ -215,9 +215,9 @@ class Surfaces:
             text = ", ".join(f"{count} at level {level}" for level, count in sorted(levels.items()))
             self.report.note(f"subdivision meshes refined: {text}")
 
-    def _next_batch(self, waiting: deque[Surface]) -> list[Surface]:
+    def _next_batch(self, waiting: deque[SubdivisionSurface]) -> list[SubdivisionSurface]:
         """Removes the next batch of meshes to refine together."""
-        batch: list[Surface] = []
+        batch: list[SubdivisionSurface] = []
         triangles = 0
         while waiting and triangles < _BATCH_TRIANGLES:
             batch.append(waiting.popleft())
@@ -270,7 +270,7 @@ class Surfaces:
             surface.level = min(max(level, surface.lowest), AUTO_LEVEL)
         self._keep_in_memory(chosen)
 
-    def _keep_in_memory(self, chosen: list[Surface]) -> None:
+    def _keep_in_memory(self, chosen: list[SubdivisionSurface]) -> None:
         """Lowers the levels of the largest meshes until all fit in ``AUTO_TRIANGLES``."""
         counts = [s.cage.triangles_at(s.level) for s in chosen]
         total = sum(counts)
@@ -290,7 +290,7 @@ class Surfaces:
         for i in sorted(lowered):
             self.report.note(what, chosen[i].draw.prim.GetPath())
 
-    def _refine(self, batch: list[Surface]) -> None:
+    def _refine(self, batch: list[SubdivisionSurface]) -> None:
         """Refines meshes in parallel and replaces the polygons that represent them."""
         fresh = []
         for surface in batch:
@@ -314,19 +314,19 @@ class Surfaces:
                 self.cache.put(surface.cage, surface.level, refined)
             self._take(surface, refined)
 
-    def _cached(self, surface: Surface) -> dict[str, Any] | None:
+    def _cached(self, surface: SubdivisionSurface) -> dict[str, Any] | None:
         """Returns the previous frame's refined mesh if it is still valid."""
         if self.cache is None or not surface.is_plain:
             return None
         return self.cache.get(surface.cage, surface.level)
 
-    def _take(self, surface: Surface, refined: dict[str, Any]) -> None:
+    def _take(self, surface: SubdivisionSurface, refined: dict[str, Any]) -> None:
         if not refined["manifold"]:
             what = "subdivision mesh with edges or points that are not manifold: sharp there"
             self.report.warn(what, surface.draw.prim.GetPath())
         self._replace(surface, refined)
 
-    def _describe(self, surface: Surface) -> dict[str, Any]:
+    def _describe(self, surface: SubdivisionSurface) -> dict[str, Any]:
         """Returns the description that ``SceneBuilder.make_surfaces`` takes."""
         cage = surface.cage
         out: dict[str, Any] = {
@@ -367,7 +367,7 @@ class Surfaces:
             out["uvs"] = {"interpolation": kind, "values": values}
         return out
 
-    def _replace(self, surface: Surface, refined: dict[str, Any]) -> None:
+    def _replace(self, surface: SubdivisionSurface, refined: dict[str, Any]) -> None:
         materials, faces, normals = surface.materials, None, refined["normals"]
         if materials.by_face is not None:
             faces = materials.by_face[refined["faces"]]

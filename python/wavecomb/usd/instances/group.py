@@ -85,7 +85,7 @@ class Group:
         volumes: Volumes with their transforms (4, 4) in group space.
         children: Instanced groups that contain lights, volumes or emitters, with their transforms.
         surfaced: Instanced groups that contain meshes to be refined, with their transforms.
-        holds_placed: Whether it or its child groups contain lights, volumes or emitters.
+        has_lights_or_volumes: Whether it or its child groups contain lights, volumes or emitters.
         sampled_light: Path of a mesh light in it that must not move.
         emitters: Emissive meshes in it; only collected for stages without lights.
         shown: The first boxes, which are never merged.
@@ -99,7 +99,7 @@ class Group:
     volumes: list[tuple[Volume, Matrices]] = field(default_factory=list)
     children: list[tuple[Group, list[AnimatedTransform]]] = field(default_factory=list)
     surfaced: list[tuple[Group, Matrices]] = field(default_factory=list)
-    holds_placed: bool = False
+    has_lights_or_volumes: bool = False
     has_surfaces: bool = False
     sampled_light: Sdf.Path | None = None
     outlines: list[NDArray[np.float64]] = field(default_factory=list)

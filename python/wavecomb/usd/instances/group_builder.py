@@ -15,7 +15,7 @@ from wavecomb.usd.geometry.curves import CurveArrays, uniform_scale
 from wavecomb.usd.geometry.gprims import COUNTS, WORDS, GprimReader, add_shape
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY, UV_NAMES, MeshArrays, is_translation
 from wavecomb.usd.geometry.strands import StrandDetail
-from wavecomb.usd.geometry.subdivision import Surfaces
+from wavecomb.usd.geometry.subdivision import SubdivisionSurfaces
 from wavecomb.usd.instances.group import Group, Matrices, Scope, emitter_of
 from wavecomb.usd.instances.instance_materials import (
     InstanceBinding,
@@ -61,7 +61,7 @@ class GroupBuilder:
         traversal: Traversal,
         materials: MaterialTable,
         light_groups: LightGroups,
-        surfaces: Surfaces,
+        surfaces: SubdivisionSurfaces,
         *,
         cache: MeshCache | None = None,
         progress: LoadProgress | None = None,
@@ -126,7 +126,9 @@ class GroupBuilder:
                     draw.material = scope.material
         for draw in found.volumes:
             self.volumes.add(group, draw, scope)
-        group.holds_placed = group.holds_placed or bool(group.lights or group.volumes)
+        group.has_lights_or_volumes = group.has_lights_or_volumes or bool(
+            group.lights or group.volumes
+        )
         self.found += len(found.draws)
         for draw in found.stand_ins:
             for material in draw.subset_materials:
@@ -139,8 +141,8 @@ class GroupBuilder:
             if self.progress is not None and self.drawn % STEP == 0:
                 self.progress(self.drawn, self.found)
         self._place_instances(group, found.instances, scope)
-        for placed in found.instancers:
-            self._place_instancer(group, placed, scope)
+        for instance in found.instancers:
+            self._place_instancer(group, instance, scope)
 
     def _bind(self, found: CollectedPrims, scope: Scope) -> None:
         """Resolves all material bindings of a group together."""
@@ -209,7 +211,7 @@ class GroupBuilder:
         if self.notes_emitters and emits:
             if isinstance(shape, MeshArrays):
                 group.emitters.append(emitter_of(shape, material, faces))
-                group.holds_placed = True
+                group.has_lights_or_volumes = True
             else:
                 self.has_other_emission = True
         options: dict[str, Any] = {
@@ -314,17 +316,17 @@ class GroupBuilder:
     ) -> None:
         """Adds native instances, grouped by prototype."""
         batches: dict[tuple[int, int], tuple[Group, list[tuple[Any, ...]]]] = {}
-        for placed in instances:
-            child = self._instance_group(placed, scope)
+        for instance in instances:
+            child = self._instance_group(instance, scope)
             if child is None:
                 continue
-            material = self.instance_materials.of_instance(placed, scope)
+            material = self.instance_materials.of_instance(instance, scope)
             if self.materials.any_emits(material, None):
                 self.has_other_emission = True
-            steps = None if placed.track is None else placed.track.steps()
+            steps = None if instance.track is None else instance.track.steps()
             count = 0 if steps is None else len(steps)
             _, batch = batches.setdefault((id(child), count), (child, []))
-            batch.append((np.array(placed.matrix), material, placed.prim, steps))
+            batch.append((np.array(instance.matrix), material, instance.prim, steps))
         for (_, count), (child, batch) in batches.items():
             matrices, materials, prims, moves = zip(*batch, strict=True)
             ids = np.array(materials, np.uint32)
@@ -332,8 +334,8 @@ class GroupBuilder:
             self.instancer.add(parent, child, np.stack(matrices), ids, prims, motion=motion)
         self.report.tally("instances", len(instances))
 
-    def _instance_group(self, placed: InstancePrim, scope: Scope) -> Group | None:
-        prim = placed.prim
+    def _instance_group(self, instance: InstancePrim, scope: Scope) -> Group | None:
+        prim = instance.prim
         prototype = prim.GetPrototype()
         path = prototype.GetPath()
         proxy = self._proxy(prim, scope.alias) if scope.alias else prim
@@ -343,8 +345,8 @@ class GroupBuilder:
         if not override and (collections or scope.alias is not None):
             alias = (path, proxy.GetPath())
             exact = self.instance_materials.of_proxies(proxy)
-        bound = placed.material is not None or (scope.bound and not override)
-        binding = self.bindings_of_instances.of_instance(placed, proxy, scope)
+        bound = instance.material is not None or (scope.bound and not override)
+        binding = self.bindings_of_instances.of_instance(instance, proxy, scope)
         inner = binding.on(
             Scope(
                 inside=True,
@@ -354,28 +356,28 @@ class GroupBuilder:
                 root=path,
             )
         )
-        key = ("native", path, inner.bound, override, placed.purpose, exact, binding.key)
+        key = ("native", path, inner.bound, override, instance.purpose, exact, binding.key)
         roots = list(prototype.GetChildren())
-        return self._group(key, str(prim.GetPath()), path, roots, inner, placed.purpose)
+        return self._group(key, str(prim.GetPath()), path, roots, inner, instance.purpose)
 
-    def _place_instancer(self, parent: Group, placed: InstancePrim, scope: Scope) -> None:
+    def _place_instancer(self, parent: Group, instance: InstancePrim, scope: Scope) -> None:
         """Adds a point instancer, grouped by prototype."""
-        prim = placed.prim
+        prim = instance.prim
         path = prim.GetPath()
         targets = UsdGeom.PointInstancer(prim).GetPrototypesRel().GetForwardedTargets()
         self.report.tally("point instancers")
         instances = read_instances(prim, self.context.time, len(targets), self.report)
         if instances is None or len(instances.kept) == 0:
             return
-        materials = self.instance_materials.of_instancer(placed, instances.authored, scope)[
+        materials = self.instance_materials.of_instancer(instance, instances.authored, scope)[
             instances.kept
         ]
         order = np.argsort(instances.prototypes, kind="stable")
         ranked = instances.prototypes[order]
-        outer = None if placed.matrix == IDENTITY else np.array(placed.matrix)
+        outer = None if instance.matrix == IDENTITY else np.array(instance.matrix)
         moved, shutter = None, self.context.motion
         if shutter is not None:
-            moved = moved_instances(prim, shutter, placed.track, outer, instances, self.report)
+            moved = moved_instances(prim, shutter, instance.track, outer, instances, self.report)
         for index, target in enumerate(targets):
             first, last = np.searchsorted(ranked, [index, index + 1])
             if first == last:
@@ -386,9 +388,9 @@ class GroupBuilder:
                 continue
             of_root = order[first:last]
             for which, binding in self.bindings_of_instances.of_points(
-                placed, root, instances.kept[of_root], instances.authored, _ANY
+                instance, root, instances.kept[of_root], instances.authored, _ANY
             ):
-                child = self._prototype_group(root, placed, scope, binding)
+                child = self._prototype_group(root, instance, scope, binding)
                 if child is None:
                     continue
                 chosen = of_root[which]
@@ -402,7 +404,7 @@ class GroupBuilder:
         self.report.tally("point instances", len(instances.kept))
 
     def _prototype_group(
-        self, root: Usd.Prim, placed: InstancePrim, scope: Scope, binding: InstanceBinding
+        self, root: Usd.Prim, instance: InstancePrim, scope: Scope, binding: InstanceBinding
     ) -> Group | None:
         """Returns the group of a point instancer's prototype."""
         path = root.GetPath()
@@ -419,7 +421,7 @@ class GroupBuilder:
         )
         path_of_material = None if inner.material is None else inner.material.GetPath()
         key = (
-            "point", path, inner.bound, inner.override, placed.purpose, inner.alias, binding.key,
+            "point", path, inner.bound, inner.override, instance.purpose, inner.alias, binding.key,
             path_of_material,
         )  # fmt: skip
-        return self._group(key, str(path), path, [root], inner, placed.purpose, _ANY)
+        return self._group(key, str(path), path, [root], inner, instance.purpose, _ANY)

@@ -72,27 +72,27 @@ class InstanceMaterials:
         bound = bound_materials(prims, self.binding_purposes)
         return tuple(str(m.GetPath()) if m else "" for m in bound)
 
-    def of_instance(self, placed: InstancePrim, scope: Scope) -> int:
+    def of_instance(self, instance: InstancePrim, scope: Scope) -> int:
         """Returns the material id for meshes of an instance that have no binding."""
-        surface = None if placed.material is None else self.materials.surface(placed.material)
+        surface = None if instance.material is None else self.materials.surface(instance.material)
         if surface is not None and not surface.stand_in:
             return self.materials.add(surface)
         if scope.override or scope.bound:
             return INHERIT_MATERIAL
-        for primvar in placed.inherited:
+        for primvar in instance.inherited:
             if primvar.GetPrimvarName() == "displayColor":
                 value = from_attribute(primvar.GetAttr(), "displayColor", self.time)
                 if value is not None and len(value.values):
-                    value = in_linear(value, self.report, placed.prim.GetPath())
+                    value = in_linear(value, self.report, instance.prim.GetPath())
                     return self.materials.plain(colour(value.values[0], DEFAULT_COLOUR))
         return INHERIT_MATERIAL if scope.inside else self.materials.plain()
 
-    def of_instancer(self, placed: InstancePrim, count: int, scope: Scope) -> NDArray[np.uint32]:
+    def of_instancer(self, instance: InstancePrim, count: int, scope: Scope) -> NDArray[np.uint32]:
         """Returns material ids (count,) of a point instancer's instances from displayColor."""
         if scope.bound or scope.override:
             return np.full(count, INHERIT_MATERIAL, np.uint32)
-        inherited = inherit(placed.prim, placed.inherited)
-        attribute = placed.prim.GetAttribute("primvars:displayColor")
+        inherited = inherit(instance.prim, instance.inherited)
+        attribute = instance.prim.GetAttribute("primvars:displayColor")
         if attribute.HasAuthoredValue():
             attributes = [attribute]
         else:
@@ -101,11 +101,11 @@ class InstanceMaterials:
             try:
                 primvar = from_attribute(candidate, "displayColor", self.time)
             except PrimvarError as error:
-                self.report.warn(f"{error}: ignored", placed.prim.GetPath())
+                self.report.warn(f"{error}: ignored", instance.prim.GetPath())
                 continue
             if primvar is None or primvar.values.shape[1] < 3:
                 continue
-            primvar = in_linear(primvar, self.report, placed.prim.GetPath())
+            primvar = in_linear(primvar, self.report, instance.prim.GetPath())
             if len(primvar.values) == 1:
                 return np.full(count, self.materials.plain(primvar.values[0]), np.uint32)
             if len(primvar.values) == count:
@@ -113,7 +113,7 @@ class InstanceMaterials:
                 ids = np.array([self.materials.plain(c) for c in palette], np.uint32)
                 return ids[index]
             what = "point instancer displayColor does not match protoIndices: ignored"
-            self.report.warn(what, placed.prim.GetPath())
+            self.report.warn(what, instance.prim.GetPath())
         default = INHERIT_MATERIAL if scope.inside else self.materials.plain()
         return np.full(count, default, np.uint32)
 
@@ -166,24 +166,24 @@ class InstanceBindings:
         self._made: dict[Hashable, Any] = {}
         self._values = Usd.Stage.CreateInMemory()
 
-    def of_instance(self, placed: InstancePrim, proxy: Usd.Prim, scope: Scope) -> InstanceBinding:
+    def of_instance(self, instance: InstancePrim, proxy: Usd.Prim, scope: Scope) -> InstanceBinding:
         """Returns the binding of a native instance.
 
         ``proxy`` is the prim on which bindings are resolved.
         """
-        material = placed.material or (scope.material if scope.bound or scope.override else None)
+        material = instance.material or (scope.material if scope.bound or scope.override else None)
         if material is not None and is_uniform(self._materials.surface(material)):
             material = None
-        if material is None and not placed.inherited:
+        if material is None and not instance.inherited:
             return PLAIN
-        prototype = placed.prim.GetPrototype().GetPath()
+        prototype = instance.prim.GetPrototype().GetPath()
         inside = Usd.PrimRange(proxy, Usd.TraverseInstanceProxies())
         reads = self._read_by((prototype, scope.alias and proxy.GetPath()), inside, material)
-        return self._binding(prototype, reads, placed.inherited, material)
+        return self._binding(prototype, reads, instance.inherited, material)
 
     def of_points(
         self,
-        placed: InstancePrim,
+        instance: InstancePrim,
         root: Usd.Prim,
         chosen: NDArray[np.intp],
         count: int,
@@ -192,16 +192,16 @@ class InstanceBindings:
         """Yields groups of instances of a prototype, with the binding of each group.
 
         Args:
-            placed: The point instancer.
+            instance: The point instancer.
             root: The prototype.
             chosen: (k,) indices of its instances in the authored arrays.
             count: Number of authored instances.
             predicate: Predicate of prims in prototypes.
         """
-        inherited = inherit(placed.prim, placed.inherited)
+        inherited = inherit(instance.prim, instance.inherited)
         varying = [
             primvar
-            for primvar in UsdGeom.PrimvarsAPI(placed.prim).GetPrimvarsWithAuthoredValues()
+            for primvar in UsdGeom.PrimvarsAPI(instance.prim).GetPrimvarsWithAuthoredValues()
             if primvar.GetInterpolation() in _OF_INSTANCES
         ]
         if not inherited and not varying:

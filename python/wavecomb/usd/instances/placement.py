@@ -13,7 +13,7 @@ from wavecomb import _core
 from wavecomb.usd.cameras import framing
 from wavecomb.usd.geometry.curves import CurveArrays
 from wavecomb.usd.geometry.mesh_arrays import MeshArrays
-from wavecomb.usd.geometry.subdivision import Surfaces
+from wavecomb.usd.geometry.subdivision import SubdivisionSurfaces
 from wavecomb.usd.instances.group import AnimatedTransform, Group, Matrices, middle_transforms
 from wavecomb.usd.instances.point_instancer import are_valid
 from wavecomb.usd.lights.mesh_light import MeshLights
@@ -80,14 +80,14 @@ class GroupInstancer:
             parent.sampled_light = child.sampled_light
             if motion is not None:
                 self.mesh_lights.report_motion(child.sampled_light)
-        if child.holds_placed:
+        if child.has_lights_or_volumes:
             middle = transforms if motion is None else middle_transforms(motion)
             places = [
                 AnimatedTransform(matrix, None if motion is None else motion[k])
                 for k, matrix in enumerate(middle)
             ]
             parent.children.append((child, places))
-            parent.holds_placed = True
+            parent.has_lights_or_volumes = True
         if child.has_surfaces:
             parent.surfaced.append((child, transforms))
             parent.has_surfaces = True
@@ -136,7 +136,7 @@ class GroupInstancer:
 
 
 def outline_of(
-    shape: MeshArrays | CurveArrays, surfaces: Surfaces, more: NDArray[np.float64] | None
+    shape: MeshArrays | CurveArrays, surfaces: SubdivisionSurfaces, more: NDArray[np.float64] | None
 ) -> NDArray[np.float64]:
     """Returns the extreme points of a shape in the space of its group."""
     points = shape.positions.reshape(-1, 3)

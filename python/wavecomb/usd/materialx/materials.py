@@ -30,27 +30,27 @@ LOOKS = Sdf.Path("/MaterialX/Looks")
 MODEL = Sdf.Path("/ModelRoot")
 
 
-def write_looks(document: Document, layer: Sdf.Layer, tell: ReportSkipped) -> None:
+def write_looks(document: Document, layer: Sdf.Layer, report_skipped: ReportSkipped) -> None:
     """Adds the looks of a document to the layer that contains its materials."""
     looks = document.root.getLooks()
     if not looks:
         return
-    writer = _Looks(document.root, Usd.Stage.Open(layer), tell)
+    writer = _LooksWriter(document.root, Usd.Stage.Open(layer), report_skipped)
     for collection in document.root.getCollections():
         writer.collection(collection, ())
     for look in looks:
         writer.look(look, ())
 
 
-class _Looks:
+class _LooksWriter:
     """Writer of collections and looks; each is written once."""
 
-    def __init__(self, root: Any, stage: Usd.Stage, tell: ReportSkipped) -> None:
+    def __init__(self, root: Any, stage: Usd.Stage, report_skipped: ReportSkipped) -> None:
         self._root = root
         self._stage = stage
-        self._tell = tell
+        self._report_skipped = report_skipped
         self._collections: dict[str, str] = {}
-        self._looks: set[str] = set()
+        self._written: set[str] = set()
         variants = stage.DefinePrim(MODEL).GetVariantSets().AddVariantSet("LookVariant")
         self._variants = variants
 
@@ -66,7 +66,7 @@ class _Looks:
         self._collections[name] = valid(name)
         for other in element.getIncludeCollections():
             if other.getName() in (*above, name):
-                self._tell(element, "MaterialX collection includes itself (left out)")
+                self._report_skipped(element, "MaterialX collection includes itself (left out)")
                 continue
             inside = self.collection(other, (*above, name))
             api.IncludePath(COLLECTIONS.AppendProperty(f"collection:{inside}"))
@@ -90,7 +90,9 @@ class _Looks:
             if Sdf.Path.IsValidPathString(name) and Sdf.Path(name).IsAbsoluteRootOrPrimPath():
                 found.append(Sdf.Path(name).ReplacePrefix(Sdf.Path.absoluteRootPath, COLLECTIONS))
             else:
-                self._tell(element, f"MaterialX geometry {name} is no path of a prim (left out)")
+                self._report_skipped(
+                    element, f"MaterialX geometry {name} is no path of a prim (left out)"
+                )
         return found
 
     def _assigned(self, assign: Any) -> str | None:
@@ -99,7 +101,9 @@ class _Looks:
             collection = self._root.getCollection(assign.getCollectionString())
             if collection is not None:
                 return self.collection(collection, ())
-            self._tell(assign, "MaterialX collection does not exist (material not assigned)")
+            self._report_skipped(
+                assign, "MaterialX collection does not exist (material not assigned)"
+            )
             return ""
         if not assign.getGeom():
             return None
@@ -120,9 +124,9 @@ class _Looks:
 
         name = look.getName()
         path = child(LOOKS, name)
-        if name in self._looks:
+        if name in self._written:
             return path
-        self._looks.add(name)
+        self._written.add(name)
         prim = self._stage.DefinePrim(path)
         base = look.getInheritsFrom()
         if base is not None and base.isA(mx.Look) and base.getName() not in (*above, name):
@@ -151,7 +155,7 @@ class _Looks:
         """Binds a material to a collection of a look, or to the whole look."""
         material = child(MATERIALS, item.getMaterial())
         if not self._stage.GetPrimAtPath(material):
-            self._tell(
+            self._report_skipped(
                 item, f"MaterialX material {item.getMaterial()} does not exist (not assigned)"
             )
             return None
@@ -195,7 +199,7 @@ class _Looks:
                 try:
                     value = usd_value(item.getAttribute("value"), kind)
                 except ValueError as error:
-                    self._tell(item, f"MaterialX value {error} (left out)")
+                    self._report_skipped(item, f"MaterialX value {error} (left out)")
                     continue
                 UsdShade.Material(prim).CreateInput(valid(item.getName()), usd).Set(value)
         choices.ClearVariantSelection()

@@ -9,8 +9,8 @@ from pathlib import Path
 from pxr import Usd
 
 from wavecomb.usd.layers.opening import open_render_settings
-from wavecomb.usd.render_settings.reader import read_choices
-from wavecomb.usd.render_settings.values import RenderChoice
+from wavecomb.usd.render_settings.reader import read_product_settings
+from wavecomb.usd.render_settings.values import ProductSettings
 from wavecomb.usd.stage.diagnostics import capture_diagnostics
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.time_codes import frame_number, time_code
@@ -21,7 +21,7 @@ def peek_products(
     render_settings: str | None = None,
     product: str | None = None,
     session_layer: str | Path | None = None,
-) -> tuple[list[RenderChoice], Usd.Stage]:
+) -> tuple[list[ProductSettings], Usd.Stage]:
     """Reads the render settings of a file; returns one choice per product, at least one.
 
     Composes nothing else and reports nothing, since loading the stage repeats all messages. Keeping
@@ -40,6 +40,6 @@ def peek_products(
     with capture_diagnostics(unread):
         layer = None if session_layer is None else Path(session_layer)
         stage = open_render_settings(Path(file), render_settings, layer)
-        choices = read_choices(stage, render_settings, product, unread)
+        choices = read_product_settings(stage, render_settings, product, unread)
         start = frame_number(time_code(stage, None))
         return [replace(choice, start=start) for choice in choices], stage

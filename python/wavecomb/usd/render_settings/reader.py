@@ -18,7 +18,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.run import aovs as aov_names
 from wavecomb.run import expressions
 from wavecomb.usd.materials.network import number, word
-from wavecomb.usd.render_settings.values import CONFORMS, RenderChoice
+from wavecomb.usd.render_settings.values import CONFORMS, ProductSettings
 from wavecomb.usd.stage.report import LoadReport
 
 MAX_PRODUCTS = 256
@@ -81,9 +81,9 @@ def find_products(
     return found
 
 
-def read_choices(
+def read_product_settings(
     stage: Usd.Stage, wanted: str | None, product: str | None, report: LoadReport
-) -> list[RenderChoice]:
+) -> list[ProductSettings]:
     """Returns one choice per product to render, at least one.
 
     Args:
@@ -104,7 +104,7 @@ def read_choices(
             raise WavecombError(f"--product {product}: no such product; the stage has: {known}")
         products = chosen
     if settings is None:
-        return [RenderChoice()]
+        return [ProductSettings()]
     return [_read(stage, settings, p, report) for p in products or [None]]
 
 
@@ -113,7 +113,7 @@ def _read(
     settings: UsdRender.Settings,
     product: UsdRender.Product | None,
     report: LoadReport,
-) -> RenderChoice:
+) -> ProductSettings:
     """Returns the values of a product, or of the settings if the product does not author them."""
     prims = [p.GetPrim() for p in (product, settings) if p is not None]
 
@@ -144,7 +144,7 @@ def _read(
     color_space = settings.GetPrim().GetAttribute("renderingColorSpace")
     if color_space and word(color_space.Get()) not in ("", "lin_rec709_scene", "lin_rec709"):
         report.missing(f"renderingColorSpace {color_space.Get()}", settings.GetPath())
-    return RenderChoice(
+    return ProductSettings(
         settings=str(settings.GetPath()),
         product=None if product is None else str(product.GetPath()),
         camera=_camera(stage, prims, report),

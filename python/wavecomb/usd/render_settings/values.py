@@ -19,7 +19,7 @@ CONFORMS = (
 
 
 @dataclass(frozen=True)
-class RenderChoice:
+class ProductSettings:
     """Values of render settings and one of their products; None means that nothing is authored.
 
     Attributes:

@@ -11,8 +11,8 @@ from wavecomb.load_options import PURPOSES, LoadOptions
 from wavecomb.usd.cameras.camera import Lens, find_camera
 from wavecomb.usd.cameras.lens import check_names
 from wavecomb.usd.geometry.shutter import Blur
-from wavecomb.usd.render_settings.reader import read_choices
-from wavecomb.usd.render_settings.values import RenderChoice
+from wavecomb.usd.render_settings.reader import read_product_settings
+from wavecomb.usd.render_settings.values import ProductSettings
 from wavecomb.usd.stage.context import BINDING_PURPOSES
 from wavecomb.usd.stage.report import LoadReport
 
@@ -30,7 +30,7 @@ class ViewSettings:
         binding_purposes: Purposes of material bindings in order of preference.
     """
 
-    choice: RenderChoice
+    choice: ProductSettings
     camera: Usd.Prim | None
     lens: Lens
     blur: Blur
@@ -51,7 +51,7 @@ def view_settings(stage: Usd.Stage, options: LoadOptions, report: LoadReport) ->
     Raises:
         WavecombError: The stage lacks something that the options name.
     """
-    choices = read_choices(stage, options.render_settings, options.product, report)
+    choices = read_product_settings(stage, options.render_settings, options.product, report)
     choice = choices[0]
     if options.product is None and len(choices) > 1:
         report.note(f"render product {choice.product} is the first of {len(choices)}")

@@ -193,10 +193,14 @@ class DrawModes:
             subset.CreateIndicesAttr([place])
             subsets.append(subset.GetPrim())
             name = f"cardLook{_CARDS[number]}"
-            materials.append(self._look(mesh.GetPath().AppendChild(name), own, self._colour(prim)))
+            materials.append(
+                self._add_material(mesh.GetPath().AppendChild(name), own, self._colour(prim))
+            )
         return StandIn(mesh.GetPrim(), "mesh", tuple(subsets), tuple(materials))
 
-    def _look(self, path: Sdf.Path, texture: str | None, colour: Gf.Vec3f) -> UsdShade.Material:
+    def _add_material(
+        self, path: Sdf.Path, texture: str | None, colour: Gf.Vec3f
+    ) -> UsdShade.Material:
         """Creates a diffuse material with a texture that has cut-out alpha, or with a colour."""
         kinds = Sdf.ValueTypeNames
         material = UsdShade.Material.Define(self._stage, path)

@@ -32,7 +32,7 @@ from wavecomb.usd.geometry.gprims import COUNTS
 from wavecomb.usd.geometry.screen_size import ViewSize
 from wavecomb.usd.geometry.shutter import find_motion
 from wavecomb.usd.geometry.strands import StrandDetail
-from wavecomb.usd.geometry.subdivision import Surfaces, parse_level
+from wavecomb.usd.geometry.subdivision import SubdivisionSurfaces, parse_level
 from wavecomb.usd.instances.group import Group, changes_size, is_lit_by_emitters, placed_lights
 from wavecomb.usd.instances.group_builder import GroupBuilder, LoadProgress
 from wavecomb.usd.instances.volumes import add_volumes, report_grid_memory, report_ignored_volumes
@@ -186,7 +186,7 @@ class _Load:
         self._context = LoadContext(self._stage, time, builder, report, options)
         self.textures = TextureTable(self._context, reuse, store)
         self._materials = MaterialTable(self._context, self.textures, apart=editable)
-        self._surfaces = Surfaces(self._context, self._materials)
+        self._surfaces = SubdivisionSurfaces(self._context, self._materials)
 
     def run(self, cache: FrameCache | None, progress: LoadProgress | None) -> dict[str, Any]:
         """Fills the builder; returns fields of ``LoadedStage``."""

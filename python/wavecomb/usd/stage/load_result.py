@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.usd.render_settings.values import RenderChoice
+from wavecomb.usd.render_settings.values import ProductSettings
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.volumes.info import VolumeFacts
 
@@ -64,7 +64,7 @@ class LoadedStage:
     frame: float | None = None
     textures: TextureCache | None = None
     shutter: tuple[float, float] | None = None
-    render: RenderChoice = field(default_factory=RenderChoice)
+    render: ProductSettings = field(default_factory=ProductSettings)
     working_space: str = "rec709"
     leaves_out_levels: bool = False
     outline: NDArray[np.float64] | None = None

@@ -63,7 +63,7 @@ class CollectedPrims:
     def binding_prims(self) -> list[Usd.Prim]:
         """Returns all prims with material bindings, in the order that ``bind`` expects."""
         prims = [draw.prim for draw in (*self.draws, *self.volumes)]
-        prims += [placed.prim for placed in self.instances]
+        prims += [instance.prim for instance in self.instances]
         return prims + [subset for draw in self.draws for subset in draw.subsets]
 
     def bind(self, materials: Iterable[UsdShade.Material | None]) -> list[UsdShade.Material | None]:
@@ -71,14 +71,14 @@ class CollectedPrims:
         materials = iter(materials)
         for draw in (*self.draws, *self.volumes):
             draw.material = next(materials)
-        for placed in self.instances:
-            placed.material = next(materials)
+        for instance in self.instances:
+            instance.material = next(materials)
         for draw in self.draws:
             if draw.subsets:
                 # USD resolves a subset without a binding to the material of its mesh.
                 draw.subset_materials = [next(materials) for _ in draw.subsets]
         bound = [m for draw in self.draws for m in (draw.material, *draw.subset_materials)]
-        return bound + [placed.material for placed in self.instances]
+        return bound + [instance.material for instance in self.instances]
 
 
 class Traversal:
@@ -211,8 +211,8 @@ class Traversal:
                 ):
                     self.report.alias(prototype.GetPath(), prim.GetPath())
                     inherited = inherit(prim, inherited)
-                    placed = InstancePrim(prim, matrix, purpose, inherited, track=track)
-                    found.instances.append(placed)
+                    instance = InstancePrim(prim, matrix, purpose, inherited, track=track)
+                    found.instances.append(instance)
                     continue
                 pick = proxies
             if type_name == "SkelRoot":
@@ -231,8 +231,8 @@ class Traversal:
                     )
             elif kind == "instancer":
                 if shown:
-                    placed = InstancePrim(prim, matrix, purpose, inherited, track=track)
-                    found.instancers.append(placed)
+                    instance = InstancePrim(prim, matrix, purpose, inherited, track=track)
+                    found.instancers.append(instance)
                 continue
             elif kind == "light":
                 if shown:

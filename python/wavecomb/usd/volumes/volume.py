@@ -113,9 +113,11 @@ class VolumeReader:
             "emission": self._working_colour(emission),
             "name": self._report.place(prim.GetPath()),
         }
-        blown = None if velocity is None else velocity.grid
+        velocity_grid = None if velocity is None else velocity.grid
         used = tuple(
-            grid.facts for grid in (density, colour, emission_field, blown) if grid is not None
+            grid.facts
+            for grid in (density, colour, emission_field, velocity_grid)
+            if grid is not None
         )
         size = float(np.ptp(corners, axis=0).max())
         may_light = max(emission) * size > GLOW
