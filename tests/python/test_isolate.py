@@ -17,7 +17,9 @@ from wavecomb.run.isolation import progress_notes, time_limit
 
 pytestmark = only_where(sys.platform == "linux", "isolation is for Linux")
 
-SUPERVISED = "from wavecomb.run.isolation import supervisor, trail; supervisor.supervise()\n"
+SUPERVISED = (
+    "from wavecomb.run.isolation import progress_notes, supervisor; supervisor.supervise()\n"
+)
 
 GOOD = '#usda 1.0\ndef Sphere "Ball" {}\n'
 
@@ -66,7 +68,7 @@ def test_exit_codes_and_streams_pass_through(code: int) -> None:
     ],
 )
 def test_a_crash_is_one_line_and_code_2(deed: str, words: str) -> None:
-    code, out, err = finished(f"trail.note('reading', '/A')\n{deed}")
+    code, out, err = finished(f"progress_notes.note('reading', '/A')\n{deed}")
     assert (code, out) == (2, "")
     assert err.startswith("error: ") and err.count("\n") == 1
     assert words in err and "/A" in err
@@ -167,8 +169,8 @@ def test_the_command_says_where_usd_crashed(tmp_path: Path) -> None:
 
 def test_an_image_library_that_crashes_is_named_with_its_file(tmp_path: Path) -> None:
     code = (
-        "trail.note('reading', '/A')\n"
-        "trail.note('decoding', 'sky.exr', 'image')\n"
+        "progress_notes.note('reading', '/A')\n"
+        "progress_notes.note('decoding', 'sky.exr', 'image')\n"
         "import os; os.abort()"
     )
     _, _, err = finished(code)

@@ -257,7 +257,7 @@ def test_render_from_python_takes_the_first_product(tmp_path):
         ("", (), "-o is missing, and the stage has no render product"),
         (PRODUCTS.replace("one.exr", "one.jpg"), (), "/Render/One: productName out/one.jpg must"),
         (PRODUCTS, ("--png", "a.png"), "--png a.png: is of one picture and the stage has 2"),
-        (PRODUCTS.replace("two.exr", "one.exr"), (), "productName out/one.exr is that of several"),
+        (PRODUCTS.replace("two.exr", "one.exr"), (), "productName out/one.exr is used by several"),
         ("uniform int2 resolution = (70000, 2)", ("-o", "a.exr"), "/Render/S: size 70000 x 2"),
         ("", ("-o", "a.exr", "--product", "X"), "--product X: no such product"),
         ("", ("-o", "a.exr", "--render-settings", "X"), "--render-settings X: no such prim"),

@@ -11,7 +11,8 @@ from wavecomb.bench.analysis.data import BASELINES, BOUNDS
 from wavecomb.bench.analysis.factorial import effects, factors_of
 from wavecomb.bench.analysis.ratios import means, order_effects, ratios, regrets
 from wavecomb.bench.columns import COUNTER_COLUMNS
-from wavecomb.bench.figures import forest, runs
+from wavecomb.bench.figures import forest
+from wavecomb.bench.figures import runs as run_figures
 from wavecomb.bench.figures.style import count_words, fixed
 from wavecomb.bench.oracle import BEST, COSTS, WORST
 from wavecomb.bench.reports.parts import Text, Writer, interval, key_of
@@ -56,7 +57,7 @@ def experiment(out: Writer, name: str, runs: pd.DataFrame) -> None:
         _ray_orders(out, key, ours)
     _cases(out, name, ours)
     _curves(out, key, runs)
-    out.draw(runs.error_over_time(runs, f"{key}-error"))
+    out.draw(run_figures.error_over_time(runs, f"{key}-error"))
     _errors(out, runs)
     _counters(out, ours)
 
@@ -80,7 +81,7 @@ def _ratio_figure(
     """Draws the ratios of one metric, if there are any."""
     if words in metrics:
         x_label = _LABELS.get(words, words)
-        out.draw(runs.ratio_figure(metrics[words], name, title, x_label, factor))
+        out.draw(run_figures.ratio_figure(metrics[words], name, title, x_label, factor))
 
 
 def _ray_orders(out: Writer, key: str, runs: pd.DataFrame) -> None:
@@ -101,7 +102,7 @@ def _cases(out: Writer, name: str, runs: pd.DataFrame) -> None:
     out.add(ratio_table(f"Ratio of means to {BASELINES['case']}", metrics, "with"))
     for words, table in metrics.items():
         key = f"{key_of(name)}-cases-{key_of(words)}"
-        out.draw(runs.ratio_figure(table, key, f"{name}: {words}", words, "case"))
+        out.draw(run_figures.ratio_figure(table, key, f"{name}: {words}", words, "case"))
 
 
 def _renderers(out: Writer, key: str, runs: pd.DataFrame) -> None:
@@ -124,7 +125,7 @@ def _curves(out: Writer, key: str, runs: pd.DataFrame) -> None:
     def curves(by: pd.Series, column: str, words: str, end: str) -> None:
         for stage, part in runs.groupby(by, sort=False):
             name, title = f"{key}-{key_of(str(stage))}-{end}", f"{stage}: time over {words}"
-            out.draw(runs.curve(part, column, times, name, title, words, series))
+            out.draw(run_figures.curve(part, column, times, name, title, words, series))
 
     factor = str(runs["factor"].iloc[0])
     if factor and runs["factor_value"].notna().all():
@@ -180,8 +181,8 @@ def _policies(out: Writer, name: str, runs: pd.DataFrame) -> None:
     for words, end in (("shade", "shade"), ("shade + order", "policies")):
         title = f"{words.capitalize()} time by policy"
         _ratio_figure(out, metrics, words, "policy", f"{key}-{end}", title)
-    out.draw(runs.pipeline(runs, f"{key}-pipeline"))
-    out.draw(runs.coherence(runs, f"{key}-coherence"))
+    out.draw(run_figures.pipeline(runs, f"{key}-pipeline"))
+    out.draw(run_figures.coherence(runs, f"{key}-coherence"))
     order = order_effects(runs)
     if not order.empty:
         out.add(Text("The verdict on order", "heading"))
@@ -295,7 +296,7 @@ def _roulette(out: Writer, runs: pd.DataFrame) -> None:
     if "efficiency" in metrics:
         name, title = "roulette-efficiency", "Roulette: efficiency"
         table = metrics["efficiency"]
-        out.draw(runs.ratio_figure(table, name, title, "efficiency", "roulette"))
+        out.draw(run_figures.ratio_figure(table, name, title, "efficiency", "roulette"))
 
 
 def _effects(out: Writer, runs: pd.DataFrame) -> None:
