@@ -280,7 +280,8 @@ def test_signals_reach_the_child_once(place: Path, number: int) -> None:
     ],
 )
 def test_a_crash_is_one_line(place: Path, deed: str, words: str) -> None:
-    code = f"from wavecomb.run.isolation import progress_notes\nprogress_notes.note('reading', '/A')\n{deed}"
+    imports = "from wavecomb.run.isolation import progress_notes\n"
+    code = f"{imports}progress_notes.note('reading', '/A')\n{deed}"
     done = subprocess.run(
         [sys.executable, "-c", PARENT, str(place), "", CHILD + code],
         capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False,
