@@ -93,7 +93,7 @@ class GroupBuilder:
         self.bindings = BindingScan()
         self.instancer = GroupInstancer(context, self.mesh_lights)
         self.instance_materials = InstanceMaterials(context, materials)
-        self.bindings_of_instances = InstanceBindings(context, materials)
+        self.instance_bindings = InstanceBindings(context, materials)
         self.volumes = VolumeInstancer(context)
         self._groups: dict[Hashable, Group] = {}
         self._known: dict[Sdf.Path, UsdShade.Material] = {}
@@ -126,9 +126,7 @@ class GroupBuilder:
                     draw.material = scope.material
         for draw in found.volumes:
             self.volumes.add(group, draw, scope)
-        group.has_lights_or_volumes = group.has_lights_or_volumes or bool(
-            group.lights or group.volumes
-        )
+        group.has_lights_or_volumes |= bool(group.lights or group.volumes)
         self.found += len(found.draws)
         for draw in found.stand_ins:
             for material in draw.subset_materials:
@@ -345,17 +343,10 @@ class GroupBuilder:
         if not override and (collections or scope.alias is not None):
             alias = (path, proxy.GetPath())
             exact = self.instance_materials.of_proxies(proxy)
-        bound = instance.material is not None or (scope.bound and not override)
-        binding = self.bindings_of_instances.of_instance(instance, proxy, scope)
-        inner = binding.on(
-            Scope(
-                inside=True,
-                bound=bound and alias is None,
-                override=override,
-                alias=alias,
-                root=path,
-            )
-        )
+        bound = alias is None and (instance.material is not None or (scope.bound and not override))
+        binding = self.instance_bindings.of_instance(instance, proxy, scope)
+        inner = Scope(inside=True, bound=bound, override=override, alias=alias, root=path)
+        inner = binding.on(inner)
         key = ("native", path, inner.bound, override, instance.purpose, exact, binding.key)
         roots = list(prototype.GetChildren())
         return self._group(key, str(prim.GetPath()), path, roots, inner, instance.purpose)
@@ -369,9 +360,8 @@ class GroupBuilder:
         instances = read_instances(prim, self.context.time, len(targets), self.report)
         if instances is None or len(instances.kept) == 0:
             return
-        materials = self.instance_materials.of_instancer(instance, instances.authored, scope)[
-            instances.kept
-        ]
+        authored = self.instance_materials.of_instancer(instance, instances.authored, scope)
+        materials = authored[instances.kept]
         order = np.argsort(instances.prototypes, kind="stable")
         ranked = instances.prototypes[order]
         outer = None if instance.matrix == IDENTITY else np.array(instance.matrix)
@@ -387,7 +377,7 @@ class GroupBuilder:
                 self.report.warn(f"point instancer prototype {target} does not exist", path)
                 continue
             of_root = order[first:last]
-            for which, binding in self.bindings_of_instances.of_points(
+            for which, binding in self.instance_bindings.of_points(
                 instance, root, instances.kept[of_root], instances.authored, _ANY
             ):
                 child = self._prototype_group(root, instance, scope, binding)
@@ -409,16 +399,8 @@ class GroupBuilder:
         """Returns the group of a point instancer's prototype."""
         path = root.GetPath()
         within = path.HasPrefix(scope.root) and scope.inside
-        inner = binding.on(
-            Scope(
-                inside=True,
-                bound=scope.bound and within,
-                override=scope.override and within,
-                alias=scope.alias if within else None,
-                root=scope.root if within else path,
-                material=scope.material if within else None,
-            )
-        )
+        outer = replace(scope, inherited=()) if within else Scope(root=path)
+        inner = binding.on(replace(outer, inside=True))
         path_of_material = None if inner.material is None else inner.material.GetPath()
         key = (
             "point", path, inner.bound, inner.override, instance.purpose, inner.alias, binding.key,
