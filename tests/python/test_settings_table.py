@@ -161,11 +161,11 @@ def test_an_added_row_is_a_field_of_the_window(with_rows: None) -> None:
 
 
 def test_an_added_row_is_kept_in_checkpoints_where_it_shows(with_rows: None) -> None:
-    from wavecomb.run.checkpoint import picture_settings
+    from wavecomb.run.checkpoint import image_settings
 
     values = {name: row.default for name, row in settings().items()}
     values |= {row.name: row.default for row in ADDED}
-    kept = picture_settings(values)
+    kept = image_settings(values)
     assert {"tea_time", "biscuit", "milk"} <= kept.keys()  # same.BITS lacks biscuit
     assert "cups" not in kept
 

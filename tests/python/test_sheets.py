@@ -16,7 +16,7 @@ from click.testing import CliRunner, Result
 
 from wavecomb.cli import main
 from wavecomb.image.compare.folders import pair_up
-from wavecomb.image.files.collection import collect, pictures_of
+from wavecomb.image.files.collection import collect, images_of
 from wavecomb.image.files.image import display, read_codes, write_exr, write_png
 from wavecomb.image.thumbnails import DisplayOptions, contact_sheet, fit_image, wipe
 from wavecomb.run.frame_names import matching
@@ -69,8 +69,8 @@ def test_frames_that_are_there(tmp_path: Path) -> None:
 def test_pictures_of_folders_and_files(frames: Path, tmp_path: Path) -> None:
     (frames / ".hidden.exr").touch()
     (frames / "notes.txt").touch()
-    assert list(pictures_of(str(frames))) == [f"shot.{k:04d}.exr" for k in (8, 9, 10, 11)]
-    assert list(pictures_of(str(frames / "shot.####.exr"))) == ["8", "9", "10", "11"]
+    assert list(images_of(str(frames))) == [f"shot.{k:04d}.exr" for k in (8, 9, 10, 11)]
+    assert list(images_of(str(frames / "shot.####.exr"))) == ["8", "9", "10", "11"]
     one = str(frames / "shot.0009.exr")
     assert list(collect([one])) == [one]
     assert "no such file" in failed("sheet", tmp_path / "no.exr", "-o", tmp_path / "a.png")

@@ -153,10 +153,10 @@ class Job:
         from wavecomb.run.bands import render_bands, sum_stats, without_samples
         from wavecomb.run.callbacks import Watcher
         from wavecomb.run.progress import Interrupt
-        from wavecomb.run.settings import picture_size
+        from wavecomb.run.settings import image_size
         from wavecomb.run.stats import write_stats
 
-        settings, height = self.settings.to_dict(), picture_size(self.settings)[1]
+        settings, height = self.settings.to_dict(), image_size(self.settings)[1]
         parts: list[dict[str, Any]] = []
         costs: Any = None
         broken = 0

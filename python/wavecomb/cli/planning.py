@@ -194,7 +194,7 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
         WavecombError: An option, a file or a setting is invalid.
     """
     from wavecomb.run.bands import band_rows
-    from wavecomb.run.settings import keeps_error
+    from wavecomb.run.settings import has_error_layers
 
     asked = _with_frame(asked, peek)
     purpose, layers, source = asked.purpose, asked.layers, asked.source
@@ -253,7 +253,7 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
         settings = plan.settings(
             chosen, aov_names.with_others(aovs, others), resumed is not None, fits
         )
-        shows_errors = keeps_error(settings) and aovs == aov_names.DEFAULT
+        shows_errors = has_error_layers(settings) and aovs == aov_names.DEFAULT
         further = (*("denoised",) * purpose.denoise, *aov_names.ERRORS * shows_errors)
         asked.check_learning(settings)
         layers.check(plan.names.output, (*aovs, *further))

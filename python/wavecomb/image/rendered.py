@@ -251,9 +251,9 @@ class Picture:
 
     def file_metadata(self) -> dict[str, Any]:
         """Returns attributes of an EXR file: version, stage, camera, settings, times, matrices."""
-        from wavecomb.run.stats import picture_metadata
+        from wavecomb.run.stats import image_metadata
 
-        return {**picture_metadata(self.stats), **self.metadata}
+        return {**image_metadata(self.stats), **self.metadata}
 
 
 def picture_of(

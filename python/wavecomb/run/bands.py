@@ -17,7 +17,7 @@ import numpy as np
 from wavecomb.errors import WavecombError
 from wavecomb.run import aovs as aov_names
 from wavecomb.run.isolation.memory import machine_limit
-from wavecomb.run.settings import check_memory, keeps_error, picture_bytes, picture_size
+from wavecomb.run.settings import check_memory, has_error_layers, image_bytes, image_size
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Settings
@@ -57,7 +57,7 @@ def band_rows(
     """
     machine = machine_limit()
     most = megabytes * 1e6 if megabytes is not None else machine and 0.5 * machine
-    needed = picture_bytes(settings, aovs, light_groups)
+    needed = image_bytes(settings, aovs, light_groups)
     if most is None or needed <= most:
         return None
     if not whole:
@@ -71,7 +71,7 @@ def band_rows(
         check_memory(settings, aovs, light_groups)
         return None
     step = tile or STEP
-    height = picture_size(settings)[1]
+    height = image_size(settings)[1]
     rows = max(step, int(most / (needed / height)) // step * step)
     return None if rows >= height else rows
 
@@ -84,7 +84,7 @@ def _needs_all(settings: Settings, aovs: Sequence[str]) -> str:
         return f"--allocate {settings.allocate}"
     if settings.firefly != "keep":
         return f"--firefly {settings.firefly}"
-    if keeps_error(settings):
+    if has_error_layers(settings):
         return "an image with errors (--adaptive, --noise, --aov error, --aov variance)"
     if any(name in aov_names.of_kind("coverage") for name in aovs):
         return "a Cryptomatte"
@@ -130,7 +130,7 @@ def without_samples(
     from wavecomb import _core
 
     of_one_pixel = {
-        "width": picture_size(settings)[0], "height": max(rows, 2), "region": (0, 0, 1, 1),
+        "width": image_size(settings)[0], "height": max(rows, 2), "region": (0, 0, 1, 1),
         "overscan": 0, "crop": False, "spp": 1, "costs": "model", "light_weights": "power",
         "allocate": "even",
     }  # fmt: skip

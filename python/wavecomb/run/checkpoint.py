@@ -43,7 +43,7 @@ class Checkpoint:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Settings of the render that affect the image; see ``picture_settings``."""
+        """Settings of the render that affect the image; see ``image_settings``."""
         return dict(self.header["settings"])
 
     @property
@@ -62,7 +62,7 @@ class Checkpoint:
         return float(self.header["seconds"])
 
 
-def picture_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
+def image_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Returns the settings that affect the image.
 
     A time limit is excluded, since it affects only the number of samples.
@@ -102,7 +102,7 @@ def make_header(
         "stage": stage,
         "source": plain(source),
         "aovs": list(aovs),
-        "settings": plain(picture_settings(settings.to_dict())),
+        "settings": plain(image_settings(settings.to_dict())),
         "scene": _fingerprint(scene, settings),
     }
 
@@ -165,7 +165,7 @@ def _check_header(header: dict[str, Any]) -> None:
     from wavecomb import _core
 
     settings = header["settings"]
-    known = picture_settings(
+    known = image_settings(
         {
             **_core.Settings().to_dict(),
             "roulette": "cost-aware",

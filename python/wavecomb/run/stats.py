@@ -169,7 +169,7 @@ def write_stats(path: str | os.PathLike[str], stats: Mapping[str, Any]) -> None:
         part.write_text(text, encoding="utf-8")
 
 
-def picture_metadata(stats: Mapping[str, Any]) -> dict[str, Any]:
+def image_metadata(stats: Mapping[str, Any]) -> dict[str, Any]:
     """Returns the statistics that are stored in the header of an image."""
     number = stats["version"] if "version" in stats else version()
     metadata: dict[str, Any] = {"Software": f"Wavecomb {number}"}

@@ -149,14 +149,14 @@ def lines_of(found: FolderComparison) -> list[str]:
             f"{change.ratio:.3f} {interval}  {change.verdict}"
         )
     lines.append(f"geometric mean of {len(found.changes)} ratios: {found.mean_ratio:.3f}")
-    lines.append(pictures_line(found))
+    lines.append(images_line(found))
     for name, configs in (("BEFORE", found.only_before), ("AFTER", found.only_after)):
         if configs:
             lines.append(f"only in {name}: {', '.join(configs)}")
     return lines
 
 
-def pictures_line(found: FolderComparison) -> str:
+def images_line(found: FolderComparison) -> str:
     """Returns a line that states whether both folders hold the same images."""
     if not found.pictures:
         return "pictures: none to compare"

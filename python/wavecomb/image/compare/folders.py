@@ -11,7 +11,7 @@ from typing import Any
 from wavecomb.errors import WavecombError
 from wavecomb.image.compare.comparison import Comparison, compare
 from wavecomb.image.compare.heatmap import Kind, heat_map
-from wavecomb.image.files.collection import is_many, pictures_of
+from wavecomb.image.files.collection import images_of, is_many
 from wavecomb.image.files.image import display
 from wavecomb.image.pages import Cell, Pair, document, figure_text, pair_section, table
 from wavecomb.image.thumbnails import DisplayOptions, fit_image
@@ -79,7 +79,7 @@ def pair_up(a: str, b: str) -> FolderPair:
     for one, other in ((a, b), (b, a)):
         if not is_many(one):
             raise WavecombError(f"{one} is one image, but {other} names several")
-    in_a, in_b = pictures_of(a), pictures_of(b)
+    in_a, in_b = images_of(a), images_of(b)
     pairs = {name: (file, in_b[name]) for name, file in in_a.items() if name in in_b}
     if not pairs:
         raise WavecombError(f"{a} and {b} have no images with the same name or frame")

@@ -24,7 +24,7 @@ def is_many(source: str) -> bool:
     return os.path.isdir(source) or (has_place(source) and not os.path.exists(source))
 
 
-def pictures_of(source: str) -> dict[str, str]:
+def images_of(source: str) -> dict[str, str]:
     """Returns files by name: frames of a sequence in order, or all images in a folder tree.
 
     Args:
@@ -65,7 +65,7 @@ def collect(sources: Iterable[str]) -> dict[str, str]:
     found: dict[str, str] = {}
     for source in sources:
         if is_many(source):
-            found.update(pictures_of(source))
+            found.update(images_of(source))
         elif os.path.isfile(source):
             found[os.path.basename(source) if len(found) else source] = source
         else:

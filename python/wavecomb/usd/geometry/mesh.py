@@ -24,13 +24,13 @@ from wavecomb.usd.geometry.mesh_arrays import (
     Array,
     MeshArrays,
     bake,
+    bake_and_triangulate,
     bake_normals,
     check_matrix,
     extent,
     is_translation,
-    place,
-    plain,
     read_faces,
+    transform_shape,
 )
 from wavecomb.usd.geometry.primvar import (
     Primvar,
@@ -113,7 +113,7 @@ class MeshReader:
         shape = read_shape(prim, self.time, names)
         if shape is None or len(shape.triangles) == 0:
             raise MeshError("no faces")
-        positions, normals, bounds = place(shape.positions, shape.normals, matrix)
+        positions, normals, bounds = transform_shape(shape.positions, shape.normals, matrix)
         triangles = shape.triangles[:, ::-1] if mirrored else shape.triangles
         return MeshArrays(positions, np.ascontiguousarray(triangles), normals, shape.uvs, bounds)
 
@@ -157,7 +157,7 @@ class MeshReader:
         flip = "orientation" in names and word(get("orientation").Get(time)) == "leftHanded"
         placed = None
         if not flip and holes is None:
-            placed = plain(points, counts, indices, matrix)
+            placed = bake_and_triangulate(points, counts, indices, matrix)
         has_bad = False
         if placed is None:
             has_bad = bool(invalid_point_mask(points, matrix).any())

@@ -88,7 +88,7 @@ def bake(points: Array, matrix: Gf.Matrix4d) -> Array:
     return out
 
 
-def plain(
+def bake_and_triangulate(
     points: Array, counts: NDArray[np.int32], indices: NDArray[np.int32], matrix: Gf.Matrix4d
 ) -> tuple[Array, Array, Topology] | None:
     """Transforms and triangulates a mesh that consists only of triangles or only of quads.
@@ -109,7 +109,9 @@ def plain(
     return positions, bounds, topology
 
 
-def place(points: Array, normals: Array, matrix: Gf.Matrix4d) -> tuple[Array, Array, Array]:
+def transform_shape(
+    points: Array, normals: Array, matrix: Gf.Matrix4d
+) -> tuple[Array, Array, Array]:
     """Transforms points and normals (n, 3) of a shape and returns them with their bounds (2, 3).
 
     Equivalent to ``bake``, ``bake_normals`` and ``extent``, but in one call.
