@@ -188,7 +188,7 @@ def test_stages_of_a_folder(tmp_path: Path) -> None:
     kept.write_text(naming_folder(suite, tmp_path).text)
     assert load_suite(kept).stages["mine"].file == (tmp_path / "mine.usda").resolve()
     (tmp_path / "mixed.usda").write_text("#usda 1.0\n")
-    with pytest.raises(WavecombError, match="mixed has the name of another stage"):
+    with pytest.raises(WavecombError, match="mixed has the same name as another stage"):
         with_folder(suite, tmp_path)
 
 

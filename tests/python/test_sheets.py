@@ -87,7 +87,7 @@ def test_pictures_of_folders_and_files(frames: Path, tmp_path: Path) -> None:
 def test_contact_sheet_has_each_picture_in_its_place(frames: Path, tmp_path: Path) -> None:
     out = tmp_path / "sheet.png"
     result = run("sheet", frames / "shot.####.exr", "-o", out, "--columns", 3, "--width", 48)
-    assert result.exit_code == 0 and "4 pictures" in result.stdout, result.output
+    assert result.exit_code == 0 and "4 images" in result.stdout, result.output
     sheet = read_codes(out)
     assert sheet.shape == (2 * (27 + 20 + 12) + 12, 3 * 60 + 12, 3)
     for k, colour in enumerate((RED, GREEN, BLUE, RED)):
@@ -185,7 +185,7 @@ def test_folders_and_sequences(frames: Path, others: Path, tmp_path: Path, patte
                          "1 of 3 pairs pass; 2 have no other"]  # fmt: skip
     text = page.read_text()
     assert text.count("<figure>") == 3  # A, B and their difference for the one pair that differs
-    assert "1 of 3 pairs pass, 2 pictures have no other" in text
+    assert "1 of 3 pairs pass, 2 images have no counterpart" in text
     document = json.loads(run("compare", a, b, "--json").stdout)
     assert [one["passed"] for one in document["pairs"]] == [True, False, False]
     assert document["only_a"] == [name(11)] and document["passed"] is False

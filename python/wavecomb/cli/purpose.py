@@ -125,7 +125,7 @@ class PurposeOptions:
         for name in ("min_spp", "max_spp"):
             if getattr(self, name) is not None and not is_adaptive:
                 raise WavecombError(
-                    f"--{name.replace('_', '-')} is for adaptive renders: "
+                    f"--{name.replace('_', '-')} applies to adaptive renders: "
                     "also give --adaptive or --noise"
                 )
         if None not in (spp, self.max_spp) and spp != self.max_spp:
