@@ -145,7 +145,7 @@ def test_samples_that_an_ending_asks_for(
             ["--min-spp", 4],
             "--min-spp applies to adaptive renders: also give --adaptive or --noise",
         ),
-        (["--max-spp", 4], "--max-spp is for adaptive renders"),
+        (["--max-spp", 4], "--max-spp applies to adaptive renders"),
         (["--noise", 0.1, "--spp", 4, "--max-spp", 5], "--spp is 4 and --max-spp 5"),
         (["--noise", 0], "must be above 0"),
         (["--time-limit", -1], "must be above 0"),
