@@ -101,7 +101,7 @@ def test_one_channel() -> None:
 
 
 def test_sizes_must_agree() -> None:
-    with pytest.raises(ValueError, match="picture A is 3 x 2 with 3 channels"):
+    with pytest.raises(ValueError, match="image A is 3 x 2 with 3 channels"):
         compare(np.ones((2, 3, 3)), np.ones((3, 2, 3)))
     with pytest.raises(ValueError, match="shape"):
         compare(np.ones(3), np.ones(3))

@@ -165,7 +165,7 @@ ROOT = HEAD + GRID_BYTES + 64
         (put(14, 7, "<H"), "its compression is not known"),
         (put(0, int.from_bytes(b"NanoVDB0", "big")), "the other byte order"),
         (put(16, 2**60), "sizes of a grid are inconsistent"),
-        (put(16 + 32, 9, "<I"), "it is of type Tree_half_5_4_3, which is not supported"),
+        (put(16 + 32, 9, "<I"), "it is of type Tree_half_5_4_3, which is not read"),
         (put(16 + 32, 2, "<I"), "differs from the file's table"),
         (put(HEAD, 0), "without a valid header"),
         (put(HEAD + 32, 2**63), "differs from the file's table"),

@@ -139,7 +139,7 @@ def test_what_metrics_refuse() -> None:
         ssim(small, small)
     with pytest.raises(ValueError, match="black"):
         flip(small + 1, small, high_range=True)
-    with pytest.raises(ValueError, match="one size"):
+    with pytest.raises(ValueError, match="same size"):
         flip(small, picture())
 
 

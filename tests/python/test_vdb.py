@@ -199,9 +199,7 @@ def test_a_type_that_is_not_read_is_named(tmp_path: Path, kind: str) -> None:
     with pytest.raises(WavecombError) as error:
         vdb.read(path, head)
     said = str(error.value)
-    assert (
-        said.startswith(f"{path}: grid 'd': ") and f"of type {kind}, which is not supported" in said
-    )
+    assert said.startswith(f"{path}: grid 'd': ") and f"of type {kind}, which is not read" in said
 
 
 def test_what_is_not_finite_is_counted(tmp_path: Path) -> None:

@@ -101,6 +101,6 @@ def write_wipe(file: str, a: str, b: str, at: float, look: DisplayOptions) -> No
 
     shown = look.codes(a), look.codes(b)
     if shown[0].shape != shown[1].shape:
-        raise WavecombError(f"{a} and {b}: only pictures of one size can be wiped")
+        raise WavecombError(f"{a} and {b}: only images of the same size can be wiped")
     names = (os.path.basename(a), os.path.basename(b))
     write_png_codes(file, wipe(*shown, at, names if names[0] != names[1] else ("A", "B")))

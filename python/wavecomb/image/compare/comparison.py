@@ -243,7 +243,7 @@ def _other_bits(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
 
 
 def _name(source: Source, fallback: str) -> str:
-    return os.fspath(source) if isinstance(source, (str, os.PathLike)) else f"picture {fallback}"
+    return os.fspath(source) if isinstance(source, (str, os.PathLike)) else f"image {fallback}"
 
 
 def _size(pixels: NDArray[Any]) -> str:
