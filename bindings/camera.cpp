@@ -13,7 +13,7 @@
 #include "bind.h"
 #include "scene_values.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/scene/camera_table.h"
+#include "wavecomb/scene/camera/camera_table.h"
 
 namespace nb = nanobind;
 using namespace wavecomb;

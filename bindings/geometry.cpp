@@ -9,11 +9,11 @@
 
 #include "bind.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/geometry/ears.h"
-#include "wavecomb/geometry/plain_mesh.h"
-#include "wavecomb/geometry/quads.h"
-#include "wavecomb/geometry/screen_size.h"
-#include "wavecomb/geometry/surface.h"
+#include "wavecomb/geometry/tessellation/ears.h"
+#include "wavecomb/geometry/tessellation/plain_mesh.h"
+#include "wavecomb/geometry/tessellation/quads.h"
+#include "wavecomb/geometry/tessellation/screen_size.h"
+#include "wavecomb/geometry/tessellation/tessellation.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene.h"
 

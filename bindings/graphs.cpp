@@ -11,7 +11,7 @@
 
 #include "bind.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/graph/parameters.h"
+#include "wavecomb/graph/parameters/parameters.h"
 #include "wavecomb/graph/run.inl"
 #include "wavecomb/texture/lookup.inl"
 

@@ -13,7 +13,7 @@
 #include "bind.h"
 #include "scene_values.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/scene/light_kind.h"
+#include "wavecomb/light/description/kind_info.h"
 #include "wavecomb/scene/scene_checks.h"
 
 namespace nb = nanobind;

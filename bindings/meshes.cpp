@@ -15,7 +15,7 @@
 #include "arguments.h"
 #include "bind.h"
 #include "scene_values.h"
-#include "wavecomb/curve/splat.h"
+#include "wavecomb/geometry/gaussian_splat/gaussian_splat.h"
 #include "wavecomb/scene/scene.h"
 
 namespace nb = nanobind;

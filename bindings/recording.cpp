@@ -6,7 +6,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "bind.h"
-#include "wavecomb/render/ray_recording.h"
+#include "wavecomb/render/inspection/ray_recording.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;

@@ -20,19 +20,19 @@
 #include "wavecomb/core/aov.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/film/cryptomatte.h"
-#include "wavecomb/integrate/calibration.h"
-#include "wavecomb/integrate/ray_recorder.h"
-#include "wavecomb/render/cost_profile.h"
+#include "wavecomb/render/inspection/learned_lookup.h"
+#include "wavecomb/render/inspection/picking.h"
+#include "wavecomb/render/inspection/ray_recording.h"
 #include "wavecomb/render/lane_kernels.h"
-#include "wavecomb/render/learned.h"
-#include "wavecomb/render/pick.h"
-#include "wavecomb/render/process_memory.h"
-#include "wavecomb/render/ray_recording.h"
-#include "wavecomb/render/render_statistics.h"
 #include "wavecomb/render/renderer.h"
 #include "wavecomb/render/snapshot.h"
+#include "wavecomb/render/statistics/cost_profile.h"
+#include "wavecomb/render/statistics/process_memory.h"
+#include "wavecomb/render/statistics/render_statistics.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/schedule/policy.h"
+#include "wavecomb/wave/cost_calibration.h"
+#include "wavecomb/wave/ray_recorder.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -185,6 +185,9 @@ nb::list aov_table() {
                                            "coverage", "groups",       "expressions",
                                            "sum",      "deep",         "median"};
   static_assert(std::size(kKinds) == static_cast<size_t>(AovKind::kMedian) + 1);
+  static constexpr const char* kContents[] = {"light", "colour", "direction",
+                                              "id",    "exact",  "value"};
+  static_assert(std::size(kContents) == static_cast<size_t>(AovContent::kValue) + 1);
   nb::list rows;
   for (const AovRow& aov : kAovs) {
     // Expressions are requested by text, and deep images are separate files.
@@ -192,6 +195,8 @@ nb::list aov_table() {
     nb::dict row;
     row["name"] = aov.name;
     row["channels"] = aov.channels;
+    row["letters"] = aov.letters;
+    row["content"] = kContents[static_cast<size_t>(aov.content)];
     row["kind"] = kKinds[static_cast<size_t>(aov.kind)];
     row["title"] = aov.title;
     rows.append(row);

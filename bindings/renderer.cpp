@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Bindings of class wavecomb._core.Renderer.
 #include "wavecomb/render/renderer.h"
-#include "wavecomb/render/cost_profile.h"
-#include "wavecomb/render/learned.h"
-#include "wavecomb/render/pick.h"
-#include "wavecomb/render/render_statistics.h"
+#include "wavecomb/render/inspection/learned_lookup.h"
+#include "wavecomb/render/inspection/picking.h"
 #include "wavecomb/render/snapshot.h"
+#include "wavecomb/render/statistics/cost_profile.h"
+#include "wavecomb/render/statistics/render_statistics.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/schedule/policy.h"
 

@@ -8,11 +8,11 @@
 #include <functional>
 #include <vector>
 
-#include "wavecomb/render/cost_profile.h"
-#include "wavecomb/render/ray_recording.h"
-#include "wavecomb/render/render_statistics.h"
+#include "wavecomb/render/inspection/ray_recording.h"
 #include "wavecomb/render/renderer.h"
 #include "wavecomb/render/snapshot.h"
+#include "wavecomb/render/statistics/cost_profile.h"
+#include "wavecomb/render/statistics/render_statistics.h"
 #include "wavecomb/scene/scene.h"
 
 /// Image and statistics of a render.

@@ -15,9 +15,9 @@
 #include "camera.h"
 #include "lights.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/graph/parameters.h"
-#include "wavecomb/integrate/program_reads.h"
-#include "wavecomb/scene/material_table.h"
+#include "wavecomb/graph/parameters/parameters.h"
+#include "wavecomb/material/description/material_table.h"
+#include "wavecomb/path/program_reads.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;

@@ -4,7 +4,7 @@
 
 #include <nanobind/nanobind.h>
 
-#include "wavecomb/render/render_statistics.h"
+#include "wavecomb/render/statistics/render_statistics.h"
 
 /// Returns the `texture_store` entry of docs/statistics.md.
 nanobind::dict texture_store_dict(const wavecomb::StoreStatistics& statistics);

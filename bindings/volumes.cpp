@@ -10,9 +10,9 @@
 #include "arguments.h"
 #include "bind.h"
 #include "scene_values.h"
+#include "wavecomb/medium/description/subsurface.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene.h"
-#include "wavecomb/scene/walk_data.h"
 
 namespace nb = nanobind;
 using namespace wavecomb;

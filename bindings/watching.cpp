@@ -16,7 +16,7 @@
 #include "bind.h"
 #include "statistics.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/render/kept_training.h"
+#include "wavecomb/render/pilots/training_cache.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;

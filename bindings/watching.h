@@ -4,9 +4,9 @@
 
 #include <nanobind/nanobind.h>
 
-#include "wavecomb/render/render_statistics.h"
 #include "wavecomb/render/renderer.h"
 #include "wavecomb/render/snapshot.h"
+#include "wavecomb/render/statistics/render_statistics.h"
 #include "wavecomb/scene/scene.h"
 
 /// Returns options with callbacks to Python's `progress(done, total)` and `watcher`, either of

@@ -14,29 +14,29 @@ endfunction()
 
 # Rows of WAVECOMB_PROGRAMS: "X(name, Class, ...)" or "P(name, Class, ...)". Each program has a
 # header with its name.
-wavecomb_read_rows(programs scene/programs.h "\n  [XP]\\([a-z_0-9]+, ")
+wavecomb_read_rows(programs material/description/programs.h "\n  [XP]\\([a-z_0-9]+, ")
 list(TRANSFORM programs REPLACE "^.*\\(([a-z_0-9]+), $" "\\1")
 file(GLOB program_headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/material/programs/*.h")
 list(TRANSFORM program_headers REPLACE "^.*/([^/]+)\\.h$" "\\1")
 foreach(program IN LISTS programs)
   if(NOT program IN_LIST program_headers)
-    message(FATAL_ERROR "WAVECOMB_PROGRAMS (src/wavecomb/scene/programs.h) has a program \"${program}\", and "
+    message(FATAL_ERROR "WAVECOMB_PROGRAMS (src/wavecomb/material/description/programs.h) has a program \"${program}\", and "
       "there is no src/wavecomb/material/programs/${program}.h")
   endif()
 endforeach()
 foreach(program IN LISTS program_headers)
   if(NOT program IN_LIST programs)
     message(FATAL_ERROR "src/wavecomb/material/programs/${program}.h is there, and WAVECOMB_PROGRAMS "
-      "(src/wavecomb/scene/programs.h) has no row for it")
+      "(src/wavecomb/material/description/programs.h) has no row for it")
   endif()
 endforeach()
 # Programs of media: rows of WAVECOMB_MEDIUM_PROGRAMS, "M(name, Class, ...)". They have no separate
 # compilation units.
-wavecomb_read_rows(media scene/programs.h " M\\([a-z_0-9]+, ")
+wavecomb_read_rows(media material/description/programs.h " M\\([a-z_0-9]+, ")
 list(TRANSFORM media REPLACE "^.*\\(([a-z_0-9]+), $" "\\1")
 # Variants as "name:program": first the full programs, then rows of WAVECOMB_VARIANTS, "X(name,
 # program, parts)".
-wavecomb_read_rows(reduced scene/material_parts.h "\n  X\\([a-z_0-9]+, [a-z_0-9]+, ")
+wavecomb_read_rows(reduced material/description/variants.h "\n  X\\([a-z_0-9]+, [a-z_0-9]+, ")
 list(TRANSFORM reduced REPLACE "^.*\\(([a-z_0-9]+), ([a-z_0-9]+), $" "\\1:\\2")
 set(variants ${programs} ${media})
 list(TRANSFORM variants REPLACE "^(.+)$" "\\1:\\1")
@@ -45,31 +45,33 @@ set(lane_sources ${core_sources})
 list(FILTER lane_sources INCLUDE REGEX "\\.lanes\\.cpp$")
 list(FILTER core_sources EXCLUDE REGEX "\\.lanes\\.cpp$|/render/lane_kernels\\.cpp$")
 # Sources excluded from unity batches (WAVECOMB_BATCH), because they reuse local names of others:
-# lights, and bare_traversal.cpp.
-file(GLOB alone "${PROJECT_SOURCE_DIR}/src/wavecomb/light/*.cpp")
-list(APPEND alone "${PROJECT_SOURCE_DIR}/src/wavecomb/accel/bare_traversal.cpp")
-set(refiner "${PROJECT_SOURCE_DIR}/src/wavecomb/geometry/subdivision.cpp")
+# lights, bare_traversal.cpp and ears.cpp.
+file(GLOB alone "${PROJECT_SOURCE_DIR}/src/wavecomb/light/kinds/*.cpp" "${PROJECT_SOURCE_DIR}/src/wavecomb/light/filters/*.cpp")
+list(APPEND alone "${PROJECT_SOURCE_DIR}/src/wavecomb/accel/bare_traversal.cpp" "${PROJECT_SOURCE_DIR}/src/wavecomb/geometry/tessellation/ears.cpp")
+set(refiner "${PROJECT_SOURCE_DIR}/src/wavecomb/geometry/tessellation/subdivision.cpp")
 set_source_files_properties(${alone} ${refiner} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 if(WAVECOMB_SANITIZE)
   # Sanitizers triple the time to optimise OpenSubdiv's templates.
   set_source_files_properties(${refiner} PROPERTIES COMPILE_OPTIONS -O0 SKIP_PRECOMPILE_HEADERS ON)
 endif()
-# Sources of scene/, render/ and core/ whose speed no render notices (checks, tables, the plan of a
-# render) are compiled with -O1, which takes a compiler two thirds of the time. Excepted are loops
-# over vertices, texels, pixels and training samples.
+# Sources whose speed no render notices (descriptions, checks, tables, the plan of a render) are
+# compiled with -O1, which takes a compiler two thirds of the time. Excepted are loops over
+# vertices, texels, pixels and training samples.
 set(cold ${core_sources})
-list(FILTER cold INCLUDE REGEX "/src/wavecomb/(scene|render|core)/[a-z_]+\\.cpp$")
-foreach(name IN ITEMS scene/fingerprint scene/image_distribution scene/light_cluster scene/light_motion scene/light_tree
-    scene/mesh_attributes scene/mesh_tangents scene/object_bounds scene/parallel scene/scene_records scene/triangle_means
-    scene/volume_grid scene/volume_motion scene/walk_data render/adaptive render/allotment render/bounce_reader
-    render/guide_training render/light_parts render/picture_tiles render/pixel_order)
+list(FILTER cold INCLUDE REGEX
+  "/src/wavecomb/(core|scene|render|(light|material|medium)/description|light/(tree|calibration)|geometry/mesh|graph/parameters)/([a-z_]+/)?[a-z_]+\\.cpp$")
+foreach(name IN ITEMS geometry/mesh/attributes geometry/mesh/tangents light/calibration/partition
+    light/description/image_distribution light/description/motion light/description/triangle_means light/tree/light_cluster
+    light/tree/light_tree medium/description/subsurface medium/description/volume_grid medium/description/volume_motion
+    render/passes/adaptive render/passes/allotment render/passes/pixel_order render/pilots/guiding_training
+    scene/fingerprint scene/object_bounds scene/parallel scene/scene_records)
   set(source "${PROJECT_SOURCE_DIR}/src/wavecomb/${name}.cpp")
   if(NOT source IN_LIST cold)
     message(FATAL_ERROR "cmake/WavecombCore.cmake lists ${source}, which is not there")
   endif()
   list(REMOVE_ITEM cold "${source}")
 endforeach()
-list(APPEND cold ${refiner})
+list(APPEND cold ${refiner} "${PROJECT_SOURCE_DIR}/src/wavecomb/light_paths/setup.cpp")
 list(REMOVE_ITEM core_sources ${cold})
 file(GLOB_RECURSE core_headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/*.h"
   "${PROJECT_SOURCE_DIR}/src/wavecomb/*.inl")
@@ -82,12 +84,17 @@ set(wavecomb_pch <algorithm> <array> <chrono> <cmath> <cstring> <functional> <li
   <optional> <span> <string> <utility> <vector> <drjit/packet.h>)
 
 # Rows of WAVECOMB_KERNELS as "kind:set:widths:reduced".
-wavecomb_read_rows(kernels integrate/kernel_matrix.h "\n  X\\([a-z]+, [a-z]+, [a-z]+, [a-z]+, ")
+wavecomb_read_rows(kernels wave/kernels/kernel_matrix.h "\n  X\\([a-z]+, [a-z]+, [a-z]+, [a-z]+, ")
 list(TRANSFORM kernels REPLACE "^.*\\(([a-z]+), ([a-z]+), ([a-z]+), ([a-z]+), $" "\\1:\\2:\\3:\\4")
 
 # wavecomb_kernel_units(VAR KIND SET WIDTH): generates the units of a row of WAVECOMB_KERNELS for
 # WIDTH lanes in the build tree. SET is `programs`, `variants` or `first` (the first program).
 function(wavecomb_kernel_units var kind set width)
+  file(GLOB_RECURSE template "${PROJECT_SOURCE_DIR}/src/wavecomb/${kind}.lanes.cpp.in")
+  if(NOT template)
+    message(FATAL_ERROR "WAVECOMB_KERNELS (src/wavecomb/wave/kernels/kernel_matrix.h) has the kind \"${kind}\", and "
+      "there is no ${kind}.lanes.cpp.in in src/wavecomb")
+  endif()
   set(units "")
   set(index 0)
   foreach(row IN LISTS variants)
@@ -97,7 +104,7 @@ function(wavecomb_kernel_units var kind set width)
     if(NOT program IN_LIST media AND (set STREQUAL "variants" OR member STREQUAL program)
         AND (NOT set STREQUAL "first" OR index EQUAL 0))
       set(unit "${PROJECT_BINARY_DIR}/lanes/${kind}_${member}_${width}.cpp")
-      configure_file("${PROJECT_SOURCE_DIR}/src/wavecomb/integrate/${kind}.lanes.cpp.in" "${unit}" @ONLY)
+      configure_file("${template}" "${unit}" @ONLY)
       # With WAVECOMB_BATCH there is a unit for each program and width.
       set_source_files_properties("${unit}" PROPERTIES UNITY_GROUP "${program}")
       list(APPEND units "${unit}")
@@ -209,10 +216,10 @@ function(wavecomb_add_core name flags)
     set_target_properties(${lanes} PROPERTIES UNITY_BUILD ${WAVECOMB_BATCH} UNITY_BUILD_MODE GROUP)
   endforeach()
   # Headers that units of kernels include, except programs and code specific to each kernel.
-  set(kernel_pch ${wavecomb_pch} <wavecomb/integrate/shared_kernels.h> <wavecomb/integrate/wave.h>
-    <wavecomb/integrate/stages/order_rays.h>)
+  set(kernel_pch ${wavecomb_pch} <wavecomb/wave/kernels/shared_kernels.h> <wavecomb/wave/wave.h>
+    <wavecomb/wave/stages/order_rays.h>)
   foreach(step IN ITEMS interact emit sample_light scatter survive)
-    list(APPEND kernel_pch <wavecomb/integrate/steps/${step}.h>)
+    list(APPEND kernel_pch <wavecomb/path/steps/${step}.h>)
   endforeach()
   target_precompile_headers(${name}_scalar PRIVATE ${kernel_pch})
   if(packets)

@@ -87,7 +87,7 @@ function(wavecomb_add_flags name arch)
     set(label default)
   endif()
   add_library(${name} INTERFACE)
-  # Sanitized builds have fewer kernels that contain the same code (integrate/kernel_matrix.h).
+  # Sanitized builds have fewer kernels that contain the same code (wave/kernels/kernel_matrix.h).
   set(reduced 0)
   if(WAVECOMB_SANITIZE AND NOT WAVECOMB_SANITIZE STREQUAL "all")
     set(reduced 1)

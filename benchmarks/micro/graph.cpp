@@ -5,7 +5,7 @@
 #include <random>
 
 #include "scene_testing.h"
-#include "wavecomb/graph/parameters.h"
+#include "wavecomb/graph/parameters/parameters.h"
 #include "wavecomb/material/openpbr_params.h"
 #include "widths.h"
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "light_testing.h"
-#include "wavecomb/scene/light_table.h"
+#include "wavecomb/light/description/light_table.h"
 #include "widths.h"
 
 namespace wavecomb::micro {

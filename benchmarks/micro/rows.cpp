@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "wavecomb/core/rows.h"
+#include "wavecomb/core/rows/rows.h"
 #include "widths.h"
 
 namespace wavecomb::micro {

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "wavecomb/core/rows.h"
+#include "wavecomb/core/rows/rows.h"
 #include "wavecomb/schedule/radix_sort.h"
 #include "wavecomb/schedule/shading_queue.h"
 #include "widths.h"

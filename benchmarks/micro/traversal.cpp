@@ -4,7 +4,7 @@
 
 #include "scene_testing.h"
 #include "spheres.h"
-#include "wavecomb/render/ray_recording.h"
+#include "wavecomb/render/inspection/ray_recording.h"
 #include "widths.h"
 
 namespace wavecomb::micro {

@@ -11,7 +11,7 @@
 #include "embree_modes.h"
 #include "scene_testing.h"
 #include "spheres.h"
-#include "wavecomb/integrate/ray_recorder.h"
+#include "wavecomb/wave/ray_recorder.h"
 
 namespace wavecomb::micro {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <string>
 
-#include "wavecomb/core/lanes.h"
+#include "wavecomb/core/lanes/lanes.h"
 
 namespace wavecomb::micro {
 

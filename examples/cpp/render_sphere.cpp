@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "wavecomb/core/error.h"
-#include "wavecomb/render/render_statistics.h"
 #include "wavecomb/render/renderer.h"
 #include "wavecomb/render/snapshot.h"
+#include "wavecomb/render/statistics/render_statistics.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wc = wavecomb;

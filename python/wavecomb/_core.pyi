@@ -969,7 +969,7 @@ class Renderer:
 
         Returns None without a surface or before training. Keys: axis, the dominant axis of the
         normal, "+x" ... "-z". density: density of guided bounces per steradian, (16, 16) float32,
-        rows of Clarberg's square (learn/directions.h); None if the guiding field has no region
+        rows of Clarberg's square (guiding/directions.h); None if the guiding field has no region
         there. With a region also guided_share (the fraction of guided bounces) and survival (of the
         trained roulette at throughput 1; 0 if unknown). light_shares: names of lights and emissive
         meshes with their selection probabilities there, largest first, estimated from 4,096

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of cameras, from the core's table (scene/camera_table.h).
+"""Parameters of cameras, from the core's table (scene/camera/camera_table.h).
 
 They determine the keywords of ``SceneBuilder.set_camera`` and its stub, the calls that a sandboxed
 process may make, the parameters that frames of a sequence share, and camera poses in the window.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of lights, from the core's table (scene/light_table.h).
+"""Parameters of lights, from the core's table (light/description/light_table.h).
 
 They determine the keywords of ``SceneBuilder.add_light`` and its stub, the calls that a sandboxed
 process may make, the inputs that the loader reads, and the window's fields.

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "scene_testing.h"
-#include "wavecomb/curve/segment.h"
-#include "wavecomb/curve/splat.h"
+#include "wavecomb/geometry/curve/segment.h"
+#include "wavecomb/geometry/gaussian_splat/gaussian_splat.h"
 
 namespace wavecomb::curve_testing {
 

@@ -6,7 +6,7 @@
 #include <initializer_list>
 
 #include "wavecomb/graph/graph.h"
-#include "wavecomb/graph/parameters.h"
+#include "wavecomb/graph/parameters/parameters.h"
 
 namespace wavecomb {
 

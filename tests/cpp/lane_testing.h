@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "wavecomb/core/lanes.h"
+#include "wavecomb/core/lanes/lanes.h"
 #include "wavecomb/core/vec.h"
 
 namespace wavecomb::lane_testing {

@@ -339,7 +339,8 @@ inline chi_square::Case light_case(std::string name, const LightView& view,
                         : detail::hit_distant<float>(detail::LightReader<float>(r, true), dir).pdf;
         // light weights do not change it
         h.pdf *= view.by_tree ? view.tree.infinite_pdf[light] : r.pick_pdf;
-        h.radiance = infinite_light_radiance<float>(view, light, to.p, dir, 0.f, true, true);
+        h.radiance = infinite_light_radiance<float>(
+            view, light, {.from = to.p, .dir = dir, .is_delta = true}, true);
       } else if (light < view.first_triangle) {
         h = light_hit<float>(view, light, to, dir, distance, true);
       } else {

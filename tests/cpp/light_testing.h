@@ -4,9 +4,9 @@
 
 #include <optional>
 
-#include "wavecomb/light/escape.h"
-#include "wavecomb/light/light.h"
-#include "wavecomb/scene/light_builder.h"
+#include "wavecomb/light/description/light_builder.h"
+#include "wavecomb/light/sampling/escape.h"
+#include "wavecomb/light/sampling/light_sample.h"
 
 namespace wavecomb::light_testing {
 
@@ -44,9 +44,12 @@ struct Lights {
   }
   void build(const std::vector<Light>& lights, const std::vector<EmissiveTriangle>& triangles = {},
              float scene_radius = 10.f) {
-    set = build_lights(
-        lights, triangles.size(), [&triangles](size_t i) { return triangles[i]; }, {0, 0, 0},
-        scene_radius, textures, nullptr, profiles);
+    set = build_lights({.lights = lights,
+                        .triangle_count = triangles.size(),
+                        .triangle = [&triangles](size_t i) { return triangles[i]; },
+                        .scene_radius = scene_radius,
+                        .textures = textures,
+                        .profiles = profiles});
   }
   LightView view() const { return set.view({records.data(), uses.data(), views.data()}); }
 };

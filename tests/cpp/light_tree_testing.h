@@ -8,7 +8,7 @@
 
 #include "light_testing.h"
 #include "wavecomb/core/warp.h"
-#include "wavecomb/light/light_tree.h"
+#include "wavecomb/light/sampling/tree_choice.h"
 
 namespace wavecomb::light_testing {
 

@@ -7,9 +7,9 @@
 #include "wavecomb/core/hash.h"
 #include "wavecomb/core/math.h"
 #include "wavecomb/core/warp.h"
-#include "wavecomb/integrate/media.h"
-#include "wavecomb/integrate/path_state.h"
 #include "wavecomb/material/bsdf.h"
+#include "wavecomb/path/media.h"
+#include "wavecomb/path/path_state.h"
 
 namespace wavecomb::media_testing {
 
@@ -36,7 +36,7 @@ class FogPhase : public BsdfTraits {
     return {square_to_sphere(u, v), albedo_, F(kDensity), Mask<F>(false), F(1.f), F(1.f)};
   }
 
-  /// Interaction with the fog, in place of a surface (integrate/steps/interact.h).
+  /// Interaction with the fog, in place of a surface (path/steps/interact.h).
   struct Interaction {
     FogPhase bsdf;
     Color<F> throughput;
@@ -65,7 +65,7 @@ class FogPhase : public BsdfTraits {
   Color<F> albedo_;
 };
 
-/// Medium interface as integrate/media.h requires it.
+/// Medium interface as path/media.h requires it.
 struct Fog {
   static constexpr bool kAny = true, kShines = false, kStreams = false;
   template <typename F>

@@ -4,9 +4,9 @@
 
 #include "graph_ops.h"
 #include "wave_testing.h"
-#include "wavecomb/scene/graph_ranges.h"
-#include "wavecomb/scene/material_parts.h"
-#include "wavecomb/scene/settled_material.h"
+#include "wavecomb/graph/parameters/ranges.h"
+#include "wavecomb/material/description/simplified_material.h"
+#include "wavecomb/material/description/variants.h"
 
 namespace wavecomb::range_testing {
 

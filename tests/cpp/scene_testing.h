@@ -16,10 +16,10 @@
 #include <vector>
 
 #include "wavecomb/core/error.h"
-#include "wavecomb/light/kinds.h"
-#include "wavecomb/render/render_statistics.h"
+#include "wavecomb/light/kinds/kinds.h"
 #include "wavecomb/render/renderer.h"
 #include "wavecomb/render/snapshot.h"
+#include "wavecomb/render/statistics/render_statistics.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb::scene_testing {

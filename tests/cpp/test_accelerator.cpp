@@ -7,7 +7,7 @@
 #include "curve_testing.h"
 #include "wavecomb/accel/presence.h"
 #include "wavecomb/core/denormals.h"
-#include "wavecomb/integrate/stages/order_rays.h"
+#include "wavecomb/wave/stages/order_rays.h"
 
 namespace wavecomb {
 namespace {
@@ -882,7 +882,9 @@ TEST(Accelerator, PresenceByItself) {
   for (int i = 0; i < 100; ++i) {
     const float u = (static_cast<float>(i) + 0.5f) / 100;
     // Triangle 0 has uv (0, 0), (1, 0), (1, 1), so u = b1 + b2 and v = b2.
-    EXPECT_EQ(is_present(scene->view(), 0, mesh, 0, u, 0, 0, keys.keys()), u > 0.5f) << u;
+    const PresenceQuery at{
+        .instance = 0, .geom = 0, .mesh = mesh, .prim = 0, .u = u, .v = 0, .slot = 0};
+    EXPECT_EQ(is_present(scene->view(), at, keys.keys()), u > 0.5f) << u;
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/render/adaptive.h"
+#include "wavecomb/render/passes/adaptive.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/render/allotment.h"
+#include "wavecomb/render/passes/allotment.h"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "lane_testing.h"
-#include "wavecomb/scene/mesh_attributes.h"
+#include "wavecomb/geometry/mesh/attributes.h"
 #include "wavecomb/texture/attribute.h"
 
 namespace wavecomb {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/integrate/camera_ray.h"
+#include "wavecomb/path/camera/camera_ray.h"
 
 #include <tuple>
 

@@ -8,10 +8,10 @@
 #include "parts.h"
 #include "wavecomb/core/frame.h"
 #include "wavecomb/film/film.h"
-#include "wavecomb/film/splat_filter.h"
-#include "wavecomb/integrate/camera_connection.h"
-#include "wavecomb/integrate/camera_ray.h"
-#include "wavecomb/render/light_paths.h"
+#include "wavecomb/film/light_splat_filter.h"
+#include "wavecomb/light_paths/camera_connection.h"
+#include "wavecomb/light_paths/setup.h"
+#include "wavecomb/path/camera/camera_ray.h"
 
 namespace wavecomb {
 namespace {

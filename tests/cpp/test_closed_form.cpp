@@ -3,9 +3,9 @@
 #include "curve_testing.h"
 #include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/core/sampler.h"
-#include "wavecomb/integrate/vertex.h"
-#include "wavecomb/light/light.h"
+#include "wavecomb/light/sampling/light_sample.h"
 #include "wavecomb/material/program_table.h"
+#include "wavecomb/path/vertex.h"
 
 namespace wavecomb {
 namespace {

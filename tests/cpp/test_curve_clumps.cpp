@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "curve_testing.h"
-#include "wavecomb/curve/clumps.h"
+#include "wavecomb/geometry/curve/bvh_nodes.h"
 
 namespace wavecomb {
 namespace {

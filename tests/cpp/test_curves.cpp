@@ -5,8 +5,8 @@
 #include "lane_testing.h"
 #include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/core/denormals.h"
-#include "wavecomb/curve/intersect.h"
-#include "wavecomb/surface/surface.h"
+#include "wavecomb/geometry/curve/intersect.h"
+#include "wavecomb/geometry/hit/surface.h"
 
 namespace wavecomb {
 namespace {

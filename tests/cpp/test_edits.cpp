@@ -8,9 +8,9 @@
 
 #include "scene_testing.h"
 #include "wavecomb/accel/embree_accelerator.h"
-#include "wavecomb/render/cost_profile.h"
-#include "wavecomb/render/pick.h"
+#include "wavecomb/render/inspection/picking.h"
 #include "wavecomb/render/renderer.h"
+#include "wavecomb/render/statistics/cost_profile.h"
 
 namespace wavecomb {
 namespace {

@@ -8,7 +8,7 @@
 #include "chi_square.h"
 #include "lane_testing.h"
 #include "light_testing.h"
-#include "wavecomb/light/emission.h"
+#include "wavecomb/light/emission/emission.h"
 
 namespace wavecomb {
 namespace {

@@ -7,7 +7,7 @@
 #include "scene_testing.h"
 #include "wavecomb/accel/presence.h"
 #include "wavecomb/core/warp.h"
-#include "wavecomb/light/light.h"
+#include "wavecomb/light/sampling/light_sample.h"
 
 namespace wavecomb {
 namespace {
@@ -243,7 +243,17 @@ TEST(EmissivePresence, RaysMeetItAsOftenAsItsOpacitySays) {
       if (opacity < 0) continue;
       uint32_t met = 0;
       for (uint32_t path = 0; path < kPaths; ++path)
-        met += is_present(scene->view(), 1, mesh, 0, at.u, at.v, path, keys) ? 1 : 0;
+        met += is_present(scene->view(),
+                          {.instance = 1,
+                           .geom = 0,
+                           .mesh = mesh,
+                           .prim = 0,
+                           .u = at.u,
+                           .v = at.v,
+                           .slot = path},
+                          keys)
+                   ? 1
+                   : 0;
       // 156 comparisons with 4.5 standard errors each.
       const double error = std::sqrt(opacity * (1 - opacity) / kPaths);
       EXPECT_NEAR(static_cast<double>(met) / kPaths, opacity, 4.5 * error + 1e-6) << one.name;

@@ -7,7 +7,7 @@
 
 #include "wavecomb/film/film.h"
 #include "wavecomb/film/filter.h"
-#include "wavecomb/integrate/camera_ray.h"
+#include "wavecomb/path/camera/camera_ray.h"
 
 namespace wavecomb {
 namespace {

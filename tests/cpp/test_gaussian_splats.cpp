@@ -7,9 +7,9 @@
 #include <numbers>
 
 #include "curve_testing.h"
-#include "wavecomb/curve/harmonics.h"
-#include "wavecomb/curve/intersect.h"
-#include "wavecomb/surface/surface.h"
+#include "wavecomb/geometry/curve/intersect.h"
+#include "wavecomb/geometry/gaussian_splat/harmonics.h"
+#include "wavecomb/geometry/hit/surface.h"
 
 namespace wavecomb {
 namespace {

@@ -10,8 +10,8 @@
 #include "graph_ops.h"
 #include "lane_testing.h"
 #include "wavecomb/graph/noise.h"
+#include "wavecomb/light/description/triangle_means.h"
 #include "wavecomb/material/openpbr_params.h"
-#include "wavecomb/scene/triangle_means.h"
 
 namespace wavecomb {
 namespace {

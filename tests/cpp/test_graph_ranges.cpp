@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Ranges of value graphs by interval arithmetic: results stay within their range, and features
 // outside of it are excluded from material variants.
-#include "wavecomb/scene/graph_ranges.h"
+#include "wavecomb/graph/parameters/ranges.h"
 
 #include "range_testing.h"
 #include "wavecomb/graph/run.h"

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 /// The guiding field: equal-area map, tables, cells, and lookup.
-#include "wavecomb/learn/guide.h"
+#include "wavecomb/guiding/lookup.h"
 
 #include "bsdf_testing.h"
 #include "lane_testing.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/learn/guide_directions.h"
-#include "wavecomb/learn/guide_field.h"
-#include "wavecomb/learn/guide_shares.h"
-#include "wavecomb/learn/guide_table.h"
-#include "wavecomb/learn/worth.h"
+#include "wavecomb/guiding/field.h"
+#include "wavecomb/guiding/mixing_fractions.h"
+#include "wavecomb/guiding/region_directions.h"
+#include "wavecomb/guiding/roulette.h"
+#include "wavecomb/guiding/sampling_table.h"
 
 namespace wavecomb {
 namespace {

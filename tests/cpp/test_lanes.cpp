@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Every operation of core/lanes.h at every width, compared with scalar loops.
+/// Every operation of core/lanes/lanes.h at every width, compared with scalar loops.
 #include "lane_testing.h"
 
 #include <cstring>

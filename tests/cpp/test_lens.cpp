@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/integrate/lens.h"
+#include "wavecomb/path/camera/lens.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 
 #include "lane_testing.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/integrate/camera_ray.h"
+#include "wavecomb/path/camera/camera_ray.h"
 
 namespace wavecomb {
 namespace {

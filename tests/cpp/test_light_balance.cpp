@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/render/light_balance.h"
+#include "wavecomb/light/calibration/balance.h"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/scene/light_builder.h"
+#include "wavecomb/light/description/light_builder.h"
 
 #include "lane_testing.h"
 #include "light_testing.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/light/light.inl"
+#include "wavecomb/light/sampling/light_sample.inl"
 
 namespace wavecomb {
 namespace {

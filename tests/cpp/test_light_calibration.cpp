@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/render/light_calibration.h"
+#include "wavecomb/render/pilots/light_calibration.h"
 
 #include <cmath>
 #include <numeric>
 
 #include "scene_testing.h"
-#include "wavecomb/scene/light_builder.h"
+#include "wavecomb/light/description/light_builder.h"
 
 namespace wavecomb {
 namespace {

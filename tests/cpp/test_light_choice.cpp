@@ -9,8 +9,8 @@
 #include "chi_square.h"
 #include "light_tree_testing.h"
 #include "parts.h"
-#include "wavecomb/light/light.h"
-#include "wavecomb/render/light_parts.h"
+#include "wavecomb/light/calibration/partition.h"
+#include "wavecomb/light/sampling/light_sample.h"
 
 namespace wavecomb {
 namespace {

@@ -170,8 +170,11 @@ TEST(LightSamples, OfTrianglesFollowTheirDensity) {
   std::vector<EmissiveTriangle> mesh = {wide, other};
   for (EmissiveTriangle& t : mesh) t.mesh_light = 0;
   Lights lit;
-  lit.set = build_lights({}, mesh.size(), [&](size_t i) { return mesh[i]; }, {0, 0, 0}, 10,
-                         lit.textures, nullptr, {}, {&placed, 1});
+  lit.set = build_lights({.triangle_count = mesh.size(),
+                          .triangle = [&](size_t i) { return mesh[i]; },
+                          .scene_radius = 10,
+                          .textures = lit.textures,
+                          .mesh_lights = {&placed, 1}});
   see(battery, "mesh light", lit, kFlat);
   battery.judge();
 }

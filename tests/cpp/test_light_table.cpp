@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// The table of light parameters: its rows, and the checks and fingerprint derived from it.
-#include "wavecomb/scene/light_table.h"
+#include "wavecomb/light/description/light_table.h"
 
 #include <gtest/gtest.h>
 

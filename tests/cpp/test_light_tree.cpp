@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Light selection by tree: probabilities, bounds, and agreement of packets with scalars.
 /// test_light_choice.cpp tests frequencies.
-#include "wavecomb/light/light_tree.h"
+#include "wavecomb/light/sampling/tree_choice.h"
 
 #include <chrono>
 #include <random>
 
 #include "lane_testing.h"
 #include "light_tree_testing.h"
-#include "wavecomb/light/light.inl"
-#include "wavecomb/scene/light_cluster.h"
-#include "wavecomb/scene/light_tree.h"
+#include "wavecomb/light/sampling/light_sample.inl"
+#include "wavecomb/light/tree/light_cluster.h"
+#include "wavecomb/light/tree/light_tree.h"
 
 namespace wavecomb {
 namespace {

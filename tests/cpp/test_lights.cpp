@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Lights: both techniques of MIS, closed forms of irradiance, textured lights, and lanes.
 /// test_light_samples.cpp has the chi-square tests.
-#include "wavecomb/light/light.h"
+#include "wavecomb/light/sampling/light_sample.h"
 
 #include <functional>
 
@@ -120,7 +120,8 @@ TEST(LightSampling, HitDensityIsTheSamplingDensity) {
       if (!is_dome_image) {
         ASSERT_NEAR(s.weight.y * s.pdf, 3, 1e-5);
       }
-      const Color<float> escaped = escaped_radiance<float>(view, c.from, s.wi, 0.f, true, true);
+      const Color<float> escaped =
+          escaped_radiance<float>(view, {.from = c.from, .dir = s.wi, .is_delta = true}, true);
       if (view.infinite_count) {
         ASSERT_NEAR(escaped.y, s.weight.y * s.pdf, 1e-3 * escaped.y + 1e-5) << c.name;
       }
@@ -150,8 +151,10 @@ TEST(LightSampling, BothHalvesOfMisSumTo1) {
       const float light_half = balance_weight<float>(s.pdf, bsdf_pdf);
       float bsdf_half = 0;
       if (view.infinite_count) {
-        const float all = escaped_radiance<float>(view, c.from, s.wi, bsdf_pdf, true, true).y;
-        bsdf_half = escaped_radiance<float>(view, c.from, s.wi, bsdf_pdf, false, true).y / all;
+        EscapedRay<float> ray{.from = c.from, .dir = s.wi, .bsdf_pdf = bsdf_pdf};
+        const float weighted = escaped_radiance<float>(view, ray, true).y;
+        ray.is_delta = true;
+        bsdf_half = weighted / escaped_radiance<float>(view, ray, true).y;
       } else {
         bsdf_half = balance_weight<float>(bsdf_pdf, density(c.lights, c.from, s.wi));
       }
@@ -281,7 +284,8 @@ TEST(Irradiance, Domes) {
     for (int i = 0; i < kN; ++i) {
       const double z = (j + 0.5) / kN, phi = 2 * kPiD * (i + 0.5) / kN;
       const auto radiance = escaped_radiance<float>(
-          lights.view(), kOrigin, bsdf_testing::direction(z, phi), 0.f, true, true);
+          lights.view(),
+          {.from = kOrigin, .dir = bsdf_testing::direction(z, phi), .is_delta = true}, true);
       exact += static_cast<double>(radiance.y) * z * 2 * kPiD / kN / kN;
     }
   EXPECT_NEAR(irradiance(lights, kOrigin, kUp) / exact, 1, 3e-3);
@@ -368,7 +372,8 @@ TEST(TexturedLights, DomeFollowsOpenExrsConvention) {
   light.texture = lights.add_texture(kW, kH, rgb);
   lights.build({light});
   const auto seen = [&](float x, float y, float z) {
-    return escaped_radiance<float>(lights.view(), kOrigin, {x, y, z}, 0.f, true, true);
+    return escaped_radiance<float>(lights.view(),
+                                   {.from = kOrigin, .dir = {x, y, z}, .is_delta = true}, true);
   };
   EXPECT_NEAR(seen(1, 0, 0).x, 1, 1e-5);
   EXPECT_NEAR(seen(0, 0, 1).y, 1, 1e-5);
@@ -476,8 +481,9 @@ TEST(LightLanes, PacketsGiveTheBitsOfScalars) {
       const auto hit = light_hit<F>(view, id, p, dir, at(7), active);
       for (const F& x : {hit.radiance.x, hit.radiance.z, hit.pdf}) put(x);
       put(triangle_light_pdf<F>(view, id, p, dir, at(7), active));
-      const auto escaped =
-          escaped_radiance<F>(view, Vec3<F>(F(0.f)), dir, at(7), at(6) < 0.3f, active);
+      const auto escaped = escaped_radiance<F>(
+          view, {.from = Vec3<F>(F(0.f)), .dir = dir, .bsdf_pdf = at(7), .is_delta = at(6) < 0.3f},
+          active);
       for (const F& x : {escaped.x, escaped.y, escaped.z}) put(x);
     }
   };
@@ -494,7 +500,8 @@ TEST(LightLanes, PacketsGiveTheBitsOfScalars) {
 TEST(LightEdges, NoLightsAndDarkLights) {
   const Lights none(std::vector<Light>{});
   EXPECT_FALSE(sample_light<float>(none.view(), kOrigin, 0.5f, 0.5f, 0.5f, true).valid);
-  EXPECT_EQ(escaped_radiance<float>(none.view(), kOrigin, kUp, 1.f, true, true).x, 0);
+  const EscapedRay<float> up{.from = kOrigin, .dir = kUp, .bsdf_pdf = 1.f, .is_delta = true};
+  EXPECT_EQ(escaped_radiance<float>(none.view(), up, true).x, 0);
   Light black = make_light(LightKind::kDome);
   black.color = {0, 0, 0};
   const Lights dark({black});

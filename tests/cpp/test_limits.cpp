@@ -141,7 +141,11 @@ LightSet many_lights(size_t most_picked, float mean_scale = 1) {
     for (float& c : t.radiance) c *= mean_scale;
     return t;
   };
-  return build_lights(lights, 100, triangle, {0, 0, 0}, 20.f, {}, nullptr, {}, {}, most_picked);
+  return build_lights({.lights = lights,
+                       .triangle_count = 100,
+                       .triangle = triangle,
+                       .scene_radius = 20.f,
+                       .most_picked = most_picked});
 }
 
 TEST(Limits, the_tree_alone_chooses_among_more_lights_than_a_table_can) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Lights that affect surfaces differently: multipliers, hidden shapes, and light linking.
 #include "scene_testing.h"
-#include "wavecomb/scene/links.h"
+#include "wavecomb/light/description/linking.h"
 
 namespace wavecomb {
 namespace {

@@ -105,11 +105,12 @@ TEST(LobeSamples, ReflectionAndRefraction) {
         battery.run(lobe_case(
             named("dielectric of", double{ior}) + named(", alpha", double{alpha}), from,
             [=, ior = ior](const Vec& wi) {
-              return eval_rough_dielectric(ggx, ior, white, false, from, wi).pdf;
+              return eval_rough_dielectric<float>({ggx, ior, white, 0.5f, false}, from, wi).pdf;
             },
             [=, ior = ior](Random& random) {
               const float l = random(), u = random(), v = random();
-              const auto s = sample_rough_dielectric(ggx, 0.5f, ior, white, false, from, l, u, v);
+              const auto s =
+                  sample_rough_dielectric<float>({ggx, ior, white, 0.5f, false}, from, l, u, v);
               return s.pdf > 0 ? s.wi : Vec(0.f);
             }));
       }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/scene/material_table.h"
+#include "wavecomb/material/description/material_table.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <string>
 
 #include "wavecomb/core/error.h"
-#include "wavecomb/scene/material_parts.h"
+#include "wavecomb/material/description/variants.h"
 #include "wavecomb/scene/scene_checks.h"
 
 namespace wavecomb {
@@ -23,7 +23,7 @@ TEST(ProgramList, ModelCostsAreThoseOfBeforeThereWasAList) {
     EXPECT_STREQ(kPrograms[i].name, names[i]);
     EXPECT_STREQ(kProgramNames[i], names[i]);
     EXPECT_EQ(kPrograms[i].model_ns, ns[i]);
-    EXPECT_EQ(kPrograms[i].can_emit, i >= 4);
+    EXPECT_EQ(can_emit(static_cast<ProgramId>(i)), i >= 4);
     EXPECT_EQ(kPrograms[i].own_count(), 0u);
   }
   for (uint32_t i = 0; i < kProgramCount; ++i)

@@ -2,10 +2,10 @@
 // Medium events, and shadow rays with coloured transmittance: fog in both integrators.
 #include "media_testing.h"
 #include "wave_testing.h"
-#include "wavecomb/integrate/run_wave.h"
-#include "wavecomb/integrate/stages/shade_batch.h"
-#include "wavecomb/integrate/trace_task.h"
 #include "wavecomb/material/program_table.h"
+#include "wavecomb/reference/trace_task.h"
+#include "wavecomb/wave/run_wave.h"
+#include "wavecomb/wave/stages/shade_batch.h"
 
 namespace wavecomb {
 namespace {

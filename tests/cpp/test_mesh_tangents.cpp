@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Smoothly interpolated tangents: meshes that have them, where they are split, and their
 /// orientation.
-#include "wavecomb/scene/mesh_tangents.h"
+#include "wavecomb/geometry/mesh/tangents.h"
 
 #include "lane_testing.h"
 #include "scene_testing.h"
 #include "wavecomb/core/octahedral.h"
+#include "wavecomb/geometry/hit/surface.h"
 #include "wavecomb/scene/parallel.h"
-#include "wavecomb/surface/surface.h"
 
 namespace wavecomb {
 namespace {

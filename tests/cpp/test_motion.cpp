@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Motion blur: compared with closed forms, and one image for all schedules.
-#include "wavecomb/surface/motion.h"
+#include "wavecomb/geometry/hit/motion.h"
 
 #include "curve_testing.h"
 #include "wave_testing.h"
-#include "wavecomb/surface/surface.h"
+#include "wavecomb/geometry/hit/surface.h"
 
 namespace wavecomb {
 namespace {

@@ -6,9 +6,9 @@
 
 #include "lane_testing.h"
 #include "light_tree_testing.h"
-#include "wavecomb/light/light.h"
-#include "wavecomb/scene/light_cluster.h"
-#include "wavecomb/scene/light_motion.h"
+#include "wavecomb/light/description/motion.h"
+#include "wavecomb/light/sampling/light_sample.h"
+#include "wavecomb/light/tree/light_cluster.h"
 
 namespace wavecomb {
 namespace {
@@ -87,8 +87,8 @@ TEST(MovingLights, BothHalvesOfMisAgree) {
     if (!s.valid) continue;
     const float radiance = s.weight.y * s.pdf;
     if (light < view.infinite_count) {
-      const auto seen = infinite_light_radiance<float>(view, light, to.p, s.wi, 0.f, true, true,
-                                                       false, 0u, 0.f, to.time);
+      const auto seen = infinite_light_radiance<float>(
+          view, light, {.from = to.p, .dir = s.wi, .is_delta = true, .time = to.time}, true);
       ASSERT_NEAR(seen.y, radiance, 2e-3f * radiance + 1e-4f);
       continue;
     }
@@ -158,9 +158,13 @@ TEST(MovingLights, PacketsGiveTheBitsOfScalars) {
       const UInt<F> light = chosen_light<F>(view, to, at(3), active);
       const auto hit = light_hit<F>(view, light, to, s.wi, s.distance, active);
       for (const F& x : {hit.radiance.x, hit.radiance.z, hit.pdf}) put(x);
-      const auto escaped =
-          escaped_radiance<F>(view, to.p, square_to_sphere<F>(at(4), at(5)), at(7), at(6) < 0.3f,
-                              active, false, UInt<F>(0u), F(0.f), to.time);
+      const auto escaped = escaped_radiance<F>(view,
+                                               {.from = to.p,
+                                                .dir = square_to_sphere<F>(at(4), at(5)),
+                                                .bsdf_pdf = at(7),
+                                                .is_delta = at(6) < 0.3f,
+                                                .time = to.time},
+                                               active);
       for (const F& x : {escaped.x, escaped.y, escaped.z}) put(x);
     }
   };

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/render/pass_plan.h"
+#include "wavecomb/render/passes/pass_plan.h"
 
 #include <gtest/gtest.h>
 
 #include <map>
 
-#include "wavecomb/render/pass_runner.h"
-#include "wavecomb/render/pixel_order.h"
+#include "wavecomb/render/passes/pass_runner.h"
+#include "wavecomb/render/passes/pixel_order.h"
 
 namespace wavecomb {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/core/path_expression.h"
+#include "wavecomb/core/path_expressions/path_expression.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "wavecomb/core/backward_automaton.h"
 #include "wavecomb/core/error.h"
+#include "wavecomb/core/path_expressions/backward_automaton.h"
 
 namespace wavecomb {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/integrate/path_aovs.h"
-#include "wavecomb/integrate/path_pool.h"
+#include "wavecomb/aov/path_aovs.h"
+#include "wavecomb/path/path_pool.h"
 
 #include <algorithm>
 #include <numeric>

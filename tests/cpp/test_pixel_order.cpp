@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/render/pixel_order.h"
+#include "wavecomb/render/passes/pixel_order.h"
 
 #include <gtest/gtest.h>
 

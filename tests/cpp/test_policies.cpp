@@ -10,11 +10,11 @@
 #include <tuple>
 
 #include "wavecomb/core/error.h"
-#include "wavecomb/integrate/stages/shade.h"
 #include "wavecomb/schedule/policies/policies.h"
 #include "wavecomb/schedule/policy.h"
 #include "wavecomb/schedule/radix_sort.h"
 #include "wavecomb/schedule/shading_queue.h"
+#include "wavecomb/wave/stages/shade.h"
 
 namespace wavecomb {
 namespace {

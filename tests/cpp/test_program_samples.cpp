@@ -7,7 +7,7 @@
 
 #include "parts.h"
 #include "program_cases.h"
-#include "wavecomb/integrate/steps/bounce_sampling.h"
+#include "wavecomb/path/steps/bounce_sampling.h"
 
 namespace wavecomb {
 namespace {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "program_cases.h"
-#include "wavecomb/integrate/program_reads.h"
+#include "wavecomb/path/program_reads.h"
 
 namespace wavecomb {
 namespace {

@@ -7,10 +7,10 @@
 #include <tuple>
 
 #include "lane_testing.h"
-#include "wavecomb/integrate/stages/order_rays.h"
-#include "wavecomb/integrate/stages/shade.h"
-#include "wavecomb/integrate/stages/trace.h"
 #include "wavecomb/schedule/radix_sort.h"
+#include "wavecomb/wave/stages/order_rays.h"
+#include "wavecomb/wave/stages/shade.h"
+#include "wavecomb/wave/stages/trace.h"
 
 namespace wavecomb {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Recording the rays of a render and tracing them again.
 #include "scene_testing.h"
-#include "wavecomb/render/ray_recording.h"
+#include "wavecomb/render/inspection/ray_recording.h"
 
 namespace wavecomb {
 namespace {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "scene_testing.h"
-#include "wavecomb/render/pilots.h"
+#include "wavecomb/render/pilots/pilots.h"
 #include "wavecomb/render/render_plan.h"
 
 namespace wavecomb {

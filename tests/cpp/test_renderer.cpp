@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/render/lane_kernels.h"
-#include "wavecomb/render/render_statistics.h"
 #include "wavecomb/render/renderer.h"
 #include "wavecomb/render/snapshot.h"
+#include "wavecomb/render/statistics/render_statistics.h"
 #include "wavecomb/scene/scene.h"
 
 #include <chrono>

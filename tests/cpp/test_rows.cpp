@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Loads and stores of rows at every lane width, compared with scalar loops. Rows end at the end of
 /// accessible memory, so that any access beyond crashes.
-#include "wavecomb/core/rows.h"
+#include "wavecomb/core/rows/rows.h"
 
 #include <sys/mman.h>
 #include <unistd.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Material simplification: constant textures become constants, and features that textures and
 // graphs cannot reach are dropped. Neither changes the image.
-#include "wavecomb/scene/settled_material.h"
+#include "wavecomb/material/description/simplified_material.h"
 
 #include "range_testing.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/render/sharing.h"
+#include "wavecomb/render/statistics/work_distribution.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/core/soa.h"
+#include "wavecomb/core/rows/soa.h"
 
 #include <gtest/gtest.h>
 

@@ -9,8 +9,8 @@
 #include "wavecomb/core/sampler.h"
 #include "wavecomb/core/warp.h"
 #include "wavecomb/film/film.h"
-#include "wavecomb/integrate/camera_ray.h"
-#include "wavecomb/integrate/integrator.h"
+#include "wavecomb/path/camera/camera_ray.h"
+#include "wavecomb/path/integrator.h"
 
 namespace wavecomb {
 namespace {

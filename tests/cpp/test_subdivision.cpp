@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/geometry/subdivision.h"
+#include "wavecomb/geometry/tessellation/subdivision.h"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include <set>
 
 #include "wavecomb/core/error.h"
-#include "wavecomb/geometry/screen_size.h"
-#include "wavecomb/geometry/surface.h"
+#include "wavecomb/geometry/tessellation/screen_size.h"
+#include "wavecomb/geometry/tessellation/tessellation.h"
 #include "wavecomb/scene/parallel.h"
 
 namespace wavecomb {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/surface/surface.h"
+#include "wavecomb/geometry/hit/surface.h"
 
 #include <numeric>
 

@@ -2,10 +2,10 @@
 // Folder `surface`: rays, lights and shading read the same values at a hit.
 #include "curve_testing.h"
 #include "lane_testing.h"
-#include "wavecomb/graph/hit_point.h"
-#include "wavecomb/surface/hit.h"
-#include "wavecomb/surface/presence.h"
-#include "wavecomb/surface/surface.h"
+#include "wavecomb/geometry/hit/hit_material.h"
+#include "wavecomb/geometry/hit/surface.h"
+#include "wavecomb/material/inputs/graph_inputs.h"
+#include "wavecomb/material/inputs/presence.h"
 
 namespace wavecomb {
 namespace {

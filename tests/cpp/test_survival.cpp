@@ -3,8 +3,8 @@
 /// estimates, and the moments that paths without roulette predict for paths with it.
 #include "chi_square.h"
 #include "wave_testing.h"
-#include "wavecomb/learn/guide_field.h"
-#include "wavecomb/learn/path_worth.h"
+#include "wavecomb/guiding/field.h"
+#include "wavecomb/guiding/path_moments.h"
 
 namespace wavecomb {
 namespace {

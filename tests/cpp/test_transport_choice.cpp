@@ -6,11 +6,11 @@
 #include <random>
 
 #include "scene_testing.h"
-#include "wavecomb/render/light_paths.h"
-#include "wavecomb/render/render_statistics.h"
+#include "wavecomb/light_paths/setup.h"
+#include "wavecomb/render/pilots/transport_choice.h"
 #include "wavecomb/render/renderer.h"
 #include "wavecomb/render/snapshot.h"
-#include "wavecomb/render/transport_choice.h"
+#include "wavecomb/render/statistics/render_statistics.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb {

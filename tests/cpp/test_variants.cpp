@@ -3,10 +3,10 @@
 #include <set>
 
 #include "wave_testing.h"
-#include "wavecomb/render/render_statistics.h"
+#include "wavecomb/material/description/variants.h"
 #include "wavecomb/render/renderer.h"
 #include "wavecomb/render/snapshot.h"
-#include "wavecomb/scene/material_parts.h"
+#include "wavecomb/render/statistics/render_statistics.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb {

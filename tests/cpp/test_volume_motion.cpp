@@ -2,8 +2,8 @@
 // Volumes that move by their velocity fields: lookup positions and bounds.
 #include "lane_testing.h"
 #include "volume_testing.h"
-#include "wavecomb/medium/volume_emission.h"
-#include "wavecomb/scene/volume_motion.h"
+#include "wavecomb/medium/description/volume_motion.h"
+#include "wavecomb/medium/volume/volume_emission.h"
 
 namespace wavecomb {
 namespace {
@@ -62,7 +62,7 @@ TEST(VolumeMotion, TransmittanceIsThatOfThePlaceAtTheTime) {
       const auto key = make_sample_key<float>(i * 2654435761u, i, 17);
       const Passage<float> p{SamplerKind::kIndependent, key, 2, o, d, o.x};
       const double x = double{transmittance_through<float>(view, Way<float>(p, VertexSet::kShadow),
-                                                           o, d, 9.f, time, true, counts)
+                                                           {o, d, 9.f, time}, true, counts)
                                   .y};
       sum += x;
       squares += x * x;

@@ -5,10 +5,10 @@
 #include "lane_testing.h"
 #include "volume_testing.h"
 #include "wavecomb/core/sampler.h"
-#include "wavecomb/medium/henyey_greenstein.h"
-#include "wavecomb/medium/tracking.h"
-#include "wavecomb/medium/volume_bsdf.h"
-#include "wavecomb/medium/volume_emission.h"
+#include "wavecomb/medium/volume/henyey_greenstein.h"
+#include "wavecomb/medium/volume/tracking.h"
+#include "wavecomb/medium/volume/volume_bsdf.h"
+#include "wavecomb/medium/volume/volume_emission.h"
 
 namespace wavecomb {
 namespace {
@@ -196,7 +196,7 @@ TEST(VolumeTracking, TransmittanceIsTheExponential) {
                             [&](const SampleKey<float>& key) {
                               const Passage<float> p{SamplerKind::kIndependent, key, 2, o, d, t};
                               const Way<float> way(p, VertexSet::kShadow);
-                              return transmittance_through<float>(r.view, way, o, d, t, 0.f, true,
+                              return transmittance_through<float>(r.view, way, {o, d, t}, true,
                                                                   counts);
                             }),
                    {std::exp(-depth[0]), std::exp(-depth[1]), std::exp(-depth[2])}, c.name);
@@ -221,7 +221,7 @@ TEST(Equiangular, DrawsByItsDensity) {
   const Vec3<float> o{-1, 0.3f, 0.4f}, d{1, 0, 0};
   for (const float u : {0.1f, 0.9f}) {
     const auto way =
-        lamp_way<float>(scene->view().lights, o, d, 1, 3.4f, 0.5f, {u, 0.3f, 0.8f, 0.f}, true);
+        lamp_way<float>(scene->view().lights, {o, d, 1, 3.4f, 0.5f}, {u, 0.3f, 0.8f, 0.f}, true);
     ASSERT_GT(way.share, 0.f);
     double sum = 0;
     for (int i = 0; i < 4000; ++i)
@@ -230,11 +230,11 @@ TEST(Equiangular, DrawsByItsDensity) {
     for (const float v : {0.f, 0.2f, 0.5f, 0.99f}) EXPECT_NEAR(way.before(way.draw(v)), v, 1e-4f);
     EXPECT_NEAR(way.draw(0), 1, 1e-4f);
   }
-  const auto none = lamp_way<float>(scene->view().lights, o, d, 2, 1, 0.5f, {}, true);
+  const auto none = lamp_way<float>(scene->view().lights, {o, d, 2, 1, 0.5f}, {}, true);
   EXPECT_EQ(none.share, 0.f);
   // Where the medium absorbs most of the light, distances are sampled by density.
   const auto thick =
-      lamp_way<float>(scene->view().lights, o, d, 1, 2.4f, 50.f, {0.9f, 0.3f, 0.8f, 0.f}, true);
+      lamp_way<float>(scene->view().lights, {o, d, 1, 2.4f, 50.f}, {0.9f, 0.3f, 0.8f, 0.f}, true);
   EXPECT_EQ(thick.share, 0.f);
 }
 
@@ -312,7 +312,7 @@ TEST(VolumeTracking, EmissionIsTheIntegral) {
                                   r.view, 0,
                                   Way<float>({SamplerKind::kIndependent, key, 1, o, d, t},
                                              VertexSet::kFlight),
-                                  o, d, t, 0.f, true, counts);
+                                  {o, d, t}, true, counts);
                             }),
                    expected, c.name);
     }

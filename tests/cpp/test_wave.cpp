@@ -4,7 +4,7 @@
 
 #include "curve_testing.h"
 #include "wave_testing.h"
-#include "wavecomb/integrate/kernel_matrix.h"
+#include "wavecomb/wave/kernels/kernel_matrix.h"
 
 namespace wavecomb {
 namespace {

@@ -6,7 +6,7 @@
 #include <map>
 
 #include "scene_testing.h"
-#include "wavecomb/scene/volume.h"
+#include "wavecomb/medium/description/volume.h"
 #include "wavecomb/texture/half.h"
 
 namespace wavecomb::volume_testing {

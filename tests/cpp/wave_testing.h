@@ -4,13 +4,13 @@
 
 #include "scene_testing.h"
 #include "wavecomb/core/denormals.h"
-#include "wavecomb/integrate/reference.h"
-#include "wavecomb/integrate/wave.h"
+#include "wavecomb/light/tree/light_tree.h"
 #include "wavecomb/material/energy_tables.h"
+#include "wavecomb/reference/reference.h"
 #include "wavecomb/render/lane_kernels.h"
-#include "wavecomb/render/pixel_order.h"
+#include "wavecomb/render/passes/pixel_order.h"
 #include "wavecomb/render/render_plan.h"
-#include "wavecomb/scene/light_tree.h"
+#include "wavecomb/wave/wave.h"
 
 namespace wavecomb::wave_testing {
 

@@ -6,10 +6,10 @@
 
 #include "light_shapes.h"
 #include "wavecomb/accel/embree_accelerator.h"
-#include "wavecomb/integrate/camera_ray.h"
-#include "wavecomb/integrate/vertex.h"
 #include "wavecomb/material/energy_tables.h"
 #include "wavecomb/material/program_table.h"
+#include "wavecomb/path/camera/camera_ray.h"
+#include "wavecomb/path/vertex.h"
 
 namespace wavecomb {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "wavecomb/light/kinds.h"
-#include "wavecomb/scene/light_data.h"
+#include "wavecomb/light/description/light_records.h"
+#include "wavecomb/light/kinds/kinds.h"
 
 namespace wavecomb {
 

@@ -32,27 +32,30 @@ def test_this_tree_is_clean():
 
 def test_downward_includes_pass(tmp_path):
     files = {
-        "core/lane_types.h": "#include <drjit/packet.h>\n",
-        "texture/tile.h": '#include "wavecomb/core/lane_types.h"\n',
+        "core/lanes/types.h": "#include <drjit/packet.h>\n",
+        "texture/tile.h": '#include "wavecomb/core/lanes/types.h"\n',
         "scene/scene.h": '#include "wavecomb/texture/tile.h"\n#include <tbb/parallel_for.h>\n',
         "accel/embree.cpp": '#include <embree4/rtcore.h>\n#include "wavecomb/scene/scene.h"\n',
         "schedule/policies/none.h": '#include "wavecomb/schedule/policy.h"\n',
         "schedule/policy.h": "#include <span>\n",
-        "integrate/wave.cpp": '#include "wavecomb/schedule/policy.h"\n',
-        "surface/uv.h": '#include "wavecomb/scene/scene.h"\n',
-        "light/triangle.h": '#include "wavecomb/surface/uv.h"\n',
+        "wave/wave.cpp": '#include "wavecomb/schedule/policy.h"\n',
+        "geometry/hit/uv.h": '#include "wavecomb/scene/scene.h"\n',
+        "light/kinds/triangle.h": '#include "wavecomb/geometry/hit/uv.h"\n',
         "graph/run.h": '#include "wavecomb/texture/tile.h"\n',
-        "graph/value.h": '#include "wavecomb/scene/scene.h"\n#include "wavecomb/graph/run.h"\n',
-        "surface/values.h": '#include "wavecomb/graph/value.h"\n',
-        "curve/check.h": '#include "wavecomb/scene/scene.h"\n',
-        "scene/builder.cpp": '#include "wavecomb/curve/check.h"\n',
-        "curve/surface.h": '#include "wavecomb/surface/uv.h"\n',
-        "render/renderer.cpp": '#include <oneapi/tbb.h>\n#include "wavecomb/integrate/wave.h"\n',
+        "graph/parameters/value.h": '#include "wavecomb/scene/scene.h"\n'
+        '#include "wavecomb/graph/run.h"\n',
+        "material/inputs/values.h": '#include "wavecomb/graph/parameters/value.h"\n',
+        "geometry/curve/checks.h": '#include "wavecomb/scene/scene.h"\n',
+        "scene/builder.cpp": '#include "wavecomb/geometry/curve/checks.h"\n',
+        "light_paths/join.h": '#include "wavecomb/path/vertex.h"\n',
+        "path/vertex.h": '#include "wavecomb/light_paths/join.h"\n',
+        "light_paths/stages/connect.h": '#include "wavecomb/wave/wave.h"\n',
+        "render/renderer.cpp": '#include <oneapi/tbb.h>\n#include "wavecomb/wave/wave.h"\n',
         "wavecomb.h": '#include "wavecomb/render/renderer.h"\n',
     }
     result = run(tree(tmp_path, files))
     assert result.returncode == 0, result.stderr
-    assert "17 files, 0 violations" in result.stdout
+    assert "19 files, 0 violations" in result.stdout
 
 
 @pytest.mark.parametrize(
@@ -60,28 +63,35 @@ def test_downward_includes_pass(tmp_path):
     [
         ("core/rng.h", '#include "wavecomb/scene/scene.h"', "above it"),
         ("scene/scene.h", '#include "wavecomb/film/film.h"', "above it"),
-        ("integrate/wave.h", '#include "wavecomb/render/renderer.h"', "above it"),
+        ("wave/wave.h", '#include "wavecomb/render/renderer.h"', "above it"),
+        ("wave/wave.h", '#include "wavecomb/reference/path_tracer.h"', "above it"),
+        ("path/vertex.h", '#include "wavecomb/wave/wave.h"', "above it"),
+        ("light_paths/join.h", '#include "wavecomb/light_paths/stages/connect.h"', "above it"),
         ("core/rng.h", '#include "wavecomb/wavecomb.h"', "above it"),
-        ("texture/tile.h", '#include "wavecomb/scene/scene.h"', "beside it"),
-        ("surface/uv.h", '#include "wavecomb/light/triangle.h"', "above it"),
-        ("graph/run.h", '#include "wavecomb/graph/value.h"', "beside it"),
-        ("texture/tile.h", '#include "wavecomb/graph/value.h"', "beside it"),
-        ("scene/scene.h", '#include "wavecomb/curve/surface.h"', "above it"),
-        ("curve/surface.h", '#include "wavecomb/graph/drive.h"', "above it"),
-        ("scene/scene.h", '#include "wavecomb/surface/uv.h"', "above it"),
+        ("texture/tile.h", '#include "wavecomb/scene/scene.h"', "above it"),
+        ("geometry/hit/uv.h", '#include "wavecomb/light/kinds/triangle.h"', "above it"),
+        ("graph/run.h", '#include "wavecomb/graph/parameters/value.h"', "above it"),
+        ("texture/tile.h", '#include "wavecomb/graph/parameters/value.h"', "above it"),
+        ("light/description/light.h", '#include "wavecomb/light/kinds/kinds.h"', "above it"),
+        ("scene/scene.h", '#include "wavecomb/geometry/hit/surface.h"', "above it"),
+        ("geometry/hit/surface.h", '#include "wavecomb/material/inputs/inputs.h"', "above it"),
+        ("geometry/hit/surface.h", '#include "wavecomb/material/bsdf.h"', "above it"),
         ("material/table.h", '#include "wavecomb/schedule/policy.h"', "beside it"),
         ("light/sampler.h", '#include  "wavecomb/accel/accelerator.h"', "beside it"),
+        ("geometry/tessellation/ears.h", '#include "wavecomb/film/film.h"', "beside it"),
         ("schedule/queue.h", '#include "wavecomb/scene/scene.h"', "only core"),
-        ("integrate/wave.cpp", "#include <embree4/rtcore.h>", "Embree"),
+        ("schedule/queue.h", '#include "wavecomb/texture/tile.h"', "only core"),
+        ("wave/wave.cpp", "#include <embree4/rtcore.h>", "Embree"),
         ("core/warp.h", "# include <drjit/math.h>", "Dr.Jit"),
         ("schedule/sort.cpp", "#include <tbb/parallel_sort.h>", "oneTBB"),
-        ("integrate/wave.cpp", '#include "oneapi/tbb/task_arena.h"', "oneTBB"),
+        ("wave/wave.cpp", '#include "oneapi/tbb/task_arena.h"', "oneTBB"),
         ("render/renderer.h", "#include <nanobind/nanobind.h>", "Python"),
         ("scene/scene.h", "#include <pxr/usd/usd/stage.h>", "USD"),
         ("core/rng.h", '#include "hash.h"', "from the root"),
         ("core/rng.h", '#include "../scene/scene.h"', "from the root"),
         ("core/rng.h", "#include <wavecomb/core/hash.h>", "write #include"),
         ("gpu/kernel.h", "#include <span>", "no known layer"),
+        ("geometry/tessellation/point.h", "#include <span>", "no known layer"),
         ("core/rng.h", '#include "wavecomb/gpu/kernel.h"', "no known layer"),
     ],
 )
@@ -110,7 +120,7 @@ def python_tree(root: pathlib.Path, files: dict[str, str]) -> pathlib.Path:
         path = root / "python" / "wavecomb" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
-    return tree(root, {"core/soa.h": ""})
+    return tree(root, {"core/rows/soa.h": ""})
 
 
 def test_imports_that_point_down_pass(tmp_path):

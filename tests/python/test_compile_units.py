@@ -18,9 +18,9 @@ from wavecomb import _core
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build" / "editable"
 HEADERS = ROOT / "src" / "wavecomb" / "material" / "programs"
-PROGRAMS = ROOT / "src" / "wavecomb" / "scene" / "programs.h"
-MATRIX = ROOT / "src" / "wavecomb" / "integrate" / "kernel_matrix.h"
-VARIANTS = ROOT / "src" / "wavecomb" / "scene" / "material_parts.h"
+PROGRAMS = ROOT / "src" / "wavecomb" / "material" / "description" / "programs.h"
+MATRIX = ROOT / "src" / "wavecomb" / "wave" / "kernels" / "kernel_matrix.h"
+VARIANTS = ROOT / "src" / "wavecomb" / "material" / "description" / "variants.h"
 
 
 @pytest.fixture(scope="module")
@@ -77,18 +77,26 @@ def test_a_program_is_in_its_own_units_alone(units_of: dict[str, set[str]], prog
     assert set(listed) == {path.stem for path in HEADERS.glob("*.h")}
     members = {"programs": [program], "variants": [program]}
     members["variants"] += [name for name, of in rows if of == program]
-    expected = {
-        f"{kind}_{member}_{width}.cpp.o"
+    kernels = {
+        f"{kind}_{member}_{width}.cpp"
         for kind, among, word, _ in kernel_rows()
         for member in members[among]
         for width in of_word[word]
     }
-    assert units_of[program] == expected
+    unity = sorted(BUILD.glob(f"CMakeFiles/wavecomb_core_*.dir/Unity/unity_{program}_cxx.cxx"))
+    if not unity:  # WAVECOMB_BATCH=OFF
+        assert units_of[program] == {f"{kernel}.o" for kernel in kernels}
+        return
+    # One unit of packets and one of scalar lanes, both of this program's kernels only.
+    assert units_of[program] == {f"unity_{program}_cxx.cxx.o"} and len(unity) == 2
+    included = re.findall(r'^#include ".*/lanes/(.*)"', "".join(map(Path.read_text, unity)), re.M)
+    assert sorted(included) == sorted(kernels)
 
 
-BODIES = ("learn/guide.inl", "graph/run.inl", "graph/hit_point.inl", "texture/lookup.inl",
-          "surface/inputs.inl", "surface/motion.inl", "light/light.inl", "light/emission.inl",
-          "curve/surface.inl")  # fmt: skip
+BODIES = ("guiding/lookup.inl", "graph/run.inl", "material/inputs/graph_inputs.inl",
+          "texture/lookup.inl", "material/inputs/inputs.inl", "geometry/hit/motion.inl",
+          "light/sampling/light_sample.inl", "light/emission/emission.inl",
+          "geometry/hit/curve_surface.inl")  # fmt: skip
 
 
 @pytest.mark.parametrize("body", BODIES)
@@ -97,6 +105,6 @@ def test_a_shared_body_is_compiled_once_per_width(
 ) -> None:
     units = {unit for unit in units_with[body] if "/tests/" not in unit}
     widths = {1, *_core.lane_widths()}
-    few = {"learn/guide.inl": 1, "texture/lookup.inl": 1, "graph/run.inl": 1}
+    few = {"guiding/lookup.inl": 1, "texture/lookup.inl": 1, "graph/run.inl": 1}
     assert units >= {f"all_shared_{width}.cpp.o" for width in widths}
     assert len(units) <= len(widths) + few.get(body, 0), units

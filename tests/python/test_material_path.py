@@ -28,19 +28,20 @@ NOT_ON_THE_PATH = {"isa.py", "usd/stage/report.py"}
 NATIVE = (
     "bindings/materials.cpp",  # add_material and add_texture
     "bindings/scene_values.cpp",  # keywords to members of Material
-    "src/wavecomb/scene/material_data.h",  # Material and MaterialRecord
-    "src/wavecomb/scene/settled_material.cpp",  # Material without inputs that have no effect
-    "src/wavecomb/scene/scene_materials.cpp",  # Material to MaterialRecord
-    "src/wavecomb/surface/inputs.inl",  # inputs at a hit: constants and textures
+    "src/wavecomb/material/description/material.h",  # Material and MaterialRecord
+    # Material without inputs that have no effect:
+    "src/wavecomb/material/description/simplified_material.cpp",
+    "src/wavecomb/material/description/scene_materials.cpp",  # Material to MaterialRecord
+    "src/wavecomb/material/inputs/inputs.inl",  # inputs at a hit: constants and textures
     "src/wavecomb/material/params.h",  # MaterialRecord to parameters at a hit
 )
 KERNELS = {
     "UsdPreviewSurface": (
-        "src/wavecomb/scene/material_table.h",
+        "src/wavecomb/material/description/material_table.h",
         "src/wavecomb/material/programs/principled.h",
     ),
     "ND_open_pbr_surface_surfaceshader": (
-        "src/wavecomb/scene/openpbr_data.h",
+        "src/wavecomb/material/description/openpbr_inputs.h",
         "src/wavecomb/material/openpbr_params.h",
         "src/wavecomb/material/programs/openpbr.h",
     ),

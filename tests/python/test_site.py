@@ -106,7 +106,7 @@ def test_sources_name_pages_that_are_there() -> None:
 
 def test_pages_name_sources_that_are_there() -> None:
     """Paths such as `folder/file.h` in pages exist below the root or a package."""
-    folders = ("", "src/wavecomb", "src/wavecomb/integrate", "src/wavecomb/material", "python",
+    folders = ("", "src/wavecomb", "src/wavecomb/material", "python",
                "python/wavecomb", "tests/cpp", "tests/python", "tests/statistics")  # fmt: skip
     name = re.compile(r"`((?:[a-z_]+/)+[a-z_.]+\.(?:h|cpp|inl|py|in|toml|txt|usda))`")
     made_up = ("CHANGELOG.md", "writing-a-policy.md", "writing-a-material.md")

@@ -41,18 +41,22 @@ class Fault:
     changes: tuple[tuple[str, str, str], ...]
 
 
-STEPS = "src/wavecomb/integrate/steps/"
+CORE = "src/wavecomb/"
 FAULTS = (
     Fault(
         "light samples through a smooth thin wall end in the light itself",
         342,
         (
             (
-                STEPS + "connection.h",
+                CORE + "light_paths/connection.h",
                 "near.distance = select(crossing, max(F(distance - closer), F(0.f)), distance);",
                 "near.distance = select(crossing & (closer > 1e30f), F(0.f), distance);",
             ),
-            (STEPS + "connection.h", "if (any(lifted)) {", "if (any(lifted) && v.depth > 1000) {"),
+            (
+                CORE + "light_paths/connection.h",
+                "if (any(lifted)) {",
+                "if (any(lifted) && v.depth > 1000) {",
+            ),
         ),
     ),
     Fault(
@@ -60,7 +64,7 @@ FAULTS = (
         38,
         (
             (
-                STEPS + "sample_light.h",
+                CORE + "path/steps/sample_light.h",
                 "valid = valid & not_(at.bsdf.enters(wo, wi));",
                 "valid = valid & not_(at.bsdf.enters(wo, wi) & Mask<F>(false));",
             ),
@@ -71,7 +75,7 @@ FAULTS = (
         29,
         (
             (
-                STEPS + "guide_bounce.h",
+                CORE + "guiding/bounce/guided_bounce.h",
                 "const F unguided = bounce_pdf(v, at.bsdf, wo, seen, wi, e);",
                 "const F unguided = e.pdf;",
             ),
@@ -82,7 +86,7 @@ FAULTS = (
         12,
         (
             (
-                "src/wavecomb/render/renderer.cpp",
+                CORE + "render/renderer.cpp",
                 "if (used.max_depth == 0) used.transport = Transport::kPath;",
                 "",
             ),
@@ -93,7 +97,7 @@ FAULTS = (
         27,
         (
             (
-                "src/wavecomb/scene/contents.cpp",
+                CORE + "medium/description/glass_contents.cpp",
                 "if (!any_) return false;",
                 "if (!any_ || meshes_.size() < 1000000) return false;",
             ),

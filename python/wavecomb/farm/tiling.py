@@ -23,7 +23,7 @@ MIN_EDGE = 64
 TILES_OF_A_WORKER = 4
 """Number of tiles of an image for each worker, so that workers end at about the same time."""
 _CHECK_SAMPLES = 16
-"""Samples per pixel between two error checks of the core (render/pass_plan.cpp)."""
+"""Samples per pixel between two error checks of the core (render/passes/pass_plan.cpp)."""
 _REACH = 4
 """Distance in pixels over which one error check has an effect: 2 for the mean of errors over
 neighbouring pixels, and 2 for spreading the marks of unfinished pixels."""

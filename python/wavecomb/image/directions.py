@@ -13,7 +13,7 @@ def square_points(directions: NDArray[Any]) -> NDArray[np.float64]:
     """Maps unit vectors (..., 3) to points (u, v) in the unit square (..., 2).
 
     P. Clarberg, "Fast Equal-Area Mapping of the (Hemi)Sphere using SIMD", JGT 13(3) 2008; the same
-    mapping as learn/directions.h.
+    mapping as guiding/directions.h.
 
     >>> square_points(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])).tolist()
     [[0.5, 0.5], [1.0, 0.5]]

@@ -93,7 +93,7 @@ def read_capture(path: Path) -> Splats:
 def basis(directions: FloatArray) -> FloatArray:
     """Evaluates real spherical harmonics up to degree 3 in unit directions (n, 3): (n, 16).
 
-    Uses the Condon-Shortley phase, like curve/harmonics.h.
+    Uses the Condon-Shortley phase, like geometry/gaussian_splat/harmonics.h.
     """
     x, y, z = directions.T
     xx, yy, zz = x * x, y * y, z * z

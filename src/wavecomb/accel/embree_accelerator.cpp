@@ -10,7 +10,7 @@
 #include "wavecomb/accel/embree_filters.h"
 #include "wavecomb/accel/embree_hierarchy.h"
 #include "wavecomb/accel/triangle_list.h"
-#include "wavecomb/curve/clumps.h"
+#include "wavecomb/geometry/curve/bvh_nodes.h"
 
 namespace wavecomb {
 namespace {
@@ -92,10 +92,16 @@ struct EmbreeAccelerator::Impl {
         list(hierarchy->rule() == HitRule::kList ? TriangleList::make(*scene) : nullptr),
         is_hair(is_mostly_hair(*scene)) {}
 
-  /// Converts the Embree ids of a packet to scene ids, in a loop that compilers vectorise.
-  void store_hits(const float* t, const float* u, const float* v, const unsigned* prim,
-                  const unsigned* geom, const unsigned* inst, const HitSpan& out, size_t base,
-                  size_t n) const {
+  /// Hits of a packet as Embree reports them: one value per ray.
+  struct PacketHits {
+    const float* t;  ///< QueryContext::t
+    const float *u, *v;
+    const unsigned *prim, *geom, *inst;
+  };
+  /// Converts the Embree ids of the first `n` rays of a packet to scene ids, in a loop that
+  /// compilers vectorise. Stores the hits in `out` from index `base` on.
+  void store_hits(const PacketHits& hits, const HitSpan& out, size_t base, size_t n) const {
+    const auto [t, u, v, prim, geom, inst] = hits;
     for (size_t i = 0; i < n; ++i) {
       const bool instanced = inst[i] != RTC_INVALID_GEOMETRY_ID;
       const uint32_t top_id = instanced ? inst[i] : geom[i];
@@ -126,7 +132,12 @@ struct EmbreeAccelerator::Impl {
       context.geom = &rh.hit.geomID;
       context.prim = &rh.hit.primID;
       rtcIntersect1(top, &rh, &args);
-      store_hits(context.t, &rh.hit.u, &rh.hit.v, &rh.hit.primID, &rh.hit.geomID, &rh.hit.instID[0],
+      store_hits({.t = context.t,
+                  .u = &rh.hit.u,
+                  .v = &rh.hit.v,
+                  .prim = &rh.hit.primID,
+                  .geom = &rh.hit.geomID,
+                  .inst = &rh.hit.instID[0]},
                  hits, i, 1);
     }
   }
@@ -182,7 +193,12 @@ struct EmbreeAccelerator::Impl {
         rtcIntersect8(valid, top, &rh, &args);
       else
         rtcIntersect4(valid, top, &rh, &args);
-      store_hits(context.t, rh.hit.u, rh.hit.v, rh.hit.primID, rh.hit.geomID, rh.hit.instID[0],
+      store_hits({.t = context.t,
+                  .u = rh.hit.u,
+                  .v = rh.hit.v,
+                  .prim = rh.hit.primID,
+                  .geom = rh.hit.geomID,
+                  .inst = rh.hit.instID[0]},
                  hits, base, n);
     }
   }

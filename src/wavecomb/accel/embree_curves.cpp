@@ -7,7 +7,7 @@
 
 #include "wavecomb/accel/embree_filters.h"
 #include "wavecomb/accel/presence.h"
-#include "wavecomb/curve/intersect.h"
+#include "wavecomb/geometry/curve/intersect.h"
 
 namespace wavecomb {
 namespace {
@@ -39,8 +39,13 @@ void for_hits(const Arguments& args, RTCRayN* rays, CurveQuery query, const Want
     const auto meet = [&](const CurvePiece& piece) {
       for (const CurveHit& hit : intersect_curve(*curves.mesh, piece, *ray, tfar, query,
                                                  RTCRayN_time(rays, n, i), curves.is_fibre)) {
-        if (curves.is_filtered && !is_met(*context, inst, args.geomID, curves.id, piece.prim, hit.u,
-                                          hit.v, RTCRayN_id(rays, n, i)))
+        if (curves.is_filtered && !is_met_by_embree_ids(*context, {.instance = inst,
+                                                                   .geom = args.geomID,
+                                                                   .mesh = curves.id,
+                                                                   .prim = piece.prim,
+                                                                   .u = hit.u,
+                                                                   .v = hit.v,
+                                                                   .slot = RTCRayN_id(rays, n, i)}))
           continue;
         found(i, piece.prim, hit);
         break;

@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "wavecomb/accel/embree_accelerator.h"
-#include "wavecomb/curve/clumps.h"
+#include "wavecomb/geometry/curve/bvh_nodes.h"
 
 namespace wavecomb {
 

@@ -5,7 +5,7 @@
 
 #include "wavecomb/accel/light_shapes.h"
 #include "wavecomb/accel/presence.h"
-#include "wavecomb/core/lanes.h"
+#include "wavecomb/core/lanes/lanes.h"
 
 namespace wavecomb {
 namespace {
@@ -70,12 +70,13 @@ float meet_light(const void* user, RTCRayN* ray, unsigned n, unsigned i) {
 
 }  // namespace
 
-bool is_met(const QueryContext& context, unsigned hit_inst, unsigned geom, uint32_t mesh,
-            uint32_t prim, float u, float v, uint32_t slot) {
-  const bool instanced = hit_inst != RTC_INVALID_GEOMETRY_ID;
-  return is_met(*context.scene, instanced ? hit_inst : 0,
-                instanced ? geom : geom - context.first_world, mesh, prim, u, v, slot,
-                *context.keys);
+bool is_met_by_embree_ids(const QueryContext& context, const PresenceQuery& at) {
+  PresenceQuery in_scene = at;
+  if (at.instance == RTC_INVALID_GEOMETRY_ID) {
+    in_scene.instance = 0;
+    in_scene.geom = at.geom - context.first_world;
+  }
+  return is_met(*context.scene, in_scene, *context.keys);
 }
 
 void presence_filter(const RTCFilterFunctionNArguments* args) {
@@ -85,9 +86,13 @@ void presence_filter(const RTCFilterFunctionNArguments* args) {
   for (unsigned i = 0; i < n; ++i) {
     if (args->valid[i] != -1) continue;
     const bool present =
-        is_met(*context, RTCHitN_instID(args->hit, n, i, 0), RTCHitN_geomID(args->hit, n, i), mesh,
-               RTCHitN_primID(args->hit, n, i), RTCHitN_u(args->hit, n, i),
-               RTCHitN_v(args->hit, n, i), RTCRayN_id(args->ray, n, i));
+        is_met_by_embree_ids(*context, {.instance = RTCHitN_instID(args->hit, n, i, 0),
+                                        .geom = RTCHitN_geomID(args->hit, n, i),
+                                        .mesh = mesh,
+                                        .prim = RTCHitN_primID(args->hit, n, i),
+                                        .u = RTCHitN_u(args->hit, n, i),
+                                        .v = RTCHitN_v(args->hit, n, i),
+                                        .slot = RTCRayN_id(args->ray, n, i)});
     if (!present) args->valid[i] = 0;
   }
 }

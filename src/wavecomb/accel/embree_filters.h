@@ -7,7 +7,8 @@
 #include <optional>
 
 #include "wavecomb/accel/embree_accelerator.h"
-#include "wavecomb/curve/ray.h"
+#include "wavecomb/accel/presence.h"
+#include "wavecomb/geometry/curve/ray.h"
 
 namespace wavecomb {
 
@@ -27,10 +28,10 @@ struct alignas(64) QueryContext {
 /// Factor by which tfar exceeds the closest distance, so that traversal finds all tied hits.
 inline constexpr float kSlack = 1.f + 0x1p-20f;
 
-/// Returns whether the ray of path `slot` hits a surface point, given by Embree ids: its object and
-/// visibility match, it is present, and for shadow rays it casts a shadow from their light.
-bool is_met(const QueryContext& context, unsigned hit_inst, unsigned geom, uint32_t mesh,
-            uint32_t prim, float u, float v, uint32_t slot);
+/// Returns whether a ray hits a point whose instance and geometry are given by Embree ids: its
+/// object and visibility match, it is present, and for shadow rays it casts a shadow from their
+/// light.
+bool is_met_by_embree_ids(const QueryContext& context, const PresenceQuery& at);
 
 /// Filter function of geometries with hits that may be rejected; see filtered_meshes(). The user
 /// pointer holds the mesh index.

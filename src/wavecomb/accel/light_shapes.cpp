@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "wavecomb/scene/light_motion.h"
+#include "wavecomb/light/description/motion.h"
 
 namespace wavecomb {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "wavecomb/scene/light_kind.h"
+#include "wavecomb/light/description/kind_info.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb {

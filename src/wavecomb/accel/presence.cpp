@@ -4,10 +4,10 @@
 #include <algorithm>
 
 #include "wavecomb/core/hash.h"
-#include "wavecomb/curve/splat.h"
-#include "wavecomb/surface/hit.h"
-#include "wavecomb/surface/presence.h"
-#include "wavecomb/surface/uv.h"
+#include "wavecomb/geometry/gaussian_splat/gaussian_splat.h"
+#include "wavecomb/geometry/hit/hit_material.h"
+#include "wavecomb/geometry/hit/uv.h"
+#include "wavecomb/material/inputs/presence.h"
 
 namespace wavecomb {
 namespace {
@@ -26,13 +26,12 @@ void mark_unseen(const Scene& scene, std::vector<uint8_t>& filtered) {
 
 /// Returns whether a surface with this opacity is present, by the random number of path and
 /// primitive.
-bool is_drawn(float opacity, uint32_t instance, uint32_t mesh, uint32_t prim, uint32_t slot,
-              const PresenceKeys& keys) {
+bool is_drawn(float opacity, const PresenceQuery& at, const PresenceKeys& keys) {
   if (opacity >= 1.f) return true;
   if (!(opacity > 0.f)) return false;
   const uint32_t path =
-      hash_u32(keys.pixel_hash[slot * keys.stride], keys.sample[slot * keys.stride]);
-  const uint32_t where = hash_u32(instance * 0x9e3779b9u + mesh, prim);
+      hash_u32(keys.pixel_hash[at.slot * keys.stride], keys.sample[at.slot * keys.stride]);
+  const uint32_t where = hash_u32(at.instance * 0x9e3779b9u + at.mesh, at.prim);
   return unit_float<float>(hash_u32(hash_u32(path, keys.salt), where)) < opacity;
 }
 
@@ -70,9 +69,11 @@ std::vector<uint8_t> fibre_meshes(const Scene& scene) {
   const auto& materials = scene.material_part()->shaded;
   std::vector<uint8_t> fibres(geometry.meshes.size(), 0);
   if (std::none_of(materials.begin(), materials.end(),
-                   [](const Material& m) { return m.program == ProgramId::kHair; }))
+                   [](const Material& m) { return has_trait(m.program, program_trait::kFibre); }))
     return fibres;
-  const auto is_other = [&](uint32_t m) { return materials[m].program != ProgramId::kHair; };
+  const auto is_other = [&](uint32_t m) {
+    return !has_trait(materials[m].program, program_trait::kFibre);
+  };
   // Materials that meshes without one inherit from their instances; the world is instance 0.
   std::vector<uint8_t> group_hands_on(geometry.groups.size(), 0), mesh_gets(fibres.size(), 0);
   for (size_t i = 0; i < geometry.instance_records.size(); ++i)
@@ -97,30 +98,32 @@ bool casts_shadow(const SceneView& scene, uint32_t instance, uint32_t geom, uint
   return (links.members[(link - 1) * links.words + (set - 1) / 32] >> ((set - 1) % 32) & 1) != 0;
 }
 
-bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32_t prim, float u,
-                float v, uint32_t slot, const PresenceKeys& keys) {
-  if (scene.has_curves && (scene.meshes[mesh].flags & kIsSplat) != 0)
-    return is_drawn(splat_alpha(splat_of(scene, mesh, prim), u, v), instance, mesh, prim, slot,
-                    keys);
+bool is_present(const SceneView& scene, const PresenceQuery& at, const PresenceKeys& keys) {
+  if (scene.has_curves && (scene.meshes[at.mesh].flags & kIsSplat) != 0)
+    return is_drawn(splat_alpha(splat_of(scene, at.mesh, at.prim), at.u, at.v), at, keys);
   const uint32_t material =
-      hit_material<float>(scene, scene.instances[instance].material, mesh, prim, true);
-  // The transmittance of shadow rays handles medium boundaries separately (medium/interiors.h).
+      hit_material<float>(scene, scene.instances[at.instance].material, at.mesh, at.prim, true);
+  // The transmittance of shadow rays handles medium boundaries separately
+  // (medium/nested/nested_media.h).
   if (keys.ray_kind == kSeenByShadowRays && scene.interiors.is_bound(material)) return false;
   if (!has_presence<float>(scene.materials, material, true)) return true;
-  const Vec2<float> uv = hit_uv<float>(scene.meshes, mesh, prim, u, v, true);
-  const float opacity = opacity_at<float>(scene.materials, scene.meshes, scene.instances, material,
-                                          instance, {mesh, prim, u, v}, uv, true);
-  return is_drawn(opacity, instance, mesh, prim, slot, keys);
+  const float opacity =
+      opacity_at<float>(scene.materials, scene.meshes, scene.instances,
+                        {.material = material,
+                         .instance = at.instance,
+                         .place = {at.mesh, at.prim, at.u, at.v},
+                         .uv = hit_uv<float>(scene.meshes, at.mesh, at.prim, at.u, at.v, true)},
+                        true);
+  return is_drawn(opacity, at, keys);
 }
 
-bool is_met(const SceneView& scene, uint32_t instance, uint32_t geom, uint32_t mesh, uint32_t prim,
-            float u, float v, uint32_t slot, const PresenceKeys& keys) {
-  if (!is_of_object(keys, instance, mesh, slot)) return false;
+bool is_met(const SceneView& scene, const PresenceQuery& at, const PresenceKeys& keys) {
+  if (!is_of_object(keys, at.instance, at.mesh, at.slot)) return false;
   if (scene.visibility &&
-      (scene.visibility[scene.instances[instance].emissive + geom] & keys.ray_kind) == 0)
+      (scene.visibility[scene.instances[at.instance].emissive + at.geom] & keys.ray_kind) == 0)
     return false;
-  if (keys.shadow_set && !casts_shadow(scene, instance, geom, slot, keys)) return false;
-  return is_present(scene, instance, mesh, prim, u, v, slot, keys);
+  if (keys.shadow_set && !casts_shadow(scene, at.instance, at.geom, at.slot, keys)) return false;
+  return is_present(scene, at, keys);
 }
 
 }  // namespace wavecomb

@@ -10,7 +10,7 @@
 
 #include "wavecomb/accel/presence.h"
 #include "wavecomb/core/frame.h"
-#include "wavecomb/core/lanes.h"
+#include "wavecomb/core/lanes/lanes.h"
 
 namespace wavecomb {
 namespace {
@@ -98,8 +98,15 @@ struct ListTracer {
     for (uint32_t bits = lane_bits<F>(in); bits != 0; bits &= bits - 1) {
       const auto i = static_cast<size_t>(std::countr_zero(bits));
       const uint32_t slot = rays.slot ? rays.slot[base + i] : static_cast<uint32_t>(base + i);
-      keep[i] = is_met(scene, list.ids_.inst[entry], list.ids_.geom[entry], t.mesh,
-                       list.ids_.prim[entry], lane(u, i), lane(v, i), slot, keys);
+      keep[i] = is_met(scene,
+                       {.instance = list.ids_.inst[entry],
+                        .geom = list.ids_.geom[entry],
+                        .mesh = t.mesh,
+                        .prim = list.ids_.prim[entry],
+                        .u = lane(u, i),
+                        .v = lane(v, i),
+                        .slot = slot},
+                       keys);
     }
     return in & Mask<F>(load<UInt<F>>(keep.data()) != UInt<F>(0u));
   }

@@ -3,7 +3,7 @@
 /// (docs/aovs.md).
 ///
 /// To add one, add a row at the end of WAVECOMB_AOVS and a line that provides its value
-/// (integrate/path_aovs.h). Film storage, layer, checkpoint block, and the names in Python, on the
+/// (aov/path_aovs.h). Film storage, layer, checkpoint block, and the names in Python, on the
 /// command line and in the window follow from the row.
 #pragma once
 
@@ -39,45 +39,56 @@ enum class AovSource : uint8_t {
   kBounce,  ///< over all bounces of the path
 };
 
-/// X(enumerator, name, channels, kind, source, title): one bit each, in this order. `channels` is 0
-/// for kinds that are not numeric or have several layers. `title` is the label in the window; ""
-/// hides the layer there.
+/// Meaning of a layer's numbers, by which files store it and the window displays it.
+enum class AovContent : uint8_t {
+  kLight,      ///< radiance: displayed with exposure and tone mapping
+  kColour,     ///< reflectance or transmittance, 0 to 1
+  kDirection,  ///< unit vector
+  kId,         ///< index of an object or material, or hashes of names
+  kExact,      ///< number that lossy compression would make useless
+  kValue,      ///< any other number: displayed in false colours
+};
+
+/// X(enumerator, name, channels, letters, content, kind, source, title): one bit each, in this
+/// order. `channels` is 0 for kinds that are not numeric or have several layers. `letters` name the
+/// channels in files, or is "" for numbers or a single channel. `title` is the label in the window;
+/// "" hides the layer there.
 // clang-format off
-#define WAVECOMB_AOVS(X)                                                                      \
-  X(Albedo, "albedo", 3, kMean, kVertex, "Albedo")                                            \
-  X(Normal, "normal", 3, kMean, kVertex, "Normal")                                            \
-  X(Depth, "depth", 1, kMeanOfHits, kHit, "Depth")                                            \
-  X(Position, "position", 3, kNearest, kHit, "Position")                                      \
-  X(Uv, "uv", 2, kNearest, kVertex, "Texture coordinates")                                    \
-  X(MaterialId, "material_id", 1, kNearest, kHit, "Materials")                                \
-  X(InstanceId, "instance_id", 1, kNearest, kHit, "Instances")                                \
-  X(CryptoObject, "crypto_object", 0, kCoverage, kHit, "Objects (Cryptomatte)")               \
-  X(CryptoMaterial, "crypto_material", 0, kCoverage, kHit, "Materials (Cryptomatte)")         \
-  X(CryptoAsset, "crypto_asset", 0, kCoverage, kHit, "Assets (Cryptomatte)")                  \
-  X(Emission, "emission", 3, kMean, kLight, "Emission")                                       \
-  X(Direct, "direct", 3, kMean, kLight, "Direct light")                                       \
-  X(Indirect, "indirect", 3, kMean, kLight, "Indirect light")                                 \
-  X(LightGroups, "light_groups", 0, kGroups, kLight, "")                                      \
-  X(Cost, "cost", 1, kSum, kTime, "Cost per pixel")                                           \
-  X(GuideAlbedo, "guide_albedo", 3, kMean, kGuide, "")                                        \
-  X(GuideNormal, "guide_normal", 3, kMean, kGuide, "")                                        \
-  X(Alpha, "alpha", 1, kMean, kHit, "Alpha")                                                  \
-  X(ByBounces, "by_bounces", 3, kMean, kWay, "Found by bounces")                              \
-  X(ByLightSamples, "by_light_samples", 3, kMean, kWay, "Found by light samples")             \
-  X(ByLightPaths, "by_light_paths", 3, kMean, kWay, "Found by light paths")                   \
-  X(GuidedShare, "guided_share", 1, kMean, kBounce, "Guided share")                           \
-  X(Survival, "survival", 1, kMean, kBounce, "Survival of roulette")                          \
-  X(Expressions, "lpe", 0, kExpressions, kLight, "")                                          \
-  X(DepthNearest, "depth_nearest", 1, kNearest, kHit, "Depth, unfiltered")                    \
-  X(Distance, "distance", 1, kNearest, kHit, "Distance, unfiltered")                          \
-  X(Motion, "motion", 2, kNearest, kHit, "Motion in the picture")                             \
-  X(Deep, "deep", 0, kDeep, kHit, "")                                                         \
-  X(Transmittance, "transmittance", 3, kMean, kHit, "Transmittance of volumes")               \
-  X(HalfDepth, "half_depth", 1, kMedian, kHit, "Depth to half opacity")
+#define WAVECOMB_AOVS(X)                                                                          \
+  X(Albedo, "albedo", 3, "RGB", kColour, kMean, kVertex, "Albedo")                                \
+  X(Normal, "normal", 3, "XYZ", kDirection, kMean, kVertex, "Normal")                             \
+  X(Depth, "depth", 1, "Z", kValue, kMeanOfHits, kHit, "Depth")                                   \
+  X(Position, "position", 3, "XYZ", kExact, kNearest, kHit, "Position")                           \
+  X(Uv, "uv", 2, "UV", kValue, kNearest, kVertex, "Texture coordinates")                          \
+  X(MaterialId, "material_id", 1, "", kId, kNearest, kHit, "Materials")                           \
+  X(InstanceId, "instance_id", 1, "", kId, kNearest, kHit, "Instances")                           \
+  X(CryptoObject, "crypto_object", 0, "", kId, kCoverage, kHit, "Objects (Cryptomatte)")          \
+  X(CryptoMaterial, "crypto_material", 0, "", kId, kCoverage, kHit, "Materials (Cryptomatte)")    \
+  X(CryptoAsset, "crypto_asset", 0, "", kId, kCoverage, kHit, "Assets (Cryptomatte)")             \
+  X(Emission, "emission", 3, "RGB", kLight, kMean, kLight, "Emission")                            \
+  X(Direct, "direct", 3, "RGB", kLight, kMean, kLight, "Direct light")                            \
+  X(Indirect, "indirect", 3, "RGB", kLight, kMean, kLight, "Indirect light")                      \
+  X(LightGroups, "light_groups", 0, "RGB", kLight, kGroups, kLight, "")                           \
+  X(Cost, "cost", 1, "", kValue, kSum, kTime, "Cost per pixel")                                   \
+  X(GuideAlbedo, "guide_albedo", 3, "RGB", kColour, kMean, kGuide, "")                            \
+  X(GuideNormal, "guide_normal", 3, "XYZ", kDirection, kMean, kGuide, "")                         \
+  X(Alpha, "alpha", 1, "", kValue, kMean, kHit, "Alpha")                                          \
+  X(ByBounces, "by_bounces", 3, "RGB", kLight, kMean, kWay, "Found by bounces")                   \
+  X(ByLightSamples, "by_light_samples", 3, "RGB", kLight, kMean, kWay, "Found by light samples")  \
+  X(ByLightPaths, "by_light_paths", 3, "RGB", kLight, kMean, kWay, "Found by light paths")        \
+  X(GuidedShare, "guided_share", 1, "", kValue, kMean, kBounce, "Guided share")                   \
+  X(Survival, "survival", 1, "", kValue, kMean, kBounce, "Survival of roulette")                  \
+  X(Expressions, "lpe", 0, "RGB", kLight, kExpressions, kLight, "")                               \
+  X(DepthNearest, "depth_nearest", 1, "Z", kExact, kNearest, kHit, "Depth, unfiltered")           \
+  X(Distance, "distance", 1, "", kExact, kNearest, kHit, "Distance, unfiltered")                  \
+  X(Motion, "motion", 2, "UV", kExact, kNearest, kHit, "Motion in the picture")                   \
+  X(Deep, "deep", 0, "", kValue, kDeep, kHit, "")                                                 \
+  X(Transmittance, "transmittance", 3, "RGB", kColour, kMean, kHit, "Transmittance of volumes")   \
+  X(HalfDepth, "half_depth", 1, "Z", kValue, kMedian, kHit, "Depth to half opacity")
 // clang-format on
 
 namespace detail {
-#define WAVECOMB_AOV(id, name, channels, kind, source, title) k##id,
+#define WAVECOMB_AOV(id, name, channels, letters, content, kind, source, title) k##id,
 enum class AovPlace : uint32_t { WAVECOMB_AOVS(WAVECOMB_AOV) kCount };
 #undef WAVECOMB_AOV
 }  // namespace detail
@@ -87,7 +98,7 @@ static_assert(kAovCount <= 32);
 
 /// AOV flags, one bit each.
 enum class Aov : uint32_t {
-#define WAVECOMB_AOV(id, name, channels, kind, source, title) \
+#define WAVECOMB_AOV(id, name, channels, letters, content, kind, source, title) \
   k##id = 1u << static_cast<uint32_t>(detail::AovPlace::k##id),
   WAVECOMB_AOVS(WAVECOMB_AOV)
 #undef WAVECOMB_AOV
@@ -98,13 +109,16 @@ struct AovRow {
   Aov aov;
   const char* name;
   uint32_t channels;
+  const char* letters;
+  AovContent content;
   AovKind kind;
   AovSource source;
   const char* title;
 };
 inline constexpr AovRow kAovs[] = {
-#define WAVECOMB_AOV(id, name, channels, kind, source, title) \
-  {Aov::k##id, name, channels, AovKind::kind, AovSource::source, title},
+#define WAVECOMB_AOV(id, name, channels, letters, content, kind, source, title) \
+  {Aov::k##id,          name,          channels,          letters,              \
+   AovContent::content, AovKind::kind, AovSource::source, title},
     WAVECOMB_AOVS(WAVECOMB_AOV)
 #undef WAVECOMB_AOV
 };

@@ -2,7 +2,7 @@
 /// Integer hashes over lanes: every random number is a hash of (pixel, sample, dimension, seed).
 #pragma once
 
-#include "wavecomb/core/lanes.h"
+#include "wavecomb/core/lanes/lanes.h"
 
 namespace wavecomb {
 

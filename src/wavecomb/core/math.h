@@ -8,7 +8,7 @@
 /// `bool = true`), which makes them the better match.
 #pragma once
 
-#include "wavecomb/core/lanes.h"
+#include "wavecomb/core/lanes/lanes.h"
 
 namespace wavecomb {
 

@@ -7,8 +7,8 @@
 /// numbers are from Joe and Kuo, 2008.
 #pragma once
 
-#include "wavecomb/core/fields.h"
 #include "wavecomb/core/hash.h"
+#include "wavecomb/core/rows/fields.h"
 #include "wavecomb/core/settings.h"
 
 namespace wavecomb {
@@ -41,7 +41,7 @@ inline constexpr uint32_t kTimeSet = 0xffffffffu;
 enum class VertexSet : uint32_t {
   kLight,     ///< light sampling (choice, u, v) and Russian roulette
   kBsdf,      ///< BSDF sampling: lobe, u, v
-  kFlight,    ///< sampling along the ray segment to the vertex (integrate/media.h)
+  kFlight,    ///< sampling along the ray segment to the vertex (path/media.h)
   kShadow,    ///< transmittance along the vertex's shadow ray
   kEmission,  ///< start of a light path, at depth 0: choice of the light, and time
 };

@@ -9,7 +9,7 @@
 
 #include "wavecomb/core/aov.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/core/path_expression.h"
+#include "wavecomb/core/path_expressions/path_expression.h"
 
 namespace wavecomb {
 
@@ -25,18 +25,18 @@ constexpr float default_filter_width(FilterKind kind) {
 enum class IntegratorKind : uint8_t { kWavefront, kReference };
 /// Where paths start. kPath: at the camera. kLight: also one light path per camera path, combined
 /// by multiple importance sampling (docs/light-paths.md). kAuto: kLight if a pilot render predicts
-/// a gain (render/transport_choice.h). kBdpt: as kLight, and vertices of both are connected.
+/// a gain (render/pilots/transport_choice.h). kBdpt: as kLight, and vertices of both are connected.
 enum class Transport : uint8_t { kPath, kLight, kAuto, kBdpt };
 /// Treatment of samples that are too bright and too rare to be reliable: keep them, or reduce their
 /// weight (film/cascades.h).
 enum class Firefly : uint8_t { kKeep, kReweight };
-/// How a vertex chooses a light to sample: by power, or with a light tree (light/light_tree.h).
-/// kAuto: by tree if there are enough lights to benefit.
+/// How a vertex chooses a light to sample: by power, or with a light tree
+/// (light/sampling/tree_choice.h). kAuto: by tree if there are enough lights to benefit.
 enum class LightSelection : uint8_t { kAuto, kTree, kPower };
 /// Selection weights of lights: by their contribution to the image, measured by a calibration
-/// before the first pass (render/light_calibration.h), or by power.
+/// before the first pass (render/pilots/light_calibration.h), or by power.
 enum class LightWeights : uint8_t { kCalibrated, kPower };
-/// Russian roulette (integrate/steps/survive.h). kAuto: kEfficient if bounces are guided, else
+/// Russian roulette (path/steps/survive.h). kAuto: kEfficient if bounces are guided, else
 /// kThroughput.
 enum class RouletteKind : uint8_t { kAuto, kOff, kThroughput, kCostAware, kEfficient };
 /// Sorting of rays before traversal.
@@ -49,10 +49,10 @@ enum class Traversal : uint8_t { kPackets, kSingle };
 /// Texture filtering. kAuto: full filtering at the camera's hits, one random texel after bounces
 /// (docs/decisions/one-texel.md). kWhole: full filtering everywhere.
 enum class TextureFilter : uint8_t { kAuto, kWhole };
-/// Distribution of a render's samples over pixels (render/allotment.h).
+/// Distribution of a render's samples over pixels (render/passes/allotment.h).
 enum class Allocate : uint8_t { kEven, kError, kEfficiency };
-/// Path guiding with a field trained before the first pass (render/guide_training.h). kAuto: if a
-/// pilot render predicts a gain.
+/// Path guiding with a field trained before the first pass (render/pilots/guiding_training.h).
+/// kAuto: if a pilot render predicts a gain.
 enum class Guiding : uint8_t { kAuto, kOn, kOff };
 /// Whether records are moved into shading order. kAuto: off, which is faster.
 enum class Materialize : uint8_t { kAuto, kOn, kOff };
@@ -94,7 +94,8 @@ struct Settings {
   LightSelection light_selection = LightSelection::kAuto;
   LightWeights light_weights = LightWeights::kCalibrated;
   Guiding guiding = Guiding::kOff;
-  /// Also use equiangular sampling of distances in homogeneous volumes (medium/equiangular.h).
+  /// Also use equiangular sampling of distances in homogeneous volumes
+  /// (medium/volume/equiangular.h).
   bool equiangular = false;
   uint32_t learn_memory_mb = 64;  ///< memory limit of learned data
   /// Sample every non-delta bounce by cosine.
@@ -102,10 +103,10 @@ struct Settings {
   IntegratorKind integrator = IntegratorKind::kWavefront;
   Transport transport = Transport::kPath;
   /// Aim light paths where earlier ones, traced before the first pass, contributed to the image
-  /// (render/light_aiming.h).
+  /// (render/pilots/light_aiming.h).
   bool light_aim = true;
   /// Merge radius in pixels, within which light paths end at points that the camera sees by
-  /// specular reflection or refraction (integrate/visible_points.h). 0 means no merging.
+  /// specular reflection or refraction (light_paths/merge_grid.h). 0 means no merging.
   float merge_radius = 0;
   Firefly firefly = Firefly::kKeep;
   AovSet aovs;                                    ///< AOVs to store; they do not affect the beauty

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "wavecomb/core/affine.h"
-#include "wavecomb/core/lanes.h"
+#include "wavecomb/core/lanes/lanes.h"
 #include "wavecomb/core/vec3.h"
 
 namespace wavecomb {

@@ -13,7 +13,7 @@
 #include "wavecomb/film/aov_film.h"
 #include "wavecomb/film/cascades.h"
 #include "wavecomb/film/error_sums.h"
-#include "wavecomb/film/splats.h"
+#include "wavecomb/film/light_splats.h"
 
 namespace wavecomb {
 
@@ -52,7 +52,7 @@ class Film {
     aovs_.keep_splats(unit);
   }
   /// Allocates a row of kVisibleWords floats per pixel for the visible points of merging
-  /// (integrate/visible_points.h).
+  /// (light_paths/merge_grid.h).
   static constexpr size_t kVisibleWords = 16;
   void keep_visible_points() { visible_.assign(pixels_.size() * kVisibleWords, 0.f); }
   std::span<const float> visible_points() const { return visible_; }

@@ -25,13 +25,13 @@
 /// A program for scattering in media (kOnSurface false) has a phase function in place of the BSDF,
 /// without a cosine, and
 ///
-///   static auto interact(const Vertex<F>&);    the interaction, see integrate/steps/interact.h
+///   static auto interact(const Vertex<F>&);    the interaction, see path/steps/interact.h
 #pragma once
 
 #include <array>
 
 #include "wavecomb/core/vec.h"
-#include "wavecomb/scene/material_data.h"
+#include "wavecomb/material/description/material.h"
 
 namespace wavecomb {
 
@@ -48,7 +48,8 @@ struct BsdfTraits {
   static constexpr bool kOnSurface = true;      ///< shades hits; otherwise has an `interact`
   static constexpr bool kOnSplats = false;      ///< provides the emission of Gaussian splats
   /// Scatters like a whole fibre around an axis: x of the local frame lies along the fibre
-  /// (curve/fibre.h), and there are no two sides. It is not reciprocal, so light paths exclude it.
+  /// (geometry/hit/fibre_frame.h), and there are no two sides. It is not reciprocal, so light paths
+  /// exclude it.
   static constexpr bool kOnFibre = false;
 
   /// Values that depend on wo only, as input of the functions below: wo itself by default.
@@ -131,7 +132,8 @@ struct ShadingParams {
   UInt<F> flags;
 };
 
-/// Inputs plus the program-specific parameters, in the order of their row (scene/programs.h).
+/// Inputs plus the program-specific parameters, in the order of their row
+/// (material/description/programs.h).
 template <typename F>
 struct OwnShadingParams : ShadingParams<F> {
   std::array<F, kMaxProgramParameters> own;

@@ -168,7 +168,7 @@ const EnergyTables& EnergyTables::shared(bool brushed) {
 const float* energy_tables(std::span<const Material> materials) {
   bool layered = false, brushed = false;
   for (const Material& m : materials) {
-    if (m.program != ProgramId::kOpenPbr) continue;
+    if (!has_trait(m.program, program_trait::kLayered)) continue;
     layered = true;
     brushed |= m.openpbr.anisotropy != 0 || m.graph != kNoGraph;
   }

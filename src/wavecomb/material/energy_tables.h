@@ -9,7 +9,7 @@
 
 #include "wavecomb/core/math.h"
 #include "wavecomb/core/vec.h"
-#include "wavecomb/scene/material_data.h"
+#include "wavecomb/material/description/material.h"
 
 namespace wavecomb {
 

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <array>
 
+#include "wavecomb/material/description/openpbr_inputs.h"
 #include "wavecomb/material/params.h"
-#include "wavecomb/scene/openpbr_data.h"
-#include "wavecomb/scene/walk_data.h"
+#include "wavecomb/medium/description/subsurface.h"
 
 namespace wavecomb {
 

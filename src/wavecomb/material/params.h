@@ -3,10 +3,10 @@
 #pragma once
 
 #include "wavecomb/core/math.h"
-#include "wavecomb/graph/drive.h"
 #include "wavecomb/material/bsdf.h"
-#include "wavecomb/surface/inputs.h"
-#include "wavecomb/surface/values.h"
+#include "wavecomb/material/graph_parameters.h"
+#include "wavecomb/material/inputs/emission_opacity.h"
+#include "wavecomb/material/inputs/inputs.h"
 
 namespace wavecomb {
 

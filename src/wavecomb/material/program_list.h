@@ -8,7 +8,7 @@
 #include <tuple>
 #include <type_traits>
 
-#include "wavecomb/scene/material_parts.h"
+#include "wavecomb/material/description/variants.h"
 
 namespace wavecomb {
 

@@ -5,9 +5,9 @@
 #include <string>
 
 #include "wavecomb/core/error.h"
-#include "wavecomb/integrate/kernel_matrix.h"
-#include "wavecomb/integrate/reference.h"
-#include "wavecomb/integrate/wave_integrator.h"
+#include "wavecomb/reference/reference.h"
+#include "wavecomb/wave/kernels/kernel_matrix.h"
+#include "wavecomb/wave/wave_integrator.h"
 
 namespace wavecomb {
 

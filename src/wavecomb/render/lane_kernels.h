@@ -6,8 +6,8 @@
 #include <memory>
 #include <vector>
 
-#include "wavecomb/integrate/integrator.h"
-#include "wavecomb/integrate/wave.h"
+#include "wavecomb/path/integrator.h"
+#include "wavecomb/wave/wave.h"
 
 namespace wavecomb {
 

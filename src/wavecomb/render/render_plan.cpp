@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <string>
 
+#include "wavecomb/light/tree/light_tree.h"
 #include "wavecomb/material/energy_tables.h"
-#include "wavecomb/scene/light_tree.h"
 
 namespace wavecomb {
 namespace {

@@ -11,9 +11,9 @@
 
 #include "wavecomb/core/task_order.h"
 #include "wavecomb/film/error_map.h"
-#include "wavecomb/render/pick.h"
-#include "wavecomb/render/process_memory.h"
+#include "wavecomb/render/inspection/picking.h"
 #include "wavecomb/render/snapshot.h"
+#include "wavecomb/render/statistics/process_memory.h"
 
 namespace wavecomb {
 namespace {
@@ -45,10 +45,9 @@ RenderRun::RenderRun(std::shared_ptr<const Scene> scene, const RenderPlan& plan,
       integrator_(make_integrator(plan.settings.integrator, context_, plan.waves.lanes,
                                   plan.waves.threads, plan.waves.wave_size)),
       runner_(*integrator_, plan.waves.threads, plan.waves.wave_size),
-      loop_(plan.settings, plan.pass_samples, resume(), plan.light_share, film_, runner_, costs_,
-            watch, [this] {
-              if (plan_.settings.merges()) visible_.build(film_.visible_points());
-            }) {}
+      loop_(plan, resume(), film_, runner_, costs_, watch, [this] {
+        if (plan_.settings.merges()) visible_.build(film_.visible_points());
+      }) {}
 
 PassState RenderRun::resume() {
   PassState pass;

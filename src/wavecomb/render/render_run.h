@@ -10,16 +10,16 @@
 
 #include "wavecomb/core/clock.h"
 #include "wavecomb/film/film.h"
-#include "wavecomb/integrate/visible_points.h"
-#include "wavecomb/integrate/wave.h"
-#include "wavecomb/render/pass_loop.h"
-#include "wavecomb/render/pass_runner.h"
-#include "wavecomb/render/pilots.h"
-#include "wavecomb/render/render_costs.h"
+#include "wavecomb/light_paths/merge_grid.h"
+#include "wavecomb/render/passes/pass_loop.h"
+#include "wavecomb/render/passes/pass_runner.h"
+#include "wavecomb/render/pilots/pilots.h"
 #include "wavecomb/render/render_plan.h"
-#include "wavecomb/render/render_statistics.h"
 #include "wavecomb/render/renderer.h"
+#include "wavecomb/render/statistics/render_costs.h"
+#include "wavecomb/render/statistics/render_statistics.h"
 #include "wavecomb/render/watch.h"
+#include "wavecomb/wave/wave.h"
 
 namespace wavecomb {
 

@@ -7,16 +7,16 @@
 
 #include "wavecomb/core/clock.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/render/cost_profile.h"
-#include "wavecomb/render/kept_training.h"
-#include "wavecomb/render/learned.h"
-#include "wavecomb/render/light_paths.h"
-#include "wavecomb/render/pick.h"
+#include "wavecomb/light_paths/setup.h"
+#include "wavecomb/render/inspection/learned_lookup.h"
+#include "wavecomb/render/inspection/picking.h"
+#include "wavecomb/render/pilots/training_cache.h"
+#include "wavecomb/render/pilots/transport_choice.h"
 #include "wavecomb/render/render_plan.h"
 #include "wavecomb/render/render_run.h"
-#include "wavecomb/render/render_statistics.h"
 #include "wavecomb/render/snapshot.h"
-#include "wavecomb/render/transport_choice.h"
+#include "wavecomb/render/statistics/cost_profile.h"
+#include "wavecomb/render/statistics/render_statistics.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb {

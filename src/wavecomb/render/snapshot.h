@@ -9,10 +9,10 @@
 
 #include "wavecomb/film/aov_film.h"
 #include "wavecomb/film/film.h"
-#include "wavecomb/render/guide_training.h"
-#include "wavecomb/render/pass_plan.h"
-#include "wavecomb/render/render_statistics.h"
+#include "wavecomb/render/passes/pass_plan.h"
+#include "wavecomb/render/pilots/guiding_training.h"
 #include "wavecomb/render/render_status.h"
+#include "wavecomb/render/statistics/render_statistics.h"
 
 namespace wavecomb {
 

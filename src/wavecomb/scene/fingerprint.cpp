@@ -8,9 +8,9 @@
 #include <variant>
 #include <vector>
 
-#include "wavecomb/scene/camera_table.h"
-#include "wavecomb/scene/light_table.h"
-#include "wavecomb/scene/material_table.h"
+#include "wavecomb/light/description/light_table.h"
+#include "wavecomb/material/description/material_table.h"
+#include "wavecomb/scene/camera/camera_table.h"
 
 namespace wavecomb {
 namespace {
@@ -131,7 +131,7 @@ uint64_t hash_materials(const Scene& scene) {
               add_named(h, p.name, m.own_value(place.index));
           },
           p.place);
-    if (m.program == ProgramId::kOpenPbr) {
+    if (has_trait(m.program, program_trait::kLayered)) {
       const OpenPbr& o = m.openpbr;
 #define WAVECOMB_ADD(kind, name, standard, least, most) h.add(o.name);
       WAVECOMB_OPENPBR_INPUTS(WAVECOMB_ADD)

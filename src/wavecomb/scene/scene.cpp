@@ -6,11 +6,11 @@
 #include <utility>
 
 #include "wavecomb/core/error.h"
-#include "wavecomb/scene/camera_table.h"
-#include "wavecomb/scene/light_table.h"
+#include "wavecomb/light/description/light_table.h"
+#include "wavecomb/medium/description/volume_motion.h"
+#include "wavecomb/scene/camera/camera_table.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene_checks.h"
-#include "wavecomb/scene/volume_motion.h"
 #include "wavecomb/texture/tile_store.h"
 
 namespace wavecomb {

@@ -10,13 +10,13 @@
 #include <unordered_map>
 #include <vector>
 
-#include "wavecomb/scene/camera.h"
-#include "wavecomb/scene/interior.h"
-#include "wavecomb/scene/mesh_tangents.h"
+#include "wavecomb/geometry/mesh/tangents.h"
+#include "wavecomb/medium/description/mesh_medium.h"
+#include "wavecomb/medium/description/subsurface.h"
+#include "wavecomb/medium/description/volume.h"
+#include "wavecomb/scene/camera/camera.h"
 #include "wavecomb/scene/scene_parts.h"
 #include "wavecomb/scene/visibility.h"
-#include "wavecomb/scene/volume.h"
-#include "wavecomb/scene/walk_data.h"
 
 namespace wavecomb {
 
@@ -35,7 +35,7 @@ struct SceneView {
   /// everything.
   const uint32_t* visibility = nullptr;
   const uint32_t* material_program = nullptr;
-  const uint32_t* material_variant = nullptr;  ///< see material_parts.h
+  const uint32_t* material_variant = nullptr;  ///< see variants.h
   MaterialView materials;
   LightView lights;
   MotionView motion;
@@ -179,7 +179,7 @@ class SceneBuilder {
   /// Returns a texture that was added; valid until the builder is destroyed or build() is called.
   const Texture& texture(uint32_t id) const;
   /// Adds a value graph for Material::graph and its parts. Outputs are numbered as in
-  /// graph/parameters.h; texture ids in it must exist.
+  /// graph/parameters/parameters.h; texture ids in it must exist.
   uint32_t add_graph(const Graph& graph);
   /// Adds a material. Its texture and graph ids must exist.
   uint32_t add_material(Material material);
@@ -252,6 +252,16 @@ class SceneBuilder {
   /// empty if neither the group nor the node moves.
   std::vector<Affine> composed(std::span<const Affine> outer, const Affine& still,
                                const Node& node) const;
+  /// Flattens all groups to instances, without those of singular transforms, and checks counts.
+  void flatten_groups(SceneGeometry& geometry);
+  /// Adds the materials that no caller adds: for meshes without one, for collisions in volumes and
+  /// media, and for exit points of random walks. Returns the index of the first, which is grey.
+  uint32_t add_implicit_materials(SceneGeometry& geometry);
+  /// Gives instances without a material the grey one. Throws Error for materials that were never
+  /// added.
+  void bind_materials(SceneGeometry& geometry, uint32_t grey) const;
+  /// Moves everything but materials, graphs and lights to `geometry`.
+  void move_parts(SceneGeometry& geometry);
   void make_records(SceneGeometry& geometry, uint32_t grey) const;
 
   uint32_t threads_;

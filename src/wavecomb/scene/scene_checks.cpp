@@ -5,8 +5,8 @@
 
 #include "wavecomb/core/error.h"
 #include "wavecomb/core/number_text.h"
-#include "wavecomb/scene/material_table.h"
-#include "wavecomb/scene/motion.h"
+#include "wavecomb/geometry/mesh/motion.h"
+#include "wavecomb/material/description/material_table.h"
 
 namespace wavecomb {
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Checks of scene values, for SceneBuilder and for edits. All throw Error with one line that names
-/// the object. For lights see scene/light_table.h.
+/// the object. For lights see light/description/light_table.h.
 #pragma once
 
 #include <cmath>
 #include <string>
 
-#include "wavecomb/scene/light_data.h"
-#include "wavecomb/scene/material_data.h"
+#include "wavecomb/light/description/light.h"
+#include "wavecomb/material/description/material.h"
 
 namespace wavecomb {
 

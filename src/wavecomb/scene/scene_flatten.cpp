@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "wavecomb/core/error.h"
-#include "wavecomb/scene/contents.h"
-#include "wavecomb/scene/interior.h"
+#include "wavecomb/medium/description/glass_contents.h"
+#include "wavecomb/medium/description/mesh_medium.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/scene/scene_checks.h"
@@ -103,49 +103,49 @@ void SceneBuilder::flatten(uint32_t group, const Instance& here, std::span<const
   }
 }
 
-std::shared_ptr<const Scene> SceneBuilder::build() {
-  auto geometry = std::make_shared<SceneGeometry>();
+void SceneBuilder::flatten_groups(SceneGeometry& geometry) {
   // Count first, because nested groups can have 2^n placements, most of which may contain nothing.
   std::vector<uint64_t> placements(groups_.size(), kUncounted);
   std::vector<Instance> flat;
   flat.reserve(count_placements(0, 0, placements));
-  flatten(0, {0, Affine{}, kInheritMaterial, kNoName, {}}, {}, placements, flat, *geometry);
+  flatten(0, {0, Affine{}, kInheritMaterial, kNoName, {}}, {}, placements, flat, geometry);
   const auto sound = [](const Affine& m) {
     const float det = m.determinant();
     return finite(m) && std::isfinite(det) && std::abs(det) > 1e-35f;
   };
-  geometry->placements.shrink_to_fit();
+  geometry.placements.shrink_to_fit();
   const size_t singular = std::erase_if(flat, [&](const Instance& i) {
     bool good = i.motion.moves() || sound(i.to_world);
     for (uint32_t k = 0; i.motion.moves() && k <= i.motion.segments; ++k)
-      good = good && sound(geometry->steps[i.motion.first + k].affine());
+      good = good && sound(geometry.steps[i.motion.first + k].affine());
     return !good;
   });
-  geometry->instances = std::move(flat);
+  geometry.instances = std::move(flat);
   if (singular > 0)
     warnings_.push_back(std::to_string(singular) +
                         " instances have a singular transform and were left out");
 
   SceneCounts counts{.meshes = meshes_.size(),
                      .materials = materials_.size() + 2 + volumes_.size(),
-                     .instances = geometry->instances.size(),
+                     .instances = geometry.instances.size(),
                      .placed = groups_[0].meshes.size(),
-                     .placements = geometry->placements.size(),
-                     .steps = geometry->steps.size()};
+                     .placements = geometry.placements.size(),
+                     .steps = geometry.steps.size()};
   for (const Group& group : groups_) counts.grouped += group.meshes.size();
-  for (const Instance& i : geometry->instances) counts.placed += groups_[i.group].meshes.size();
+  for (const Instance& i : geometry.instances) counts.placed += groups_[i.group].meshes.size();
   check_counts(counts);
+}
 
+uint32_t SceneBuilder::add_implicit_materials(SceneGeometry& geometry) {
   // A grey material for meshes without a material binding.
-  const auto material_count = static_cast<uint32_t>(materials_.size());
-  const uint32_t grey = material_count;
+  const auto grey = static_cast<uint32_t>(materials_.size());
   Material fallback;
   fallback.name = "default";
   fallback.program = ProgramId::kDiffuse;
   fallback.base_color = {0.5f, 0.5f, 0.5f};
   materials_.push_back(fallback);
   // One material for the collisions in each volume.
-  geometry->first_volume_material = grey + 1;
+  geometry.first_volume_material = grey + 1;
   for (const Volume& volume : volumes_) {
     Material inside;
     inside.name = volume.name;
@@ -155,53 +155,67 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   // A material for the exit points of subsurface random walks.
   if (std::ranges::any_of(materials_, [](const Material& m) {
         const Vec3<float>& r = m.openpbr.subsurface_radius;
-        return m.program == ProgramId::kOpenPbr && std::max({r.x, r.y, r.z}) > 0;
+        return has_trait(m.program, program_trait::kSubsurface) && std::max({r.x, r.y, r.z}) > 0;
       })) {
-    geometry->exit_material = static_cast<uint32_t>(materials_.size());
+    geometry.exit_material = static_cast<uint32_t>(materials_.size());
     Material white = fallback;
     white.name = "below surfaces";
     white.base_color = {1, 1, 1};
     materials_.push_back(white);
   }
   // A material for collisions in media inside meshes.
-  const bool absorbing = !volumes_.empty() || absorbing_glass_holds_objects(
-                                                  materials_, meshes_, groups_, geometry->instances,
-                                                  geometry->steps, lights_);
+  const bool absorbing = !volumes_.empty() ||
+                         absorbing_glass_holds_objects(materials_, meshes_, groups_,
+                                                       geometry.instances, geometry.steps, lights_);
   if (std::ranges::any_of(materials_,
                           [&](const Material& m) { return asks_for_interiors(m, absorbing); })) {
-    geometry->inside_material = static_cast<uint32_t>(materials_.size());
+    geometry.inside_material = static_cast<uint32_t>(materials_.size());
     Material inside;
     inside.name = "inside of meshes";
     inside.program = ProgramId::kVolume;
     materials_.push_back(inside);
   }
+  return grey;
+}
+
+void SceneBuilder::bind_materials(SceneGeometry& geometry, uint32_t grey) const {
   for (const Mesh& mesh : meshes_) {
-    const auto bad = [&](uint32_t m) { return m != kInheritMaterial && m >= material_count; };
+    const auto bad = [&](uint32_t m) { return m != kInheritMaterial && m >= grey; };
     if (bad(mesh.material) ||
         std::any_of(mesh.face_materials.begin(), mesh.face_materials.end(), bad))
       throw Error(quoted("mesh", mesh.name) + " uses a material that was never added");
   }
-  for (Instance& i : geometry->instances) {
+  for (Instance& i : geometry.instances) {
     if (i.material == kInheritMaterial) i.material = grey;
     if (i.material > grey) throw Error("an instance uses a material that was never added");
   }
+}
 
+void SceneBuilder::move_parts(SceneGeometry& geometry) {
   // The nesting is no longer needed.
   children_ = {};
   node_steps_ = {};
-  geometry->meshes = std::move(meshes_);
-  geometry->groups = std::move(groups_);
-  geometry->textures = std::move(textures_);
-  geometry->profiles = std::move(profiles_);
-  geometry->filters = std::move(filters_);
-  geometry->sets = std::move(sets_);
-  geometry->visibility = std::move(visibility_);
-  geometry->mesh_lights = std::move(mesh_lights_);
-  geometry->volumes = std::move(volumes_);
-  geometry->light_groups = std::move(light_groups_);
-  geometry->attribute_names = std::move(attribute_names_);
-  geometry->names = std::move(names_);
-  geometry->warnings = std::move(warnings_);
+  geometry.meshes = std::move(meshes_);
+  geometry.groups = std::move(groups_);
+  geometry.textures = std::move(textures_);
+  geometry.profiles = std::move(profiles_);
+  geometry.filters = std::move(filters_);
+  geometry.sets = std::move(sets_);
+  geometry.visibility = std::move(visibility_);
+  geometry.mesh_lights = std::move(mesh_lights_);
+  geometry.volumes = std::move(volumes_);
+  geometry.light_groups = std::move(light_groups_);
+  geometry.attribute_names = std::move(attribute_names_);
+  geometry.names = std::move(names_);
+  geometry.warnings = std::move(warnings_);
+}
+
+std::shared_ptr<const Scene> SceneBuilder::build() {
+  auto geometry = std::make_shared<SceneGeometry>();
+  flatten_groups(*geometry);
+  const uint32_t grey = add_implicit_materials(*geometry);
+  bind_materials(*geometry, grey);
+  move_parts(*geometry);
   std::shared_ptr<const SceneMaterials> materials;
   std::shared_ptr<const SceneLights> lights;
   std::shared_ptr<const SceneTangents> tangents;

@@ -4,11 +4,11 @@
 #include <algorithm>
 
 #include "wavecomb/core/error.h"
-#include "wavecomb/scene/light_data.h"
-#include "wavecomb/scene/mesh.h"
-#include "wavecomb/scene/motion.h"
+#include "wavecomb/geometry/mesh/mesh.h"
+#include "wavecomb/geometry/mesh/motion.h"
+#include "wavecomb/light/description/light_records.h"
+#include "wavecomb/material/description/openpbr_inputs.h"
 #include "wavecomb/scene/names.h"
-#include "wavecomb/scene/openpbr_data.h"
 #include "wavecomb/scene/scene_parts.h"
 
 namespace wavecomb {

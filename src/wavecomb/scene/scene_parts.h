@@ -12,17 +12,17 @@
 #include <string>
 #include <vector>
 
-#include "wavecomb/scene/interior.h"
-#include "wavecomb/scene/light_builder.h"
-#include "wavecomb/scene/light_data.h"
-#include "wavecomb/scene/links.h"
-#include "wavecomb/scene/material_data.h"
-#include "wavecomb/scene/mesh.h"
-#include "wavecomb/scene/motion.h"
+#include "wavecomb/geometry/mesh/mesh.h"
+#include "wavecomb/geometry/mesh/motion.h"
+#include "wavecomb/light/description/light.h"
+#include "wavecomb/light/description/light_builder.h"
+#include "wavecomb/light/description/linking.h"
+#include "wavecomb/material/description/material.h"
+#include "wavecomb/medium/description/mesh_medium.h"
+#include "wavecomb/medium/description/subsurface.h"
+#include "wavecomb/medium/description/volume.h"
 #include "wavecomb/scene/names.h"
 #include "wavecomb/scene/visibility.h"
-#include "wavecomb/scene/volume.h"
-#include "wavecomb/scene/walk_data.h"
 #include "wavecomb/texture/texture.h"
 
 namespace wavecomb {
@@ -141,13 +141,13 @@ struct SceneMaterials {
                  uint32_t inside_material);
 
   std::vector<Material> materials;  ///< as the caller described them
-  std::vector<Material> shaded;     ///< after simplification by settled() (settled_material.h)
+  std::vector<Material> shaded;     ///< after simplification by settled() (simplified_material.h)
   std::shared_ptr<const GraphSet> graphs;
   std::vector<MaterialRecord> records;
   std::vector<TextureUseRecord> uses;
   std::vector<uint32_t> programs;  ///< by material
   std::vector<uint32_t> variants;  ///< least expensive variant of the program of each material
-  /// By material: whether smooth tangents affect its shading (mesh_tangents.h).
+  /// By material: whether smooth tangents affect its shading (tangents.h).
   std::vector<uint8_t> wants_tangents;
   std::vector<OpenPbrRecord> openpbr;  ///< for materials of the program openpbr
   /// By material; empty if no program has specific parameters.

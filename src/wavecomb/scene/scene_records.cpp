@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "wavecomb/curve/check.h"
-#include "wavecomb/scene/mesh_attributes.h"
+#include "wavecomb/geometry/curve/checks.h"
+#include "wavecomb/geometry/mesh/attributes.h"
 #include "wavecomb/scene/object_bounds.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene.h"

@@ -5,7 +5,7 @@
 #include <map>
 #include <string_view>
 
-#include "wavecomb/scene/links.h"
+#include "wavecomb/light/description/linking.h"
 #include "wavecomb/scene/names.h"
 #include "wavecomb/scene/scene.h"
 

@@ -50,6 +50,8 @@ class SchedulingPolicy {
  public:
   virtual ~SchedulingPolicy() = default;
   virtual std::string_view name() const = 0;
+  /// Returns whether order() always keeps arrival order.
+  virtual bool keeps_arrival_order() const { return false; }
   /// Returns the QueueColumn bits that order() reads.
   virtual uint32_t columns() const { return 0; }
   /// Writes one 64-bit key per record. Records are shaded in ascending key order, ties in arrival

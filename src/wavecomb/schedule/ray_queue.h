@@ -2,7 +2,7 @@
 /// Rays of a wave that are traced next, shadow rays, and the results of traversal.
 #pragma once
 
-#include "wavecomb/core/soa.h"
+#include "wavecomb/core/rows/soa.h"
 
 namespace wavecomb {
 

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "wavecomb/core/soa.h"
+#include "wavecomb/core/rows/soa.h"
 
 namespace wavecomb {
 

@@ -2,7 +2,7 @@
 /// Conversion between IEEE 754 binary16 and float.
 #pragma once
 
-#include "wavecomb/core/lanes.h"
+#include "wavecomb/core/lanes/lanes.h"
 
 namespace wavecomb {
 

@@ -2,8 +2,8 @@
 /// Definitions for lookup.h; include only where the templates are instantiated.
 #pragma once
 
-#include "wavecomb/core/fields.h"
-#include "wavecomb/core/rows.h"
+#include "wavecomb/core/rows/fields.h"
+#include "wavecomb/core/rows/rows.h"
 #include "wavecomb/texture/half.h"
 #include "wavecomb/texture/lookup.h"
 #include "wavecomb/texture/srgb.h"

@@ -90,7 +90,7 @@ def test_numbers_of_dropped_files(qtbot, pair, files):
 
 def test_other_sizes_are_explained_and_shown(qtbot, pair, files):
     pair.open("B", [files["small"]])
-    qtbot.waitUntil(lambda: "only images of the same size" in verdict(pair))
+    qtbot.waitUntil(lambda: "only pictures of one size" in verdict(pair))
     settled(qtbot, pair)
     assert "A is 30 x 20, B is 30 x 10" in verdict(pair) and numbers(pair) == {}
     assert pair.view.image("B").height() == 10 and pair.view.image("D") is None

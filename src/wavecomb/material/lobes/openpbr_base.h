@@ -3,13 +3,13 @@
 /// transmissive dielectric.
 #pragma once
 
+#include "wavecomb/material/description/variants.h"
 #include "wavecomb/material/energy_tables.h"
 #include "wavecomb/material/lobes/coat.h"
 #include "wavecomb/material/lobes/ggx_anisotropic.h"
 #include "wavecomb/material/lobes/rough_dielectric.h"
 #include "wavecomb/material/lobes/thin_film.h"
 #include "wavecomb/material/openpbr_params.h"
-#include "wavecomb/scene/material_parts.h"
 
 namespace wavecomb {
 

@@ -16,6 +16,16 @@ inline Mask<F> is_smooth_dielectric(const F& alpha, const F& ior) {
   return (alpha < kDeltaAlpha) | (alpha * abs(F(ior - 1.f)) < 1e-4f);
 }
 
+/// Rough dielectric interface. Refers to the parameters of a BSDF.
+template <typename F>
+struct RoughDielectric {
+  const Ggx<F>& ggx;
+  const F& ior;          ///< index of refraction of the inner side relative to the outer side
+  const Color<F>& tint;  ///< of transmission
+  const F& roughness;    ///< for BsdfSample::roughness
+  bool schlick;          ///< whether reflectance uses Schlick's approximation
+};
+
 /// Evaluates f |cos theta_i| and the density of the sampler below. With eta the index relative to
 /// the side of wo, and c = wi . h + (wo . h) / eta:
 ///   reflection:   f cos = R D G2 / (4 |z_o|),                      pdf = R D G1 / (4 |z_o|);
@@ -23,8 +33,9 @@ inline Mask<F> is_smooth_dielectric(const F& alpha, const F& ior) {
 ///                 pdf = T D G1 |wi.h wo.h| / (|z_o| c^2),
 /// eq. 20 and 21 with the Jacobians of eq. 14 and 17. The factor 1 / eta^2 scales radiance.
 template <typename F>
-inline BsdfEval<F> eval_rough_dielectric(const Ggx<F>& ggx, const F& ior, const Color<F>& tint,
-                                         bool schlick, const Vec3<F>& wo, const Vec3<F>& wi) {
+inline BsdfEval<F> eval_rough_dielectric(const RoughDielectric<F>& lobe, const Vec3<F>& wo,
+                                         const Vec3<F>& wi) {
+  const auto& [ggx, ior, tint, roughness, schlick] = lobe;
   const F eta = relative_ior(wo, ior);
   const F side = copysign(F(1.f), wo.z);
   const Mask<F> reflects = F(wi.z * side) > 0.f;
@@ -56,9 +67,9 @@ inline BsdfEval<F> eval_rough_dielectric(const Ggx<F>& ggx, const F& ior, const 
 /// Samples a visible normal, then reflection with probability R. The weight is G2 / G1, times tint
 /// / eta^2 for transmission.
 template <typename F>
-inline BsdfSample<F> sample_rough_dielectric(const Ggx<F>& ggx, const F& roughness, const F& ior,
-                                             const Color<F>& tint, bool schlick, const Vec3<F>& wo,
+inline BsdfSample<F> sample_rough_dielectric(const RoughDielectric<F>& lobe, const Vec3<F>& wo,
                                              const F& u_lobe, const F& u, const F& v) {
+  const auto& [ggx, ior, tint, roughness, schlick] = lobe;
   const F eta = relative_ior(wo, ior);
   const F side = copysign(F(1.f), wo.z);
   const Vec3<F> wo_up(wo.x, wo.y, abs(wo.z));
@@ -72,7 +83,7 @@ inline BsdfSample<F> sample_rough_dielectric(const Ggx<F>& ggx, const F& roughne
       (reflects & (wi_up.z > 0.f)) | (not_(reflects) & (wi_up.z < 0.f) & (cos_t > 0.f));
   BsdfSample<F> s;
   s.wi = Vec3<F>(wi_up.x, wi_up.y, wi_up.z * side);
-  const BsdfEval<F> e = eval_rough_dielectric(ggx, ior, tint, schlick, wo, s.wi);
+  const BsdfEval<F> e = eval_rough_dielectric(lobe, wo, s.wi);
   const Mask<F> valid = right_side & (e.pdf > 0.f);
   const F g = ggx.g2_over_g1(wo_up, wi_up);
   const F inv_eta2 = 1.f / sqr(eta);

@@ -36,7 +36,7 @@ class DielectricBsdf : public BsdfTraits {
 
   BsdfEval<F> eval(const Vec3<F>& wo, const Vec3<F>& wi) const {
     if (all(smooth_)) return {Color<F>(F(0.f)), F(0.f)};
-    const BsdfEval<F> e = eval_rough_dielectric(ggx_, ior_, tint_, schlick_, wo, wi);
+    const BsdfEval<F> e = eval_rough_dielectric(rough(), wo, wi);
     return {select<F>(smooth_, Color<F>(F(0.f)), e.f_cos), select(smooth_, F(0.f), e.pdf)};
   }
 
@@ -49,14 +49,15 @@ class DielectricBsdf : public BsdfTraits {
     BsdfSample<F> s = empty_sample<F>();
     if (any(smooth_)) s = sample_smooth_dielectric(wo, ior_, tint_, schlick_, u_lobe);
     if (!all(smooth_)) {
-      const BsdfSample<F> rough =
-          sample_rough_dielectric(ggx_, roughness_, ior_, tint_, schlick_, wo, u_lobe, u, v);
-      s = select_sample(smooth_, s, rough);
+      const BsdfSample<F> by_microfacet = sample_rough_dielectric(rough(), wo, u_lobe, u, v);
+      s = select_sample(smooth_, s, by_microfacet);
     }
     return s;
   }
 
  private:
+  RoughDielectric<F> rough() const { return {ggx_, ior_, tint_, roughness_, schlick_}; }
+
   Color<F> tint_;
   F ior_, roughness_;
   Ggx<F> ggx_;

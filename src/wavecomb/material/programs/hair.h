@@ -12,8 +12,9 @@ namespace wavecomb {
 
 /// Hair BSDF. base_color is the colour of many fibres together (Chiang et al. 2016, 4.2), roughness
 /// the longitudinal roughness. Program-specific parameters, in the order of their row
-/// (scene/programs.h): azimuthal_roughness; scale_tt and scale_trt, factors of the longitudinal
-/// width of TT and TRT; cuticle_tilt in degrees towards the root; tint_r, tint_tt, tint_trt.
+/// (material/description/programs.h): azimuthal_roughness; scale_tt and scale_trt, factors of the
+/// longitudinal width of TT and TRT; cuticle_tilt in degrees towards the root; tint_r, tint_tt,
+/// tint_trt.
 ///
 /// The BSDF describes the whole fibre, transmission included; continued rays hit only the outside
 /// of fibres (accel/presence.h). There are no two sides, and |cos theta_i| is included in the

@@ -21,10 +21,10 @@ namespace wavecomb {
 ///
 /// Opaque and thin-walled surfaces are two-sided. Inside a transmissive solid there is no fuzz, and
 /// the coat does not reflect. Subsurface scattering is diffuse reflection, or, with random walks,
-/// enters through a diffuse lobe to the other side (medium/walk.h).
+/// enters through a diffuse lobe to the other side (medium/subsurface/random_walk.h).
 ///
-/// A variant compiled for some of the features (scene/material_parts.h) gives bitwise equal results
-/// for materials that use no others.
+/// A variant compiled for some of the features (material/description/variants.h) gives bitwise
+/// equal results for materials that use no others.
 template <typename F, uint32_t kParts>
 class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   using Viewed = ViewedBsdf<OpenPbrBsdf<F, kParts>, F>;

@@ -28,8 +28,8 @@ namespace wavecomb {
 ///                  energy.
 /// docs/decisions/preview-surface.md compares it with the specification and other renderers.
 ///
-/// A variant compiled for some of the features (scene/material_parts.h) gives bitwise equal results
-/// for materials that use no others.
+/// A variant compiled for some of the features (material/description/variants.h) gives bitwise
+/// equal results for materials that use no others.
 template <typename F, uint32_t kParts>
 class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
   using Viewed = ViewedBsdf<PrincipledBsdf<F, kParts>, F>;

@@ -8,6 +8,7 @@ namespace {
 class NonePolicy final : public SchedulingPolicy {
  public:
   std::string_view name() const override { return "none"; }
+  bool keeps_arrival_order() const override { return true; }
   bool order(const ShadingQueueView&, const CostSnapshot&, std::span<uint64_t>) const override {
     return false;
   }

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+/// First hits of camera rays for AOVs, recorded before shading.
+#pragma once
+
+#include <limits>
+
+#include "wavecomb/aov/aov_tables.h"
+#include "wavecomb/aov/rows.h"
+#include "wavecomb/path/camera/camera_ray.h"
+
+namespace wavecomb {
+
+/// AOV rows of camera rays and their first hits.
+///
+/// Contract: used only as a base of PathAovs. Slots must be below the capacity.
+class PathFirstHits {
+ public:
+  PathFirstHits() = default;
+  /// Allocates the rows that `set` needs. `tables` may be null if nothing in `set` needs them.
+  PathFirstHits(size_t capacity, const AovSet& set, const AovTables* tables)
+      : names_(tables), transmits_(set.has(Aov::kTransmittance)) {
+    const auto rows = [&](SlotRows& block, bool wanted, size_t words) {
+      if (wanted) block = SlotRows(capacity, words);
+    };
+    rows(depth_, set.has(Aov::kDepth), 1);
+    rows(end_, set.any(Aov::kDeep | Aov::kHalfDepth | Aov::kTransmittance), kRowWords<RayEndRow>);
+    rows(hits_, set.has(AovKind::kNearest) || set.has(AovKind::kCoverage), kRowWords<FirstHitRow>);
+    rows(centre_, set.has(AovKind::kNearest), 1);
+    rows(motion_, set.has(Aov::kMotion), 2);
+    rows(alpha_, set.has(Aov::kAlpha), 1);
+  }
+
+  /// Starts camera rays with the sample values `r`.
+  template <typename F>
+  void begin(const CameraSetup& camera, const Sample4<F>& r, const UInt<F>& slot,
+             const Mask<F>& active) const {
+    if (centre_) scatter<F>(centre_.rows, centre_distance2<F>(camera, r, active), slot, active);
+  }
+
+  bool wants_hits() const { return hits_ || depth_ || end_; }
+  bool wants_alpha() const { return bool(alpha_); }
+  /// Sets alpha to 1 for the active lanes' paths.
+  template <typename F>
+  void cover(const UInt<F>& slot, const Mask<F>& active) const {
+    wavecomb::scatter<F>(alpha_.rows, F(1.f), slot, active);
+  }
+
+  /// Records a camera ray that hits the shape of light `light` at `p`.
+  template <typename F>
+  void hit_light(const CameraSetup& camera, const UInt<F>& slot, const Vec3<F>& p, const F& time,
+                 const UInt<F>& light, const Mask<F>& active) const {
+    const F depth = camera_depth<F>(camera, p, time, active);
+    store_depth<F>(slot, depth, active);
+    if (!hits_) return;
+    const UInt<F> none(kNothingHit);
+    store_row<FirstHitRow, F>(hits_.rows, slot,
+                              {p, names_->light_object(light), none, none, depth,
+                               camera_distance<F>(camera, p, time, active)},
+                              active);
+  }
+
+  /// Records a camera ray that hits `surface` at `p`.
+  template <typename F>
+  void hit_surface(const CameraSetup& camera, const UInt<F>& slot, const Vec3<F>& p, const F& time,
+                   const FirstSurface<F>& surface, const Mask<F>& active) const {
+    const F depth = camera_depth<F>(camera, p, time, active);
+    store_depth<F>(slot, depth, active);
+    if (hits_)
+      store_row<FirstHitRow, F>(
+          hits_.rows, slot,
+          {p, names_->template object<F>(surface.inst, surface.geom, active), surface.material,
+           surface.inst, depth, camera_distance<F>(camera, p, time, active)},
+          active);
+  }
+
+  bool wants_motion() const { return bool(motion_); }
+  /// Records the screen motion of the first hit, in pixels (screen_motion.h).
+  template <typename F>
+  void move(const UInt<F>& slot, const Vec2<F>& pixels, const Mask<F>& active) const {
+    scatter_words<F>(motion_.rows, pixels, slot * 2u, active);
+  }
+
+  /// Records a camera ray that a volume stops at `p`. Volumes have no position, depth and instance
+  /// AOVs.
+  template <typename F>
+  [[gnu::noinline, gnu::cold]] void hit_volume(const CameraSetup& camera, const UInt<F>& slot,
+                                               const Vec3<F>& p, const F& time,
+                                               const VolumeSeen<F>& seen,
+                                               const Mask<F>& active) const {
+    if (end_) scatter_ray_end<F>(slot, camera_depth<F>(camera, p, time, active), F(1.f), active);
+    if (!hits_) return;
+    const F far(std::numeric_limits<float>::infinity());
+    const UInt<F> object =
+        select(Mask<UInt<F>>(seen.in_mesh), seen.place, names_->volume_object(seen.volume));
+    store_row<FirstHitRow, F>(
+        hits_.rows, slot, {Vec3<F>(F(0.f)), object, seen.material, UInt<F>(kNothingHit), far, far},
+        active);
+  }
+  bool wants_transmittance() const { return transmits_; }
+  /// Records the transmittance `through` of volumes along the camera ray; 0 if the path scattered.
+  template <typename F>
+  void pass(const UInt<F>& slot, const Color<F>& through, const Mask<F>& active) const {
+    scatter_words<F>(end_.rows, through,
+                     slot * uint32_t{kRowWords<RayEndRow>} + word_of(&RayEndRow<float>::through),
+                     active);
+  }
+
+ protected:
+  size_t hit_bytes() const {
+    size_t n = 0;
+    for (const SlotRows* block : {&depth_, &end_, &hits_, &centre_, &motion_, &alpha_})
+      n += block->bytes();
+    return n;
+  }
+  /// Clears the slots below `slots`.
+  void clear_hits(size_t slots) const {
+    alpha_.zero(slots);
+    motion_.zero(slots);
+    constexpr float kFar = std::numeric_limits<float>::infinity();
+    if (depth_) std::fill_n(depth_.rows, slots, kFar);
+    for (uint32_t i = 0; end_ && i < slots; ++i)
+      store_row<RayEndRow, float>(end_.rows, i, {kFar, 0.f, Color<float>(1.f)}, true);
+    const FirstHitRow<float> none{Vec3<float>(0.f), kNothingHit, kNothingHit,
+                                  kNothingHit,      kFar,        kFar};
+    for (uint32_t i = 0; hits_ && i < slots; ++i)
+      store_row<FirstHitRow, float>(hits_.rows, i, none, true);
+  }
+
+  SlotRows depth_, end_, hits_;
+  SlotRows motion_;  ///< in pixels, x and y
+  SlotRows centre_;  ///< squared distance of the sample from the pixel's centre, in pixels
+  SlotRows alpha_;   ///< 1 if the camera ray hit something opaque
+
+ private:
+  /// Stores the depth of the ray's end, and whether a volume stopped it, in the first two words of
+  /// RayEndRow.
+  template <typename F>
+  void scatter_ray_end(const UInt<F>& slot, const F& depth, const F& in_volume,
+                       const Mask<F>& active) const {
+    const UInt<F> at = slot * uint32_t{kRowWords<RayEndRow>};
+    scatter_words<F>(end_.rows, Vec2<F>{depth, in_volume}, at, active);
+  }
+  /// Stores the depth of a surface along the camera's axis.
+  template <typename F>
+  void store_depth(const UInt<F>& slot, const F& depth, const Mask<F>& active) const {
+    if (depth_) scatter<F>(depth_.rows, depth, slot, active);
+    if (end_) scatter_ray_end<F>(slot, depth, F(0.f), active);
+  }
+
+  const AovTables* names_ = nullptr;
+  bool transmits_ = false;
+};
+
+}  // namespace wavecomb

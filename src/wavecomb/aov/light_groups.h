@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Contributions by light group. Runs only if the render has light groups.
+#pragma once
+
+#include "wavecomb/aov/aov_tables.h"
+#include "wavecomb/path/steps/emit.h"
+
+namespace wavecomb {
+
+/// Returns the film indices of the groups of the lanes' lights; kNoGroup for groups without a layer
+/// and for kNoLight.
+template <typename F>
+inline UInt<F> kept_group(const uint32_t* kept, const UInt<F>& light, const Mask<F>& active) {
+  using U = UInt<F>;
+  const Mask<U> known(active & Mask<F>(light != U(kNoLight)));
+  return select(known, gather<U>(kept, light, known), U(kNoGroup));
+}
+
+/// Splits the result of environment_emission by light: calls add(light, colour) for each infinite
+/// light with is_wanted(light). All terms are clamped by the same factor as their sum, so that they
+/// add up to it. The body is in path/steps/escape.h.
+template <typename F, typename IsWanted, typename Add>
+void split_environment(const SceneView& scene, const ShadeSettings& settings, uint32_t depth,
+                       const PathState<F>& path, const Mask<F>& active, const IsWanted& is_wanted,
+                       const Add& add);
+
+}  // namespace wavecomb

@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: Apache-2.0
+/// AOV values of paths. Both integrators own a PathAovs with one row for each path slot and report
+/// the events of a path to it:
+///
+///   begin      a camera ray starts (first_hits.h)
+///   hit_light, hit_surface   the camera ray has its first hit
+///   vertex     a vertex was shaded
+///   add        a light contributes to the path
+///   end_depth  the radiance includes the emission at vertex `depth`, but not its light sample
+///   resolve    the path's values are added to the film
+///
+/// Rows exist only for the requested AOVs. Splitting the radiance into emission, direct and
+/// indirect light costs nothing in shading, since copies of it before the light samples of the
+/// first two vertices are enough.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstring>
+
+#include "wavecomb/aov/aov_tables.h"
+#include "wavecomb/aov/cost_rows.h"
+#include "wavecomb/aov/first_hits.h"
+#include "wavecomb/aov/light_groups.h"
+#include "wavecomb/aov/path_expressions.h"
+#include "wavecomb/aov/rows.h"
+#include "wavecomb/core/rows/fields.h"
+#include "wavecomb/film/aov_film.h"
+#include "wavecomb/path/path_pool.h"
+#include "wavecomb/path/path_state.h"
+
+namespace wavecomb {
+
+/// Calls put(aov, value) for each AOV of the first vertex whose source is kVertex. `value` has the
+/// channels of the AOV, and `path` is the state that arrived.
+template <typename F, typename Put>
+inline void for_each_vertex_value(const VertexAovs<F>& v, const PathState<F>& /*path*/,
+                                  const Put& put) {
+  put(Aov::kAlbedo, v.albedo);
+  put(Aov::kNormal, v.normal);
+  put(Aov::kUv, v.uv);
+}
+
+/// AOV rows of the paths of a wave.
+///
+/// Contract: owned by one wave, or one reference integrator. Slots must be below the capacity.
+class PathAovs : public PathFirstHits, public PathCostRows {
+ public:
+  PathAovs() = default;
+  /// Allocates the rows that `layout` needs. `tables` may be null if nothing in `layout` needs
+  /// them.
+  PathAovs(size_t capacity, const AovLayout& layout, const AovTables* tables)
+      : PathFirstHits(capacity, layout.set, tables),
+        PathCostRows(layout.set.has(Aov::kCost) ? capacity : 0, tables && tables->models_cost),
+        layout_(layout),
+        tables_(tables) {
+    const AovSet& set = layout.set;
+    const auto rows = [&](Block& block, bool wanted, size_t words) {
+      if (wanted) block = Block(capacity, words);
+    };
+    uint32_t words = 0;
+    for (const AovRow& row : kAovs) {
+      if (row.source != AovSource::kVertex || !set.has(row.aov)) continue;
+      vertex_at_[place_of(row.aov)] = words;
+      words += row.channels;
+    }
+    rows(vertex_, words > 0, words);
+    for (Block& part : parts_) rows(part, set.any(AovSet::kParts), kRadianceWords);
+    rows(early_links_, set.any(AovSet::kParts) && tables && tables->connects, kRadianceWords);
+    rows(groups_, layout.light_groups > 0, kRadianceWords * layout.light_groups);
+    if (layout.expressions > 0)
+      expressions_ =
+          PathExpressions(capacity, tables->automaton, tables->end_of_light, tables->multipliers);
+    rows(guides_, set.has(AovSource::kGuide), kRowWords<GuideRow>);
+    rows(light_samples_, set.has(AovSource::kWay), kRadianceWords);
+    rows(bounces_, set.has(AovSource::kBounce), kRowWords<BounceRow>);
+  }
+
+  size_t bytes() const {
+    size_t n = expressions_.bytes() + hit_bytes() + cost_bytes();
+    for (const Block* block : blocks()) n += block->bytes();
+    return n;
+  }
+
+  // ---- before the first ray ---------------------------------------------------------------------
+
+  /// Clears the slots below `slots`.
+  void clear(size_t slots) {
+    for (const Block* block :
+         {&vertex_, &guides_, &groups_, &light_samples_, &bounces_, &early_links_})
+      block->zero(slots);
+    clear_hits(slots);
+    clear_costs(slots);
+    expressions_.clear(slots);
+  }
+
+  // ---- vertices ---------------------------------------------------------------------------------
+
+  /// Returns the AOV values that shading has to provide at `depth`.
+  template <typename F>
+  VertexAovs<F> wanted(uint32_t depth) const {
+    VertexAovs<F> v;
+    v.wants_uv = depth == 0 && layout_.set.has(Aov::kUv);
+    v.wants_lights = wants_lights();
+    v.wants_events = bool(expressions_);
+    v.wants_bounces = bool(bounces_);
+    v.uv = {F(0.f), F(0.f)};
+    return v;
+  }
+  /// Returns whether shading has to provide any AOV value at `depth`.
+  bool wants_vertex(uint32_t depth) const {
+    return (depth == 0 && vertex_) || guides_ || wants_lights() || bounces_;
+  }
+
+  /// Records a shaded vertex. `path` is the state that arrived there.
+  template <typename F>
+  void vertex(uint32_t depth, const UInt<F>& slot, const VertexAovs<F>& v, const PathState<F>& path,
+              const Mask<F>& active) const {
+    if (depth == 0 && vertex_) {
+      const UInt<F> row = slot * static_cast<uint32_t>(vertex_.words);
+      for_each_vertex_value<F>(v, path, [&](Aov aov, const auto& value) {
+        const uint32_t at = vertex_at_[place_of(aov)];
+        if (at != kNotKept) scatter_words<F>(vertex_.rows, value, row + at, active);
+      });
+    }
+    if (guides_) store_guides<F>(slot, v, path, active);
+    if (bounces_) add_bounce<F>(slot, v, active);
+  }
+  /// Records the survival probability `q` of roulette before a vertex, for paths at `depth`.
+  template <typename F>
+  void survive(uint32_t depth, const UInt<F>& slot, const F& q, const Mask<F>& active) const {
+    if (!bounces_ || depth == 0) return;
+    BounceRow<F> row = load_row<BounceRow, F>(bounces_.rows, slot, active);
+    row.survived += q - 1.f;  // add_bounce() has counted the bounce with probability 1
+    store_row<BounceRow, F>(bounces_.rows, slot, row, active);
+  }
+
+  // ---- light ------------------------------------------------------------------------------------
+
+  /// Returns whether contributions must be reported by light.
+  bool wants_lights() const { return groups_ || expressions_; }
+  /// Returns the index of the stored light group of each lane's light, or kNoGroup.
+  template <typename F>
+  UInt<F> group_of(const UInt<F>& light, const Mask<F>& active) const {
+    if (!groups_) return UInt<F>(kNoGroup);
+    return kept_group<F>(tables_->kept_group.data(), light, active);
+  }
+  const PathExpressions& expressions() const { return expressions_; }
+  /// Adds a contribution of `light`, or kNoLight, to the paths in the active lanes' slots, which
+  /// must be distinct.
+  template <typename F>
+  void add_light(const UInt<F>& slot, const UInt<F>& light, const Color<F>& c,
+                 const Mask<F>& active) const {
+    if (groups_) add<F>(slot, group_of<F>(light, active), c, active);
+    if (expressions_) expressions_.add<F>(slot, light, c, active);
+  }
+  /// Adds emission of volumes.
+  template <typename F>
+  void add_glow(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
+    if (groups_) add<F>(slot, UInt<F>(tables_->group_of_rest), c, active);
+    if (expressions_) expressions_.add_glow<F>(slot, c, active);
+  }
+  /// Adds the contribution `c` of the light sample of the last vertex, from a light of `group`.
+  template <typename F>
+  void add_direct(const UInt<F>& slot, const UInt<F>& group, const Color<F>& c,
+                  const Mask<F>& active) const {
+    if (groups_) add<F>(slot, group, c, active);
+    if (expressions_) expressions_.add_lit<F>(slot, c, active);
+  }
+  /// Adds the contribution `c` to light group `group` only.
+  template <typename F>
+  void add(const UInt<F>& slot, const UInt<F>& group, const Color<F>& c,
+           const Mask<F>& active) const {
+    const Mask<F> kept = active & Mask<F>(group != UInt<F>(kNoGroup));
+    if (any(kept)) add_radiance<F>(groups_.rows, slot * layout_.light_groups + group, c, kept);
+  }
+  bool wants_light_samples() const { return bool(light_samples_); }
+  /// Adds the contribution `c` of light samples to the paths in the active lanes' slots, which must
+  /// be distinct.
+  template <typename F>
+  void add_light_sample(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
+    add_radiance<F>(light_samples_.rows, slot, c, active);
+  }
+  bool wants_links() const { return early_links_ || wants_lights() || light_samples_; }
+  /// Adds the contribution `c` of connections between vertices at `depth` and vertices of light
+  /// paths from `light`. light_path_aovs.h adds it to light path expressions.
+  template <typename F>
+  void add_link(uint32_t depth, const UInt<F>& slot, const UInt<F>& light, const Color<F>& c,
+                const Mask<F>& active) const {
+    if (early_links_ && depth == 0) add_radiance<F>(early_links_.rows, slot, c, active);
+    if (groups_) add<F>(slot, group_of<F>(light, active), c, active);
+    if (light_samples_) add_light_sample<F>(slot, c, active);
+  }
+  /// Adds the environment's light to the paths of the active lanes.
+  template <typename F>
+  void add_environment(const SceneView& scene, const ShadeSettings& settings, uint32_t depth,
+                       const UInt<F>& slot, const PathState<F>& path, const Mask<F>& active) const {
+    split_environment<F>(
+        scene, settings, depth, path, active,
+        [&](uint32_t light) { return expressions_ || tables_->kept_group[light] != kNoGroup; },
+        [&](uint32_t light, const Color<F>& share) {
+          add_light<F>(slot, UInt<F>(light), share, active);
+        });
+  }
+
+  /// Copies the radiance of slots below `slots`. It includes the emission at the vertex at `depth`,
+  /// but not its light sample.
+  void end_depth(uint32_t depth, const float* radiance, size_t slots) const {
+    if (depth < parts_.size() && parts_[depth])
+      std::memcpy(parts_[depth].rows, radiance, slots * kRadianceWords * sizeof(float));
+  }
+  /// Copies the radiance for `depth` and all later vertices, after the paths have ended.
+  void end_path(uint32_t depth, const float* radiance, size_t slots) const {
+    for (; depth < parts_.size(); ++depth) end_depth(depth, radiance, slots);
+  }
+
+  // ---- to the film ------------------------------------------------------------------------------
+
+  /// Multiplies all radiance values by the camera's exposure.
+  void expose(float exposure, size_t slots) const {
+    const auto scale = [&](const Block& block, size_t words) {
+      for (size_t i = 0; block && i < slots * words; ++i) block.rows[i] *= exposure;
+    };
+    for (const Block& part : parts_) scale(part, kRadianceWords);
+    scale(early_links_, kRadianceWords);
+    scale(groups_, kRadianceWords * layout_.light_groups);
+    expressions_.scale(exposure, slots);
+    scale(light_samples_, kRadianceWords);
+  }
+  /// Adds the values of the paths in slots [begin, end) to `pixel`, in the order of slots.
+  /// `radiance` holds the RadianceRow of each slot.
+  void resolve(AovFilm& film, size_t pixel, size_t begin, size_t end, const float* radiance) const;
+
+  // For tests: rows of light groups, or null.
+  const float* group_rows() const { return groups_.rows; }
+
+ private:
+  using Block = SlotRows;
+
+  /// Slots of the paths of one pixel.
+  struct SlotRange {
+    uint32_t begin, end;
+    template <typename Each>
+    void for_each(const Each& each) const {
+      for (uint32_t slot = begin; slot < end; ++slot) each(slot);
+    }
+  };
+  // Parts of resolve(): how camera rays end; values of vertices and first hits; radiance by source;
+  // bounces and costs.
+  void resolve_ends(AovFilm& film, size_t pixel, const SlotRange& slots,
+                    const float* radiance) const;
+  void resolve_vertices(AovFilm& film, size_t pixel, const SlotRange& slots) const;
+  void resolve_light(AovFilm& film, size_t pixel, const SlotRange& slots,
+                     const float* radiance) const;
+  void resolve_work(AovFilm& film, size_t pixel, const SlotRange& slots) const;
+  /// Calls put(aov, words) for each AOV of vertices of this kind that is kept. `words` holds its
+  /// first word in the row of slot 0.
+  template <typename Put>
+  void for_each_vertex_aov(AovKind kind, const Put& put) const;
+
+  std::array<const Block*, 8> blocks() const {
+    return {&vertex_, &parts_[0], &parts_[1],      &early_links_,
+            &groups_, &guides_,   &light_samples_, &bounces_};
+  }
+
+  /// Marks an AOV without words in vertex_.
+  static constexpr uint32_t kNotKept = 0xffffffffu;
+  static constexpr std::array<uint32_t, kAovCount> nothing_kept() {
+    std::array<uint32_t, kAovCount> at{};
+    at.fill(kNotKept);
+    return at;
+  }
+
+  /// Stores the denoiser inputs of paths that have met only clear surfaces so far.
+  template <typename F>
+  void store_guides(const UInt<F>& slot, const VertexAovs<F>& v, const PathState<F>& path,
+                    const Mask<F>& active) const {
+    const GuideRow<F> before = load_row<GuideRow, F>(guides_.rows, slot, active);
+    const Mask<F> seen = active & (before.is_final == 0.f);
+    if (none(seen)) return;
+    const Guides<F> g = guides_of<F>(v, path);
+    store_row<GuideRow, F>(guides_.rows, slot,
+                           {g.albedo, g.normal, select(v.is_clear, F(0.f), F(1.f))}, seen);
+  }
+
+  /// Adds the bounce of a vertex, if it has one.
+  template <typename F>
+  void add_bounce(const UInt<F>& slot, const VertexAovs<F>& v, const Mask<F>& active) const {
+    const Mask<F> there = active & (v.survival >= 0.f);
+    if (none(there)) return;
+    BounceRow<F> row = load_row<BounceRow, F>(bounces_.rows, slot, there);
+    row.guided += v.guided;
+    row.survived += v.survival;
+    row.bounces += 1.f;
+    store_row<BounceRow, F>(bounces_.rows, slot, row, there);
+  }
+
+  AovLayout layout_;
+  const AovTables* tables_ = nullptr;
+  Block vertex_;
+  /// First word of each AOV in a row of vertex_, or kNotKept.
+  std::array<uint32_t, kAovCount> vertex_at_ = nothing_kept();
+  std::array<Block, 2> parts_;  ///< radiance before the light samples of vertices 0 and 1
+  /// Contributions of connections at first vertices. They are indirect light, although they are
+  /// added between the two copies in parts_.
+  Block early_links_;
+  Block groups_;  ///< radiance by light group; the groups of a slot are adjacent
+  Block guides_, bounces_;
+  PathExpressions expressions_;
+  Block light_samples_;  ///< contributions of light samples
+};
+
+}  // namespace wavecomb

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Rows of AOV values that paths keep until they are added to the film (path_aovs.h).
+#pragma once
+
+#include <cstring>
+
+#include "wavecomb/core/rows/fields.h"
+#include "wavecomb/core/rows/soa.h"
+#include "wavecomb/film/aov_film.h"
+
+namespace wavecomb {
+
+/// First hit of a camera ray, before shading. Indices are kNothingHit if there is none.
+template <typename F>
+struct FirstHitRow {
+  Vec3<F> position;
+  UInt<F> object, material, instance;
+  F depth, distance;  ///< distance along the camera's axis, and from the camera's position
+  WAVECOMB_FIELDS(position, object, material, instance, depth, distance)
+};
+
+/// Volume event of a path: the index of the volume, or placed_geometry() of the mesh that the
+/// medium fills, and the material.
+template <typename F>
+struct VolumeSeen {
+  UInt<F> volume, place, material;
+  Mask<F> in_mesh;
+};
+
+/// Geometry and material that a camera ray hits first.
+template <typename F>
+struct FirstSurface {
+  UInt<F> inst, geom;  ///< geom: geometry within the instance's group
+  UInt<F> material;
+};
+
+/// End of a camera ray.
+template <typename F>
+struct RayEndRow {
+  F depth;           ///< infinite if the ray hits nothing
+  F in_volume;       ///< 1 if a volume stopped the ray, else 0
+  Color<F> through;  ///< transmittance of the volumes before the hit; 0 if they stopped the ray
+  WAVECOMB_FIELDS(depth, in_volume, through)
+};
+
+/// Calls put(aov, value) for each AOV of the nearest sample whose source is kHit.
+template <typename Put>
+inline void for_each_hit_value(const FirstHitRow<float>& hit, const Put& put) {
+  put(Aov::kPosition, hit.position);
+  put(Aov::kMaterialId, id_value(hit.material));
+  put(Aov::kInstanceId, id_value(hit.instance));
+  put(Aov::kDepthNearest, hit.depth);
+  put(Aov::kDistance, hit.distance);
+}
+
+/// Denoiser inputs of a path: albedo and normal of the first vertex that is not clear, or of the
+/// last vertex so far.
+template <typename F>
+struct GuideRow {
+  Color<F> albedo;
+  Vec3<F> normal;
+  F is_final;  ///< 1 after a vertex that is not clear
+  WAVECOMB_FIELDS(albedo, normal, is_final)
+};
+
+/// Sums over the bounces of a path: probabilities that the guiding field sampled the direction,
+/// survival probabilities of roulette, and number of bounces.
+template <typename F>
+struct BounceRow {
+  F guided, survived, bounces;
+  WAVECOMB_FIELDS(guided, survived, bounces)
+};
+
+/// Rows of `words` 32-bit words, one for each slot.
+struct SlotRows {
+  SoaBlock owner;
+  float* rows = nullptr;
+  size_t words = 0;
+
+  SlotRows() = default;
+  SlotRows(size_t capacity, size_t words_)
+      : owner(1, capacity * words_), rows(owner.floats(0)), words(words_) {}
+  explicit operator bool() const { return rows != nullptr; }
+  void zero(size_t slots) const {
+    if (rows) std::memset(rows, 0, slots * words * sizeof(float));
+  }
+  size_t bytes() const { return owner.bytes(); }
+};
+
+/// Stores the words of `value` one after another, starting at word `at`.
+template <typename F>
+inline void scatter_words(float* rows, const F& value, const UInt<F>& at, const Mask<F>& active) {
+  scatter<F>(rows, value, at, active);
+}
+template <typename F>
+inline void scatter_words(float* rows, const Vec2<F>& value, const UInt<F>& at,
+                          const Mask<F>& active) {
+  scatter<F>(rows, value.x, at, active);
+  scatter<F>(rows, value.y, at + 1u, active);
+}
+template <typename F>
+inline void scatter_words(float* rows, const Vec3<F>& value, const UInt<F>& at,
+                          const Mask<F>& active) {
+  scatter<F>(rows, value.x, at, active);
+  scatter<F>(rows, value.y, at + 1u, active);
+  scatter<F>(rows, value.z, at + 2u, active);
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Motion of the camera ray's hit across the image while the shutter is open.
+#pragma once
+
+#include "wavecomb/geometry/hit/surface.h"
+#include "wavecomb/light/sampling/moving.h"
+#include "wavecomb/light_paths/camera_connection.h"
+
+namespace wavecomb {
+
+/// Returns the image position of a point at a shutter time, in pixels from the upper left corner,
+/// seen through the centre of a lens without distortion. Not for latlong cameras.
+template <typename F>
+inline Vec2<F> place_in_picture(const CameraSetup& camera, const Vec3<F>& p, const F& time,
+                                const Mask<F>& active) {
+  const CameraSpace<F> space(camera, time, active);
+  const Vec3<F> from = p - space.m.t;
+  const F inverse_det = 1.f / space.det;
+  F x = dot(space.x, from) * inverse_det, y = dot(space.y, from) * inverse_det;
+  if (camera.projection == Projection::kPerspective) {
+    const F depth = F(-dot(space.z, from)) * inverse_det;
+    x = x / depth;
+    y = y / depth;
+  }
+  return {F(x - camera.x0) * (1.f / camera.step_x), F(camera.y1 - y) * (1.f / camera.step_y)};
+}
+
+/// Returns the motion from the image position of `first` at shutter open to that of `last` at
+/// shutter close, in pixels, x to the right and y up. Returns 0 if one of them has no image
+/// position.
+template <typename F>
+inline Vec2<F> screen_motion(const CameraSetup& camera, const Vec3<F>& first, const Vec3<F>& last,
+                             const Mask<F>& active) {
+  const Vec2<F> a = place_in_picture<F>(camera, first, F(0.f), active);
+  const Vec2<F> b = place_in_picture<F>(camera, last, F(1.f), active);
+  const F x = b.x - a.x, y = a.y - b.y;
+  const Mask<F> good = is_finite(x) & is_finite(y);
+  return {select(good, x, F(0.f)), select(good, y, F(0.f))};
+}
+
+/// Returns the motion of the point that is at `p` on lights `light` at `time`.
+template <typename F>
+inline Vec2<F> screen_motion_of_light(const LightView& lights, const CameraSetup& camera,
+                                      const UInt<F>& light, const Vec3<F>& p, const F& time,
+                                      const Mask<F>& active) {
+  if (!lights.motions) return screen_motion<F>(camera, p, p, active);
+  const Vec3<F> rests = light_pose<F>(lights, light, time, active).point_to_rest(p);
+  const auto at = [&](float moment) {
+    return light_pose<F>(lights, light, F(moment), active).point_to_world(rests);
+  };
+  return screen_motion<F>(camera, at(0.f), at(1.f), active);
+}
+
+/// Returns the motion of the surface point of a hit.
+template <typename F>
+[[gnu::noinline, gnu::cold]] Vec2<F> screen_motion_of_hit(const SceneView& scene,
+                                                          const CameraSetup& camera, MeshHit<F> hit,
+                                                          const Vec3<F>& dir,
+                                                          const Mask<F>& active) {
+  hit.time = F(0.f);
+  const Vec3<F> first = setup_surface<F>(scene, hit, dir, false, false, active).p;
+  hit.time = F(1.f);
+  const Vec3<F> last = setup_surface<F>(scene, hit, dir, false, false, active).p;
+  return screen_motion<F>(camera, first, last, active);
+}
+
+}  // namespace wavecomb

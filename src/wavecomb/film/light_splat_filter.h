@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Pixel filter for light splats.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "wavecomb/core/lanes/arithmetic.h"
+#include "wavecomb/film/film.h"
+#include "wavecomb/film/filter.h"
+
+namespace wavecomb {
+
+/// Wrap-around of a panoramic image: points repeat after a full turn in x, and beyond a pole they
+/// appear upside down and half a turn away. `pixels` of 0 means that the image does not wrap.
+struct PictureTurn {
+  float pixels = 0;            ///< width of a full turn in pixels
+  float north = 0, south = 0;  ///< y coordinates of the poles in pixels
+};
+
+/// Distributes a light splat over pixels. A splat at (x, y), in pixels from the upper left corner
+/// of the image, contributes to each pixel with the filter density at its offset from the pixel
+/// centre. This matches the density with which the pixel's own samples, all of weight 1, would lie
+/// there.
+class SplatFilter {
+ public:
+  /// `rendered`: pixels that receive light splats.
+  SplatFilter(const FilterTable& filter, const Region& rendered, const PictureTurn& turn = {})
+      : filter_(filter), rendered_(rendered), turn_(turn) {}
+
+  /// Returns whether a splat at (x, y) contributes to any pixel.
+  template <typename F>
+  Mask<F> reaches(const F& x, const F& y) const {
+    if (turn_.pixels == 0) [[likely]]
+      return (x >= left()) & (x < right()) & holds_row<F>(y);
+    const F half = x + 0.5f * turn_.pixels;
+    return (holds_row<F>(y) & comes_round<F>(x)) |
+           ((holds_row<F>(F(2 * turn_.north - y)) | holds_row<F>(F(2 * turn_.south - y))) &
+            comes_round<F>(half));
+  }
+
+  /// Calls add(pixel, weight) for each pixel (Film::index) to which a splat at (x, y) contributes.
+  template <typename Add>
+  void spread(const Film& film, float x, float y, const Add& add) const {
+    if (turn_.pixels == 0) [[likely]] {
+      spread_at(film, x, y, add);
+      return;
+    }
+    const float half = x + 0.5f * turn_.pixels;
+    spread_around(film, x, y, add);
+    spread_around(film, half, 2 * turn_.north - y, add);
+    spread_around(film, half, 2 * turn_.south - y, add);
+  }
+
+ private:
+  // Bounds of the splat positions whose filter footprint reaches a rendered pixel.
+  float left() const { return low(rendered_.x0); }
+  float right() const { return high(rendered_.x1); }
+  float low(uint32_t edge) const { return static_cast<float>(edge) + 0.5f - filter_.radius(); }
+  float high(uint32_t edge) const { return static_cast<float>(edge) - 0.5f + filter_.radius(); }
+  template <typename F>
+  Mask<F> holds_row(const F& y) const {
+    return (y >= low(rendered_.y0)) & (y < high(rendered_.y1));
+  }
+  /// Shifts x by whole turns to within one turn to the right of left().
+  template <typename F>
+  F after_left(const F& x) const {
+    return x - floor(F(F(x - left()) * (1.f / turn_.pixels))) * turn_.pixels;
+  }
+  /// Whether a position reaches a rendered column after whole turns.
+  template <typename F>
+  Mask<F> comes_round(const F& x) const {
+    return after_left<F>(x) < right();
+  }
+
+  template <typename Add>
+  void spread_around(const Film& film, float x, float y, const Add& add) const {
+    if (!holds_row<float>(y)) return;
+    for (float at = after_left<float>(x); at < right(); at += turn_.pixels)
+      spread_at(film, at, y, add);
+  }
+
+  template <typename Add>
+  void spread_at(const Film& film, float x, float y, const Add& add) const {
+    const float r = filter_.radius();
+    // Pixels i with |x - (i + 1/2)| < r.
+    const auto first = [&](float at, uint32_t edge) {
+      return std::max(static_cast<int>(std::floor(at - r - 0.5f)), static_cast<int>(edge));
+    };
+    const auto last = [&](float at, uint32_t edge) {
+      return std::min(static_cast<int>(std::ceil(at + r - 0.5f)), static_cast<int>(edge) - 1);
+    };
+    const int x1 = last(x, rendered_.x1), y1 = last(y, rendered_.y1);
+    for (int j = first(y, rendered_.y0); j <= y1; ++j) {
+      const float row = filter_.density(y - (static_cast<float>(j) + 0.5f));
+      if (!(row > 0)) continue;
+      for (int i = first(x, rendered_.x0); i <= x1; ++i) {
+        const float weight = row * filter_.density(x - (static_cast<float>(i) + 0.5f));
+        if (weight > 0) add(film.index(static_cast<uint32_t>(i), static_cast<uint32_t>(j)), weight);
+      }
+    }
+  }
+
+  const FilterTable& filter_;
+  Region rendered_;
+  PictureTurn turn_;
+};
+
+}  // namespace wavecomb

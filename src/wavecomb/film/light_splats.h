@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Light splats: contributions of light paths, which may land on any pixel.
+///
+/// Sums are integers, so that the result does not depend on order and any wave may add to any pixel
+/// at any time. Each wave collects its splats in its own SplatList; between wave stages, its worker
+/// adds them to the film's SplatLayer.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "wavecomb/core/fixed_point.h"
+
+namespace wavecomb {
+
+/// Bounded buffer of light splats.
+///
+/// Contract: owned by one worker; allocates only on construction.
+class SplatList {
+ public:
+  struct Splat {
+    uint32_t pixel;  ///< Film::index
+    float r, g, b;
+    bool in_half = false;  ///< SplatLayer::is_in_half of the light path's sample
+  };
+
+  SplatList() = default;
+  explicit SplatList(size_t capacity) { splats_.reserve(capacity); }
+
+  /// Adds a light splat. Returns false if the list is full; the splat is then not stored.
+  [[nodiscard]] bool add(const Splat& splat) {
+    if (splats_.size() == splats_.capacity()) return false;
+    splats_.push_back(splat);
+    return true;
+  }
+  void clear() { splats_.clear(); }
+  size_t bytes() const { return splats_.capacity() * sizeof(Splat); }
+  std::span<const Splat> splats() const { return splats_; }
+
+ private:
+  std::vector<Splat> splats_;
+};
+
+/// Fixed-point sums of light splats. A `place` is an index into the sums.
+///
+/// The range of splat values exceeds the bits of one sum. Values of `kLeastCoarse` units and more
+/// go to a second sum whose unit is 2^kCoarseExponent times as large.
+///
+/// Contract: add() may be called concurrently; all other members only while no thread adds.
+class SplatSums {
+ public:
+  /// Red, green and blue in fine units, then red, green and blue in coarse units.
+  using Sum = std::array<int64_t, 6>;
+  /// Ratio of coarse to fine unit as a power of two, and the least value, in fine units, that is
+  /// added to the coarse sum.
+  static constexpr int kCoarseExponent = 20;
+  static constexpr double kLeastCoarse = 0x1p40;
+
+  SplatSums() = default;
+  SplatSums(size_t places, FixedPoint unit)
+      : unit_(unit), scale_(std::ldexp(1.0, -unit.exponent)), sums_(places) {}
+
+  bool empty() const { return sums_.empty(); }
+  size_t bytes() const { return sums_.size() * sizeof(Sum); }
+  /// Adds a value to a sum atomically.
+  void add(size_t place, float r, float g, float b) {
+    const FixedPoint coarse{unit_.exponent + kCoarseExponent};
+    Sum& sum = sums_[place];
+    const float rgb[3] = {r, g, b};
+    for (size_t c = 0; c < 3; ++c) {
+      const double units = double{rgb[c]} * scale_;
+      if (std::abs(units) < kLeastCoarse)
+        plus(sum[c], static_cast<int64_t>(std::nearbyint(units)));
+      else
+        plus(sum[c + 3], coarse.from(rgb[c]));
+    }
+  }
+  /// Returns the sum in the units of the added values.
+  double value(size_t place, size_t channel) const {
+    const FixedPoint coarse{unit_.exponent + kCoarseExponent};
+    const Sum& sum = sums_[place];
+    return unit_.to_double(sum[channel]) + coarse.to_double(sum[channel + 3]);
+  }
+  std::vector<Sum>& sums() { return sums_; }
+  const std::vector<Sum>& sums() const { return sums_; }
+
+  static void plus(int64_t& sum, int64_t x) {
+    if (x != 0) std::atomic_ref(sum).fetch_add(x, std::memory_order_relaxed);
+  }
+
+ private:
+  FixedPoint unit_;
+  double scale_ = 1;
+  std::vector<Sum> sums_;
+};
+
+/// Scale that turns sums of light splats into pixel values: `numbers` light paths per pixel sample
+/// over `paths` light paths traced.
+struct SplatScale {
+  double numbers = 1, paths = 0;
+
+  double of(double sum) const { return paths > 0 ? sum * numbers / paths : 0.0; }
+  std::array<double, 3> of(const SplatSums& sums, size_t place) const {
+    return {of(sums.value(place, 0)), of(sums.value(place, 1)), of(sums.value(place, 2))};
+  }
+};
+
+/// Light splats of the beauty, by pixel, and counts of the light paths traced.
+///
+/// Contract: add() and done() may be called concurrently, done() by one thread per light path
+/// index; all other members only while no thread adds.
+class SplatLayer {
+ public:
+  using Sum = SplatSums::Sum;
+
+  SplatLayer() = default;
+  /// `paths`: number of light path indices, each of which stands for `scale` light paths per
+  /// sample. `with_error`: also sums one half of the samples separately.
+  SplatLayer(size_t pixels, FixedPoint unit, size_t paths = 0, double scale = 1,
+             bool with_error = false)
+      : sums_(pixels, unit),
+        half_(with_error ? SplatSums(pixels, unit) : SplatSums()),
+        samples_(paths),
+        scale_(scale) {}
+
+  bool empty() const { return sums_.empty(); }
+  bool has_error() const { return !half_.empty(); }
+  /// Adds the splats of `list`.
+  void add(const SplatList& list) {
+    for (const SplatList::Splat& s : list.splats()) {
+      sums_.add(s.pixel, s.r, s.g, s.b);
+      if (s.in_half && has_error()) half_.add(s.pixel, s.r, s.g, s.b);
+    }
+  }
+  /// Adds `list`, which came from `paths` light paths.
+  void add(const SplatList& list, uint32_t paths) {
+    add(list);
+    SplatSums::plus(paths_[0], paths);
+  }
+  /// Returns whether a light path's sample belongs to the half. Every second sample does, since
+  /// each sample of all light paths uses its own sequence (light_paths/light_path.h).
+  static bool is_in_half(uint32_t sample) { return sample % 2 == 0; }
+  /// Records that light path index `path` was traced for samples [first, first + count).
+  void done(size_t path, uint32_t first, uint32_t count) {
+    samples_[path] += count;
+    SplatSums::plus(paths_[0], count);
+    if (has_error()) SplatSums::plus(paths_[1], (first + count + 1) / 2 - (first + 1) / 2);
+  }
+  /// Number of samples traced, by light path index.
+  const std::vector<uint32_t>& samples() const { return samples_; }
+  /// Scale that turns the current sums into means.
+  SplatScale scale() const { return scale_of(paths_[0]); }
+  /// Returns the mean contribution of light paths to a pixel, rgb.
+  std::array<double, 3> mean(size_t pixel) const { return scale().of(sums_, pixel); }
+  /// Returns the mean minus the estimate of the half alone, scaled to the standard error of the
+  /// mean (the halves are independent). Zero if either half has no light paths.
+  std::array<double, 3> difference(size_t pixel) const {
+    if (!has_error() || paths_[1] == 0 || paths_[1] == paths_[0]) return {};
+    std::array<double, 3> out = mean(pixel);
+    const std::array<double, 3> half = scale_of(paths_[1]).of(half_, pixel);
+    const double size =
+        std::sqrt(static_cast<double>(paths_[1]) / static_cast<double>(paths_[0] - paths_[1]));
+    for (size_t c = 0; c < 3; ++c) out[c] = (out[c] - half[c]) * size;
+    return out;
+  }
+  const std::vector<Sum>& sums() const { return sums_.sums(); }
+  size_t bytes() const {
+    return sums_.bytes() + half_.bytes() + samples_.size() * sizeof(uint32_t);
+  }
+  /// Calls block(name, values) for each vector of sums, for checkpoints.
+  template <typename Block>
+  void for_each_block(const Block& block) {
+    if (empty()) return;
+    block("splats", sums_.sums());
+    block("splat_half", half_.sums());
+    block("splat_paths", paths_);
+    block("splat_samples", samples_);
+  }
+
+ private:
+  SplatScale scale_of(int64_t paths) const {
+    return {scale_ * static_cast<double>(std::max<size_t>(1, samples_.size())),
+            static_cast<double>(paths)};
+  }
+
+  SplatSums sums_, half_;
+  std::vector<int64_t> paths_ = std::vector<int64_t>(2);  ///< light paths: total, half
+  std::vector<uint32_t> samples_;
+  double scale_ = 1;
+};
+
+}  // namespace wavecomb

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Validation of meshes of curves or points.
+#pragma once
+
+#include <string>
+
+#include "wavecomb/geometry/mesh/mesh.h"
+
+namespace wavecomb {
+
+/// Throws Error that begins with `name` if array sizes, control points or radii are invalid.
+void check_curves(const Mesh& mesh, const std::string& name);
+
+/// Returns the MeshFlags of a mesh of curves or points, except those of texture coordinates.
+uint32_t curve_flags(const Mesh& mesh);
+
+}  // namespace wavecomb

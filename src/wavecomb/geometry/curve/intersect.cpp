@@ -1,0 +1,378 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/geometry/curve/intersect.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "wavecomb/geometry/curve/bezier.h"
+#include "wavecomb/geometry/curve/points_at.h"
+#include "wavecomb/geometry/curve/segment.h"
+#include "wavecomb/geometry/curve/sub_segments.h"
+#include "wavecomb/geometry/gaussian_splat/gaussian_splat.h"
+
+namespace wavecomb {
+namespace {
+
+using namespace curve_math;
+
+uint32_t first_point(const Mesh& mesh, uint32_t prim) {
+  return mesh.indices[prim] & kCurveFirstPoint;
+}
+
+/// Intersection of a ray with one segment.
+class SegmentTest {
+ public:
+  SegmentTest(const Mesh& mesh, uint32_t prim, const PointsAt& points, const RaySpace& ray,
+              float tfar, CurveQuery query, CurveHits& hits)
+      : mesh_(mesh),
+        prim_(prim),
+        first_(first_point(mesh, prim)),
+        cubic_(mesh.is_cubic()),
+        ray_(ray),
+        z_far_(tfar * ray.length),
+        query_(query),
+        hits_(hits),
+        points_(points) {
+    const uint32_t n = cubic_ ? 4 : 2;
+    for (uint32_t k = 0; k < n; ++k) {
+      curve_.p[k] = ray.point(widen(points.position(first_ + k)));
+      curve_.r[k] = mesh.radii[first_ + k];
+      if (mesh.is_ribbon()) normal_[k] = ray.vector(widen(points.normal(first_ + k)));
+    }
+    if (cubic_) return;
+    Bezier::line(curve_.p);
+    Bezier::line(curve_.r);
+    Bezier::line(normal_);
+  }
+
+  /// Finds hits on the sub-segment of `node`. `outside`: skips hits from inside.
+  void run(bool outside, uint32_t node) {
+    side_ = -1;
+    // Entry points of a tube behind the ray origin also matter, since the ray may start inside.
+    if (mesh_.is_ribbon() || outside) z_near_ = 0;
+    // From inside, the ray may leave the tube in another sub-segment, so search the whole segment.
+    if (mesh_.is_ribbon() || outside) return search_node(node);
+    if (passes_by(curve_, *std::max_element(curve_.r, curve_.r + 4))) return;
+    const int halvings = depth();
+    search(curve_, 0, 1, halvings);
+    if (query_ == CurveQuery::kAny && !hits_.empty()) return;
+    if (!may_be_inside_ && (query_ != CurveQuery::kAll || hits_.empty())) return;
+    side_ = 1;
+    z_near_ = 0;
+    search(curve_, 0, 1, halvings);
+  }
+
+ private:
+  /// Returns the number of halvings after which sub-segments deviate from straight lines by less
+  /// than a fraction of the radius (bound by Wang, 1984), and sets bulge_.
+  int depth() {
+    double bend = 0;
+    for (int i = 0; i < 2; ++i) {
+      const V d = curve_.p[i] - curve_.p[i + 1] * 2.0 + curve_.p[i + 2];
+      bend = std::max(bend, dot_d(d, d));
+    }
+    const double r = *std::max_element(curve_.r, curve_.r + 4);
+    bulge_ = 0.75 * std::sqrt(bend);
+    const double pieces4 = bulge_ / std::max(kStraight * r, 1e-300);  // sub-segments^2
+    int halvings = mesh_.is_ribbon() ? kRibbonHalvings : 0;
+    while (halvings < kMostHalvings && pieces4 > static_cast<double>(1u << (2 * halvings)))
+      ++halvings;
+    bulge_ /= static_cast<double>(1u << (2 * halvings));
+    return halvings;
+  }
+
+  /// Returns whether the ray passes the convex hull of a sub-segment on either side of its chord.
+  static bool passes_by(const Bezier& piece, double r) {
+    const double x = piece.p[3].x - piece.p[0].x, y = piece.p[3].y - piece.p[0].y;
+    const auto beside = [&](int k) { return x * piece.p[k].y - y * piece.p[k].x; };
+    const double b0 = beside(0), b1 = beside(1), b2 = beside(2);  // beside(3) equals beside(0)
+    const double least = std::min(b0, std::min(b1, b2)), most = std::max(b0, std::max(b1, b2));
+    const double reach = r * r * (x * x + y * y) * (1 + 1e-9);
+    return (least > 0 && least * least > reach) || (most < 0 && most * most > reach);
+  }
+
+  /// Searches the sub-segment of a CurvePiece node, or an ancestor of it that is straight enough.
+  void search_node(uint32_t node) {
+    int halvings = depth();
+    Bezier piece = curve_;
+    double u0 = 0, u1 = 1;
+    for (uint32_t bit = std::bit_floor(node) / 2; bit > 0 && halvings > 0; bit /= 2, --halvings) {
+      const bool second = (node & bit) != 0;
+      Bezier::keep_half(piece.p, second);
+      Bezier::keep_half(piece.r, second);
+      (second ? u0 : u1) = 0.5 * (u0 + u1);
+    }
+    search(piece, u0, u1, halvings);
+  }
+
+  /// Bisects a sub-segment recursively while the ray may hit its hull.
+  void search(const Bezier& piece, double u0, double u1, int halvings) {
+    const double r = *std::max_element(piece.r, piece.r + 4);
+    if (passes_by(piece, r)) return;
+    const auto misses = [&](double V::* axis, double lo, double hi) {
+      double least = piece.p[0].*axis, most = least;
+      for (int k = 1; k < 4; ++k) {
+        least = std::min(least, piece.p[k].*axis);
+        most = std::max(most, piece.p[k].*axis);
+      }
+      return least - r > hi || most + r < lo;
+    };
+    if (misses(&V::x, 0, 0) || misses(&V::y, 0, 0) || misses(&V::z, z_near_, z_far_)) return;
+    if (halvings == 0) return mesh_.is_ribbon() ? meet_ribbon(u0, u1) : meet_tube(u0, u1, side_);
+    if (halvings <= kLeafHalvings && !mesh_.is_ribbon())
+      return search_leaves(piece, r, u0, u1, halvings);
+    Bezier a, b;
+    Bezier::split(piece.p, a.p, b.p);
+    Bezier::split(piece.r, a.r, b.r);
+    const double middle = 0.5 * (u0 + u1);
+    search(a, u0, middle, halvings - 1);
+    if (query_ == CurveQuery::kAny && !hits_.empty()) return;
+    search(b, middle, u1, halvings - 1);
+  }
+
+  /// Tests all straight sub-segments below a sub-segment of a tube at once.
+  void search_leaves(const Bezier& piece, double r, double u0, double u1, int halvings) {
+    uint32_t left = leaves_near(piece, halvings, r, bulge_, z_near_, z_far_);
+    const double step = (u1 - u0) / (1 << halvings);
+    for (; left != 0; left &= left - 1) {
+      const double from = u0 + std::countr_zero(left) * step;
+      meet_tube(from, from + step, side_);
+      if (query_ == CurveQuery::kAny && !hits_.empty()) return;
+    }
+  }
+
+  /// Returns a step in u towards the entry or exit of a tube. The ray intersects the sphere of
+  /// parameter u at z(u) -+ sqrt(h(u)), h = r^2 - x^2 - y^2. It enters the tube where z - sqrt(h)
+  /// is minimal (side -1) and leaves it where z + sqrt(h) is maximal (side 1). If curve and radius
+  /// are linear around u,
+  ///   A w + B = -side z' sqrt(h),  A = r'^2 - x'^2 - y'^2,  B = r r' - x x' - y y',
+  /// at u + w. This describes a cone with spherical ends; w = 0 is the exact condition.
+  double step(double u, int side) const {
+    const V c = curve_.at(u), d = curve_.along(u);
+    const double r = curve_.radius(u), dr = curve_.widening(u);
+    const double a = dr * dr - d.x * d.x - d.y * d.y, b = r * dr - c.x * d.x - c.y * d.y;
+    const double h = r * r - c.x * c.x - c.y * c.y, k = d.z * d.z - a;
+    if (!(k > 0)) return dr > 0 ? kFar : -kFar;  // one sphere contains the next
+    const double discriminant = b * b - a * h;
+    if (discriminant < 0) {
+      if (a < 0) return -b / a;              // a miss here; step to where the ray is closest
+      return side * d.z > 0 ? kFar : -kFar;  // the ray runs along the inside of the cone
+    }
+    const double q = -side * d.z * std::sqrt(discriminant / k);
+    // Two forms of the same root; choose the one without cancellation.
+    double w = 0;
+    if (q * b > 0)
+      w = (b * b - d.z * d.z * h) / (k * (q + b));
+    else if (a != 0)
+      w = (q - b) / a;
+    // Roots on the other half of the cone, with negative radii, are not extrema.
+    return r + dr * w >= 0 ? w : std::copysign(kFar, dr);
+  }
+
+  /// Adds the extremum of `side` in [u0, u1] if the steps from both ends lead into the interval.
+  /// The curve's own ends may be extrema as well.
+  void meet_tube(double u0, double u1, int side) {
+    const double s0 = step(u0, side), s1 = step(u1, side);
+    if (s0 > 0 && s1 < 0)
+      meet_tube_at(extreme_between(u0, s0, u1, s1, side), side);
+    else if (u0 == 0 && s0 <= 0)
+      meet_tube_at(0, side);
+    else if (u1 == 1 && s1 >= 0)
+      meet_tube_at(1, side);
+  }
+
+  /// Returns the root of step() between u0, where it is s0 > 0, and u1, where it is s1 < 0, by a
+  /// bracketed secant method.
+  double extreme_between(double u0, double s0, double u1, double s1, int side) const {
+    double before = s0 < -s1 ? u0 : u1, step_before = s0 < -s1 ? s0 : s1;
+    double u = u0 + (u1 - u0) * (s0 / (s0 - s1));
+    for (int i = 0; i < kSteps; ++i) {
+      const double s = step(u, side);
+      if (s == 0) break;
+      (s > 0 ? u0 : u1) = u;
+      const double slope = (s - step_before) / (u - before);
+      double next = slope < 0 ? u - s / slope : u + s;
+      if (!(next > u0 && next < u1)) next = 0.5 * (u0 + u1);
+      before = u;
+      step_before = s;
+      u = next;
+      // Convergence is superlinear, so the next step would be negligible.
+      if (std::abs(u - before) < kNear) break;
+    }
+    return u;
+  }
+
+  void meet_tube_at(double u, int side) {
+    const V c = curve_.at(u);
+    const double r = curve_.radius(u), h = r * r - c.x * c.x - c.y * c.y;
+    if (!(h >= 0 && r > 0)) return;
+    const double z = c.z + side * std::sqrt(h);
+    const V n = V{-c.x, -c.y, z - c.z} * (1 / r);
+    const bool is_inside =
+        (u == 0 && goes_on_at(n, kCurveGoesOnBefore, 0, first_ - 1)) ||
+        (u == 1 && goes_on_at(n, kCurveGoesOnAfter, 3, first_ + (cubic_ ? 4 : 2)));
+    if (!(z > 0) || is_inside)
+      may_be_inside_ = true;
+    else if (z <= z_far_)
+      add_tube(z, u, ray_.back(n));
+  }
+
+  /// Returns whether normal n of the end sphere points into the adjoining segment.
+  bool goes_on_at(const V& n, uint32_t flag, int end, uint32_t next) const {
+    if ((mesh_.indices[prim_] & flag) == 0) return false;
+    const V d = ray_.point(widen(points_.position(next))) - curve_.p[end];
+    const double dr = mesh_.radii[next] - curve_.r[end];
+    return dot_d(n, d) + dr > kSeam * std::sqrt(dot_d(d, d));
+  }
+
+  /// Adds a hit on a tube with the surface coordinates from which shading reconstructs the point.
+  void add_tube(double z, double u, const V& normal) {
+    if (query_ == CurveQuery::kAny) return add(z, 0, 0);
+    CurveSegment<float> s;
+    s.cubic = cubic_;
+    for (uint32_t k = 0; k < 4; ++k) {
+      const uint32_t i = first_ + (cubic_ || k < 2 ? k : 1);
+      s.p[k] = points_.position(i);
+      s.r[k] = mesh_.radii[i];
+    }
+    auto along = static_cast<float>(u);
+    const TubeFrame<float> tube = tube_frame<float>(s, curve_point<float>(s, along));
+    const Vec3<float> n = tube.frame.to_local(narrow(normal));
+    if (u == 0 || u == 1) {
+      const float polar = atan2(std::sqrt(n.x * n.x + n.y * n.y), n.z);
+      const float beyond = polar - atan2(tube.sin_side, tube.cos_side);
+      along = u == 0 ? -std::max(beyond, 0.f) : 1.f + std::max(-beyond, 0.f);
+    }
+    add(z, along, atan2(n.y, n.x) * kInv2Pi);
+  }
+
+  /// Signed offset of the ray across the ribbon. With b = c' x n, the ray hits the strip's plane at
+  /// u where x b_y = y b_x.
+  double across(double u) const {
+    const V c = curve_.at(u), b = cross_d(curve_.along(u), Bezier::mix(normal_, u));
+    return c.x * b.y - c.y * b.x;
+  }
+
+  void meet_ribbon(double u0, double u1) {
+    const double f0 = across(u0), f1 = across(u1);
+    if ((f0 < 0) != (f1 < 0)) return meet_ribbon_between(u0, f0, u1, f1);
+    // A ribbon seen nearly edge-on may be hit twice. Tests whether the sign changes at the extremum
+    // of the parabola through the ends and the midpoint.
+    const double slope = f1 - f0, bend = 2 * (f0 + f1) - 4 * across(0.5 * (u0 + u1));
+    const double at = bend != 0 ? 0.5 - 0.5 * slope / bend : -1;
+    if (!(at > 0 && at < 1)) return;
+    const double um = u0 + at * (u1 - u0), fm = across(um);
+    if ((fm < 0) == (f0 < 0)) return;
+    meet_ribbon_between(u0, f0, um, fm);
+    meet_ribbon_between(um, fm, u1, f1);
+  }
+
+  /// Finds the hit between parameters where across() has different signs, by the Illinois method
+  /// (regula falsi).
+  void meet_ribbon_between(double u0, double f0, double u1, double f1) {
+    double u = u0;
+    int kept = 0;  // end that the last step kept: -1 or 1
+    for (int i = 0; i < kRibbonSteps && u1 - u0 > 1e-15; ++i) {
+      u = std::clamp((f1 * u0 - f0 * u1) / (f1 - f0), u0, u1);
+      const double f = across(u);
+      if (f == 0) break;
+      if ((f < 0) == (f0 < 0)) {
+        if (kept == 1) f1 *= 0.5;
+        u0 = u, f0 = f, kept = 1;
+      } else {
+        if (kept == -1) f0 *= 0.5;
+        u1 = u, f1 = f, kept = -1;
+      }
+    }
+    V b = cross_d(curve_.along(u), Bezier::mix(normal_, u));
+    b = b * (1 / std::sqrt(dot_d(b, b)));
+    const V c = curve_.at(u);
+    const double r = curve_.radius(u), s = -(c.x * b.x + c.y * b.y) / (r * (b.x * b.x + b.y * b.y));
+    if (!(std::abs(s) <= 1)) return;
+    const double z = c.z + s * r * b.z;
+    if (z > 0 && z <= z_far_) add(z, static_cast<float>(u), static_cast<float>(0.5 * s + 0.5));
+  }
+
+  void add(double z, float u, float v) {
+    const CurveHit hit{static_cast<float>(z / ray_.length), u, v < 0 ? v + 1 : v};
+    // Adjacent sub-segments find the same hit.
+    for (const CurveHit& known : hits_)
+      if (std::abs(known.u - u) < 1e-6f && std::abs(known.t - hit.t) <= 1e-6f * hit.t) return;
+    if (hit.t > 0) hits_.add(hit);
+  }
+
+  static constexpr double kStraight = 0.025;  ///< fraction of the radius
+  static constexpr int kMostHalvings = 9, kRibbonHalvings = 3;
+  static constexpr int kSteps = 40, kRibbonSteps = 100;
+  static constexpr double kNear = 1e-9;  ///< smaller steps no longer change the extremum
+  static constexpr double kFar = 2;      ///< a step beyond either end
+  /// Sine of the angle by which end caps overlap the joint with the next segment, to prevent gaps.
+  static constexpr double kSeam = 1e-3;
+
+  const Mesh& mesh_;
+  const uint32_t prim_, first_;
+  const bool cubic_;
+  const RaySpace& ray_;
+  const double z_far_;
+  const CurveQuery query_;
+  CurveHits& hits_;
+  const PointsAt& points_;
+  Bezier curve_;
+  V normal_[4];
+  double bulge_ = 0;            ///< deviation of the final sub-segments from straight lines
+  double z_near_ = -kInfinity;  ///< least z of relevant entry points
+  int side_ = -1;               ///< extrema to find: -1 entries, 1 exits
+  bool may_be_inside_ = false;  ///< entered behind the ray origin or from the adjoining segment
+};
+
+void intersect_sphere(const Mesh& mesh, uint32_t prim, const PointsAt& points, const RaySpace& ray,
+                      float tfar, bool outside, CurveHits& hits) {
+  const V c = ray.point(widen(points.position(prim)));
+  const double r = mesh.radii[prim], h = r * r - c.x * c.x - c.y * c.y;
+  if (!(h >= 0) || r == 0) return;
+  for (const double side : {-1.0, 1.0}) {
+    if (outside && side > 0) break;
+    const double z = c.z + side * std::sqrt(h), t = z / ray.length;
+    if (!(t > 0 && t <= tfar)) continue;
+    const Vec3<float> n = narrow(ray.back({-c.x, -c.y, z - c.z}));
+    const float phi = atan2(n.y, n.x) * kInv2Pi;
+    hits.add({static_cast<float>(t), phi < 0 ? phi + 1 : phi,
+              atan2(std::sqrt(n.x * n.x + n.y * n.y), n.z) * kInvPi});
+  }
+}
+
+}  // namespace
+
+Bounds curve_bounds(const Mesh& mesh, uint32_t prim, uint32_t step) {
+  const bool point = mesh.is_dots();
+  const size_t first = point ? prim : first_point(mesh, prim);
+  const size_t n = point ? 1 : mesh.segment_points();
+  Bounds box;
+  for (size_t k = first; k < first + n; ++k) {
+    const float* p = &mesh.positions[3 * (step * mesh.vertex_count() + k)];
+    const Vec3<float> r =
+        mesh.splats.empty() ? Vec3<float>(mesh.radii[k]) : splat_reach(mesh.splats[k]);
+    const auto reach = [](float x, float by) { return 1e-6f * std::abs(x) + 1.00001f * by; };
+    const Vec3<float> by(reach(p[0], r.x), reach(p[1], r.y), reach(p[2], r.z));
+    box.add({p[0] - by.x, p[1] - by.y, p[2] - by.z});
+    box.add({p[0] + by.x, p[1] + by.y, p[2] + by.z});
+  }
+  return box;
+}
+
+CurveHits intersect_curve(const Mesh& mesh, const CurvePiece& piece, const CurveRay& of, float tfar,
+                          CurveQuery query, float time, bool outside) {
+  const RaySpace& ray = of.space;
+  const PointsAt points(mesh, time);
+  CurveHits hits;
+  if (mesh.primitive == Primitive::kSphere)
+    intersect_sphere(mesh, piece.prim, points, ray, tfar, outside, hits);
+  else if (mesh.primitive == Primitive::kSplat)
+    intersect_splat(mesh.splats[piece.prim], points.position(piece.prim), of, tfar, hits);
+  else
+    SegmentTest(mesh, piece.prim, points, ray, tfar, query, hits).run(outside, piece.node);
+  return hits;
+}
+
+}  // namespace wavecomb

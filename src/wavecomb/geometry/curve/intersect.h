@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Intersection of rays with curves and points.
+///
+/// Tests one ray at a time in double precision, so that hits do not depend on other rays
+/// (docs/decisions/curves.md).
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "wavecomb/geometry/curve/ray.h"
+#include "wavecomb/geometry/mesh/mesh.h"
+#include "wavecomb/scene/scene.h"
+
+namespace wavecomb {
+
+/// Hit on a curve or point; u and v are defined in geometry/curve/segment.h.
+struct CurveHit {
+  float t, u, v;
+};
+
+/// Hits of a ray on one primitive, sorted by distance.
+class CurveHits {
+ public:
+  static constexpr uint32_t kMost = 8;  ///< farther hits than the nearest 8 are dropped
+
+  void add(const CurveHit& hit) {
+    if (count_ == kMost && !(hit.t < hits_[kMost - 1].t)) return;
+    uint32_t at = count_ < kMost ? count_++ : kMost - 1;
+    for (; at > 0 && hit.t < hits_[at - 1].t; --at) hits_[at] = hits_[at - 1];
+    hits_[at] = hit;
+  }
+  bool empty() const { return count_ == 0; }
+  const CurveHit* begin() const { return hits_.data(); }
+  const CurveHit* end() const { return hits_.data() + count_; }
+
+ private:
+  std::array<CurveHit, kMost> hits_;
+  uint32_t count_ = 0;
+};
+
+/// Sub-segment: node 1 is the whole segment; nodes 2 n and 2 n + 1 are the halves of n in
+/// parameter.
+struct CurvePiece {
+  static constexpr uint32_t kNodes = 8;  ///< node indices are less than this
+
+  uint32_t prim;
+  uint32_t node = 1;
+};
+
+/// Type of query: the first hit, all hits, or whether there is any hit (u and v are then not
+/// computed).
+enum class CurveQuery { kFirst, kAll, kAny };
+
+/// Returns conservative bounds of primitive `prim` of a mesh of curves or points at a motion step.
+Bounds curve_bounds(const Mesh& mesh, uint32_t prim, uint32_t step = 0);
+
+/// Returns hits with 0 < t <= tfar, t in units of |dir|, on the outside and inside of a primitive
+/// of a mesh of curves or points. End caps of tubes that lie inside the adjoining segment are not
+/// hit. `time`: in [0, 1] over the mesh's motion steps. `outside`: skips hits from inside. Includes
+/// all hits on the given sub-segment and possibly others of its segment; hits are bit-identical to
+/// those of the whole segment.
+CurveHits intersect_curve(const Mesh& mesh, const CurvePiece& piece, const CurveRay& ray,
+                          float tfar, CurveQuery query, float time = 0, bool outside = false);
+
+}  // namespace wavecomb

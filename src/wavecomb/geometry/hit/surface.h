@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Shading points of hits.
+#pragma once
+
+#include "wavecomb/geometry/hit/curve_surface.h"
+#include "wavecomb/geometry/hit/shading_normal.h"
+#include "wavecomb/geometry/hit/surface_reader.h"
+#include "wavecomb/geometry/hit/tangent.h"
+#include "wavecomb/geometry/hit/uv.h"
+
+namespace wavecomb {
+
+/// Computes the shading point of a hit. `dir` is the unit direction of the ray. `with_uv` computes
+/// uv, dpdu and uv_per_length, `with_terminator` the terminator vector. kWithCurves and kWithMotion
+/// can be false for scenes without curves or motion.
+///
+/// The offset bounds the distance between p and the true surface due to rounding in interpolation,
+/// transform and traversal, in the manner of Pharr, Jakob, Humphreys, "Physically Based Rendering",
+/// section 6.8. The terminator vector follows Hanika, "Hacking the Shadow Terminator", Ray Tracing
+/// Gems II.
+template <typename F, bool kWithCurves = true, bool kWithMotion = true>
+WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F>& hit,
+                                         const Vec3<F>& dir, bool with_uv, bool with_terminator,
+                                         const Mask<F>& lanes) {
+  using U = UInt<F>;
+  Mask<F> active = lanes;
+  if (kWithCurves && scene.has_curves)
+    active = active & not_(detail::is_curved<F>(scene, hit.mesh, lanes));
+  const detail::MeshReader<F> mesh(scene.meshes, hit.mesh, active);
+  detail::InstanceMaps<F> maps(scene.instances, hit.inst, active);
+  const U corner = hit.prim * 3u;
+  const auto [i0, i1, i2] = mesh.corners(hit.prim, active);
+  Vec3<F> p0 = mesh.vec3(&MeshRecord::positions, i0, active);
+  Vec3<F> p1 = mesh.vec3(&MeshRecord::positions, i1, active);
+  Vec3<F> p2 = mesh.vec3(&MeshRecord::positions, i2, active);
+  F moved_size(0.f);
+  if (kWithMotion && scene.has_motion) [[unlikely]] {
+    const MovedTriangle<F> moved =
+        moved_triangle<F>(scene, hit.inst, hit.mesh, {i0, i1, i2}, hit.time, maps, active);
+    p0 = moved.p[0];
+    p1 = moved.p[1];
+    p2 = moved.p[2];
+    maps.place(moved.instance);
+    moved_size = moved.instance.size;
+  }
+  const F b1 = hit.u, b2 = hit.v, b0 = 1.f - b1 - b2;
+  const Vec3<F> e1 = p1 - p0, e2 = p2 - p0;
+  const Vec3<F> p = fma(e2, b2, fma(e1, b1, p0));
+
+  Surface<F> s;
+  s.p = maps.point(p);
+  const Vec3<F> area_vector = maps.map_normal(cross(e1, e2));  // length: twice the world area
+  const F area2 = length(area_vector);
+  const F safe_area2 = select(area2 > 0.f, area2, F(1.f));
+  s.ng = select<F>(area2 > 0.f, area_vector * F(1.f / safe_area2), -dir);
+
+  // Bound of the rounding error: all terms of the interpolated point and, with a smaller weight,
+  // the triangle's corners, from which traversal subtracts the ray's origin. All axes count, since
+  // the products of traversal mix them.
+  const Vec3<F> q0 = detail::abs3(p0), q1 = detail::abs3(p1), q2 = detail::abs3(p2);
+  const Vec3<F> size = (q0 * abs(b0) + q1 * b1 + q2 * b2) + max(q0, max(q1, q2)) * F(0.25f);
+  const auto magnitude = [&](int i, const F& t) {
+    return dot(detail::abs3(maps.row[i]), size) + abs(t);
+  };
+  s.offset =
+      max(max(magnitude(0, maps.t.x), magnitude(1, maps.t.y)), magnitude(2, maps.t.z)) * 0x1p-20f;
+  // Interpolation between motion steps adds rounding errors of the size of both steps.
+  if (kWithMotion && scene.has_motion) [[unlikely]]
+    s.offset = max(s.offset, F(moved_size * 0x1.4p-20f));
+
+  s.ns = s.ng;
+  s.terminator = Vec3<F>(F(0.f));
+  const Mask<F> smooth =
+      Mask<F>((mesh.flags & (kNormalsPerVertex | kNormalsPerCorner)) != U(0u)) & active;
+  if (any(smooth)) {
+    const Mask<F> per_corner = Mask<F>((mesh.flags & kNormalsPerCorner) != U(0u));
+    const Mask<U> pick(per_corner);
+    const U a0 = select(pick, U(corner), i0), a1 = select(pick, U(corner + 1u), i1),
+            a2 = select(pick, U(corner + 2u), i2);
+    Vec3<F> n0 = mesh.vec3(&MeshRecord::normals, a0, smooth);
+    Vec3<F> n1 = mesh.vec3(&MeshRecord::normals, a1, smooth);
+    Vec3<F> n2 = mesh.vec3(&MeshRecord::normals, a2, smooth);
+    if (kWithMotion && scene.has_motion) [[unlikely]] {
+      const auto moved = moved_normals<F>(scene, hit.mesh, {a0, a1, a2}, hit.time, smooth);
+      n0 = moved[0];
+      n1 = moved[1];
+      n2 = moved[2];
+    }
+    const Vec3<F> n = maps.map_normal(fma(n2, b2, fma(n1, b1, Vec3<F>(n0 * b0))));
+    const F len2 = length_squared(n);
+    const Mask<F> good = smooth & (len2 > 0.f) & is_finite(len2);
+    Vec3<F> ns = n * F(1.f / sqrt(select(good, len2, F(1.f))));
+    const F side = dot(ns, s.ng);
+    ns = select<F>(side < 0.f, -ns, ns);
+    s.ns = select<F>(good, ns, s.ng);
+
+    if (with_terminator) {
+      // Project p to the tangent planes at the vertices and interpolate, on the side of the normals
+      // only.
+      const auto lift = [&](const Vec3<F>& q, const Vec3<F>& vertex_normal) {
+        const F n2len = length_squared(vertex_normal);
+        const F h = dot(Vec3<F>(p - q), vertex_normal) / select(n2len > 0.f, n2len, F(1.f));
+        return vertex_normal * min(h, F(0.f));
+      };
+      const Vec3<F> d = lift(p0, n0) * b0 + lift(p1, n1) * b1 + lift(p2, n2) * b2;
+      const Vec3<F> world = -maps.vector(d);
+      const Mask<F> outward = good & (side > 0.f) & (dot(world, s.ng) > 0.f);
+      s.terminator = select<F>(outward, world, Vec3<F>(F(0.f)));
+    }
+  }
+  s.uv = {b1, b2};
+  s.dpdu = Vec3<F>(F(0.f));
+  s.handedness = maps.side;
+  s.uv_per_length = F(0.f);
+  if (with_uv) {
+    const UvTriangle<F> t = uv_triangle<F>(mesh, {i0, i1, i2}, hit.prim, active);
+    const Vec2<F>&d1 = t.d1, &d2 = t.d2;
+    s.uv = t.at(b1, b2);
+    const F det = fma(d1.x, d2.y, F(-(d1.y * d2.x)));
+    s.uv_per_length = sqrt(F(abs(det) / safe_area2));
+    const Mask<F> mirrored = det < 0.f;
+    s.handedness = select(mirrored, F(-maps.side), maps.side);
+    // dp/du = (d2.v e1 - d1.v e2) / det. Only its direction is used.
+    const Vec3<F> across = e1 * d2.y - e2 * d1.y;
+    Vec3<F> tangent = select<F>(mirrored, -across, across);
+    if (scene.tangents)
+      tangent = detail::smooth_tangent<F>(scene, hit, {i0, i1, i2}, tangent, active);
+    s.dpdu = maps.vector(tangent);
+  }
+  if (kWithCurves && scene.has_curves) {
+    const Mask<F> curved = lanes & not_(active);
+    if (any(curved)) detail::setup_curved<F>(scene, hit, dir, with_uv, curved, s);
+  }
+  s.unbent = s.ns;
+  s.ns = facing_normal<F>(dir, s.ng, s.ns);
+  return s;
+}
+
+/// Returns the origin of a ray that leaves `s` along `dir`, offset from the surface on that side,
+/// without the terminator vector.
+template <typename F>
+WAVECOMB_INLINE Vec3<F> clear_origin(const Surface<F>& s, const Vec3<F>& dir) {
+  return fma(s.ng, select(dot(dir, s.ng) > 0.f, s.offset, F(-s.offset)), s.p);
+}
+
+/// Returns the origin of a ray that leaves `s` along `dir`, offset from the surface and by the
+/// terminator vector on that side.
+template <typename F>
+WAVECOMB_INLINE Vec3<F> spawn_origin(const Surface<F>& s, const Vec3<F>& dir) {
+  const Mask<F> outside = dot(dir, s.ng) > 0.f;
+  const F d = select(outside, s.offset, F(-s.offset));
+  const Vec3<F> base = s.p + select<F>(outside, s.terminator, Vec3<F>(F(0.f)));
+  return fma(s.ng, d, base);
+}
+
+}  // namespace wavecomb

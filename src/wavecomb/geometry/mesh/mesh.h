@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Triangle meshes, curves, points and Gaussian splats.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "wavecomb/texture/attribute_data.h"
+
+namespace wavecomb {
+
+/// Material id for meshes that use the material of their instance (see Instance::material).
+inline constexpr uint32_t kInheritMaterial = 0xffffffffu;
+
+enum class Attribute : uint8_t {
+  kNone,
+  kVertex,  ///< one value per vertex, addressed by the triangle's indices
+  /// One value per corner: 3 per triangle in order; 2 per curve segment, for its ends; 1 per point.
+  kCorner,
+};
+
+/// Values that vary over a mesh (a primvar), which materials read by the id of the name.
+struct MeshAttribute {
+  uint32_t id = kNoAttribute;  ///< id of SceneBuilder::attribute
+  AttributeRate rate = AttributeRate::kConstant;
+  uint32_t width = 1;             ///< `width` floats for each value, finite
+  std::span<const float> values;  ///< `width` for each value, finite
+};
+
+/// Type of the primitives of a mesh.
+enum class Primitive : uint8_t {
+  kTriangle,
+  kLinearTube,
+  kCubicTube,
+  kLinearRibbon,
+  kCubicRibbon,
+  kSphere,
+  kSplat
+};
+
+/// Shape and opacity of a Gaussian splat, made by geometry/gaussian_splat/gaussian_splat.h; centre
+/// and colour are stored separately.
+struct alignas(64) SplatRow {
+  float whiten[9];  ///< rows of the map from offsets to standard deviations
+  float opacity;    ///< opacity along a ray through the centre
+  float cut;      ///< square of the cutoff in standard deviations, beyond which rays miss the splat
+  float half[3];  ///< half extents of the bounding box about the centre
+  float unused[2] = {};
+};
+static_assert(sizeof(SplatRow) == 64);
+
+/// An indexed triangle mesh, curves or points (geometry/curve/segment.h), or splats
+/// (geometry/gaussian_splat/gaussian_splat.h), which need a material of program emissive. The
+/// caller owns the arrays, which are not copied; `owner` keeps them alive for as long as a Scene
+/// uses them.
+struct Mesh {
+  std::string name;
+  Primitive primitive = Primitive::kTriangle;
+  /// 3 floats per vertex, Bezier control point or point, step after step.
+  std::span<const float> positions;
+  /// 3 per triangle, counter-clockwise as seen from outside; 1 per curve segment
+  /// (kCurveFirstPoint); empty for points.
+  std::span<const uint32_t> indices;
+  /// 1 per control point or point, or the radius of the bounding sphere of each splat; empty for
+  /// triangles.
+  std::span<const float> radii;
+  /// 3 floats per vertex or corner, or per control point of ribbons, step after step; empty for
+  /// flat shading.
+  std::span<const float> normals;
+  Attribute normals_at = Attribute::kNone;
+  std::span<const float> uvs;  ///< 2 floats per vertex or corner; empty: uv = barycentrics
+  Attribute uvs_at = Attribute::kNone;
+  std::span<const uint32_t> face_materials;  ///< one per primitive, or empty
+  uint32_t material = kInheritMaterial;      ///< used if face_materials is empty
+  uint32_t light_group = 0;                  ///< group of its emission: SceneBuilder::light_group
+  uint32_t mesh_light = 0xffffffffu;         ///< SceneBuilder::add_mesh_light, or kNoLight
+  /// Length of the prefix of `name` that names the asset of the mesh; 0 if unknown.
+  uint32_t asset_length = 0;
+  std::span<const SplatRow> splats;  ///< 1 per splat
+  std::span<const float> harmonics;  ///< 3 (harmonics_degree + 1)^2 floats per splat: its colour
+  uint32_t harmonics_degree = 0;     ///< 0 to 3
+  std::vector<MeshAttribute> attributes;  ///< for the first step, as for uvs
+  /// Number of shapes at equally spaced shutter times; 1 if the mesh does not deform.
+  uint32_t steps = 1;
+  std::shared_ptr<const void> owner;
+
+  bool is_curved() const { return primitive != Primitive::kTriangle; }
+  bool is_strands() const { return is_curved() && !is_dots(); }
+  /// Returns whether each point is a primitive.
+  bool is_dots() const { return primitive == Primitive::kSphere || primitive == Primitive::kSplat; }
+  bool is_ribbon() const {
+    return primitive == Primitive::kLinearRibbon || primitive == Primitive::kCubicRibbon;
+  }
+  bool is_cubic() const {
+    return primitive == Primitive::kCubicTube || primitive == Primitive::kCubicRibbon;
+  }
+  /// Returns the number of control points of a segment.
+  size_t segment_points() const { return is_cubic() ? 4 : 2; }
+  size_t triangle_count() const { return is_curved() ? 0 : indices.size() / 3; }
+  /// Returns the number of triangles, curve segments, points or splats.
+  size_t primitive_count() const {
+    if (is_dots()) return vertex_count();
+    return is_curved() ? indices.size() : indices.size() / 3;
+  }
+  size_t vertex_count() const { return positions.size() / 3 / steps; }
+  bool deforms() const { return steps > 1; }
+};
+
+/// Packed mesh: addresses and flags, 16 32-bit words. For splats `normals` points to SplatRow and
+/// `uvs` to the harmonics.
+struct alignas(64) MeshRecord {
+  uint64_t positions, indices, normals, uvs, face_materials;
+  uint32_t material;
+  uint32_t flags;
+  float uv_density;  ///< sqrt(uv area / area) over all triangles, object space; 0 without uvs
+  uint32_t motion;   ///< index into MotionView::meshes
+  uint64_t radii;
+};
+static_assert(sizeof(MeshRecord) == 64);
+enum MeshFlags : uint32_t {
+  kNormalsPerVertex = 1,
+  kNormalsPerCorner = 2,
+  kUvsPerVertex = 4,
+  kUvsPerCorner = 8,
+  kIsTube = 16,
+  kIsRibbon = 32,
+  kIsSphere = 64,
+  kIsCubic = 128,
+  kIsSplat = 256,
+  kIsDots = kIsSphere | kIsSplat,
+  kIsCurved = kIsTube | kIsRibbon | kIsDots,
+};
+/// Shift of Mesh::harmonics_degree in MeshRecord::flags, 2 bits.
+inline constexpr uint32_t kHarmonicsShift = 10;
+
+}  // namespace wavecomb

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Mesh tangents along u that vary smoothly over triangles, as normals do.
+///
+/// They follow MikkTSpace, for which normal maps are baked (M. Mikkelsen, "Simulation of Wrinkled
+/// Surfaces Revisited", 2008). Corners of a vertex with the same texture coordinates, normal and
+/// texture orientation share one tangent. It is the mean of the tangents of their triangles, each
+/// projected to the plane of the normal and weighted by the triangle's angle at the corner.
+/// Tangents are therefore split at texture seams, where the texture is mirrored, and at hard edges.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "wavecomb/geometry/mesh/mesh.h"
+
+namespace wavecomb {
+
+struct SceneGeometry;
+struct SceneMaterials;
+
+/// Tangents of one mesh in its local space, encoded by core/octahedral.h. Tangents that cancel out
+/// and those of triangles without area in the texture are kNoDirection.
+struct MeshTangents {
+  std::vector<uint32_t> codes;  ///< one per vertex or corner, step after step
+  bool at_corners = false;      ///< set if some vertex has more than one tangent
+};
+
+/// Makes the tangents of a mesh with normals and texture coordinates. Runs in parallel; the result
+/// does not depend on the number of threads.
+MeshTangents make_tangents(const Mesh& mesh);
+
+/// Packed reference to the tangents of a mesh.
+struct TangentRecord {
+  uint64_t codes = 0;     ///< address, or 0 if the mesh has no tangents
+  uint32_t step = 0;      ///< number of codes of one step, for a mesh that deforms
+  uint32_t segments = 0;  ///< number of steps less one
+  uint32_t at_corners = 0;
+  uint32_t pad = 0;
+};
+
+/// Tangents of the meshes with a material that needs them: one that is anisotropic, has a normal
+/// map, or reads tangents in a graph. Other meshes use no memory for tangents.
+struct SceneTangents {
+  /// Makes the tangents of a scene. `before`, or null, holds those of a scene with the same
+  /// geometry, which are reused where possible.
+  SceneTangents(const SceneGeometry& geometry, const SceneMaterials& materials,
+                const SceneTangents* before);
+
+  /// By mesh, null for none; empty if no mesh has tangents.
+  std::vector<std::shared_ptr<const MeshTangents>> of_mesh;
+  std::vector<TangentRecord> records;  ///< by mesh; empty if no mesh has tangents
+  uint64_t bytes() const;
+};
+
+}  // namespace wavecomb

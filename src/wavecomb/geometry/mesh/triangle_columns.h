@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Crossing counts for mesh faces on parallel lines, for inside tests.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "wavecomb/geometry/mesh/mesh.h"
+
+namespace wavecomb {
+
+/// Triangles of a mesh in a 2D grid perpendicular to one direction. The direction is oblique to the
+/// axes, so that lines through the middle of a regular mesh do not hit its edges.
+class TriangleColumns {
+ public:
+  /// Builds the grid. `mesh` must outlive it.
+  explicit TriangleColumns(const Mesh& mesh);
+
+  /// Returns the number of faces through which the line from `p` leaves the mesh less the number
+  /// through which it enters: 1 inside a closed mesh that faces outwards, 0 outside. Adds the
+  /// number of tested triangles to `tests`.
+  int faces_left(const Vec3<float>& p, size_t& tests) const;
+
+ private:
+  Vec3<float> vertex(uint32_t i) const;
+  uint32_t cell(float at, float lowest, float per_unit) const;
+
+  std::span<const float> positions_;
+  std::span<const uint32_t> indices_;
+  uint32_t side_ = 1;  ///< number of cells along x and along y
+  float low_[2] = {}, high_[2] = {}, per_unit_[2] = {};
+  /// Range of `triangles_` for each cell, and the total number at the end.
+  std::vector<uint32_t> first_;
+  std::vector<uint32_t> triangles_;  ///< triangle indices, cell by cell
+};
+
+}  // namespace wavecomb

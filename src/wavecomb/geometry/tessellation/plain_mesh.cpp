@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/geometry/tessellation/plain_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace wavecomb {
+
+void bake_points(std::span<const float> points, std::span<const double, 16> matrix,
+                 std::span<float> out) {
+  for (size_t i = 0; i + 2 < points.size(); i += 3) {
+    const double x = points[i], y = points[i + 1], z = points[i + 2];
+    for (size_t k = 0; k < 3; ++k) {
+      const double turned = std::fma(z, matrix[8 + k], std::fma(y, matrix[4 + k], x * matrix[k]));
+      // 0.0 avoids negative zeros
+      out[i + k] = static_cast<float>((0.0 + turned) + matrix[12 + k]);
+    }
+  }
+}
+
+void bake_normals(std::span<const float> normals, std::span<const double, 16> inverse,
+                  std::span<float> out) {
+  for (size_t i = 0; i + 2 < normals.size(); i += 3) {
+    const double x = normals[i], y = normals[i + 1], z = normals[i + 2];
+    double turned[3];
+    for (size_t k = 0; k < 3; ++k)
+      turned[k] = 0.0 + std::fma(z, inverse[4 * k + 2],
+                                 std::fma(y, inverse[4 * k + 1], x * inverse[4 * k]));
+    const double length =
+        std::sqrt(turned[0] * turned[0] + turned[1] * turned[1] + turned[2] * turned[2]);
+    for (size_t k = 0; k < 3; ++k)
+      out[i + k] = static_cast<float>(turned[k] / (length > 0 ? length : 1));
+  }
+}
+
+std::optional<PointBounds> bounds_of(std::span<const float> points, double limit) {
+  if (points.size() < 3) return std::nullopt;
+  PointBounds bounds{{{points[0], points[1], points[2]}, {points[0], points[1], points[2]}}};
+  bool is_near = true;
+  for (size_t i = 0; i + 2 < points.size(); i += 3) {
+    for (size_t k = 0; k < 3; ++k) {
+      const float value = points[i + k];
+      is_near = is_near && std::abs(static_cast<double>(value)) < limit;  // false for NaN
+      bounds[0][k] = std::min(bounds[0][k], value);
+      bounds[1][k] = std::max(bounds[1][k], value);
+    }
+  }
+  return is_near ? std::optional(bounds) : std::nullopt;
+}
+
+uint32_t corners_of_faces(std::span<const int32_t> counts, std::span<const int32_t> indices,
+                          size_t point_count) {
+  if (counts.empty() || (counts[0] != 3 && counts[0] != 4)) return 0;
+  const int32_t size = counts[0];
+  if (indices.size() != counts.size() * static_cast<size_t>(size)) return 0;
+  bool is_plain = true;
+  for (const int32_t count : counts) is_plain = is_plain && count == size;
+  uint32_t highest = 0;  // negative indices are large as unsigned
+  for (const int32_t index : indices) highest = std::max(highest, static_cast<uint32_t>(index));
+  return is_plain && highest < point_count ? static_cast<uint32_t>(size) : 0;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Conversion of subdivision surfaces and displaced polygons to triangle meshes.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "wavecomb/geometry/tessellation/subdivision.h"
+#include "wavecomb/material/description/material.h"
+
+namespace wavecomb {
+
+/// Displacement along the normal: a texture if there is one, else a constant.
+struct Displacement {
+  float constant = 0;
+  TextureUse use;
+  const TextureView* texture = nullptr;
+
+  /// Returns the distance at texture coordinates (u, v) of the mesh.
+  float at(float u, float v) const;
+};
+
+/// Interpolation of a primvar.
+enum class PrimvarKind : uint8_t { kNone, kVertex, kVarying, kFaceVarying };
+
+/// Values of a primvar on the cage, or on triangles at level 0.
+struct SurfacePrimvar {
+  PrimvarKind kind = PrimvarKind::kNone;
+  /// (points, width), or (values of the channel, width). At level 0, face-varying values other than
+  /// uvs are (triangles, 3, width).
+  std::span<const float> values;
+  uint32_t width = 1;
+  uint32_t channel = 0;  ///< index into Cage::channels if face-varying
+};
+
+/// Input of make_surface. The caller owns the arrays.
+struct SurfaceDesc {
+  Cage cage;
+  std::span<const float> points;  ///< 3 per point of the cage
+  /// 0: no subdivision; displaces the triangles below.
+  uint32_t level = 1;
+  std::span<const uint32_t> triangles;         ///< level 0: 3 points per triangle
+  std::span<const uint32_t> triangle_faces;    ///< level 0: cage face of each triangle
+  std::span<const uint32_t> triangle_corners;  ///< level 0: 3 indices of face-varying values per
+                                               ///< triangle
+  SurfacePrimvar uvs;
+  std::vector<SurfacePrimvar> primvars;
+  std::vector<Displacement> displacements;
+  /// For each face of the cage an index into displacements, or -1 for none. Empty: all faces use
+  /// the first displacement.
+  std::span<const int32_t> face_displacement;
+  /// Transform from cage to mesh space, for row vectors: p' = p M.
+  std::array<double, 16> matrix{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  bool left_handed = false;
+};
+
+/// Values of a primvar on triangles: (points, width), or with per_corner (triangles, 3, width)
+/// because corners at a point differ.
+struct SurfaceValues {
+  std::vector<float> values;
+  bool per_corner = false;
+};
+
+/// Triangle mesh with values per point. A vertex is duplicated, with bitwise equal positions, where
+/// normals or texture coordinates differ between faces.
+struct SurfaceMesh {
+  std::vector<float> positions, normals, uvs;  ///< 3, 3 and 2 per point; uvs may be empty
+  std::vector<uint32_t> triangles;             ///< 3 points per triangle, counter-clockwise seen
+                                               ///< from outside
+  std::vector<uint32_t> faces;                 ///< cage face of each triangle
+  std::vector<SurfaceValues> primvars;         ///< one for each of SurfaceDesc::primvars
+  bool is_manifold = true;
+};
+
+/// Triangulates the surface. Points lie on the limit surface and have its normals. Displaced points
+/// move along the limit normal by the mean displacement of the adjacent faces, so no gaps open at
+/// seams of texture coordinates or materials; their normals are those of the displaced triangles.
+/// Throws Error with a one-line description if the input is invalid.
+SurfaceMesh make_surface(const SurfaceDesc& desc);
+
+}  // namespace wavecomb

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Collects training samples for path guiding, in path order whichever worker traced the path.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "wavecomb/aov/path_aovs.h"
+#include "wavecomb/guiding/field.h"
+#include "wavecomb/guiding/image_tiles.h"
+#include "wavecomb/path/path_history.h"
+#include "wavecomb/schedule/cost_snapshot.h"
+
+namespace wavecomb {
+
+/// Training samples, in path order.
+struct Lessons {
+  std::vector<TrainingRecord> records;  ///< bounces that contributed light, of all rounds
+  std::vector<BounceLesson> bounces;    ///< all bounces of the last round
+  // One per path of the last round:
+  std::vector<float> luminances;
+  std::vector<PathLesson> paths;
+};
+
+/// Cost model in units of one ray traced through a BVH.
+struct PathCosts {
+  double ray = 1;                         ///< of a bounce ray or a shadow ray
+  double lookup = 0;                      ///< of a guiding field lookup at a vertex
+  const CostSnapshot* shading = nullptr;  ///< costs of materials
+
+  /// Returns the cost of a vertex with its light sample.
+  double vertex(uint32_t material) const {
+    return ray + lookup + double{shading->material(material) / kModelRayNs};
+  }
+};
+
+/// Parameters of a training round.
+struct LessonPlan {
+  uint32_t first, samples;  ///< first sample and number of samples of each pixel
+  uint32_t most_depth;
+  const GuideGrid& grid;
+  GuideView guide;            ///< field that guides the bounces, or empty
+  const PictureTiles* tiles;  ///< brightness of the image; null if unknown
+  PathCosts costs;
+  uint32_t roulette_depth;
+};
+
+/// Converts finished paths to training samples.
+///
+/// Contract: workers may call ended() concurrently, each for different paths.
+class BounceReader final : public HistoryReader {
+ public:
+  /// Most vertices of a path that become training samples.
+  static constexpr uint32_t kVertices = 6;
+
+  /// `pixels` and `plan` must outlive the reader.
+  BounceReader(std::span<const uint32_t> pixels, const LessonPlan& plan);
+
+  uint32_t most() const override { return kVertices; }
+  void ended(const PathHistory& history, const float* radiance, const WaveTask& task) override;
+  /// Appends the training samples in path order.
+  void append_to(Lessons& lessons) const;
+
+ private:
+  /// Adds the training samples of the path in `slot`, which has index `path` and ended with the
+  /// radiance `end`. `inverse_scale` is one over the brightness of the image at its pixel.
+  void read(const PathHistory& history, uint32_t slot, const Color<float>& end, size_t path,
+            float inverse_scale);
+  void add_record(size_t path, const HistoryRow<float>& v, const GuidePlace<float>& place,
+                  float nearness, float value, float weight);
+
+  std::span<const uint32_t> pixels_;
+  const LessonPlan& plan_;
+  std::vector<TrainingRecord> records_;  ///< kVertices for each path
+  std::vector<BounceLesson> bounces_;    ///< kVertices for each path
+  std::vector<uint8_t> record_counts_, bounce_counts_;
+  std::vector<float> luminance_;
+  std::vector<PathLesson> paths_;
+};
+
+}  // namespace wavecomb

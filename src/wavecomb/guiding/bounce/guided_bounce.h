@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Bounces sampled from a mixture of BSDF and guiding distribution (guiding/lookup.h):
+///
+///   p(wi) = a p_bsdf(wi) + (1 - a) p_guide(wi) [wi is on the side of wo]
+///
+/// where a is GuidePlace::bsdf_share, and p_bsdf is the density of unguided bounces: by the lobes
+/// of the BSDF, or by the cosine with cosine sampling (bounce_sampling.h). The guiding distribution
+/// covers only the viewer's side of a surface, so only the BSDF samples transmission. A delta lobe
+/// is selected with a times its own probability. MIS uses p for bounces and for light samples.
+#pragma once
+
+#include "wavecomb/guiding/lookup.h"
+#include "wavecomb/path/steps/bounce_sampling.h"
+#include "wavecomb/path/steps/interact.h"
+#include "wavecomb/path/steps/vertex_context.h"
+
+namespace wavecomb {
+
+/// Whether bounces of program `Bsdf` can be guided.
+template <typename Bsdf>
+inline constexpr bool kGuided = Bsdf::kHasNonDelta && Bsdf::kOnSurface;
+
+/// Looks up the guiding distribution at a vertex.
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
+WAVECOMB_INLINE GuidePlace<F> guide_place(const Vertex<F, kFeatures>& v, const Interaction& at,
+                                          const Frame<F>& frame, const Vec3<F>& wo) {
+  if constexpr (kGuided<Bsdf>) {
+    if (v.guide) [[unlikely]] {
+      const Vec3<F> p = fma(v.path.dir, v.t, v.path.o);
+      const Vec3<F> n = select<F>(wo.z < 0.f, -frame.n, frame.n);
+      GuidePlace<F> place = find_guide<F>(*v.guide, p, guide_axis<F>(n), v.material, v.active);
+      place.guided = place.guided & at.bsdf.has_non_delta();
+      return place;
+    }
+  }
+  return {};
+}
+
+/// Returns the density of the mixture for a bounce along `world` (`wi` in the frame whose z axis is
+/// the normal), which the BSDF samples with density `p_bsdf`.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE F mixed_pdf(const Vertex<F, kFeatures>& v, const GuidePlace<F>& place,
+                            const Vec3<F>& world, const Vec3<F>& wi, const Vec3<F>& wo,
+                            const F& p_bsdf) {
+  if constexpr (kGuided<Bsdf>) {
+    if (v.guide && any(place.guided)) [[unlikely]] {
+      const Mask<F> near = place.guided & (F(wi.z * wo.z) > 0.f);
+      const F p_guide = guide_pdf<F>(*v.guide, place, world, near);
+      const F mixed = fma(place.bsdf_share, p_bsdf, F((F(1.f) - place.bsdf_share) * p_guide));
+      return select(place.guided, mixed, p_bsdf);
+    }
+  }
+  return p_bsdf;
+}
+
+/// Turns `b`, a bounce sampled from the BSDF, into a sample of the mixture. r.w selects the
+/// technique. The ray cone always uses the roughness of the sampled BSDF lobe. Writes the training
+/// data of the bounce to `out`.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE void guide_bounce(const VertexContext<Bsdf, F, kFeatures>& c, const Sample4<F>& r,
+                                  BsdfSample<F>& b, VertexResult<F>& out) {
+  if constexpr (kGuided<Bsdf>) {
+    const Vertex<F, kFeatures>& v = c.vertex;
+    const GuidePlace<F>& place = c.guide;
+    if (!v.guide) [[likely]]
+      return;
+    out.axis = place.axis;
+    out.bsdf_pdf = b.pdf;
+    const Mask<F>& guided = place.guided;
+    if (none(guided)) return;
+    const F& a = place.bsdf_share;
+    const Mask<F> by_guide = guided & (r.w >= a);
+    // f |cos|, and the density without guiding.
+    Color<F> f_cos = b.weight * b.pdf;
+    F p_bsdf = b.pdf;
+    if (any(by_guide)) {
+      const Vec3<F> wi = c.frame.to_local(sample_guide<F>(*v.guide, place, r.y, r.z, by_guide));
+      const BsdfEval<F> e = c.at.bsdf.eval(c.view, wi);
+      const Mask<F> there = F(wi.z * c.wo.z) > 0.f;
+      b.wi = select<F>(by_guide, wi, b.wi);
+      f_cos = select<F>(by_guide, select<F>(there, e.f_cos, Color<F>(F(0.f))), f_cos);
+      const F unguided = bounce_pdf(v, c.at.bsdf, c.wo, c.view, wi, e);
+      p_bsdf = select(by_guide, select(there, unguided, F(0.f)), p_bsdf);
+      b.is_delta = b.is_delta & not_(by_guide);
+      b.eta = select(by_guide, F(1.f), b.eta);
+    }
+    const F mixed = mixed_pdf<Bsdf, F>(v, place, c.frame.to_world(b.wi), b.wi, c.wo, p_bsdf);
+    // The pdf of a delta lobe is its selection probability.
+    const F pdf = select(b.is_delta, F(a * p_bsdf), mixed);
+    b.weight = select<F>(guided, f_cos * F(1.f / select(pdf > 0.f, pdf, F(1.f))), b.weight);
+    out.bsdf_pdf = p_bsdf;
+    b.pdf = select(guided, pdf, b.pdf);
+  }
+}
+
+}  // namespace wavecomb

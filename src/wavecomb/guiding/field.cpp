@@ -1,0 +1,346 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/guiding/field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numeric>
+
+#include "wavecomb/core/morton.h"
+#include "wavecomb/guiding/lookup.inl"
+#include "wavecomb/guiding/mixing_fractions.h"
+#include "wavecomb/guiding/region_directions.h"
+#include "wavecomb/guiding/sampling_table.h"
+
+namespace wavecomb {
+namespace {
+
+/// Cells with more records are divided.
+constexpr size_t kCellRecords = 2048;
+/// Minimum number of records for a region to get a separate distribution.
+constexpr double kOwnRecords = 64;
+/// Maximum number of records from which the directions of a cell are computed.
+constexpr size_t kDirections = 8192;
+/// Weight of the parent cell's distribution and moments, in records.
+constexpr double kPrior = 64;
+/// Minimum number of records of a material before it limits guiding.
+constexpr double kMaterialRecords = 512;
+/// Fraction of bounces sampled by the BSDF in the first round, before moments are known.
+constexpr float kFirstShare = 0.5f;
+
+uint32_t code_of(const GuideGrid& grid, const float (&p)[3]) {
+  uint32_t step[3];
+  for (int i = 0; i < 3; ++i) step[i] = detail::guide_steps<float>(p[i], grid.lo[i], grid.scale[i]);
+  return morton_3(step[0], step[1], step[2]);
+}
+
+/// Extracts every third bit of a Morton code, starting with the lowest.
+uint32_t compact_bits_3(uint32_t x) {
+  uint32_t out = 0;
+  for (uint32_t i = 0; i < kGuideBits; ++i) out |= (x >> (3 * i) & 1u) << i;
+  return out;
+}
+
+}  // namespace
+
+GuideGrid::GuideGrid(const float (&low)[3], const float (&high)[3]) {
+  for (int i = 0; i < 3; ++i) {
+    const double size = double{high[i]} - double{low[i]};
+    lo[i] = low[i];
+    scale[i] = size > 0 && std::isfinite(size) ? static_cast<float>((1u << kGuideBits) / size) : 0;
+  }
+}
+
+/// Builds the octree from the root down and creates the regions.
+class GuideFieldBuilder {
+ public:
+  GuideFieldBuilder(GuideField& field, std::span<const TrainingRecord> records, size_t materials,
+                    bool first, bool guides)
+      : field_(field), parts_(field.parts_), first_(first), guides_(guides) {
+    std::vector<std::pair<uint32_t, uint32_t>> order(records.size());
+    for (uint32_t i = 0; i < records.size(); ++i)
+      order[i] = {code_of(field.grid_, records[i].p), i};
+    std::sort(order.begin(), order.end());
+    records_.reserve(records.size());
+    codes_.reserve(records.size());
+    for (const auto& [code, i] : order) {
+      records_.push_back(records[i]);
+      codes_.push_back(code);
+    }
+    if (!first) {
+      ratios_.reserve(records.size());
+      for (const TrainingRecord& r : records_) ratios_.push_back(share_ratios(r));
+    }
+    weigh_materials(materials);
+  }
+
+  void build(size_t cell_records) {
+    cell_records_ = cell_records;
+    parts_.entries.assign(kGuideTopCells, kGuideCell);
+    parts_.cells.clear();
+    parts_.tables.clear();
+    parts_.spheres.clear();
+    parts_.bsdf_share.clear();
+    field_.facts_ = {records_.size(), 0, 0, 0, 0, 1};
+    bring_ = off_ = on_ = 0;
+    guided_ = 0;
+    for (RegionPart& part : levels_[0]) part = {};
+    divide(0, 0, 0, records_.size());
+    GuideFacts& facts = field_.facts_;
+    facts.cells = static_cast<uint32_t>(parts_.cells.size() / kGuideAxes);
+    facts.regions = static_cast<uint32_t>(parts_.bsdf_share.size());
+    for (const float a : parts_.bsdf_share) facts.guided_regions += a < 1 ? 1 : 0;
+    if (bring_ > 0) facts.guided_share = guided_ / bring_;
+    if (off_ > 0) facts.moment_ratio = on_ / off_;
+  }
+
+ private:
+  /// Statistics of the records of one cell whose surfaces face one axis.
+  struct RegionPart {
+    DirectionBins density{};  ///< sums to 1, or 0 if nothing is known
+    double count = 0;
+    GuideSphere sphere;  ///< centre of the directions of `density`
+    ShareMoments moments;
+    uint32_t region = kNoGuideRegion;  ///< once created
+  };
+  using Cell = std::array<RegionPart, kGuideAxes>;
+
+  void weigh_materials(size_t materials) {
+    parts_.material_share.assign(std::max<size_t>(materials, 1), 0.f);
+    if (first_) return;
+    std::vector<ShareMoments> moments(parts_.material_share.size());
+    const double cut = largest(records_);
+    for (size_t i = 0; i < records_.size(); ++i)
+      if (const TrainingRecord& r = records_[i]; r.material < moments.size())
+        moments[r.material].add(ratios_[i], std::min(double{r.value}, cut));
+    for (size_t m = 0; m < moments.size(); ++m)
+      if (moments[m].count >= kMaterialRecords)
+        parts_.material_share[m] = kBsdfShares[moments[m].best()];
+  }
+
+  /// Returns the clamp for values: sqrt(n) times the mean of n values, so that no single one
+  /// dominates.
+  static double largest(std::span<const TrainingRecord> records) {
+    double sum = 0;
+    for (const TrainingRecord& r : records) sum += double{r.value};
+    return records.empty() ? 0 : sum / std::sqrt(static_cast<double>(records.size()));
+  }
+
+  /// Computes the statistics of records [begin, end), blended with those of the parent cell.
+  void read(uint32_t depth, size_t begin, size_t end) {
+    Cell& cell = levels_[depth];
+    const std::span here = std::span(records_).subspan(begin, end - begin);
+    for (RegionPart& part : cell) part = {};
+    const double cut = largest(here);
+    for (std::vector<const TrainingRecord*>& bounces : by_axis_) bounces.clear();
+    for (size_t i = begin; i < end; ++i) {
+      const TrainingRecord& r = records_[i];
+      by_axis_[r.axis].push_back(&r);
+      if (!first_) cell[r.axis].moments.add(ratios_[i], std::min(double{r.value}, cut));
+    }
+    for (uint32_t axis = 0; axis < kGuideAxes; ++axis) {
+      RegionPart& part = cell[axis];
+      part.count = static_cast<double>(by_axis_[axis].size());
+      part.sphere = fit_sphere(by_axis_[axis], cut);
+      part.density = direction_bins(some_bounces(by_axis_[axis], kDirections), part.sphere, cut);
+      const RegionPart* above = depth > 0 ? &levels_[depth - 1][axis] : nullptr;
+      const double sum = std::accumulate(part.density.begin(), part.density.end(), 0.0);
+      const double prior = above && above->count > 0 ? kPrior : 0;
+      const double n = sum > 0 ? part.count : 0;
+      if (n + prior == 0) continue;
+      for (uint32_t b = 0; b < kGuideBins; ++b) {
+        const double own = n > 0 ? part.density[b] / sum * n : 0;
+        part.density[b] = (own + (prior > 0 ? prior * above->density[b] : 0)) / (n + prior);
+      }
+      if (prior > 0 && above->moments.count > 0)
+        part.moments.add(above->moments, kPrior / std::max(above->moments.count, kPrior));
+    }
+  }
+
+  /// Returns the region of a cell and axis. Too few records: the region of the nearest ancestor
+  /// with enough, or kNoGuideRegion.
+  uint32_t region_of(uint32_t depth, uint32_t axis) {
+    RegionPart& part = levels_[depth][axis];
+    if (part.count < kOwnRecords) return depth > 0 ? region_of(depth - 1, axis) : kNoGuideRegion;
+    if (part.region != kNoGuideRegion) return part.region;
+    part.region = static_cast<uint32_t>(parts_.bsdf_share.size());
+    const size_t at = parts_.tables.size();
+    parts_.tables.resize(at + kGuideWords);
+    write_guide_table(smoothed(part.density),
+                      std::span(parts_.tables).subspan(at).first<kGuideWords>());
+    parts_.spheres.push_back(part.sphere);
+    parts_.bsdf_share.push_back(!guides_ ? 1.f
+                                : first_ ? kFirstShare
+                                         : kBsdfShares[part.moments.best()]);
+    return part.region;
+  }
+
+  /// Processes the octree node of `depth` whose Morton codes share the prefix of `code`. Its
+  /// records are [begin, end).
+  void divide(uint32_t depth, uint32_t code, size_t begin, size_t end) {
+    read(depth, begin, end);
+    if (end - begin <= cell_records_ || depth == kGuideBits) {
+      add_cell(depth, code, begin, end);
+      return;
+    }
+    const uint32_t shift = 3 * (kGuideBits - depth - 1);
+    size_t from = begin;
+    for (uint32_t child = 0; child < 8; ++child) {
+      const uint32_t first = code | child << shift;
+      const uint64_t limit = uint64_t{first} + (uint64_t{1} << shift);
+      const auto to = static_cast<size_t>(
+          std::lower_bound(codes_.begin() + static_cast<std::ptrdiff_t>(from),
+                           codes_.begin() + static_cast<std::ptrdiff_t>(end), limit,
+                           [](uint32_t a, uint64_t b) { return a < b; }) -
+          codes_.begin());
+      divide(depth + 1, first, from, to);
+      from = to;
+    }
+  }
+
+  void add_cell(uint32_t depth, uint32_t code, size_t begin, size_t end) {
+    const auto cell = static_cast<uint32_t>(parts_.cells.size() / kGuideAxes);
+    for (uint32_t axis = 0; axis < kGuideAxes; ++axis)
+      parts_.cells.push_back(region_of(depth, axis));
+    fill(depth, code, kGuideCell | cell);
+    const uint32_t* regions = parts_.cells.data() + size_t{cell} * kGuideAxes;
+    for (size_t i = begin; i < end; ++i) {
+      const TrainingRecord& r = records_[i];
+      const uint32_t region = regions[r.axis];
+      float a = 1;
+      if (region != kNoGuideRegion)
+        a = std::max(parts_.bsdf_share[region], r.material < parts_.material_share.size()
+                                                    ? parts_.material_share[r.material]
+                                                    : 0.f);
+      const double brought = double{r.weight} * double{r.value};
+      bring_ += brought;
+      guided_ += a < 1 ? brought * (1 - double{a}) : 0;
+      if (!(r.guide_pdf > 0)) continue;
+      const double moment = brought * brought * double{r.pdf};
+      off_ += moment / double{r.bsdf_pdf};
+      on_ += moment / (double{a} * double{r.bsdf_pdf} + (1 - double{a}) * double{r.guide_pdf});
+    }
+  }
+
+  /// Writes `entry` to all grid entries that the node covers.
+  void fill(uint32_t depth, uint32_t code, uint32_t entry) {
+    const uint32_t x = compact_bits_3(code), y = compact_bits_3(code >> 1),
+                   z = compact_bits_3(code >> 2);
+    std::vector<uint32_t>& entries = parts_.entries;
+    uint32_t bits = kGuideTopBits, first = 0, width = kGuideTopBits;
+    for (;;) {
+      const uint32_t shift = kGuideBits - bits, mask = (1u << width) - 1;
+      const uint32_t at[3] = {x >> shift & mask, y >> shift & mask, z >> shift & mask};
+      if (depth <= bits) {
+        const uint32_t size = 1u << (bits - depth);
+        for (uint32_t k = 0; k < size; ++k)
+          for (uint32_t j = 0; j < size; ++j)
+            for (uint32_t i = 0; i < size; ++i)
+              entries[first + (at[0] + i) + ((at[1] + j) << width) + ((at[2] + k) << (2 * width))] =
+                  entry;
+        return;
+      }
+      uint32_t& here = entries[first + at[0] + (at[1] << width) + (at[2] << (2 * width))];
+      if (here >= kGuideCell) {
+        here = static_cast<uint32_t>(entries.size());
+        first = here;
+        entries.resize(entries.size() + kGuideBrickCells, kGuideCell);
+      } else {
+        first = here;
+      }
+      bits += kGuideBrickBits;
+      width = kGuideBrickBits;
+    }
+  }
+
+  GuideField& field_;
+  GuideParts& parts_;  ///< parts of field_
+  bool first_, guides_;
+  std::vector<TrainingRecord> records_;  ///< sorted by Morton code
+  std::vector<ShareRatios> ratios_;      ///< of records_; empty in the first round
+  std::vector<uint32_t> codes_;
+  size_t cell_records_ = kCellRecords;
+  std::array<std::vector<const TrainingRecord*>, kGuideAxes> by_axis_;  ///< scratch of read()
+  std::array<Cell, kGuideBits + 1> levels_;  ///< path from the root to the node in divide()
+  double bring_ = 0, guided_ = 0, off_ = 0, on_ = 0;
+};
+
+GuideField::GuideField(const GuideGrid& grid, std::span<const TrainingRecord> records,
+                       size_t materials, bool first, bool guides, size_t most_bytes)
+    : grid_(grid) {
+  const auto builder =
+      std::make_unique<GuideFieldBuilder>(*this, records, materials, first, guides);
+  for (size_t cell_records = kCellRecords;; cell_records *= 2) {
+    builder->build(cell_records);
+    if (bytes() <= most_bytes || cell_records >= records.size()) break;
+  }
+  weigh_bounces({}, {});
+}
+
+GuideField::GuideField(const GuideGrid& grid, GuideParts parts, const GuideFacts& facts,
+                       size_t materials)
+    : grid_(grid), parts_(std::move(parts)), facts_(facts) {
+  check_guide_parts(parts_, materials);
+}
+
+uint64_t bounce_place(const GuideGrid& grid, const Vec3<float>& p, uint32_t axis) {
+  return uint64_t{code_of(grid, {p.x, p.y, p.z})} << 3 | axis;
+}
+
+void GuideField::weigh_bounces(std::span<const BounceLesson> lessons, const PathLesson& paths) {
+  struct Sums {
+    double count = 0, value = 0, squared = 0, cost = 0;
+  };
+  const size_t regions = parts_.bsdf_share.size();
+  std::vector<Sums> sums(regions + 1);  // the last one: all regions
+  parts_.survival.assign(regions, 0.f);
+  const auto for_each = [&, v = view()](const auto& add) {
+    for (const BounceLesson& lesson : lessons) {
+      if (!v.grid) break;
+      const auto code = static_cast<uint32_t>(lesson.place >> 3);
+      const uint32_t cell = detail::guide_cell<float>(
+          v, compact_bits_3(code), compact_bits_3(code >> 1), compact_bits_3(code >> 2), true);
+      const uint32_t region = parts_.cells[size_t{cell} * kGuideAxes + (lesson.place & 7u)];
+      if (region != kNoGuideRegion) add(sums[region], lesson);
+      add(sums[regions], lesson);
+    }
+  };
+  for_each([](Sums& s, const BounceLesson& lesson) {
+    s.count += 1;
+    s.value += double{lesson.value};
+    s.cost += double{lesson.cost};
+  });
+  // Clamp squares as values are clamped: no bounce counts for more than sqrt(n) times the mean.
+  for_each([](Sums& s, const BounceLesson& lesson) {
+    s.squared += std::min(double{lesson.squared}, s.value * s.value / s.count);
+  });
+  for (size_t i = 0; i < regions; ++i) {
+    const Sums& s = sums[i].count >= kOwnRecords ? sums[i] : sums[regions];
+    if (s.cost > 0 && paths.variance > 0)
+      parts_.survival[i] = static_cast<float>(
+          std::sqrt(std::max(s.squared, 0.0) / s.cost * paths.cost / paths.variance));
+  }
+}
+
+GuideView GuideField::view() const {
+  GuideView view;
+  for (int i = 0; i < 3; ++i) {
+    view.lo[i] = grid_.lo[i];
+    view.scale[i] = grid_.scale[i];
+  }
+  if (parts_.bsdf_share.empty()) return view;
+  view.grid = parts_.entries.data();
+  view.cells = parts_.cells.data();
+  view.tables = parts_.tables.data();
+  view.spheres = parts_.spheres.data();
+  view.bsdf_share = parts_.bsdf_share.data();
+  view.survival = parts_.survival.data();
+  view.material_share = parts_.material_share.data();
+  return view;
+}
+
+size_t GuideField::bytes() const {
+  return parts_.bytes();
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The guiding field: incident light by region of space and direction, learned from training
+/// bounces.
+///
+/// Cells are an octree over the bounds of the scene. A cell with more than kCellRecords
+/// contributing bounces is divided. A region is the part of a cell whose surfaces face one axis
+/// direction. Its distribution is the mean value of its bounces by direction. With few bounces it
+/// is blended with the distribution q of the parent cell:
+///   p = (n p_own + kPrior q) / (n + kPrior)   for n bounces.
+///
+/// The fraction a of a region's bounces that the BSDF samples minimises the second moment of the
+/// mixture, estimated from the same bounces. For values x sampled with density p, and the densities
+/// p_b of the BSDF and p_g of the guiding field:
+///   S(a) = sum of x^2 p / (a p_b + (1 - a) p_g).
+/// The candidates for a are kBsdfShares; 1 is chosen where guiding does not help.
+///
+/// Sums follow the order of the records, so equal records give bitwise equal fields.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "wavecomb/core/vec3.h"
+#include "wavecomb/guiding/field_arrays.h"
+#include "wavecomb/guiding/field_view.h"
+#include "wavecomb/guiding/roulette.h"
+#include "wavecomb/guiding/training_sample.h"
+
+namespace wavecomb {
+
+/// Grid of 2^kGuideBits steps per axis over the bounds of the scene.
+struct GuideGrid {
+  float lo[3] = {}, scale[3] = {};
+
+  /// Takes the corners of the bounds, low <= high.
+  GuideGrid(const float (&low)[3], const float (&high)[3]);
+};
+
+/// Packs position and axis: the Morton code of the grid position of p, and in the lowest three bits
+/// the guide_axis of the surface.
+uint64_t bounce_place(const GuideGrid& grid, const Vec3<float>& p, uint32_t axis);
+
+/// Summary figures of a field.
+struct GuideFacts {
+  uint64_t records = 0;  ///< bounces that contribute light
+  uint32_t cells = 0, regions = 0, guided_regions = 0;
+  /// Mean probability that the field samples a bounce, and second moment of the mixture relative to
+  /// that of the BSDF alone. Both are weighted by the contribution of bounces to the image.
+  double guided_share = 0, moment_ratio = 1;
+};
+
+/// A guiding field and the arrays that kernels read. Immutable except for weigh_bounces.
+class GuideField {
+ public:
+  /// Creates an empty field. It guides nothing but defines the grid for bounce_place.
+  explicit GuideField(const GuideGrid& grid) : grid_(grid) {}
+  /// Builds a field from training records. `materials` is the number of materials. `first` means:
+  /// the records hold no densities of a field yet, so each region is guided half of the time. With
+  /// `guides` false, all bounces are left to the BSDF. The cell size doubles until the field takes
+  /// at most `most_bytes` or cannot shrink further.
+  GuideField(const GuideGrid& grid, std::span<const TrainingRecord> records, size_t materials,
+             bool first, bool guides, size_t most_bytes);
+  /// Restores a field that was saved for a scene with this number of materials. Throws Error if
+  /// `parts` are inconsistent.
+  GuideField(const GuideGrid& grid, GuideParts parts, const GuideFacts& facts, size_t materials);
+
+  /// Computes the survival factor of each region from bounces with and without contribution
+  /// (guiding/roulette.h).
+  void weigh_bounces(std::span<const BounceLesson> lessons, const PathLesson& paths);
+
+  /// Pointers to the arrays; valid while the field exists and weigh_bounces is not called.
+  GuideView view() const;
+  /// Memory of the arrays.
+  size_t bytes() const;
+  const GuideFacts& facts() const { return facts_; }
+  const GuideParts& parts() const { return parts_; }
+
+ private:
+  friend class GuideFieldBuilder;
+
+  GuideGrid grid_;
+  GuideParts parts_;
+  GuideFacts facts_;
+};
+
+}  // namespace wavecomb

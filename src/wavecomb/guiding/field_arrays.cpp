@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/guiding/field_arrays.h"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "wavecomb/core/error.h"
+#include "wavecomb/guiding/field_view.h"
+
+namespace wavecomb {
+namespace {
+
+/// Checks the grid: kGuideTopCells entries followed by bricks. Each brick divides exactly one entry
+/// and is at most kGuideLevels deep. All other entries refer to cells below `cells`.
+bool is_grid(std::span<const uint32_t> entries, size_t cells) {
+  if (entries.size() < kGuideTopCells || (entries.size() - kGuideTopCells) % kGuideBrickCells != 0)
+    return false;
+  std::vector<uint32_t> bricks{0}, next;  // their first entries
+  std::vector<bool> seen((entries.size() - kGuideTopCells) / kGuideBrickCells);
+  for (uint32_t level = 0; level <= kGuideLevels; ++level) {
+    next.clear();
+    for (const uint32_t first : bricks)
+      for (const uint32_t e :
+           entries.subspan(first, level == 0 ? kGuideTopCells : kGuideBrickCells)) {
+        if (e >= kGuideCell) {
+          if ((e & (kGuideCell - 1)) >= cells) return false;
+          continue;
+        }
+        const size_t brick = (size_t{e} - kGuideTopCells) / kGuideBrickCells;
+        if (e < kGuideTopCells || (e - kGuideTopCells) % kGuideBrickCells != 0 ||
+            brick >= seen.size() || seen[brick] || level == kGuideLevels)
+          return false;
+        seen[brick] = true;
+        next.push_back(e);
+      }
+    bricks.swap(next);
+  }
+  return true;
+}
+
+/// Checks that a cumulative row assigns all 65536 values and at least one to each bin.
+bool is_row(std::span<const uint32_t> words) {
+  uint32_t start = 0;
+  for (const uint32_t word : words) {
+    if ((word & 0xffffu) != start || word >> 16 == 0) return false;
+    start += word >> 16;
+  }
+  return start == 1u << 16;
+}
+
+bool are_rows(std::span<const uint32_t> tables) {
+  for (size_t at = 0; at < tables.size(); at += kGuideSide)
+    if (!is_row(tables.subspan(at, kGuideSide))) return false;
+  return true;
+}
+
+bool are_spheres(std::span<const GuideSphere> spheres) {
+  return std::all_of(spheres.begin(), spheres.end(), [](const GuideSphere& s) {
+    return std::isfinite(s.middle[0]) && std::isfinite(s.middle[1]) && std::isfinite(s.middle[2]) &&
+           std::isfinite(s.nearness) && s.nearness >= 0;
+  });
+}
+
+bool are_between(std::span<const float> values, float least, float most) {
+  return std::all_of(values.begin(), values.end(),
+                     [=](float v) { return least <= v && v <= most; });
+}
+
+}  // namespace
+
+void check_guide_parts(const GuideParts& parts, size_t materials) {
+  static_assert(kGuideWords % kGuideSide == 0, "a table is rows");
+  const size_t regions = parts.bsdf_share.size();
+  const bool is_field =
+      regions > 0 && parts.tables.size() == regions * kGuideWords &&
+      parts.survival.size() == regions && parts.spheres.size() == regions &&
+      are_spheres(parts.spheres) && parts.material_share.size() == std::max<size_t>(materials, 1) &&
+      parts.cells.size() % kGuideAxes == 0 &&
+      std::all_of(parts.cells.begin(), parts.cells.end(),
+                  [=](uint32_t r) { return r < regions || r == kNoGuideRegion; }) &&
+      is_grid(parts.entries, parts.cells.size() / kGuideAxes) && are_rows(parts.tables) &&
+      // A material may have a minimum of 0, which means unknown; a region never has.
+      are_between(parts.bsdf_share, 0x1p-20f, 1.f) && are_between(parts.material_share, 0.f, 1.f);
+  if (!is_field)
+    throw Error("the saved guiding field does not fit this scene or is damaged; train a new one");
+}
+
+}  // namespace wavecomb

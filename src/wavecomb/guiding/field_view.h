@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Device layout of the guiding field.
+///
+/// Space is divided into cells, and each cell into six regions by the axis direction that a surface
+/// faces. A region holds the distribution of incident light times BSDF by direction, as seen from
+/// the region's centre. The field is constant while waves run.
+#pragma once
+
+#include <cstdint>
+
+#include "wavecomb/guiding/parallax_sphere.h"
+
+namespace wavecomb {
+
+/// Number of direction bins per axis of the equal-area square. A bin is about 7 degrees wide.
+inline constexpr uint32_t kGuideSide = 32;
+inline constexpr uint32_t kGuideBins = kGuideSide * kGuideSide;
+/// Number of 32-bit words in the table of a region: one marginal row, then one conditional row for
+/// each of its bins. The low half of a word is the first of 65536 sample values of a bin, the high
+/// half is their number.
+inline constexpr uint32_t kGuideWords = kGuideSide + kGuideBins;
+/// Number of axis directions that a surface can face: +x, -x, +y, -y, +z, -z.
+inline constexpr uint32_t kGuideAxes = 6;
+
+/// The top level of the grid has 2^4 entries per axis. An entry can be divided into a brick of 2^2
+/// entries per axis, up to three times.
+inline constexpr uint32_t kGuideTopBits = 4, kGuideBrickBits = 2, kGuideLevels = 3;
+inline constexpr uint32_t kGuideBits = kGuideTopBits + kGuideLevels * kGuideBrickBits;
+static_assert(kGuideBits == 10, "morton_3 has ten bits for each axis");
+inline constexpr uint32_t kGuideTopCells = 1u << (3 * kGuideTopBits);
+inline constexpr uint32_t kGuideBrickCells = 1u << (3 * kGuideBrickBits);
+/// Flag of grid entries that refer to a cell, whose index is in the remaining bits. Without the
+/// flag, an entry is the index of the first entry of a brick.
+inline constexpr uint32_t kGuideCell = 0x80000000u;
+inline constexpr uint32_t kNoGuideRegion = 0xffffffffu;
+
+/// Pointers to the arrays of the guiding field. A null `grid` means: no guiding.
+struct GuideView {
+  const uint32_t* grid = nullptr;        ///< kGuideTopCells entries, then bricks
+  const uint32_t* cells = nullptr;       ///< region or kNoGuideRegion by kGuideAxes * cell + axis
+  const uint32_t* tables = nullptr;      ///< kGuideWords per region
+  const GuideSphere* spheres = nullptr;  ///< per region: where its light lies
+  const float* bsdf_share = nullptr;     ///< per region: probability that the BSDF samples a bounce
+  /// Per region: survival probability of a path whose throughput equals the brightness of the
+  /// image, before it is clamped (guiding/roulette.h).
+  const float* survival = nullptr;
+  const float* material_share = nullptr;  ///< per material: minimum of bsdf_share
+  /// 1 / (brightness of the image) in tile_rows x tile_rows tiles; null means: not known.
+  const float* tiles = nullptr;
+  uint32_t tile_rows = 0;
+  float tiles_of_x = 0, tiles_of_y = 0;  ///< tiles per pixel
+  float lo[3] = {};                      ///< lower corner of the grid
+  float scale[3] = {};                   ///< grid steps per unit of length
+};
+
+}  // namespace wavecomb

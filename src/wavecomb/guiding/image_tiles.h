@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Approximate brightness of the image in tiles, from paths traced before the first pass.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "wavecomb/core/settings.h"
+#include "wavecomb/guiding/field_view.h"
+
+namespace wavecomb {
+
+/// Brightness of the whole image in at most 16 x 16 tiles of at least 64 paths. Sums are integers,
+/// so the result does not depend on the order of the paths.
+class PictureTiles {
+ public:
+  /// Path i belongs to pixel pixels[i] (x | y << 16) and has the radiance luminance[i].
+  PictureTiles(const Settings& settings, std::span<const uint32_t> pixels,
+               std::span<const float> luminance);
+  /// Restores tiles from inverse_scales() of an image of this size. Throws Error if the size does
+  /// not match.
+  PictureTiles(const Settings& settings, std::vector<double> inverse_scales);
+
+  uint32_t count() const { return rows_ * rows_; }
+  /// Returns the tile of a pixel.
+  uint32_t of(uint32_t pixel) const;
+  /// Whether any path contributed light.
+  bool is_lit() const { return !inverse_.empty(); }
+  /// Returns one over the brightness of the image at a pixel: the mean over its tile, with each
+  /// path clamped to 64 times the median. Contract: is_lit().
+  double inverse_scale(uint32_t pixel) const { return inverse_[of(pixel)]; }
+  /// By tile, row by row; empty if no path contributed light.
+  const std::vector<double>& inverse_scales() const { return inverse_; }
+  /// Writes the tiles to `view`, if any path contributed light.
+  void apply(GuideView& view) const;
+
+ private:
+  uint32_t width_, height_, rows_ = 1;
+  std::vector<double> inverse_;
+  std::vector<float> table_;  ///< inverse_ in single precision
+};
+
+}  // namespace wavecomb

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Distribution of incident directions of a region, estimated from its training bounces.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "wavecomb/guiding/field_view.h"
+#include "wavecomb/guiding/parallax_sphere.h"
+#include "wavecomb/guiding/training_sample.h"
+
+namespace wavecomb {
+
+/// Weights of direction bins, row by row of the equal-area square (directions.h).
+using DirectionBins = std::array<double, kGuideBins>;
+/// Returns the unit vector at the centre of a bin.
+Vec3<float> bin_direction(uint32_t bin);
+
+/// Training bounces of one region; not owned.
+using Bounces = std::span<const TrainingRecord* const>;
+
+/// Fits the sphere on which the incident light of a region is assumed to lie. Its centre is the
+/// mean position of the bounces. Its radius is the candidate whose direction bins have the largest
+/// sum of squares, that is, the most concentrated distribution. Candidates are multiples of the
+/// mean hit distance, because an opening is nearer than what is seen through it. The value of each
+/// bounce is clamped to `cut`.
+GuideSphere fit_sphere(Bounces bounces, double cut);
+
+/// Returns `count` of the bounces at equal index intervals, or all if there are fewer.
+std::vector<const TrainingRecord*> some_bounces(Bounces bounces, size_t count);
+
+/// Sums the values of bounces, clamped to `cut`, by their direction as seen from the centre of
+/// `sphere`.
+DirectionBins direction_bins(Bounces bounces, const GuideSphere& sphere, double cut);
+
+/// Blurs the bins by about 5 degrees, since a few hundred bounces per region leave gaps.
+DirectionBins smoothed(const DirectionBins& bins);
+
+}  // namespace wavecomb

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Interface that each kind of light implements for the scene. The kinds are defined in light/, a
+/// layer above the scene; light/kinds/kinds.cpp and light/kinds/mesh_light.cpp define these
+/// functions.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "wavecomb/light/description/light_builder.h"
+#include "wavecomb/light/description/light_records.h"
+#include "wavecomb/light/description/light_table.h"
+#include "wavecomb/light/tree/light_cluster.h"
+#include "wavecomb/scene/scene_parts.h"
+
+namespace wavecomb {
+
+/// Inputs of a light kind for making records, and the set that receives its additional data.
+struct LightMaking {
+  LightSet& set;           ///< receives densities, portals and shapings
+  const LightSet* before;  ///< as in LightInputs
+  double scene_radius;
+  std::span<const TexturePtr> textures;
+  std::span<const IesProfile> profiles;
+  std::span<const LightFilter> filters;
+};
+
+/// A record under construction, and the power on which its selection probability is based, W.
+struct MadeLight {
+  LightRecord record{};
+  double power = 0;
+};
+
+/// Shape that rays can hit: none, the parallelogram p, u, v of the record, or the shape of `box`
+/// and `intersect`.
+enum class LightShape : uint8_t { kNone, kParallelogram, kOwn };
+
+/// Description of a kind of light for the scene and the accelerator. Its kernels are in the header
+/// of the kind.
+struct LightKindInfo {
+  const char* name = "";
+  std::vector<const char*> prims;  ///< types of USD prims that are rendered as this kind
+  uint32_t traits = 0;             ///< bits of light_trait
+  /// Names of the rows of light_table() that this kind uses in addition to those of its traits and
+  /// of all lights.
+  std::vector<const char*> parameters;
+  /// Rows of parameters specific to this kind, made by own_parameter.
+  std::vector<LightParameter> own;
+  /// Sets position, area, radiance and power. Null if the records are made elsewhere.
+  void (*make)(MadeLight&, const Light&, LightMaking&) = nullptr;
+  /// Sets bounds for the light tree, which are initialized to `light.p` and the intensity power /
+  /// pi. Null if the kind is not in the tree.
+  void (*bound)(LightCluster&, const LightRecord& light, double power) = nullptr;
+  /// Returns the shape of a record. Null if rays cannot hit this kind.
+  LightShape (*shape)(const LightRecord&) = nullptr;
+  /// For LightShape::kOwn: a slightly enlarged bounding box, and the distance to the hit along d in
+  /// units of |d|, or 0 if there is none ahead. `o` is relative to light.p. One ray at a time in
+  /// double precision, so that a hit does not depend on the other rays of its packet.
+  Bounds (*box)(const LightRecord&) = nullptr;
+  double (*intersect)(const LightRecord&, const double* o, const double* d) = nullptr;
+
+  bool has(uint32_t trait) const { return (traits & trait) != 0; }
+};
+
+/// Returns all kinds, indexed by LightKind.
+std::span<const LightKindInfo> light_kinds();
+inline const LightKindInfo& info_of(LightKind kind) {
+  return light_kinds()[static_cast<size_t>(kind)];
+}
+
+/// Makes the record of a light and computes its power.
+MadeLight make_light(const Light& light, LightMaking& making);
+/// Packs a light filter.
+FilterRecord make_light_filter(const LightFilter& filter);
+
+/// Makes the record of a mesh light instance, with the values that its triangles share.
+LightRecord make_mesh_light(const PlacedMeshLight& placed, LightMaking& making);
+
+/// A packed triangle and its power in W.
+struct MadeTriangle {
+  TriangleLight light{};
+  double power = 0;
+};
+/// Packs a triangle, without setting the index of its texture coordinates.
+MadeTriangle make_triangle(const LightSet& set, const EmissiveTriangle& triangle);
+
+}  // namespace wavecomb

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Light descriptions that SceneBuilder takes.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "wavecomb/core/affine.h"
+#include "wavecomb/texture/texture.h"
+
+namespace wavecomb {
+
+/// Index of a kind of light in the list of light/kinds/kinds.h.
+enum class LightKind : uint8_t;
+/// Kind of the lights that belong to meshes, LightKind::kTriangle.
+inline constexpr LightKind kMeshLight = LightKind{6};
+/// Maximum number of parameters specific to one kind of light.
+inline constexpr size_t kMaxOwnParameters = 4;
+inline constexpr uint32_t kNoLight = 0xffffffffu;
+inline constexpr uint32_t kNoShaping = 0xffffffffu;
+inline constexpr uint32_t kNoIes = 0xffffffffu;
+inline constexpr uint32_t kNoFilter = 0xffffffffu;
+inline constexpr uint32_t kPlainShadow = 0xffffffffu;
+inline constexpr uint32_t kNoPortals = 0xffffffffu;
+inline constexpr uint32_t kNoDistribution = 0xffffffffu;
+/// Set of all geometry, which needs no GeometrySet. kNoSet + 1 is 0.
+inline constexpr uint32_t kNoSet = 0xffffffffu;
+
+/// UsdLuxShapingAPI: dependence of the emission on direction. The axis of the light is its -z.
+struct Shaping {
+  float focus = 0;  ///< exponent of the cosine to the axis; 0 or less: no focus
+  Vec3<float> focus_tint{0, 0, 0};
+  float cone_angle = 180;      ///< degrees from the axis; 180 or more: no cone
+  float cone_softness = 0;     ///< fraction of the cone over which emission falls to 0
+  uint32_t ies = kNoIes;       ///< profile id of SceneBuilder::add_ies
+  float ies_angle_scale = 0;   ///< as defined by UsdLux; 0: no scaling
+  bool ies_normalize = false;  ///< divide by IesProfile::mean
+
+  bool is_plain() const { return !(focus > 0) && !(cone_angle < 180) && ies == kNoIes; }
+};
+
+/// UsdLuxShadowAPI: adjustments of a light's shadows that are not physically based.
+struct ShadowLook {
+  Vec3<float> color{0, 0, 0};  ///< fraction of the light that arrives in shadow
+  /// Maximum world-space distance of an occluder from the shaded surface; less than 0: unlimited.
+  float distance = -1;
+  float falloff = -1;  ///< length before `distance` over which shadows fade; 0 or less: no fade
+  float gamma = 1;     ///< exponent of the shadow strength where it fades
+
+  bool is_plain() const { return color.x == 0 && color.y == 0 && color.z == 0 && distance < 0; }
+};
+
+/// Light filter that modifies the emission of a light (light/filters/filter.h).
+struct LightFilter {
+  /// Maps the filter's space to the world. Its barn-door window is the plane z = -distance; a
+  /// distance of 0 or less means no window.
+  Affine to_world;
+  float distance = 0;
+  /// Edges (a, b, c) of the window: at (x, y) each edge passes smoothstep(a x + b y + c) of the
+  /// light.
+  std::array<Vec3<float>, 4> sides{
+      {{0.f, 0.f, 1.f}, {0.f, 0.f, 1.f}, {0.f, 0.f, 1.f}, {0.f, 0.f, 1.f}}};
+  /// Gobo image on the window, looked up at u = picture_u . (x, y, 1), v = picture_v . (x, y, 1).
+  uint32_t texture = kNoTexture;
+  Vec3<float> picture_u{1, 0, 0.5f}, picture_v{0, 1, 0.5f};
+  /// Distance ramps: light rises from 0 at near_start to its full value at near_end, and falls from
+  /// far_start to 0 at far_end. A ramp whose end is not beyond its start is off.
+  float near_start = 0, near_end = 0, far_start = 0, far_end = 0;
+  float density = 1;  ///< strength of the filter: 0 leaves light unchanged, 1 applies it fully
+  uint32_t next = kNoFilter;  ///< next filter of the chain, which was added before this one
+
+  bool fades() const { return near_end > near_start || far_end > far_start; }
+};
+
+/// Intensity distribution of an IES file, expanded to the full circle: candela on a grid of angles
+/// in degrees, both ascending. It is interpolated bilinearly and is 0 outside the vertical angles.
+struct IesProfile {
+  std::vector<float> vertical;    ///< angle from the axis, within [0, 180], two or more values
+  std::vector<float> horizontal;  ///< 0 to 360; a single value for a rotationally symmetric profile
+  std::vector<float> candela;     ///< [horizontal][vertical]
+
+  /// Returns the mean over the sphere of directions, or over a hemisphere if the vertical angles
+  /// span no more than one. It is exact for profiles that are linear in both angles.
+  double mean() const;
+  bool covers_sphere() const { return vertical.back() - vertical.front() > 95.7f; }
+};
+
+/// Relation between the light of a mesh and the emission of its material, which cameras and mirrors
+/// see (UsdLux light:materialSyncMode).
+enum class MaterialSync : uint32_t {
+  kGlowTintsLight,  ///< the light is the material's emission times the light's colour
+  kIndependent,     ///< the light is the light's colour alone
+  kNoResponse,      ///< as kGlowTintsLight, and cameras and mirrors see the tinted emission
+};
+
+/// A light as the stage describes it, in its local space. As in UsdLux, rects and disks lie in the
+/// xy plane and emit along -z, distant lights emit along -z, and domes have their pole at +y and
+/// the orientation of UsdLuxDomeLight.
+struct Light {
+  std::string name;
+  LightKind kind{};  ///< a rect by default
+  Affine to_world;   ///< transform at mid-shutter
+  /// Transforms at equally spaced shutter times, two or more; empty if the light does not move. The
+  /// light moves as a rigid body with the scale of `to_world`.
+  std::vector<Affine> motion;
+  bool moves() const { return !motion.empty(); }
+  /// Emitted radiance, W / (m^2 sr). The unit differs for distant lights of angle 0 (irradiance)
+  /// and spheres of radius 0 (radiant intensity); see build_lights
+  /// (light/description/light_builder.h).
+  Vec3<float> color{1, 1, 1};
+  float width = 1, height = 1;  ///< size of a rect before `to_world`
+  float radius = 0.5f;          ///< radius of a disk, sphere or cylinder before `to_world`
+  float length = 1;             ///< length of a cylinder along x before `to_world`
+  float angle = 0.53f;          ///< apparent diameter of a distant light, degrees
+  /// UsdLux `normalize`: divide by the world-space area, or by the solid angle for distant lights.
+  bool normalize = false;
+  /// For a rect (u to the right, v up as seen from the front) or a dome (latlong).
+  uint32_t texture = kNoTexture;
+  uint32_t group = 0;  ///< light group id of SceneBuilder::light_group
+  Shaping shaping;     ///< for area lights and point lights
+  /// Factors of the light's contribution to the diffuse and the specular response of materials
+  /// (UsdLux; not physically based).
+  float diffuse = 1, specular = 1;
+  /// Ids of SceneBuilder::add_geometry_set: the objects that the light illuminates, and those that
+  /// cast shadows from it.
+  uint32_t light_link = kNoSet, shadow_link = kNoSet;
+  ShadowLook shadow;
+  /// Id of SceneBuilder::add_light_filter; ignored for infinite lights.
+  uint32_t filter = kNoFilter;
+  bool visible = true;  ///< whether camera and bounce rays can hit its shape
+  /// Portals of a dome: maps of the unit square in the xy plane to the openings towards which the
+  /// dome is sampled. The -z side of a portal receives the light.
+  std::vector<Affine> portals;
+  /// Values of the parameters specific to the kind (LightKindInfo::own), if given.
+  std::array<std::optional<float>, kMaxOwnParameters> own;
+  /// For mesh lights (kind kMeshLight), whose `to_world` maps to the space of the mesh's group.
+  MaterialSync sync = MaterialSync::kGlowTintsLight;
+};
+
+}  // namespace wavecomb

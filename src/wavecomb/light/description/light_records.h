@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Packed lights that kernels read.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "wavecomb/light/description/light.h"
+#include "wavecomb/material/description/material.h"
+
+namespace wavecomb {
+
+struct LightAim;
+struct MeshRecord;
+struct InstanceRecord;
+
+/// Packed light other than an emissive triangle: 48 32-bit words. Vectors are in world space. Use
+/// of the members by kind:
+///   rect      p corner, u, v edges, their lengths and inverses, n unit normal (direction of
+///             emission), area
+///   disk      p centre, u, v half axes, n, area
+///   sphere    p centre, radius (0: a point light, radiance is then radiant intensity), area
+///   cylinder  p centre of one end, u axis to the other end, radius, area
+///   distant   n unit direction in which light travels, one_minus_cos of its half angle (0: a
+///   single
+///             direction, radiance is then irradiance at normal incidence)
+///   dome      u, v, n: world axes of the dome's local x, y, z
+///   triangle  an instance of a mesh light: the values that its triangles share. radiance is the
+///             emitted radiance for kIndependent, else a factor of the material's emission; area
+struct alignas(64) LightRecord {
+  float p[3], u[3], v[3], n[3];
+  float radiance[3];
+  float area;
+  float radius;
+  float one_minus_cos;
+  float pick_pdf;  ///< probability of selection by power
+  uint32_t kind;
+  uint32_t texture;
+  /// Index into LightView::distributions for a dome or rect with a texture; kNoDistribution for a
+  /// rect that is sampled uniformly.
+  uint32_t distribution;
+  uint32_t shaping;  ///< index into LightView::shapings, or kNoShaping
+  float diffuse, specular;
+  /// Nonzero: light samples have MIS weight 1, and paths that hit the light by a bounce that light
+  /// sampling could have made contribute nothing. Set for lights whose shape rays cannot hit, and
+  /// for lights whose shadows differ from those that bounce rays see.
+  uint32_t sampled_only;
+  uint32_t hidden;  ///< 1: rays cannot hit its shape
+  uint32_t light_link, shadow_link;
+  uint32_t sync;     ///< MaterialSync of a mesh light
+  uint32_t portals;  ///< portals of a dome: index into LightView::portal_groups, or kNoPortals
+  /// |u|, |v|, and their inverses, each 0 for a vector of length 0.
+  float length_u, length_v, inverse_u, inverse_v;
+  uint32_t shadow;  ///< index into LightView::shadows, or kPlainShadow
+  uint32_t filter;  ///< index into LightView::filters, or kNoFilter
+  /// Nonzero: no light paths start here; only camera paths sample this light.
+  uint32_t camera_only;
+};
+static_assert(sizeof(LightRecord) == 192);
+
+/// Packed motion of a light record (light/description/motion.h): 8 32-bit words.
+struct alignas(32) LightMotion {
+  float origin[3] = {0, 0, 0};  ///< pivot of the rotation, at mid-shutter
+  uint32_t first = 0;           ///< index of its first LightStep
+  uint32_t segments = 0;        ///< number of steps less one; 0: the light does not move
+  uint32_t pad[3] = {0, 0, 0};
+};
+static_assert(sizeof(LightMotion) == 32);
+/// Pose of a moving light at one step.
+struct alignas(32) LightStep {
+  float turn[4] = {0, 0, 0, 1};  ///< rotation from mid-shutter, a unit quaternion x y z w
+  float place[3] = {0, 0, 0};    ///< position of the pivot
+  float pad = 0;
+  bool operator==(const LightStep&) const = default;
+};
+static_assert(sizeof(LightStep) == 32);
+
+/// Packed Shaping.
+struct alignas(64) ShapingRecord {
+  float axis[3];  ///< unit vector in world space, the axis of the emission
+  /// Rows of the map from world directions to the light's local space.
+  float to_light_x[3], to_light_y[3], to_light_z[3];
+  float focus;  ///< 0: none
+  float tint[3];
+  float cone, cone_start;  ///< radians: where emission ends, and where it begins to fall off
+  float ies_scale;
+  float angle_scale;
+  uint32_t ies;  ///< index into LightView::ies, or kNoIes
+};
+static_assert(sizeof(ShapingRecord) == 128);
+
+/// Packed ShadowLook.
+struct alignas(32) ShadowLookRecord {
+  float color[3];
+  float distance;  ///< kFarAway if unlimited
+  float falloff;
+  float inverse_gamma;
+};
+static_assert(sizeof(ShadowLookRecord) == 32);
+
+/// Packed LightFilter.
+struct alignas(64) FilterRecord {
+  /// Rows of the map from world space to the filter's space.
+  float row_x[3], row_y[3], row_z[3], origin[3];
+  float side_0[3], side_1[3], side_2[3], side_3[3];
+  float picture_u[3], picture_v[3];
+  float distance;
+  uint32_t texture;
+  float near_start, near_inverse, far_start, far_inverse;
+  float density;
+  uint32_t next;
+};
+static_assert(sizeof(FilterRecord) == 192);
+
+/// Offsets of an IesProfile in LightView::ies_numbers.
+struct IesRecord {
+  /// The candela values follow the horizontal angles.
+  uint32_t vertical, vertical_count, horizontal, horizontal_count;
+};
+
+/// Packed triangle of an emissive mesh, in world space, which emits on both sides. There may be
+/// millions, read in random order, so each fills one cache line.
+struct alignas(64) TriangleLight {
+  float p[3], u[3], v[3];  ///< vertex 0 and the edges from it
+  /// Radiance times opacity if both are constant. Otherwise three bit patterns: kEmission or
+  /// kOpacity, which says what varies; the material that determines it; and the index of its
+  /// TriangleUvs.
+  float radiance[3];
+  float m[3];      ///< unit geometric normal times the area
+  float pick_pdf;  ///< probability of selection by power
+  /// The emission and opacity of the material vary.
+  static constexpr float kEmission = -1.f;
+  /// Only the opacity of the material varies. It scales the radiance of a mesh light that ignores
+  /// the material's emission.
+  static constexpr float kOpacity = -2.f;
+  bool varies() const { return radiance[0] < 0; }
+};
+static_assert(sizeof(TriangleLight) == 64);
+
+/// Identity and texture coordinates of a triangle whose emission or opacity varies.
+struct alignas(16) TriangleUvs {
+  float uv0[2], uv1[2], uv2[2];
+  uint32_t mesh, prim;
+  uint32_t instance;
+};
+static_assert(sizeof(TriangleUvs) == 48);
+
+/// Piecewise constant density over [0,1]^2 for importance sampling of an image, as integer counts.
+/// Interval x of a row is selected with probability n / 65536, where n is the difference between
+/// its cumulative value and the next, so that probabilities are exact.
+///
+/// Inversion reads two cache lines: the coarse line of the row, which holds every 32nd value and
+/// stays in the cache, and one line of 32 values.
+struct Distribution2D {
+  static constexpr uint32_t kCounts = 65536;
+  static constexpr uint32_t kLine = 32;             ///< values in a cache line
+  static constexpr uint32_t kMost = kLine * kLine;  ///< maximum number of intervals in a row
+  /// Padding after the last value of a row. It is not less than any value, since kCounts itself is
+  /// never stored.
+  static constexpr uint16_t kPad = kCounts - 1;
+  struct alignas(64) Line {
+    uint16_t value[kLine];
+  };
+  uint32_t width = 0, height = 0;
+  uint32_t row_lines = 0;     ///< cache lines of a row of `cumulative`
+  double mean_luminance = 0;  ///< mean over the sphere (dome) or the square (rect)
+  /// 1 / (integral of the squared density over the square): 1 for a uniform image, near 0 if a few
+  /// pixels dominate. Used for rects.
+  float spread = 1;
+  /// `height` rows of `width` cumulative values, each starting at 0, then the marginal distribution
+  /// of `height` values. Each row starts a cache line.
+  std::vector<Line> cumulative;
+  /// First value of each cache line, one coarse line for each row and one for the marginal
+  /// distribution.
+  std::vector<Line> coarse;
+};
+
+/// Integer alias tables that map a random number k in [0, 2^24) to a light. Numbers below `split`
+/// select a record, the others a triangle, so that looking up one of a few strong lights does not
+/// touch the table of millions of triangles. Each bin of a table covers 2^shift random numbers.
+struct PickTable {
+  /// Bins of both groups. Random number r of the 2^shift of bin b selects light b of the group if r
+  /// < bin mod 2^shift, and light bin >> shift otherwise.
+  const uint32_t* bins = nullptr;
+  uint32_t split = 0;
+  uint32_t shift[2] = {};
+  uint32_t triangle_bins = 0;  ///< index of the first bin of the triangles
+};
+
+/// Packed child of a light tree node: bounds of the lights below it, in 8 32-bit words.
+struct LightTreeChild {
+  float centre[3];  ///< centre of the bounding sphere
+  float radius;
+  /// Emitted along the normals, summed over the lights, relative to all lights of the tree.
+  float intensity;
+  /// Axis of the cone of normals, 16 bits for each component: 0 is -1, 65535 is 1.
+  uint32_t axis_xy;
+  /// From the low bits: z of the axis (16 bits), sin(angle / 2) of the cone in steps of 1 / 255 (8
+  /// bits), sin(angle / 2) of the emission angle in steps of 1 / 127 (7 bits), and 1 bit for
+  /// two-sided emission.
+  uint32_t axis_z_cones;
+  uint32_t next;  ///< node, or kTreeLeaf | light
+};
+static_assert(sizeof(LightTreeChild) == 32);
+
+/// A node of a light tree, one cache line.
+struct alignas(64) LightTreeNode {
+  LightTreeChild child[2];
+};
+static_assert(sizeof(LightTreeNode) == 64);
+
+inline constexpr uint32_t kTreeLeaf = 0x80000000u;
+/// Maximum depth of a light in the tree: a trail has one bit for each node above the light.
+inline constexpr uint32_t kMaxTreeDepth = 31;
+
+/// Light tree (light/sampling/tree_choice.h). Random numbers k in [0, 2^24) below `numbers` select
+/// a light of the tree; the others select the first infinite light i with k < infinite_ends[i].
+struct LightTreeView {
+  const LightTreeNode* nodes = nullptr;
+  /// Path to each light: bit d selects the child of the node at depth d. kNoLight if the light is
+  /// not in the tree.
+  const uint32_t* trails = nullptr;
+  const uint32_t* infinite_ends = nullptr;
+  const float* infinite_pdf = nullptr;
+  uint32_t root = kNoLight;
+  uint32_t numbers = 0;
+  /// Number of lights of equal power that would be equally hard to select from: 1 / sum of the
+  /// squared fractions of the power of the tree. 0 if no light of the tree emits.
+  float effective_lights = 0;
+};
+
+/// Packed light linking (light/description/linking.h). Null if no light is linked.
+struct LinkView {
+  const uint32_t* classes = nullptr;
+  const uint32_t* members = nullptr;
+  uint32_t words = 0;
+};
+
+/// Portals of a dome, a range of LightView::portals.
+struct PortalGroup {
+  uint32_t first, count;
+  /// Solid angle in sr of a uniform image with the same power and the same squared power: 4 pi for
+  /// a uniform dome, small if a sun dominates.
+  float image_solid_angle;
+};
+
+/// Device view of all lights. Light i is record i if i < first_triangle, otherwise triangle i -
+/// first_triangle. Infinite lights (distant, dome) come first.
+struct LightView {
+  const LightRecord* lights = nullptr;
+  const TriangleLight* triangles = nullptr;
+  const TriangleUvs* triangle_uvs = nullptr;
+  PickTable pick;
+  /// Selection probability of each light if `pick` does not use those of the records; else null.
+  const float* pick_pdf = nullptr;
+  LightTreeView tree;
+  bool by_tree = false;  ///< select lights by `tree` instead of `pick`
+  uint32_t count = 0;    ///< number of records and triangles
+  uint32_t first_triangle = 0;
+  uint32_t infinite_count = 0;
+  const Distribution2D* distributions = nullptr;
+  // Null if no dome has portals. Portals are stored like rects.
+  const LightRecord* portals = nullptr;
+  const PortalGroup* portal_groups = nullptr;
+  // Null if no light has shaping.
+  const ShapingRecord* shapings = nullptr;
+  const IesRecord* ies = nullptr;
+  const float* ies_numbers = nullptr;
+  const FilterRecord* filters = nullptr;  ///< null if no light has a filter
+  const LightMotion* motions = nullptr;   ///< by record; null if no light moves
+  const LightStep* motion_steps = nullptr;
+  const ShadowLookRecord* shadows = nullptr;  ///< null if all shadows are plain
+  /// Record of the mesh light of each triangle, or kNoLight. Null if there are no mesh lights.
+  const uint32_t* mesh_lights = nullptr;
+  bool has_effects = false;      ///< some record is sampled_only or has multipliers
+  bool has_multipliers = false;  ///< some record's diffuse or specular is not 1
+  LinkView links;
+  /// Textures, and the materials of triangles whose emission or opacity varies.
+  MaterialView materials;
+  /// Bounding sphere of all surfaces, the target of light paths from infinite lights, which start
+  /// `reach` before its centre, outside all light shapes. Radius 0 means that no light paths start.
+  float centre[3] = {0, 0, 0};
+  float radius = 0, reach = 0;
+  bool sends_paths() const { return radius > 0; }
+  const LightAim* aim = nullptr;  ///< target spheres of light paths; null for none
+  // Geometry for opacity graphs that read positions; null for a light set without geometry.
+  const MeshRecord* meshes = nullptr;
+  const InstanceRecord* instances = nullptr;
+};
+
+}  // namespace wavecomb

@@ -1,0 +1,372 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/light/description/light_table.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <type_traits>
+
+#include "wavecomb/core/error.h"
+#include "wavecomb/core/number_text.h"
+#include "wavecomb/geometry/mesh/motion.h"
+#include "wavecomb/light/description/kind_info.h"
+#include "wavecomb/scene/scene_checks.h"
+
+namespace wavecomb {
+namespace {
+
+constexpr uint32_t kNone = 0xffffffffu;
+static_assert(kNoTexture == kNone && kNoIes == kNone && kNoSet == kNone && kNoFilter == kNone);
+
+/// Returns a member of a light, or a nested member.
+template <auto kFirst, auto... kRest, typename Object>
+auto& member(Object& object) {
+  if constexpr (sizeof...(kRest) == 0)
+    return object.*kFirst;
+  else
+    return member<kRest...>(object.*kFirst);
+}
+template <auto... kPath>
+using MemberType = std::remove_reference_t<decltype(member<kPath...>(std::declval<Light&>()))>;
+
+template <auto... kPath>
+LightValue read(const Light& light) {
+  const auto& value = member<kPath...>(light);
+  using T = MemberType<kPath...>;
+  if constexpr (std::is_enum_v<T>)
+    return static_cast<uint32_t>(value);
+  else if constexpr (std::is_same_v<T, uint32_t>)
+    return value == kNone ? LightValue() : LightValue(value);
+  else
+    return value;
+}
+
+template <auto... kPath>
+void write(Light& light, const LightValue& value) {
+  auto& to = member<kPath...>(light);
+  using T = MemberType<kPath...>;
+  if constexpr (std::is_enum_v<T>)
+    to = static_cast<T>(std::get<uint32_t>(value));
+  else if constexpr (std::is_same_v<T, uint32_t>)
+    to = std::holds_alternative<std::monostate>(value) ? kNone : std::get<uint32_t>(value);
+  else
+    to = std::get<T>(value);
+}
+
+template <typename T>
+constexpr LightValueKind kValueKind = std::is_same_v<T, float>         ? LightValueKind::kNumber
+                                      : std::is_same_v<T, Vec3<float>> ? LightValueKind::kColour
+                                      : std::is_same_v<T, bool>        ? LightValueKind::kFlag
+                                      : std::is_same_v<T, uint32_t>    ? LightValueKind::kId
+                                      : std::is_enum_v<T> ? LightValueKind::kChoice
+                                                          : LightValueKind::kTransforms;
+
+/// Makes the row of a parameter without limits.
+template <auto... kPath>
+LightParameter row(const char* name, const char* label, const char* input, const char* help) {
+  LightParameter p;
+  p.name = name;
+  p.label = label;
+  p.help = help;
+  p.input = input;
+  p.kind = kValueKind<MemberType<kPath...>>;
+  p.read = &read<kPath...>;
+  p.write = &write<kPath...>;
+  return p;
+}
+
+/// Limits a parameter to values of 0 or more.
+LightParameter positive(LightParameter p, double usual) {
+  p.least = 0;
+  p.usual = usual;
+  return p;
+}
+LightParameter usually(LightParameter p, double usual) {
+  p.usual = usual;
+  return p;
+}
+LightParameter id(LightParameter p, LightRefers refers) {
+  p.refers = refers;
+  return p;
+}
+LightParameter in(LightGroup group, LightParameter p) {
+  p.group = group;
+  return p;
+}
+/// Marks a row as a parameter of all lights, of lights with a trait, or (`in`) of kinds that name
+/// it.
+LightParameter all(LightGroup group, LightParameter p) {
+  p.is_common = true;
+  return in(group, std::move(p));
+}
+LightParameter with(uint32_t trait, LightGroup group, LightParameter p) {
+  p.trait = trait;
+  return in(group, std::move(p));
+}
+LightParameter choice(LightParameter p, std::vector<const char*> choices) {
+  p.choices = std::move(choices);
+  p.is_own = true;
+  return p;
+}
+
+/// Returns the parameters of shape and emission.
+std::vector<LightParameter> shape_rows() {
+  using L = Light;
+  using enum LightGroup;
+  using namespace light_trait;
+  return {
+      all(kEmission, positive(row<&L::color>("color", "colour", "color",
+                                             "Emitted radiance, W / (m^2 sr): colour * intensity * "
+                                             "2^exposure * colour temperature."),
+                              1)),
+      in(kShape,
+         positive(row<&L::width>("width", "width", "width", "Size along x, in local units."), 10)),
+      in(kShape,
+         positive(row<&L::height>("height", "height", "height", "Size along y, in local units."),
+                  10)),
+      in(kShape,
+         positive(row<&L::radius>("radius", "radius", "radius",
+                                  "Radius in local units; a sphere of radius 0 is a point light."),
+                  10)),
+      in(kShape,
+         positive(row<&L::length>("length", "length", "length", "Size along x, in local units."),
+                  10)),
+      in(kShape,
+         positive(row<&L::angle>("angle", "angle", "angle",
+                                 "Apparent diameter in degrees; 0 gives a single direction."),
+                  10)),
+      with(kSized, kEmission,
+           row<&L::normalize>("normalize", "normalize", "normalize",
+                              "Divides radiance by the world-space area; for a distant light, by "
+                              "UsdLux's sizeFactor.")),
+      with(kPictured, kEmission,
+           id(row<&L::texture>("texture", "texture", "texture:file",
+                               "Texture that multiplies the colour: on a rect with u to the right "
+                               "and v up as seen from the front, on a dome as latlong."),
+              LightRefers::kTexture)),
+      with(kPlaced, kEmission,
+           id(row<&L::group>("group", "group", "", "Name of its light group, for AOVs."),
+              LightRefers::kGroup)),
+      all(kResponse,
+          positive(
+              row<&L::diffuse>("diffuse", "diffuse", "diffuse",
+                               "Factor of its contribution to the diffuse response of materials."),
+              2)),
+      all(kResponse,
+          positive(row<&L::specular>(
+                       "specular", "specular", "specular",
+                       "Factor of its contribution to the specular response of materials."),
+                   2)),
+  };
+}
+
+/// Returns the parameters of the dependence on direction.
+std::vector<LightParameter> shaping_rows() {
+  using S = Shaping;
+  using enum LightGroup;
+  using namespace light_trait;
+  constexpr auto kS = &Light::shaping;
+  return {
+      with(kShaped, kShaping,
+           usually(row<kS, &S::focus>(
+                       "focus", "focus", "shaping:focus",
+                       "Exponent of the cosine to the axis, -z; 0 or less for no focus."),
+                   50)),
+      with(kShaped, kShaping,
+           row<kS, &S::focus_tint>("focus_tint", "focus tint", "shaping:focusTint",
+                                   "Tint of the emission off the axis if there is a focus.")),
+      with(kShaped, kShaping,
+           usually(
+               row<kS, &S::cone_angle>(
+                   "cone_angle", "cone angle", "shaping:cone:angle",
+                   "Angle from the axis in degrees at which light ends; 180 or more for no cone."),
+               180)),
+      with(kShaped, kShaping,
+           row<kS, &S::cone_softness>("cone_softness", "cone softness", "shaping:cone:softness",
+                                      "Fraction of the cone over which light falls to 0.")),
+      with(kShaped, kShaping,
+           id(row<kS, &S::ies>("ies", "IES profile", "shaping:ies:file",
+                               "Profile of add_ies that multiplies its radiance."),
+              LightRefers::kProfile)),
+      with(kShaped, kShaping,
+           row<kS, &S::ies_angle_scale>(
+               "ies_angle_scale", "IES angle scale", "shaping:ies:angleScale",
+               "Scale of the profile's vertical angles as defined by UsdLux; 0 for no scaling.")),
+      with(kShaped, kShaping,
+           row<kS, &S::ies_normalize>("ies_normalize", "IES normalize", "shaping:ies:normalize",
+                                      "Divides the profile by its mean over directions.")),
+  };
+}
+
+/// Returns the parameters of linking and shadows.
+std::vector<LightParameter> shadow_rows() {
+  using L = Light;
+  using H = ShadowLook;
+  using enum LightGroup;
+  constexpr auto kH = &L::shadow;
+  return {
+      all(kResponse,
+          id(row<&L::light_link>("light_link", "light link", "",
+                                 "Geometry set that it illuminates; all geometry if not given."),
+             LightRefers::kSet)),
+      all(kResponse, id(row<&L::shadow_link>(
+                            "shadow_link", "shadow link", "",
+                            "Geometry set that casts shadows from it; all geometry if not given."),
+                        LightRefers::kSet)),
+      all(kResponse, positive(row<kH, &H::color>("shadow_color", "shadow colour", "shadow:color",
+                                                 "Fraction of its light that arrives in shadow."),
+                              1)),
+      all(kResponse,
+          usually(row<kH, &H::distance>("shadow_distance", "shadow distance", "shadow:distance",
+                                        "Maximum world-space distance of an occluder from the "
+                                        "shaded surface; less than 0 for no limit."),
+                  10)),
+      all(kResponse,
+          usually(row<kH, &H::falloff>("shadow_falloff", "shadow falloff", "shadow:falloff",
+                                       "Length before the shadow distance over which shadows fade; "
+                                       "0 or less for no fade."),
+                  10)),
+      all(kResponse,
+          positive(row<kH, &H::gamma>("shadow_falloff_gamma", "shadow falloff gamma",
+                                      "shadow:falloffGamma",
+                                      "Exponent of the shadow strength where shadows fade."),
+                   4)),
+  };
+}
+
+/// Returns the parameters that refer to filters, motion, portals and materials.
+std::vector<LightParameter> other_rows() {
+  using L = Light;
+  using enum LightGroup;
+  using namespace light_trait;
+  return {
+      with(kFiltered, kEmission,
+           id(row<&L::filter>("filter", "filter", "",
+                              "Filter of add_light_filter that modifies its emission."),
+              LightRefers::kFilter)),
+      with(kSeen, kShape,
+           row<&L::visible>("visible", "visible", "",
+                            "Whether camera and bounce rays can hit its shape.")),
+      with(kPlaced, kShape,
+           row<&L::motion>("motion", "motion", "",
+                           "Transforms at equally spaced shutter times, (k, 4, 4), two or more. "
+                           "Its size is that of the transform at mid-shutter.")),
+      in(kShape,
+         row<&L::portals>("portals", "portals", "",
+                          "Maps of the unit square in the xy plane to openings towards which the "
+                          "dome is sampled, (k, 4, 4). Their -z sides receive the light.")),
+      in(kEmission,
+         choice(
+             row<&L::sync>("material_sync", "material sync", "",
+                           "Relation between its light and the emission of the mesh's material."),
+             {"materialGlowTintsLight", "independent", "noMaterialResponse"})),
+  };
+}
+
+std::vector<LightParameter> make_light_parameters() {
+  std::vector<LightParameter> table;
+  for (const auto& rows : {shape_rows(), shaping_rows(), shadow_rows(), other_rows()})
+    table.insert(table.end(), rows.begin(), rows.end());
+  const std::span<const LightKindInfo> kinds = light_kinds();
+  for (const LightKindInfo& kind : kinds)
+    table.insert(table.end(), kind.own.begin(), kind.own.end());
+  for (LightParameter& p : table)
+    for (size_t k = 0; k < kinds.size(); ++k) {
+      const auto is_name = [&](const char* name) { return name == std::string_view(p.name); };
+      const auto is_row = [&](const LightParameter& own) { return is_name(own.name); };
+      const bool has = p.is_common || kinds[k].has(p.trait) ||
+                       std::ranges::any_of(kinds[k].parameters, is_name) ||
+                       std::ranges::any_of(kinds[k].own, is_row);
+      p.kinds |= uint32_t{has} << k;
+    }
+  return table;
+}
+
+std::string limits(const LightParameter& p) {
+  if (std::isfinite(p.least) && std::isfinite(p.most))
+    return "from " + text(p.least) + " to " + text(p.most);
+  if (std::isfinite(p.least)) return text(p.least) + " or more";
+  return std::isfinite(p.most) ? text(p.most) + " or less" : "a finite number";
+}
+
+bool in_range(const LightParameter& p, float v) {
+  return std::isfinite(v) && double{v} >= p.least && double{v} <= p.most;
+}
+
+void check_value(const std::string& of, const LightParameter& p, const LightValue& value,
+                 const LightReferences& there) {
+  if (const auto* number = std::get_if<float>(&value); number && !in_range(p, *number))
+    throw Error(of + p.name + " is " + text(double{*number}) + "; it must be " + limits(p));
+  if (const auto* c = std::get_if<Vec3<float>>(&value))
+    if (!in_range(p, c->x) || !in_range(p, c->y) || !in_range(p, c->z))
+      throw Error(of + p.name + " is (" + text(double{c->x}) + ", " + text(double{c->y}) + ", " +
+                  text(double{c->z}) + "); each must be " + limits(p));
+  if (const auto* maps = std::get_if<std::vector<Affine>>(&value))
+    for (const Affine& map : *maps)
+      if (!finite(map))
+        throw Error(of + "a transform of " + p.name + " is not finite; give finite numbers");
+  const auto* number = std::get_if<uint32_t>(&value);
+  const size_t counts[] = {kNone, there.textures, there.profiles, there.sets, kNone, there.filters};
+  if (!number || *number < counts[static_cast<size_t>(p.refers)]) return;
+  const std::string what = light_refers_name(p.refers);
+  throw Error(of + p.name + " is " + what + " " + std::to_string(*number) +
+              ", which was never added; add " + what + "s before lights");
+}
+
+void check(const Light& light, const LightReferences& there) {
+  const std::string of = quoted("light", light.name) + ": ";
+  if (!finite(light.to_world)) throw Error(of + "its transform is not finite; mend it");
+  if (light.moves() && (light.motion.size() < 2 || light.motion.size() > kMostSteps))
+    throw Error(of + "motion has " + std::to_string(light.motion.size()) +
+                " transforms; give from 2 to " + std::to_string(kMostSteps) + ", or none");
+  for (const LightParameter& p : light_table())
+    if (!p.is_own || p.is_of(light.kind)) check_value(of, p, p.read(light), there);
+}
+
+}  // namespace
+
+std::span<const LightParameter> light_table() {
+  static const std::vector<LightParameter> table = make_light_parameters();
+  return table;
+}
+
+const LightParameter* find_light_parameter(std::string_view name) {
+  for (const LightParameter& p : light_table())
+    if (name == p.name) return &p;
+  return nullptr;
+}
+
+const char* light_refers_name(LightRefers refers) {
+  constexpr const char* kNames[] = {"", "texture", "profile", "set", "group", "filter"};
+  return kNames[static_cast<size_t>(refers)];
+}
+
+const char* light_kind_name(LightKind kind) {
+  return info_of(kind).name;
+}
+
+LightKind light_kind(std::string_view name) {
+  const std::span<const LightKindInfo> kinds = light_kinds();
+  std::string known;
+  for (size_t k = 0; k < kinds.size(); ++k) {
+    if (!kinds[k].has(light_trait::kPlaced)) continue;
+    if (name == kinds[k].name) return static_cast<LightKind>(k);
+    known += (known.empty() ? "" : ", ") + std::string(kinds[k].name);
+  }
+  throw Error("light kind is '" + std::string(name) + "'; it must be one of " + known);
+}
+
+void check_light(const Light& light, const LightReferences& there) {
+  const bool is_known = static_cast<size_t>(light.kind) < light_kinds().size();
+  if (!is_known || !info_of(light.kind).has(light_trait::kPlaced))
+    throw Error(quoted("light", light.name) + ": its kind has no place of its own");
+  check(light, there);
+}
+
+void check_mesh_light(const Light& light, const LightReferences& there) {
+  if (light.kind != kMeshLight)
+    throw Error(quoted("light", light.name) + ": its kind is not a mesh light");
+  check(light, there);
+}
+
+}  // namespace wavecomb

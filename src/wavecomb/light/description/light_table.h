@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Table of light parameters: one row for each member of Light and Shaping, and for the parameters
+/// specific to one kind. Range checks, the scene fingerprint, Python keywords, sandbox calls and
+/// the fields of the window are derived from it. To add a parameter, add a member, a row here, and
+/// its use; for one kind only, add a row to that kind (LightKindInfo::own) and its use.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "wavecomb/light/description/light.h"
+
+namespace wavecomb {
+
+/// Value of a light parameter. A choice is stored as its index, an unset id (kNoTexture, ...) as
+/// monostate.
+using LightValue =
+    std::variant<std::monostate, bool, uint32_t, float, Vec3<float>, std::vector<Affine>>;
+
+enum class LightValueKind : uint8_t { kNumber, kColour, kFlag, kChoice, kId, kTransforms };
+/// Type of object to which an id refers.
+enum class LightRefers : uint8_t { kNothing, kTexture, kProfile, kSet, kGroup, kFilter };
+/// Group of parameters in a form.
+enum class LightGroup : uint8_t { kEmission, kShape, kShaping, kResponse };
+
+/// Traits that kinds of lights share.
+namespace light_trait {
+/// A light with a transform, as opposed to the light of a mesh.
+inline constexpr uint32_t kPlaced = 1;
+inline constexpr uint32_t kSized = 2;      ///< `normalize` has an effect
+inline constexpr uint32_t kShaped = 4;     ///< supports UsdLuxShapingAPI
+inline constexpr uint32_t kSeen = 8;       ///< rays can hit its shape
+inline constexpr uint32_t kPictured = 16;  ///< supports a texture
+inline constexpr uint32_t kInfinite = 32;  ///< surrounds the scene at infinite distance
+inline constexpr uint32_t kFiltered = 64;  ///< supports light filters
+/// Its radiance is the background of light path expressions.
+inline constexpr uint32_t kBackground = 128;
+}  // namespace light_trait
+
+/// Description of a light parameter. Contract: lives as long as the program.
+struct LightParameter {
+  const char* name = "";   ///< keyword of add_light
+  const char* label = "";  ///< label in a form
+  const char* help = "";   ///< one sentence, with the unit
+  const char* input = "";  ///< UsdLux name without "inputs:"; "" if UsdLux has no equivalent
+  LightGroup group = LightGroup::kEmission;
+  LightValueKind kind = LightValueKind::kNumber;
+  LightRefers refers = LightRefers::kNothing;
+  /// Bounds of a number or of each component of a colour; all values are finite.
+  double least = -std::numeric_limits<double>::infinity();
+  double most = std::numeric_limits<double>::infinity();
+  double usual = 1;  ///< upper end of a slider if there is no `most`
+  std::vector<const char*> choices;
+  /// Lights with this trait have the parameter, in addition to the kinds that name it.
+  uint32_t trait = 0;
+  bool is_common = false;  ///< all lights have it
+  bool is_own = false;     ///< specific to one kind of light
+  uint32_t kinds = 0;      ///< bit k: lights of LightKind k have it
+
+  LightValue (*read)(const Light&) = nullptr;
+  void (*write)(Light&, const LightValue&) = nullptr;
+
+  bool is_of(LightKind light) const { return (kinds >> static_cast<uint32_t>(light) & 1) != 0; }
+  /// Returns whether the value can be edited in a scene that is built.
+  bool can_change() const {
+    return kind == LightValueKind::kNumber || kind == LightValueKind::kColour ||
+           kind == LightValueKind::kFlag;
+  }
+  LightValue standard() const { return read(Light{}); }
+};
+
+/// Returns all parameters except kind, name and to_world, in the order in which fingerprints hash
+/// them. Those specific to one kind come last.
+std::span<const LightParameter> light_table();
+/// Returns the row of a parameter, or null for an unknown name.
+const LightParameter* find_light_parameter(std::string_view name);
+
+/// Returns value `kIndex` of the parameters specific to a kind, at most kMaxOwnParameters, for
+/// LightKindInfo::own.
+template <size_t kIndex>
+float own_value(const Light& light, float standard) {
+  static_assert(kIndex < kMaxOwnParameters);
+  return light.own[kIndex].value_or(standard);
+}
+template <size_t kIndex, float kStandard>
+LightParameter own_parameter(const char* name, const char* label, const char* input,
+                             const char* help, double least, double most) {
+  LightParameter p;
+  p.name = name;
+  p.label = label;
+  p.input = input;
+  p.help = help;
+  p.group = LightGroup::kShape;
+  p.least = least;
+  p.most = most;
+  p.is_own = true;
+  p.read = [](const Light& light) -> LightValue { return own_value<kIndex>(light, kStandard); };
+  p.write = [](Light& light, const LightValue& value) {
+    light.own[kIndex] = std::get<float>(value);
+  };
+  return p;
+}
+
+/// Returns the name of a type of object, such as "texture"; "" for kNothing.
+const char* light_refers_name(LightRefers refers);
+const char* light_kind_name(LightKind kind);
+/// Returns the kind of that name, which must have a transform (not a mesh light). Throws Error for
+/// other names.
+LightKind light_kind(std::string_view name);
+
+/// Numbers of objects to which lights can refer.
+struct LightReferences {
+  size_t textures = 0, profiles = 0, sets = 0, filters = 0;
+};
+
+/// Throws Error with one line that names the light if a value is not finite or out of range, if an
+/// id refers to an object that was never added, or if the kind has no transform.
+void check_light(const Light& light, const LightReferences& there);
+/// Applies the same checks to a mesh light.
+void check_mesh_light(const Light& light, const LightReferences& there);
+
+}  // namespace wavecomb

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Lights that move while the shutter is open. They move as rigid bodies from their pose at
+/// mid-shutter, which their records describe.
+///
+/// At a given time, the record is rotated by R about its pivot `origin`, which moves to `place`:
+///   x = R (x_rest - origin) + place
+/// R is a unit quaternion, interpolated between the two steps around that time. The motion is
+/// rigid, so distances, solid angles and densities equal those of the record seen from x_rest.
+#pragma once
+
+#include <span>
+
+#include "wavecomb/light/description/light_records.h"
+
+namespace wavecomb {
+
+struct LightSet;
+struct LightCluster;
+
+/// Adds the motion of `lights` to `set`, which already contains their records.
+void add_motions(LightSet& set, std::span<const Light> lights);
+
+/// Pose of a light at a time, in double precision; LightPose (light/sampling/moving.h) is its
+/// counterpart for kernels.
+struct LightPlace {
+  double x[3], y[3], z[3];  ///< directions of its mid-shutter axes
+  double place[3], origin[3];
+
+  LightPlace(const LightMotion& motion, std::span<const LightStep> steps, double time);
+  void to_rest(const double (&direction)[3], double (&out)[3]) const;
+  void point_to_rest(const double (&point)[3], double (&out)[3]) const;
+  void to_world(const double (&direction)[3], double (&out)[3]) const;
+};
+
+/// A ball.
+struct Ball {
+  double centre[3];
+  double radius;
+};
+/// Returns a ball that contains the ball `at_rest` in all poses of a light that moves.
+Ball along_way(const LightMotion& motion, std::span<const LightStep> steps, const Ball& at_rest);
+/// Returns bounds of a light over its whole motion, from its bounds at mid-shutter.
+LightCluster along_way(const LightMotion& motion, std::span<const LightStep> steps,
+                       const LightCluster& at_rest);
+
+}  // namespace wavecomb

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Fits the spheres that light paths are aimed at to training light paths.
+#pragma once
+
+#include <span>
+
+#include "wavecomb/light/description/aim.h"
+
+namespace wavecomb {
+
+/// Training sample of a light path: its first hit, and the luminance that it contributes to the
+/// image from its second vertex on. The contribution of the first vertex is not counted, because
+/// light samples find it as well.
+struct AimLesson {
+  float x = 0, y = 0, z = 0;
+  float worth = 0;
+};
+
+/// Fits spheres around the first hits of light paths that contribute to the image. Bounding boxes
+/// are split as long as that increases the likelihood, the largest gain first.
+///
+/// With W_k the contribution in box k and A_k = r_k^2, the mixture chooses sphere k with a
+/// probability proportional to W_k and is uniform within it. Compared with a single sphere, its
+/// log-likelihood is higher by
+///   sum_k W_k log(W_k / A_k) - W log(W / A),
+/// which the splits maximise. `scene_radius` is the radius of the bounding sphere of all surfaces.
+/// Returns no spheres if fewer than four samples contribute.
+LightAim aim_targets(std::span<const AimLesson> lessons, float scene_radius);
+
+}  // namespace wavecomb

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Light paths: sampling of a light, a point on it and a direction, and the densities that both
+/// ends of a path need for multiple importance sampling (docs/light-paths.md).
+///
+/// Two kinds of lights emit no light paths, and only camera paths find them: lights with properties
+/// that light paths do not support, such as links, multipliers, decay or motion
+/// (LightRecord::camera_only), and mesh lights, whose visible emission differs from the light they
+/// cast. Bodies are in emission.inl.
+#pragma once
+
+#include "wavecomb/light/sampling/light_sample.h"
+
+namespace wavecomb {
+
+/// Start of a light path. `flux` is the flux that the path carries. `density` is
+/// KindEmission::density times the probability of selecting the light; MIS weights use 1 /
+/// `density`.
+template <typename F>
+struct Emission {
+  Vec3<F> o, d;
+  Color<F> flux;
+  F density;
+  UInt<F> light;
+  Mask<F> valid;
+};
+
+/// Random numbers in [0, 1): for the light (a multiple of 2^-24), the point on it, the direction,
+/// and the sphere it is aimed at.
+template <typename F>
+struct EmissionNumbers {
+  F pick, u, v, s, t, aim;
+};
+
+/// Density with which camera paths find a light from the first surface that a light path hits.
+/// `density` is the solid angle density of a light sample. For a point light it is the probability
+/// of selecting the light times the squared distance d^2, since 1 / d^2 takes the place of its
+/// solid angle. For a distant light without an angle it is the probability of selecting the light.
+template <typename F>
+struct LightReach {
+  F density;
+  Mask<F> is_delta;  ///< whether no bounce can hit the light
+};
+
+/// Samples a light by its weight, and a path from it. The origin is offset from the light's own
+/// shape.
+template <typename F>
+Emission<F> sample_emission(const LightView& view, const EmissionNumbers<F>& r,
+                            const Mask<F>& wanted);
+
+/// Returns Emission::density of a path from `light` that arrives at `from` along -dir over the
+/// distance t. Returns 0 if the light emits no paths.
+template <typename F>
+F emission_density(const LightView& view, const UInt<F>& light, const Vec3<F>& from,
+                   const Vec3<F>& dir, const F& t, const Mask<F>& wanted);
+
+/// Returns how light samples and bounces at `from` find `light`, which emitted a path that arrived
+/// along -dir over the distance t.
+template <typename F>
+LightReach<F> light_reach(const LightView& view, const UInt<F>& light, const LightReceiver<F>& from,
+                          const Vec3<F>& dir, const F& t, const Mask<F>& active);
+
+}  // namespace wavecomb

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Bodies of emission.h, for the compile units that instantiate them.
+#pragma once
+
+#include "wavecomb/light/emission/aim.h"
+#include "wavecomb/light/emission/emission.h"
+#include "wavecomb/light/sampling/escape.h"
+#include "wavecomb/light/sampling/light_sample.inl"
+
+namespace wavecomb {
+
+namespace detail {
+
+/// Returns the lanes whose light emits light paths.
+template <typename F>
+inline Mask<F> sends_paths(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
+  using U = UInt<F>;
+  const Mask<F> there = active & Mask<F>(light < U(view.count));
+  const Mask<F> triangle = there & Mask<F>(light >= U(view.first_triangle));
+  const Mask<F> record = there & not_(triangle);
+  Mask<F> sends = there;
+  if (any(triangle) && view.mesh_lights)
+    sends = sends & (not_(triangle) | Mask<F>(record_of<F>(view, light, triangle) == U(kNoLight)));
+  if (any(record)) {
+    const LightReader<F> reader(view.lights, light, record);
+    sends = sends & (not_(record) | Mask<F>(reader[&LightRecord::camera_only] == U(0u)));
+  }
+  return sends;
+}
+
+/// Returns the probability with which sample_emission() selects a light. `recorded` is the pick_pdf
+/// in its record or row.
+template <typename F>
+inline F emission_pick_pdf(const LightView& view, const UInt<F>& light, const F& recorded,
+                           const Mask<F>& active) {
+  return view.pick_pdf ? gather<F>(view.pick_pdf, light, active) : recorded;
+}
+
+/// Returns the magnitude of the terms that a point on a light is computed from.
+template <typename F>
+inline F size_of_terms(const Vec3<F>& p, const Vec3<F>& u, const Vec3<F>& v) {
+  const auto most = [](const Vec3<F>& a) { return max(max(abs(a.x), abs(a.y)), abs(a.z)); };
+  return F(most(p) + most(u)) + most(v);
+}
+
+/// Returns the lanes whose light no bounce can hit: point lights, and distant lights without an
+/// angle.
+template <typename F>
+inline Mask<F> is_delta_light(const LightReader<F>& light, const Mask<F>& active) {
+  Mask<F> delta(false);
+  for_each_kind<F>(light[&LightRecord::kind], active, [&](LightKind kind, const Mask<F>& lanes) {
+    delta = delta | (lanes & visit(kind, [&]<typename Kind>(Kind) {
+                       return Kind::template is_delta<F>(light);
+                     }));
+  });
+  return delta;
+}
+
+}  // namespace detail
+
+template <typename F>
+[[gnu::noinline]] Emission<F> sample_emission(const LightView& view, const EmissionNumbers<F>& r,
+                                              const Mask<F>& wanted) {
+  using U = UInt<F>;
+  Emission<F> out{Vec3<F>(F(0.f)),  Vec3<F>(F(0.f), F(0.f), F(1.f)),
+                  Color<F>(F(0.f)), F(0.f),
+                  U(kNoLight),      Mask<F>(false)};
+  if (!view.sends_paths() || view.count == 0 || none(wanted)) return out;
+  const U light = detail::pick_light<F>(view, r.pick, wanted);
+  const Mask<F> active = detail::sends_paths<F>(view, light, wanted);
+  const auto put = [&](const detail::KindEmission<F>& e, const F& recorded, const F& size,
+                       const Mask<F>& lanes) {
+    const F density = e.density * detail::emission_pick_pdf<F>(view, light, recorded, lanes);
+    const Mask<F> valid = lanes & (density > 0.f) & is_finite(density) & not_(is_black(e.radiance));
+    const F inverse = 1.f / select(valid, density, F(1.f));
+    // Offsets the origin from the light by more than its rounding error.
+    out.o = select<F>(valid, fma(e.n, F(size * 0x1p-20f), e.p), out.o);
+    out.d = select<F>(valid, e.d, out.d);
+    out.flux = select<F>(valid, e.radiance * inverse, out.flux);
+    out.density = select(valid, density, out.density);
+    out.valid = out.valid | valid;
+  };
+  const Mask<F> triangle = active & Mask<F>(light >= U(view.first_triangle));
+  if (any(triangle)) {
+    const detail::TriangleReader<F> reader(view, light, triangle);
+    detail::KindEmission<F> e =
+        detail::emit_triangle<F>(reader, view, r.u, r.v, r.s, r.t, triangle);
+    if (view.aim) detail::aim_directions<F>(view, r.aim, r.s, r.t, 2.f, e, triangle);
+    put(e, reader.pick_pdf, detail::size_of_terms<F>(reader.p, reader.u, reader.v), triangle);
+  }
+  const Mask<F> others = active & not_(triangle);
+  if (any(others)) {
+    const detail::LightReader<F> any_light(view.lights, light, others);
+    detail::for_each_kind<F>(
+        any_light[&LightRecord::kind], others, [&](LightKind kind, const Mask<F>& lanes) {
+          const detail::LightReader<F> reader(view.lights, light, lanes);
+          detail::KindEmission<F> e = visit(kind, [&]<typename Kind>(Kind) {
+            return Kind::template emit<F>({view, reader, r.u, r.v, r.s, r.t, lanes});
+          });
+          if (view.aim) {
+            if (visit(kind, []<typename Kind>(Kind) { return Kind::kIsInfinite; }))
+              detail::aim_places<F>(view, r.aim, r.u, r.v, e, lanes);
+            else
+              detail::aim_directions<F>(view, r.aim, r.s, r.t, 1.f, e, lanes);
+          }
+          if (view.shapings)
+            e.radiance = detail::shaped<F>(view, reader.shaping(), e.d, e.radiance, lanes);
+          if (view.filters) [[unlikely]]
+            e.radiance = detail::filtered<F>(view, reader[&LightRecord::filter], {e.p, e.d, F(0.f)},
+                                             e.radiance, lanes);
+          const F size = detail::size_of_terms<F>(reader.p(), reader.u(), reader.v());
+          put(e, reader.pick_pdf(), F(size + reader.radius()), lanes);
+        });
+  }
+  out.light = select(Mask<U>(out.valid), light, out.light);
+  return out;
+}
+
+template <typename F>
+[[gnu::noinline]] F emission_density(const LightView& view, const UInt<F>& light,
+                                     const Vec3<F>& from, const Vec3<F>& dir, const F& t,
+                                     const Mask<F>& wanted) {
+  F density(0.f);
+  if (none(wanted)) return density;
+  const Mask<F> active = detail::sends_paths<F>(view, light, wanted);
+  const auto put = [&](const F& one, const F& recorded, const Mask<F>& lanes) {
+    const F all = one * detail::emission_pick_pdf<F>(view, light, recorded, lanes);
+    density = select(lanes & is_finite(all), all, density);
+  };
+  const Mask<F> triangle = active & Mask<F>(light >= UInt<F>(view.first_triangle));
+  if (any(triangle)) {
+    const detail::TriangleReader<F> reader(view, light, triangle);
+    const F area = length(reader.m);
+    F one = 0.5f * detail::even_emission_density<F>(area);
+    if (view.aim) {
+      const F own = abs(dot(reader.m, dir)) * F(0.5f * kInvPi) / select(area > 0.f, area, F(1.f));
+      one = one * detail::aim_from_near<F>(view, fma(dir, t, from), -dir, own);
+    }
+    put(one, reader.pick_pdf, triangle);
+  }
+  const Mask<F> others = active & not_(triangle);
+  if (none(others)) return density;
+  const detail::LightReader<F> any_light(view.lights, light, others);
+  detail::for_each_kind<F>(
+      any_light[&LightRecord::kind], others, [&](LightKind kind, const Mask<F>& lanes) {
+        const detail::LightReader<F> reader(view.lights, light, lanes);
+        const F one = visit(kind, [&]<typename Kind>(Kind) {
+          const F even = Kind::template emission_density<F>({view, reader, from, dir, t, lanes});
+          if (!view.aim) return even;
+          return F(even * detail::aim_of_kind<Kind, F>(view, reader, from, dir, t));
+        });
+        put(one, reader.pick_pdf(), lanes);
+      });
+  return density;
+}
+
+template <typename F>
+[[gnu::noinline]] LightReach<F> light_reach(const LightView& view, const UInt<F>& light,
+                                            const LightReceiver<F>& from, const Vec3<F>& dir,
+                                            const F& t, const Mask<F>& active) {
+  using U = UInt<F>;
+  LightReach<F> reach{F(0.f), Mask<F>(false)};
+  const Mask<F> triangle = active & Mask<F>(light >= U(view.first_triangle));
+  if (any(triangle)) reach.density = triangle_light_pdf<F>(view, light, from, dir, t, triangle);
+  const Mask<F> infinite = active & Mask<F>(light < U(view.infinite_count));
+  for (uint32_t i = 0; i < view.infinite_count && any(infinite); ++i) {
+    const Mask<F> here = infinite & Mask<F>(light == U(i));
+    if (none(here)) continue;
+    const LightRecord& record = view.lights[i];
+    const detail::LightReader<float> one(record, true);
+    const bool is_delta = detail::is_delta_light<float>(one, true);
+    const F pdf = is_delta ? F(1.f) : visit(record.kind, [&]<typename Kind>(Kind) {
+      return Kind::template escape<F>({view, record, from.p, dir, here}).pdf;
+    });
+    reach.density = select(here, F(pdf * infinite_pick_pdf(view, i)), reach.density);
+    if (is_delta) reach.is_delta = reach.is_delta | here;
+  }
+  const Mask<F> placed = active & not_(triangle) & not_(infinite);
+  if (none(placed)) return reach;
+  const detail::LightReader<F> reader(view.lights, light, placed);
+  const Mask<F> point = detail::is_delta_light<F>(reader, placed);
+  const Mask<F> area = placed & not_(point);
+  if (any(area))
+    reach.density = select(area, light_hit<F>(view, light, from, dir, t, area).pdf, reach.density);
+  if (any(point)) {
+    const F pick = detail::finite_pick_pdf<F>(view, light, reader.pick_pdf(), from, point);
+    reach.density = select(point, F(pick * t * t), reach.density);
+    reach.is_delta = reach.is_delta | point;
+  }
+  return reach;
+}
+
+}  // namespace wavecomb

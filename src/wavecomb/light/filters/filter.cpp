@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/light/filters/filter.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "wavecomb/light/kinds/record_builder.h"
+
+namespace wavecomb {
+namespace making {
+namespace {
+
+/// Stores the inverse of `to_world`: its rows and its translation. All are 0 if `to_world` is
+/// singular.
+void put_inverse(FilterRecord& r, const Affine& to_world) {
+  const Double3 axes[3] = {to_double(to_world.axis(0)), to_double(to_world.axis(1)),
+                           to_double(to_world.axis(2))};
+  const double det = dot(axes[0], cross(axes[1], axes[2]));
+  const double scale = std::isnormal(det) ? 1 / det : 0;
+  float (*const rows[3])[3] = {&r.row_x, &r.row_y, &r.row_z};
+  const Double3 t = to_double(to_world.t);
+  for (size_t i = 0; i < 3; ++i) {
+    const Double3 row = cross(axes[(i + 1) % 3], axes[(i + 2) % 3]) * scale;
+    put(*rows[i], row);
+    r.origin[i] = static_cast<float>(-dot(row, t));
+  }
+}
+
+void put_line(float (&to)[3], const Vec3<float>& line) {
+  put(to, to_double(line));
+}
+
+}  // namespace
+
+ShadowLookRecord make_shadow(const ShadowLook& look) {
+  ShadowLookRecord r{};
+  put(r.color, to_double(look.color));
+  r.distance = look.distance < 0 ? kFarAway : look.distance;
+  // The falloff zone ends at the surface at the latest.
+  r.falloff = look.distance < 0 ? 0.f : std::clamp(look.falloff, 0.f, look.distance);
+  r.inverse_gamma = 1 / std::max(look.gamma, 1e-3f);
+  return r;
+}
+
+}  // namespace making
+
+FilterRecord make_light_filter(const LightFilter& filter) {
+  using namespace making;
+  FilterRecord r{};
+  put_inverse(r, filter.to_world);
+  put_line(r.side_0, filter.sides[0]);
+  put_line(r.side_1, filter.sides[1]);
+  put_line(r.side_2, filter.sides[2]);
+  put_line(r.side_3, filter.sides[3]);
+  put_line(r.picture_u, filter.picture_u);
+  put_line(r.picture_v, filter.picture_v);
+  r.distance = filter.distance;
+  r.texture = filter.texture;
+  const auto inverse = [](float from, float to) { return to > from ? 1 / (to - from) : 0.f; };
+  const bool begins = filter.near_end > filter.near_start;
+  r.near_start = begins ? filter.near_start : -1.f;
+  r.near_inverse = begins ? inverse(filter.near_start, filter.near_end) : 1.f;
+  r.far_start = filter.far_start;
+  r.far_inverse = inverse(filter.far_start, filter.far_end);
+  r.density = std::clamp(filter.density, 0.f, 1.f);
+  r.next = filter.next;
+  return r;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/light/kinds/mesh_light.h"
+
+#include <bit>
+
+#include "wavecomb/light/kinds/record_builder.h"
+
+namespace wavecomb {
+
+using namespace making;
+
+LightKindInfo TriangleKind::describe() {
+  using namespace light_trait;
+  LightKindInfo kind;
+  kind.name = "triangle";
+  kind.traits = kSized | kShaped | kSeen;
+  kind.parameters = {"material_sync"};
+  return kind;
+}
+
+LightRecord make_mesh_light(const PlacedMeshLight& placed, LightMaking& making) {
+  Light light = *placed.light;
+  light.to_world = placed.to_world * light.to_world;
+  LightRecord record = make_light(light, making).record;
+  const bool there = placed.area >= kLeastArea;
+  put_radiance(record,
+               to_double(light.color) * (!there ? 0 : (light.normalize ? 1 / placed.area : 1)));
+  record.area = static_cast<float>(placed.area);
+  record.sync = static_cast<uint32_t>(light.sync);
+  // Paths that hit the mesh do not receive light that is independent of its material.
+  if (light.sync == MaterialSync::kIndependent) record.sampled_only = 1;
+  if (!placed.is_sampled) record.sampled_only = 0;
+  return record;
+}
+
+MadeTriangle make_triangle(const LightSet& set, const EmissiveTriangle& t) {
+  MadeTriangle made;
+  TriangleLight& r = made.light;
+  const Double3 p0 = to_double(t.p0);
+  const Double3 u = subtract(to_double(t.p1), p0), v = subtract(to_double(t.p2), p0);
+  const Double3 m = cross(u, v) * 0.5;
+  const double area = length(m);
+  put(r.p, p0);
+  put(r.u, u);
+  put(r.v, v);
+  put(r.m, m);
+  const auto sane = [](float x) { return std::clamp(double{x}, 0.0, kMostRadiance); };
+  Double3 radiance{sane(t.radiance[0]), sane(t.radiance[1]), sane(t.radiance[2])};
+  float varying = t.material == kNoLight ? 0.f : TriangleLight::kEmission;
+  if (t.mesh_light != kNoLight) {
+    const LightRecord& mesh = set.records[set.record_count + t.mesh_light];
+    const Double3 tint = to_double(mesh.radiance);
+    const bool independent = mesh.sync == static_cast<uint32_t>(MaterialSync::kIndependent);
+    if (independent) varying = t.opacity_varies ? TriangleLight::kOpacity : 0.f;
+    radiance =
+        independent ? tint : Double3{radiance.x * tint.x, radiance.y * tint.y, radiance.z * tint.z};
+  }
+  radiance = radiance * double{t.opacity};
+  const double mean = luminance(radiance.x, radiance.y, radiance.z) * double{t.mean_scale};
+  put(r.radiance, {std::min(radiance.x, kMostRadiance), std::min(radiance.y, kMostRadiance),
+                   std::min(radiance.z, kMostRadiance)});
+  if (varying != 0) {
+    r.radiance[0] = varying;
+    r.radiance[1] = std::bit_cast<float>(t.material);
+  }
+  made.power = area < kLeastArea ? 0 : 2 * kPiD * area * mean;
+  return made;
+}
+
+}  // namespace wavecomb

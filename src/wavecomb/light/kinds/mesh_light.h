@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Mesh lights: triangles of meshes with UsdLux light attributes, whose light may differ from the
+/// emission of their material.
+#pragma once
+
+#include "wavecomb/light/filters/shaping.h"
+#include "wavecomb/light/kinds/triangle.h"
+#include "wavecomb/light/sampling/linking.h"
+
+namespace wavecomb {
+
+namespace detail {
+
+/// Returns the radiance of samples `s` on triangles `light`, with tint and shaping of their mesh
+/// lights. Constant radiance was tinted when the scene was built.
+template <typename F>
+inline Color<F> of_mesh_light(const LightView& view, const UInt<F>& light,
+                              const TriangleReader<F>& triangle, const KindSample<F>& s,
+                              const Mask<F>& active) {
+  const UInt<F> record = record_of<F>(view, light, active);
+  const Mask<F> known = active & (s.pdf > 0.f) & Mask<F>(record != UInt<F>(kNoLight));
+  if (none(known)) return s.radiance;
+  const LightReader<F> reader(view.lights, record, known);
+  const Mask<F> varies = known & (triangle.radiance.x < 0.f);
+  const Color<F> radiance = select<F>(varies, s.radiance * reader.radiance(), s.radiance);
+  if (!view.shapings) return radiance;
+  return shaped<F>(view, reader.shaping(), -s.wi, radiance, known);
+}
+
+/// Returns the factor for emission that a path hits, for a light with these multipliers. `share` is
+/// the diffuse fraction of the path's last bounce; the rest is specular. Cameras see the light
+/// without multipliers. `is_seen` marks paths that light sampling cannot produce.
+template <typename F>
+inline Color<F> factor_of_hit(const F& diffuse, const F& specular, const Mask<F>& sampled_only,
+                              const Mask<F>& is_seen, bool from_camera, const Color<F>& share) {
+  Color<F> factor(F(1.f));
+  if (!from_camera) {
+    const F more = diffuse - specular;
+    factor = {fma(more, share.x, specular), fma(more, share.y, specular),
+              fma(more, share.z, specular)};
+  }
+  return select<F>(sampled_only & not_(is_seen), Color<F>(F(0.f)), factor);
+}
+
+}  // namespace detail
+
+/// Ray that hits an emissive mesh, and the bounce that started it.
+template <typename F>
+struct MeshLightRay {
+  Vec3<F> dir;
+  UInt<F> link;      ///< link class of the surface that the ray left
+  Mask<F> is_delta;  ///< of delta bounces and camera rays, which no light sample matches
+  bool from_camera;
+  Color<F> diffuse;  ///< diffuse fraction of the bounce, by colour
+};
+
+/// Returns the radiance that a path receives along `ray` from meshes with mesh light records
+/// `record` (kNoLight for other meshes), before MIS. `emission` is that of the material.
+template <typename F>
+inline Color<F> mesh_light_radiance(const LightView& view, const UInt<F>& record,
+                                    const Color<F>& emission, const MeshLightRay<F>& ray,
+                                    const Mask<F>& active) {
+  using U = UInt<F>;
+  using R = LightRecord;
+  const Mask<F> known = active & Mask<F>(record != U(kNoLight));
+  if (none(known)) return emission;
+  const detail::LightReader<F> light(view.lights, record, known);
+  const U sync = light[&R::sync];
+  const Mask<F> shows_material =
+      ray.is_delta & Mask<F>(sync != U(static_cast<uint32_t>(MaterialSync::kNoResponse)));
+  const Mask<F> given = known & not_(shows_material);
+  if (none(given)) return emission;
+  Color<F> radiance = emission * light.radiance();
+  if (view.shapings) radiance = detail::shaped<F>(view, light.shaping(), -ray.dir, radiance, given);
+  const Mask<F> sampled_only = Mask<F>(light[&R::sampled_only] != U(0u));
+  radiance =
+      radiance * detail::factor_of_hit<F>(light[&R::diffuse], light[&R::specular], sampled_only,
+                                          ray.is_delta, ray.from_camera, ray.diffuse);
+  if (view.links.members) {
+    const U set = light[&R::light_link];
+    radiance = radiance * select(is_linked<F>(view.links, ray.link, set, given), F(1.f), F(0.f));
+  }
+  return select<F>(given, radiance, emission);
+}
+
+/// Kind of mesh lights in WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h). Records of mesh lights are
+/// never selected themselves; their triangles have separate rows.
+struct TriangleKind : FlatKind {
+  static LightKindInfo describe();
+  template <typename F>
+  static detail::KindHit<F> hit(const detail::LightMeeting<F>& /*meeting*/) {
+    return detail::dark<F>();
+  }
+  template <typename F>
+  static detail::KindSample<F> sample(const detail::LightQuery<F>& /*query*/) {
+    return {};
+  }
+  template <typename F>
+  static detail::KindEmission<F> emit(const detail::EmissionQuery<F>& /*query*/) {
+    return {};
+  }
+  template <typename F>
+  static F emission_density(const detail::LightMeeting<F>& /*meeting*/) {
+    return F(0.f);
+  }
+};
+
+}  // namespace wavecomb

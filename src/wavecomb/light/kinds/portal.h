@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Portals: rectangles, such as the windows of a room, that guide the sampling of a dome.
+///
+/// Directions to the dome are sampled through the portals with probability a, uniformly in their
+/// total solid angle, and otherwise by the dome's image. The density of a direction is that of the
+/// mixture for both techniques,
+///     p = a (number of portals it passes) / (sum of solid angles) + (1 - a) p_image,
+/// so that light from outside the portals also counts. With w the solid angle of the portals and i
+/// PortalGroup::image_solid_angle, a = i / (i + w), clamped: the smaller of the two finds the light
+/// better. Points that see no portal from its back (the side that light leaves at), or only ones
+/// smaller than kLeastRectSolidAngle, use the image alone.
+#pragma once
+
+#include "wavecomb/light/kinds/rect.h"
+
+namespace wavecomb::detail {
+
+inline constexpr float kLeastPortalShare = 0.2f, kMostPortalShare = 0.9f;
+
+/// Portals of one dome, as seen from the points `from`.
+template <typename F>
+class Portals {
+ public:
+  Portals(const LightView& view, uint32_t group, const Vec3<F>& from, const Mask<F>& active)
+      : first_(view.portals + view.portal_groups[group].first),
+        count_(view.portal_groups[group].count),
+        from_(from),
+        active_(active),
+        image_(view.portal_groups[group].image_solid_angle),
+        total_(0.f) {
+    for_each([&](const SphericalRect<F>& r, const LightReader<F>&) {
+      total_ += select(r.usable, r.solid_angle, F(0.f));
+    });
+  }
+
+  /// Returns the probability of sampling through the portals.
+  F share() const {
+    const F a = clamp(F(image_ / F(total_ + image_)), F(kLeastPortalShare), F(kMostPortalShare));
+    return select(total_ > 0.f, a, F(0.f));
+  }
+
+  /// Samples directions through the portals, uniform in solid angle. Undefined if no portal is
+  /// visible.
+  Vec3<F> sample(const F& u, const F& v) const {
+    Vec3<F> wi(F(0.f), F(0.f), F(1.f));
+    const F pick = u * total_;
+    F before(0.f);
+    for_each([&](const SphericalRect<F>& r, const LightReader<F>& portal) {
+      const Mask<F> here = r.usable & (pick >= before);
+      const F size = select(r.usable, r.solid_angle, F(1.f));
+      const F inside = clamp(F((pick - before) / size), F(0.f), F(kOneMinusEpsilon));
+      const Vec2<F> at = sample_spherical_rect<F>(r, inside, v);
+      const Vec3<F> q = fma(portal.u(), at.x, fma(portal.v(), at.y, portal.p()));
+      wi = select<F>(here, make_direction<F>(q - from_).wi, wi);
+      before += select(r.usable, size, F(0.f));
+    });
+    return wi;
+  }
+
+  /// Returns the density of the mixture. `through` marks lanes whose direction is from sample().
+  F pdf(const Vec3<F>& wi, const F& image_pdf, const Mask<F>& through) const {
+    F hits(0.f);
+    for_each([&](const SphericalRect<F>& r, const LightReader<F>&) {
+      const F dz = -dot(wi, r.n);
+      const F scale = r.z / select(dz > 0.f, dz, F(1.f));
+      const F x = dot(wi, r.x) * scale, y = dot(wi, r.y) * scale;
+      const Mask<F> inside =
+          r.usable & (dz > 0.f) & (x >= r.x0) & (x <= r.x1) & (y >= r.y0) & (y <= r.y1);
+      hits += select(inside, F(1.f), F(0.f));
+    });
+    hits = select(through, max(hits, F(1.f)), hits);  // rounding may decide at an edge
+    const F share_ = share();
+    const F by_portals = hits / select(total_ > 0.f, total_, F(1.f));
+    return fma(share_, by_portals, F((1.f - share_) * image_pdf));
+  }
+
+ private:
+  template <typename Function>
+  void for_each(const Function& one) const {
+    for (uint32_t i = 0; i < count_; ++i) {
+      const LightReader<F> portal(first_[i], active_);
+      one(make_spherical_rect<F>(portal, from_), portal);
+    }
+  }
+
+  const LightRecord* first_;
+  uint32_t count_;
+  Vec3<F> from_;
+  Mask<F> active_;
+  F image_;  ///< PortalGroup::image_solid_angle
+  F total_;  ///< total solid angle of the portals
+};
+
+}  // namespace wavecomb::detail

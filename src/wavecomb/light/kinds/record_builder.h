@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Shared functions of the light kinds that build light records, in double precision.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "wavecomb/light/description/kind_info.h"
+
+namespace wavecomb::making {
+
+inline constexpr double kPiD = 3.14159265358979323846;
+
+/// Smaller areas are indistinguishable from 0 in float. Such lights are dark.
+inline constexpr double kLeastArea = 1e-36;
+/// Largest radiance. Products of larger values overflow.
+inline constexpr double kMostRadiance = 1e30;
+
+struct Double3 {
+  double x, y, z;
+  Double3 operator*(double s) const { return {x * s, y * s, z * s}; }
+};
+inline Double3 to_double(const Vec3<float>& v) {
+  return {v.x, v.y, v.z};
+}
+inline Double3 to_double(const float* v) {
+  return {v[0], v[1], v[2]};
+}
+inline Double3 subtract(const Double3& a, const Double3& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+inline Double3 cross(const Double3& a, const Double3& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+inline double dot(const Double3& a, const Double3& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+inline double length(const Double3& a) {
+  return std::sqrt(dot(a, a));
+}
+/// Returns a / |a|, or +z for the zero vector.
+inline Double3 unit(const Double3& a) {
+  const double n = length(a);
+  return n > 0 ? a * (1 / n) : Double3{0, 0, 1};
+}
+inline void put(float (&to)[3], const Double3& v) {
+  to[0] = static_cast<float>(v.x);
+  to[1] = static_cast<float>(v.y);
+  to[2] = static_cast<float>(v.z);
+}
+inline double luminance(double r, double g, double b) {
+  return 0.212656 * r + 0.715158 * g + 0.072186 * b;
+}
+
+inline void put_radiance(LightRecord& record, const Double3& v) {
+  put(record.radiance,
+      {std::min(v.x, kMostRadiance), std::min(v.y, kMostRadiance), std::min(v.z, kMostRadiance)});
+}
+
+/// Light::color without negative components, and its luminance.
+struct LightColour {
+  Double3 rgb;
+  double mean;
+
+  explicit LightColour(const Light& light)
+      : rgb{std::max(0.0, double{light.color.x}), std::max(0.0, double{light.color.y}),
+            std::max(0.0, double{light.color.z})},
+        mean(luminance(rgb.x, rgb.y, rgb.z)) {}
+};
+
+/// Sets radiance and power of a light with the given surface area. A light without area is dark.
+void finish_area(MadeLight& made, const Light& light, double area);
+
+/// Sets area, emission directions, radiance and power of a planar light with the given edges or
+/// half axes, whose area is `area_factor` |u x v|.
+void finish_flat(MadeLight& made, const Light& light, const Double3& u, const Double3& v,
+                 double area_factor);
+
+/// Returns the sampling distribution of a light with this texture and radiance: the one in
+/// making.before if it exists, else the result of `build`.
+Distribution2D density_of(const LightRecord& light, const LightMaking& making,
+                          Distribution2D (*build)(const TextureView&, const Vec3<float>&));
+
+/// Adds the shaping to a light, and scales its power by the fraction of light that the shaping
+/// passes. Each attribute contributes its mean over all directions, as if they were independent.
+void add_shaping(MadeLight& made, const Light& light, LightMaking& making);
+
+/// Returns the packed shadow attributes of a light.
+ShadowLookRecord make_shadow(const ShadowLook& look);
+
+/// Returns a box from point `a` to point `b`, extended by `half` and a tolerance for rounding.
+Bounds box_around(const float (&a)[3], const float (&b)[3], const float (&half)[3]);
+
+}  // namespace wavecomb::making

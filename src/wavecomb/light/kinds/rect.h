@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Rectangle lights, sampled uniformly by solid angle. Parallelograms (sheared rectangles) and
+/// rectangles of very small solid angle are sampled uniformly by area.
+///
+/// With an image, a point is sampled by the image with probability a, and otherwise uniformly as
+/// above. The density of a direction is that of the mixture for both techniques,
+///     p = a p_image d^2 / (A cos) + (1 - a) p_even,
+/// where p_image is the density over the unit square and A the area. Let i be the fraction of the
+/// square that the light of the image occupies (Distribution2D::spread), and g the fraction of the
+/// rectangle that dominates the view from the point, which is 1 if all of it is equally close. Then
+/// a = g / (g + i), clamped: the smaller of the two finds the light better, that is the image from
+/// far away and the solid angle close by.
+#pragma once
+
+#include "wavecomb/light/kinds/image.h"
+#include "wavecomb/light/kinds/record_reader.h"
+#include "wavecomb/texture/lookup.h"
+
+namespace wavecomb::detail {
+
+/// Returns the radiance at (s, t) of the rectangle, with s to the right and t up as seen from the
+/// front.
+template <typename F>
+inline Color<F> rect_radiance(const LightReader<F>& light, const TextureView* textures, const F& s,
+                              const F& t, const Mask<F>& active) {
+  const Color<F> color = light.radiance();
+  const UInt<F> texture = light.texture();
+  const Mask<F> textured = active & Mask<F>(texture != UInt<F>(kNoTexture));
+  if (none(textured)) return color;
+  const Texel<F> texel = lookup<F>(textures, texture, s, t, F(0.f), textured);
+  const Color<F> image(texel.r, texel.g, texel.b);
+  return select<F>(textured, color * not_negative(image), color);
+}
+
+/// Below this solid angle, area sampling is as good, and solid angles lose precision.
+inline constexpr float kLeastRectSolidAngle = 2e-3f;
+
+/// Rectangle as seen from a point (C. Urena, M. Fajardo, A. King, "An Area-Preserving
+/// Parametrization for Spherical Rectangles", CGF 32(4) 2013). The point is the origin, x and y run
+/// along the edges, and z points towards the rectangle, which is [x0, x1] x [y0, y1] at distance z.
+///
+/// The solid angle is the sum over the corners of +-atan(x y / (z d)), d = sqrt(x^2 + y^2 + z^2).
+/// This equals the paper's sum of angles minus 2 pi, in which each angle is pi / 2 + asin(b c),
+/// with b and c the z components of the normals of the planes through two adjacent edges. Each
+/// angle is the argument of the complex number z d + i x y, so that the difference of the two
+/// angles along an edge x, which is less than pi, is the argument of
+///   z^2 d_0 d_1 + x^2 y_0 y_1 + i x z (y_1 d_0 - y_0 d_1).
+/// If that is out of range (lengths above 10^9 or below 10^-9), the rectangle is not usable.
+template <typename F>
+struct SphericalRect {
+  Vec3<F> x, y, n;
+  F inverse_width, inverse_height, x0, x1, y0, y1, z;
+  F solid_angle;
+  F begin;  ///< k in the paper
+  /// 1 / sqrt(y0^2 + z^2), and the z components of the normals at the edges y0 and y1
+  F near_y, b0, b1;
+  Mask<F> usable;
+};
+
+template <typename F>
+inline SphericalRect<F> make_spherical_rect(const LightReader<F>& light, const Vec3<F>& from) {
+  SphericalRect<F> r;
+  r.inverse_width = light[&LightRecord::inverse_u];
+  r.inverse_height = light[&LightRecord::inverse_v];
+  r.x = light.u() * r.inverse_width;
+  r.y = light.v() * r.inverse_height;
+  r.n = light.n();
+  const Vec3<F> corner = light.p() - from;
+  r.x0 = dot(corner, r.x);
+  r.y0 = dot(corner, r.y);
+  r.x1 = r.x0 + light[&LightRecord::length_u];
+  r.y1 = r.y0 + light[&LightRecord::length_v];
+  r.z = -dot(corner, r.n);  // the front of the light is the side that n points to
+  const F z2 = r.z * r.z, edge0 = fma(r.y0, r.y0, z2), edge1 = fma(r.y1, r.y1, z2);
+  const auto between = [&](const F& x) {
+    const F zd0 = r.z * sqrt(fma(x, x, edge0)), zd1 = r.z * sqrt(fma(x, x, edge1));
+    const F xy0 = x * r.y0, xy1 = x * r.y1;
+    return atan2(fma(xy1, zd0, F(-(xy0 * zd1))), fma(zd0, zd1, F(xy0 * xy1)));
+  };
+  const F right = between(r.x1), left = between(r.x0);
+  r.solid_angle = right - left;
+  r.begin = kPi + left;
+  const F least(1e-30f);  // for a point on the line of an edge
+  r.near_y = 1.f / sqrt(max(edge0, least));
+  r.b0 = -r.y0 * r.near_y;
+  r.b1 = r.y1 / sqrt(max(edge1, least));
+  r.usable = (abs(dot(r.x, r.y)) < 1e-5f) & (r.z > 0.f) & (r.solid_angle > kLeastRectSolidAngle) &
+             is_finite(r.solid_angle);
+  return r;
+}
+
+/// Maps (u, v) of the unit square to the rectangle, in fractions of its width and height. This is
+/// the paper's algorithm 2, with z0 = -z and f = g / sin.
+template <typename F>
+inline Vec2<F> sample_spherical_rect(const SphericalRect<F>& r, const F& u, const F& v) {
+  const auto [sin_a, cos_a] = sincos_2pi(F(fma(u, r.solid_angle, r.begin) * kInv2Pi));
+  const F g = fma(cos_a, r.b0, F(-r.b1)), sine = abs(sin_a);
+  const F n0 = r.z * r.near_y * sine;
+  const F a2 = F(abs(g) - n0) * F(abs(g) + n0);
+  const F away = F(r.z * sine) / sqrt(max(a2, F(1e-30f)));
+  const F x = clamp(copysign(away, F(g * sin_a)), r.x0, r.x1);
+  const F d2 = fma(x, x, F(r.z * r.z));
+  const F h0 = r.y0 / sqrt(fma(r.y0, r.y0, d2)), h1 = r.y1 / sqrt(fma(r.y1, r.y1, d2));
+  const F h = fma(v, F(h1 - h0), h0);
+  const F rest = max(F((1.f - h) * (1.f + h)), F(1e-14f));
+  const F y = clamp(F(h * sqrt(F(d2 / rest))), r.y0, r.y1);
+  const auto share = [](const F& at, const F& inverse) {
+    return clamp(F(at * inverse), F(0.f), F(1.f));
+  };
+  return {share(F(x - r.x0), r.inverse_width), share(F(y - r.y0), r.inverse_height)};
+}
+
+/// Returns the solid angle density of a point on the rectangle; 0 if it is seen from behind.
+template <typename F>
+inline F rect_pdf(const SphericalRect<F>& r, const F& distance2, const F& cos_light,
+                  const F& area) {
+  const Mask<F> seen = (cos_light > 0.f) & (distance2 > 0.f) & (area > 0.f);
+  const F by_angle = 1.f / select(r.usable, r.solid_angle, F(1.f));
+  const F pdf = select(seen, by_angle, F(0.f));
+  if (all(r.usable)) return pdf;
+  return select(r.usable, pdf, area_to_solid_angle<F>(distance2, cos_light, area));
+}
+
+/// Returns the probability of sampling a rectangle by its image, which has the given `spread`. It
+/// is a multiple of 1/16, so that both techniques get a whole number of the 2^24 values of u. The
+/// fraction g is bounded from below by solid angle / (area * largest solid angle per area, z /
+/// d^3).
+template <typename F>
+inline F picture_share(const SphericalRect<F>& r, const F& area, float spread) {
+  const F x = clamp(F(0.f), r.x0, r.x1), y = clamp(F(0.f), r.y0, r.y1);
+  const F d2 = fma(x, x, fma(y, y, F(r.z * r.z)));
+  const F most = area * r.z;
+  const F g = r.solid_angle * d2 * sqrt(d2) / select(r.usable & (most > 0.f), most, F(1.f));
+  const F share = g / F(g + spread);
+  const F sixteenths = clamp(floor(fma(share, F(16.f), F(0.5f))), F(2.f), F(14.f));
+  return select(r.usable, sixteenths, F(14.f)) * 0.0625f;
+}
+
+/// Returns the lanes whose rectangle is sampled by an image.
+template <typename F>
+inline Mask<F> has_picture(const LightReader<F>& light, const Mask<F>& active) {
+  return active & Mask<F>(light.texture() != UInt<F>(kNoTexture)) &
+         Mask<F>(light[&LightRecord::distribution] != UInt<F>(kNoDistribution));
+}
+
+/// Calls `one(distribution, lanes)` for each image in the lanes.
+template <typename F, typename Function>
+inline void for_each_picture(const LightView& view, const LightReader<F>& light,
+                             const Mask<F>& lanes, const Function& one) {
+  const UInt<F> index = light[&LightRecord::distribution];
+  Mask<F> pending = lanes;
+  while (any(pending)) {
+    const auto first = static_cast<size_t>(std::countr_zero(lane_bits<F>(pending)));
+    const uint32_t number = lane(index, first);
+    const Mask<F> same = pending & Mask<F>(index == UInt<F>(number));
+    one(view.distributions[number], same);
+    pending = pending & not_(same);
+  }
+}
+
+/// Samples the rectangle without its image: (u, v) to fractions of its edges.
+template <typename F>
+inline Vec2<F> sample_rect_evenly(const SphericalRect<F>& r, const F& u, const F& v,
+                                  const Mask<F>& active) {
+  if (none(active & r.usable)) return {u, v};
+  const Vec2<F> by_angle = sample_spherical_rect<F>(r, u, v);
+  return {select(r.usable, by_angle.x, u), select(r.usable, by_angle.y, v)};
+}
+
+/// Point on the rectangle in fractions of its edges. Without an image, `share` is 0 and
+/// `picture_pdf`, which is over the unit square, is ignored.
+template <typename F>
+struct RectPoint {
+  Vec2<F> at;
+  F share, picture_pdf;
+};
+
+template <typename F>
+[[gnu::noinline]] RectPoint<F> sample_pictured_rect(const LightView& view,
+                                                    const LightReader<F>& light,
+                                                    const SphericalRect<F>& r, const F& u,
+                                                    const F& v, const Mask<F>& active) {
+  F share(0.f);
+  const Mask<F> pictured = has_picture<F>(light, active);
+  for_each_picture<F>(view, light, pictured, [&](const Distribution2D& d, const Mask<F>& lanes) {
+    share = select(lanes, picture_share<F>(r, light.area(), d.spread), share);
+  });
+  const Mask<F> by_picture = pictured & (u < share);
+  const F rest = clamp(F((u - share) / F(1.f - share)), F(0.f), F(kOneMinusEpsilon));
+  RectPoint<F> point{sample_rect_evenly<F>(r, select(by_picture, u, rest), v, active), share,
+                     F(0.f)};
+  const F within = select(by_picture, F(u / select(by_picture, share, F(1.f))), F(0.f));
+  for_each_picture<F>(view, light, pictured, [&](const Distribution2D& d, const Mask<F>& lanes) {
+    const Mask<F> here = lanes & by_picture, elsewhere = lanes & not_(by_picture);
+    if (any(here)) {
+      const ImagePoint<F> p = sample_image<F>(d, within, v, here);
+      point.at = {select(here, p.x, point.at.x), select(here, F(1.f - p.y), point.at.y)};
+      point.picture_pdf = select(here, p.pdf, point.picture_pdf);
+    }
+    if (any(elsewhere)) {
+      const F pdf = image_pdf_at<F>(d, point.at.x, F(1.f - point.at.y), elsewhere);
+      point.picture_pdf = select(elsewhere, pdf, point.picture_pdf);
+    }
+  });
+  return point;
+}
+
+/// Returns the solid angle density of the mixture. `even` is the density without the image.
+template <typename F>
+inline F pictured_rect_pdf(const F& share, const F& picture_pdf, const F& even, const F& distance2,
+                           const F& cos_light, const F& area) {
+  const F by_picture = picture_pdf * area_to_solid_angle<F>(distance2, cos_light, area);
+  return fma(share, by_picture, F(F(1.f - share) * even));
+}
+
+/// Samples a point q = p + a u + b v. The rectangle emits only towards n.
+template <typename F>
+inline KindSample<F> sample_rect(const LightView& view, const LightReader<F>& light,
+                                 const Vec3<F>& from, const F& u, const F& v,
+                                 const Mask<F>& active) {
+  const SphericalRect<F> r = make_spherical_rect<F>(light, from);
+  RectPoint<F> point{Vec2<F>{u, v}, F(0.f), F(0.f)};
+  const bool pictured = any(has_picture<F>(light, active));
+  if (pictured) [[unlikely]]
+    point = sample_pictured_rect<F>(view, light, r, u, v, active);
+  else
+    point.at = sample_rect_evenly<F>(r, u, v, active);
+  const Vec3<F> q = fma(light.u(), point.at.x, fma(light.v(), point.at.y, light.p()));
+  const Direction<F> d = make_direction<F>(q - from);
+  const F cos_light = -dot(d.wi, light.n());
+  F pdf = rect_pdf<F>(r, d.length2, cos_light, light.area());
+  if (pictured) [[unlikely]]
+    pdf = pictured_rect_pdf<F>(point.share, point.picture_pdf, pdf, d.length2, cos_light,
+                               light.area());
+  return {d.wi, d.length,
+          rect_radiance<F>(light, view.materials.textures, point.at.x, point.at.y,
+                           active & (pdf > 0.f)),
+          pdf, Mask<F>(false)};
+}
+
+/// Returns the position of a point of the rectangle's plane in fractions of its edges: with h = q -
+/// p = a u + b v and m = u x v, a = (h x v) . m / m^2 and b = (u x h) . m / m^2.
+template <typename F>
+inline Vec2<F> place_on_rect(const LightReader<F>& light, const Vec3<F>& q) {
+  const Vec3<F> h = q - light.p();
+  const Vec3<F> edge_u = light.u(), edge_v = light.v();
+  const Vec3<F> m = cross(edge_u, edge_v);
+  const F m2 = dot(m, m);
+  const F inverse = 1.f / select(m2 > 0.f, m2, F(1.f));
+  const F a = dot(cross(h, edge_v), m) * inverse;
+  const F b = dot(cross(edge_u, h), m) * inverse;
+  return {clamp(a, F(0.f), F(1.f)), clamp(b, F(0.f), F(1.f))};
+}
+
+/// Returns radiance and density for a ray that hits the rectangle at distance t.
+template <typename F>
+inline KindHit<F> hit_rect(const LightView& view, const LightReader<F>& light,
+                           const Vec3<F>& origin, const Vec3<F>& dir, const F& t,
+                           const Mask<F>& active) {
+  const F cos_light = -dot(dir, light.n());
+  const Mask<F> front = active & (cos_light > 0.f);
+  const Vec2<F> at = place_on_rect<F>(light, fma(dir, t, origin));
+  const Color<F> radiance = rect_radiance<F>(light, view.materials.textures, at.x, at.y, front);
+  const SphericalRect<F> r = make_spherical_rect<F>(light, origin);
+  F pdf = rect_pdf<F>(r, F(t * t), cos_light, light.area());
+  const Mask<F> pictured = has_picture<F>(light, front);
+  for_each_picture<F>(view, light, pictured, [&](const Distribution2D& d, const Mask<F>& lanes) {
+    const F mixed = pictured_rect_pdf<F>(picture_share<F>(r, light.area(), d.spread),
+                                         image_pdf_at<F>(d, at.x, F(1.f - at.y), lanes), pdf,
+                                         F(t * t), cos_light, light.area());
+    pdf = select(lanes, mixed, pdf);
+  });
+  return {select<F>(front, radiance, Color<F>(F(0.f))), pdf};
+}
+
+/// Samples a path from a point on the rectangle, by the distribution of its image or uniformly.
+template <typename F>
+inline KindEmission<F> emit_rect(const EmissionQuery<F>& q) {
+  const LightReader<F>& light = q.light;
+  Vec2<F> at{q.u, q.v};
+  F square_pdf(1.f);
+  const Mask<F> pictured = has_picture<F>(light, q.lanes);
+  for_each_picture<F>(q.view, light, pictured, [&](const Distribution2D& d, const Mask<F>& lanes) {
+    const ImagePoint<F> point = sample_image<F>(d, q.u, q.v, lanes);
+    at = {select(lanes, point.x, at.x), select(lanes, F(1.f - point.y), at.y)};
+    square_pdf = select(lanes, point.pdf, square_pdf);
+  });
+  const Vec3<F> p = fma(light.u(), at.x, fma(light.v(), at.y, light.p()));
+  return emit_by_cosine<F>(p, light.n(), q.s, q.t,
+                           rect_radiance<F>(light, q.view.materials.textures, at.x, at.y, q.lanes),
+                           F(square_pdf * even_emission_density<F>(light.area())));
+}
+
+/// Returns KindEmission::density of emit_rect() for a ray that hits the rectangle.
+template <typename F>
+inline F rect_emission_density(const LightMeeting<F>& m) {
+  const LightReader<F>& light = m.light;
+  F density = even_emission_density<F>(light.area());
+  const Mask<F> pictured = has_picture<F>(light, m.lanes);
+  if (none(pictured)) return density;
+  const Vec2<F> at = place_on_rect<F>(light, fma(m.dir, m.t, m.origin));
+  for_each_picture<F>(m.view, light, pictured, [&](const Distribution2D& d, const Mask<F>& lanes) {
+    density *= select(lanes, image_pdf_at<F>(d, at.x, F(1.f - at.y), lanes), F(1.f));
+  });
+  return density;
+}
+
+}  // namespace wavecomb::detail
+
+namespace wavecomb {
+
+/// Kind of rect lights in WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h).
+struct RectKind : FlatKind {
+  static LightKindInfo describe();
+  template <typename F>
+  static detail::KindSample<F> sample(const detail::LightQuery<F>& q) {
+    return detail::sample_rect<F>(q.view, q.light, q.from, q.u, q.v, q.lanes);
+  }
+  template <typename F>
+  static detail::KindHit<F> hit(const detail::LightMeeting<F>& m) {
+    return detail::hit_rect<F>(m.view, m.light, m.origin, m.dir, m.t, m.lanes);
+  }
+  template <typename F>
+  static detail::KindEmission<F> emit(const detail::EmissionQuery<F>& q) {
+    return detail::emit_rect<F>(q);
+  }
+  template <typename F>
+  static F emission_density(const detail::LightMeeting<F>& m) {
+    return detail::rect_emission_density<F>(m);
+  }
+};
+
+}  // namespace wavecomb

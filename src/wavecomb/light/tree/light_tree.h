@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Builds the light tree, which selects a light for a given shading point.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "wavecomb/core/settings.h"
+#include "wavecomb/light/description/light_records.h"
+
+namespace wavecomb {
+
+struct LightSet;
+
+/// Light tree over the finite lights that emit, and the selection probabilities of infinite lights.
+struct LightTree {
+  std::vector<LightTreeNode> nodes;  ///< depth first; one fewer than lights in the tree
+  std::vector<uint32_t> trails;      ///< LightTreeView::trails for all lights
+  std::vector<uint32_t> infinite_ends;
+  std::vector<float> infinite_pdf;
+  uint32_t root = kNoLight;  ///< node 0, or the only light; kNoLight if no light of the tree emits
+  float effective_lights = 0;  ///< LightTreeView::effective_lights
+  uint32_t numbers = 0;        ///< how many of the 2^24 random numbers select a light of the tree
+
+  /// Returns the device view. Contract: it points into this tree.
+  LightTreeView view() const;
+};
+
+/// Computes everything of the tree of `set` that does not need its nodes: the selection
+/// probabilities of infinite lights, and `effective_lights`. The result has no nodes and no trails.
+LightTree outline_light_tree(const LightSet& set, std::span<const double> powers);
+
+/// Returns whether LightSelection::kAuto uses a tree for this number of effective lights.
+bool pays_as_tree(float effective_lights);
+
+/// Builds the tree over the finite lights of `set` with `powers` (of all lights, W) above 0: binned
+/// splits that minimize the cost by bounds, orientation and power ("SAOH"), down to single lights,
+/// after A. Conty Estevez and C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree
+/// Splitting", 2018, section 4. Runs in parallel; the result does not depend on the number of
+/// threads. Infinite lights are selected by power as in build_pick_table, with one random number in
+/// a hundred distributed evenly among all lights.
+LightTree build_light_tree(const LightSet& set, std::span<const double> powers);
+
+/// Returns whether lights are selected by tree. A scene without finite lights has no tree. kAuto
+/// uses the tree for many finite lights of similar power; selection by power suffices if a few
+/// strong lights dominate.
+bool chooses_by_tree(LightSelection selection, const LightView& lights);
+
+}  // namespace wavecomb

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Ratio R that camera paths carry when light paths share their MIS weights (docs/light-paths.md).
+///
+/// Three techniques sample a path x_0 (lens) x_1 .. x_n x_L (light): the bounces of a camera path,
+/// the light sample at x_n, and a light path that is connected to the camera at x_1. Let w_i be the
+/// direction from x_i towards the camera and l_i towards the light, g the geometric normal, p->_i
+/// the density of the bounce w_i -> l_i and p<-_i the density of l_i -> w_i, all over solid angle.
+/// The density of the third technique divided by that of the first is
+///   R = N / G  prod_{i=1..n} |g l_i| / (|g w_i| p->_i)  prod_{i=2..n} p<-_i   times  D,
+/// where G is the density of camera paths (camera_connection.h), N the number of light paths in the
+/// image for each sample of a pixel, and D the density of the light (light/emission/emission.h).
+/// Each vertex multiplies its factors into R. At a delta lobe the ratio of densities is the ratio
+/// of the solid angles,
+///   p<- / p-> = |w z| / (|l z| eta^2),   z the shading normal, eta that of w -> l.
+/// R is 0 if light paths cannot make the connection: x_1 is specular, its shading normal is
+/// adjusted to the viewer, or it lies on a fibre.
+///
+/// With connections between vertices, R is the sum over the third technique and all connections of
+/// x_i to x_i+1. Such a connection has
+///   E_i = d^2 / p->_i   (d is the distance)
+/// in place of p<-_i+1 and of all earlier factors of R:
+///   R_n = |g l_n| / (|g w_n| p->_n) (R_n-1 p<-_n + E_n-1).
+/// E is 0 if one of the two vertices scatters as a delta, if light paths cannot reach x_i+1, or if
+/// the viewer is inside an absorbing material.
+///
+/// With merging, camera paths whose bounces were all deltas have a different third technique: a
+/// light path that ends within r of x_k, the first vertex with a non-delta lobe. Its R starts with
+/// pi r^2 in place of 1 / (G |g w_k|). A delta bounce at x_k sets R to 0.
+#pragma once
+
+#include "wavecomb/light_paths/connection.h"
+#include "wavecomb/path/steps/interact.h"
+#include "wavecomb/path/steps/note_events.h"
+#include "wavecomb/path/steps/vertex_context.h"
+
+namespace wavecomb {
+
+inline constexpr float kMostRatio = 1e30f;
+
+/// Returns the lanes whose delta transmission is not symmetric, as in layered materials.
+template <typename Bsdf, typename F>
+inline Mask<F> passes_one_way(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>& wi) {
+  if constexpr (requires { bsdf.is_layered(); })
+    return (F(wo.z * wi.z) < 0.f) & bsdf.is_layered();
+  else
+    return Mask<F>(false);
+}
+
+/// R at a vertex of a camera path. `ratio` is R up to the previous bounce, or 0 if light paths
+/// cannot reach the vertex.
+template <typename F>
+struct JointVertex {
+  F ratio;
+  F inverse_cos;   ///< 1 / |g w|
+  F linked;        ///< E of the connection between the previous vertex and this one
+  Mask<F> merges;  ///< lanes where light paths may be merged (merge_point.h)
+  F radius2;       ///< squared merge radius
+
+  /// Returns R including this vertex for a direction `world` to the light (`local` in the frame),
+  /// as if light samples or bounces had density 1 there: R p<- |g l| / |g w|. Lanes outside
+  /// `wanted` are undefined.
+  template <typename Bsdf, uint32_t kFeatures, typename Interaction>
+  WAVECOMB_INLINE F towards(const Vertex<F, kFeatures>& v, const Interaction& at, const Vec3<F>& wo,
+                            const Vec3<F>& world, const Vec3<F>& local,
+                            const Mask<F>& wanted) const {
+    const F turn = abs(dot(at.s.ng, world)) * inverse_cos;
+    F r = ratio * turn;
+    if (v.depth > 0) {
+      const Mask<F> bounces = wanted & not_(merges) & (r > 0.f);
+      if (any(bounces)) {
+        const F back = at.bsdf.eval(at.bsdf.view(local), wo).pdf;
+        r *= select(bounces, back, F(1.f));
+      }
+    }
+    return v.settings.connects ? fma(linked, turn, r) : r;
+  }
+};
+
+/// Computes the state of R at the vertex, before its bounce.
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
+WAVECOMB_INLINE JointVertex<F> joint_vertex(const Vertex<F, kFeatures>& v, const Interaction& at,
+                                            const Frame<F>& frame) {
+  if constexpr (Bsdf::kOnFibre) return {F(0.f), F(0.f), F(0.f), Mask<F>(false), F(0.f)};
+  const Vec3<F>& dir = v.path.dir;
+  const F seen = dot(at.s.ng, dir);
+  const Frame<F> unbent = at.unbent_frame(v);
+  Mask<F> reached = not_(at.bends(v, unbent, dir)) & (seen != 0.f);
+  reached = reached & Mask<F>(frame.n.x == unbent.n.x) & Mask<F>(frame.n.y == unbent.n.y) &
+            Mask<F>(frame.n.z == unbent.n.z);
+  F linked(0.f);
+  if (v.settings.connects && v.depth > 0) {
+    Mask<F> links = reached & (v.path.pdf > 0.f);
+    if (Bsdf::kAbsorbs) links = links & (seen < 0.f);
+    linked = select(links, F(F(v.t * v.t) / select(links, v.path.pdf, F(1.f))), F(0.f));
+  }
+  // For a viewer inside an absorbing material, light paths do not know the length of the absorbing
+  // segment.
+  if (Bsdf::kAbsorbs && v.depth == 0) reached = reached & (seen < 0.f);
+  JointVertex<F> joint{select(reached, v.path.ratio, F(0.f)),
+                       F(1.f / select(seen != 0.f, abs(seen), F(1.f))), min(linked, F(kMostRatio)),
+                       Mask<F>(false), F(0.f)};
+  if (v.settings.merge_scale > 0.f) [[unlikely]] {
+    const F radius = v.path.cone_width * v.settings.merge_scale;
+    joint.radius2 = radius * radius;
+    joint.merges = reached & v.path.awaits_merge & (joint.radius2 > 0.f);
+    if constexpr (Bsdf::kHasNonDelta)
+      joint.merges = joint.merges & at.bsdf.has_non_delta();
+    else
+      joint.merges = Mask<F>(false);
+    joint.ratio =
+        select(joint.merges, F(joint.radius2 * F(abs(seen) * (kPi * v.settings.light_paths))),
+               joint.ratio);
+  }
+  return joint;
+}
+
+/// Stores the vertex as a point where light paths may be merged.
+template <typename F, uint32_t kFeatures, typename Interaction>
+WAVECOMB_INLINE void leave_point(const Vertex<F, kFeatures>& v, const Interaction& at,
+                                 const JointVertex<F>& joint) {
+  v.visible->seen = v.active & joint.merges;
+  v.visible->row = {at.s.p,
+                    sqrt(joint.radius2),
+                    -v.path.dir,
+                    pack_normal<F>(at.s.ng),
+                    clean<F>(at.throughput, 0.f),
+                    UInt<F>(v.depth)};
+}
+
+/// Computes the connection that the vertex offers to a vertex of a light path. With w the direction
+/// to that vertex, the offer has the factors on the camera's side of the contribution
+///   T f(w, l) |cos| |g w| / |g l| T_light f_light  v / d^2
+/// and of its weight v (light_vertex.h). Uses no random numbers.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE void offer_connection(const VertexContext<Bsdf, F, kFeatures>& context) {
+  const Vertex<F, kFeatures>& v = context.vertex;
+  const auto& at = context.at;
+  ConnectionOffer<F>& offer = *v.offer;
+  const Mask<F> wanted = offer.wanted & v.active & at.bsdf.has_non_delta();
+  if (!Bsdf::kHasNonDelta || none(wanted)) return;
+  const Connection<F> c = connect_to_point<F>(at, offer.to);
+  const Vec3<F>& w = c.d;
+  const Vec3<F> wi = context.frame.to_local(w);
+  const BsdfEval<F> e = at.bsdf.eval(context.view, wi);
+  const Mask<F> shown = wanted & c.valid & at.is_consistent(w, wi);
+  const Color<F> light = at.throughput * e.f_cos * offer.vertices;
+  offer.row = {c.o, e.pdf, select<F>(shown, clean<F>(light, 0.f), Color<F>(F(0.f))),
+               context.joint.template towards<Bsdf>(v, at, context.wo, w, wi, shown)};
+  if (v.wants_events()) [[unlikely]]
+    offer.note = note_event<std::remove_cvref_t<decltype(at.bsdf)>, F>(at.bsdf, context.wo, wi);
+}
+
+/// Sets R after the bounce `b` along `world`, and whether the path awaits a merge.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE void next_ratio(const VertexContext<Bsdf, F, kFeatures>& c, const Vec3<F>& world,
+                                const BsdfSample<F>& b, PathState<F>& next) {
+  const Vertex<F, kFeatures>& v = c.vertex;
+  const auto& at = c.at;
+  const Vec3<F>& wo = c.wo;
+  const JointVertex<F>& joint = c.joint;
+  const Mask<F> by_pdf = not_(b.is_delta) & (b.pdf > 0.f);
+  const F by_density = joint.template towards<Bsdf>(v, at, wo, world, b.wi, by_pdf) /
+                       select(b.pdf > 0.f, b.pdf, F(1.f));
+  F r = by_density;
+  if (any(b.is_delta)) {
+    const F z = abs(b.wi.z) * F(b.eta * b.eta);
+    F by_angle = joint.ratio * F(abs(dot(at.s.ng, world)) * joint.inverse_cos) *
+                 F(abs(wo.z) / select(z > 0.f, z, F(1.f)));
+    by_angle = select(passes_one_way<Bsdf, F>(at.bsdf, wo, b.wi), F(0.f), by_angle);
+    r = select(b.is_delta, v.depth == 0 ? F(0.f) : by_angle, r);
+  }
+  r = min(max(r, F(0.f)), F(kMostRatio));
+  if (v.settings.merge_scale > 0.f) [[unlikely]] {
+    const Mask<F> waits = v.depth == 0 ? b.is_delta : Mask<F>(b.is_delta & v.path.awaits_merge);
+    next.awaits_merge = waits & not_(joint.merges);
+    r = select(next.awaits_merge | (b.is_delta & joint.merges), F(0.f), r);
+  }
+  next.ratio = r;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Start of light paths. Light paths are numbered like the pixels of the image, and a pass traces
+/// the same number of samples of each. Random numbers depend only on the path's number and the
+/// sample, not on the schedule.
+#pragma once
+
+#include "wavecomb/core/sampler.h"
+#include "wavecomb/film/light_splat_filter.h"
+#include "wavecomb/geometry/hit/motion.h"
+#include "wavecomb/light/emission/emission.h"
+#include "wavecomb/light_paths/merge_grid.h"
+#include "wavecomb/path/camera/camera_ray.h"
+#include "wavecomb/path/path_state.h"
+
+namespace wavecomb {
+
+/// Start of a light path. `eta_scale` is one over its largest flux, so that roulette, which
+/// multiplies the two, sees the remaining fraction of the flux.
+template <typename F>
+struct LightPath {
+  SampleKey<F> key;
+  Emission<F> emission;
+  Color<F> flux;
+  F weight;  ///< 1 / D
+  F eta_scale;
+
+  /// Returns the state of the path on its first ray.
+  PathState<F> start() const {
+    return {.dir = emission.d,
+            .throughput = flux,
+            .eta_scale = eta_scale,
+            .o = emission.o,
+            .mis_sum = weight,
+            .light = emission.light};
+  }
+};
+
+/// Returns the number of the light path of a pixel (x | y << 16) of the whole image.
+template <typename U>
+inline U light_path_number(const Settings& settings, const U& pixel) {
+  return (pixel >> 16) * settings.width + (pixel & 0xffffu);
+}
+
+/// Returns the sampler key of a light path. All light paths of a sample are points of one sequence,
+/// so that together they are well distributed over lights and directions. The low bits of the
+/// path's number are the index in the sequence.
+template <typename F>
+inline SampleKey<F> light_path_key(const Settings& settings, const UInt<F>& pixel,
+                                   const UInt<F>& sample) {
+  using U = UInt<F>;
+  const U number = light_path_number<U>(settings, pixel);
+  const U block = number >> detail::kIndexBits;
+  const U sequence = hash_u32<U>(hash_u32<U>(sample, block), U(settings.seed ^ 0x2c1b3c6du));
+  return {sequence, number & ((1u << detail::kIndexBits) - 1u)};
+}
+
+template <typename F>
+inline LightPath<F> begin_light_path(const LightView& lights, const Settings& settings,
+                                     const UInt<F>& pixel, const UInt<F>& sample,
+                                     const Mask<F>& active) {
+  LightPath<F> path;
+  path.key = light_path_key<F>(settings, pixel, sample);
+  const Sample4<F> way = sample_4d<F>(settings.sampler, path.key, kCameraSet);
+  const Sample4<F> choice =
+      sample_4d<F>(settings.sampler, path.key, vertex_set(VertexSet::kEmission, 0));
+  path.emission =
+      sample_emission<F>(lights, {choice.x, way.z, way.w, way.x, way.y, choice.y}, active);
+  const F largest = max_component(path.emission.flux);
+  const F scale = 1.f / select(path.emission.valid, largest, F(1.f));
+  path.flux = path.emission.flux;
+  path.eta_scale = scale;
+  path.weight = 1.f / select(path.emission.valid, path.emission.density, F(1.f));
+  return path;
+}
+
+/// Parameters of the render that vertices of light paths need.
+struct LightPathSetup {
+  const CameraSetup& camera;
+  const SplatFilter& filter;
+  float share;           ///< 1 / N, where N is the number of light paths in the image per sample
+  float camera_squares;  ///< WaveContext::camera_squares
+  const Merger* merger;  ///< null without merging
+};
+
+/// Returns the setup of a WaveContext.
+template <typename Context>
+inline LightPathSetup light_path_setup(const Context& context, const Merger* merger = nullptr) {
+  return {*context.camera, *context.splat_filter, context.light_path_share(),
+          context.camera_squares, context.lessons ? nullptr : merger};
+}
+
+/// Returns the settings for shading camera paths in a render that may have light paths.
+template <typename Context>
+inline ShadeSettings camera_shade_settings(const Context& context) {
+  ShadeSettings s(*context.settings);
+  s.joins_light = context.joins_light() && !context.has_media();
+  if (context.merges()) {
+    s.merge_scale = context.settings->merge_radius / kConeShare;
+    s.light_paths = 1.f / context.light_path_share();
+  }
+  return s;
+}
+
+/// Returns the shutter time of the light path of a pixel and sample. With connections it is the
+/// time of the camera path.
+template <typename F>
+inline F light_path_time(const Settings& settings, const SampleKey<F>& key, const UInt<F>& pixel,
+                         const UInt<F>& sample) {
+  return path_time<F>(settings.sampler,
+                      settings.connects() ? make_sample_key<F>(pixel, sample, settings.seed) : key);
+}
+
+/// Returns the state of a light path at the end of its ray of length `t`. The ray cone is that of a
+/// camera ray to the hit, so that textures are filtered as the camera sees them.
+template <typename F>
+inline PathState<F> light_path_state(const CameraSetup& camera, const LightPathRow<F>& row,
+                                     const F& t, const F& time, const Mask<F>& active) {
+  F width(kConeShare * camera.step_y);
+  if (camera.projection != Projection::kOrthographic)
+    width *= length(Vec3<F>(fma(row.d, t, row.o) - camera_place<F>(camera, time, active).t));
+  return {.dir = row.d,
+          .throughput = row.throughput,
+          .eta_scale = row.eta_scale,
+          .cone_width = width,
+          .o = row.o,
+          .mis_sum = row.mis_sum,
+          .bounce_pdf = row.bounce_pdf,
+          .light = row.light};
+}
+
+/// Result of shading a vertex of a light path. `v.direct` is the contribution to the pixels.
+template <typename F>
+struct LightVertexResult {
+  VertexResult<F> v;
+  F x, y;           ///< film position in pixels, if there is a shadow ray
+  Vec3<F> p;        ///< position of the vertex
+  Mask<F> offered;  ///< whether vertices of camera paths may connect to it
+};
+
+/// Vertices of camera paths to connect vertices of light paths to, instead of the camera.
+template <typename F>
+struct ConnectionTarget {
+  ConnectionRow<F> row;
+  Mask<F> is_first;  ///< whether the light path's vertex is the first of its path
+};
+
+}  // namespace wavecomb

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+/// AOV values of light paths, and the state that they need: the light that emitted the path (in its
+/// PathRow), the number of scatterings and, for light path expressions, a state of
+/// BackwardAutomaton for each colour.
+///
+/// Lobes are classified as on camera paths (path_expressions.h). A bounce continues as diffuse with
+/// a probability equal to the diffuse fraction; all colours use the same random number of the
+/// vertex. A contribution to the camera is split by the fraction itself. A connection is split at
+/// both vertices.
+///
+///   begin     a path starts at a light
+///   shade     a vertex was shaded
+///   keep      camera paths connect to this vertex
+///   show      the camera sees the vertex: the contribution is added to the film
+///   offer     a vertex of a camera path offers a connection
+///   link      the vertex of the light path was shaded for the connection
+///   connect   the ray between the two is free
+#pragma once
+
+#include <bit>
+
+#include "wavecomb/aov/aov_tables.h"
+#include "wavecomb/aov/path_expressions.h"
+#include "wavecomb/aov/rows.h"
+#include "wavecomb/core/path_expressions/backward_automaton.h"
+#include "wavecomb/core/rows/fields.h"
+#include "wavecomb/film/film.h"
+#include "wavecomb/film/light_splat_filter.h"
+#include "wavecomb/film/light_splat_layout.h"
+#include "wavecomb/path/path_state.h"
+
+namespace wavecomb {
+
+/// State of a light path for light path expressions.
+template <typename F>
+struct LightWayRow {
+  UInt<F> states;  ///< of the three colours, in the layout of ExpressionRow
+  // Vertex that was shaded last: the states before it, and its scattering towards the camera.
+  UInt<F> shown_states, shown_event;
+  Color<F> shown_diffuse;
+  WAVECOMB_FIELDS(states, shown_states, shown_event, shown_diffuse)
+};
+
+/// Connection of a stored vertex of a light path with a vertex of a camera path. Both have the
+/// states before the vertex and the classification of its scattering along the connection; fields
+/// of the camera path start with `seen`.
+template <typename F>
+struct LinkRow {
+  UInt<F> states, event;
+  Color<F> diffuse;
+  UInt<F> seen_states, seen_event;
+  Color<F> seen_diffuse;
+  WAVECOMB_FIELDS(states, event, diffuse, seen_states, seen_event, seen_diffuse)
+};
+
+/// Contribution of a vertex of a light path to the film.
+struct LightSplat {
+  uint32_t slot;   ///< of the path
+  uint32_t depth;  ///< of the vertex
+  uint32_t light;  ///< that the path left
+  float x, y;      ///< position on the film, pixels
+  Color<float> c;
+};
+
+/// AOV values of the light paths of a wave.
+///
+/// Contract: owned by one wave, or one reference integrator. Slots must be below the capacity.
+class LightPathAovs {
+ public:
+  LightPathAovs() = default;
+  /// `tables` may be null if nothing in `layout` needs them.
+  LightPathAovs(size_t capacity, const AovLayout& layout, const AovTables* tables, bool connects)
+      : places_(layout), tables_(tables) {
+    if (layout.expressions == 0) return;
+    backward_ = &tables->backward;
+    ways_ = SlotRows(capacity, kRowWords<LightWayRow>);
+    if (connects) links_ = SlotRows(capacity, kRowWords<LinkRow>);
+  }
+
+  /// Returns whether any AOV layer needs contributions of light paths.
+  explicit operator bool() const { return places_.count > 0; }
+  /// Returns whether vertices must classify their scatterings.
+  bool wants_events() const { return backward_ != nullptr; }
+  size_t bytes() const { return ways_.bytes() + links_.bytes(); }
+
+  /// Starts paths at lights `light`.
+  template <typename F>
+  [[gnu::noinline, gnu::cold]] void begin(const UInt<F>& slot, const UInt<F>& light,
+                                          const Mask<F>& active) const {
+    using U = UInt<F>;
+    const Mask<U> on(active);
+    const U end = gather<U>(tables_->end_of_light.data(), light, on);
+    const U state = gather<U>(backward_->begin.data(), end, on);
+    U states(0u);
+    for (uint32_t c = 0; c < 3; ++c) states = states | (state << (ColourStates::kBits * c));
+    store_row<LightWayRow, F>(ways_.rows, slot, {states, states, U(0u), Color<F>(F(0.f))}, active);
+  }
+
+  /// Records a shaded vertex, whose scatterings `v` classifies.
+  template <typename F>
+  [[gnu::noinline, gnu::cold]] void shade(uint32_t depth, const UInt<F>& slot,
+                                          const SampleKey<F>& key, const VertexAovs<F>& v,
+                                          const Mask<F>& active) const {
+    using U = UInt<F>;
+    const U before = load_row<LightWayRow, F>(ways_.rows, slot, active).states;
+    const U path = hash_u32<U>(key.pixel_hash, key.sample);
+    const F u = unit_float<F>(hash_u32<U>(path, U(0x51ed270bu + depth)));
+    const U states = ColourStates::after<F>(backward_->next.data(), before, v.bounce, u, active);
+    store_row<LightWayRow, F>(ways_.rows, slot, {states, before, v.lit.event, v.lit.diffuse},
+                              active);
+  }
+
+  /// Marks the vertex that was shaded last as the one to connect to.
+  template <typename F>
+  [[gnu::noinline, gnu::cold]] void keep(const UInt<F>& slot, const Mask<F>& active) const {
+    const UInt<F> states = load_row<LightWayRow, F>(ways_.rows, slot, active).shown_states;
+    scatter_field<F>(links_.rows, &LinkRow<float>::states, slot, states, active);
+  }
+
+  /// Records the vertices of camera paths that offer a connection. `states` are their states before
+  /// the vertex.
+  template <typename F>
+  [[gnu::noinline, gnu::cold]] void offer(const UInt<F>& slot, const UInt<F>& states,
+                                          const ScatteringNote<F>& note,
+                                          const Mask<F>& active) const {
+    LinkRow<F> row = load_row<LinkRow, F>(links_.rows, slot, active);
+    row.seen_states = states;
+    row.seen_event = note.event;
+    row.seen_diffuse = note.diffuse;
+    store_row<LinkRow, F>(links_.rows, slot, row, active);
+  }
+
+  /// Records the scattering at the stored vertices of light paths, shaded for the connection.
+  template <typename F>
+  [[gnu::noinline, gnu::cold]] void link(const UInt<F>& slot, const ScatteringNote<F>& note,
+                                         const Mask<F>& active) const {
+    LinkRow<F> row = load_row<LinkRow, F>(links_.rows, slot, active);
+    row.event = note.event;
+    row.diffuse = note.diffuse;
+    store_row<LinkRow, F>(links_.rows, slot, row, active);
+  }
+
+  /// Adds the contribution `c` of connections to the expressions of camera paths.
+  template <typename F>
+  [[gnu::noinline, gnu::cold]] void connect(const PathExpressions& to, const UInt<F>& slot,
+                                            const Color<F>& c, const Mask<F>& active) const {
+    using U = UInt<F>;
+    if (none(active)) return;
+    const LinkRow<F> row = load_row<LinkRow, F>(links_.rows, slot, active);
+    const auto split = [](const Color<F>& all, const Color<F>& share, const auto& add) {
+      const Color<F> diffuse = all * share;
+      add(kDiffuseEvent, diffuse);
+      add(kGlossyEvent, all - diffuse);
+    };
+    split(c, row.diffuse, [&](uint32_t lobe, const Color<F>& shown) {
+      split(shown, row.seen_diffuse, [&](uint32_t seen_lobe, const Color<F>& part) {
+        for_each_colour<F>(part, [&](uint32_t k, const F& value) {
+          const U from =
+              ColourStates::next<F>(backward_->next.data(), ColourStates::of<F>(row.states, k),
+                                    row.event, U(lobe), active);
+          const U seen = to.next<F>(ColourStates::of<F>(row.seen_states, k), row.seen_event,
+                                    U(seen_lobe), active);
+          const U matched = gather<U>(backward_->matched.data(),
+                                      from * backward_->forward_states + seen, Mask<U>(active));
+          to.add_matched<F>(slot, k, matched, value, active);
+        });
+      });
+    });
+  }
+
+  /// Adds a light splat to the layers of the film. The sums are integers, so that the order does
+  /// not matter.
+  void show(Film& film, const SplatFilter& filter, const LightSplat& splat) const;
+
+ private:
+  SplatPlaces places_;
+  const AovTables* tables_ = nullptr;
+  const BackwardAutomaton* backward_ = nullptr;  ///< null without expressions
+  SlotRows ways_, links_;
+};
+
+}  // namespace wavecomb

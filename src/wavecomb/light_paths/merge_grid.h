@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Spatial index of the points that the camera sees in mirrors and through glass (merge_point.h),
+/// for merging with light paths.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "wavecomb/film/film.h"
+#include "wavecomb/light_paths/merge_point.h"
+
+namespace wavecomb {
+
+static_assert(kVisibleWords == Film::kVisibleWords);
+
+/// Hash grid of visible points. Each point is stored in the cells that the sphere of its radius
+/// overlaps. The cell size depends on the radius.
+///
+/// Contract: build() must not run during searches.
+class VisibleGrid {
+ public:
+  /// Builds the grid. `points` holds one row for each pixel and must outlive the grid.
+  void build(std::span<const float> points);
+  const float* points() const { return points_; }
+
+  /// Iterates over the points within whose radius a position lies.
+  class Search {
+   public:
+    Search() = default;
+    Search(const VisibleGrid& grid, float x, float y, float z) : grid_(&grid), at_{x, y, z} {}
+    /// Advances to the next point and returns its pixel in `pixel`. Returns false at the end.
+    bool next(uint32_t& pixel);
+
+   private:
+    const VisibleGrid* grid_ = nullptr;
+    float at_[3] = {};
+    size_t level_ = 0;
+    uint32_t begin_ = 0, end_ = 0;
+  };
+
+ private:
+  friend class Search;
+  uint32_t bucket(int exponent, const int32_t (&cell)[3]) const;
+
+  const float* points_ = nullptr;
+  std::vector<int> levels_;  ///< exponents of the radii that occur
+  std::vector<uint32_t> starts_, entries_;
+};
+
+/// Targets of merging light paths with visible points.
+struct Merger {
+  const VisibleGrid* grid;  ///< null if there are no points
+  SplatList* splats;
+  Film* film;
+};
+
+}  // namespace wavecomb

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Points that the camera sees in mirrors and through glass, for merging with light paths
+/// (docs/light-paths.md, "Merging").
+///
+/// A camera path whose bounces so far were all deltas (at least one) stores a point at its first
+/// vertex with a non-delta lobe. A light path cannot connect to the camera through a mirror.
+/// Instead, a light path with a vertex within r of the point is treated as if it ended there, where
+/// r is given in pixels as seen at the point. These are the visible points of progressive photon
+/// mapping (T. Hachisuka et al., "Progressive Photon Mapping", 2008). Their light is splatted to
+/// the pixels of the points in integer sums, whose order does not matter.
+///
+/// A pass has one sample for each pixel, which stores at most one point. The light paths of the
+/// pass are traced after all camera paths.
+#pragma once
+
+#include <cstring>
+
+#include "wavecomb/core/rows/fields.h"
+#include "wavecomb/core/rows/soa.h"
+#include "wavecomb/core/vec3.h"
+
+namespace wavecomb {
+
+/// Visible point, as a row.
+template <typename F>
+struct VisiblePoint {
+  Vec3<F> p;
+  F radius;        ///< 0 if there is no point
+  Vec3<F> w;       ///< unit vector towards the viewer
+  UInt<F> normal;  ///< pack_normal() of the geometric normal
+  Color<F> light;  ///< pixel value for unit radiance along w, before exposure
+  UInt<F> depth;   ///< number of vertices of the camera path before the point
+  WAVECOMB_FIELDS(p, radius, w, normal, light, depth)
+};
+inline constexpr size_t kVisibleWords = kRowWords<VisiblePoint>;
+
+/// Visible point that a vertex of a camera path may store.
+template <typename F>
+struct VisibleOffer {
+  VisiblePoint<F> row;
+  Mask<F> seen{false};  ///< lanes that store a point
+};
+
+/// Visible points of the paths of a wave.
+///
+/// Contract: owned by one wave, or one reference integrator. Each slot has one row.
+class VisibleRows {
+ public:
+  VisibleRows() = default;
+  /// Allocates rows for `capacity` slots; 0 disables merging.
+  explicit VisibleRows(size_t capacity)
+      : block_(capacity > 0 ? SoaBlock(1, capacity * kVisibleWords) : SoaBlock()) {
+    if (capacity > 0) rows = block_.floats(0);
+  }
+
+  explicit operator bool() const { return rows != nullptr; }
+  size_t bytes() const { return block_.bytes(); }
+  /// Clears the points of slots below `slots`.
+  void clear(size_t slots) const { std::memset(rows, 0, slots * kVisibleWords * sizeof(float)); }
+  const float* row(size_t slot) const { return rows + slot * kVisibleWords; }
+
+  float* rows = nullptr;
+
+ private:
+  SoaBlock block_;
+};
+
+}  // namespace wavecomb

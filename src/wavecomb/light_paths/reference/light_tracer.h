@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Light paths of the reference integrator, traced one after the other in scalar code.
+#pragma once
+
+#include "wavecomb/light_paths/light_path.h"
+#include "wavecomb/light_paths/stages/light_splat.h"
+#include "wavecomb/path/steps/survive.h"
+#include "wavecomb/reference/reference_worker.h"
+#include "wavecomb/reference/single_rays.h"
+#include "wavecomb/wave/kernels/program_dispatch.h"
+
+namespace wavecomb {
+
+/// Traces light paths one after the other and adds their contributions to the film.
+class LightTracer {
+  using F = float;
+
+ public:
+  LightTracer(const WaveContext& context, ReferenceWorker& worker)
+      : context_(context),
+        settings_(ShadeSettings(*context.settings).of_light_paths()),
+        merger_{context.visible, &worker.splats, context.film},
+        setup_(light_path_setup(context, context.merges() ? &merger_ : nullptr)),
+        clock_(worker.clock),
+        counts_(worker.counts),
+        rays_(context, worker.counts, worker.aovs),
+        splats_(worker.splats),
+        vertices_(worker.light_vertices),
+        light_aovs_(worker.light_aovs) {}
+
+  /// Traces one light path. With `keeps`, stores one of its vertices for the camera path of the
+  /// same pixel and sample.
+  void trace(uint32_t pixel, uint32_t sample, bool keeps = false) {
+    if (keeps) vertices_.clear(1);
+    const SceneView& scene = context_.scene;
+    const LightPath<F> start =
+        begin_light_path<F>(scene.lights, *context_.settings, pixel, sample, true);
+    const Emission<F>& e = start.emission;
+    if (!e.valid) return;
+    rays_.begin(start.key, context_.moves()
+                               ? light_path_time<F>(*context_.settings, start.key, pixel, sample)
+                               : 0.f);
+    if (light_aovs_.wants_events()) light_aovs_.begin<F>(kOnlySlot, e.light, true);
+    PathState<F> path = start.start();
+    for (uint32_t depth = 0;; ++depth) {
+      clock_.enter(Phase::kTrace);
+      const SingleHit hit = rays_.intersect(path.o, path.dir, kInfinity, depth);
+      clock_.enter(Phase::kShade);
+      if (hit.inst == kNoHit || hit.inst == kLightShape) return;
+      if (context_.lessons && depth == 0)
+        context_.lessons->begin(light_path_number(*context_.settings, pixel),
+                                fma(path.dir, hit.t, path.o));
+      const uint32_t mesh = rays_.mesh_of(hit), material = rays_.material_of(hit, mesh);
+      if (settings_.cost_aware && depth >= settings_.roulette_depth) {
+        const F q = cost_aware_survival<F>(scene, *context_.roulette_costs, material, path, true);
+        if (!(cost_aware_number<F>(start.key, depth) < q)) return;
+        path.throughput *= 1.f / q;
+      }
+      VertexAovs<F> aovs;
+      aovs.wants_events = light_aovs_.wants_events();
+      const LightVertexResult<F> out = shade(start.key, depth, hit, mesh, material, path, aovs);
+      const VertexResult<F>& v = out.v;
+      if (aovs.wants_events) light_aovs_.shade<F>(depth, kOnlySlot, start.key, aovs, true);
+      if (keeps) keep(start.key, depth, hit, mesh, material, path, out);
+      if (v.has_shadow) {
+        clock_.enter(Phase::kShadow);
+        if (!rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, nullptr))
+          bring(pixel, sample, depth, path.light, out);
+      }
+      if (!v.alive) return;
+      path = v.next;
+    }
+  }
+
+ private:
+  void bring(uint32_t pixel, uint32_t sample, uint32_t depth, uint32_t light,
+             const LightVertexResult<F>& out) {
+    if (context_.lessons) {
+      context_.lessons->bring(light_path_number(*context_.settings, pixel), depth, out.v.direct);
+      return;
+    }
+    add_splat(context_, splats_, sample, out.x, out.y, out.v.direct);
+    if (light_aovs_)
+      light_aovs_.show(*context_.film, *context_.splat_filter,
+                       {.slot = kOnlySlot,
+                        .depth = depth,
+                        .light = light,
+                        .x = out.x,
+                        .y = out.y,
+                        .c = out.v.direct});
+  }
+
+  void keep(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit, uint32_t mesh,
+            uint32_t material, const PathState<F>& path, const LightVertexResult<F>& out) {
+    const ShadingRecord<F> record{hit.t,    hit.u, hit.v,    hit.prim,
+                                  hit.inst, mesh,  hit.geom, kOnlySlot};
+    if (keep_light_vertex<F>(vertices_, depth, light_path_row<F>(path, key), record, material,
+                             out.p, out.offered) &&
+        light_aovs_.wants_events())
+      light_aovs_.keep<F>(kOnlySlot, true);
+  }
+
+  LightVertexResult<F> shade(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit,
+                             uint32_t mesh, uint32_t material, const PathState<F>& path,
+                             VertexAovs<F>& aovs) {
+    const SceneView& scene = context_.scene;
+    counts_.add_records(depth, 1);
+    const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, rays_.time()};
+    const PathState<F> state = light_path_state<F>(*context_.camera, light_path_row<F>(path, key),
+                                                   hit.t, rays_.time(), true);
+    return kShadeLightVertex<F>[scene.material_program[material]](
+        {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, state, &aovs, true},
+        setup_, nullptr);
+  }
+
+  const WaveContext& context_;
+  const ShadeSettings settings_;
+  const Merger merger_;
+  const LightPathSetup setup_;
+  PhaseClock& clock_;
+  Counts& counts_;
+  SingleRays rays_;
+  SplatList& splats_;
+  LightVertices& vertices_;
+  LightPathAovs& light_aovs_;
+};
+
+/// Adds the contributions of a task's light paths to the film.
+inline void end_light_task(const WaveContext& context, ReferenceWorker& worker,
+                           const WaveTask& task) {
+  if (!context.lessons) context.film->take(worker.splats);
+  count_light_paths(context, task);
+}
+
+/// Traces the light paths of a task.
+inline void trace_light_task(const WaveContext& context, ReferenceWorker& worker,
+                             const WaveTask& task) {
+  LightTracer tracer(context, worker);
+  worker.clock.start(Phase::kGenerate);
+  for (uint32_t p = 0; p < task.pixel_count; ++p)
+    for (uint32_t s = 0; s < task.samples; ++s) {
+      worker.clock.enter(Phase::kGenerate);
+      tracer.trace(task.pixels[p], task.first_sample + s);
+    }
+  end_light_task(context, worker, task);
+  worker.clock.stop();
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Wave stage 4b, for connections: shades the vertices of light paths for the camera paths in the
+/// same slots, and adds the contributions of unblocked connections to those camera paths.
+#pragma once
+
+#include "wavecomb/wave/stages/order.h"
+#include "wavecomb/wave/stages/shade.h"
+#include "wavecomb/wave/stages/trace.h"
+
+namespace wavecomb {
+
+/// Fills the shading queue with the light path vertices that the records just shaded connect to,
+/// grouped by program.
+template <typename F>
+void collect_connections(Wave& wave, const WaveContext& context, uint32_t depth) {
+  using U = UInt<F>;
+  using Q = ShadingQueue;
+  const LightVertices& vertices = wave.light_vertices;
+  ShadingQueue& queue = wave.shading;
+  const size_t shaded = queue.size;
+  queue.clear();
+  size_t n = 0;
+  // The queue is overwritten in place: writes stay behind reads.
+  for (size_t i = 0; i < shaded; i += kWidth<F>) {
+    Mask<F> active = first_lanes<F>(shaded - i);
+    const U slot = load<U>(queue.slot + i);
+    const auto offer = load_row<ConnectionRow, F>(vertices.connections, slot, active);
+    active = active & (max_component(offer.light) > 0.f);
+    if (none(active)) continue;
+    const auto chosen = load_row<LightVertexRow, F>(vertices.chosen, slot, active);
+    const Mask<U> on(active);
+    const U program = gather<U>(context.scene.material_variant, chosen.material, on);
+    compress_store<U>(queue.slot + n, slot, on);
+    compress_store<U>(queue.uints(Q::kMaterial) + n, chosen.material, on);
+    compress_store<U>(queue.uints(Q::kProgram) + n, program, on);
+    n += compress_row<ShadingRecord, F>(
+        queue.row(n), load_row<ShadingRecord, F>(vertices.records, slot, active), active);
+  }
+  queue.size = n;
+  for (size_t i = 0; i < n; ++i) wave.sorter.keys()[i] = queue.uints(Q::kProgram)[i];
+  queue.ordered = n > 1 && wave.sorter.sort(n, queue.sorted_indices);
+  wave.counts.add_records(depth, n);
+}
+
+/// Connects the shaded vertices of camera paths at `depth`. Does not change the list of their next
+/// rays.
+template <typename F>
+void connect(Wave& wave, const WaveContext& context, uint32_t depth) {
+  using U = UInt<F>;
+  wave.clock.enter(Phase::kShade);
+  collect_connections<F>(wave, context, depth);
+  if (wave.shading.size == 0) return;
+  wave.light_use = Wave::LightUse::kConnect;
+  const ShadeSettings settings = ShadeSettings(*context.settings).of_light_paths();
+  shade<F>(wave, context, settings, depth, kShadeLightBatch);
+  wave.light_use = Wave::LightUse::kShow;
+  compact_shadows<F>(wave);
+  const ShadowQueue& q = wave.shadows;
+  if (q.size == 0) return;
+  wave.clock.enter(Phase::kShadow);
+  fetch_shadows<F>(wave);
+  occlude<F>(wave, context, depth, context.scene.lights.links.members != nullptr);
+  for (size_t i = 0; i < q.size; i += kWidth<F>) {
+    const Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(q.occluded + i) == U(0u));
+    const U slot = load<U>(q.slot + i);
+    const Color<F> c{load<F>(q.r + i), load<F>(q.g + i), load<F>(q.b + i)};
+    add_radiance<F>(wave.pool.radiance, slot, c, active);
+    if (wave.aovs.wants_links()) [[unlikely]] {
+      const auto light =
+          gather_field<F>(wave.light_vertices.paths, &LightPathRow<float>::light, slot, active);
+      wave.aovs.add_link<F>(depth, slot, light, c, active);
+      if (wave.light_aovs.wants_events())
+        wave.light_aovs.connect<F>(wave.aovs.expressions(), slot, c, active);
+    }
+  }
+}
+
+}  // namespace wavecomb

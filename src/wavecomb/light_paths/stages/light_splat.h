@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Wave stage 4 of light paths: adds the contributions of vertices that the camera sees to the
+/// film.
+#pragma once
+
+#include "wavecomb/light/emission/aim_samples.h"
+#include "wavecomb/light_paths/light_path.h"
+#include "wavecomb/wave/stages/trace.h"
+
+namespace wavecomb {
+
+/// Adds a contribution of sample `sample` at position (x, y) of the film, in pixels, to the sums of
+/// the surrounding pixels. The sums are integers, so that the order does not matter.
+inline void add_splat(const WaveContext& context, SplatList& list, uint32_t sample, float x,
+                      float y, const Color<float>& c) {
+  Film& film = *context.film;
+  context.splat_filter->spread(film, x, y, [&](size_t pixel, float weight) {
+    const SplatList::Splat splat{static_cast<uint32_t>(pixel), c.x * weight, c.y * weight,
+                                 c.z * weight, SplatLayer::is_in_half(sample)};
+    film.collect(list, splat);
+  });
+}
+
+/// Returns the number of the light path in a slot of a wave.
+inline uint32_t light_path_in(const WaveContext& context, const WaveTask& task, uint32_t slot) {
+  return light_path_number(*context.settings, task.pixels[slot / task.samples]);
+}
+
+/// Records the first hits of the light paths in a wave as training samples.
+inline void note_first_places(const Wave& wave, const WaveContext& context, const WaveTask& task) {
+  const RayQueue& rays = wave.rays;
+  for (size_t i = 0; i < rays.size; ++i) {
+    if (wave.hits.inst[i] == kNoHit) continue;
+    const Vec3<float> o{rays.ox[i], rays.oy[i], rays.oz[i]}, d{rays.dx[i], rays.dy[i], rays.dz[i]};
+    context.lessons->begin(light_path_in(context, task, rays.slot[i]), fma(d, wave.hits.t[i], o));
+  }
+}
+
+/// Reports the finished light paths of a task to the film.
+inline void count_light_paths(const WaveContext& context, const WaveTask& task) {
+  if (context.lessons) return;
+  for (uint32_t p = 0; p < task.pixel_count; ++p)
+    context.film->splats().done(light_path_number(*context.settings, task.pixels[p]),
+                                task.first_sample, task.samples);
+}
+
+/// Tests which vertices the camera sees. Adds their contributions to the film or, in training, to
+/// the training samples.
+template <typename F>
+void splat(Wave& wave, const WaveContext& context, const WaveTask& task, uint32_t depth) {
+  const ShadowQueue& q = wave.shadows;
+  occlude<F>(wave, context, depth, false);
+  for (size_t i = 0; i < q.size; ++i) {
+    if (q.occluded[i] != 0) continue;
+    if (context.lessons) [[unlikely]] {
+      context.lessons->bring(light_path_in(context, task, q.slot[i]), depth,
+                             {q.r[i], q.g[i], q.b[i]});
+      continue;
+    }
+    const auto row = load_row<ShadowRow, float>(wave.pool.shadows, q.slot[i], true);
+    const float x = bits_float<float>(row.group), y = bits_float<float>(row.set);
+    const Color<float> c{q.r[i], q.g[i], q.b[i]};
+    add_splat(context, wave.splats, task.first_sample + q.slot[i] % task.samples, x, y, c);
+    if (wave.light_aovs) [[unlikely]] {
+      const auto light =
+          gather_field<float>(wave.pool.paths, &LightPathRow<float>::light, q.slot[i], true);
+      wave.light_aovs.show(
+          *context.film, *context.splat_filter,
+          {.slot = q.slot[i], .depth = depth, .light = light, .x = x, .y = y, .c = c});
+    }
+  }
+  if (context.lessons) return;
+  context.film->take(wave.splats);
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Material descriptions: a shading program with parameters and textures.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "wavecomb/core/affine.h"
+#include "wavecomb/graph/graph.h"
+#include "wavecomb/material/description/openpbr_inputs.h"
+#include "wavecomb/material/description/programs.h"
+#include "wavecomb/texture/texture.h"
+
+namespace wavecomb {
+
+/// Material parameters that a texture can drive. Each has a constant that is used without a
+/// texture.
+enum class Input : uint8_t {
+  kBaseColor,  ///< RGB; albedo; reflectance at normal incidence (F0) of metal; tint of dielectrics
+  /// RGB; tint at 82 degrees (F82) of metal; F0 of principled with specular workflow.
+  kSpecularColor,
+  kEmission,   ///< RGB radiance
+  kRoughness,  ///< perceptual; alpha = roughness^2
+  kMetallic,
+  kClearcoat,
+  kClearcoatRoughness,
+  kOpacity,
+  kNormal,  ///< tangent-space normal, already scaled and biased to [-1, 1]
+};
+inline constexpr uint32_t kInputCount = 9;
+inline constexpr const char* kInputNames[kInputCount] = {
+    "base_color", "specular_color",      "emission", "roughness", "metallic",
+    "clearcoat",  "clearcoat_roughness", "opacity",  "normal"};
+inline constexpr uint32_t input_bit(Input s) {
+  return 1u << static_cast<uint32_t>(s);
+}
+
+/// A texture connected to an input: value = texel * scale + bias at uv' = transform(uv).
+struct TextureUse {
+  uint32_t texture = kNoTexture;
+  /// 0 to 3 reads that channel for r, g and b; 4 reads RGB.
+  uint32_t channel = 4;
+  std::array<float, 4> scale{1, 1, 1, 1}, bias{0, 0, 0, 0};
+  /// u' = m[0] u + m[1] v + m[2]; v' = m[3] u + m[4] v + m[5].
+  std::array<float, 6> uv{1, 0, 0, 0, 1, 0};
+};
+
+/// A material. The defaults are those of UsdPreviewSurface.
+struct Material {
+  std::string name;
+  ProgramId program = ProgramId::kPrincipled;
+  Vec3<float> base_color{0.18f, 0.18f, 0.18f};
+  Vec3<float> specular_color{0, 0, 0};
+  Vec3<float> emission{0, 0, 0};
+  float roughness = 0.5f;
+  float metallic = 0;
+  float clearcoat = 0;
+  float clearcoat_roughness = 0.01f;
+  float opacity = 1;
+  float ior = 1.5f;
+  float opacity_threshold = 0;  ///< > 0: opacity below it counts as 0, other opacity as 1
+  /// Measured complex index of refraction of a conductor (metal only), used instead of F0 and F82
+  /// if any component of k is > 0.
+  Vec3<float> conductor_eta{0, 0, 0}, conductor_k{0, 0, 0};
+  bool specular_workflow = false;  ///< principled: F0 comes from specular_color instead of metallic
+  bool presence = false;  ///< principled: opacity is presence (cut-out) instead of transparency
+  std::array<TextureUse, kInputCount> textures;
+  OpenPbr openpbr;  ///< used only by the program openpbr
+  /// Values of the parameters specific to the program (ProgramInfo::own), if given.
+  std::array<std::optional<float>, kMaxProgramParameters> own;
+  /// Value graphs that compute parameters at hits, instead of constants and textures: ids of
+  /// SceneBuilder::add_graph, or kNoGraph. The graphs for opacity and emission repeat the relevant
+  /// parts of `graph`, so that shadow rays and light samples evaluate nothing else.
+  uint32_t graph = kNoGraph, opacity_graph = kNoGraph, emission_graph = kNoGraph;
+
+  /// Returns parameter `i` of those specific to the program.
+  float own_value(size_t i) const { return own[i].value_or(info_of(program).own[i].standard); }
+  bool has_texture(Input s) const { return textures[static_cast<size_t>(s)].texture != kNoTexture; }
+  /// Returns whether the material can emit: its program reads the emission input, which is not
+  /// zero.
+  bool emits() const {
+    return can_emit(program) && (emission.x > 0 || emission.y > 0 || emission.z > 0 ||
+                                 has_texture(Input::kEmission) || emission_graph != kNoGraph);
+  }
+  /// Returns whether ray traversal must evaluate the presence of the surface.
+  bool needs_presence() const {
+    return (presence || opacity_threshold > 0) &&
+           (opacity < 1 || opacity < opacity_threshold || opacity_varies());
+  }
+  /// Returns whether opacity varies over surfaces with this material.
+  bool opacity_varies() const { return has_texture(Input::kOpacity) || opacity_graph != kNoGraph; }
+};
+
+/// Packed material: 32 floats in a row, so that a record fills two cache lines.
+struct alignas(64) MaterialRecord {
+  float base_color[3], specular_color[3], emission[3];
+  float roughness, metallic, clearcoat, clearcoat_roughness, opacity;
+  float normal[3];
+  float ior, opacity_threshold;
+  float conductor_eta[3], conductor_k[3];
+  uint32_t textured_inputs;  ///< bit s: input s reads a texture
+  uint32_t flags;            ///< MaterialFlags
+  uint32_t program;
+  uint32_t openpbr;  ///< index of its OpenPbrRecord
+  uint32_t graph = kNoGraph, opacity_graph = kNoGraph, emission_graph = kNoGraph;
+};
+static_assert(sizeof(MaterialRecord) == 128);
+/// Bit of MaterialRecord::textured_inputs beyond those of the inputs: the program needs a tangent
+/// frame along the texture's u, even if it reads no texture.
+inline constexpr uint32_t kNeedsTangent = 1u << 31;
+/// Bits of MaterialRecord::textured_inputs: a graph drives parameters; a graph drives the normal.
+inline constexpr uint32_t kReadsGraph = 1u << 30, kGraphNormal = 1u << 29;
+enum MaterialFlags : uint32_t {
+  kSpecularWorkflow = 1,
+  kPresence = 2,
+  kConductorIndex = 4,
+  kEmits = 8,
+  kHasGraph = 16,
+};
+/// Packed TextureUse: 16 32-bit words.
+struct alignas(64) TextureUseRecord {
+  uint32_t texture, channel;
+  float scale[4], bias[4], uv[6];
+};
+static_assert(sizeof(TextureUseRecord) == 64);
+
+/// Packed parameters specific to a program.
+struct alignas(16) ProgramParameterRecord {
+  float value[kMaxProgramParameters];
+};
+static_assert(sizeof(ProgramParameterRecord) == 4 * kMaxProgramParameters);
+
+/// Device view of all materials. Texture uses are indexed by `material * kInputCount + input`.
+struct MaterialView {
+  const MaterialRecord* materials = nullptr;
+  const TextureUseRecord* uses = nullptr;
+  const TextureView* textures = nullptr;
+  const OpenPbrRecord* openpbr = nullptr;
+  /// By material; null if no material's program has specific parameters.
+  const ProgramParameterRecord* own = nullptr;
+  const float* energy = nullptr;  ///< EnergyTables; set if a material needs them
+  GraphView graphs{};
+};
+
+}  // namespace wavecomb

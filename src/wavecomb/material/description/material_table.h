@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Table of material parameters other than textures, graphs and the inputs of OpenPBR
+/// (material/description/openpbr_inputs.h): one row for each such member of Material, and for the
+/// parameters specific to one program (material/description/programs.h). Range checks, the scene
+/// fingerprint, Python keywords and edits, and sandbox calls are derived from it. To add a
+/// parameter of several programs, add a member to Material and to MaterialRecord, a row here, a
+/// line where records are made (scene_materials.cpp), and its use; for one program only, an entry
+/// to its row in material/description/programs.h and its use.
+#pragma once
+
+#include <span>
+#include <type_traits>
+#include <variant>
+
+#include "wavecomb/material/description/material.h"
+
+namespace wavecomb {
+
+/// A parameter specific to one program: number `index` of ProgramInfo::own.
+struct OwnParameter {
+  ProgramId program;
+  size_t index;
+
+  bool is_of(const Material& material) const { return material.program == program; }
+  const ProgramParameter& info() const { return info_of(program).own[index]; }
+};
+
+/// Description of a material parameter. Contract: lives as long as the program.
+struct MaterialParameter {
+  const char* name;  ///< keyword of add_material
+  std::variant<float Material::*, Vec3<float> Material::*, bool Material::*, OwnParameter> place;
+
+  /// Null if materials of any program have the parameter.
+  const OwnParameter* own() const { return std::get_if<OwnParameter>(&place); }
+};
+
+/// Returns all parameters in the order in which fingerprints hash them. A new member of Material
+/// changes the fingerprint of every scene, so older checkpoints cannot be continued. Parameters
+/// specific to a program come last, and are hashed only if they differ from the default.
+std::span<const MaterialParameter> material_table();
+
+/// Calls visit(row, value) for each parameter of a material (const or not) of type `Value`: float,
+/// Vec3<float> or bool. Parameters specific to other programs are skipped.
+template <typename Value, typename Object, typename Visit>
+void for_each_parameter(Object& material, const Visit& visit) {
+  for (const MaterialParameter& p : material_table()) {
+    if (const auto* member = std::get_if<Value Material::*>(&p.place)) visit(p, material.**member);
+    if constexpr (std::is_same_v<Value, float>)
+      if (const OwnParameter* own = p.own(); own && own->is_of(material)) {
+        float value = material.own_value(own->index);
+        visit(p, value);
+        if constexpr (!std::is_const_v<Object>) material.own[own->index] = value;
+      }
+  }
+}
+
+}  // namespace wavecomb

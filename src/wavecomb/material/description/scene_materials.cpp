@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+/// SceneMaterials: packs materials.
+#include <algorithm>
+#include <cmath>
+
+#include "wavecomb/core/denormals.h"
+#include "wavecomb/graph/parameters/parameters.h"
+#include "wavecomb/material/description/simplified_material.h"
+#include "wavecomb/material/description/variants.h"
+#include "wavecomb/scene/scene_parts.h"
+
+namespace wavecomb {
+namespace {
+
+MaterialRecord make_material_record(const Material& m, const GraphSet& graphs) {
+  MaterialRecord r{};
+  const auto put = [](float* to, const Vec3<float>& v) {
+    to[0] = v.x;
+    to[1] = v.y;
+    to[2] = v.z;
+  };
+  put(r.base_color, m.base_color);
+  put(r.specular_color, m.specular_color);
+  put(r.emission, m.emission);
+  r.roughness = m.roughness;
+  r.metallic = m.metallic;
+  r.clearcoat = m.clearcoat;
+  r.clearcoat_roughness = m.clearcoat_roughness;
+  r.opacity = m.opacity;
+  put(r.normal, {0, 0, 1});
+  r.ior = m.ior;
+  r.opacity_threshold = m.opacity_threshold;
+  put(r.conductor_eta, m.conductor_eta);
+  put(r.conductor_k, m.conductor_k);
+  for (uint32_t s = 0; s < kInputCount; ++s)
+    if (m.has_texture(static_cast<Input>(s))) r.textured_inputs |= 1u << s;
+  if (m.specular_workflow) r.flags |= kSpecularWorkflow;
+  if (m.needs_presence()) r.flags |= kPresence;
+  if (m.conductor_k.x > 0 || m.conductor_k.y > 0 || m.conductor_k.z > 0) r.flags |= kConductorIndex;
+  if (m.emits()) r.flags |= kEmits;
+  r.program = static_cast<uint32_t>(m.program);
+  if (has_trait(m.program, program_trait::kLayered) && m.openpbr.anisotropy != 0)
+    r.textured_inputs |= kNeedsTangent;
+  r.graph = m.graph;
+  r.opacity_graph = m.opacity_graph;
+  r.emission_graph = m.emission_graph;
+  if (m.graph != kNoGraph) {
+    r.flags |= kHasGraph;
+    r.textured_inputs |= kReadsGraph;
+    if (graphs.drives(m.graph, kNormalOutput)) r.textured_inputs |= kGraphNormal;
+  }
+  return r;
+}
+
+bool wants_tangents(const Material& m, const GraphSet& graphs) {
+  constexpr uint32_t kTangents =
+      graph_input_bit(GraphInput::kTangent) | graph_input_bit(GraphInput::kBitangent);
+  return m.has_texture(Input::kNormal) || graphs.drives(m.graph, kNormalOutput) ||
+         graphs.reads(m.graph, kTangents) ||
+         (has_trait(m.program, program_trait::kLayered) &&
+          (m.openpbr.anisotropy != 0 || graphs.drives(m.graph, graph_parameter("anisotropy"))));
+}
+
+ProgramParameterRecord make_own_record(const Material& m) {
+  ProgramParameterRecord r{};
+  for (size_t i = 0; i < kMaxProgramParameters; ++i) r.value[i] = m.own_value(i);
+  return r;
+}
+
+OpenPbrRecord make_openpbr_record(const OpenPbr& m) {
+  OpenPbrRecord r{};
+  auto& inputs = static_cast<OpenPbrInputs<float>&>(r);
+  inputs = m;
+  inputs.rotation = m.rotation - std::floor(m.rotation);
+  inputs.transmission_tint = m.transmission_color;
+  inputs.extinction = Vec3<float>(0.f);
+  const auto bring_to_range = [&] {
+    detail::for_each_word<0, float>(inputs, [](auto at, float& value) {
+      constexpr uint32_t kAt = kFirstOpenPbrOutput + at;
+      value = std::clamp(value, kGraphRanges.low[kAt], kGraphRanges.high[kAt]);
+    });
+  };
+  bring_to_range();
+  if (m.transmission_depth > 0) {
+    const auto extinction = [&](float& tint) {
+      const float sigma = -std::log(std::max(tint, 1e-6f)) / m.transmission_depth;
+      tint = 1;
+      return sigma;
+    };
+    inputs.extinction = {extinction(inputs.transmission_tint.x),
+                         extinction(inputs.transmission_tint.y),
+                         extinction(inputs.transmission_tint.z)};
+  }
+  r.thin_walled = m.thin_walled ? 1.f : 0.f;
+  return r;
+}
+
+TextureUseRecord make_use_record(const TextureUse& use) {
+  TextureUseRecord r{};
+  r.texture = use.texture;
+  r.channel = use.channel;
+  std::copy(use.scale.begin(), use.scale.end(), r.scale);
+  std::copy(use.bias.begin(), use.bias.end(), r.bias);
+  std::copy(use.uv.begin(), use.uv.end(), r.uv);
+  return r;
+}
+
+}  // namespace
+
+SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const GraphSet> programs_,
+                               std::span<const TexturePtr> textures, uint32_t exit_material,
+                               uint32_t inside_material)
+    : materials(std::move(all)), graphs(std::move(programs_)) {
+  const DenormalsOff denormals_off;  // same floating-point mode as in kernels
+  for (const Material& m : materials) shaded.push_back(settled(m, *graphs, textures));
+  const bool has_own = std::ranges::any_of(
+      materials, [](const Material& m) { return info_of(m.program).own_count() > 0; });
+  for (const Material& m : shaded) {
+    records.push_back(make_material_record(m, *graphs));
+    if (has_own) own.push_back(make_own_record(m));
+    if (has_trait(m.program, program_trait::kLayered)) {
+      records.back().openpbr = static_cast<uint32_t>(openpbr.size());
+      openpbr.push_back(make_openpbr_record(m.openpbr));
+      const WalkKind walk =
+          exit_material != kInheritMaterial ? walk_kind(m, *graphs) : WalkKind::kNone;
+      openpbr.back().walks = static_cast<float>(walk);
+      if (walk != WalkKind::kNone) {
+        walks.resize(materials.size());
+        walks[records.size() - 1] = make_walk_medium(m, walk);
+      }
+    }
+    for (const TextureUse& use : m.textures) uses.push_back(make_use_record(use));
+    programs.push_back(static_cast<uint32_t>(m.program));
+    variants.push_back(least_variant(
+        m.program, parts_of(m, *graphs, textures, exit_material != kInheritMaterial)));
+    wants_tangents.push_back(wavecomb::wants_tangents(m, *graphs) ? 1 : 0);
+    has_presence = has_presence || m.needs_presence();
+    has_emission = has_emission || m.emits();
+  }
+  if (inside_material == kInheritMaterial) return;
+  // The scene has determined that paths need a medium stack.
+  interiors = make_interiors(shaded, *graphs, true);
+}
+
+}  // namespace wavecomb

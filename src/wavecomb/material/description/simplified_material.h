@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Simplification of materials whose textures and graphs are constant.
+#pragma once
+
+#include <span>
+
+#include "wavecomb/material/description/material.h"
+#include "wavecomb/texture/texture.h"
+
+namespace wavecomb {
+
+/// Range of each component of an input.
+struct InputRange {
+  Vec3<float> low, high;
+};
+
+/// Returns the range of values that input `input` may read by `use`, clamped as kernels clamp it.
+/// The range of a normal is not clamped, since kernels normalize it instead.
+InputRange input_range(Input input, const TextureUse& use, const Texture& texture);
+
+/// Returns `material` with every texture that has the same value everywhere replaced by a constant,
+/// and with opacity and emission graphs that can give only one value replaced by it. Shading
+/// results are identical, with fewer texture lookups. If no texture is left, shading uses a
+/// different tangent frame, so that individual samples differ while their expectation stays the
+/// same.
+Material settled(Material material, const GraphSet& graphs, std::span<const TexturePtr> textures);
+
+}  // namespace wavecomb

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Program variants: the same shading code compiled for a subset of features.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "wavecomb/material/description/material.h"
+
+namespace wavecomb {
+
+/// Features of the programs principled and openpbr that a variant can omit.
+enum Part : uint32_t {
+  kVaries = 1,     ///< reads textures or a value graph
+  kGlows = 2,      ///< emission
+  kMetals = 4,     ///< metallic above 0, or F0 by specular_color
+  kCoats = 8,      ///< a clearcoat
+  kPasses = 16,    ///< clearcoat
+  kBacks = 32,     ///< straight or refracted transmission
+  kFuzzes = 64,    ///< openpbr: diffuse transmission of thin walls, and subsurface random walks
+  kFilms = 128,    ///< openpbr: a thin film
+  kBrushes = 256,  ///< openpbr: anisotropy and its rotation
+};
+inline constexpr uint32_t kAllParts =
+    kVaries | kGlows | kMetals | kCoats | kPasses | kBacks | kFuzzes | kFilms | kBrushes;
+
+/// Reduced variants: X(name, program, parts), in ascending order of cost. A material uses the first
+/// variant that has all of its parts. CMake reads this list as well and makes a compile unit for
+/// each row.
+#define WAVECOMB_VARIANTS(X)                       \
+  X(gloss, principled, 0)                          \
+  X(tinted_gloss, principled, kMetals)             \
+  X(textured_gloss, principled, kVaries)           \
+  X(textured_metal, principled, kVaries | kMetals) \
+  X(base, openpbr, kMetals)                        \
+  X(textured_base, openpbr, kVaries | kMetals)
+
+struct Variant {
+  const char* name;
+  const char* program;
+  uint32_t parts;
+};
+/// All variants: first the complete programs, in the order of ProgramId.
+inline constexpr Variant kVariants[] = {
+#define WAVECOMB_PROGRAM(name, ...) {#name, #name, kAllParts},
+    WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM) WAVECOMB_MEDIUM_PROGRAMS(WAVECOMB_PROGRAM)
+#undef WAVECOMB_PROGRAM
+#define WAVECOMB_VARIANT(name, program, parts) {#name, #program, parts},
+        WAVECOMB_VARIANTS(WAVECOMB_VARIANT)
+#undef WAVECOMB_VARIANT
+};
+inline constexpr uint32_t kVariantCount = sizeof(kVariants) / sizeof(Variant);
+
+/// Returns the id of the program called `name`. An unknown name is not a constant expression, so it
+/// fails to compile.
+constexpr ProgramId program_id(std::string_view name) {
+  uint32_t i = 0;
+  while (name != kProgramNames[i]) ++i;
+  return static_cast<ProgramId>(i);
+}
+/// Returns the program of a variant.
+constexpr ProgramId program_of(uint32_t variant) {
+  return program_id(kVariants[variant].program);
+}
+
+/// Returns the parts that a settled material (simplified_material.h) may use, whatever values its
+/// textures have and whatever its graphs return within their ranges (ranges.h). `textures`
+/// are those that the graphs may read. `may_walk` is set if the scene has subsurface random walks.
+uint32_t parts_of(const Material& material, const GraphSet& graphs,
+                  std::span<const TexturePtr> textures, bool may_walk = false);
+
+/// Returns the least expensive variant of a program that has all of these parts.
+uint32_t least_variant(ProgramId program, uint32_t parts);
+
+}  // namespace wavecomb

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Emission and opacity of materials at hits. All callers get the same values; shading reads its
+/// own emission from the same inputs and graphs (material/params.h).
+///
+/// Graphs override textures, and textures override constants, for each component.
+#pragma once
+
+#include "wavecomb/graph/parameters/value.h"
+#include "wavecomb/material/inputs/inputs.h"
+
+namespace wavecomb {
+
+namespace detail {
+
+/// Graph inputs where only texture coordinates are known.
+template <typename F>
+struct UvOnly {
+  const Vec2<F>& uv;
+  const Footprint<F>& footprint;
+  GraphPoint<F> operator()(const Mask<F>& /*active*/) const {
+    GraphPoint<F> at;
+    at.uv = uv;
+    at.footprint = footprint;
+    return at;
+  }
+};
+
+}  // namespace detail
+
+/// Returns the radiance that the surface emits at `uv`, regardless of its presence. `footprint` is
+/// that of the ray in uv space. Graphs get the inputs that `make_point(active)` returns, which is
+/// called only if there is a graph.
+template <typename F, typename MakePoint>
+inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
+                               const Footprint<F>& footprint, const MakePoint& make_point,
+                               const Mask<F>& active) {
+  const detail::InputReader<F> inputs(view, material, uv, footprint, active);
+  const Vec3<F> constant = inputs.record[&MaterialRecord::emission];
+  const Color<F> plain = detail::sane_emission(inputs.value(Input::kEmission, constant));
+  const UInt<F> graph = inputs.record[&MaterialRecord::emission_graph];
+  const Mask<F> driven = active & Mask<F>(graph != UInt<F>(kNoGraph));
+  if (none(driven)) return plain;
+  return graph_value<F>(view, graph, kEmissionOutput, make_point(driven), driven, plain);
+}
+/// Returns the emission for graphs that read only uv.
+template <typename F>
+inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
+                               const Footprint<F>& footprint, const Mask<F>& active) {
+  return fetch_emission<F>(view, material, uv, footprint, detail::UvOnly<F>{uv, footprint}, active);
+}
+
+/// Returns the presence of the surface at `uv`, the probability that a ray hits it. It is 0 or 1
+/// with an opacity threshold, and 1 for materials whose opacity is transparency, which the program
+/// handles. `make_point` has the same role as in fetch_emission.
+template <typename F, typename MakePoint>
+inline F fetch_opacity(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
+                       const Footprint<F>& footprint, const MakePoint& make_point,
+                       const Mask<F>& active) {
+  using R = MaterialRecord;
+  const detail::InputReader<F> inputs(view, material, uv, footprint, active);
+  F opacity = detail::saturate(inputs.value(Input::kOpacity, inputs.record[&R::opacity]));
+  const UInt<F> graph = inputs.record[&R::opacity_graph];
+  const Mask<F> driven = active & Mask<F>(graph != UInt<F>(kNoGraph));
+  if (any(driven))
+    opacity =
+        graph_value<F>(view, graph, kOpacityOutput, make_point(driven), driven, Vec3<F>(opacity)).x;
+  const F threshold = inputs.record[&R::opacity_threshold];
+  const F cut = select(opacity < threshold, F(0.f), F(1.f));
+  const F present = select(threshold > 0.f, cut, opacity);
+  return select(detail::opacity_is_presence(inputs, threshold), present, F(1.f));
+}
+/// Returns the presence for graphs that read only uv.
+template <typename F>
+inline F fetch_opacity(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
+                       const Footprint<F>& footprint, const Mask<F>& active) {
+  return fetch_opacity<F>(view, material, uv, footprint, detail::UvOnly<F>{uv, footprint}, active);
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Media inside meshes: glass, liquids, and fog that a mesh bounds.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "wavecomb/core/rows/fields.h"
+#include "wavecomb/core/vec.h"
+
+namespace wavecomb {
+
+struct Material;
+struct GraphSet;
+
+/// Role of a surface as the boundary of a medium.
+enum class InteriorKind : uint32_t {
+  kNone,      ///< bounds no medium
+  kRefracts,  ///< refractive boundary of glass or a liquid
+  kClear,  ///< boundary of fog: index of refraction 1, no scattering or absorption at the surface
+};
+
+/// Packed medium behind a surface, one record for each material.
+template <typename F>
+struct InteriorMedium {
+  Color<F> absorption, scattering;  ///< coefficients, per unit of length
+  F anisotropy;                     ///< mean cosine of the scattering angle
+  F ior;
+  /// In overlaps the medium of highest priority counts; among equal ones, the last entered.
+  F priority;
+  UInt<F> kind;  ///< InteriorKind
+  Vec3<F> pad, pad_too;
+  WAVECOMB_FIELDS(absorption, scattering, anisotropy, ior, priority, kind, pad, pad_too)
+};
+static_assert(sizeof(InteriorMedium<float>) == 64);
+
+/// Device view of the media of all materials.
+struct InteriorView {
+  /// Media by material. Null if no material needs a medium stack; absorption is then applied at the
+  /// hit where a path leaves the solid (path/steps/interact.h).
+  const InteriorMedium<float>* media = nullptr;
+  uint32_t event_material = 0;  ///< material that shades collisions in media with clear boundaries
+
+  bool is_bound(uint32_t material) const {
+    return media && media[material].kind != static_cast<uint32_t>(InteriorKind::kNone);
+  }
+};
+
+/// Returns whether a material is a solid that transmits light and absorbs part of it inside.
+bool absorbs_inside(const Material& material);
+/// Returns whether a material needs paths to track a medium stack: it scatters inside, has a
+/// priority, or bounds an absorbing medium without refraction. If `absorbing` is set, absorption
+/// alone is enough. Set it for scenes with volumes, in which a path scattered by a volume inside
+/// the solid has covered part of its length before the collision, and for scenes with objects
+/// inside absorbing glass (medium/description/glass_contents.h).
+bool asks_for_interiors(const Material& material, bool absorbing);
+/// Makes the media of all materials; empty if no material needs a medium stack.
+std::vector<InteriorMedium<float>> make_interiors(std::span<const Material> materials,
+                                                  const GraphSet& graphs, bool absorbing);
+
+}  // namespace wavecomb

@@ -1,0 +1,341 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Rays through media inside meshes, from bound to bound.
+///
+/// A ray through media k with absorption a_k and scattering s_k, over lengths t_k, has
+///   throughput *= exp(-sum a_k t_k)
+/// and collides after an exponentially distributed optical depth of scattering, which a hero
+/// channel samples (medium/volume/tracking.h). Each medium is homogeneous, so a new distance is
+/// sampled where a medium begins. If lights guide distances, it is sampled when the next bound or
+/// surface is known.
+///
+/// Scattering behind a refractive boundary skips light sampling, since no shadow ray can reach a
+/// light, and continues as a random walk. Where the walk hits a surface, it becomes a path again,
+/// with MIS weight 1 for the emission it hits. Scattering inside a clear bound, which does not
+/// refract, is an event with light sample, bounce and MIS, as in volumes.
+#pragma once
+
+#include "wavecomb/geometry/hit/surface.h"
+#include "wavecomb/medium/nested/ray_columns.h"
+#include "wavecomb/medium/subsurface/random_walk.h"
+#include "wavecomb/medium/volume/equiangular.h"
+#include "wavecomb/medium/volume/tracking.h"
+#include "wavecomb/path/path_pool.h"
+#include "wavecomb/path/statistics.h"
+
+namespace wavecomb {
+
+/// Traces the rays of a wave through the media inside meshes.
+///
+/// Contract: the random numbers of a ray depend only on that ray, so that neither order nor lane
+/// width has an effect.
+class Interiors {
+ public:
+  /// `counts` receives the number of traced rays, as steps of random walks. `by_lamps` selects
+  /// equiangular sampling of distances in fog (equiangular.h).
+  Interiors(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
+            const InteriorBuffers& buffers, Counts& counts, bool by_lamps)
+      : scene_(scene),
+        accel_(accel),
+        width_(width),
+        by_lamps_(by_lamps),
+        b_(buffers),
+        counts_(counts) {}
+
+  /// Returns the medium stack at a point. `keys` may be those of any path.
+  Inside<float> surround(Vec3<float> p, float time, PresenceKeys keys) const;
+
+  /// Traces all rays to the event or surface that stops them. `hits` holds their first hits, and on
+  /// return the hits of visible surfaces. `around` is the medium stack at the camera for new paths,
+  /// or null for paths that continue. start(i, path) returns the InteriorStart of the packet at i.
+  template <typename F, typename Start>
+  void fly(const InteriorRays& rays, const HitSpan& hits, const InteriorEvents& events,
+           const Inside<float>* around, PresenceKeys keys, const Start& start) const;
+  /// Multiplies `product` by the transmittance of shadow rays of length `most`, where 0 skips a
+  /// ray. `keys` include the shadow sets if lights are linked.
+  template <typename F>
+  void pass(const InteriorRays& rays, const float* most, float* const (&product)[3],
+            PresenceKeys keys) const;
+
+ private:
+  enum Column : size_t { kO, kD = kO + 3, kTfar = kD + 3, kSlot, kTime, kHit, kWho = kHit + 6 };
+  static_assert(kWho < InteriorBuffers::kColumns);
+  static constexpr float kFar = 1e30f;
+  static constexpr uint32_t kWalked = 1;
+
+  template <typename F>
+  using Rays = detail::InteriorPacket<F>;
+  template <typename F>
+  using Met = detail::InteriorMet<F>;
+  template <typename F>
+  using Hit = detail::InteriorHit<F>;
+
+  float* states() const { return b_.rows.floats(0); }
+  float* loads(size_t capacity) const {
+    return states() + capacity * kRowWords<detail::InteriorState>;
+  }
+
+  template <typename F>
+  static Hit<F> hit_at(const HitSpan& h, size_t i) {
+    return {load<F>(h.t + i),          load<F>(h.u + i),          load<F>(h.v + i),
+            load<UInt<F>>(h.prim + i), load<UInt<F>>(h.geom + i), load<UInt<F>>(h.inst + i)};
+  }
+  HitSpan traced() const {
+    const SoaBlock& c = b_.columns;
+    return {c.floats(kHit),    c.floats(kHit + 1), c.floats(kHit + 2),
+            c.uints(kHit + 3), c.uints(kHit + 4),  c.uints(kHit + 5)};
+  }
+  void trace(size_t n, const PresenceKeys& keys) const {
+    const SoaBlock& c = b_.columns;
+    accel_.intersect({c.floats(kO), c.floats(kO + 1), c.floats(kO + 2), c.floats(kD),
+                      c.floats(kD + 1), c.floats(kD + 2), c.floats(kTfar), c.uints(kSlot), n,
+                      scene_.has_motion ? c.floats(kTime) : nullptr},
+                     traced(), width_, false, keys);
+    counts_.walk_steps += n;
+  }
+
+  /// Returns the lanes of a packet whose rays see an object (placed_geometry): it is visible to
+  /// their kind of ray, and linked to the light of a shadow ray. An object that a ray does not see
+  /// neither stops nor attenuates it, but the ray still enters and leaves it.
+  template <typename F>
+  Mask<F> sees(const Rays<F>& r, const UInt<F>& object, const Mask<F>& lanes) const;
+  /// Returns the medium inside a bound, or none if the ray does not see the bound.
+  template <typename F>
+  InteriorMedium<F> medium_of(const Rays<F>& r, const Bound<F>& bound,
+                              const Mask<F>& active) const {
+    const Mask<F> there = active & Mask<F>(bound.material != UInt<F>(kNothing));
+    return load_row<InteriorMedium, F>(reinterpret_cast<const float*>(scene_.interiors.media),
+                                       bound.material, sees<F>(r, bound.place, there));
+  }
+  /// Event in a volume that stops a ray, and the distance to it.
+  template <typename F>
+  struct Limit {
+    F length;
+    UInt<F> material;
+  };
+  template <typename F>
+  Limit<F> limit_of(const InteriorEvents& events, const Rays<F>& r) const {
+    using U = UInt<F>;
+    if (!events.limited) return {F(kInfinity), U(uint32_t{Flights::kNoEvent})};
+    const Mask<F> may = r.active & Mask<F>((r.s.flags & U(kWalked)) == U(0u));
+    const F at = gather<F>(events.t, r.who, may);
+    return {select(may, max(F(at - r.s.start), F(0.f)), F(kInfinity)),
+            gather<U>(events.material, r.who, Mask<U>(may))};
+  }
+  /// Returns the distance at which a ray continues past a hit at t that neither stops it nor bounds
+  /// a medium. The step is just above rounding error, since a bound may follow closely. Hitting the
+  /// same surface again only costs time.
+  template <typename F>
+  F past_hit(const F& t) const {
+    return fma(t, F(1.f + 0x1p-20f), F(scene_.scale * 0x1p-21f));
+  }
+  /// Returns what the rays of the packet hit. Where a ray passes, `s` and `inside` are moved to the
+  /// other side.
+  template <typename F>
+  Met<F> meet(Rays<F>& r, Inside<F>& inside, const Bound<F>& now, const Mask<F>& lanes) const;
+  /// Returns whether lights guide the distances in a medium.
+  template <typename F>
+  static Mask<F> is_lit(const InteriorMedium<F>& m) {
+    return Mask<F>(m.kind == UInt<F>(static_cast<uint32_t>(InteriorKind::kClear))) &
+           (max_component(m.scattering) > 0.f);
+  }
+  /// Samples the distance to the next collision with the random number `u`. A medium without
+  /// scattering has no collision and keeps a stored number for the first distance. If lights guide
+  /// the distance, stores `u` until the length of the segment is known.
+  template <typename F>
+  void draw(Rays<F>& r, const Inside<F>& inside, const F& u, const Mask<F>& lanes) const;
+  /// Samples the distance by lights, with the stored number, in a medium that ends at `far`.
+  template <typename F>
+  LampWay<F> draw_by_lamps(Rays<F>& r, const InteriorMedium<F>& medium, const F& far,
+                           const Mask<F>& lanes) const;
+  /// Scatters at a collision. Returns the lanes whose path is terminated.
+  template <typename F>
+  Mask<F> turn(const InteriorRays& all, Rays<F>& r, const InteriorMedium<F>& medium,
+               const F& length, const Mask<F>& lanes) const;
+  /// Advances rays to their next bound or collision, finishes those that end, and lists the others
+  /// from `left` on. Returns the number of listed rays.
+  template <typename F>
+  size_t advance(const InteriorRays& all, const HitSpan& hits, const InteriorEvents& events,
+                 Rays<F>& r, size_t left) const;
+  /// State of rays that end, at a surface, at a collision or outside the scene.
+  template <typename F>
+  struct SegmentEnd {
+    InsideRow<F> inside;
+    UInt<F> material;    ///< of the event, or Flights::kNoEvent
+    Mask<F> terminated;  ///< lanes whose path ends here
+  };
+  /// Stores hit, event and path of the rays in the lanes `done`.
+  template <typename F>
+  void finish(const InteriorRays& all, const HitSpan& hits, const InteriorEvents& events,
+              const Rays<F>& r, const SegmentEnd<F>& end, const Mask<F>& done) const;
+  /// Advances shadow rays.
+  template <typename F>
+  size_t advance_shadow(const InteriorRays& all, float* const (&product)[3], Rays<F>& r,
+                        size_t left) const;
+  template <typename F>
+  size_t put(const InteriorRays& all, const Rays<F>& r, const Mask<F>& goes_on, size_t left) const;
+  /// Advances the listed rays until none is left.
+  template <typename F, typename Advance>
+  void run(const InteriorRays& all, size_t left, PresenceKeys keys, const Advance& advance) const;
+
+  const SceneView& scene_;
+  const EmbreeAccelerator& accel_;
+  uint32_t width_;
+  bool by_lamps_;
+  const InteriorBuffers& b_;
+  Counts& counts_;
+};
+
+template <typename F, typename Advance>
+inline void Interiors::run(const InteriorRays& all, size_t left, PresenceKeys keys,
+                           const Advance& advance) const {
+  using U = UInt<F>;
+  const uint32_t salt = keys.salt;
+  for (uint32_t step = 1; left > 0; ++step) {
+    keys.salt = salt + 0x10000u * step;
+    trace(left, keys);
+    const size_t n = left;
+    left = 0;
+    for (size_t j = 0; j < n; j += kWidth<F>) {
+      counts_.walk_lanes += kWidth<F>;
+      const Mask<F> active = first_lanes<F>(n - j);
+      const U who = load<U>(b_.columns.uints(kWho) + j);
+      Rays<F> r{who, active, load_row<detail::InteriorState, F>(states(), who, active),
+                load_row<detail::InteriorLoad, F>(loads(all.size), who, active),
+                hit_at<F>(traced(), j)};
+      left += advance(r, left);
+    }
+  }
+}
+
+template <typename F, typename Start>
+inline void Interiors::fly(const InteriorRays& rays, const HitSpan& hits,
+                           const InteriorEvents& events, const Inside<float>* around,
+                           PresenceKeys keys, const Start& start) const {
+  using U = UInt<F>;
+  const uint32_t kind = keys.ray_kind;
+  size_t left = 0;
+  for (size_t i = 0; i < rays.size; i += kWidth<F>) {
+    const Mask<F> active = first_lanes<F>(rays.size - i);
+    const U slot = load<U>(rays.slot + i);
+    const PathRow<F> path = load_row<PathRow, F>(rays.paths, slot, active);
+    const InsideRow<F> row = load_row<InsideRow, F>(rays.inside, slot, active);
+    Inside<F> inside = around ? around->template everywhere<F>() : Inside<F>(row);
+    if (!around) inside.cross(scene_.interiors, row.place, row.crossed, kBounceCrosses, active);
+    const InteriorStart<F> begins = start(i, path);
+    const auto three = [&](float* const(&k)[3]) {
+      return Vec3<F>(load<F>(k[0] + i), load<F>(k[1] + i), load<F>(k[2] + i));
+    };
+    const Color<F>& sum = path.throughput;
+    Rays<F> r;
+    r.who = lane_index<F>() + static_cast<uint32_t>(i);
+    r.active = active;
+    r.s = {three(rays.o),
+           three(rays.d),
+           path.throughput,
+           F(0.f),
+           F(sum.x + sum.y + sum.z),
+           F(kFar * F(1.f + begins.first)),
+           begins.seed,
+           U(0u),
+           begins.hero,
+           U(0u)};
+    inside.store_in(r.l);
+    r.l.absorbed = r.l.ratio = Color<F>(F(1.f));
+    r.l.time = rays.times ? load<F>(rays.times + i) : F(0.f);
+    r.hit = hit_at<F>(hits, i);
+    r.kind = kind;
+    draw<F>(r, inside, begins.first, active);
+    left +=
+        scene_.visibility ? put<F>(rays, r, active, left) : advance<F>(rays, hits, events, r, left);
+  }
+  // The first hits leave out bounds that are invisible to these rays. The rays must still enter and
+  // leave them.
+  if (scene_.visibility) keys.ray_kind = kSeenByAll;
+  run<F>(rays, left, keys, [&](Rays<F>& r, size_t at) {
+    r.kind = kind;
+    return advance<F>(rays, hits, events, r, at);
+  });
+}
+
+template <typename F>
+inline void Interiors::pass(const InteriorRays& rays, const float* most, float* const (&product)[3],
+                            PresenceKeys keys) const {
+  using U = UInt<F>;
+  // Rays also enter and leave bounds that do not attenuate them.
+  const PresenceKeys asked = keys;
+  keys.ray_kind = kSeenByAll;
+  keys.shadow_set = nullptr;
+  size_t left = 0;
+  for (size_t i = 0; i < rays.size; i += kWidth<F>) {
+    const F length = load<F>(most + i);
+    const Mask<F> active = first_lanes<F>(rays.size - i) & (length > 0.f);
+    const U slot = load<U>(rays.slot + i);
+    const InsideRow<F> row = load_row<InsideRow, F>(rays.inside, slot, active);
+    Inside<F> inside(row);
+    inside.cross(scene_.interiors, row.place, row.crossed, kShadowCrosses, active);
+    const auto three = [&](float* const(&k)[3]) {
+      return Vec3<F>(load<F>(k[0] + i), load<F>(k[1] + i), load<F>(k[2] + i));
+    };
+    Rays<F> r;
+    r.who = lane_index<F>() + static_cast<uint32_t>(i);
+    r.active = active;
+    r.s = {three(rays.o), three(rays.d), Color<F>(F(0.f)), F(0.f), F(0.f), length, U(0u), U(0u),
+           U(0u),         U(0u)};
+    inside.store_in(r.l);
+    r.l.absorbed = r.l.ratio = Color<F>(F(1.f));
+    r.l.time = rays.times ? load<F>(rays.times + i) : F(0.f);
+    left += put<F>(rays, r, active, left);
+  }
+  run<F>(rays, left, keys, [&](Rays<F>& r, size_t at) {
+    r.kind = kSeenByShadowRays;
+    if (asked.shadow_set) {
+      const U slot = gather<U>(rays.slot, r.who, Mask<U>(r.active));
+      r.shadow_set = gather<U>(asked.shadow_set, slot * asked.shadow_stride, Mask<U>(r.active));
+    }
+    return advance_shadow<F>(rays, product, r, at);
+  });
+}
+
+/// A ray in an arbitrary direction leaves the bounds that it has not entered. The first one that it
+/// leaves is the innermost.
+inline Inside<float> Interiors::surround(Vec3<float> p, float time, PresenceKeys keys) const {
+  keys.ray_kind = kSeenByAll;
+  Bound<float> left[kMostInside];
+  size_t count = 0;
+  Inside<float> entered;
+  const SoaBlock& c = b_.columns;
+  const Vec3<float> d = normalize(Vec3<float>(0.4834f, 0.6291f, 0.6087f));
+  for (uint32_t i = 0; i < kLongWalk; ++i) {
+    const float ray[7] = {p.x, p.y, p.z, d.x, d.y, d.z, kFar};
+    for (size_t k = 0; k < 7; ++k) c.floats(kO + k)[0] = ray[k];
+    c.uints(kSlot)[0] = 0;
+    c.floats(kTime)[0] = time;
+    trace(1, keys);
+    const Hit<float> h = hit_at<float>(traced(), 0);
+    if (h.inst == kNoHit) break;
+    const float past = past_hit<float>(h.t);
+    p = fma(d, past, p);
+    if (h.inst == kLightShape) continue;
+    const HitPlace<float> place = hit_place<float>(scene_, h.inst, h.geom, h.prim, true);
+    if (!scene_.interiors.is_bound(place.material) ||
+        detail::is_curved<float>(scene_, place.mesh, true))
+      continue;
+    const Surface<float> at = setup_surface<float>(
+        scene_, {h.inst, place.mesh, h.prim, h.u, h.v, time}, d, false, false, true);
+    p = spawn_origin<float>(at, d);
+    const Bound<float> bound{place.object, place.material};
+    if (dot(d, at.ng) < 0)
+      entered.enter(bound, true);
+    else if (entered.holds(bound.place))
+      entered.leave(bound.place, true);
+    else if (count < kMostInside)
+      left[count++] = bound;
+  }
+  Inside<float> inside;
+  while (count > 0) inside.enter(left[--count], true);
+  return inside;
+}
+
+}  // namespace wavecomb
+
+#include "wavecomb/medium/nested/ray_steps.h"

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Data of rays through media inside meshes (nested_media.h).
+#pragma once
+
+#include "wavecomb/accel/embree_accelerator.h"
+#include "wavecomb/geometry/hit/hit_material.h"
+#include "wavecomb/medium/nested/buffers.h"
+#include "wavecomb/medium/nested/medium_stack.h"
+
+namespace wavecomb {
+
+/// Columns of rays, and the rows of their paths.
+struct InteriorRays {
+  float *o[3], *d[3];    ///< updated if a path has scattered
+  const uint32_t* slot;  ///< row of each path
+  size_t size;
+  const float* times;  ///< shutter times; null without motion
+  float* paths;        ///< PathRow
+  float* inside;       ///< InsideRow
+};
+
+/// Results of the rays, as in Flights, and the transmittance of absorption. With `limited`, `t` and
+/// `material` initially hold the event in a volume that stops each ray. Such an event no longer
+/// applies to a ray that has scattered, whose hero becomes kNoHero.
+struct InteriorEvents {
+  bool limited;
+  float* t;
+  uint32_t* material;
+  float *ratio[3], *absorbed[3];
+  uint32_t* hero;
+};
+
+/// Start of a ray through media: the hero channel, the random number of the first distance, and the
+/// seed for all other random numbers.
+template <typename F>
+struct InteriorStart {
+  UInt<F> hero, seed;
+  F first;
+};
+
+/// Mesh and material of a hit, and its object as placed_geometry().
+template <typename F>
+struct HitPlace {
+  UInt<F> mesh, material, object;
+};
+template <typename F>
+inline HitPlace<F> hit_place(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
+                             const UInt<F>& prim, const Mask<F>& active) {
+  using U = UInt<F>;
+  const auto of_instance = [&](auto member) {
+    return gather_member<F>(scene.instances, member, inst, active);
+  };
+  const U mesh = gather<U>(scene.geometry_mesh, of_instance(&InstanceRecord::geometry) + geom,
+                           Mask<U>(active));
+  return {mesh, hit_material<F>(scene, of_instance(&InstanceRecord::material), mesh, prim, active),
+          of_instance(&InstanceRecord::emissive) + geom};
+}
+
+namespace detail {
+
+/// State of a ray in progress.
+template <typename F>
+struct InteriorState {
+  Vec3<F> o, d;
+  Color<F> throughput;
+  F start;  ///< length covered since the last collision
+  F first;  ///< Walk::first
+  /// Distance to the next collision, or kFar. Until something scatters it is kFar (1 + u), which
+  /// stores the random number u of the first distance; u is stratified over a pixel's samples. For
+  /// shadow rays it is the remaining length.
+  F rest;
+  UInt<F> seed, number, hero, flags;
+  WAVECOMB_FIELDS(o, d, throughput, start, first, rest, seed, number, hero, flags)
+};
+/// Medium stack of a ray, and its attenuation since the last collision.
+template <typename F>
+struct InteriorLoad {
+  UInt<F> place_0, place_1, place_2, place_3, material_0, material_1, material_2, material_3;
+  Color<F> absorbed, ratio;
+  F time;
+  WAVECOMB_FIELDS(place_0, place_1, place_2, place_3, material_0, material_1, material_2,
+                  material_3, absorbed, ratio, time)
+};
+static_assert(kRowWords<InteriorState> + kRowWords<InteriorLoad> == InteriorBuffers::kWords);
+template <typename F>
+struct InteriorHit {
+  F t, u, v;
+  UInt<F> prim, geom, inst;
+};
+/// Packet of rays.
+template <typename F>
+struct InteriorPacket {
+  UInt<F> who;  ///< index among all rays
+  Mask<F> active;
+  InteriorState<F> s;
+  InteriorLoad<F> l;
+  InteriorHit<F> hit;
+  uint32_t kind = kSeenByAll;  ///< RayVisibility of the rays
+  UInt<F> shadow_set{0u};      ///< ShadowRow::set of shadow rays; 0 if all objects block them
+};
+/// Hits of a packet: surfaces, and which of them bound a medium or let the ray pass.
+template <typename F>
+struct InteriorMet {
+  Mask<F> surface, passes, bound;
+  F outer{1.f};
+  UInt<F> object{0u};
+};
+
+}  // namespace detail
+
+}  // namespace wavecomb

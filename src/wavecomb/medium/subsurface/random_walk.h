@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Subsurface random walks in homogeneous media, collision by collision.
+///
+/// A walk begins where a diffuse lobe enters a subsurface body (OpenPbrBsdf::enters) and ends where
+/// it hits the surface of the same object from inside. There the path continues at a white diffuse
+/// surface, seen from outside, with a light sample and a bounce. Nothing is refracted at either
+/// end. Uniform incident light therefore leaves uniformly, and a flat surface has the requested
+/// colour (medium/description/subsurface.h).
+///
+/// Techniques: each walk has a hero channel, which determines its distances (hero wavelengths,
+/// Wilkie et al. 2014), and is either free or guided. A free walk follows the medium's phase
+/// function. A guided walk heads for the surface that it entered by (Krivanek and d'Eon, "A
+/// Zero-Variance-Based Sampling Scheme for Monte Carlo Subsurface Scattering", 2014): with n the
+/// normal there, mu = d n, and nu the diffusion length in mean free paths, it samples
+///
+///   p(d) = 1 / (2 pi (nu - mu) ln((nu + 1) / (nu - 1))),
+///   p(t) = s exp(-s t),   s = (1 - mu / nu) e
+///
+/// where e is the extinction. A random number that is stratified over the pixel's samples selects
+/// the technique, and the weight includes all six techniques (balance heuristic over whole walks).
+/// With q_k the probabilities of the techniques and p_k their densities,
+///
+///   T_c = T_c(0) A_c p_c / sum over k of q_k p_k
+///
+/// where A_c is the product of the albedos along the walk and p_c the density of a free walk of
+/// channel c. No weight therefore exceeds one over the probability of free walks.
+#pragma once
+
+#include <algorithm>
+
+#include "wavecomb/core/frame.h"
+#include "wavecomb/core/math.h"
+#include "wavecomb/light/sampling/tree_choice.h"
+#include "wavecomb/medium/description/subsurface.h"
+#include "wavecomb/medium/volume/henyey_greenstein.h"
+
+namespace wavecomb {
+
+/// Number of collisions after which a walk continues only with probability 1/2 per collision. This
+/// guarantees termination and keeps the mean.
+inline constexpr uint32_t kLongWalk = 512;
+/// Fraction of the initial light below which a walk is subject to roulette.
+inline constexpr float kFaintWalk = 0.25f;
+/// Fraction of walks that are guided, in a thick body with isotropic scattering.
+inline constexpr float kLedShare = 0.75f;
+
+/// State of a walk before its next collision.
+template <typename F>
+struct Walk {
+  Vec3<F> o, d;
+  Color<F> throughput;
+  F first;            ///< sum of the channels of the initial throughput
+  F rest;             ///< distance to the next collision, after begin_flight()
+  UInt<F> seed;       ///< seed of its random numbers
+  UInt<F> number;     ///< number of collisions so far
+  UInt<F> normal;     ///< pack_normal() of the outward normal of the surface that it entered by
+  F choice, flight;   ///< random numbers for the technique and the first distance
+  UInt<F> technique;  ///< hero channel, plus kLed if the walk is guided
+  Color<F> free;      ///< q_k p_k of free walks by channel, relative to the sum over all techniques
+  Color<F> led;       ///< the same quantity for guided walks
+
+  static constexpr uint32_t kLed = 4;
+
+  UInt<F> channel() const { return technique & 3u; }
+  Mask<F> is_led() const { return Mask<F>(technique >= UInt<F>(kLed)); }
+};
+
+/// Returns four random numbers for collision `number`.
+template <typename F>
+inline Sample4<F> walk_numbers(const UInt<F>& seed, const UInt<F>& number) {
+  using U = UInt<F>;
+  const U a = hash_u32<U>(seed, number);
+  return {unit_float<F>(hash_u32<U>(a ^ 0x68bc21ebu)), unit_float<F>(hash_u32<U>(a ^ 0x02e5be93u)),
+          unit_float<F>(hash_u32<U>(a ^ 0x967a889bu)), unit_float<F>(hash_u32<U>(a ^ 0x368cc8b7u))};
+}
+
+namespace detail {
+
+template <typename F>
+inline Vec3<F> walk_normal(const Walk<F>& w) {
+  return normalize(unpack_normal<F>(w.normal));
+}
+template <typename F>
+inline F component(const Color<F>& c, const UInt<F>& channel) {
+  using U = UInt<F>;
+  return select(channel == U(0u), c.x, select(channel == U(1u), c.y, c.z));
+}
+template <typename F>
+inline F sum(const Color<F>& c) {
+  return c.x + c.y + c.z;
+}
+/// Returns f(a_c, b_c) for each channel c.
+template <typename F, typename Function>
+inline Color<F> each_channel(const Color<F>& a, const Color<F>& b, const Function& f) {
+  return {f(a.x, b.x), f(a.y, b.y), f(a.z, b.z)};
+}
+/// Applies a step with these densities by technique, which multiplies the light of the walk by
+/// `through`.
+template <typename F>
+inline void weigh_step(const Color<F>& free, const Color<F>& led, const Color<F>& through,
+                       Walk<F>& w) {
+  w.free = w.free * free;
+  w.led = w.led * led;
+  const F all = sum(w.free) + sum(w.led);
+  const F scale = select(all > 0.f, F(1.f / all), F(0.f));
+  w.free = w.free * scale;
+  w.led = w.led * scale;
+  w.throughput = w.throughput * through * scale;
+}
+/// Returns s / e by channel. The first flight follows the direction of the lobe with the extinction
+/// of the medium.
+template <typename F>
+inline Color<F> led_density(const WalkMedium<F>& medium, const Walk<F>& w) {
+  const F mu = select(Mask<F>(w.number == UInt<F>(0u)), F(0.f), dot(w.d, walk_normal(w)));
+  const auto density = [&](const F& nu) { return max(F(1.f - mu / nu), F(1e-3f)); };
+  return {density(medium.diffusion.x), density(medium.diffusion.y), density(medium.diffusion.z)};
+}
+
+}  // namespace detail
+
+/// Selects the technique of a walk that enters a body. `across` is the thickness of the object
+/// along the ray. Channels are selected by the light that a thick body would reflect. Few walks are
+/// guided if the body is thin or scattering is anisotropic.
+template <typename F>
+inline void choose_technique(const WalkMedium<F>& medium, const F& across, Walk<F>& w) {
+  using U = UInt<F>;
+  const Color<F> part = w.throughput * medium.color;
+  const Color<F> share = part * F(1.f / max(detail::sum(part), F(1e-30f)));
+  const F depth = across * abs(dot(w.d, detail::walk_normal(w)));
+  const F even = 1.f - abs(medium.anisotropy);
+  const Color<F> part_led = detail::each_channel<F>(
+      medium.extinction, medium.diffusion, [&](const F& extinction, const F& nu) {
+        return F(F(kLedShare) * even * even * even * (1.f - exp(F(-(depth * extinction / nu)))));
+      });
+  w.led = share * part_led;
+  w.free = share - w.led;
+  w.technique = U(Walk<F>::kLed + 2u);
+  F after = detail::sum(w.free) + w.led.x + w.led.y;
+  const auto before = [&](const F& size, uint32_t technique) {
+    w.technique = select(Mask<U>(w.choice < after), U(technique), w.technique);
+    after = after - size;
+  };
+  before(w.led.y, Walk<F>::kLed + 1u);
+  before(w.led.x, Walk<F>::kLed);
+  before(w.free.z, 2u);
+  before(w.free.y, 1u);
+  before(w.free.x, 0u);
+}
+
+/// Samples the distance of a walk to its next collision.
+template <typename F>
+inline void begin_flight(const WalkMedium<F>& medium, Walk<F>& w) {
+  using U = UInt<F>;
+  const U channel = w.channel();
+  const F denser = detail::component<F>(detail::led_density(medium, w), channel);
+  const F extinction =
+      detail::component<F>(medium.extinction, channel) * select(w.is_led(), denser, F(1.f));
+  const F number =
+      select(Mask<F>(w.number == U(0u)), w.flight, walk_numbers<F>(w.seed, w.number).x);
+  w.rest = max(F(-log(F(1.f - number)) / extinction), F(1e-30f));
+}
+
+/// Advances a walk by `t`, to a collision where `collides`, otherwise to the surface. Returns the
+/// lanes that continue, without those that have reached the surface.
+template <typename F>
+inline Mask<F> end_flight(const WalkMedium<F>& medium, const F& t, const Mask<F>& collides,
+                          Walk<F>& w) {
+  using U = UInt<F>;
+  const auto density = [&](const F& extinction, const F& denser) {
+    const F thick = extinction * denser;
+    const F through = exp(F(-thick * t));
+    return select(collides, F(through * thick), through);
+  };
+  const Color<F> free = detail::each_channel<F>(medium.extinction, Color<F>(F(1.f)), density);
+  const Color<F> led =
+      detail::each_channel<F>(medium.extinction, detail::led_density(medium, w), density);
+  detail::weigh_step<F>(free, led, select<F>(collides, free * medium.albedo, free), w);
+  w.o = fma(w.d, t, w.o);
+
+  // The random numbers of the collision follow the number of the flight.
+  const Sample4<F> r = walk_numbers<F>(w.seed, U(w.number + 0x80000000u));
+  const F left = detail::sum(w.throughput);
+  F q = select(left < F(kFaintWalk) * w.first, F(left / w.first), F(1.f));
+  q = select(w.number >= kLongWalk, F(0.5f * q), q);
+  const Mask<F> on = collides & (r.z < q);
+  if (none(on)) return on;
+  const Vec3<F> d = w.d;
+  const Color<F> throughput = w.throughput;
+  w.throughput = w.throughput * F(F(1.f) / select(on, q, F(1.f)));
+
+  const U channel = w.channel();
+  const Mask<F> is_led = w.is_led();
+  const F g = select(abs(medium.anisotropy) < F(kLeastMeanCosine), F(0.f), medium.anisotropy);
+  const F nu = detail::component<F>(medium.diffusion, channel);
+  const F log_nu = detail::component<F>(medium.log_diffusion, channel);
+  const F c = select(is_led, clamp(F(nu - (nu + 1.f) * exp(F(-(r.x * log_nu)))), F(-1.f), F(1.f)),
+                     sample_henyey_greenstein<F>(g, r.x));
+  const F s = safe_sqrt(F(1.f - c * c));
+  const SinCos<F> turn = sincos_2pi(r.y);
+  const Vec3<F> n = detail::walk_normal(w);
+  const Vec3<F> next = normalize(make_frame<F>(select<F>(is_led, n, w.d))
+                                     .to_world(Vec3<F>(F(s * turn.cos), F(s * turn.sin), c)));
+  const F phase = henyey_greenstein<F>(g, dot(w.d, next));
+  const F mu = dot(next, n);
+  const Color<F> lead = detail::each_channel<F>(
+      medium.diffusion, medium.log_diffusion, [&](const F& wide, const F& log_wide) {
+        return F(kInv2Pi / (max(F(wide - mu), F(1e-3f)) * log_wide * phase));
+      });
+  w.d = next;
+  detail::weigh_step<F>(Color<F>(F(1.f)), lead, Color<F>(F(1.f)), w);
+  w.number = w.number + 1u;
+  w.d = select<F>(on, w.d, d);
+  w.throughput = select<F>(on, w.throughput, throughput);
+  return on;
+}
+
+/// Returns the subsurface medium of a material.
+template <typename F>
+inline WalkMedium<F> walk_medium(const WalkView& view, const UInt<F>& material,
+                                 const Mask<F>& active) {
+  return load_row<WalkMedium, F>(reinterpret_cast<const float*>(view.media), material, active);
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Subsurface random walks of a wave. All walks take one step at a time, and the remaining ones are
+/// compacted, so that lanes stay full.
+#pragma once
+
+#include "wavecomb/accel/embree_accelerator.h"
+#include "wavecomb/core/rows/soa.h"
+#include "wavecomb/medium/subsurface/random_walk.h"
+#include "wavecomb/scene/scene.h"
+
+namespace wavecomb {
+
+/// End of a walk at the surface.
+template <typename F>
+struct WalkEnd {
+  Vec3<F> p, d;  ///< hit point, and direction in which the walk arrived
+  Color<F> throughput;
+  F u, v;
+  UInt<F> prim, geom, inst;
+  UInt<F> material, collisions;
+};
+
+/// Columns of walks, in a block that the caller owns.
+///
+/// Contract: the random numbers of a walk depend only on that walk, so that neither order nor lane
+/// width has an effect.
+class Walkers {
+ public:
+  static constexpr size_t kColumns = 36;
+  explicit Walkers(const SoaBlock& block) : c_(block) {}
+
+  size_t size() const { return size_; }
+
+  static constexpr uint32_t kNoMedium = 0xffffffffu;
+
+  /// Adds the walks in the active lanes. `who` is passed to `finish`, and `slot` is the path's
+  /// slot.
+  template <typename F>
+  void add(const Walk<F>& w, const UInt<F>& who, const UInt<F>& slot, const F& time,
+           const Mask<F>& active) {
+    size_ += put<F>(size_, {w, who, slot, UInt<F>(kNoMedium), time}, active);
+  }
+
+  /// Starts the added walks. medium_of(inst, geom, prim, met) returns the material that they hit on
+  /// their object, which `keys` specify, or kNoMedium. Calls leave(lanes, slot) for paths that do
+  /// not start a walk.
+  template <typename F, typename MediumOf, typename Leave>
+  void enter(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
+             const PresenceKeys& keys, const MediumOf& medium_of, const Leave& leave) {
+    using U = UInt<F>;
+    trace(scene, accel, width, keys, nullptr);
+    size_t left = 0;
+    for (size_t i = 0; i < size_; i += kWidth<F>) {
+      const Mask<F> active = first_lanes<F>(size_ - i);
+      const U inst = load<U>(c_.uints(kHitInst) + i);
+      Row<F> row = get<F>(i);
+      row.material =
+          medium_of(inst, load<U>(c_.uints(kHitGeom) + i), load<U>(c_.uints(kHitPrim) + i),
+                    Mask<F>(active & Mask<F>(inst != U(kNoHit))));
+      const Mask<F> walks = active & Mask<F>(row.material != U(kNoMedium));
+      choose_technique<F>(walk_medium<F>(scene.walks, row.material, walks),
+                          load<F>(c_.floats(kHitT) + i), row.walk);
+      if (any(Mask<F>(active & not_(walks)))) leave(Mask<F>(active & not_(walks)), row.slot);
+      left += put<F>(left, row, walks);
+    }
+    size_ = left;
+  }
+
+  /// Runs all walks to their end. `keys` are indexed by path slot and specify the objects; their
+  /// salt is that of the ray that entered. Calls finish(lanes, who, end, came) for walks that have
+  /// ended. Lanes in `came` have reached the surface.
+  template <typename F, typename Finish>
+  void run(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
+           PresenceKeys keys, uint64_t& steps, uint64_t& lanes, const Finish& finish) {
+    using U = UInt<F>;
+    const uint32_t salt = keys.salt;
+    for (uint32_t step = 0; size_ > 0; ++step) {
+      for (size_t i = 0; i < size_; i += kWidth<F>) {
+        Row<F> row = get<F>(i);
+        const Mask<F> active = first_lanes<F>(size_ - i);
+        begin_flight<F>(walk_medium<F>(scene.walks, row.material, active), row.walk);
+        store(c_.floats(kRest) + i, row.walk.rest);
+      }
+      keys.salt = salt + 0x10000u * (step + 1);
+      trace(scene, accel, width, keys, c_.floats(kRest));
+      steps += size_;
+      size_t left = 0;
+      for (size_t i = 0; i < size_; i += kWidth<F>) {
+        lanes += kWidth<F>;
+        const Mask<F> active = first_lanes<F>(size_ - i);
+        Row<F> row = get<F>(i);
+        Walk<F>& w = row.walk;
+        const U inst = load<U>(c_.uints(kHitInst) + i);
+        const F hit_t = load<F>(c_.floats(kHitT) + i);
+        const Mask<F> collides = active & Mask<F>(inst == U(kNoHit));
+        const Mask<F> own = active & not_(collides);
+        Walk<F> after = w;
+        const F t = select(own, hit_t, w.rest);
+        const Mask<F> goes_on =
+            end_flight<F>(walk_medium<F>(scene.walks, row.material, active), t, collides, after);
+        const Mask<F> ended = active & not_(goes_on);
+        if (any(ended)) {
+          const WalkEnd<F> end{after.o,
+                               after.d,
+                               after.throughput,
+                               load<F>(c_.floats(kHitU) + i),
+                               load<F>(c_.floats(kHitV) + i),
+                               load<U>(c_.uints(kHitPrim) + i),
+                               load<U>(c_.uints(kHitGeom) + i),
+                               inst,
+                               row.material,
+                               w.number};
+          finish(ended, row.who, end, Mask<F>(ended & own));
+        }
+        row.walk = after;
+        left += put<F>(left, row, active & not_(ended));
+      }
+      size_ = left;
+    }
+  }
+
+ private:
+  enum Column : size_t {
+    kO,
+    kD = kO + 3,
+    kThroughput = kD + 3,
+    kFree = kThroughput + 3,
+    kLed = kFree + 3,
+    kFirst = kLed + 3,
+    kRest,
+    kSeed,
+    kNumber,
+    kNormal,
+    kChoice,
+    kFlight,
+    kTechnique,
+    kWho,
+    kSlot,
+    kMaterial,
+    kTime,
+    kHitT,
+    kHitU,
+    kHitV,
+    kHitPrim,
+    kHitGeom,
+    kHitInst,
+    kEnd
+  };
+  static_assert(kEnd <= kColumns);
+
+  void trace(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
+             const PresenceKeys& keys, const float* tfar) const {
+    accel.intersect({c_.floats(kO), c_.floats(kO + 1), c_.floats(kO + 2), c_.floats(kD),
+                     c_.floats(kD + 1), c_.floats(kD + 2), tfar, c_.uints(kSlot), size_,
+                     scene.has_motion ? c_.floats(kTime) : nullptr},
+                    {c_.floats(kHitT), c_.floats(kHitU), c_.floats(kHitV), c_.uints(kHitPrim),
+                     c_.uints(kHitGeom), c_.uints(kHitInst)},
+                    width, false, keys);
+  }
+
+  template <typename F>
+  struct Row {
+    Walk<F> walk;
+    UInt<F> who, slot, material;
+    F time;
+  };
+
+  template <typename F>
+  Row<F> get(size_t i) const {
+    using U = UInt<F>;
+    const auto real = [&](size_t column) { return load<F>(c_.floats(column) + i); };
+    const auto number = [&](size_t column) { return load<U>(c_.uints(column) + i); };
+    const auto three = [&](size_t column) {
+      return Vec3<F>(real(column), real(column + 1), real(column + 2));
+    };
+    return {{three(kO), three(kD), three(kThroughput), real(kFirst), real(kRest), number(kSeed),
+             number(kNumber), number(kNormal), real(kChoice), real(kFlight), number(kTechnique),
+             three(kFree), three(kLed)},
+            number(kWho),
+            number(kSlot),
+            number(kMaterial),
+            real(kTime)};
+  }
+  /// Stores the active lanes contiguously from `i` on, and returns their number. May overwrite up
+  /// to a packet behind them.
+  template <typename F>
+  size_t put(size_t i, const Row<F>& row, const Mask<F>& active) {
+    using U = UInt<F>;
+    size_t n = 0;
+    const auto real = [&](size_t column, const F& x) {
+      n = compress_store<F>(c_.floats(column) + i, x, active);
+    };
+    const auto number = [&](size_t column, const U& x) {
+      compress_store<U>(c_.uints(column) + i, x, Mask<U>(active));
+    };
+    const auto three = [&](size_t column, const Vec3<F>& x) {
+      real(column, x.x);
+      real(column + 1, x.y);
+      real(column + 2, x.z);
+    };
+    const Walk<F>& w = row.walk;
+    three(kO, w.o);
+    three(kD, w.d);
+    three(kThroughput, w.throughput);
+    three(kFree, w.free);
+    three(kLed, w.led);
+    real(kFirst, w.first);
+    real(kRest, w.rest);
+    real(kChoice, w.choice);
+    real(kFlight, w.flight);
+    real(kTime, row.time);
+    number(kSeed, w.seed);
+    number(kNumber, w.number);
+    number(kNormal, w.normal);
+    number(kTechnique, w.technique);
+    number(kWho, row.who);
+    number(kSlot, row.slot);
+    number(kMaterial, row.material);
+    return n;
+  }
+
+  const SoaBlock& c_;
+  size_t size_ = 0;
+};
+
+}  // namespace wavecomb

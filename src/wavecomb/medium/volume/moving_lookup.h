@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Lookup of volume fields at the time of a ray. The value at p is the field's value at p - v(p) t,
+/// where v is the velocity at p and t the time in seconds since the grids were sampled.
+///
+/// Moving volumes are traversed by the cells of a grid that bounds the field over the whole shutter
+/// interval (medium/description/volume_motion.h), others by the cells of the field's grid. All
+/// lanes use the same one of the two.
+#pragma once
+
+#include "wavecomb/medium/volume/grid_lookup.h"
+
+namespace wavecomb {
+
+/// Returns the cells for traversing a volume's density.
+inline const PlacedGrid& flown_cells(const VolumeRecord& v) {
+  return v.moves ? v.density_cells : v.density;
+}
+/// Returns the cells for traversing a volume's emission.
+inline const PlacedGrid& glow_cells(const VolumeRecord& v) {
+  return v.moves ? v.glow_cells : v.glow;
+}
+
+/// Returns the seconds at a shutter time from 0 to 1.
+template <typename F>
+inline F seconds_at(const VolumeRecord& v, const F& time) {
+  return fma(time, F(v.seconds_span), F(v.seconds_open));
+}
+
+/// Returns the position, in bricks, at which a field is read for `p`.
+template <typename F>
+inline Vec3<F> drifted(const FieldDrift& drift, const GridView& velocity, const Vec3<F>& p,
+                       const F& seconds, const Mask<F>& active) {
+  const Color<F> v = grid_color<F>(velocity, bricks_point<F>(drift.to_velocity, p), active);
+  const Vec3<F> way = bricks_vector<F>(drift.per_second, v) * seconds;
+  return bricks_point<F>(drift.to_bricks, p) - way;
+}
+
+/// Returns the density at `p`, in the space of `flown_cells`.
+template <typename F>
+inline F density_at(const VolumeRecord& v, const Vec3<F>& p, const F& seconds,
+                    const Mask<F>& active) {
+  if (!v.moves) return grid_value<F>(v.density.grid, p, active);
+  return grid_value<F>(v.density.grid, drifted<F>(v.density_drift, v.velocity, p, seconds, active),
+                       active);
+}
+/// Returns the emission field at `p`, in the space of `glow_cells`, at a shutter time.
+template <typename F>
+inline Color<F> glow_at(const VolumeRecord& v, const Vec3<F>& p, const F& time,
+                        const Mask<F>& active) {
+  if (!v.moves) return grid_color<F>(v.glow.grid, p, active);
+  return grid_color<F>(
+      v.glow.grid, drifted<F>(v.glow_drift, v.velocity, p, seconds_at<F>(v, time), active), active);
+}
+/// Returns the colour field at a point in world space, at a shutter time.
+template <typename F>
+inline Color<F> tint_at(const VolumeRecord& v, const Vec3<F>& p, const F& time,
+                        const Mask<F>& active) {
+  if (!v.moves || !v.color.grid.table)
+    return grid_color<F>(v.color.grid, bricks_point<F>(v.color.to_bricks, p), active);
+  return grid_color<F>(v.color.grid,
+                       drifted<F>(v.color_drift, v.velocity, p, seconds_at<F>(v, time), active),
+                       active);
+}
+
+}  // namespace wavecomb

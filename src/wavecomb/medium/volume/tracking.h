@@ -1,0 +1,316 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Free flights and transmittance along ray segments through volumes.
+///
+/// Uses null scattering (Miller, Georgiev and Jarosz, "A null-scattering path integral formulation
+/// of light transport", 2019): null collisions increase the extinction to a majorant that is
+/// constant in each cell of a grid, so that distances to collisions are exponential. Volumes are
+/// sampled one after the other. Where several overlap, the nearest of their collisions is the
+/// collision of all together, since the minimum of independent exponential distances is exponential
+/// with the sum of their rates.
+///
+/// The random numbers of collision i in volume v are hashes of (the path's numbers, v, i), so that
+/// the schedule has no effect.
+#pragma once
+
+#include "wavecomb/medium/volume/homogeneous.h"
+#include "wavecomb/medium/volume/moving_lookup.h"
+#include "wavecomb/medium/volume/ray_segments.h"
+
+namespace wavecomb {
+
+/// Random numbers of a ray segment: the sample values of its vertex set, some of which the first
+/// volume uses directly, since they are stratified over a pixel's samples, and a seed for all other
+/// numbers.
+template <typename F>
+struct Way {
+  Sample4<F> r;
+  UInt<F> seed;
+
+  Way(SamplerKind sampler, const SampleKey<F>& key, uint32_t depth, VertexSet set)
+      : r(sample_4d<F>(sampler, key, vertex_set(set, depth))),
+        seed(float_bits<F>(r.x) ^ hash_u32<UInt<F>>(key.pixel_hash, key.sample)) {}
+  Way(const Passage<F>& p, VertexSet set) : Way(p.sampler, p.key, p.depth, set) {}
+  /// Returns a copy with independent random numbers.
+  Way branch(uint32_t number) const {
+    Way other = *this;
+    other.seed = hash_u32<UInt<F>>(seed, UInt<F>(0x2545f491u + number));
+    return other;
+  }
+};
+
+namespace detail {
+
+/// Time in seconds, by lane, at which a visitor reads a moving volume.
+template <typename F>
+class WaySeconds {
+ public:
+  /// `times` is Ways::times.
+  WaySeconds(const VolumeRecord& v, const float* times) : v_(v), times_(times) {}
+  void start(const UInt<F>& way, const Mask<F>& lanes) {
+    if (v_.moves && times_)
+      seconds_ = select(lanes, seconds_at<F>(v_, gather<F>(times_, way, lanes)), seconds_);
+  }
+  const F& operator()() const { return seconds_; }
+
+ private:
+  const VolumeRecord& v_;
+  const float* times_;
+  F seconds_{0.f};
+};
+
+}  // namespace detail
+
+// ---- flights -----------------------------------------------------------------------------------
+
+namespace detail {
+
+/// Visitor that samples free flights through one volume.
+template <typename F>
+class FlightVisitor {
+  using U = UInt<F>;
+
+ public:
+  /// `times` is Ways::times.
+  FlightVisitor(const VolumeRecord& v, uint32_t material, const Flights& flights, FlightKeeps keeps,
+                const float* times)
+      : v_(v), seconds_(v, times), material_(material), flights_(flights), keeps_(keeps) {}
+
+  void start(const U& way, const Mask<F>& lanes) {
+    const U hero = gather<U>(flights_.hero, way, Mask<U>(lanes));
+    const F own = select(hero == U(0u), F(v_.extinction[0]),
+                         select(hero == U(1u), F(v_.extinction[1]), F(v_.extinction[2])));
+    of_hero_ = select(lanes, own, of_hero_);
+    ratio_ = select<F>(lanes, Color<F>(F(1.f)), ratio_);
+    stopped_ = stopped_ & not_(lanes);
+    seconds_.start(way, lanes);
+  }
+  Mask<F> collide(const Mask<F>& lanes, const F& x, const Vec3<F>& p, const F& majorant,
+                  CollisionNumbers<F>& numbers) {
+    const F density = density_at<F>(v_, p, seconds_(), lanes) / select(lanes, majorant, F(1.f));
+    const F real = min(F(density * of_hero_), F(1.f));
+    const Mask<F> stops = lanes & (numbers.next(lanes) < real);
+    if (!v_.is_grey) {
+      const F by_hero = F(1.f) / select(stops, real, F(1.f - real));
+      const auto channel = [&](const F& ratio, float extinction) {
+        const F share = min(F(density * extinction), F(1.f));
+        return select(lanes, F(ratio * select(stops, share, F(1.f - share)) * by_hero), ratio);
+      };
+      ratio_ = {channel(ratio_.x, v_.extinction[0]), channel(ratio_.y, v_.extinction[1]),
+                channel(ratio_.z, v_.extinction[2])};
+    }
+    stopped_ = stopped_ | stops;
+    x_ = select(stops, x, x_);
+    return stops;
+  }
+  void finish(const U& way, const Mask<F>& lanes) {
+    if (none(lanes)) return;
+    if (keeps_ != FlightKeeps::kRatios) {
+      const Mask<F> stops = lanes & stopped_;
+      scatter<F>(flights_.t, x_, way, stops);
+      scatter<U>(flights_.material, U(material_), way, Mask<U>(stops));
+    }
+    if (keeps_ == FlightKeeps::kStops || v_.is_grey) return;
+    const F* const ratio[3] = {&ratio_.x, &ratio_.y, &ratio_.z};
+    for (int k = 0; k < 3; ++k)
+      scatter<F>(flights_.ratio[k], F(gather<F>(flights_.ratio[k], way, lanes) * *ratio[k]), way,
+                 lanes);
+  }
+
+ private:
+  const VolumeRecord& v_;
+  WaySeconds<F> seconds_;
+  uint32_t material_;
+  const Flights& flights_;
+  FlightKeeps keeps_;
+  F of_hero_{0.f}, x_{0.f};
+  Color<F> ratio_{F(1.f)};
+  Mask<F> stopped_{false};
+};
+
+}  // namespace detail
+
+namespace detail {
+
+/// Samples free flights through one volume.
+template <typename F>
+inline void fly_in(const VolumeView& volumes, uint32_t i, const Ways& ways, const Flights& flights,
+                   FlightKeeps keeps, VolumeCounts& counts) {
+  const VolumeRecord& v = volumes.volumes[i];
+  FlightVisitor<F> visitor(v, volumes.first_material + i, flights, keeps, ways.times);
+  each_collision<F>(flown_cells(v), v.most_extinction, i, ways, counts, visitor);
+}
+
+}  // namespace detail
+
+/// Returns whether all volumes have the same extinction in all channels.
+inline bool are_grey(const VolumeView& volumes) {
+  return std::all_of(volumes.volumes, volumes.volumes + volumes.count,
+                     [](const VolumeRecord& v) { return v.is_grey; });
+}
+/// Returns whether flights have weights other than 1. `lamps` holds the lights that guide distances
+/// in homogeneous volumes, or is null.
+inline bool weigh_anything(const VolumeView& volumes, const LightView* lamps) {
+  return lamps || !are_grey(volumes);
+}
+
+/// Samples only where flights stop, in all volumes. `scratch` receives the original lengths of the
+/// segments, which are `ways.most` and `flights.t`.
+template <typename F>
+inline void stop_flights(const VolumeView& volumes, const Ways& ways, const Flights& flights,
+                         float* scratch, const LightView* lamps, VolumeCounts& counts) {
+  std::copy_n(flights.t, ways.count, scratch);
+  Ways original = ways;
+  original.most = scratch;
+  for (uint32_t i = 0; i < volumes.count; ++i)
+    if (lamps && is_drawn_by_lamps(volumes.volumes[i]))
+      fly_evenly<F>(volumes, i, original, flights, FlightKeeps::kStops, *lamps, counts);
+    else
+      detail::fly_in<F>(volumes, i, ways, flights, FlightKeeps::kStops, counts);
+}
+
+/// Computes the ratios after all stops are known. Flights through the first volumes went further
+/// than the final stop, so they are repeated up to it with the same random numbers. A flight that
+/// its own volume stopped keeps its original length and repeats exactly.
+template <typename F>
+inline void weigh_flights(const VolumeView& volumes, const Ways& ways, const Flights& flights,
+                          float* scratch, const LightView* lamps, VolumeCounts& counts) {
+  Ways original = ways, once_more = ways;
+  original.most = scratch;
+  once_more.most = scratch + ways.count;
+  for (uint32_t i = 0; i < volumes.count; ++i) {
+    if (lamps && is_drawn_by_lamps(volumes.volumes[i])) {
+      fly_evenly<F>(volumes, i, original, flights, FlightKeeps::kRatios, *lamps, counts);
+      continue;
+    }
+    if (volumes.volumes[i].is_grey) continue;
+    for (size_t k = 0; k < ways.count; ++k) {
+      scratch[ways.count + k] =
+          flights.material[k] == volumes.first_material + i ? scratch[k] : flights.t[k];
+      if (flights.hero[k] == Flights::kNoHero) scratch[ways.count + k] = 0;
+    }
+    detail::fly_in<F>(volumes, i, once_more, flights, FlightKeeps::kRatios, counts);
+  }
+}
+
+/// Runs stop_flights() and weigh_flights(). `ways.most` is `flights.t`, and `scratch` has room for
+/// two numbers per segment.
+template <typename F>
+inline void fly_through(const VolumeView& volumes, const Ways& ways, const Flights& flights,
+                        float* scratch, const LightView* lamps, VolumeCounts& counts) {
+  if (lamps || (volumes.count > 1 && !are_grey(volumes))) {
+    stop_flights<F>(volumes, ways, flights, scratch, lamps, counts);
+    weigh_flights<F>(volumes, ways, flights, scratch, lamps, counts);
+    return;
+  }
+  for (uint32_t i = 0; i < volumes.count; ++i)
+    detail::fly_in<F>(volumes, i, ways, flights, FlightKeeps::kBoth, counts);
+}
+
+/// Samples one flight in each lane.
+template <typename F>
+inline Flight<F> fly_through(const VolumeView& volumes, const Passage<F>& p,
+                             const Color<F>& throughput, const Mask<F>& active,
+                             const LightView* lamps, VolumeCounts& counts) {
+  using U = UInt<F>;
+  constexpr size_t kLanes = kWidth<F>;
+  const Way<F> way(p, VertexSet::kFlight);
+  const PacketWays<F> packet(p.o, p.d, p.t, way.seed, way.r.z, p.time, active);
+  alignas(64) float t[kLanes], ratio[3][kLanes], scale[3][kLanes], scratch[2 * kLanes];
+  alignas(64) uint32_t material[kLanes], hero[kLanes];
+  Ways ways = packet.ways();
+  std::copy_n(ways.most, kLanes, t);
+  ways.most = t;
+  store(material, U(uint32_t{Flights::kNoEvent}));
+  store(hero, hero_of<F>(way.r.y, throughput));
+  for (auto& one : ratio) store(one, F(1.f));
+  for (auto& one : scale) store(one, F(1.f));
+  fly_through<F>(
+      volumes, ways,
+      {t, material, {ratio[0], ratio[1], ratio[2]}, hero, {scale[0], scale[1], scale[2]}}, scratch,
+      lamps, counts);
+  const U stopped_by = load<U>(material);
+  const auto three = [](const float (&columns)[3][kLanes]) {
+    return Color<F>(load<F>(columns[0]), load<F>(columns[1]), load<F>(columns[2]));
+  };
+  return {Mask<F>(stopped_by != U(uint32_t{Flights::kNoEvent})), load<F>(t), stopped_by,
+          flight_weight<F>(three(ratio), throughput) * three(scale)};
+}
+
+// ---- transmittance -----------------------------------------------------------------------------
+
+namespace detail {
+
+/// Visitor that multiplies by the transmittance of one volume.
+template <typename F>
+class TransmittanceVisitor {
+  using U = UInt<F>;
+  static constexpr float kLittle = 0.1f;
+
+ public:
+  /// `times` is Ways::times.
+  TransmittanceVisitor(const VolumeRecord& v, float* const (&product)[3], const float* times)
+      : v_(v), seconds_(v, times), columns_(product) {}
+
+  void start(const U& way, const Mask<F>& lanes) {
+    const auto column = [&](int k) { return gather<F>(columns_[k], way, lanes); };
+    product_ = select<F>(lanes, Color<F>(column(0), column(1), column(2)), product_);
+    seconds_.start(way, lanes);
+  }
+  Mask<F> collide(const Mask<F>& lanes, const F& /*x*/, const Vec3<F>& p, const F& majorant,
+                  CollisionNumbers<F>& numbers) {
+    const F density = density_at<F>(v_, p, seconds_(), lanes) / select(lanes, majorant, F(1.f));
+    const auto kept = [&](float extinction) { return max(F(1.f - density * extinction), F(0.f)); };
+    Color<F> now =
+        product_ * Color<F>(kept(v_.extinction[0]), kept(v_.extinction[1]), kept(v_.extinction[2]));
+    const F q = min(F(max_component(now) * (1.f / kLittle)), F(1.f));
+    const Mask<F> ends = lanes & not_(numbers.next(lanes) < q);
+    now = now * F(F(1.f) / select(q > 0.f, q, F(1.f)));
+    product_ = select<F>(lanes, select<F>(ends, Color<F>(F(0.f)), now), product_);
+    return ends;
+  }
+  void finish(const U& way, const Mask<F>& lanes) {
+    const F* const product[3] = {&product_.x, &product_.y, &product_.z};
+    for (int k = 0; k < 3; ++k) scatter<F>(columns_[k], *product[k], way, lanes);
+  }
+
+ private:
+  const VolumeRecord& v_;
+  WaySeconds<F> seconds_;
+  float* const (&columns_)[3];
+  Color<F> product_{F(0.f)};
+};
+
+}  // namespace detail
+
+/// Multiplies each `product` by the transmittance of a ray segment: exactly for homogeneous
+/// volumes, and otherwise by ratio tracking (Novak, Selle and Jarosz, "Residual Ratio Tracking",
+/// 2014, eq. 9) with Russian roulette at low transmittance.
+template <typename F>
+inline void transmittance_through(const VolumeView& volumes, const Ways& ways,
+                                  float* const (&product)[3], VolumeCounts& counts) {
+  for (uint32_t i = 0; i < volumes.count; ++i) {
+    const VolumeRecord& v = volumes.volumes[i];
+    if (is_even(v)) {
+      pass_evenly<F>(v, ways, product, counts);
+      continue;
+    }
+    detail::TransmittanceVisitor<F> visitor(v, product, ways.times);
+    each_collision<F>(flown_cells(v), v.most_extinction, i, ways, counts, visitor);
+  }
+}
+
+/// Returns the transmittance of one ray segment in each lane, with the random numbers of `way`.
+template <typename F>
+inline Color<F> transmittance_through(const VolumeView& volumes, const Way<F>& way,
+                                      const RaySegment<F>& segment, const Mask<F>& active,
+                                      VolumeCounts& counts) {
+  const PacketWays<F> packet(segment.o, segment.d, segment.length, way.seed, way.r.z, segment.time,
+                             active);
+  alignas(64) float product[3][kWidth<F>];
+  for (auto& one : product) store(one, F(1.f));
+  float* const columns[3] = {product[0], product[1], product[2]};
+  transmittance_through<F>(volumes, packet.ways(), columns, counts);
+  return {load<F>(product[0]), load<F>(product[1]), load<F>(product[2])};
+}
+
+}  // namespace wavecomb

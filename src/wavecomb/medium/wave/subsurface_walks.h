@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Subsurface random walks: from the ray that enters a body to the point where the path leaves it,
+/// for all paths of a wave together.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <span>
+#include <utility>
+
+#include "wavecomb/geometry/hit/hit_material.h"
+#include "wavecomb/medium/nested/ray_columns.h"
+#include "wavecomb/medium/subsurface/walk_queue.h"
+#include "wavecomb/medium/volume/tracking.h"
+#include "wavecomb/wave/stages/trace.h"
+#include "wavecomb/wave/wave.h"
+
+namespace wavecomb {
+
+/// Base of Volumes for subsurface scattering.
+class WalksBelow {
+ public:
+  /// `counts` receives the statistics of walks. `walks` has Walkers::kColumns columns.
+  WalksBelow(const WaveContext& context, Counts& counts, const SoaBlock& walks)
+      : context_(context), counts_(counts), walks_(walks) {}
+
+  /// Returns whether the scene has subsurface scattering.
+  bool has_walks() const { return context_.scene.walks.media != nullptr; }
+  /// Runs the walk of the reference integrator for a path whose ray has entered a subsurface body
+  /// and hit `hit`. The passage leads to the hit. `keys` are those of the ray and include the
+  /// object. If the walk leaves the body, sets `came_out`, and `path` and `hit` describe a ray that
+  /// views the exit point from outside. Returns false if the walk was terminated inside. If the ray
+  /// does not hit the object, returns true with `path` and `hit` unchanged, except that path.pdf
+  /// becomes 0, since no light sample competes with the path.
+  template <typename Hit>
+  bool walk(const Passage<float>& p, const PresenceKeys& keys, PathState<float>& path, Hit& hit,
+            bool& came_out) const {
+    Walkers walkers(walks_);
+    walkers.add<float>(begin_walk<float>(p.sampler, p.key, p.depth, path.o, path.dir,
+                                         path.throughput, path.entry.normal),
+                       0u, 0u, p.time, true);
+    enter<float>(walkers, keys, 1, [](bool, uint32_t) {});
+    if (walkers.size() == 0) {
+      path.pdf = 0.f;
+      return true;
+    }
+    walkers.run<float>(context_.scene, *context_.accel, 1, keys, counts_.walk_steps,
+                       counts_.walk_lanes,
+                       [&](bool, uint32_t, const WalkEnd<float>& end, bool came) {
+                         came_out = came;
+                         const Seen<float> seen = from_outside(end);
+                         path.o = seen.o;
+                         path.dir = seen.d;
+                         path.throughput = end.throughput;
+                         hit.t = seen.t;
+                         hit.u = end.u;
+                         hit.v = end.v;
+                         hit.prim = end.prim;
+                         hit.geom = end.geom;
+                         hit.inst = end.inst;
+                       });
+    return came_out;
+  }
+  /// Returns the lanes of the rays at `i` that view the exit point of a walk.
+  template <typename F>
+  Mask<F> came_out(const Wave& wave, size_t i) const {
+    return Mask<F>(load<UInt<F>>(wave.ways.uints(kExit) + i) != UInt<F>(0u));
+  }
+  uint32_t exit_material() const { return context_.scene.walks.exit_material; }
+
+ protected:
+  /// Columns of Wave::ways.
+  enum Column : size_t {
+    kDistance,
+    kMaterial,
+    kRatio,
+    kHero = kRatio + 3,
+    kSeed,
+    kFirst,
+    kExit,
+    kAbsorbed,
+    kScratch = kAbsorbed + 3
+  };
+  static_assert(kScratch + 2 == Wave::kWayColumns);
+  static_assert(Walkers::kColumns == Wave::kWalkColumns);
+
+  /// Runs the walks of all rays of a wave that entered a subsurface body.
+  template <typename F>
+  void walk_all(Wave& wave, uint32_t depth, SamplerKind sampler) const {
+    using U = UInt<F>;
+    if (!has_walks()) return;
+    const SceneView& scene = context_.scene;
+    const RayQueue& q = wave.rays;
+    uint32_t* const exits = wave.ways.uints(kExit);
+    Walkers walkers(walks_);
+    for (size_t i = 0; i < q.size; i += kWidth<F>) {
+      const Mask<F> active = first_lanes<F>(q.size - i);
+      const U slot = load<U>(q.slot + i);
+      store(exits + i, U(0u));
+      PathRow<F> path = load_row<PathRow, F>(wave.pool.paths, slot, active);
+      const Mask<F> below = active & path.enters_body();
+      if (none(below)) continue;
+      const UInt<F> normal = path.take_entry().normal;
+      store_row<PathRow, F>(wave.pool.paths, slot, path, below);
+      const F time = scene.has_motion
+                         ? gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot, below)
+                         : F(0.f);
+      walkers.add<F>(
+          begin_walk<F>(sampler, path.key, depth, path.o, path.d, path.throughput, normal),
+          lane_index<F>() + static_cast<uint32_t>(i), slot, time, below);
+    }
+    if (walkers.size() == 0) return;
+    PresenceKeys keys = presence_keys(wave.pool, depth, false);
+    // Holds BodyEntry::body (PathRow::take_entry).
+    keys.object = &reinterpret_cast<const PathRow<float>*>(wave.pool.paths)->receiver;
+    const auto leave = [&](const Mask<F>& lanes, const U& slot) {
+      PathRow<F> path = load_row<PathRow, F>(wave.pool.paths, slot, lanes);
+      path.receiver = U(0u);
+      // No light sample competes with the path (path/steps/sample_light.h).
+      path.pdf = F(0.f);
+      store_row<PathRow, F>(wave.pool.paths, slot, path, lanes);
+    };
+    enter<F>(walkers, keys, context_.traversal_width, leave);
+    if (walkers.size() == 0) return;
+    const auto start = PhaseClock::Clock::now();
+    if (context_.measures_costs) std::fill(wave.scratch.begin(), wave.scratch.end(), 0.f);
+    walkers.run<F>(
+        scene, *context_.accel, context_.traversal_width, keys, counts_.walk_steps,
+        counts_.walk_lanes,
+        [&](const Mask<F>& ended, const U& who, const WalkEnd<F>& end, const Mask<F>& came) {
+          finish_walks<F>(wave, ended, who, end, came);
+          if (context_.measures_costs) count_collisions<F>(wave.scratch, end, ended);
+        });
+    if (context_.measures_costs)
+      charge_walks(
+          wave, std::chrono::duration<double, std::nano>(PhaseClock::Clock::now() - start).count());
+  }
+
+  const WaveContext& context_;
+  Counts& counts_;
+
+ private:
+  template <typename F>
+  static Walk<F> begin_walk(SamplerKind sampler, const SampleKey<F>& key, uint32_t depth,
+                            const Vec3<F>& o, const Vec3<F>& d, const Color<F>& throughput,
+                            const UInt<F>& entry_normal) {
+    using U = UInt<F>;
+    const Way<F> way(sampler, key, depth, VertexSet::kFlight);
+    const Color<F> none(F(0.f));
+    return {o,          d,
+            throughput, F(throughput.x + throughput.y + throughput.z),
+            F(0.f),     way.branch(0x51ee9u).seed,
+            U(0u),      entry_normal,
+            way.r.y,    way.r.z,
+            U(0u),      none,
+            none};
+  }
+  /// Ray that views the exit point of a walk from outside.
+  template <typename F>
+  struct Seen {
+    Vec3<F> o, d;
+    F t;
+  };
+  template <typename F>
+  Seen<F> from_outside(const WalkEnd<F>& end) const {
+    const F t(1e-3f * context_.scene.scale);
+    return {fma(end.d, t, end.p), -end.d, t};
+  }
+
+  /// Starts walks inside the objects of `keys`. Calls leave(lanes, slot) for paths that hit none of
+  /// them, or whose material has no subsurface medium.
+  template <typename F, typename Leave>
+  void enter(Walkers& walkers, const PresenceKeys& keys, uint32_t width, const Leave& leave) const {
+    using U = UInt<F>;
+    walkers.enter<F>(
+        context_.scene, *context_.accel, width, keys,
+        [&](const U& inst, const U& geom, const U& prim, const Mask<F>& met) {
+          const U material = hit_place<F>(context_.scene, inst, geom, prim, met).material;
+          const Mask<F> walks =
+              met & (walk_medium<F>(context_.scene.walks, material, met).extinction.x > 0.f);
+          return select(Mask<U>(walks), material, U(Walkers::kNoMedium));
+        },
+        leave);
+    counts_.walks += walkers.size();
+    counts_.walk_steps += walkers.size();
+  }
+  /// Adds the collisions of ended walks to their materials.
+  template <typename F>
+  static void count_collisions(std::span<float> of_material, const WalkEnd<F>& end,
+                               const Mask<F>& ended) {
+    constexpr size_t kLanes = kWidth<F>;
+    alignas(64) uint32_t material[kLanes], collisions[kLanes];
+    store(material, end.material);
+    store(collisions, end.collisions);
+    for (uint32_t bits = lane_bits<F>(ended); bits != 0; bits &= bits - 1) {
+      const auto lane = static_cast<size_t>(std::countr_zero(bits));
+      of_material[material[lane]] += static_cast<float>(collisions[lane] + 1);
+    }
+  }
+  /// Charges the time of walks to their materials, by the collision counts in Wave::scratch.
+  static void charge_walks(Wave& wave, double ns) {
+    double all = 0;
+    for (const float steps : wave.scratch) all += double{steps};
+    for (size_t m = 0; m < wave.scratch.size(); ++m)
+      if (wave.scratch[m] > 0)
+        wave.costs.charge_beside(static_cast<uint32_t>(m), ns * double{wave.scratch[m]} / all);
+  }
+  template <typename F>
+  void finish_walks(Wave& wave, const Mask<F>& ended, const UInt<F>& who, const WalkEnd<F>& end,
+                    const Mask<F>& came) const {
+    using U = UInt<F>;
+    const RayQueue& q = wave.rays;
+    const HitBuffer& hits = wave.hits;
+    const Seen<F> seen = from_outside(end);
+    const U slot = gather<U>(q.slot, who, Mask<U>(ended));
+    PathRow<F> path = load_row<PathRow, F>(wave.pool.paths, slot, ended);
+    path.o = seen.o;
+    path.d = seen.d;
+    path.throughput = select<F>(came, end.throughput, Color<F>(F(0.f)));
+    path.receiver = U(0u);
+    store_row<PathRow, F>(wave.pool.paths, slot, path, ended);
+    const auto real = [&](float* column, const F& x) { scatter<F>(column, x, who, ended); };
+    const auto number = [&](uint32_t* column, const U& x) {
+      scatter<U>(column, x, who, Mask<U>(ended));
+    };
+    const auto three = [&](float* x, float* y, float* z, const Vec3<F>& v) {
+      real(x, v.x);
+      real(y, v.y);
+      real(z, v.z);
+    };
+    three(q.ox, q.oy, q.oz, seen.o);
+    three(q.dx, q.dy, q.dz, seen.d);
+    real(hits.t, seen.t);
+    real(hits.u, end.u);
+    real(hits.v, end.v);
+    number(hits.prim, end.prim);
+    number(hits.geom, end.geom);
+    number(hits.inst, select(Mask<U>(came), end.inst, U(kNoHit)));
+    number(wave.ways.uints(kExit), select(Mask<U>(came), U(1u), U(0u)));
+  }
+
+  const SoaBlock& walks_;
+};
+
+}  // namespace wavecomb

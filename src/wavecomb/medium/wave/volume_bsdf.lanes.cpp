@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Kernels of program "volume". Compiled once for each lane width, with WAVECOMB_LANES set to it.
+#include "wavecomb/medium/volume/volume_bsdf.h"
+
+#include "wavecomb/wave/kernels/shared_kernels.h"
+#include "wavecomb/wave/stages/shade_batch.h"
+
+namespace wavecomb {
+
+using VolumeLanes = Lanes<WAVECOMB_LANES>;
+
+WAVECOMB_SHARED_KERNELS(extern, VolumeLanes);
+
+template void shade_batch<VolumeBsdf<VolumeLanes>, VolumeLanes, kEverything>(
+    Wave&, const WaveContext&, const ShadeSettings&, uint32_t, size_t, size_t);
+#if WAVECOMB_LANES == 1
+// For the reference integrator.
+template VertexResult<float> shade_vertex<VolumeBsdf<float>, float, kEverything>(
+    const Vertex<float>&);
+#endif
+
+}  // namespace wavecomb

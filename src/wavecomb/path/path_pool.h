@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Storage for the paths of a wave, one slot for each path.
+#pragma once
+
+#include <cstddef>
+
+#include "wavecomb/core/rows/fields.h"
+#include "wavecomb/core/rows/soa.h"
+#include "wavecomb/core/sampler.h"
+#include "wavecomb/core/vec.h"
+
+namespace wavecomb {
+
+/// Ray, the first fields of both PathRow and ShadowRow.
+template <typename F>
+struct RayHead {
+  Vec3<F> o, d;
+  WAVECOMB_FIELDS(o, d)
+};
+
+/// Subsurface body that a ray enters, where it starts a random walk.
+template <typename F>
+struct BodyEntry {
+  UInt<F> body{0u};    ///< object_of() of the body
+  UInt<F> normal{0u};  ///< packed normal at the entry, outwards
+};
+
+/// Camera path between two vertices. Each vertex reads the row and overwrites it with the next ray.
+///
+/// A ray that enters a subsurface body (enters_body()) uses neither a cone nor a receiver. The row
+/// stores its BodyEntry in their words and marks the layout by the sign bit of `pdf`. Only the
+/// member functions know this encoding.
+template <typename F>
+struct PathRow {
+  Vec3<F> o, d;  ///< the ray to trace
+  Color<F> throughput;
+  F pdf;        ///< density of the bounce that made the ray; 0 for a delta bounce or camera ray
+  F eta_scale;  ///< product of eta^2 of the refractions so far, for roulette
+  F cone_width, cone_spread;  ///< ray cone at the origin: width in scene units, spread in radians
+  SampleKey<F> key;
+  UInt<F> receiver;  ///< LightReceiver::normal of the vertex that made the ray
+  WAVECOMB_FIELDS(o, d, throughput, pdf, eta_scale, cone_width, cone_spread, key, receiver)
+
+  Mask<F> enters_body() const { return pdf < 0.f; }
+  /// Makes the rays of `lanes` enter a body. Their pdf must be above 0.
+  void set_entry(const Mask<F>& lanes, const BodyEntry<F>& entry) {
+    pdf = select(lanes, F(-pdf), pdf);
+    cone_width = select(lanes, bits_float<F>(entry.normal), cone_width);
+    receiver = select(Mask<UInt<F>>(lanes), entry.body, receiver);
+  }
+  /// Returns the entry, and gives the ray a cone of width 0. The word of `receiver` continues to
+  /// hold the body, which the ray queries of the walk read there.
+  BodyEntry<F> take_entry() {
+    const BodyEntry<F> entry{receiver, float_bits<F>(cone_width)};
+    pdf = abs(pdf);
+    cone_width = F(0.f);
+    return entry;
+  }
+};
+
+/// Light path between two vertices, in the same slots as camera paths.
+template <typename F>
+struct LightPathRow {
+  Vec3<F> o, d;         ///< the ray to trace
+  Color<F> throughput;  ///< flux
+  F mis_sum;            ///< PathState::mis_sum
+  F eta_scale;
+  F unused;
+  F bounce_pdf;  ///< PathState::bounce_pdf
+  SampleKey<F> key;
+  UInt<F> light;  ///< light that the path left
+  WAVECOMB_FIELDS(o, d, throughput, mis_sum, eta_scale, unused, bounce_pdf, key, light)
+};
+
+/// Path state that only some scenes need.
+template <typename F>
+struct PathColdRow {
+  F time;        ///< shutter time in [0, 1)
+  UInt<F> link;  ///< PathState::link
+  F importance;  ///< PathState::importance
+  WAVECOMB_FIELDS(time, link, importance)
+};
+
+/// Bits of InsideRow::crossed beside the material: whether the bounce and the shadow ray continue
+/// on the other side of the surface, and whether the path arrived from outside.
+enum Crossing : uint32_t { kBounceCrosses = 1, kShadowCrosses = 2, kEnters = 4 };
+inline constexpr uint32_t kCrossingBits = 3;
+
+/// Medium stack of a path: at most four entries, each a placed_geometry() and a material, in the
+/// order in which the path entered them. kNothing marks the unused entries at the end
+/// (medium/nested/nested_media.h).
+template <typename F>
+struct InsideRow {
+  UInt<F> place_0, place_1, place_2, place_3, material_0, material_1, material_2, material_3;
+  UInt<F> place;    ///< placed_geometry() of the vertex
+  UInt<F> crossed;  ///< result of shading the vertex: Crossing bits and the material
+  F outer;          ///< PathState::outer and PathState::medium of the vertex
+  UInt<F> medium;
+  WAVECOMB_FIELDS(place_0, place_1, place_2, place_3, material_0, material_1, material_2,
+                  material_3, place, crossed, outer, medium)
+};
+
+/// Shadow ray of a path, which has at most one at each vertex.
+template <typename F>
+struct ShadowRow {
+  Vec3<F> o, d;
+  F tfar;
+  Color<F> direct;  ///< contribution if the ray is free
+  UInt<F> group;    ///< light group of `direct`, or kNoGroup
+  UInt<F> set;      ///< VertexResult::shadow_set
+  WAVECOMB_FIELDS(o, d, tfar, direct, group, set)
+};
+
+/// First fields of ShadowRow, which the shadow queue copies.
+template <typename F>
+struct ShadowHead {
+  Vec3<F> o, d;
+  F tfar;
+  Color<F> direct;
+  WAVECOMB_FIELDS(o, d, tfar, direct)
+};
+
+/// Radiance of a path, or of one component of it.
+template <typename F>
+struct RadianceRow {
+  Color<F> sum;
+  WAVECOMB_FIELDS(sum)
+};
+inline constexpr size_t kRadianceWords = kRowWords<RadianceRow>;
+
+static_assert(kRowWords<PathRow> == 16 && kRowWords<ShadowRow> == 16, "a cache line each");
+static_assert(kIsHead<RayHead, PathRow> && kIsHead<RayHead, ShadowRow>);
+// Stages that trace rays and draw random numbers treat both kinds of paths alike.
+static_assert(kFieldWords<LightPathRow> == kFieldWords<PathRow>);
+static_assert(offsetof(LightPathRow<float>, throughput) == offsetof(PathRow<float>, throughput) &&
+              offsetof(LightPathRow<float>, eta_scale) == offsetof(PathRow<float>, eta_scale) &&
+              offsetof(LightPathRow<float>, key) == offsetof(PathRow<float>, key));
+
+/// Path state of one wave. A slot holds one (pixel, sample) for the lifetime of its path. Its state
+/// is a row of one cache line, and its shadow ray is a second row, so that shading touches only the
+/// cache lines of the paths it shades, in any order of hits (docs/decisions/path-rows.md).
+///
+/// Contract: owned by one wave.
+class PathPool {
+ public:
+  PathPool() = default;
+  /// Allocates `capacity` slots. The flags add optional rows: `cold` PathColdRow, `joined`
+  /// PathState::ratio, `knows` InsideRow, `shaded` VertexResult::shade, `split` PathState::diffuse.
+  PathPool(size_t capacity, bool cold, bool joined = false, bool knows = false, bool shaded = false,
+           bool split = false)
+      : rows_(1, capacity * (kRowWords<PathRow> + kRowWords<ShadowRow> + kRadianceWords)),
+        cold_(cold ? SoaBlock(1, capacity * kRowWords<PathColdRow>) : SoaBlock()),
+        ratios_(joined ? SoaBlock(1, capacity) : SoaBlock()),
+        inside_(knows ? SoaBlock(1, capacity * kRowWords<InsideRow>) : SoaBlock()),
+        shades_(shaded ? SoaBlock(1, capacity * kRadianceWords) : SoaBlock()),
+        diffuse_(split ? SoaBlock(1, capacity * kRadianceWords) : SoaBlock()) {
+    paths = rows_.floats(0);
+    shadows = paths + capacity * kRowWords<PathRow>;
+    radiance = shadows + capacity * kRowWords<ShadowRow>;
+    this->cold = cold ? cold_.floats(0) : nullptr;
+    ratio = joined ? ratios_.floats(0) : nullptr;
+    inside = knows ? inside_.floats(0) : nullptr;
+    shades = shaded ? shades_.floats(0) : nullptr;
+    diffuse = split ? diffuse_.floats(0) : nullptr;
+  }
+
+  float* paths = nullptr;     ///< PathRow or LightPathRow
+  float* shadows = nullptr;   ///< ShadowRow
+  float* radiance = nullptr;  ///< RadianceRow
+  float* cold = nullptr;      ///< PathColdRow, or null
+  float* ratio = nullptr;     ///< pack_ratio() of the paths; null without light paths
+  float* inside = nullptr;    ///< InsideRow; null without nested dielectrics
+  float* shades = nullptr;    ///< RadianceRow of VertexResult::shade; null if shadows are black
+  /// RadianceRow of PathState::diffuse; null if no light has multipliers
+  float* diffuse = nullptr;
+  size_t bytes() const {
+    return rows_.bytes() + cold_.bytes() + ratios_.bytes() + inside_.bytes() + shades_.bytes() +
+           diffuse_.bytes();
+  }
+
+ private:
+  SoaBlock rows_, cold_, ratios_, inside_, shades_, diffuse_;
+};
+
+/// Adds `c` to the active lanes' rows of `radiance`. The rows must be distinct.
+template <typename F>
+WAVECOMB_INLINE void add_radiance(float* radiance, const UInt<F>& row, const Color<F>& c,
+                                  const Mask<F>& active) {
+  RadianceRow<F> r = load_row<RadianceRow, F>(radiance, row, active);
+  r.sum += c;
+  store_row<RadianceRow, F>(radiance, row, r, active);
+}
+
+}  // namespace wavecomb

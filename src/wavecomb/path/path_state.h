@@ -1,0 +1,339 @@
+// SPDX-License-Identifier: Apache-2.0
+/// State that a path carries from vertex to vertex, and the inputs and outputs of the steps of a
+/// vertex (steps/).
+#pragma once
+
+#include "wavecomb/core/rows/fields.h"
+#include "wavecomb/core/sampler.h"
+#include "wavecomb/core/settings.h"
+#include "wavecomb/core/vec.h"
+#include "wavecomb/geometry/hit/hit_material.h"
+#include "wavecomb/geometry/hit/surface.h"
+#include "wavecomb/guiding/field_view.h"
+#include "wavecomb/light/sampling/light_sample.h"
+#include "wavecomb/light_paths/light_vertices.h"
+#include "wavecomb/light_paths/merge_point.h"
+#include "wavecomb/path/features.h"
+#include "wavecomb/path/path_pool.h"
+
+namespace wavecomb {
+
+/// Render settings that shading reads.
+struct ShadeSettings {
+  SamplerKind sampler;
+  uint32_t max_depth;
+  bool roulette;    ///< roulette by throughput, after a vertex
+  bool cost_aware;  ///< roulette by throughput and cost, before a vertex
+  bool efficient;   ///< roulette by learned expected contribution, after a vertex
+  uint32_t roulette_depth;
+  float clamp_indirect;  ///< largest luminance of indirect contributions; 0 disables clamping
+  bool schlick_fresnel;
+  bool cosine_sampling;
+  bool filters_textures_whole;
+  bool shows_sky;            ///< whether camera rays show domes and distant lights
+  bool connects;             ///< whether vertices of camera paths and light paths are connected
+  bool joins_light = false;  ///< whether MIS weights of camera paths include light paths
+  /// Merge radius divided by the width of the path's ray cone. 0 disables merging.
+  float merge_scale = 0;
+  float light_paths = 0;  ///< light paths in the image per sample, if merged
+
+  explicit ShadeSettings(const Settings& s)
+      : sampler(s.sampler),
+        max_depth(s.max_depth),
+        roulette(s.roulette != RouletteKind::kOff && s.roulette != RouletteKind::kCostAware),
+        cost_aware(s.roulette == RouletteKind::kCostAware),
+        efficient(s.roulette == RouletteKind::kEfficient || s.roulette == RouletteKind::kAuto),
+        roulette_depth(s.roulette_depth),
+        clamp_indirect(s.clamp_indirect),
+        schlick_fresnel(s.schlick_fresnel),
+        cosine_sampling(s.cosine_sampling),
+        filters_textures_whole(s.texture_filter == TextureFilter::kWhole),
+        shows_sky(!s.alpha),
+        connects(s.connects()) {}
+
+  /// Returns whether a path that leaves the scene after `depth` vertices adds the environment's
+  /// light.
+  bool sees_sky(uint32_t depth) const { return shows_sky || depth > 0; }
+
+  /// Returns the settings for light paths, which filter textures at every vertex, since each vertex
+  /// is connected to the camera.
+  ShadeSettings of_light_paths() const {
+    ShadeSettings s = *this;
+    s.filters_textures_whole = true;
+    return s;
+  }
+};
+
+/// State of a path at a vertex. `dir` is the direction of the ray that arrived, and the ray cone is
+/// given at the hit.
+template <typename F>
+struct PathState {
+  Vec3<F> dir;
+  Color<F> throughput;
+  F pdf{0.f};  ///< density of the previous bounce; 0 for a delta bounce or camera ray
+  F eta_scale{1.f};
+  F cone_width{0.f}, cone_spread{0.f};
+  Vec3<F> o;             ///< origin of the ray that arrived
+  UInt<F> receiver{0u};  ///< LightReceiver::normal of the previous vertex
+  UInt<F> link{0u};      ///< link class of the surface that the ray left, if lights are linked
+  F importance{0.f};     ///< one over the brightness of the image at the pixel; 0 if unknown
+  /// The ratio R of light_paths/join.h, the density of light paths relative to this path; 0 if no
+  /// light path can produce it.
+  F ratio{0.f};
+  /// Whether all bounces so far were deltas and the path waits for a vertex to merge at.
+  Mask<F> awaits_merge{false};
+  Mask<F> enters_body{false};  ///< whether the bounce enters a subsurface body
+  BodyEntry<F> entry{};        ///< that body
+  // Only for light paths (light_paths/light_vertex.h):
+  F mis_sum{0.f};     ///< the sum S of the MIS weight
+  F bounce_pdf{0.f};  ///< density of the previous bounce; 0 if its vertex cannot be connected
+  UInt<F> light{0u};  ///< light that the path left
+  // Only for scenes with nested dielectrics (InsideRow):
+  F outer{1.f};        ///< index of refraction on the other side of the surface
+  UInt<F> medium{0u};  ///< material whose medium scatters here
+  F time{0.5f};        ///< shutter time, if lights move
+  /// Diffuse fraction of the previous bounce, by colour, if lights have diffuse and specular
+  /// multipliers.
+  Color<F> diffuse{F(0.f)};
+
+  LightReceiver<F> vertex_before() const {
+    LightReceiver<F> from(o, receiver);
+    from.time = time;
+    return from;
+  }
+};
+
+/// Returns the state of a camera path at the end of its ray of length `t`. Fields that are not in
+/// the row have their default values.
+template <typename F>
+WAVECOMB_INLINE PathState<F> path_state(const PathRow<F>& row, const F& t) {
+  return {.dir = row.d,
+          .throughput = row.throughput,
+          .pdf = row.pdf,
+          .eta_scale = row.eta_scale,
+          .cone_width = fma(row.cone_spread, t, row.cone_width),
+          .cone_spread = row.cone_spread,
+          .o = row.o,
+          .receiver = row.receiver};
+}
+/// Returns the row of a camera path whose next ray is that of `next`. `kMayEnter` is false if no
+/// ray can enter a subsurface body.
+template <bool kMayEnter, typename F>
+WAVECOMB_INLINE PathRow<F> path_row(const PathState<F>& next, const SampleKey<F>& key) {
+  PathRow<F> row{.o = next.o,
+                 .d = next.dir,
+                 .throughput = next.throughput,
+                 .pdf = next.pdf,
+                 .eta_scale = next.eta_scale,
+                 .cone_width = next.cone_width,
+                 .cone_spread = next.cone_spread,
+                 .key = key,
+                 .receiver = next.receiver};
+  if constexpr (kMayEnter) row.set_entry(next.enters_body, next.entry);
+  return row;
+}
+/// Returns the row of a light path whose next ray is that of `next`.
+template <typename F>
+WAVECOMB_INLINE LightPathRow<F> light_path_row(const PathState<F>& next, const SampleKey<F>& key) {
+  return {.o = next.o,
+          .d = next.dir,
+          .throughput = next.throughput,
+          .mis_sum = next.mis_sum,
+          .eta_scale = next.eta_scale,
+          .unused = F(0.f),
+          .bounce_pdf = next.bounce_pdf,
+          .key = key,
+          .light = next.light};
+}
+/// Returns the word of PathPool::ratio: PathState::ratio, or -1 if the path awaits a merge.
+template <typename F>
+WAVECOMB_INLINE F pack_ratio(const PathState<F>& state) {
+  return select(state.awaits_merge, F(-1.f), state.ratio);
+}
+template <typename F>
+WAVECOMB_INLINE void unpack_ratio(const F& word, PathState<F>& state) {
+  state.awaits_merge = word < 0.f;
+  state.ratio = max(word, F(0.f));
+}
+
+/// Output of shading one vertex. Values of lanes outside the masks are undefined.
+template <typename F>
+struct VertexResult {
+  Color<F> emitted;    ///< emission to add to the path's radiance, already clamped
+  Mask<F> has_shadow;  ///< whether the vertex casts a shadow ray
+  Vec3<F> shadow_o, shadow_d;
+  F shadow_tfar;
+  UInt<F> shadow_set;  ///< result of shadow_set(); 0 without light linking
+  Color<F> direct;     ///< contribution if the shadow ray is free, already clamped
+  Color<F> shade;     ///< fraction of `direct` that remains if the shadow ray is blocked, by colour
+  Mask<F> alive;      ///< whether the path continues
+  PathState<F> next;  ///< ray and state of the next path segment
+  // For training of the guiding field, if Vertex::guide is set: guide_axis of the surface, and
+  // density of the bounce by the BSDF alone.
+  UInt<F> axis;
+  F bsdf_pdf;
+  UInt<F> crossed;  ///< InsideRow::crossed, if the scene has nested dielectrics
+};
+
+/// Classification of a scattering for light path expressions: its PathEvent, and its diffuse
+/// fraction by colour. The rest is glossy, or specular if `is_delta`.
+template <typename F>
+struct ScatteringNote {
+  UInt<F> event{0u};
+  Color<F> diffuse{F(0.f)};
+  Mask<F> is_delta{false};
+};
+
+/// AOV values of a vertex. The steps write them directly instead of returning them, since most
+/// vertices have none, and values that live until the end of shading would occupy registers.
+template <typename F>
+struct VertexAovs {
+  /// Requested values. All fields without a flag here are always written.
+  bool wants_uv = false, wants_lights = false, wants_bounces = false;
+  bool wants_events = false;  ///< classifies scatterings; implies wants_lights
+  Color<F> albedo;
+  Vec3<F> normal;
+  Mask<F> is_clear;  ///< whether the surface has only delta lobes, such as a mirror or glass
+  Vec2<F> uv;
+  UInt<F> emitter, lit_by;  ///< lights that contribute `emitted` and `direct`, or kNoLight
+  // With wants_lights: the position from which a light was sampled, and the MIS weight that
+  // `direct` contains. A weight of -1 means that no light was sampled.
+  Vec3<F> lit_at;
+  F light_weight;
+  // With wants_events: classification of the scattering of the light sample and of the bounce
+  // (path/steps/note_events.h).
+  ScatteringNote<F> lit, bounce;
+  // With wants_bounces: the probability that the guiding field sampled the direction of the bounce,
+  // and the survival probability of roulette. A survival of -1 means that there was no bounce.
+  F guided, survival;
+};
+
+/// Auxiliary albedo and normal for a denoiser.
+template <typename F>
+struct Guides {
+  Color<F> albedo;
+  Vec3<F> normal;
+};
+
+/// Returns the denoiser inputs at a vertex: albedo, tinted by the mirrors and glass before it, and
+/// normal. If the vertex is clear, the next vertex replaces both.
+template <typename F>
+inline Guides<F> guides_of(const VertexAovs<F>& v, const PathState<F>& path) {
+  const auto tinted = [&](const F& albedo, const F& throughput) {
+    // eta_scale removes the radiance scaling at refractions. The minimum is needed because roulette
+    // may have increased the throughput.
+    return F(min(F(albedo * throughput * path.eta_scale), F(1.f)));
+  };
+  return {{tinted(v.albedo.x, path.throughput.x), tinted(v.albedo.y, path.throughput.y),
+           tinted(v.albedo.z, path.throughput.z)},
+          v.normal};
+}
+
+/// Connection that a vertex of a camera path offers to a vertex of a light path.
+template <typename F>
+struct ConnectionOffer {
+  Vec3<F> to;      ///< position of the light path's vertex
+  F vertices;      ///< LightVertexRow::vertices
+  Mask<F> wanted;  ///< whether such a vertex exists and the path would not exceed the maximum depth
+  ConnectionRow<F> row;  ///< output; black where `wanted` is false
+  /// Output, if light path expressions are active; undefined where `wanted` is false.
+  ScatteringNote<F> note{};
+};
+
+/// Returns the offer of camera paths in `slot`, at `depth`, to the light path vertices chosen for
+/// these slots. Its contribution is still black.
+template <typename F>
+inline ConnectionOffer<F> offer_for(const LightVertices& from, const UInt<F>& slot, uint32_t depth,
+                                    uint32_t max_depth, const Mask<F>& active) {
+  const auto chosen = load_row<LightVertexRow, F>(from.chosen, slot, active);
+  const Vec3<F> none(F(0.f));
+  return {chosen.p,
+          F(Int<F>(chosen.vertices)),
+          Mask<F>(active & Mask<F>(chosen.vertices != UInt<F>(0u)) &
+                  Mask<F>(chosen.depth + (depth + 2) <= UInt<F>(max_depth))),
+          {none, F(0.f), none, F(0.f)}};
+}
+
+/// Input of all steps of a vertex. `depth` is 0 at the first vertex, and `t` is the length of the
+/// ray that arrived. `hit` and `geom` (the geometry within the instance's group) describe a
+/// surface; at a vertex in a volume `hit.inst` is kNoSurface. `kFeatures` is the set of features
+/// that the kernel is compiled for.
+template <typename F, uint32_t kFeatures = kEverything>
+struct Vertex {
+  const SceneView& scene;
+  const ShadeSettings& settings;
+  const SampleKey<F>& key;
+  uint32_t depth;
+  const MeshHit<F>& hit;
+  const UInt<F>& geom;
+  const F& t;
+  const UInt<F>& material;
+  const PathState<F>& path;
+  VertexAovs<F>* aovs;  ///< null if no AOV needs the vertex
+  const Mask<F>& active;
+  const GuideView* guide = nullptr;     ///< guiding field that guides bounces or is in training
+  ConnectionOffer<F>* offer = nullptr;  ///< null without connections
+  VisibleOffer<F>* visible = nullptr;   ///< null without merging
+
+  static constexpr bool has(Feature feature) { return (kFeatures & feature) != 0; }
+  /// Returns the AOV values to write, or null.
+  VertexAovs<F>* notes() const { return has(kNotes) ? aovs : nullptr; }
+  bool joins_light() const { return has(kJoined) && settings.joins_light; }
+  bool wants_lights() const { return notes() && aovs->wants_lights; }
+  bool wants_events() const { return notes() && aovs->wants_events; }
+  bool wants_bounces() const { return notes() && aovs->wants_bounces; }
+  bool knows_inside() const { return has(kInside) && scene.interiors.media; }
+  bool has_links() const { return has(kLinks) && scene.lights.links.members; }
+};
+
+/// Length of a shadow ray as a fraction of the distance to the light, so that the ray ends before
+/// the light's surface.
+inline constexpr float kShadowReach = 0.9999f;
+
+/// Returns `c`, scaled down to a luminance of at most `limit` (0 means no limit). Returns black if
+/// `c` is not finite.
+template <typename F>
+inline Color<F> clean(const Color<F>& c, float limit) {
+  const Mask<F> ok = is_finite(c.x) & is_finite(c.y) & is_finite(c.z);
+  Color<F> r = select<F>(ok, c, Color<F>(F(0.f)));
+  if (limit > 0) {
+    const F y = luminance(r);
+    r = r * select(y > limit, F(limit / max(y, F(1e-30f))), F(1.f));
+  }
+  return r;
+}
+
+/// Returns the luminance limit of a contribution after `bounces` scatterings. Direct light has
+/// none.
+inline float clamp_limit(const ShadeSettings& s, uint32_t bounces) {
+  return bounces > 1 ? s.clamp_indirect : 0.f;
+}
+
+/// Returns the index of geometry `geom` of instance `inst` in arrays that have one entry for each
+/// geometry of each instance.
+template <typename F>
+inline UInt<F> placed_geometry(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
+                               const Mask<F>& active) {
+  return gather_member<F>(scene.instances, &InstanceRecord::emissive, inst, active) + geom;
+}
+
+/// Returns the lanes whose camera ray hits a holdout, which is black and has alpha 0. Requires
+/// scene.visibility.
+template <typename F>
+inline Mask<F> held_out(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
+                        const Mask<F>& active) {
+  using U = UInt<F>;
+  const U seen =
+      gather<U>(scene.visibility, placed_geometry<F>(scene, inst, geom, active), Mask<U>(active));
+  return active & Mask<F>((seen & static_cast<uint32_t>(kHeldOut)) != U(0u));
+}
+
+/// Returns the link class of geometry `geom` of instance `inst`.
+template <typename F>
+inline UInt<F> link_class(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
+                          const Mask<F>& active) {
+  return gather<UInt<F>>(scene.lights.links.classes, placed_geometry<F>(scene, inst, geom, active),
+                         Mask<UInt<F>>(active));
+}
+
+}  // namespace wavecomb

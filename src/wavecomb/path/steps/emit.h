@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The step `emit`: emission that a path hits.
+///
+/// With throughput T_k at x_k, a bounce with density p_bsdf (0 for a mirror or the camera) that
+/// hits emission Le adds its contribution, weighted against light sampling with density p_light:
+///   L += T_k Le(x_k) w,   w = p_bsdf / (p_bsdf + p_light)   (balance heuristic, Veach 1997, 9.2)
+#pragma once
+
+#include "wavecomb/light/emission/emission.h"
+#include "wavecomb/light/sampling/light_sample.h"
+#include "wavecomb/path/steps/interact.h"
+
+namespace wavecomb {
+
+/// Returns the balance heuristic weight of a bounce against a light sample; 1 for a delta bounce
+/// (bsdf_pdf = 0).
+template <typename F>
+inline F bounce_weight(const F& bsdf_pdf, const F& light_pdf) {
+  return select(bsdf_pdf > 0.f,
+                F(bsdf_pdf / select(bsdf_pdf > 0.f, F(bsdf_pdf + light_pdf), F(1.f))), F(1.f));
+}
+
+/// Returns the radiance of emissive surfaces before MIS in scenes with mesh lights. `emission` is
+/// that of their materials.
+template <typename F>
+[[gnu::noinline]] Color<F> mesh_light_emission(const SceneView& scene, const UInt<F>& inst,
+                                               const UInt<F>& geom, const Color<F>& emission,
+                                               const PathState<F>& path, bool from_camera,
+                                               const Mask<F>& active) {
+  using U = UInt<F>;
+  const U place = placed_geometry<F>(scene, inst, geom, active);
+  const U record =
+      select(Mask<U>(active), gather<U>(scene.mesh_lights, place, Mask<U>(active)), U(kNoLight));
+  return mesh_light_radiance<F>(scene.lights, record, emission,
+                                {.dir = path.dir,
+                                 .link = path.link,
+                                 .is_delta = not_(path.pdf > 0.f),
+                                 .from_camera = from_camera,
+                                 .diffuse = path.diffuse},
+                                active);
+}
+
+/// Returns the emission of textures and graphs at their finest level in `lanes`, as light samples
+/// and light paths use it, and `filtered` in other lanes. Filtered emission has a different mean
+/// wherever emission is cut off, by an edge of the mesh or by the weights of multiple importance
+/// sampling.
+template <typename F>
+[[gnu::noinline, gnu::cold]] Color<F> finest_emission(const SceneView& scene, const MeshHit<F>& hit,
+                                                      const Surface<F>& s, const Vec3<F>& dir,
+                                                      const UInt<F>& material,
+                                                      const Color<F>& filtered,
+                                                      const Mask<F>& lanes) {
+  const Footprint<F> finest(F(0.f));
+  const auto point = [&](const Mask<F>& driven) {
+    return graph_point<F>(scene, hit, s, dir, finest, driven);
+  };
+  return select<F>(lanes, fetch_emission<F>(scene.materials, material, s.uv, finest, point, lanes),
+                   filtered);
+}
+
+/// Returns the contribution of a light's own shape that a path hits, including its MIS weight.
+template <typename F>
+inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& settings,
+                               uint32_t depth, const UInt<F>& light, const F& t,
+                               const PathState<F>& path, const Mask<F>& active) {
+  LightHit<F> hit = light_hit<F>(scene.lights, light, path.vertex_before(), path.dir, t, active);
+  F w = bounce_weight<F>(path.pdf, hit.pdf);
+  if (scene.lights.sends_paths()) [[unlikely]]
+    w = joint_bounce_weight<F>(
+        path.pdf, hit.pdf, not_(Mask<F>(path.pdf > 0.f)),
+        F(path.ratio * emission_density<F>(scene.lights, light, path.o, path.dir, t, active)));
+  if (scene.lights.has_effects) [[unlikely]]
+    hit.radiance = hit.radiance * LightEffect<F>(scene.lights, light, active)
+                                      .of_hit(not_(path.pdf > 0.f), depth == 0, path.diffuse);
+  if (scene.lights.links.members)
+    w = select(shines_on<F>(scene.lights, path.link, light, active), w, F(0.f));
+  return clean<F>(path.throughput * hit.radiance * w, clamp_limit(settings, depth));
+}
+
+/// Returns the contribution of the emissive surface at a vertex. Records the emitter for AOVs.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE Color<F> emit(const Vertex<F, kFeatures>& v,
+                              const SurfaceInteraction<Bsdf, F>& at) {
+  using U = UInt<F>;
+  const SceneView& scene = v.scene;
+  Color<F> emission = at.emission;
+  // No other technique finds emission that the camera sees directly or in a mirror. It keeps the
+  // texture filter, since images need antialiasing.
+  if constexpr (Bsdf::kTextured)
+    if (at.textured && v.depth > 0) [[unlikely]] {
+      const Mask<F> varies =
+          Mask<F>((at.textured_inputs & (input_bit(Input::kEmission) | kReadsGraph)) != U(0u));
+      const Mask<F> lanes = v.depth > 1 ? varies : varies & (v.path.pdf > 0.f);
+      if (any(v.active & lanes))
+        emission = finest_emission<F>(scene, v.hit, at.s, v.path.dir, v.material, emission,
+                                      v.active & lanes);
+    }
+  if (v.has(kMeshLights) && scene.mesh_lights) [[unlikely]]
+    emission =
+        mesh_light_emission<F>(scene, v.hit.inst, v.geom, emission, v.path, v.depth == 0, v.active);
+  const Mask<F> emits = v.active & not_(is_black(emission));
+  if (none(emits)) return Color<F>(F(0.f));
+  F light_pdf(0.f), others(0.f);
+  if (scene.has_emissive_meshes) {
+    const U place = placed_geometry<F>(scene, v.hit.inst, v.geom, emits);
+    const U base = gather<U>(scene.emissive_lights, place, Mask<U>(emits));
+    if (v.wants_lights())
+      v.aovs->emitter = select(Mask<U>(base == U(kNoLight)), base, U(base + v.hit.prim));
+    const Mask<F> sampled = emits & Mask<F>(base != U(kNoLight)) & (v.path.pdf > 0.f);
+    if (any(sampled))
+      light_pdf = select(sampled,
+                         triangle_light_pdf<F>(scene.lights, base + v.hit.prim,
+                                               v.path.vertex_before(), v.path.dir, v.t, sampled),
+                         F(0.f));
+    if constexpr ((kFeatures & kJoined) != 0)
+      if (v.joins_light() && v.depth > 0) [[unlikely]] {
+        const Mask<F> known = emits & Mask<F>(base != U(kNoLight));
+        others = v.path.ratio * emission_density<F>(scene.lights, base + v.hit.prim, v.path.o,
+                                                    v.path.dir, v.t, known);
+      }
+  }
+  F w = bounce_weight<F>(v.path.pdf, light_pdf);
+  if constexpr ((kFeatures & kJoined) != 0)
+    if (v.joins_light() && scene.has_emissive_meshes && v.depth > 0) [[unlikely]]
+      w = joint_bounce_weight<F>(v.path.pdf, light_pdf, not_(Mask<F>(v.path.pdf > 0.f)), others);
+  const Color<F> e = clean<F>(at.throughput * emission * w, clamp_limit(v.settings, v.depth));
+  return select<F>(emits, e, Color<F>(F(0.f)));
+}
+
+}  // namespace wavecomb

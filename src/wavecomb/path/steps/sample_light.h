@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The step `sample_light`: next event estimation with one shadow ray for each vertex.
+///
+/// A light and a point on it in direction wi are sampled with density p_light over solid angle:
+///   L += T_k f(wo, wi) |cos theta_i| Le / p_light  w  V,   w = p_light / (p_bounce + p_light)
+/// (balance heuristic, Veach 1997, 9.2; w = 1 for delta lights, which no bounce hits). The shadow
+/// ray determines the visibility V.
+#pragma once
+
+#include <cmath>
+
+#include "wavecomb/guiding/bounce/guided_bounce.h"
+#include "wavecomb/light/filters/shadow.h"
+#include "wavecomb/light/sampling/light_sample.h"
+#include "wavecomb/light_paths/connection.h"
+#include "wavecomb/light_paths/join.h"
+#include "wavecomb/path/steps/bounce_sampling.h"
+#include "wavecomb/path/steps/interact.h"
+#include "wavecomb/path/steps/vertex_context.h"
+
+namespace wavecomb {
+
+/// Returns the receiver for light sampling. Its position is set when a light is sampled.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F, kFeatures>& v,
+                                                const Frame<F>& frame, const Vec3<F>& wo) {
+  LightReceiver<F> receiver(Vec3<F>(F(0.f)));
+  if (v.has(kMotion) && v.scene.lights.motions) [[unlikely]]
+    receiver.time = v.hit.time;
+  if (v.scene.lights.by_tree) {
+    // A surface without transmission receives light only on the viewer's side.
+    if (!Bsdf::kTransmits)
+      receiver.normal = pack_normal<F>(select<F>(wo.z < 0.f, -frame.n, frame.n));
+    receiver.seed =
+        hash_u32<UInt<F>>(v.key.pixel_hash, UInt<F>(v.key.sample + 0x632be5abu * (v.depth + 1)));
+  }
+  return receiver;
+}
+
+/// Returns the MIS weight of the light sample of `to_light` against bounces with density `p_bounce`
+/// and light paths (join.h). `wi` is its direction in the frame of the vertex. If R includes this
+/// vertex with p_light in place of p_bounce,
+///   w = 1 / (1 + p_bounce / p_light + R D / p_light);
+/// for a point light the last term has p_light d^2 in place of p_light.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE F joint_light_weight(const VertexContext<Bsdf, F, kFeatures>& c,
+                                     const LightConnection<F>& to_light, const Vec3<F>& wi,
+                                     const F& p_bounce) {
+  const LightView& lights = c.vertex.scene.lights;
+  const LightSample<F>& l = to_light.light;
+  const F pdf = select(l.pdf > 0.f, l.pdf, F(1.f));
+  const F by_bounce = select(l.is_delta, F(0.f), F(p_bounce / pdf));
+  if (!lights.sends_paths()) return 1.f / F(1.f + by_bounce);
+  const F density =
+      emission_density<F>(lights, l.light, to_light.origin, l.wi, l.distance, l.valid);
+  const Mask<F> point = l.is_delta & (l.distance < kFarAway);
+  const F nee = select(point, F(pdf * F(l.distance * l.distance)), pdf);
+  const F by_path =
+      F(c.joint.template towards<Bsdf>(c.vertex, c.at, c.wo, l.wi, wi, l.valid) * density) / nee;
+  return 1.f / F(F(1.f + by_bounce) + min(by_path, F(kMostRatio)));
+}
+
+namespace detail {
+
+/// Light sample that a vertex may use.
+template <typename F>
+struct LightCandidate {
+  Vec3<F> origin;  ///< of the shadow ray
+  Vec3<F> wi;
+  F distance;
+  Color<F> c;     ///< contribution if the light is visible, divided by the density
+  F w;            ///< MIS weight, included in c
+  Mask<F> valid;  ///< whether the contribution may be non-zero; otherwise c is undefined
+  UInt<F> light;
+  UInt<F> shadow_set;    ///< for linked lights
+  ShadowReach<F> reach;  ///< for lights with shadow attributes
+};
+
+/// Returns the light sample for the sample values `r` in the lanes `lit`. `receiver` is that of the
+/// context with its position, and `link` the link class of the surface.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE LightCandidate<F> light_candidate(const VertexContext<Bsdf, F, kFeatures>& c,
+                                                  const LightReceiver<F>& receiver,
+                                                  const Sample4<F>& r, const UInt<F>& link,
+                                                  const Mask<F>& lit) {
+  using U = UInt<F>;
+  const Vertex<F, kFeatures>& v = c.vertex;
+  const auto& at = c.at;
+  const LightView& lights = v.scene.lights;
+  const LightConnection<F> to_light = connect_to_light<Bsdf, F>(v, at, receiver, r, lit);
+  const LightSample<F>& l = to_light.light;
+  const Vec3<F> wi = c.frame.to_local(l.wi);
+  const BsdfEval<F> e = at.bsdf.eval(c.view, wi);
+  const F p_bounce =
+      mixed_pdf<Bsdf, F>(v, c.guide, l.wi, wi, c.wo, bounce_pdf(v, at.bsdf, c.wo, c.view, wi, e));
+  F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + p_bounce), F(1e-30f))));
+  Color<F> f_cos = e.f_cos;
+  const U& light = l.light;
+  U set(0u);
+  const bool has_effects = v.has(kMeshLights) && lights.has_effects;
+  if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface)
+    if (v.joins_light()) [[unlikely]]
+      w = joint_light_weight(c, to_light, wi, p_bounce);
+  ShadowReach<F> reach{F(kFarAway), Color<F>(F(0.f))};
+  if (has_effects) [[unlikely]] {
+    const LightEffect<F> effect(lights, light, lit);
+    const Color<F> diffuse = at.bsdf.diffuse_f_cos(c.view, wi);
+    f_cos = select<F>(effect.applies,
+                      fma(f_cos - diffuse, effect.specular, diffuse * effect.diffuse), f_cos);
+    w = select(effect.sampled_only, F(1.f), w);
+    if (lights.shadows) [[unlikely]]
+      reach = shadow_reach<F>(lights, effect.shadow, r.w, lit);
+  }
+  if (v.has_links()) [[unlikely]] {
+    w = select(shines_on<F>(lights, link, light, lit), w, F(0.f));
+    set = shadow_set<F>(lights, light, lit);
+  }
+  Mask<F> valid = lit & l.valid & at.is_consistent(l.wi, wi);
+  // The random walk finds light that enters a subsurface body (medium/subsurface/random_walk.h).
+  if constexpr ((kFeatures & kBelow) != 0 && Bsdf::kWalks)
+    valid = valid & not_(at.bsdf.enters(c.wo, wi));
+  return {to_light.origin, l.wi, l.distance, at.throughput * f_cos * l.weight * w, w, valid,
+          light,           set,  reach};
+}
+
+/// Number of light samples that a vertex on a fibre evaluates.
+inline constexpr uint32_t kFibreCandidates = 3;
+
+/// Selects one of several light samples x_i with a probability proportional to the luminance g_i of
+/// its unoccluded contribution c_i:
+///   c = c_k sum_i g_i / (n g_k),   k with probability g_k / sum_i g_i
+/// (resampled importance sampling: J. Talbot, D. Cline, P. Egbert, "Importance Resampling for
+/// Global Illumination", 2005). The mean is that of a single light sample for any densities and
+/// weights in c, so the MIS weights stay those of a single sample. Where rays are expensive, as
+/// among strands, a shadow ray to an important light justifies three evaluations
+/// (docs/decisions/light-candidates.md). `first` belongs to the sample values `r`. The others use
+/// shifted values: evenly over all lights, and on each light by the R2 lattice (M. Roberts, "The
+/// Unreasonable Effectiveness of Quasirandom Sequences", 2018).
+template <typename F, typename Candidate>
+WAVECOMB_INLINE LightCandidate<F> resample(const LightCandidate<F>& first, const Sample4<F>& r, F u,
+                                           const Candidate& candidate) {
+  using U = UInt<F>;
+  constexpr float kN = kFibreCandidates, kSteps[2] = {0.7548777f, 0.5698403f};
+  const auto brightness = [](const LightCandidate<F>& one) {
+    return select(one.valid, luminance(clean<F>(one.c, 0.f)), F(0.f));
+  };
+  const auto moved = [](const F& x, float by) {
+    const F y = x + (by - std::floor(by));
+    return select(y < 1.f, y, F(y - 1.f));
+  };
+  LightCandidate<F> kept = first;
+  F g = brightness(first), sum = g;
+  for (uint32_t k = 1; k < kFibreCandidates; ++k) {
+    const auto n = static_cast<float>(k);
+    const LightCandidate<F> other = candidate(
+        Sample4<F>{moved(r.x, n / kN), moved(r.y, n * kSteps[0]), moved(r.z, n * kSteps[1]), r.w});
+    const F h = brightness(other);
+    sum += h;
+    // One random number serves all selections: after rescaling it is uniform again.
+    const F q = select(h > 0.f, F(h / select(h > 0.f, sum, F(1.f))), F(0.f));
+    const Mask<F> takes = u < q;
+    u = select(takes, F(u / max(q, F(1e-20f))), F((u - q) / max(F(1.f - q), F(1e-20f))));
+    g = select(takes, h, g);
+    kept.origin = select<F>(takes, other.origin, kept.origin);
+    kept.wi = select<F>(takes, other.wi, kept.wi);
+    kept.distance = select(takes, other.distance, kept.distance);
+    kept.c = select<F>(takes, other.c, kept.c);
+    kept.w = select(takes, other.w, kept.w);
+    kept.valid = (takes & other.valid) | (not_(takes) & kept.valid);
+    kept.light = select(Mask<U>(takes), other.light, kept.light);
+    kept.shadow_set = select(Mask<U>(takes), other.shadow_set, kept.shadow_set);
+    kept.reach.distance = select(takes, other.reach.distance, kept.reach.distance);
+    kept.reach.color = select<F>(takes, other.reach.color, kept.reach.color);
+  }
+  kept.c = kept.c * F(sum / select(g > 0.f, F(g * kN), F(1.f)));
+  return kept;
+}
+
+}  // namespace detail
+
+/// Samples a point on a light, and sets up its shadow ray. `out.next.link` must be set.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE void sample_light(const VertexContext<Bsdf, F, kFeatures>& c, const Sample4<F>& r,
+                                  VertexResult<F>& out) {
+  const Vertex<F, kFeatures>& v = c.vertex;
+  const auto& at = c.at;
+  const LightView& lights = v.scene.lights;
+  const Mask<F> lit = v.active & at.bsdf.has_non_delta();
+  if (!Bsdf::kHasNonDelta || lights.count == 0 || none(lit)) return;
+  LightReceiver<F> receiver = c.receiver;
+  receiver.p = at.origin(-v.path.dir);
+  const auto candidate = [&](const Sample4<F>& u) {
+    return detail::light_candidate(c, receiver, u, out.next.link, lit);
+  };
+  detail::LightCandidate<F> one = candidate(r);
+  if constexpr (Bsdf::kOnFibre)
+    if (lights.count > 1)
+      one = detail::resample<F>(one, r, candidate_number<F>(v.key, v.depth), candidate);
+  out.direct = clean<F>(one.c, clamp_limit(v.settings, v.depth + 1));
+  out.has_shadow = one.valid & (max_component(out.direct) > 0.f);
+  if (v.has_links()) [[unlikely]]
+    out.shadow_set = one.shadow_set;
+  if (v.wants_lights()) {
+    v.aovs->lit_by = one.light;
+    v.aovs->lit_at = one.origin;
+    v.aovs->light_weight = one.w;
+  }
+  out.shadow_o = one.origin;
+  out.shadow_d = one.wi;
+  out.shadow_tfar = one.distance * kShadowReach;
+  if (v.has(kMeshLights) && lights.has_effects) [[unlikely]] {
+    out.shadow_tfar = min(out.shadow_tfar, one.reach.distance);
+    out.shade = one.reach.color;
+  }
+}
+
+}  // namespace wavecomb

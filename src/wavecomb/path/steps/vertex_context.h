@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Values that the steps of a vertex share.
+#pragma once
+
+#include <utility>
+
+#include "wavecomb/guiding/lookup.h"
+#include "wavecomb/path/steps/interact.h"
+
+namespace wavecomb {
+
+template <typename F>
+struct JointVertex;
+
+/// Context of the steps after `interact`: references to values that take_steps() (path/vertex.h)
+/// has computed once for the vertex.
+///
+/// Contract: valid only within take_steps(). Steps read it and write VertexResult and the outputs
+/// of Vertex. They are inlined, so that no reference costs a memory access.
+template <typename Bsdf, typename F, uint32_t kFeatureSet>
+struct VertexContext {
+  using Program = Bsdf;
+  using Float = F;
+  using Interaction = decltype(interact<Bsdf, F>(std::declval<const Vertex<F, kFeatureSet>&>()));
+  /// BSDF of the interaction. A program for volumes has a different type than its phase function.
+  using Scattering = std::remove_cvref_t<decltype(std::declval<const Interaction&>().bsdf)>;
+  using View = decltype(std::declval<const Scattering&>().view(std::declval<const Vec3<F>&>()));
+  static constexpr uint32_t kFeatures = kFeatureSet;
+
+  const Vertex<F, kFeatures>& vertex;
+  const Interaction& at;             ///< shading point or volume event
+  const Frame<F>& frame;             ///< of the BSDF's local directions
+  const Vec3<F>& wo;                 ///< direction to the viewer, in `frame`
+  const View& view;                  ///< of the BSDF from `wo`
+  const GuidePlace<F>& guide;        ///< lookup in the guiding field
+  const JointVertex<F>& joint;       ///< ratio R of light paths; zero without light paths
+  const LightReceiver<F>& receiver;  ///< for light sampling, without a position
+};
+
+}  // namespace wavecomb

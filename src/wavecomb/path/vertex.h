@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Shading of one path vertex as a sequence of steps. The wave and the reference integrator share
+/// it.
+#pragma once
+
+#include "wavecomb/core/sampler.h"
+#include "wavecomb/guiding/bounce/guided_bounce.h"
+#include "wavecomb/light_paths/join.h"
+#include "wavecomb/path/path_pool.h"
+#include "wavecomb/path/steps/emit.h"
+#include "wavecomb/path/steps/interact.h"
+#include "wavecomb/path/steps/note_events.h"
+#include "wavecomb/path/steps/sample_light.h"
+#include "wavecomb/path/steps/scatter.h"
+#include "wavecomb/path/steps/survive.h"
+
+namespace wavecomb {
+
+/// Returns InsideRow::crossed of a vertex whose bounce and shadow ray are in `out`.
+template <typename F, uint32_t kFeatures>
+inline UInt<F> crossed_at(const Vertex<F, kFeatures>& v, const Frame<F>& frame, const Vec3<F>& wo,
+                          const VertexResult<F>& out) {
+  using U = UInt<F>;
+  const auto bit = [&](const Mask<F>& on, Crossing what) {
+    return select(Mask<U>(on), U(uint32_t{what}), U(0u));
+  };
+  const auto crosses = [&](const Vec3<F>& d) { return Mask<F>(F(dot(frame.n, d) * wo.z) < 0.f); };
+  return (v.material << kCrossingBits) | bit(wo.z > 0.f, kEnters) |
+         bit(out.alive & crosses(out.next.dir), kBounceCrosses) |
+         bit(out.has_shadow & crosses(out.shadow_d), kShadowCrosses);
+}
+
+/// Runs the steps of a vertex for the active lanes' paths, all with shading program `Bsdf`.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
+  using U = UInt<F>;
+  using V = Vertex<F, kFeatures>;
+  VertexResult<F> out;
+  out.emitted = Color<F>(F(0.f));
+  out.direct = Color<F>(F(0.f));
+  out.has_shadow = Mask<F>(false);
+  out.alive = Mask<F>(false);
+  out.shadow_set = U(0u);
+  if constexpr (V::has(kMeshLights)) out.shade = Color<F>(F(0.f));
+  out.next.link = U(0u);
+  out.axis = U(0u);
+  out.bsdf_pdf = F(0.f);
+  if constexpr (V::has(kInside)) out.crossed = U(0u);
+  if (v.wants_lights()) {
+    v.aovs->emitter = v.aovs->lit_by = U(kNoLight);
+    v.aovs->light_weight = F(-1.f);
+  }
+  if (v.wants_bounces()) v.aovs->survival = F(-1.f);
+
+  const auto at = interact<Bsdf, F>(v);
+  if constexpr (Bsdf::kEmits) out.emitted = emit<Bsdf, F>(v, at);
+  const Frame<F> frame = at.frame(v);
+  const Vec3<F> wo = frame.to_local(-v.path.dir);
+  at.note(v, frame);
+  if (v.depth >= v.settings.max_depth) return out;
+  if (v.has_links()) [[unlikely]]
+    out.next.link = at.link_class(v);
+
+  const auto view = at.bsdf.view(wo);
+  const GuidePlace<F> place = guide_place<Bsdf, F>(v, at, frame, wo);
+  JointVertex<F> joint{};
+  if constexpr (V::has(kJoined) && Bsdf::kOnSurface)
+    if (v.joins_light()) [[unlikely]] {
+      joint = joint_vertex<Bsdf, F>(v, at, frame);
+      if (v.visible) leave_point<F>(v, at, joint);
+    }
+
+  const Sample4<F> r_light =
+      sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kLight, v.depth));
+  const LightReceiver<F> receiver = light_receiver<Bsdf, F>(v, frame, wo);
+  const VertexContext<Bsdf, F, kFeatures> context{.vertex = v,
+                                                  .at = at,
+                                                  .frame = frame,
+                                                  .wo = wo,
+                                                  .view = view,
+                                                  .guide = place,
+                                                  .joint = joint,
+                                                  .receiver = receiver};
+  sample_light(context, r_light, out);
+  if constexpr (V::has(kJoined) && Bsdf::kOnSurface)
+    if (v.offer) [[unlikely]]
+      offer_connection(context);
+  const Sample4<F> r_bsdf =
+      sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kBsdf, v.depth));
+  scatter(context, r_bsdf, out);
+  survive<F>(v, place, luminance(at.throughput), r_light.w, out);
+  if constexpr (Bsdf::kOnSurface && Bsdf::kTransmits)
+    if (v.knows_inside()) [[unlikely]]
+      out.crossed = crossed_at<F>(v, frame, wo, out);
+  if (v.wants_events()) [[unlikely]]
+    note_events(context, out);
+  return out;
+}
+
+/// Runs take_steps() without inlining, for the reference integrator.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+VertexResult<F> shade_vertex(const Vertex<F, kFeatures>& v) {
+  return take_steps<Bsdf, F>(v);
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,376 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Scalar path tracer of the reference integrator, which traces one path after the other.
+#pragma once
+
+#include <utility>
+
+#include "wavecomb/aov/path_aovs.h"
+#include "wavecomb/aov/screen_motion.h"
+#include "wavecomb/geometry/hit/hit_material.h"
+#include "wavecomb/guiding/lookup.h"
+#include "wavecomb/light_paths/camera_connection.h"
+#include "wavecomb/light_paths/light_path.h"
+#include "wavecomb/path/media.h"
+#include "wavecomb/path/path_history.h"
+#include "wavecomb/path/shading_record.h"
+#include "wavecomb/path/steps/emit.h"
+#include "wavecomb/path/steps/escape.h"
+#include "wavecomb/path/steps/survive.h"
+#include "wavecomb/reference/reference.h"
+#include "wavecomb/reference/single_rays.h"
+#include "wavecomb/wave/kernels/program_dispatch.h"
+
+namespace wavecomb {
+
+/// Traces camera paths one at a time and depth first. `Media` samples the volumes, media and
+/// subsurface random walks between mesh surfaces (path/media.h).
+template <typename Media>
+class PathTracer {
+  using F = float;
+
+ public:
+  PathTracer(const WaveContext& context, ReferenceWorker& worker, const Media& media)
+      : context_(context),
+        media_(media),
+        settings_(camera_shade_settings(context)),
+        clock_(worker.clock),
+        counts_(worker.counts),
+        rays_(context, worker.counts, worker.aovs),
+        aovs_(worker.aovs),
+        history_(worker.history),
+        light_aovs_(worker.light_aovs),
+        vertices_(worker.light_vertices),
+        visible_(worker.visible) {}
+
+  /// Traces the path of `task`, which has one pixel and one sample, and returns its radiance times
+  /// the camera's exposure. Slot 0 of the worker's AOVs then holds the AOVs of the path.
+  Color<F> exposed_path(const WaveTask& task) {
+    aovs_.clear(1);
+    history_.clear(1);
+    radiance_ = {};
+    if (visible_) visible_.clear(1);
+    const uint32_t last = trace_path(*task.pixels, task.first_sample);
+    aovs_.end_path(last, radiance(), 1);
+    if (history_) context_.histories->ended(history_, radiance(), task);
+    const F exposure = context_.camera->exposure;
+    if (exposure != 1) {
+      radiance_.sum *= exposure;
+      aovs_.expose(exposure, 1);
+    }
+    return radiance_.sum;
+  }
+  /// Traces a path only to record the lights that its vertices sample, as path `path` of `out`.
+  void probe(uint32_t pixel, uint32_t sample, size_t path, LightProbes& out) {
+    probes_ = {out.probes.data() + path * out.most, out.most};
+    probe_count_ = 0;
+    aovs_.clear(1);
+    radiance_ = {};
+    trace_path(pixel, sample);
+    out.luminance[path] = luminance(radiance_.sum);
+    out.counts[path] = probe_count_;
+  }
+  const float* radiance() const { return reinterpret_cast<const float*>(&radiance_); }
+
+ private:
+  /// Traces one camera path. Returns the first depth for which end_depth() has not stored the
+  /// radiance.
+  uint32_t trace_path(uint32_t pixel, uint32_t sample) {
+    const SceneView& scene = context_.scene;
+    const SampleKey<F> key = make_sample_key<F>(pixel, sample, context_.settings->seed);
+    const Sample4<F> r = sample_4d<F>(settings_.sampler, key, kCameraSet);
+    const auto x = static_cast<F>(pixel & 0xffffu), y = static_cast<F>(pixel >> 16);
+    const F time = context_.moves() ? camera_time<F>(*context_.camera, x, y,
+                                                     path_time<F>(settings_.sampler, key))
+                                    : 0.f;
+    rays_.begin(key, time);
+    const CameraRay<F> ray = camera_ray<F>(*context_.camera, x, y, r, true, time);
+    aovs_.begin<F>(*context_.camera, r, kSlot, true);
+    F cone_at_origin = ray.width;
+    const F importance =
+        context_.weighs_pixels() ? picture_importance<F>(*context_.guide, x, y, true) : 0.f;
+    PathState<F> path{.dir = ray.d,
+                      .throughput = Color<F>(1.f),
+                      .cone_spread = ray.spread,
+                      .o = ray.o,
+                      .importance = importance};
+    ++counts_.samples;
+
+    for (uint32_t depth = 0;; ++depth) {
+      path.time = time;
+      clock_.enter(Phase::kTrace);
+      const F tfar = depth == 0 && context_.camera->has_far ? ray.tfar : kInfinity;
+      SingleHit hit = rays_.intersect(path.o, path.dir, tfar, depth);
+      clock_.enter(Phase::kShade);
+      bool came_out = false;
+      if (path.enters_body) {
+        if (!walk(key, depth, path, hit, came_out)) return depth;
+        cone_at_origin = path.cone_width;
+      }
+      if constexpr (Media::kAny) {
+        const Flight<F> flight = fly(key, depth, path, hit);
+        if constexpr (Media::kShines)
+          if (media_.shines())
+            add_glow(clean<F>(
+                path.throughput *
+                    media_.template emission<F>(
+                        {settings_.sampler, key, depth, path.o, path.dir, hit.t, time}, true),
+                clamp_limit(settings_, depth)));
+        path.throughput = path.throughput * flight.weight;
+        note_way(depth, flight, path.throughput);
+        if (flight.stopped) hit = {flight.t, 0.f, 0.f, 0, 0, kNoSurface, flight.material};
+      }
+      path.cone_width = fma(path.cone_spread, hit.t, cone_at_origin);
+      if (hit.inst == kNoHit) {
+        if (!settings_.sees_sky(depth)) return depth;
+        radiance_.sum += environment_emission<F>(scene, settings_, depth, path, true);
+        if (aovs_.wants_lights())
+          aovs_.add_environment<F>(scene, settings_, depth, kSlot, path, true);
+        return depth;
+      }
+      const Vec3<F> p = fma(path.dir, hit.t, path.o);
+      if (hit.inst == kLightShape) {
+        if (depth == 0 && aovs_.wants_alpha()) aovs_.cover<F>(kSlot, true);
+        if (depth == 0) aovs_.hit_light<F>(*context_.camera, kSlot, p, time, hit.geom, true);
+        if (depth == 0 && aovs_.wants_motion())
+          aovs_.move<F>(
+              kSlot,
+              screen_motion_of_light<F>(scene.lights, *context_.camera, hit.geom, p, time, true),
+              true);
+        add(hit.geom, shape_emission<F>(scene, settings_, depth, hit.geom, hit.t, path, true));
+        return depth;
+      }
+      const bool on_surface = hit.inst != kNoSurface;
+      if (depth == 0 && on_surface && scene.visibility &&
+          held_out<F>(scene, hit.inst, hit.geom, true))
+        return depth;
+      if (depth == 0 && aovs_.wants_alpha()) aovs_.cover<F>(kSlot, true);
+      const uint32_t mesh = on_surface ? rays_.mesh_of(hit) : 0;
+      uint32_t material = on_surface ? rays_.material_of(hit, mesh) : hit.event_material;
+      if constexpr (Media::kStreams)
+        if (came_out && on_surface) material = media_.exit_material();
+      if (depth == 0 && on_surface)
+        aovs_.hit_surface<F>(*context_.camera, kSlot, p, time,
+                             {.inst = hit.inst, .geom = hit.geom, .material = material}, true);
+      if (depth == 0 && on_surface && aovs_.wants_motion())
+        aovs_.move<F>(
+            kSlot,
+            screen_motion_of_hit<F>(scene, *context_.camera,
+                                    {hit.inst, mesh, hit.prim, hit.u, hit.v, 0.f}, path.dir, true),
+            true);
+      if (depth == 0 && !on_surface)
+        aovs_.hit_volume<F>(*context_.camera, kSlot, p, time, volume_seen(material), true);
+      if (on_surface && settings_.cost_aware && depth >= settings_.roulette_depth) {
+        const F q = cost_aware_survival<F>(scene, *context_.roulette_costs, material, path, true);
+        aovs_.survive<F>(depth, kSlot, q, true);
+        if (!(cost_aware_number<F>(key, depth) < q)) return depth;
+        path.throughput *= 1.f / q;
+      }
+      VertexAovs<F> aovs = aovs_.wanted<F>(depth);
+      aovs.wants_lights |= !probes_.empty();
+      if (context_.joins_light() && depth == 0 && on_surface)
+        path.ratio =
+            first_ratio<F>(*context_.camera, context_.light_path_share(), p, path.dir, time, true);
+      if (context_.knows_inside()) {
+        path.outer = inside_.outer;
+        path.medium = inside_.medium;
+      }
+      const VertexResult<F> v = shade(key, depth, hit, mesh, material, path, aovs);
+      if (context_.knows_inside()) {
+        inside_.crossed = v.crossed;
+      }
+      add(aovs.emitter, v.emitted);
+      if constexpr (!Media::kAny)
+        if (vertices_ && aovs.wants_events)
+          light_aovs_.offer<F>(kSlot, aovs_.expressions().states<F>(kSlot, true), offer_.note,
+                               true);
+      if (aovs.wants_events && (v.alive || v.has_shadow))
+        aovs_.expressions().scatter<F>(depth, kSlot, key, aovs, v.has_shadow, true);
+      aovs_.vertex<F>(depth, kSlot, aovs, path, true);
+      if (history_)
+        history_.vertex<F>(depth, kSlot,
+                           {.path = path, .t = hit.t, .material = material, .result = v},
+                           radiance(), true);
+      aovs_.end_depth(depth, radiance(), 1);
+      bool is_free = false;
+      if (v.has_shadow) {
+        clock_.enter(Phase::kShadow);
+        const bool links = context_.scene.lights.links.members != nullptr;
+        is_free = !rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth,
+                                  links ? &v.shadow_set : nullptr);
+        if (is_free || max_component(v.shade) > 0.f)
+          add_direct(key, depth, v, is_free, aovs_.group_of<F>(aovs.lit_by, true));
+      }
+      if constexpr (!Media::kAny)
+        if (vertices_ && max_component(offer_.row.light) > 0.f) connect(depth);
+      if (!probes_.empty() && aovs.light_weight >= 0.f)
+        note_choice(v, aovs, is_free ? luminance(v.direct) : 0.f);
+      if (!v.alive) return depth + 1;
+      path = v.next;
+      path.importance = importance;
+      cone_at_origin = v.next.cone_width;
+    }
+  }
+
+  /// Continues a ray that has entered a subsurface body as a random walk. A ray that hits no
+  /// surface of that body continues unchanged. Sets `came_out` if the walk has left the body.
+  /// Returns false if the path is terminated.
+  bool walk(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit,
+            bool& came_out) {
+    path.enters_body = false;
+    path.receiver = 0u;
+    path.cone_width = 0.f;
+    const uint32_t object = path.entry.body;
+    if constexpr (Media::kStreams) {
+      PresenceKeys keys = rays_.keys();
+      keys.object = &object;
+      return media_.walk(passage_of(key, depth, path, hit), keys, path, hit, came_out);
+    }
+    return true;
+  }
+
+  /// Returns the ray segment of a path to `hit`. It refers to the path and the hit.
+  Passage<F> passage_of(const SampleKey<F>& key, uint32_t depth, const PathState<F>& path,
+                        const SingleHit& hit) const {
+    return {settings_.sampler, key, depth, path.o, path.dir, hit.t, rays_.time()};
+  }
+
+  /// Samples the free flight of a path along its ray segment to `hit`.
+  Flight<F> fly(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit) {
+    if constexpr (Media::kStreams)
+      if (context_.knows_inside())
+        return media_.fly_inside(passage_of(key, depth, path, hit), rays_.keys(), path, hit,
+                                 inside_);
+    return media_.template fly<F>(passage_of(key, depth, path, hit), path.throughput, true);
+  }
+
+  void note_choice(const VertexResult<F>& v, const VertexAovs<F>& aovs, F brought) {
+    if (probe_count_ == probes_.size()) return;
+    probes_[probe_count_++] = {aovs.lit_by,
+                               brought,
+                               aovs.light_weight,
+                               {aovs.lit_at.x, aovs.lit_at.y, aovs.lit_at.z},
+                               v.next.receiver};
+  }
+
+  /// Adds the contribution `c` of `light` to the radiance. `light` is kNoLight for emission of
+  /// other surfaces.
+  void add(uint32_t light, const Color<F>& c) {
+    radiance_.sum += c;
+    if (aovs_.wants_lights()) aovs_.add_light<F>(kSlot, light, c, true);
+  }
+
+  /// Adds the emission `c` of volumes to the radiance.
+  void add_glow(const Color<F>& c) {
+    radiance_.sum += c;
+    if (aovs_.wants_lights()) aovs_.add_glow<F>(kSlot, c, true);
+  }
+  /// Records the ray segment for AOVs. `throughput` is the throughput of the path after the flight.
+  void note_way(uint32_t depth, const Flight<F>& flight, const Color<F>& throughput) {
+    const bool straight = !flight.stopped && !flight.walked;
+    if (depth == 0 && aovs_.wants_transmittance())
+      aovs_.pass<F>(kSlot, straight ? throughput : Color<F>(0.f), true);
+    if (aovs_.expressions() && flight.walked) aovs_.expressions().walk<F>(kSlot, true);
+  }
+  /// Returns the volume, or the mesh filled with a medium, whose event `material` has stopped the
+  /// path.
+  VolumeSeen<F> volume_seen(uint32_t material) const {
+    const SceneView& scene = context_.scene;
+    if (context_.knows_inside() && material == scene.interiors.event_material)
+      return {0, inside_.place, inside_.medium, true};
+    return {material - scene.volumes.first_material, 0, material, false};
+  }
+
+  /// Adds the light sample of `v`, whose light is in `group`. Volumes always attenuate it, and
+  /// media inside meshes do if the shadow ray is free. If an object blocks the ray, only the
+  /// fraction v.shade (the shadow colour of the light) remains.
+  void add_direct(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v, bool is_free,
+                  uint32_t group) {
+    Color<F> c = v.direct;
+    if constexpr (Media::kAny) {
+      const F t = v.shadow_tfar * (1.f / kShadowReach);
+      c = c * media_.template transmittance<F>(
+                  {settings_.sampler, key, depth, v.shadow_o, v.shadow_d, t, rays_.time()}, true);
+      if constexpr (Media::kStreams)
+        if (is_free && context_.knows_inside())
+          c = c *
+              media_.pass_inside(rays_.keys(), rays_.time(), inside_, v.shadow_o, v.shadow_d, t);
+    }
+    if (!is_free) c = c * v.shade;
+    radiance_.sum += c;
+    if (aovs_.wants_lights()) aovs_.add_direct<F>(kSlot, group, c, true);
+    if (aovs_.wants_light_samples()) aovs_.add_light_sample<F>(kSlot, c, true);
+    if (history_) history_.light<F>(depth, kSlot, c, true);
+  }
+
+  VertexResult<F> shade(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit,
+                        uint32_t mesh, uint32_t material, const PathState<F>& path,
+                        VertexAovs<F>& aovs) {
+    const SceneView& scene = context_.scene;
+    counts_.add_records(depth, 1);
+    if (aovs_.models_cost()) aovs_.add_cost(kSlot, context_.roulette_costs->material(material));
+    const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, rays_.time()};
+    const bool joins = settings_.joins_light, connects = joins && vertices_;
+    if (connects) offer_ = offer_for<F>(vertices_, kSlot, depth, settings_.max_depth, true);
+    VisibleOffer<F> visible;
+    constexpr auto& kernels = kShadeVertex<F, typename Media::template Programs<F>>;
+    const VertexResult<F> v = kernels[scene.material_program[material]](
+        {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, path, &aovs, true,
+         context_.guide, connects ? &offer_ : nullptr, joins && visible_ ? &visible : nullptr});
+    if (visible.seen) store_row<VisiblePoint, F>(visible_.rows, kSlot, visible.row, true);
+    return v;
+  }
+
+  /// Connects the vertex at `depth` of the camera path to the chosen vertex of the light path.
+  void connect(uint32_t depth) {
+    clock_.enter(Phase::kShade);
+    const SceneView& scene = context_.scene;
+    const auto at = load_row<LightVertexRow, F>(vertices_.chosen, kSlot, true);
+    const auto from = load_row<LightPathRow, F>(vertices_.paths, kSlot, true);
+    const auto hit = load_row<ShadingRecord, F>(vertices_.records, kSlot, true);
+    counts_.add_records(depth, 1);
+    if (aovs_.models_cost()) aovs_.add_cost(kSlot, context_.roulette_costs->material(at.material));
+    const ConnectionTarget<F> target{offer_.row, at.depth == 0};
+    const MeshHit<F> mesh_hit{hit.inst, hit.mesh, hit.prim, hit.u, hit.v, rays_.time()};
+    const PathState<F> state =
+        light_path_state<F>(*context_.camera, from, hit.t, rays_.time(), true);
+    const LightPathSetup setup = light_path_setup(context_);
+    VertexAovs<F> aovs;
+    aovs.wants_events = light_aovs_.wants_events();
+    const VertexResult<F> v = kShadeLightVertex<F>[scene.material_program[at.material]](
+                                  {scene, light_settings_, from.key, depth, mesh_hit, hit.geom,
+                                   hit.t, at.material, state, &aovs, true},
+                                  setup, & target)
+                                  .v;
+    if (aovs.wants_events) light_aovs_.link<F>(kSlot, aovs.lit, true);
+    if (!v.has_shadow) return;
+    clock_.enter(Phase::kShadow);
+    const uint32_t no_set = 0;
+    const bool links = scene.lights.links.members != nullptr;
+    if (rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, links ? &no_set : nullptr))
+      return;
+    radiance_.sum += v.direct;
+    aovs_.add_link<F>(depth, kSlot, from.light, v.direct, true);
+    if (light_aovs_.wants_events())
+      light_aovs_.connect<F>(aovs_.expressions(), kSlot, v.direct, true);
+  }
+
+  static constexpr uint32_t kSlot = kOnlySlot;
+  const WaveContext& context_;
+  [[maybe_unused]] const Media& media_;
+  const ShadeSettings settings_, light_settings_ = settings_.of_light_paths();
+  PhaseClock& clock_;
+  Counts& counts_;
+  SingleRays rays_;
+  PathAovs& aovs_;
+  PathHistory& history_;
+  LightPathAovs& light_aovs_;
+  LightVertices& vertices_;     ///< vertices of the light path; empty without connections
+  const VisibleRows& visible_;  ///< point where light paths may be merged
+  ConnectionOffer<F> offer_;    ///< connection that the current vertex offers
+  RadianceRow<F> radiance_;
+  InsideRow<F> inside_{};         ///< medium stack of the path, if the scene has nested dielectrics
+  std::span<LightProbe> probes_;  ///< sampled lights of the path; empty if unused
+  uint32_t probe_count_ = 0;
+};
+
+}  // namespace wavecomb

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/inspection/learned_lookup.h"
+
+#include <algorithm>
+
+#include "wavecomb/guiding/lookup.h"
+#include "wavecomb/guiding/region_directions.h"
+#include "wavecomb/light/calibration/partition.h"
+#include "wavecomb/light/sampling/light_sample.h"
+#include "wavecomb/light/tree/light_tree.h"
+
+namespace wavecomb {
+namespace {
+
+void look_up_field(const GuideTraining& training, const SeenPlace& place, LearnedPlace& out) {
+  if (!training.field) return;
+  const GuideView view = view_of(training);
+  const auto found = find_guide<float>(view, place.p, out.axis, place.material, true);
+  out.known = found.known;
+  if (!found.known) return;
+  out.guided_share = 1.f - found.bsdf_share;
+  out.survival = found.survival;
+  out.density.resize(kGuideBins);
+  for (uint32_t i = 0; i < kGuideBins; ++i)
+    out.density[i] = guide_pdf<float>(view, found, bin_direction(i), true);
+}
+
+/// Counts the lights that evenly spaced random numbers select at the point.
+void count_lights(const Learned& learned, const SeenPlace& place, LearnedPlace& out) {
+  const Scene& scene = *learned.scene;
+  const LightParts parts = divide_lights(scene, false);  // gives the names
+  LightView lights = scene.view().lights;
+  if (lights.count == 0 || lights.count > kMostWeighed) return;
+  if (parts.size() == 0) {  // a single light or emissive mesh
+    out.light_shares.emplace_back("the only light", 1.f);
+    return;
+  }
+  lights.by_tree = learned.by_tree;
+  if (learned.by_tree) lights.tree = scene.light_tree(0).view();
+  if (learned.lights) learned.lights->weighed.apply(lights);
+  LightReceiver<float> receiver(place.p, pack_normal<float>(place.n));
+  std::vector<uint32_t> counts(parts.size());
+  constexpr uint32_t kStep = (1u << 24) / kCountedChoices;
+  for (uint32_t i = 0; i < kCountedChoices; ++i) {
+    receiver.seed = i;
+    const float u = static_cast<float>(i * kStep + kStep / 2) * 0x1p-24f;
+    const uint32_t light = chosen_light<float>(lights, receiver, u, true);
+    const uint32_t part = light == kNoLight ? kNoPart : parts.of(light);
+    if (part != kNoPart) ++counts[part];
+  }
+  for (size_t part = 0; part < counts.size(); ++part)
+    if (counts[part] > 0)
+      out.light_shares.emplace_back(parts.names[part],
+                                    static_cast<float>(counts[part]) / kCountedChoices);
+  std::stable_sort(out.light_shares.begin(), out.light_shares.end(),
+                   [](const auto& a, const auto& b) { return a.second > b.second; });
+}
+
+}  // namespace
+
+LearnedPlace look_up(const Learned& learned, const SeenPlace& place) {
+  LearnedPlace out;
+  out.axis = guide_axis<float>(place.n);
+  if (learned.training) look_up_field(*learned.training, place, out);
+  count_lights(learned, place, out);
+  return out;
+}
+
+}  // namespace wavecomb

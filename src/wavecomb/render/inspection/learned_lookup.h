@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Lookup of learned data at a surface point: the guiding distribution and the selection
+/// probabilities of lights. Kernels read the same tables.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "wavecomb/core/vec3.h"
+#include "wavecomb/render/pilots/guiding_training.h"
+#include "wavecomb/render/pilots/light_calibration.h"
+#include "wavecomb/scene/scene.h"
+
+namespace wavecomb {
+
+/// Data that a render learned before its first pass. Does not change afterwards.
+struct Learned {
+  std::shared_ptr<const Scene> scene;              ///< the rendered scene
+  bool by_tree = false;                            ///< LightView::by_tree
+  std::shared_ptr<const LightCalibration> lights;  ///< null if lights are selected by power
+  std::shared_ptr<const GuideTraining> training;   ///< may have no field
+};
+
+/// Surface point at which learned data is looked up.
+struct SeenPlace {
+  Vec3<float> p, n;       ///< n: unit normal on the viewer's side
+  uint32_t material = 0;  ///< index into the scene's materials
+};
+
+/// Learned data at a surface point.
+struct LearnedPlace {
+  /// Axis that the surface faces (one of kGuideAxes), and whether the field has a region there.
+  uint32_t axis = 0;
+  bool known = false;
+  /// Density per steradian of the guiding distribution, if `known`: kGuideSide rows of kGuideSide
+  /// bins of the square map of directions (guiding/directions.h).
+  std::vector<float> density;
+  float guided_share = 0;  ///< fraction of bounces that sample the guiding field
+  /// Survival probability of learned roulette for a throughput equal to the brightness of the
+  /// image, before clamping (guiding/roulette.h), or 0 if unknown.
+  float survival = 0;
+  /// Names of lights and emissive meshes with their selection probability at the point, largest
+  /// first, without those of probability 0. Empty if there are no lights or more than kMostWeighed.
+  std::vector<std::pair<std::string, float>> light_shares;
+};
+
+/// Number of light selections from which the probabilities are counted.
+inline constexpr uint32_t kCountedChoices = 4096;
+
+/// Looks up the learned data at `place`.
+LearnedPlace look_up(const Learned& learned, const SeenPlace& place);
+
+}  // namespace wavecomb

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Training paths and pilot renders of some pixels, with or without path guiding.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "wavecomb/guiding/bounce/bounce_reader.h"
+#include "wavecomb/guiding/image_tiles.h"
+#include "wavecomb/render/pilots/guiding_training.h"
+#include "wavecomb/wave/wave.h"
+
+namespace wavecomb {
+
+/// Cost of a ray tested against a list of triangles, relative to a ray traced through a BVH.
+inline constexpr double kListRay = 0.3;
+/// Costs in rays of shading a vertex and of looking up the guiding field there. Used by pilot
+/// renders; learned roulette uses the costs of the materials.
+inline constexpr double kShadingRays = 0.7, kGuidedRays = 0.9;
+
+/// Returns `count` pixels of `order`, evenly spread, in the same order.
+std::vector<uint32_t> some_pixels(const std::vector<uint32_t>& order, uint64_t count);
+
+/// Returns the mean without the given fraction of the largest values. Sorts `values`.
+double mean_without_largest(std::vector<double>& values, double share);
+
+/// Traces the paths of `plan` from `pixels`, guided by the field of `context`, in batches that
+/// bound memory. Replaces the bounces and paths in `lessons` and appends to its records. Returns
+/// the cost, in rays traced through a BVH.
+double teach(WaveContext context, const WaveSetup& waves, std::span<const uint32_t> pixels,
+             const LessonPlan& plan, Lessons& lessons, const std::function<bool()>& stopped);
+
+/// Result of a pilot render: two images of some pixels with different seeds. Both use the sampler
+/// of the render, so that their noise is that of well-distributed samples.
+struct Trial {
+  uint32_t samples = 0;             ///< per pixel, in each image
+  std::vector<double> differences;  ///< of the two means of each pixel
+  double cost = 0;                  ///< of both images, in rays traced through a BVH
+
+  double cost_of_sample() const {
+    return cost / (2.0 * samples * static_cast<double>(differences.size()));
+  }
+};
+
+/// Work of a pilot render of some pixels.
+struct PilotRenderPlan {
+  std::span<const uint32_t> pixels;
+  uint32_t samples;        ///< per pixel, in each of two images
+  const GuideView* guide;  ///< guiding field to use, or null for none
+  const GuideGrid& grid;   ///< of the guiding field
+};
+
+/// Renders the pixels twice, with `settings` except for the seed.
+Trial try_out(WaveContext context, Settings settings, const WaveSetup& waves,
+              const PilotRenderPlan& plan, const std::function<bool()>& stopped);
+
+/// Returns the mean squared difference of the two images, relative to the brightness of the image.
+/// Leaves out the pixels that differ most, since fireflies say little about other pixels. Contract:
+/// `tiles` are lit.
+double error_of(const Trial& trial, std::span<const uint32_t> pixels, const PictureTiles& tiles);
+
+}  // namespace wavecomb

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Trains the guiding field before the first pass.
+///
+/// Camera paths over the whole image are traced in rounds, each with twice as many paths as the one
+/// before. The first round samples the BSDFs only, the others use the field of the rounds before.
+/// The result does not depend on seed, region, threads, waves or lanes, so that crops, resumed
+/// renders and merged renders are guided by the same field. Training paths do not contribute to the
+/// image, because a field built from the samples that it guides would bias them.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+
+#include "wavecomb/core/settings.h"
+#include "wavecomb/guiding/field.h"
+#include "wavecomb/guiding/image_tiles.h"
+#include "wavecomb/render/wave_setup.h"
+#include "wavecomb/scene/scene.h"
+
+namespace wavecomb {
+
+struct WaveContext;
+
+/// Statistics of the training.
+struct GuideStatistics {
+  GuideFacts facts;    ///< of the last field that was built
+  uint64_t paths = 0;  ///< training paths; 0 if nothing was learned
+  uint32_t rounds = 0;
+  uint64_t field_bytes = 0;
+  /// For Guiding::kAuto: efficiency with the field over efficiency without, measured in pilot
+  /// renders, or 0 if unknown.
+  double gain = 0;
+  /// Expected fraction of vertices at which a path survives learned roulette.
+  double survival = 1;
+  bool used = false;  ///< whether the render uses the field for bounces or roulette
+  double seconds = 0;
+  bool is_kept = false;  ///< taken over from an earlier render or a checkpoint
+};
+
+/// Result of the training.
+struct GuideTraining {
+  std::shared_ptr<const GuideField> field;  ///< null if nothing was learned
+  std::optional<PictureTiles> tiles;        ///< brightness of the image; set if there is a field
+  GuideStatistics statistics;
+};
+
+/// Returns the device layout of the field and of the tiles. Contract: valid as long as `training`.
+GuideView view_of(const GuideTraining& training);
+
+/// Returns the grid of a scene's guiding field.
+GuideGrid grid_of(const Scene& scene);
+
+/// Returns whether the settings ask for path guiding or learned roulette.
+bool is_taught(const Settings& settings);
+
+/// Trains the field for a render with `context`, whose lights are calibrated. Gives up if `stopped`
+/// returns true; the result is then invalid.
+GuideTraining train_guide(const WaveContext& context, const Scene& scene, const WaveSetup& waves,
+                          const std::function<bool()>& stopped);
+
+}  // namespace wavecomb

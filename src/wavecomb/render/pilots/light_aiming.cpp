@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/pilots/light_aiming.h"
+
+#include <algorithm>
+#include <memory>
+
+#include "wavecomb/core/clock.h"
+#include "wavecomb/film/filter.h"
+#include "wavecomb/light/emission/aim_samples.h"
+#include "wavecomb/light_paths/setup.h"
+#include "wavecomb/render/inspection/picking.h"
+#include "wavecomb/render/lane_kernels.h"
+#include "wavecomb/render/passes/pass_runner.h"
+
+namespace wavecomb {
+namespace {
+
+constexpr uint32_t kAimRounds = 4, kAimSeed = 0x9e3779b9u;
+/// Cells along each side of the image through which rays look for surface points.
+constexpr uint32_t kSeenCells = 48;
+/// Paths of a round: one for every kAimShare pixels of the image, within these limits.
+constexpr uint64_t kAimShare = 4, kLeastAimPaths = 8192, kMostAimPaths = 131'072;
+
+/// Returns spheres around the points that the camera sees. Their radii are doubled, to include
+/// objects that reflect or focus light onto these points.
+LightAim aim_at_seen(const Scene& scene, const EmbreeAccelerator& accel, const Settings& settings,
+                     float scene_radius) {
+  std::vector<AimLesson> seen;
+  for (const Vec3<float>& p :
+       seen_places(scene, accel, settings.width, settings.height, kSeenCells))
+    seen.push_back({p.x, p.y, p.z, 1.f});
+  LightAim aim = aim_targets(seen, scene_radius);
+  for (uint32_t k = 0; k < aim.count; ++k)
+    aim.radius[k] = std::min(2 * aim.radius[k], scene_radius);
+  return aim;
+}
+
+/// Returns a plan with one sample of each of the first `count` light paths. Path numbers are coded
+/// as pixels, which may lie below the image if it is small.
+PassPlan first_paths(const Settings& settings, uint64_t count, uint32_t sample) {
+  PassPlan plan;
+  plan.pixels.reserve(count);
+  for (uint64_t i = 0; i < count; ++i)
+    plan.pixels.push_back(static_cast<uint32_t>(i % settings.width | (i / settings.width) << 16));
+  plan.batches.push_back({0, plan.pixels.size(), sample, 1});
+  return plan;
+}
+
+}  // namespace
+
+LightAiming learn_to_aim(const WaveContext& render, const Scene& scene, const WaveSetup& waves,
+                         const std::function<bool()>& stopped) {
+  const Clock::time_point start = Clock::now();
+  LightAiming out;
+  if (!render.scene.lights.sends_paths()) return out;
+  Settings settings = *render.settings;
+  settings.region.reset();
+  settings.crop = false;
+  settings.aovs = {};
+  settings.seed = kAimSeed;
+  // Roulette would multiply the contribution of survivors, which adds noise.
+  settings.roulette = RouletteKind::kOff;
+  const FilterTable filter(settings.filter, settings.used_filter_width());
+  const SplatFilter splat_filter = splat_filter_of(*render.camera, filter, settings.rendered());
+  WaveContext context = render;
+  context.settings = &settings;
+  context.splat_filter = &splat_filter;
+  context.recorder = nullptr;
+  const uint64_t numbers = uint64_t{settings.width} * settings.height;
+  const uint64_t count = std::clamp(numbers / kAimShare, kLeastAimPaths, kMostAimPaths);
+  const std::unique_ptr<Integrator> integrator =
+      make_integrator(settings.integrator, context, waves.lanes, waves.threads, waves.wave_size);
+  PassRunner runner(*integrator, waves.threads, waves.wave_size);
+  out.aim = aim_at_seen(scene, *context.accel, settings, context.scene.lights.radius);
+  for (uint32_t round = 0; round < kAimRounds; ++round) {
+    AimLessons lessons(count);
+    context.lessons = &lessons;
+    context.scene.lights.aim = out.aim.count > 0 ? &out.aim : nullptr;
+    runner.run(first_paths(settings, count, round), stopped, true);
+    if (stopped()) return {};
+    out.aim = aim_targets(lessons.rows(), context.scene.lights.radius);
+    out.paths += count;
+  }
+  out.seconds = seconds_since(start);
+  return out;
+}
+
+}  // namespace wavecomb

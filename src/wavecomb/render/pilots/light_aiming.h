@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Learns where to aim light paths, before the first pass.
+///
+/// Light paths are traced in rounds. The first round aims at the points that the camera sees, the
+/// others at the results of the round before. These paths do not contribute to the image. The
+/// result does not depend on seed, region, samples, threads, waves or lanes, so that crops, resumed
+/// renders and merged renders aim alike.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "wavecomb/light/description/aim.h"
+#include "wavecomb/render/pilots/guiding_training.h"
+#include "wavecomb/wave/wave.h"
+
+namespace wavecomb {
+
+/// Result of the pilot that learns where to aim, with statistics.
+struct LightAiming {
+  LightAim aim;        ///< without spheres: paths are not aimed
+  uint64_t paths = 0;  ///< training paths
+  double seconds = 0;
+};
+
+/// Learns for a render with `context`, whose lights are calibrated and send paths. Gives up if
+/// `stopped` returns true; the result is then invalid.
+LightAiming learn_to_aim(const WaveContext& context, const Scene& scene, const WaveSetup& waves,
+                         const std::function<bool()>& stopped);
+
+}  // namespace wavecomb

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/pilots/light_calibration.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <unordered_map>
+
+#include "wavecomb/core/clock.h"
+#include "wavecomb/core/denormals.h"
+#include "wavecomb/guiding/image_tiles.h"
+#include "wavecomb/light/calibration/balance.h"
+#include "wavecomb/light/sampling/tree_choice.h"
+#include "wavecomb/light/tree/light_tree.h"
+#include "wavecomb/reference/reference.h"
+#include "wavecomb/scene/parallel.h"
+#include "wavecomb/wave/cost_calibration.h"
+
+namespace wavecomb {
+namespace {
+
+/// Calibration traces one path for every kPixelsOfPath pixels, within these limits.
+constexpr uint32_t kMostPaths = 16384, kLeastPaths = 1024, kPixelsOfPath = 4;
+/// Vertices of a path at which a light is selected.
+constexpr uint32_t kVertices = 3;
+constexpr size_t kChunk = 128;
+/// Light tree nodes above this depth are balanced.
+constexpr uint32_t kTiltDepth = 6;
+/// Largest light tree whose nodes are balanced: the nodes are copied, 64 bytes for each light.
+constexpr size_t kMostTilted = size_t{1} << 20;
+
+uint32_t path_count(const Settings& settings) {
+  const uint64_t pixels = uint64_t{settings.width} * settings.height;
+  return static_cast<uint32_t>(
+      std::clamp<uint64_t>(pixels / kPixelsOfPath, kLeastPaths, kMostPaths));
+}
+
+/// Returns pixels spread over the whole image by M. Roberts' R2 sequence, in integer arithmetic.
+std::vector<uint32_t> spread_pixels(const Settings& settings, uint32_t count) {
+  std::vector<uint32_t> pixels(count);
+  for (uint32_t i = 0; i < count; ++i) {
+    const uint32_t u = (i + 1) * 3242174889u, v = (i + 1) * 2447445414u;
+    const auto x = static_cast<uint32_t>(uint64_t{u} * settings.width >> 32);
+    const auto y = static_cast<uint32_t>(uint64_t{v} * settings.height >> 32);
+    pixels[i] = x | y << 16;
+  }
+  return pixels;
+}
+
+/// Returns the changed odds of the upper tree nodes, from the samples that passed through them.
+std::vector<NodeTilt> balance_nodes(const LightTreeView& tree, const LightProbes& probes,
+                                    std::span<const double> scales) {
+  std::unordered_map<uint32_t, size_t> index;
+  std::vector<std::pair<uint32_t, NodeBalance>> nodes;
+  const DenormalsOff denormals_off;
+  for (size_t path = 0; path < scales.size(); ++path) {
+    for (uint32_t k = 0; k < probes.counts[path]; ++k) {
+      const LightProbe& probe = probes.probes[path * probes.most + k];
+      if (!(probe.value > 0) || probe.light == kNoLight) continue;
+      uint32_t way = tree.trails[probe.light];
+      if (way == kNoLight) continue;
+      uint32_t depth = 0, at = tree.root;
+      const LightReceiver<float> to({probe.at[0], probe.at[1], probe.at[2]}, probe.normal);
+      detail::descend<float>(tree, to, true, [&](float left, bool) {
+        const bool right = (way & 1u) != 0;
+        way >>= 1;
+        if (depth++ < kTiltDepth) {
+          const auto [found, fresh] = index.try_emplace(at, nodes.size());
+          if (fresh) nodes.push_back({at, {}});
+          nodes[found->second].second.add(right, double{right ? 1.f - left : left},
+                                          double{probe.value} * scales[path], double{probe.weight});
+          at = tree.nodes[at].child[right ? 1 : 0].next;
+        }
+        return right;
+      });
+    }
+  }
+  std::vector<NodeTilt> tilts;
+  for (const auto& [node, balance] : nodes)
+    if (const float odds = balance.odds(); odds != 1) tilts.push_back({node, odds});
+  return tilts;
+}
+
+/// Returns whether a calibration for settings `a` is valid for `b`.
+bool alike(const Settings& a, const Settings& b) {
+  return a.width == b.width && a.height == b.height && a.max_depth == b.max_depth &&
+         a.filter == b.filter && a.used_filter_width() == b.used_filter_width() &&
+         a.light_selection == b.light_selection && a.schlick_fresnel == b.schlick_fresnel &&
+         a.cosine_sampling == b.cosine_sampling && a.texture_filter == b.texture_filter;
+}
+
+/// Traces the calibration paths through the scene of `view`, whose lights have the initial
+/// probabilities.
+LightProbes trace_probes(const Scene& scene, const EmbreeAccelerator& accel, const SceneView& view,
+                         const Settings& settings, std::span<const uint32_t> pixels,
+                         const std::function<bool()>& stopped) {
+  Settings probing;
+  probing.width = settings.width;
+  probing.height = settings.height;
+  probing.max_depth = std::min(settings.max_depth, kVertices);
+  probing.schlick_fresnel = settings.schlick_fresnel;
+  probing.cosine_sampling = settings.cosine_sampling;
+  probing.texture_filter = settings.texture_filter;
+  probing.sampler = SamplerKind::kIndependent;
+  probing.seed = 0x9e3779b9u;
+  const FilterTable filter(settings.filter, settings.used_filter_width());
+  const CameraSetup camera(scene.camera(), settings.width, settings.height, filter,
+                           settings.overscan);
+  Film film(1, 1, AovLayout{});
+  WaveContext context{};
+  context.scene = view;
+  context.accel = &accel;
+  context.settings = &probing;
+  context.camera = &camera;
+  context.film = &film;
+  context.traversal_width = 1;
+  LightProbes probes(pixels.size(), kVertices);
+  parallel_for((pixels.size() + kChunk - 1) / kChunk, [&](size_t chunk) {
+    if (stopped()) return;
+    const DenormalsOff denormals_off;
+    const size_t first = chunk * kChunk;
+    run_light_probes(context, pixels, first, std::min(kChunk, pixels.size() - first), probes);
+  });
+  return probes;
+}
+
+}  // namespace
+
+LightCalibration calibrate_lights(const Scene& scene, const EmbreeAccelerator& accel,
+                                  const SceneView& view, const Settings& settings,
+                                  const std::function<bool()>& stopped) {
+  const auto start = std::chrono::steady_clock::now();
+  LightCalibration out;
+  if (settings.light_weights == LightWeights::kPower || settings.max_depth == 0) return out;
+  LightParts parts = divide_lights(scene, view.lights.by_tree);
+  if (parts.size() == 0) return out;
+  const LightSet& set = scene.light_set();
+  const LightTree& tree = parts.by_tree ? scene.light_tree(settings.threads) : set.tree;
+  const bool has_nodes = parts.by_tree && tree.nodes.size() > 1 && set.size() <= kMostTilted;
+  if (parts.size() < 2 && !has_nodes) return out;
+
+  // Mix with even probabilities, so that lights of little power are sampled too.
+  std::vector<double> even(parts.size());
+  for (size_t i = 0; i < parts.size(); ++i)
+    even[i] = 0.5 * parts.power[i] + 0.5 / static_cast<double>(parts.size());
+  LightWeigher weigher(set, tree, parts);
+  const WeighedLights first = weigher.weigh(even, {});
+  SceneView probing = view;
+  first.apply(probing.lights);
+  const std::vector<uint32_t> pixels = spread_pixels(settings, path_count(settings));
+  const LightProbes probes = trace_probes(scene, accel, probing, settings, pixels, stopped);
+  if (stopped()) return out;
+
+  const PictureTiles tiles(settings, pixels, probes.luminance);
+  std::vector<double> scales;
+  if (tiles.is_lit())
+    for (const uint32_t pixel : pixels) scales.push_back(tiles.inverse_scale(pixel));
+  LightBalance balance(first.shares, size_t{tiles.count()} * kVertices);
+  for (size_t path = 0; path < scales.size(); ++path) {
+    for (uint32_t k = 0; k < probes.counts[path]; ++k) {
+      const LightProbe& probe = probes.probes[path * probes.most + k];
+      const uint32_t part = parts.of(probe.light);
+      if (part != kNoPart)
+        balance.add(tiles.of(pixels[path]) * kVertices + k, part,
+                    double{probe.value} * scales[path], double{probe.weight});
+    }
+  }
+  std::vector<NodeTilt> tilts;
+  if (has_nodes) tilts = balance_nodes(probing.lights.tree, probes, scales);
+  out.weighed = weigher.weigh(balance.shares(parts.power), tilts);
+  out.parts = std::move(parts);
+  out.paths = static_cast<uint32_t>(pixels.size());
+  out.tilted_nodes = static_cast<uint32_t>(tilts.size());
+  out.seconds = seconds_since(start);
+  return out;
+}
+
+std::shared_ptr<const LightCalibration> LightCalibrationCache::get(
+    const std::shared_ptr<const Scene>& scene, const EmbreeAccelerator& accel,
+    const SceneView& view, const Settings& settings, const std::function<bool()>& stopped) {
+  const bool is_off = settings.light_weights == LightWeights::kPower;
+  if (!last_ || is_off || scene_.lock() != scene || !alike(settings_, settings)) {
+    last_ = std::make_shared<const LightCalibration>(
+        calibrate_lights(*scene, accel, view, settings, stopped));
+    settings_ = settings;
+    scene_ = stopped() || is_off ? std::weak_ptr<const Scene>() : scene;
+  } else if (!last_->kept) {
+    auto kept = std::make_shared<LightCalibration>(*last_);
+    kept->kept = true;
+    kept->seconds = 0;
+    last_ = kept;
+  }
+  return last_;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/pilots/pilots.h"
+
+#include <utility>
+
+namespace wavecomb {
+namespace {
+
+/// Returns the training that a render uses: a new one, or that of an earlier render.
+std::shared_ptr<const GuideTraining> training_for(const PilotInput& input,
+                                                  const WaveContext& context, PilotCache& cache) {
+  if (input.learned.empty())
+    return cache.trainings.get(input.scene, context, input.plan.waves, input.stopped);
+  return std::make_shared<const GuideTraining>(
+      unpacked_training(input.learned, *input.scene, input.plan.settings));
+}
+
+}  // namespace
+
+void PilotResults::apply(WaveContext& context) const {
+  context.scene.lights = light_view;
+  if (training->field) context.guide = &guide_view;
+}
+
+PilotResults run_pilots(const PilotInput& input, PilotCache& cache) {
+  const RenderPlan& plan = input.plan;
+  WaveContext context = input.context;
+  LightView& view = context.scene.lights;
+  PilotResults found;
+  found.lights = cache.lights.get(input.scene, plan.accelerator, plan.view, input.light_settings,
+                                  input.stopped);
+  found.lights->weighed.apply(view);
+  if (context.joins_light()) send_paths(*input.scene, view);
+  input.costs.start(context, plan.kernels, input.profile, input.halted);
+  if (plan.settings.joins_light() && plan.settings.light_aim) {
+    found.aiming = input.aiming;
+    if (!found.aiming)
+      found.aiming = std::make_shared<const LightAiming>(
+          learn_to_aim(context, *input.scene, plan.waves, input.stopped));
+    if (found.aiming->aim.count > 0) view.aim = &found.aiming->aim;
+  }
+  found.light_view = view;
+  found.training = training_for(input, context, cache);
+  if (found.training->field) found.guide_view = view_of(*found.training);
+  return found;
+}
+
+}  // namespace wavecomb

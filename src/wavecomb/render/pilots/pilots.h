@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Pilot renders: small renders before the first pass that measure what the render needs.
+///
+/// They run in this order, and each uses the results of those before:
+/// 1. light calibration: the contribution of each light to the image (light_calibration.h);
+/// 2. costs of materials (render_costs.h);
+/// 3. aiming: directions for light paths (light_aiming.h);
+/// 4. training: where light comes from (guiding_training.h).
+/// Each returns its result with the seconds that it took and its statistics. Except for costs,
+/// which change no image, they depend only on counted samples of the whole image. Whether and how
+/// many light paths the render uses was decided before, by a pilot that compares whole renders
+/// (transport_choice.h).
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <span>
+
+#include "wavecomb/guiding/field_view.h"
+#include "wavecomb/render/pilots/light_aiming.h"
+#include "wavecomb/render/pilots/light_calibration.h"
+#include "wavecomb/render/pilots/training_cache.h"
+#include "wavecomb/render/render_plan.h"
+
+namespace wavecomb {
+
+/// Results of the pilots of earlier renders of the same scene.
+///
+/// Contract: one thread at a time.
+struct PilotCache {
+  LightCalibrationCache lights;
+  GuideTrainingCache trainings;
+};
+
+/// Results of the pilots of one render.
+struct PilotResults {
+  std::shared_ptr<const LightCalibration> lights;  ///< null if not calibrated yet
+  std::shared_ptr<const LightAiming> aiming;       ///< null if light paths are not aimed
+  /// Never null; without a field before and unless it is trained.
+  std::shared_ptr<const GuideTraining> training = std::make_shared<const GuideTraining>();
+  LightView light_view;  ///< lights with calibrated weights, and aimed if they send paths
+  GuideView guide_view;  ///< of the field of `training`, if it has one
+
+  /// Makes the waves of `context` use these results. Contract: this object outlives the use of the
+  /// context and does not change meanwhile.
+  void apply(WaveContext& context) const;
+};
+
+/// Input of the pilots.
+struct PilotInput {
+  std::shared_ptr<const Scene> scene;
+  const RenderPlan& plan;
+  const WaveContext& context;  ///< of the render
+  RenderCosts& costs;          ///< gets what is measured
+  /// Costs of an earlier render, or null.
+  const CostProfile* profile = nullptr;
+  /// The image that lights are calibrated for: that of the plan, or of the render that this pilot
+  /// render is for.
+  const Settings& light_settings;
+  /// Packed training of an earlier render (packed_training()), which replaces training; or empty.
+  std::span<const std::byte> learned;
+  /// Result of an earlier pilot render of the same image, which replaces learning to aim; may be
+  /// null.
+  std::shared_ptr<const LightAiming> aiming;
+  std::function<bool()> stopped;  ///< whether to give up
+  std::function<bool()> halted;   ///< whether to pause soon
+};
+
+/// Runs the pilots of a render. The results are invalid if `stopped` returned true.
+PilotResults run_pilots(const PilotInput& input, PilotCache& cache);
+
+}  // namespace wavecomb

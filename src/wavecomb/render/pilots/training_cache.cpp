@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/pilots/training_cache.h"
+
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+#include <utility>
+
+#include "wavecomb/core/error.h"
+
+namespace wavecomb {
+namespace {
+
+/// Version of the packed format. Increase it when the format changes.
+constexpr uint32_t kKeptFormat = 2;
+
+class ByteWriter {
+ public:
+  template <typename T>
+  void value(const T& v) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    append(&v, sizeof(T));
+  }
+  template <typename T>
+  void row(const std::vector<T>& values) {
+    value(uint64_t{values.size()});
+    append(values.data(), values.size() * sizeof(T));
+  }
+  std::vector<std::byte> take() { return std::move(bytes_); }
+
+ private:
+  void append(const void* data, size_t size) {
+    const auto* from = static_cast<const std::byte*>(data);
+    bytes_.insert(bytes_.end(), from, from + size);
+  }
+
+  std::vector<std::byte> bytes_;
+};
+
+class ByteReader {
+ public:
+  explicit ByteReader(std::span<const std::byte> bytes) : left_(bytes) {}
+
+  template <typename T>
+  void value(T& v) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    take(&v, sizeof(T));
+  }
+  template <typename T>
+  void row(std::vector<T>& values) {
+    uint64_t count = 0;
+    value(count);
+    check(count <= left_.size() / sizeof(T));
+    values.resize(count);
+    take(values.data(), count * sizeof(T));
+  }
+  /// Throws Error if any bytes are left.
+  void end() const { check(left_.empty()); }
+
+ private:
+  static void check(bool is_good) {
+    if (!is_good) throw Error("what was learned before is cut, or is of another build; start anew");
+  }
+  void take(void* to, size_t size) {
+    check(size <= left_.size());
+    if (size > 0) std::memcpy(to, left_.data(), size);
+    left_ = left_.subspan(size);
+  }
+
+  std::span<const std::byte> left_;
+};
+
+/// Writes or reads the statistics.
+template <typename Archive, typename Statistics>
+void pass_statistics(Archive& archive, Statistics& s) {
+  archive.value(s.facts.records);
+  archive.value(s.facts.cells);
+  archive.value(s.facts.regions);
+  archive.value(s.facts.guided_regions);
+  archive.value(s.facts.guided_share);
+  archive.value(s.facts.moment_ratio);
+  archive.value(s.paths);
+  archive.value(s.rounds);
+  archive.value(s.field_bytes);
+  archive.value(s.gain);
+  archive.value(s.survival);
+}
+
+template <typename Archive, typename Parts>
+void pass_parts(Archive& archive, Parts& parts) {
+  archive.row(parts.entries);
+  archive.row(parts.cells);
+  archive.row(parts.tables);
+  archive.row(parts.spheres);
+  archive.row(parts.bsdf_share);
+  archive.row(parts.material_share);
+  archive.row(parts.survival);
+}
+
+/// Returns the settings with those that do not affect training reset to their defaults.
+Settings that_teach(Settings settings) {
+  const Settings fresh;
+  settings.seed = fresh.seed;
+  settings.region.reset();
+  settings.crop = fresh.crop;
+  settings.aovs = fresh.aovs;
+  settings.light_groups.clear();
+  settings.expressions.clear();
+  settings.error = fresh.error;
+  settings.wave_size = fresh.wave_size;
+  settings.lanes = fresh.lanes;
+  settings.policy = fresh.policy;
+  settings.materialize = fresh.materialize;
+  settings.ray_order = fresh.ray_order;
+  settings.shadow_order = fresh.shadow_order;
+  settings.traversal = fresh.traversal;
+  settings.cost_weight = fresh.cost_weight;
+  settings.progressive = fresh.progressive;
+  // With a time limit, the number of training paths depends on the number of threads.
+  if (!(settings.time_limit > 0)) settings.threads = fresh.threads;
+  return settings;
+}
+
+}  // namespace
+
+std::vector<std::byte> packed_training(const GuideTraining& training) {
+  if (training.statistics.paths == 0) return {};
+  ByteWriter writer;
+  writer.value(kKeptFormat);
+  pass_statistics(writer, training.statistics);
+  writer.value(static_cast<uint8_t>(training.field ? 1 : 0));
+  if (training.field) {
+    pass_parts(writer, training.field->parts());
+    writer.row(training.tiles ? training.tiles->inverse_scales() : std::vector<double>());
+  }
+  return writer.take();
+}
+
+GuideTraining unpacked_training(std::span<const std::byte> bytes, const Scene& scene,
+                                const Settings& settings) {
+  ByteReader reader(bytes);
+  uint32_t format = 0;
+  reader.value(format);
+  if (format != kKeptFormat)
+    throw Error("what was learned before is of another version; resume with that, or start anew");
+  GuideTraining out;
+  pass_statistics(reader, out.statistics);
+  uint8_t has_field = 0;
+  reader.value(has_field);
+  if (has_field != 0) {
+    GuideParts parts;
+    std::vector<double> inverse_scales;
+    pass_parts(reader, parts);
+    reader.row(inverse_scales);
+    out.field = std::make_shared<const GuideField>(grid_of(scene), std::move(parts),
+                                                   out.statistics.facts, scene.materials().size());
+    out.tiles.emplace(settings, std::move(inverse_scales));
+  }
+  reader.end();
+  out.statistics.used = out.field != nullptr;
+  out.statistics.is_kept = true;
+  return out;
+}
+
+std::shared_ptr<const GuideTraining> GuideTrainingCache::get(
+    const std::shared_ptr<const Scene>& scene, const WaveContext& context, const WaveSetup& waves,
+    const std::function<bool()>& stopped) {
+  const Settings settings = that_teach(*context.settings);
+  if (last_ && scene_.lock() == scene && settings_ == settings) {
+    if (!last_->statistics.is_kept) {
+      auto kept = std::make_shared<GuideTraining>(*last_);
+      kept->statistics.is_kept = true;
+      kept->statistics.seconds = 0;
+      last_ = std::move(kept);
+    }
+    return last_;
+  }
+  auto trained =
+      std::make_shared<const GuideTraining>(train_guide(context, *scene, waves, stopped));
+  if (trained->statistics.paths > 0 && !stopped()) {
+    last_ = trained;
+    settings_ = settings;
+    scene_ = scene;
+  }
+  return trained;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/pilots/transport_choice.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "wavecomb/core/clock.h"
+#include "wavecomb/core/path_expressions/backward_automaton.h"
+#include "wavecomb/wave/wave.h"
+
+namespace wavecomb {
+namespace {
+
+/// Samples per pixel of a pilot render, enough for the effects of the Sobol sequence and of
+/// roulette, and limits of its pixel count.
+constexpr uint32_t kTransportSamples = 8;
+constexpr uint64_t kLeastTransportPixels = 400, kMostTransportPixels = 16'384;
+/// A pilot render takes one of every kTransportShare samples of the render. With five images, of
+/// which three cost two or three times as much as the others, pilots take at most a fiftieth of the
+/// render.
+constexpr uint64_t kTransportShare = 500;
+constexpr std::array<uint32_t, 2> kTransportSeeds = {0x3c6ef372u, 0xa54ff53au};
+/// Costs in rays of a vertex: by kernels for camera paths only, and by kernels that support light
+/// paths.
+constexpr double kPathVertex = 0.7, kJointVertex = 0.8;
+/// With merging, additional costs in rays of a camera path (which may store a visible point) and of
+/// a light vertex.
+constexpr double kMergedPath = 1, kMergedVertex = 1;
+/// Fraction of the noisiest pixels that are also left out for a second estimate. A single one may
+/// hold most of the noise of a small image, which makes results differ between pilot renders.
+constexpr double kNoisiest = 0.01;
+/// Light that is rarely found makes nearly all pixels black and the others far too bright. Its
+/// squared error is limited to this many squares of the light at the pixel.
+constexpr double kMostLost = 8;
+/// Least predicted gain in efficiency for light paths to be used.
+constexpr double kWorthwhileLight = 1.3;
+/// Roughness below which a lobe is sharp enough for visible caustics.
+constexpr float kSharpRoughness = 0.4f;
+
+/// Returns the width and height of a pilot render for a render with settings `s`, or 0 if the
+/// render has too few samples.
+std::array<uint32_t, 2> trial_size(const Settings& s) {
+  const uint64_t samples = uint64_t{s.width} * s.height * s.spp;
+  const uint64_t pixels = std::min({samples / kTransportShare / kTransportSamples,
+                                    kMostTransportPixels, uint64_t{s.width} * s.height});
+  if (pixels < kLeastTransportPixels) return {0, 0};
+  const double shrink = std::sqrt(static_cast<double>(pixels) / (double{1} * s.width * s.height));
+  const auto side = [&](uint32_t full) {
+    return std::max(1u, static_cast<uint32_t>(std::lround(full * shrink)));
+  };
+  return {side(s.width), side(s.height)};
+}
+
+float brightness(const std::vector<float>& rgb, size_t pixel) {
+  return luminance(Vec3<float>{rgb[3 * pixel], rgb[3 * pixel + 1], rgb[3 * pixel + 2]});
+}
+
+/// Returns 1 / (I^2 + 0.01 mean(I)^2) for each pixel, with I the mean of the images over 3 x 3
+/// pixels.
+std::vector<double> inverse_squares(const std::vector<double>& mean, uint32_t width) {
+  const auto height = static_cast<uint32_t>(mean.size() / width);
+  double all = 0;
+  for (const double v : mean) all += v / static_cast<double>(mean.size());
+  std::vector<double> out(mean.size());
+  for (uint32_t y = 0; y < height; ++y)
+    for (uint32_t x = 0; x < width; ++x) {
+      double sum = 0, count = 0;
+      for (uint32_t v = y - std::min(y, 1u); v <= std::min(y + 1, height - 1); ++v)
+        for (uint32_t u = x - std::min(x, 1u); u <= std::min(x + 1, width - 1); ++u) {
+          sum += mean[size_t{v} * width + u];
+          ++count;
+        }
+      const double square = sum / count * (sum / count) + 0.01 * all * all;
+      out[size_t{y} * width + x] = square > 0 ? 1 / square : 0;
+    }
+  return out;
+}
+
+/// Rays and shading records of a pilot render.
+struct TrialWork {
+  double rays = 0, records = 0;
+
+  double cost(double vertex) const { return rays + vertex * records; }
+};
+TrialWork work_of(const std::array<TransportTrial, 2>& trials) {
+  TrialWork work;
+  for (const TransportTrial& t : trials) {
+    work.rays += 0.5 * static_cast<double>(t.rays);
+    work.records += 0.5 * static_cast<double>(t.records);
+  }
+  return work;
+}
+/// Returns the work of camera paths alone, extrapolated from two ratios of light paths.
+TrialWork work_without(const TransportTrials& trials) {
+  const TrialWork few = work_of(trials.with[0]), many = work_of(trials.with[1]);
+  const double a = double{kTriedShares[0].paths()}, b = double{kTriedShares[1].paths()};
+  const auto at_none = [&](double x, double y) { return (b * x - a * y) / (b - a); };
+  return {at_none(few.rays, many.rays), at_none(few.records, many.records)};
+}
+
+/// Squared relative noise by pixel.
+using PixelNoise = std::vector<double>;
+
+double sum(const PixelNoise& noise) {
+  return std::accumulate(noise.begin(), noise.end(), 0.0);
+}
+
+/// Returns the sum without the noisiest pixels.
+double sum_of_most(PixelNoise noise) {
+  const auto most =
+      noise.end() - static_cast<ptrdiff_t>(kNoisiest * static_cast<double>(noise.size()));
+  if (most != noise.end()) std::nth_element(noise.begin(), most, noise.end());
+  return std::accumulate(noise.begin(), most, 0.0);
+}
+
+/// Returns whether a lobe of this roughness is sharp. If the roughness varies, it may be.
+bool is_sharp(float roughness, bool varies) {
+  return varies || roughness < kSharpRoughness;
+}
+
+}  // namespace
+
+TransportGain transport_gain(const TransportTrials& trials, double longer) {
+  const std::array<TransportTrial, 2>& most = trials.with[kTriedShares.size() - 1];
+  const size_t pixels = most[0].beauty.size() / 3;
+  std::vector<double> mean(pixels);
+  for (size_t i = 0; i < pixels; ++i)
+    for (const auto& with : trials.with)
+      for (const TransportTrial& t : with)
+        mean[i] += 0.5 / kTriedShares.size() * double{brightness(t.beauty, i)};
+  const std::vector<double> scale = inverse_squares(mean, trials.width);
+  const auto squared = [](double d) { return d * d; };
+  PixelNoise camera(pixels), left(pixels);
+  for (size_t i = 0; i < pixels; ++i) {
+    const double l0 = brightness(most[0].by_light_paths, i);
+    const double l1 = brightness(most[1].by_light_paths, i);
+    const double c0 = brightness(most[0].beauty, i) - l0, c1 = brightness(most[1].beauty, i) - l1;
+    camera[i] = 0.5 * squared(c0 - c1) * scale[i];
+    const double bound = kMostLost * std::max(0.0, l0 * l1) * longer;
+    left[i] = std::min(trials.variance[i] / kTransportSamples, bound) * scale[i];
+  }
+  const TrialWork without = work_without(trials);
+  const double path_cost = without.cost(kPathVertex);
+  const double all_without = (sum(camera) + sum(left)) * path_cost;
+  const double most_without =
+      (sum_of_most(std::move(camera)) + sum_of_most(std::move(left))) * path_cost;
+  TransportGain best;
+  for (size_t k = 0; k < kTriedShares.size(); ++k) {
+    const auto& with = trials.with[k];
+    PixelNoise noise(pixels);
+    for (size_t i = 0; i < pixels; ++i)
+      noise[i] = 0.5 * scale[i] *
+                 squared(double{brightness(with[0].beauty, i)} - brightness(with[1].beauty, i));
+    const TrialWork work = work_of(with);
+    double cost = work.cost(kJointVertex);
+    if (trials.merges)
+      cost += kMergedPath * kTransportSamples * static_cast<double>(pixels) +
+              kMergedVertex * (work.records - without.records);
+    const double all = sum(noise) * cost, of_most = sum_of_most(std::move(noise)) * cost;
+    const double gain =
+        std::max(all > 0 ? all_without / all : 0, of_most > 0 ? most_without / of_most : 0);
+    if (gain > best.gain) best = {gain, kTriedShares[k]};
+  }
+  return best;
+}
+
+bool focuses_light(const Scene& scene) {
+  return std::any_of(scene.materials().begin(), scene.materials().end(), [](const Material& m) {
+    const bool varies = m.graph != kNoGraph;
+    if (has_trait(m.program, program_trait::kGlass)) return true;
+    if (!has_trait(m.program, program_trait::kGlossy)) return false;
+    const bool passes = (m.opacity < 1 && !m.presence && m.opacity_threshold <= 0) ||
+                        m.openpbr.transmission_weight > 0;
+    const bool coats = m.clearcoat > 0 || m.has_texture(Input::kClearcoat);
+    return varies || passes || is_sharp(m.roughness, m.has_texture(Input::kRoughness)) ||
+           (coats && is_sharp(m.clearcoat_roughness, m.has_texture(Input::kClearcoatRoughness)));
+  });
+}
+
+TransportChoice choose_transport(const Scene& scene, const Settings& settings,
+                                 const RenderTrial& render, const std::function<bool()>& stopped) {
+  const Clock::time_point start = Clock::now();
+  TransportChoice choice;
+  const auto refused = [&](const LightPathRefusal& refusal) {
+    if (!refusal.what.empty()) choice.why = "light paths do not go with " + refusal.what;
+    return !refusal.what.empty();
+  };
+  if (settings.max_depth == 0) {
+    choice.why = "no light is scattered at a maximum depth of 0";
+    return choice;
+  }
+  if (refused(light_path_refusal(settings)) || refused(light_path_refusal(scene))) return choice;
+  try {
+    (void)BackwardAutomaton(PathAutomaton(settings.expressions, scene.light_groups()));
+  } catch (const Error&) {
+    choice.why = "light paths have no room for so many light path expressions";
+    return choice;
+  }
+  if (!focuses_light(scene)) {
+    choice.why = "nothing in the stage is clear or glossy";
+    return choice;
+  }
+  if (!sends_paths(scene)) {
+    choice.why = "no light sends paths";
+    return choice;
+  }
+  const auto [width, height] = trial_size(settings);
+  if (width == 0) {
+    choice.why = "too few samples to find out whether light paths pay";
+    return choice;
+  }
+  Settings small = settings;
+  small.width = width;
+  small.height = height;
+  small.spp = kTransportSamples;
+  small.region.reset();
+  small.crop = false;
+  small.time_limit = 0;
+  small.firefly = Firefly::kKeep;
+  small.adaptive = small.noise = 0;
+  small.allocate = Allocate::kEven;
+  small.error = false;
+  small.costs = CostSource::kModel;
+  small.aovs.bits = 0;
+  small.light_groups.clear();
+  small.expressions.clear();
+  TransportTrials trials;
+  trials.width = width;
+  trials.merges = settings.merge_radius > 0;
+  small.seed = kTransportSeeds[0];
+  small.transport = Transport::kLight;
+  small.aovs.bits = static_cast<uint32_t>(Aov::kByLightPaths);
+  const TransportTrial squares = render(small, kTriedShares.back(), true);
+  for (size_t k = 0; k < kTriedShares.size(); ++k)
+    for (size_t i = 0; i < kTransportSeeds.size(); ++i) {
+      small.seed = kTransportSeeds[i];
+      if (!stopped()) trials.with[k][i] = render(small, kTriedShares[k], false);
+    }
+  if (stopped()) return choice;
+  const double unit = scene_brightness(scene);
+  for (size_t i = 0; i < squares.beauty.size() / 3; ++i)
+    trials.variance.push_back(unit * brightness(squares.by_light_paths, i));
+  const TransportGain found =
+      transport_gain(trials, static_cast<double>(settings.spp) / kTransportSamples);
+  choice.gain = found.gain;
+  choice.why =
+      "by a trial of " + std::to_string(width) + " x " + std::to_string(height) + " pixels";
+  if (found.gain >= kWorthwhileLight) {
+    choice.transport = Transport::kLight;
+    choice.share = found.share;
+  }
+  choice.seconds = seconds_since(start);
+  return choice;
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Statistics of a render.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "wavecomb/path/statistics.h"
+#include "wavecomb/render/passes/allotment.h"
+#include "wavecomb/render/pilots/guiding_training.h"
+#include "wavecomb/render/pilots/transport_choice.h"
+#include "wavecomb/render/statistics/work_distribution.h"
+#include "wavecomb/scene/scene.h"
+#include "wavecomb/texture/tile_store.h"
+
+namespace wavecomb {
+
+class PassRunner;
+class RenderCosts;
+struct LightCalibration;
+struct WaveContext;
+
+/// Statistics of one material.
+struct MaterialStatistics {
+  std::string name, program;
+  uint64_t records = 0;  ///< shading records
+  uint64_t timed_records = 0;
+  double measured_ns = 0;    ///< mean of the timed records; 0 if none was timed
+  double calibrated_ns = 0;  ///< before the first pass
+  double predicted_ns = 0;   ///< cost that the next pass would be scheduled by
+};
+
+/// Selection probability of a part of the lights: as rendered, and by power alone.
+struct LightShare {
+  std::string name;
+  double share, by_power;
+};
+
+/// Statistics of the light calibration.
+struct LightShares {
+  double seconds = 0;
+  uint32_t paths = 0;         ///< 0 if there was nothing to calibrate
+  bool kept = false;          ///< taken over from an earlier render
+  uint32_t tilted_nodes = 0;  ///< light tree nodes with changed odds
+  std::vector<LightShare> parts;
+};
+
+/// Statistics of the aiming of light paths.
+struct AimStatistics {
+  uint32_t targets = 0;  ///< spheres; 0 if paths are not aimed
+  uint64_t paths = 0;    ///< training paths; 0 if aiming was not trained
+  double seconds = 0;
+};
+
+/// Statistics of a render. Phase times are sums over workers.
+struct RenderStatistics {
+  double build_s = 0, render_s = 0;
+  double first_samples_s = 0;  ///< part of render_s, until the first wave was done
+  std::vector<std::pair<std::string, double>> phases_s;
+  uint64_t samples = 0, rays = 0, shadow_rays = 0, records = 0;
+  uint64_t packets = 0, packet_lanes = 0;
+  VolumeCounts volume_counts;
+  uint64_t walks = 0, walk_steps = 0, walk_lanes = 0;  ///< subsurface random walks; see Counts
+  uint32_t threads = 0, wave_size = 0, lanes = 0;
+  uint32_t passes = 0;  ///< begun
+  Sharing sharing;
+  uint64_t resumed_samples = 0;  ///< from a checkpoint; not in `samples`
+  double error = 0;              ///< mean relative error of the image; infinite if unknown
+  SceneBytes scene_bytes;
+  uint64_t accelerator_bytes = 0, wave_bytes = 0, film_bytes = 0, peak_rss_bytes = 0;
+  bool cancelled = false;  ///< stopped by the caller; false if a time limit ended the render
+  // By path depth; the last entry holds all deeper ones.
+  std::vector<uint64_t> rays_at, shadow_rays_at, records_at;
+  double run_length = 0, material_homogeneity = 0, texture_homogeneity = 0;
+  std::vector<MaterialStatistics> materials;
+  double cost_r2 = 0, cost_mean_error = 0;  ///< of predictions for the last pass that had any
+  uint64_t cost_materials = 0;  ///< number of materials compared; 0 without a prediction
+  std::vector<std::pair<std::string, uint64_t>> policy_uses;  ///< queues ordered by each policy
+  double calibration_s = 0;
+  LightShares light_calibration;
+  AllotmentFacts allotment;
+  GuideStatistics guiding;
+  AimStatistics light_aiming;
+  std::vector<std::string> lights_without_paths;  ///< names, if other lights send light paths
+  std::optional<TransportChoice> transport;       ///< for Transport::kAuto
+  std::optional<StoreStatistics> texture_store;   ///< if texture memory has a limit
+};
+
+/// Adds up the counters of the workers, by phase, depth, policy and material, into `statistics`.
+void add_up(const PassRunner& runner, const WaveContext& context, const Scene& scene,
+            const RenderCosts& costs, RenderStatistics& statistics);
+
+/// Returns the statistics of a light calibration.
+LightShares light_shares(const LightCalibration& calibration);
+
+}  // namespace wavecomb

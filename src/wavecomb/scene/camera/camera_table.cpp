@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/scene/camera/camera_table.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+#include "wavecomb/core/error.h"
+#include "wavecomb/core/number_text.h"
+#include "wavecomb/geometry/mesh/motion.h"
+#include "wavecomb/scene/scene_checks.h"
+
+namespace wavecomb {
+namespace {
+
+template <auto kMember>
+CameraValue read(const Camera& camera) {
+  using T = std::remove_cvref_t<decltype(camera.*kMember)>;
+  if constexpr (std::is_enum_v<T>)
+    return static_cast<uint32_t>(camera.*kMember);
+  else if constexpr (std::is_array_v<T>)
+    return std::to_array(camera.*kMember);
+  else
+    return camera.*kMember;
+}
+
+template <auto kMember>
+void write(Camera& camera, const CameraValue& value) {
+  using T = std::remove_cvref_t<decltype(camera.*kMember)>;
+  if constexpr (std::is_enum_v<T>)
+    camera.*kMember = static_cast<T>(std::get<uint32_t>(value));
+  else if constexpr (std::is_array_v<T>)
+    std::copy_n(std::get<FourNumbers>(value).begin(), 4, camera.*kMember);
+  else
+    camera.*kMember = std::get<T>(value);
+}
+
+template <auto kMember>
+CameraParameter row(const char* name, const char* help) {
+  CameraParameter p;
+  p.name = name;
+  p.help = help;
+  p.read = &read<kMember>;
+  p.write = &write<kMember>;
+  p.kind = static_cast<CameraValueKind>(p.read(Camera{}).index());
+  return p;
+}
+/// Makes the row of a numeric parameter with an inclusive lower bound.
+template <auto kMember>
+CameraParameter number_from(const char* name, double least, const char* help) {
+  CameraParameter p = row<kMember>(name, help);
+  p.least = least;
+  return p;
+}
+/// Makes the row of a numeric parameter with an exclusive lower bound.
+template <auto kMember>
+CameraParameter number_above(const char* name, double least, const char* help) {
+  CameraParameter p = number_from<kMember>(name, least, help);
+  p.is_above = true;
+  return p;
+}
+/// Makes the row of a numeric parameter that may be infinite.
+template <auto kMember>
+CameraParameter distance(const char* name, const char* help) {
+  CameraParameter p = row<kMember>(name, help);
+  p.may_be_infinite = true;
+  return p;
+}
+template <auto kMember>
+CameraParameter choice(const char* name, std::vector<const char*> choices, const char* help) {
+  CameraParameter p = row<kMember>(name, help);
+  p.choices = std::move(choices);
+  return p;
+}
+CameraParameter needed(CameraParameter p) {
+  p.is_needed = true;
+  return p;
+}
+CameraParameter counted(CameraParameter p) {
+  p.counts_always = true;
+  return p;
+}
+
+std::vector<CameraParameter> make_camera_parameters() {
+  using C = Camera;
+  return {
+      counted(number_from<&C::lens_radius>(
+          "lens_radius", 0, "Lens radius in scene units; 0 gives a pinhole camera.")),
+      counted(distance<&C::focus_distance>(
+          "focus_distance",
+          "Distance of the focal plane along -z, scene units; above 0 with a lens.")),
+      counted(number_from<&C::near_clip>(
+          "near_clip", 0,
+          "Near clipping distance along -z, scene units; radial for a latlong camera.")),
+      counted(distance<&C::far_clip>(
+          "far_clip", "Far clipping distance along -z, scene units; radial for a latlong camera.")),
+      counted(needed(row<&C::window>(
+          "window",
+          "Visible region (x0, x1, y0, y1): on the plane z = -1, in scene units for an "
+          "orthographic camera, longitude and latitude in radians for a latlong one."))),
+      choice<&C::projection>("projection", {"perspective", "orthographic", "latlong"},
+                             "latlong shows all directions, longitude to the right, latitude up."),
+      choice<&C::conform>("conform",
+                          {"expandAperture", "cropAperture", "adjustApertureWidth",
+                           "adjustApertureHeight", "adjustPixelAspectRatio"},
+                          "How the window is fitted to an image of another aspect ratio: "
+                          "UsdRender's aspectRatioConformPolicy."),
+      number_above<&C::pixel_aspect>("pixel_aspect", 0, "Pixel width / pixel height."),
+      row<&C::clip_planes>("clip_planes",
+                           "Planes (a, b, c, d) in camera space; camera rays ignore points with a "
+                           "x + b y + c z + d < 0."),
+      number_from<&C::exposure>("exposure", 0, "Factor of the image's radiance."),
+      number_from<&C::aperture_blades>(
+          "aperture_blades", 0, "Number of corners of the aperture, 3 or more; 0 gives a disk."),
+      row<&C::aperture_rotation>("aperture_rotation", "Rotation of the aperture, degrees."),
+      number_above<&C::lens_squeeze>("lens_squeeze", 0,
+                                     "Aperture height / aperture width, for anamorphic lenses."),
+      row<&C::lens_k1>("lens_k1",
+                       "Radial distortion, coefficient of r^2 on the plane at distance 1."),
+      row<&C::lens_k2>("lens_k2", "Radial distortion, coefficient of r^4."),
+      row<&C::lens_k3>("lens_k3", "Radial distortion, coefficient of r^6."),
+      row<&C::lens_p1>("lens_p1", "Tangential distortion."),
+      row<&C::lens_p2>("lens_p2", "Tangential distortion."),
+      row<&C::lens_map>(
+          "lens_map",
+          "Distortion as a map of n x n nodes over the image, two in each four numbers: positions "
+          "in fractions of the undistorted image's width and height."),
+      choice<&C::rolling_shutter>("rolling_shutter", {"off", "top", "bottom", "left", "right"},
+                                  "Image edge at which a rolling shutter begins."),
+      number_from<&C::rolling_duration>(
+          "rolling_duration", 0, "Fraction of the shutter interval for which a row is exposed."),
+  };
+}
+
+bool finite(const FourNumbers& four) {
+  for (const float x : four)
+    if (!std::isfinite(x)) return false;
+  return true;
+}
+
+bool is_place(const Affine& m) {
+  return finite(m) && std::abs(m.determinant()) >= 1e-30f;
+}
+
+constexpr float kHalfTurn = 1.5708f;  ///< pi / 2, with tolerance for rounding
+
+}  // namespace
+
+void CameraParameter::check(const Camera& camera) const {
+  const auto wrong = [&](const std::string& what) {
+    throw Error("the camera's " + std::string(name) + " " + what);
+  };
+  const CameraValue value = read(camera);
+  if (const auto* number = std::get_if<float>(&value)) {
+    const double v = *number;
+    if (std::isnan(v) || (std::isinf(v) && !may_be_infinite)) wrong("is not finite; mend it");
+    if (v < least || (is_above && v <= least))
+      wrong("is " + text(v) + "; it must be " +
+            (is_above ? "above " + text(least) : text(least) + " or more"));
+  } else if (const auto* four = std::get_if<FourNumbers>(&value)) {
+    if (!finite(*four)) wrong("is not finite; mend it");
+  } else if (const auto* planes = std::get_if<std::vector<FourNumbers>>(&value)) {
+    for (const FourNumbers& plane : *planes)
+      if (!finite(plane)) wrong("are not finite; give finite numbers");
+  }
+}
+
+std::span<const CameraParameter> camera_table() {
+  static const std::vector<CameraParameter> table = make_camera_parameters();
+  return table;
+}
+
+void check_camera(const Camera& camera) {
+  if (!is_place(camera.to_world))
+    throw Error("the camera's transform is singular or not finite; give an invertible one");
+  if (camera.steps.size() == 1 || camera.steps.size() > kMostSteps)
+    throw Error("the camera's motion needs 2 to " + std::to_string(kMostSteps) + " steps");
+  for (const Affine& step : camera.steps)
+    if (!is_place(step))
+      throw Error(
+          "the camera's motion has a singular or non-finite transform; give invertible ones");
+  for (const CameraParameter& p : camera_table()) p.check(camera);
+  // Checks that involve several parameters.
+  const float* w = camera.window;
+  if (!(w[0] < w[1]) || !(w[2] < w[3]))
+    throw Error("the camera's window is empty; check its aperture and focal length");
+  if (camera.projection == Projection::kLatlong && (w[3] > kHalfTurn || w[2] < -kHalfTurn))
+    throw Error("the latlong camera's window must lie between the poles");
+  if (camera.lens_radius > 0 && !(camera.focus_distance > 0))
+    throw Error("the camera's lens needs a focus distance above 0");
+  const float blades = camera.aperture_blades;
+  if (blades != 0 && (blades < 3 || blades > 64 || blades != std::floor(blades)))
+    throw Error("the camera's aperture_blades is " + text(blades) +
+                "; it must be 0, or a whole number from 3 to 64");
+  if (camera.rolling_duration > 1)
+    throw Error("the camera's rolling_duration is " + text(camera.rolling_duration) +
+                "; it must be from 0 to 1");
+  if (!camera.lens_map.empty() && lens_map_nodes(camera) == 0)
+    throw Error("the camera's lens_map needs n x n nodes with an even n");
+  if (!(camera.far_clip > camera.near_clip))
+    throw Error("the camera's clipping range must end beyond its start");
+}
+
+}  // namespace wavecomb

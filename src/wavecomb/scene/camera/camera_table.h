@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Table of camera parameters other than the transform: one row for each member of Camera. Range
+/// checks, the scene fingerprint, Python keywords and their stub, sandbox calls and the poses of
+/// the window are derived from it. To add a parameter, add a member, a row here, and its use.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "wavecomb/scene/camera/camera.h"
+
+namespace wavecomb {
+
+using FourNumbers = std::array<float, 4>;
+/// Value of a camera parameter. A choice is stored as its index.
+using CameraValue = std::variant<float, uint32_t, FourNumbers, std::vector<FourNumbers>>;
+
+/// Alternatives of CameraValue, in the same order.
+enum class CameraValueKind : uint8_t { kNumber, kChoice, kFour, kPlanes };
+
+/// Description of a camera parameter. Contract: lives as long as the program.
+struct CameraParameter {
+  const char* name = "";  ///< keyword of set_camera
+  const char* help = "";  ///< one sentence, with the unit
+  CameraValueKind kind = CameraValueKind::kNumber;
+  double least = -std::numeric_limits<double>::infinity();  ///< lower bound of a number
+  bool is_above = false;                                    ///< the bound is exclusive
+  bool may_be_infinite = false;
+  std::vector<const char*> choices;
+  bool is_needed = false;  ///< set_camera requires it
+  /// The fingerprint includes the value even if it is the default, as it did before the table had
+  /// optional rows.
+  bool counts_always = false;
+
+  CameraValue (*read)(const Camera&) = nullptr;
+  void (*write)(Camera&, const CameraValue&) = nullptr;
+
+  CameraValue standard() const { return read(Camera{}); }
+  /// Throws Error naming the parameter unless its value is in range.
+  void check(const Camera& camera) const;
+};
+
+/// Returns all parameters except `to_world` and `steps`, in the order in which fingerprints hash
+/// them.
+std::span<const CameraParameter> camera_table();
+
+/// Throws Error with one line that says which camera value is invalid.
+void check_camera(const Camera& camera);
+
+}  // namespace wavecomb

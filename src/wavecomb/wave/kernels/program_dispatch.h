@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Tables of the kernels of all programs, by program id. Each kernel is compiled in a separate unit
+/// (kernel_matrix.h); this header only declares them.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "wavecomb/material/program_list.h"
+#include "wavecomb/path/path_state.h"
+#include "wavecomb/wave/kernels/kernel_matrix.h"
+#include "wavecomb/wave/wave.h"
+
+namespace wavecomb {
+
+// Defined in wave/stages/shade_batch.h and vertex.h.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
+                 uint32_t depth, size_t begin, size_t end);
+template <typename Bsdf, typename F, uint32_t kFeatures>
+VertexResult<F> shade_vertex(const Vertex<F, kFeatures>& v);
+// Defined in light_paths/stages/shade_light_batch.h and light_vertex.h.
+struct LightPathSetup;
+template <typename F>
+struct LightVertexResult;
+template <typename F>
+struct ConnectionTarget;
+template <typename Bsdf, typename F, uint32_t kFeatures>
+void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
+                       uint32_t depth, size_t begin, size_t end);
+template <typename Bsdf, typename F, uint32_t kFeatures>
+LightVertexResult<F> shade_light_vertex(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
+                                        const ConnectionTarget<F>* target);
+
+namespace detail {
+template <typename F>
+using BatchKernels =
+    std::array<decltype(&shade_batch<DiffuseBsdf<F>, F, kEverything>), kVariantCount>;
+
+/// Uses the kernel of a program for all its variants.
+template <typename Kernels>
+constexpr Kernels for_variants(Kernels kernels) {
+  for (uint32_t v = kProgramCount; v < kVariantCount; ++v)
+    kernels[v] = kernels[static_cast<size_t>(program_of(v))];
+  return kernels;
+}
+// Programs of volume events have no plain kernels.
+template <size_t kVariant>
+inline constexpr bool kIsOfSurface =
+    static_cast<size_t>(program_of(kVariant)) < kSurfaceProgramCount;
+template <size_t kVariant, typename F>
+constexpr typename BatchKernels<F>::value_type plain_batch_kernel() {
+  if constexpr (kIsOfSurface<kVariant>)
+    return &shade_batch<VariantBsdf<kVariant, F>, F, kPlain>;
+  else
+    return nullptr;
+}
+template <typename Bsdf, typename F>
+constexpr typename BatchKernels<F>::value_type general_batch_kernel() {
+  constexpr size_t kProgram = id_of<Bsdf, F>();
+  if constexpr (kProgram < kSurfaceProgramCount && !has_program_kernels(kProgram, kWidth<F>))
+    return &shade_batch<Program<static_cast<ProgramId>(kProgram), float>, float, kEverything>;
+  else
+    return &shade_batch<Bsdf, F, kEverything>;
+}
+template <typename F, typename... Bsdf>
+constexpr auto batch_kernels(ProgramList<Bsdf...>) {
+  BatchKernels<F> kernels{};
+  ((kernels[id_of<Bsdf, F>()] = general_batch_kernel<Bsdf, F>()), ...);
+  return for_variants(kernels);
+}
+template <typename F, typename... Bsdf>
+constexpr auto light_batch_kernels(ProgramList<Bsdf...>) {
+  BatchKernels<F> kernels{};
+  ((kernels[id_of<Bsdf, F>()] = &shade_light_batch<Bsdf, F, kEverything>), ...);
+  return for_variants(kernels);
+}
+template <typename F, size_t... kVariant>
+constexpr auto plain_batch_kernels(std::index_sequence<kVariant...>) {
+  return BatchKernels<F>{plain_batch_kernel<kVariant, F>()...};
+}
+template <typename F, typename... Bsdf>
+constexpr auto vertex_kernels(ProgramList<Bsdf...>) {
+  std::array<decltype(&shade_vertex<DiffuseBsdf<F>, F, kEverything>), kProgramCount> kernels{};
+  ((kernels[id_of<Bsdf, F>()] = &shade_vertex<Bsdf, F, kEverything>), ...);
+  return kernels;
+}
+template <typename F, typename... Bsdf>
+constexpr auto light_vertex_kernels(ProgramList<Bsdf...>) {
+  std::array<decltype(&shade_light_vertex<DiffuseBsdf<F>, F, kEverything>), kProgramCount>
+      kernels{};
+  ((kernels[id_of<Bsdf, F>()] = &shade_light_vertex<Bsdf, F, kEverything>), ...);
+  return kernels;
+}
+}  // namespace detail
+
+/// Kernels of the programs of a list: shade_batch for waves, by variant (all variants of a program
+/// use its kernel), and shade_vertex for the reference integrator, by ProgramId.
+template <typename F, typename List>
+inline constexpr auto kShadeBatch = detail::batch_kernels<F>(List{});
+template <typename F, typename List>
+inline constexpr auto kShadeVertex = detail::vertex_kernels<F>(List{});
+/// Kernels for light paths, for waves of any lane width.
+inline constexpr auto kShadeLightBatch =
+    detail::light_batch_kernels<LightLanes>(Programs<LightLanes>{});
+template <typename F>
+inline constexpr auto kShadeLightVertex = detail::light_vertex_kernels<F>(Programs<F>{});
+/// Plain kernels by variant. Only available if kHasPlain.
+template <typename F>
+inline constexpr auto kShadePlain =
+    detail::plain_batch_kernels<F>(std::make_index_sequence<kVariantCount>());
+
+}  // namespace wavecomb

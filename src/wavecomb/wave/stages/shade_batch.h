@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Wave stage 3c for one program: shades a batch of its records in packets.
+#pragma once
+
+#include "wavecomb/path/vertex.h"
+#include "wavecomb/wave/stages/record_packet.h"
+#include "wavecomb/wave/wave.h"
+
+namespace wavecomb {
+
+/// Runs the steps of a vertex. Packet kernels inline them; scalar kernels call the function of the
+/// reference integrator.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE VertexResult<F> shade_one(const Vertex<F, kFeatures>& v) {
+  if constexpr (kIsScalar<F>)
+    return shade_vertex<Bsdf, F>(v);
+  else
+    return take_steps<Bsdf, F>(v);
+}
+
+/// Shades records [begin, end) of the shading order, all of variant `Bsdf`, one packet at a time.
+/// The next ray of a path overwrites its last ray in the pool, and outcomes are stored in arrival
+/// order.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
+                 uint32_t depth, size_t begin, size_t end) {
+  using U = UInt<F>;
+  const ShadingQueue& queue = wave.shading;
+  const PathPool& pool = wave.pool;
+  VertexAovs<F> aovs = wave.aovs.template wanted<F>(depth);
+  using V = Vertex<F, kFeatures>;
+  const bool wants_aovs = V::has(kNotes) && wave.aovs.wants_vertex(depth);
+  const bool is_watched = wants_aovs || (V::has(kNotes) && wave.history);
+  const bool joins = V::has(kJoined) && settings.joins_light;
+  const bool links = V::has(kLinks) && context.links();
+  for (size_t i = begin; i < end; i += kWidth<F>) {
+    const RecordPacket<F> packet(queue, i, end);
+    const Mask<F>& active = packet.active;
+    const auto& r = packet.record;
+    const U slot = r.slot, material = packet.material;
+    MeshHit<F> hit{r.inst, r.mesh, r.prim, r.u, r.v};
+    if (V::has(kMotion) && context.scene.has_motion) [[unlikely]]
+      hit.time = gather_field<F>(pool.cold, &PathColdRow<float>::time, slot, active);
+    const auto path = load_row<PathRow, F>(pool.paths, slot, active);
+    const F t = r.t;
+    PathState<F> state = path_state<F>(path, t);
+    if (links && context.scene.mesh_lights && depth > 0) [[unlikely]]
+      state.link = gather_field<F>(pool.cold, &PathColdRow<float>::link, slot, active);
+    if (V::has(kMeshLights) && context.scene.mesh_lights && pool.diffuse && depth > 0) [[unlikely]]
+      state.diffuse = load_row<RadianceRow, F>(pool.diffuse, slot, active).sum;
+    if (context.weighs_pixels()) [[unlikely]]
+      state.importance = gather_field<F>(pool.cold, &PathColdRow<float>::importance, slot, active);
+    if (joins) [[unlikely]]
+      unpack_ratio<F>(gather<F>(pool.ratio, slot, active), state);
+    const bool knows_inside = V::has(kInside) && pool.inside;
+    if (knows_inside) [[unlikely]] {
+      state.outer = gather_field<F>(pool.inside, &InsideRow<float>::outer, slot, active);
+      state.medium = gather_field<F>(pool.inside, &InsideRow<float>::medium, slot, active);
+    }
+    ConnectionOffer<F> offer;
+    const bool connects = joins && wave.light_vertices;
+    if (connects) [[unlikely]]
+      offer = offer_for<F>(wave.light_vertices, slot, depth, settings.max_depth, active);
+    VisibleOffer<F> visible;
+    const bool merges = joins && wave.visible;
+    const V vertex{context.scene,
+                   settings,
+                   path.key,
+                   depth,
+                   hit,
+                   r.geom,
+                   t,
+                   material,
+                   state,
+                   wants_aovs ? &aovs : nullptr,
+                   active,
+                   context.guide,
+                   connects ? &offer : nullptr,
+                   merges ? &visible : nullptr};
+    const VertexResult<F> v = shade_one<Bsdf, F>(vertex);
+    if (merges && any(visible.seen)) [[unlikely]]
+      store_row<VisiblePoint, F>(wave.visible.rows, slot, visible.row, visible.seen);
+    if (connects) [[unlikely]] {
+      store_row<ConnectionRow, F>(wave.light_vertices.connections, slot, offer.row, active);
+      if (aovs.wants_events)
+        wave.light_aovs.offer<F>(slot, wave.aovs.expressions().template states<F>(slot, active),
+                                 offer.note, active);
+    }
+
+    const Mask<F> emits = active & not_(is_black(v.emitted));
+    if (any(emits)) add_radiance<F>(pool.radiance, slot, v.emitted, emits);
+    U lit_by(0u);
+    if (V::has(kNotes) && aovs.wants_lights) {
+      wave.aovs.template add_light<F>(slot, aovs.emitter, v.emitted, emits);
+      lit_by = wave.aovs.template group_of<F>(aovs.lit_by, v.has_shadow);
+      if (aovs.wants_events)
+        wave.aovs.expressions().template scatter<F>(depth, slot, path.key, aovs, v.has_shadow,
+                                                    Mask<F>(v.alive | v.has_shadow));
+    }
+    if (is_watched) {
+      if (wants_aovs) wave.aovs.template vertex<F>(depth, slot, aovs, state, active);
+      if (wave.history)
+        wave.history.template vertex<F>(depth, slot,
+                                        {.path = state, .t = t, .material = material, .result = v},
+                                        pool.radiance, active);
+    }
+    packet.note(queue, v.alive, v.next.dir, v.has_shadow, v.shadow_d);
+    if (any(v.has_shadow))
+      store_row<ShadowRow, F>(
+          pool.shadows, slot,
+          {v.shadow_o, v.shadow_d, v.shadow_tfar, v.direct, lit_by, v.shadow_set}, v.has_shadow);
+    if constexpr (V::has(kMeshLights))
+      if (pool.shades) [[unlikely]]
+        store_row<RadianceRow, F>(pool.shades, slot, {v.shade}, v.has_shadow);
+    if constexpr (V::has(kMeshLights))
+      if (pool.diffuse) [[unlikely]]
+        store_row<RadianceRow, F>(pool.diffuse, slot, {v.next.diffuse}, v.alive);
+    if (any(v.alive))
+      store_row<PathRow, F>(pool.paths, slot, path_row < (kFeatures & kBelow) != 0 && Bsdf::kWalks,
+                            F > (v.next, path.key), v.alive);
+    if (joins) [[unlikely]]
+      scatter<F>(pool.ratio, pack_ratio<F>(v.next), slot, v.alive);
+    if (knows_inside) [[unlikely]]
+      scatter_field<F>(pool.inside, &InsideRow<float>::crossed, slot, v.crossed, active);
+    if (links) scatter_field<F>(pool.cold, &PathColdRow<float>::link, slot, v.next.link, v.alive);
+    ++wave.counts.packets;
+    wave.counts.packet_lanes += kWidth<F>;
+  }
+}
+
+}  // namespace wavecomb

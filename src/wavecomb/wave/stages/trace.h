@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Wave stage 2 finds the closest hits of rays, and wave stage 4 tests shadow rays.
+#pragma once
+
+#include "wavecomb/path/media.h"
+#include "wavecomb/wave/wave.h"
+
+namespace wavecomb {
+
+/// Copies the first fields of the queued slots' rows into columns.
+template <template <typename> class Head, template <typename> class Row, typename F, typename Queue,
+          size_t C>
+void fetch(const Queue& q, const float* rows, float* const (&columns)[C]) {
+  for (size_t i = 0; i < q.size; i += kWidth<F>) {
+    const Mask<F> active = first_lanes<F>(q.size - i);
+    store_columns<Head, F>(load_head<Head, Row, F>(rows, load<UInt<F>>(q.slot + i), active),
+                           columns, i);
+  }
+}
+
+/// Copies the rays of the queued slots into columns.
+template <typename F>
+void fetch_rays(Wave& wave) {
+  RayQueue& q = wave.rays;
+  fetch<RayHead, PathRow, F>(q, wave.pool.paths, {q.ox, q.oy, q.oz, q.dx, q.dy, q.dz});
+}
+
+/// Copies the shadow rays of the queued slots into columns.
+template <typename F>
+void fetch_shadows(Wave& wave) {
+  ShadowQueue& q = wave.shadows;
+  fetch<ShadowHead, ShadowRow, F>(q, wave.pool.shadows,
+                                  {q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, q.tfar, q.r, q.g, q.b});
+}
+
+/// Copies the shutter times of the queued slots' paths into a column. Returns null if the scene has
+/// no motion.
+template <typename F, typename Queue>
+const float* fetch_times(Wave& wave, const Queue& q) {
+  float* times = wave.times.floats(0);
+  if (!times) return nullptr;
+  for (size_t i = 0; i < q.size; i += kWidth<F>) {
+    const Mask<F> active = first_lanes<F>(q.size - i);
+    store(times + i, gather_field<F>(wave.pool.cold, &PathColdRow<float>::time,
+                                     load<UInt<F>>(q.slot + i), active));
+  }
+  return times;
+}
+
+/// Returns the presence keys of rays at `depth`. Shadow rays use different random numbers than path
+/// rays. With `linked`, each shadow ray hits only the geometry in its shadow set.
+inline PresenceKeys presence_keys(const PathPool& pool, uint32_t depth, bool shadow,
+                                  bool linked = false) {
+  const auto* path = reinterpret_cast<const PathRow<float>*>(pool.paths);
+  PresenceKeys keys{&path->key.pixel_hash, &path->key.sample, kRowWords<PathRow>,
+                    2 * depth + (shadow ? 1u : 0u)};
+  keys.ray_kind = ray_kind(depth, shadow);
+  if (linked) {
+    keys.shadow_set = &reinterpret_cast<const ShadowRow<float>*>(pool.shadows)->set;
+    keys.shadow_stride = kRowWords<ShadowRow>;
+  }
+  return keys;
+}
+
+/// Traces the ray queue and stores the closest hits in the hit buffer. `times` is the result of
+/// fetch_times().
+inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const float* tfar,
+                  const float* times, bool coherent) {
+  const RayQueue& q = wave.rays;
+  const RaySpan rays{q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, tfar, q.slot, q.size, times};
+  if (context.recorder) context.recorder->closest(&wave, rays, depth, coherent);
+  const HitBuffer& h = wave.hits;
+  const auto start = wave.aovs.start_time();
+  context.accel->intersect(rays, {h.t, h.u, h.v, h.prim, h.geom, h.inst}, context.traversal_width,
+                           coherent, presence_keys(wave.pool, depth, false));
+  const auto slot_of = [&](size_t i) { return q.slot[i]; };
+  wave.aovs.charge_rays(q.size, slot_of);
+  wave.aovs.spread_time(q.size, start, slot_of);
+  wave.counts.add_rays(depth, q.size);
+}
+
+/// Tests the shadow rays for occlusion. `linked` is passed to presence_keys().
+template <typename F>
+void occlude(Wave& wave, const WaveContext& context, uint32_t depth, bool linked) {
+  const ShadowQueue& q = wave.shadows;
+  const RaySpan rays{q.ox, q.oy,   q.oz,   q.dx,   q.dy,
+                     q.dz, q.tfar, q.slot, q.size, fetch_times<F>(wave, q)};
+  if (context.recorder) context.recorder->occluded(&wave, rays, depth, false);
+  const auto start = wave.aovs.start_time();
+  context.accel->occluded(rays, q.occluded, context.traversal_width, false,
+                          presence_keys(wave.pool, depth, true, linked));
+  const auto slot_of = [&](size_t i) { return q.slot[i]; };
+  wave.aovs.charge_rays(q.size, slot_of);
+  wave.aovs.spread_time(q.size, start, slot_of);
+  wave.counts.add_shadow_rays(depth, q.size);
+}
+
+/// Adds the contributions of unblocked shadow rays to their slots, attenuated by volumes and media.
+/// A slot has at most one shadow ray, so the order of the queue does not matter.
+template <typename F, typename Media>
+void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
+            [[maybe_unused]] const Media& media) {
+  using U = UInt<F>;
+  const ShadowQueue& q = wave.shadows;
+  occlude<F>(wave, context, depth, context.scene.lights.links.members != nullptr);
+  if constexpr (Media::kStreams) media.template pass_all<F>(wave, depth, context.settings->sampler);
+  const bool is_watched =
+      wave.aovs.wants_lights() || wave.aovs.wants_light_samples() || wave.history;
+  for (size_t i = 0; i < q.size; i += kWidth<F>) {
+    Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(q.occluded + i) == U(0u));
+    const U slot = load<U>(q.slot + i);
+    Color<F> c{load<F>(q.r + i), load<F>(q.g + i), load<F>(q.b + i)};
+    if constexpr (Media::kAny) {
+      if constexpr (Media::kStreams) {
+        c = c * media.template passed<F>(wave, i);
+      } else {
+        const Mask<F> asked = wave.pool.shades ? first_lanes<F>(q.size - i) : active;
+        const auto path = load_row<PathRow, F>(wave.pool.paths, slot, asked);
+        const Vec3<F> o{load<F>(q.ox + i), load<F>(q.oy + i), load<F>(q.oz + i)};
+        const Vec3<F> d{load<F>(q.dx + i), load<F>(q.dy + i), load<F>(q.dz + i)};
+        const F t = load<F>(q.tfar + i) * (1.f / kShadowReach);
+        c = c * media.template transmittance<F>(
+                    {context.settings->sampler, path.key, depth, o, d, t}, asked);
+      }
+    }
+    if (wave.pool.shades) [[unlikely]] {
+      // Coloured shadows: a blocked ray keeps a fraction of the light.
+      const Mask<F> blocked = first_lanes<F>(q.size - i) & not_(active);
+      const Color<F> shade = load_row<RadianceRow, F>(wave.pool.shades, slot, blocked).sum;
+      c = select<F>(blocked, c * shade, c);
+      active = active | (blocked & (max_component(shade) > 0.f));
+    }
+    add_radiance<F>(wave.pool.radiance, slot, c, active);
+    if (is_watched) {
+      if (wave.aovs.wants_lights())
+        wave.aovs.add_direct<F>(
+            slot, gather_field<F>(wave.pool.shadows, &ShadowRow<float>::group, slot, active), c,
+            active);
+      if (wave.aovs.wants_light_samples()) wave.aovs.add_light_sample<F>(slot, c, active);
+      if (wave.history) wave.history.light<F>(depth, slot, c, active);
+    }
+  }
+}
+
+}  // namespace wavecomb

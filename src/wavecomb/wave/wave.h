@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Wave: the paths of a batch of pixels and samples. One worker traces them to their end, using
+/// only its own buffers.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "wavecomb/accel/embree_accelerator.h"
+#include "wavecomb/aov/aov_tables.h"
+#include "wavecomb/aov/path_aovs.h"
+#include "wavecomb/core/settings.h"
+#include "wavecomb/film/film.h"
+#include "wavecomb/film/light_splat_filter.h"
+#include "wavecomb/light_paths/light_path_aovs.h"
+#include "wavecomb/light_paths/light_vertices.h"
+#include "wavecomb/light_paths/merge_grid.h"
+#include "wavecomb/medium/nested/buffers.h"
+#include "wavecomb/path/camera/camera_ray.h"
+#include "wavecomb/path/integrator.h"
+#include "wavecomb/path/path_history.h"
+#include "wavecomb/path/path_pool.h"
+#include "wavecomb/path/phase_clock.h"
+#include "wavecomb/path/shading_record.h"
+#include "wavecomb/path/statistics.h"
+#include "wavecomb/schedule/chooser.h"
+#include "wavecomb/schedule/coherence.h"
+#include "wavecomb/schedule/cost_tracker.h"
+#include "wavecomb/schedule/policy.h"
+#include "wavecomb/schedule/radix_sort.h"
+#include "wavecomb/schedule/ray_order.h"
+#include "wavecomb/schedule/ray_queue.h"
+#include "wavecomb/schedule/shading_queue.h"
+#include "wavecomb/wave/cost_calibration.h"
+#include "wavecomb/wave/ray_recorder.h"
+
+namespace wavecomb {
+
+class AimLessons;
+
+/// Data that all waves of a render read.
+struct WaveContext {
+  SceneView scene;
+  const EmbreeAccelerator* accel;
+  const Settings* settings;
+  const CameraSetup* camera;
+  /// Scheduling policies. With several, each worker chooses one for each queue.
+  std::span<const SchedulingPolicy* const> policies;
+  std::span<const MaterialTraits> traits;
+  const CostSnapshot* costs;           ///< for scheduling policies
+  const CostSnapshot* roulette_costs;  ///< for cost-aware roulette
+  OrderGrid grid;                      ///< for ray orders and hit positions
+  Film* film;                          ///< each wave writes only its own pixels
+  uint32_t traversal_width;
+  bool wants_position;                 ///< whether some policy reads position keys
+  bool measures_costs;                 ///< whether batches are timed
+  RayRecorder* recorder;               ///< receives the rays of benchmarks, otherwise null
+  const AovTables* aovs = nullptr;     ///< object names and groups for AOVs; null if unused
+  HistoryReader* histories = nullptr;  ///< receives vertices of finished paths; null if unused
+  const GuideView* guide = nullptr;    ///< guides bounces, or is in training; null without guiding
+  bool discards = false;  ///< if true, paths serve `histories` only, and the film gets none
+  const SplatFilter* splat_filter = nullptr;  ///< filter of light paths; null without light paths
+  AimLessons* lessons = nullptr;  ///< receives the contributions of light paths instead of the film
+  float light_paths = 1;          ///< light paths per camera path, averaged over the image
+  /// Not 0 in some pilot renders: light splats then carry, instead of light, the variance that this
+  /// light would add to a sample of a pixel if camera paths had to find it, divided by this
+  /// brightness (light_vertex.h). 0 means that splats carry light.
+  float camera_squares = 0;
+
+  /// Points of camera paths to merge light paths with; null without merging.
+  const VisibleGrid* visible = nullptr;
+
+  /// Returns whether light paths are merged with points of camera paths.
+  bool merges() const { return visible != nullptr; }
+  /// Returns whether the render has light paths.
+  bool joins_light() const { return splat_filter != nullptr; }
+  /// Returns whether vertices of camera paths connect to vertices of light paths.
+  bool connects() const { return joins_light() && settings->connects(); }
+  /// Returns one over the number of light paths in the whole image for each sample of a pixel.
+  float light_path_share() const {
+    return 1.f / (static_cast<float>(settings->width) * static_cast<float>(settings->height) *
+                  light_paths);
+  }
+
+  /// Returns whether the scene has volumes, nested dielectrics or subsurface scattering.
+  bool has_media() const {
+    return scene.volumes.count > 0 || scene.walks.media != nullptr || knows_inside();
+  }
+  /// Returns whether paths keep a medium stack.
+  bool knows_inside() const { return scene.interiors.media != nullptr; }
+  /// Returns whether paths need a shutter time.
+  bool moves() const { return scene.has_motion || camera->moves(); }
+  /// Returns whether paths keep the link class of the surface that they left.
+  bool links() const { return scene.lights.links.members != nullptr; }
+  /// Returns whether paths keep the importance of their pixel.
+  bool weighs_pixels() const { return guide && guide->tiles; }
+  /// Returns the number of vertices to keep for each path.
+  uint32_t kept_vertices() const { return histories ? histories->most() : 0; }
+  bool orders_rays() const {
+    return settings->ray_order != RayOrder::kSlot || settings->shadow_order != RayOrder::kSlot;
+  }
+};
+
+/// Buffers of one worker.
+///
+/// Contract: used by one thread at a time. The constructor allocates everything; a running wave
+/// allocates nothing.
+struct Wave {
+  Wave(uint32_t capacity, const WaveContext& context)
+      : pool(capacity, context.moves() || context.links() || context.weighs_pixels(),
+             context.joins_light(), context.knows_inside(), context.scene.lights.shadows != nullptr,
+             context.scene.lights.has_multipliers),
+        aovs(capacity, context.film->aovs().layout(), context.aovs),
+        history(capacity, context.kept_vertices()),
+        rays(capacity),
+        hits(capacity),
+        shading(capacity, kRowWords<ShadingRecord>),
+        shadows(capacity),
+        columns(3, capacity),
+        times(context.scene.has_motion ? SoaBlock(1, capacity) : SoaBlock()),
+        walks(context.scene.walks.media ? SoaBlock(kWalkColumns, capacity) : SoaBlock()),
+        ways(context.has_media() ? SoaBlock(kWayColumns, capacity) : SoaBlock()),
+        interiors(context.knows_inside() ? capacity : 0),
+        sorter(capacity),
+        ray_sorter(context.orders_rays() ? capacity : 0),
+        ray_indices(context.orders_rays() ? capacity + SoaBlock::kPad : 0),
+        scratch(context.traits.size()),
+        costs(context.traits.size()),
+        splats(context.joins_light() ? kSplats : 0),
+        policy_chooser(context.policies.size()),
+        ray_chooser(kRayOrders),
+        shadow_chooser(kRayOrders),
+        light_vertices(context.connects() ? capacity : 0),
+        visible(context.merges() ? capacity : 0),
+        light_aovs(context.joins_light() ? LightPathAovs(capacity, context.film->aovs().layout(),
+                                                         context.aovs, context.connects())
+                                         : LightPathAovs()) {}
+  static constexpr size_t kWayColumns = 14, kWalkColumns = 36;
+  static constexpr size_t kSplats = 4096;  ///< size of the buffer of light splats
+  static constexpr size_t kRayOrders = 4;  ///< slot, morton, morton-octant and direction
+
+  PathPool pool;
+  PathAovs aovs;
+  PathHistory history;  ///< empty if unused
+  RayQueue rays;
+  HitBuffer hits;
+  ShadingQueue shading;
+  ShadowQueue shadows;
+  SoaBlock columns;  ///< columns of ShadingQueueView: throughput, position key, texture key
+  SoaBlock times;    ///< shutter times of the traced rays, if the scene has motion
+  SoaBlock walks;    ///< subsurface random walks (medium/subsurface/walk_queue.h)
+  SoaBlock ways;     ///< free flights in volumes (medium/wave/volumes.h)
+  InteriorBuffers interiors;  ///< buffers of the medium stack (medium/nested/nested_media.h)
+  RadixSorter sorter, ray_sorter;
+  std::vector<uint32_t> ray_indices;  ///< padded by one packet
+  std::vector<float> scratch;         ///< one value for each material, for policies
+  CostTracker costs;
+  SplatList splats;
+  Chooser policy_chooser, ray_chooser, shadow_chooser;
+  CoherenceCounts coherence;
+  /// Number of shading queues so far, of which some are measured for coherence.
+  uint32_t queues = 0;
+  PhaseClock clock;
+  Counts counts;
+  LightVertices light_vertices;
+  VisibleRows visible;
+  LightPathAovs light_aovs;  ///< AOVs of light paths
+  /// Purpose of shading the vertices of light paths: connect them to the camera; connect them to
+  /// the camera and store them; or connect them to the camera path in the same slot.
+  enum class LightUse : uint8_t { kShow, kKeep, kConnect } light_use = LightUse::kShow;
+
+  size_t bytes() const {
+    return pool.bytes() + aovs.bytes() + history.bytes() + rays.bytes() + hits.bytes() +
+           shading.bytes() + shadows.bytes() + columns.bytes() + times.bytes() + walks.bytes() +
+           ways.bytes() + interiors.bytes() + splats.bytes() + light_vertices.bytes() +
+           visible.bytes() + light_aovs.bytes();
+  }
+};
+
+/// Runs a wave with kernels of `W` lanes: generate -> (trace -> policy -> shade -> shadow)* ->
+/// resolve. task.from_lights selects light paths.
+template <size_t W>
+void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task);
+
+/// Runs a wave through the volumes of the scene (medium/).
+template <size_t W>
+void run_wave_in_volumes(Wave& wave, const WaveContext& context, const WaveTask& task);
+
+/// Shades synthetic hits of one material with kernels of `W` lanes. Returns the time in
+/// nanoseconds.
+template <size_t W>
+double time_material(Wave& wave, const WaveContext& context, const CalibrationHits& hits);
+
+}  // namespace wavecomb
