@@ -90,6 +90,7 @@ def test_render_writes_everything(fake: Fake, stage: str, tmp_path: Path) -> Non
     assert document["schema"] == "wavecomb-statistics/1"
     seconds = {"load": 0.25, "build": 0.1, "render": 0.5}
     others = dict.fromkeys(("first_samples", "resumed", "denoise"), 0.0)
+    assert document["seconds"].pop("write") > 0.0
     assert document["seconds"] == {**seconds, **others}
     assert document["counts"]["samples"] == 4800
     assert sorted(path.name for path in tmp_path.iterdir()) == [
@@ -514,7 +515,7 @@ def test_lane_widths_that_are_not_built(tmp_path: Path) -> None:
     built = _core.lane_widths()
     assert len(built) == 1 or built[0] == 1
     shown = "|".join(["auto", *(str(width) for width in built)])
-    assert f"--lanes [{shown}]" in wavecomb("render", "--help").stdout
+    assert f"--lanes [{shown}]" in wavecomb("render", "--help-all").stdout
     stage, out = tmp_path / "stage.usdc", tmp_path / "a.exr"
     assert wavecomb("scene", "cornell", "-o", stage).returncode == 0
     for width in (1, 4, 8, 16):

@@ -125,7 +125,8 @@ def test_every_setting_has_its_option() -> None:
 
 
 def test_an_added_row_is_an_option(with_rows: None) -> None:
-    from wavecomb.cli.setting_options import SettingCommand, setting_options
+    from wavecomb.cli.command import SettingCommand
+    from wavecomb.cli.setting_options import setting_options
 
     got: dict[str, Any] = {}
 

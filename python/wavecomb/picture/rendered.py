@@ -154,7 +154,7 @@ class Picture:
             tile: EXR: edge of tiles in pixels, a multiple of 16; 0 means scanlines.
             split: EXR: write one file per AOV, path.NAME.exr, with the beauty in ``path`` itself.
             exposure: PNG: exposure in stops.
-            tone_map: PNG: "clamp" or "neutral".
+            tone_map: PNG: "clamp", "neutral", or "ocio:VIEW" for a view of OpenColorIO.
 
         Returns:
             The files that were written.

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.gui.viewport import ocio
+from wavecomb import ocio
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.picture import image
 from wavecomb.picture.layer_view import Shown, show_layer
