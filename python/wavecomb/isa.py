@@ -151,6 +151,8 @@ class Finder:
             others = (one for one in sys.meta_path if one is not Finder)
             found = (one.find_spec(name, path, target) for one in others)
             file = next((spec.origin for spec in found if spec is not None), None)
+            if file is not None and os.path.dirname(file) not in path:
+                return None
         if file is None or not file.endswith(tuple(EXTENSION_SUFFIXES)):
             return None
         # The module and its classes are named after this name, not after the folder.

@@ -67,7 +67,7 @@ def views(display: str | None = None) -> list[str]:
 
 
 def tone_map(view: str, display: str | None = None) -> str:
-    """Returns the tone mapping of ``wavecomb.Image.save`` that shows an image through a view.
+    """Returns the tone mapping of ``wavecomb.Picture.save`` that shows an image through a view.
 
     Args:
         view: Name of a view, regardless of case.

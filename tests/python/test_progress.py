@@ -150,7 +150,7 @@ def test_samples_that_an_ending_asks_for(
         (["--preview-every", 5], "--preview-every is for previews: give --preview, too"),
         (["--preview", "a.exr"], "--preview a.exr: the name must end in .png"),
         (["--resume", "none.ckpt"], "none.ckpt: no such file"),
-        (["--checkpoint", "no/such/a.ckpt"], "does not exist"),
+        (["--checkpoint", "/proc/no/a.ckpt"], "cannot be written"),
     ],
 )
 def test_bad_options(

@@ -135,7 +135,7 @@ def test_an_added_row_is_an_option(with_rows: None) -> None:
     def command(**chosen: Any) -> None:
         got.update({name: value for name, value in chosen.items() if value is not None})
 
-    shown = CliRunner().invoke(command, ["--help"]).output
+    shown = CliRunner().invoke(command, ["--help-all"]).output
     for row in ADDED:
         assert row.option in shown
         assert row.help in shown

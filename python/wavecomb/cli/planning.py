@@ -385,7 +385,8 @@ def _check_outputs(asked: Asked, names: Names, purpose: PurposeOptions) -> None:
     ]
     for name, option, ending in outputs:
         if name is not None and ending is not None and not name.lower().endswith(ending):
-            raise WavecombError(f"{option} {name}: the name must end in {ending}")
+            endings = ".exr or .png" if option == "-o" else ending
+            raise WavecombError(f"{option} {name}: the name must end in {endings}")
         if option == "--costs" and name is not None and not name.lower().endswith(".json"):
             sources = known_settings()["costs"].choices
             raise WavecombError(
