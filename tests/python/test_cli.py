@@ -301,7 +301,7 @@ def test_summary_of_scheduling(fake: Fake, stage: str, tmp_path: Path) -> None:
         for i in range(9)
     ]  # fmt: skip
     fake.stats = {
-        "settings": {"policy": "adaptive"},
+        "settings": {"policy": "adaptive", "width": 8, "height": 8},
         "phases_s": {"trace": 1.0, "keys": 0.1, "sort": 0.1, "shade": 1.8},
         "counts": {
             **{"samples": 100, "rays": 250, "shadow_rays": 100, "records": 9000},

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Sequence
 
@@ -110,7 +111,9 @@ def start_qt(timeout: float = 60.0) -> tuple[str, str]:
     if libraries := missing_libraries():
         return "", libraries_message(libraries)
     said = [line for line in done.stderr.splitlines() if line.strip()]
-    return "", said[0].strip() if said else f"Qt ended with code {done.returncode}"
+    # Qt's messages begin with a category, such as "qt.qpa.xcb: ".
+    why = said[0].strip() if said else f"Qt ended with code {done.returncode}"
+    return "", re.sub(r"^qt\.[\w.]+: ", "", why)
 
 
 def check_window() -> None:
