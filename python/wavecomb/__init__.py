@@ -17,12 +17,14 @@ from wavecomb import isa
 isa.install()
 
 if TYPE_CHECKING:
+    from wavecomb import scenes
     from wavecomb._core import Scene, SceneBuilder, Settings
     from wavecomb.api import load, render
-    from wavecomb.errors import WavecombError
+    from wavecomb.errors import Error, WavecombError
     from wavecomb.image import cryptomatte
     from wavecomb.image.compare.comparison import Comparison, compare
     from wavecomb.image.rendered import Picture
+    from wavecomb.renderer import Renderer
     from wavecomb.run.sequence import render_frames
     from wavecomb.scheduling import SchedulingPolicy
     from wavecomb.window import Window, view
@@ -31,7 +33,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Comparison",
+    "Error",
     "Picture",
+    "Renderer",
     "Scene",
     "SceneBuilder",
     "SchedulingPolicy",
@@ -44,12 +48,15 @@ __all__ = [
     "load",
     "render",
     "render_frames",
+    "scenes",
     "view",
 ]
 
 _HOMES = {
     "Comparison": "wavecomb.image.compare.comparison",
+    "Error": "wavecomb.errors",
     "Picture": "wavecomb.image.rendered",
+    "Renderer": "wavecomb.renderer",
     "Scene": "wavecomb._core",
     "SceneBuilder": "wavecomb._core",
     "SchedulingPolicy": "wavecomb.scheduling",
@@ -71,6 +78,11 @@ def __getattr__(name: str) -> Any:
         value: Any = version()
     elif name == "cryptomatte":
         from wavecomb.image import cryptomatte as value
+    elif name == "scenes":
+        # A from-import would call this function again.
+        from importlib import import_module
+
+        value = import_module("wavecomb.scenes")
     elif name in _HOMES:
         from importlib import import_module
 

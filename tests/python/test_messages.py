@@ -41,7 +41,7 @@ def refused(done: subprocess.CompletedProcess[str], *said: str) -> None:
         (("--size", "0", "10"), "size 0 x 10"),
         (("--wave-size", "3"), "wave_size"),
         (("-o", "a.jpg"), "a.jpg: the name must end in .exr"),
-        (("-o", "gone/a.exr"), "gone"),
+        (("-o", "/proc/gone/a.exr"), "/proc/gone/a.exr: cannot be written"),
         (("--png", "b.exr"), "b.exr: the name must end in .png"),
     ],
 )

@@ -341,8 +341,10 @@ def test_a_render_as_people_make_it(place: Path) -> None:
     made |= {f"f.00{i}{layer}.exr" for i in (1, 2) for layer in ("", ".normal")}
     assert set(os.listdir(place / "out")) - {"p.png"} == made
     assert set(os.listdir(place / "shot")) == {"s.usda", "d.exr"}
-    stderr = run(*boxed, "-o", place / "nowhere/a.exr", code=2).stderr
-    assert "nowhere does not exist; make it first" in stderr and stderr.count("\n") == 1
+    run(*boxed, "-o", place / "new/folder/a.exr")
+    assert os.listdir(place / "new/folder") == ["a.exr"]
+    stderr = run(*boxed, "-o", place / "shot/d.exr/a.exr", code=2).stderr
+    assert "d.exr is not a folder" in stderr and stderr.count("\n") == 1
 
 
 @pytest.mark.slow

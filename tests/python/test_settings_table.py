@@ -125,7 +125,8 @@ def test_every_setting_has_its_option() -> None:
 
 
 def test_an_added_row_is_an_option(with_rows: None) -> None:
-    from wavecomb.cli.setting_options import SettingCommand, setting_options
+    from wavecomb.cli.command import SettingCommand
+    from wavecomb.cli.setting_options import setting_options
 
     got: dict[str, Any] = {}
 
@@ -134,7 +135,7 @@ def test_an_added_row_is_an_option(with_rows: None) -> None:
     def command(**chosen: Any) -> None:
         got.update({name: value for name, value in chosen.items() if value is not None})
 
-    shown = CliRunner().invoke(command, ["--help"]).output
+    shown = CliRunner().invoke(command, ["--help-all"]).output
     for row in ADDED:
         assert row.option in shown
         assert row.help in shown

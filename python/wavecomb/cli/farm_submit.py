@@ -12,6 +12,7 @@ from typing import Any
 import click
 
 from wavecomb import processes
+from wavecomb.cli.command import SettingCommand
 from wavecomb.cli.farm_run import DASHBOARD, ON, run_job
 from wavecomb.cli.farm_tiles import check_options, job_of
 from wavecomb.cli.frames import frame_options
@@ -19,7 +20,7 @@ from wavecomb.cli.options import examples, isolation_options, stage_options
 from wavecomb.cli.planning import Asked, prepare
 from wavecomb.cli.render import picture_options
 from wavecomb.cli.sandbox import enter_to_read, enter_to_render
-from wavecomb.cli.setting_options import Real, SettingCommand
+from wavecomb.cli.setting_options import Real
 from wavecomb.errors import WavecombError
 
 _PLAN_S = 4 * 3600.0
@@ -31,7 +32,7 @@ _PLAN_S = 4 * 3600.0
     cls=SettingCommand,
     epilog=examples(
         "wavecomb farm submit shot.usd -o out/shot.####.exr --frames 1-48 --on local:4",
-        "wavecomb farm submit shot.usd -o shot.exr --size 3840 2160 --tiles 8x4 --on local:4",
+        "wavecomb farm submit shot.usd -o shot.exr --size 3840x2160 --tiles 8x4 --on local:4",
         "wavecomb farm submit /share/shot.usd -o /share/shot.exr --on dask:tls://HOST:8786",
     ),
 )
@@ -168,7 +169,7 @@ def plan_command(text: str) -> None:
     }
     asked = Asked.take(request)
     enter_to_render(
-        asked.written(), asked.output, asked.output_dir, asked.frames, asked.source.frame,
+        asked.written(), asked.image, asked.output_dir, asked.frames, asked.source.frame,
         split=asked.layers.split, gpu=False,
     )  # fmt: skip
     prepared = prepare(asked)

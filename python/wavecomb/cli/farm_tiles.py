@@ -16,6 +16,7 @@ import click
 
 from wavecomb.cli.options import warn
 from wavecomb.cli.planning import Asked, Prepared
+from wavecomb.cli.size import is_png
 from wavecomb.errors import WavecombError
 from wavecomb.run.guiding_file import BEFORE
 
@@ -74,8 +75,8 @@ def check_tile(text: str, options: dict[str, Any]) -> tuple[int, int]:
         raise WavecombError(f"--tile {text}: must be I/N; tiles inside the file are --exr-tile")
     found = parse_tile(text)
     check_options(options, "--tile")
-    if options["output"] is None:
-        raise WavecombError("--tile: needs -o, because the tile is written beside it")
+    if options["output"] is None or is_png(options["output"]):
+        raise WavecombError("--tile: needs -o FILE.exr, because the tile is written beside it")
     return found
 
 
@@ -96,6 +97,8 @@ def job_of(prepared: Prepared, asked: Asked, **more: Any) -> Job:
     for index, (plan, numbers, job) in enumerate(prepared.jobs):
         source = plan.source(prepared.source)
         names = plan.names
+        if names.output is None:
+            raise WavecombError(f"{names.image}: a farm writes EXR files; give -o FILE.exr")
         shots.append(
             shot_of(
                 job.settings.to_dict(), job.aovs, source.for_load(None), names.output, names.png,

@@ -168,6 +168,8 @@ SYNONYMS = {
     "--height": "--size",
     "--out": "--output",
     "--outfile": "--output",
+    "--output-file": "--output",
+    "--output-image": "--output",
     "--destination": "--output",
     "--image": "--output",
     "--bounces": "--max-depth",

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import signal
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -27,18 +28,27 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Names:
-    """File names of one image. In a sequence, they hold placeholders for the frame."""
+    """File names of one image. In a sequence, they hold placeholders for the frame.
 
-    output: str
+    ``output`` is the EXR; None if only a PNG is written.
+    """
+
+    output: str | None
     png: str | None
     stats: str | None
     deep: str | None = None
 
+    @property
+    def image(self) -> str:
+        """The EXR, or the PNG if that is the only image."""
+        image = self.output or self.png
+        assert image is not None
+        return image
+
     def at(self, frame: float) -> Names:
         """Returns the file names for a frame."""
-        others = (self.png, self.stats, self.deep)
-        filled = (None if name is None else fill(name, frame) for name in others)
-        return Names(fill(self.output, frame), *filled)
+        names = (self.output, self.png, self.stats, self.deep)
+        return Names(*(None if name is None else fill(name, frame) for name in names))
 
     def all(self) -> list[str]:
         """Returns all file names that are not None, in the order in which files are written."""
@@ -269,18 +279,31 @@ class Job:
         picture = done.picture
         _warn_of_broken(_broken_pixels(picture))
         if denoise:
-            picture = picture.with_denoised(threads=self.settings.threads)
-        written = [str(name) for name in picture.save(names.output, **self.layers.file_options())]
+            with self.reporter.working("denoising"):
+                picture = picture.with_denoised(threads=self.settings.threads)
+        start = time.perf_counter()
+        with self.reporter.working("writing"):
+            written = self._save(picture, names)
+        seconds = {**picture.stats["seconds"], "write": time.perf_counter() - start}
+        stats = {**picture.stats, "seconds": seconds}
+        if names.stats is not None:
+            write_stats(names.stats, stats)
+            written.append(names.stats)
+        return replace(done, stats=stats, picture=picture), written
+
+    def _save(self, picture: Picture, names: Names) -> list[str]:
+        """Writes the image files; returns their names."""
+        written: list[str] = []
+        if names.output is not None:
+            files = picture.save(names.output, **self.layers.file_options())
+            written += map(str, files)
         if names.png is not None:
             picture.save(names.png, exposure=self.exposure, tone_map=self.tone_map)
             written.append(names.png)
         if names.deep is not None:
             picture.save_deep(names.deep, half=self.layers.half)
             written.append(names.deep)
-        if names.stats is not None:
-            write_stats(names.stats, picture.stats)
-            written.append(names.stats)
-        return replace(done, stats=picture.stats, picture=picture), written
+        return written
 
 
 class _NotKept(Exception):

@@ -58,7 +58,21 @@ def enter_to_render(
             parts.append((where, f"{stem}.", ending))
     if output is None:
         trees.append((os.path.abspath(folder or os.curdir), ".exr"))
-    enter(Outputs(tuple(filled), tuple(dict.fromkeys(parts)), tuple(trees)), gpu=gpu)
+    outputs = Outputs(tuple(filled), tuple(dict.fromkeys(parts)), tuple(trees))
+    _make_folders(given)
+    enter(outputs, gpu=gpu)
+
+
+def _make_folders(names: Iterable[str]) -> None:
+    """Creates the missing folders of files, which the sandboxed process cannot do."""
+    for name in names:
+        folder = os.path.dirname(os.path.realpath(name))
+        if not has_place(folder) and not os.path.exists(folder):
+            try:
+                os.makedirs(folder, exist_ok=True)
+            except OSError as error:
+                why = error.strerror or str(error)
+                raise OSError(f"{name}: cannot be written: {why}") from error
 
 
 def enter_to_read(outputs: Iterable[str | None], *, split: str | None = None) -> None:

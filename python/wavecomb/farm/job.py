@@ -279,8 +279,10 @@ def _checked(cls: type[Job], value: Mapping[str, Any]) -> Job:
             raise ValueError("files: must have path and sha256")
     if not (isinstance(given["stage"], str) and isinstance(given["folder"], str)):
         raise ValueError("stage and folder: must be names")
-    if given["tone_map"] not in ("clamp", "neutral"):
-        raise ValueError("tone_map: must be clamp or neutral")
+    if given["tone_map"] not in ("clamp", "neutral") and not str(given["tone_map"]).startswith(
+        "ocio:"
+    ):
+        raise ValueError("tone_map: must be clamp, neutral or ocio:VIEW")
     job = cls(
         **{
             **given, "shots": shots, "images": tuple(images), "files": files,

@@ -23,7 +23,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 from wavecomb.errors import WavecombError
 from wavecomb.gui import theme
 from wavecomb.gui.messages import install_hooks
-from wavecomb.gui.needs import NO_DISPLAY, has_display
+from wavecomb.gui.needs import NO_DISPLAY, has_display, libraries_message, missing_libraries
 from wavecomb.gui.setup import Setup
 
 
@@ -37,7 +37,9 @@ def _qt_says(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
         if "platform plugin" in line and not has_display():
             line = NO_DISPLAY
         elif "platform plugin" in line or "display" in line:
-            line = f"no window can be opened: {line}"
+            missing = missing_libraries()
+            why = libraries_message(missing) if missing else line
+            line = f"no window can be opened: {why}"
         sys.stderr.write(f"error: {line}\n")
         sys.stderr.flush()
         os._exit(2)

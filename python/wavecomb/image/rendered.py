@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from wavecomb.image.files.exr import ALPHA
 from wavecomb.run import aovs as aov_names
@@ -154,7 +154,7 @@ class Picture:
             tile: EXR: edge of tiles in pixels, a multiple of 16; 0 means scanlines.
             split: EXR: write one file per AOV, path.NAME.exr, with the beauty in ``path`` itself.
             exposure: PNG: exposure in stops.
-            tone_map: PNG: "clamp" or "neutral".
+            tone_map: PNG: "clamp", "neutral", or "ocio:VIEW" for a view of OpenColorIO.
 
         Returns:
             The files that were written.
@@ -221,6 +221,14 @@ class Picture:
 
         shown = self.beauty if self.denoised is None else self.denoised
         return to_rec709(shown, self.stats.get("working_space", "rec709"))
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        """Returns the beauty (height, width, 3) for ``np.asarray``."""
+        if dtype is None or self.beauty.dtype == dtype:
+            return self.beauty.copy() if copy else self.beauty
+        if copy is False:
+            raise ValueError(f"the image is float32; {dtype} needs a copy")
+        return self.beauty.astype(dtype)
 
     def __repr__(self) -> str:
         from wavecomb.image.notebook import facts

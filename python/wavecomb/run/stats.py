@@ -83,6 +83,7 @@ def make_stats(
             "first_samples": 0.0,
             "resumed": float(resumed_s),
             "denoise": 0.0,
+            "write": 0.0,
             **seconds,
         },
         "phases_s": phases,

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.gui.viewport import ocio
+from wavecomb import ocio
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.image.files import image
 from wavecomb.image.layer_view import DisplayLayer, show_layer

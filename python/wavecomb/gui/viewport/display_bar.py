@@ -19,8 +19,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from wavecomb import ocio
 from wavecomb.gui import theme
-from wavecomb.gui.viewport import display, ocio
+from wavecomb.gui.viewport import display
 from wavecomb.gui.viewport.expression_dialog import ExpressionDialog
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.gui.viewport.session import Session, Setup

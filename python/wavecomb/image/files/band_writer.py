@@ -34,7 +34,7 @@ class BandFiles:
 
     def __init__(
         self,
-        output: str,
+        output: str | None,
         png: str | None,
         *,
         height: int,
@@ -46,7 +46,7 @@ class BandFiles:
         """Takes the arguments of ``Picture.save`` and the height of the whole image.
 
         Args:
-            output: File name that ends in .exr.
+            output: File name that ends in .exr, or None.
             png: File name that ends in .png, or None.
             height: Total number of rows.
             window: Position in a larger image, as in ``write_exr``.
@@ -73,7 +73,7 @@ class BandFiles:
         """Writes the next rows; all bands must have the same layers."""
         self.rows += len(band.beauty)
         layers = self._by_file(band.layers())
-        if not self._sheets:
+        if not self.written:
             self._open(layers, band)
         for name, its_layers in layers.items():
             sheet, file = self._sheets[name]
@@ -107,6 +107,8 @@ class BandFiles:
     def _by_file(
         self, layers: dict[str, NDArray[np.float32]]
     ) -> dict[str, dict[str, NDArray[np.float32]]]:
+        if self._output is None:
+            return {}
         if not self._split:
             return {self._output: layers}
         grouped = by_aov(layers)

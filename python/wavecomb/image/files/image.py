@@ -16,6 +16,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from wavecomb import ocio
 from wavecomb.image.files.exr import bands_of, channel_names, write_bands, write_exr
 from wavecomb.image.files.output_file import check_name, check_regular, one_line, problem_of
 from wavecomb.machine import memory_bytes
@@ -34,7 +35,8 @@ __all__ = [
 ]
 
 Array = NDArray[np.float32]
-Transfer = Literal["clamp", "neutral"]
+Transfer = Literal["clamp", "neutral"] | str
+"""Tone mapping: "clamp", "neutral", or a result of ``wavecomb.ocio.tone_map``."""
 
 _HALF_MAX = 65504.0
 _NAN_COLOUR = (255, 0, 255)
@@ -54,7 +56,8 @@ def write_png(
         path: File name that ends in .png.
         rgb: Linear Rec.709 (height, width, 3).
         exposure: Exposure in stops; the image is multiplied by 2^exposure.
-        tone_map: "clamp" clips at 1; "neutral" rolls highlights off towards white. See ``display``.
+        tone_map: "clamp" clips at 1; "neutral" rolls highlights off towards white; "ocio:VIEW" is a
+            view of OpenColorIO. See ``display``.
         alpha: (height, width) alpha of premultiplied colours; None means an opaque image.
     """
     name = os.fspath(path)
@@ -117,12 +120,16 @@ def display(
     if alpha is not None:
         covered = np.clip(np.nan_to_num(alpha), 0.0, 1.0).astype(np.float32)[:, :, None]
         linear = np.divide(linear, covered, out=linear, where=covered > 0)
-    if tone_map == "neutral":
-        linear = _neutral(linear)
-    elif tone_map != "clamp":
-        raise ValueError(f"tone map {tone_map!r} is none of clamp, neutral")
-    encoded = srgb_from_linear(np.clip(linear, 0.0, 1.0))
-    pixels: NDArray[np.uint8] = np.floor(encoded * 255.0 + 0.5).astype(np.uint8)
+    pixels: NDArray[np.uint8]
+    if tone_map.startswith(ocio.PREFIX):
+        pixels = ocio.mapped(np.minimum(linear, _HALF_MAX), tone_map)
+    else:
+        if tone_map == "neutral":
+            linear = _neutral(linear)
+        elif tone_map != "clamp":
+            raise ValueError(f"tone map {tone_map!r} is none of clamp, neutral, ocio:VIEW")
+        encoded = srgb_from_linear(np.clip(linear, 0.0, 1.0))
+        pixels = np.floor(encoded * 255.0 + 0.5).astype(np.uint8)
     pixels[broken] = _NAN_COLOUR
     if alpha is None:
         return pixels

@@ -162,11 +162,18 @@ def problem_of(library: Any) -> str:
 def check_writable(path: str | os.PathLike[str]) -> None:
     """Raises OSError with a one-line message unless the file can be written now.
 
-    Call this before long work. It creates and removes a private folder next to the file.
+    Call this before long work. It creates missing folders, and creates and removes a private folder
+    next to the file.
     """
-    target = _target(path)
+    check_name(path)
+    target = Path(os.path.realpath(path))
     other = _publisher_of(target)
+    is_missing = not target.parent.exists()
     try:
+        if is_missing and other is None:
+            target.parent.mkdir(parents=True, exist_ok=True)
+        if not is_missing or other is None:
+            _target(path)
         if other is not None:
             other.check(target)
             return

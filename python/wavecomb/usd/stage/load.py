@@ -155,7 +155,11 @@ def _file_of(source: str | Path | Usd.Stage) -> Path:
 def _opened(source: str | Path | Usd.Stage, options: LoadOptions) -> Usd.Stage:
     """Returns the open stage with the variants of the options."""
     if isinstance(source, Usd.Stage):
-        select_variants(source, options.variants or {})
+        target = source.GetEditTarget()
+        try:
+            select_variants(source, options.variants or {})
+        finally:
+            source.SetEditTarget(target)
         return source
     layer = None if options.session_layer is None else Path(options.session_layer)
     return open_stage(

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from wavecomb.usd.materials.texture import TextureCache
 
 
-@dataclass
+@dataclass(repr=False)
 class LoadedStage:
     """A loaded stage.
 
@@ -72,6 +72,17 @@ class LoadedStage:
     catchers: tuple[str, ...] = ()
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     _kept: list[_core.Renderer] = field(default_factory=list, init=False, repr=False, compare=False)
+
+    def __repr__(self) -> str:
+        scene = self.scene
+        counts = (
+            (scene.instanced_triangles, "triangles"),
+            (len(scene.materials), "materials"),
+            (scene.light_count, "lights"),
+        )
+        said = ", ".join(f"{count:,} {name}" for count, name in counts)
+        camera = self.camera_path or "none"
+        return f"<wavecomb.LoadedStage {self.stage_path}: {said}, camera {camera}>"
 
     @contextlib.contextmanager
     def renderer(self, threads: int = 0) -> Iterator[tuple[_core.Renderer, bool]]:

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 from wavecomb.errors import WavecombError
 
+PREFIX = "ocio:"
+"""Start of a tone mapping that names a view: "ocio:VIEW" or "ocio:VIEW|DISPLAY"."""
+
 _ENCODED = ("srgb - display", "srgb", "rec.1886 rec.709 - display")
 _LINEAR = (
     "lin_rec709",
@@ -48,13 +51,50 @@ def _current() -> tuple[Any, str, str] | None:
     return _config(os.environ.get("OCIO") or None)
 
 
-def views() -> list[str]:
-    """Returns the views for an sRGB screen; none if $OCIO cannot be used."""
+def displays() -> list[str]:
+    """Returns the displays of the configuration; none if $OCIO cannot be used."""
+    current = _current()
+    return [] if current is None else list(current[0].getDisplayNames())
+
+
+def views(display: str | None = None) -> list[str]:
+    """Returns the views of a display, by default of an sRGB screen; none if $OCIO is unusable."""
     current = _current()
     if current is None:
         return []
-    config, display, _ = current
-    return [name for name in config.getViewNames(display) if name.lower() != "raw"]
+    config, usual, _ = current
+    return [name for name in config.getViewNames(display or usual) if name.lower() != "raw"]
+
+
+def tone_map(view: str, display: str | None = None) -> str:
+    """Returns the tone mapping of ``wavecomb.Picture.save`` that shows an image through a view.
+
+    Args:
+        view: Name of a view, regardless of case.
+        display: Name of a display, regardless of case; None means an sRGB screen.
+
+    Raises:
+        WavecombError: $OCIO cannot be used, or it has no such view or display.
+    """
+    if why := problem():
+        raise WavecombError(why)
+    if display is not None:
+        display = _known("display", display, displays())
+    return PREFIX + "|".join(filter(None, (_known("view", view, views(display)), display)))
+
+
+def _known(what: str, name: str, there: list[str]) -> str:
+    found = {one.lower(): one for one in there}.get(name.lower())
+    if found is None:
+        config = os.environ.get("OCIO") or "OpenColorIO's configuration (set OCIO for another)"
+        raise WavecombError(f"no OCIO {what} {name!r} in {config}; there are {', '.join(there)}")
+    return found
+
+
+def mapped(rgb: NDArray[Any], tone_map: str) -> NDArray[np.uint8]:
+    """Converts linear Rec.709 (h, w, 3) to 8-bit values by a result of ``tone_map``."""
+    view, _, display = tone_map.removeprefix(PREFIX).partition("|")
+    return through_view(rgb, view, display or None)
 
 
 def problem() -> str | None:
@@ -67,7 +107,7 @@ def problem() -> str | None:
     return None
 
 
-def through_view(rgb: NDArray[Any], view: str) -> NDArray[np.uint8]:
+def through_view(rgb: NDArray[Any], view: str, display: str | None = None) -> NDArray[np.uint8]:
     """Converts linear Rec.709, finite, (h, w, 3) to 8-bit values of the display.
 
     Raises:
@@ -76,16 +116,16 @@ def through_view(rgb: NDArray[Any], view: str) -> NDArray[np.uint8]:
     import OpenImageIO as oiio
 
     current = _current()
-    if current is None or view not in views():
+    if current is None or view not in views(display):
         raise WavecombError(
-            f"no view {view!r}; there are {', '.join(['Linear', 'Neutral', *views()])}"
+            f"no view {view!r}; there are {', '.join(['Linear', 'Neutral', *views(display)])}"
         )
-    _, display, linear = current
+    _, usual, linear = current
     source = oiio.ImageBuf(np.ascontiguousarray(rgb, dtype=np.float32))
     # Use only this thread: the render uses all cores, and OpenImageIO's thread pool was seen to
     # deadlock.
     shown = oiio.ImageBufAlgo.ociodisplay(
-        source, display, view, linear, colorconfig=_name(), nthreads=1
+        source, display or usual, view, linear, colorconfig=_name(), nthreads=1
     )
     if shown.has_error:
         raise WavecombError(f"view {view!r}: {shown.geterror()}")
