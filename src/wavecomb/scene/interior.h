@@ -46,13 +46,22 @@ struct InteriorView {
   }
 };
 
-/// Whether a material is a solid that transmits light and absorbs it inside.
-bool absorbs_inside(const Material& material);
+/// Whether a material is a solid that transmits light, possibly by a value graph, and absorbs it
+/// inside with constant coefficients.
+bool absorbs_inside(const Material& material, const GraphSet& graphs);
+/// Whether a material is a solid that transmits light and absorbs it inside as a value graph says.
+/// The graph is evaluated where a path leaves the glass, so that the coefficients of a segment
+/// depend on its direction.
+bool absorbs_by_graph(const Material& material, const GraphSet& graphs);
 /// Whether a material needs paths to know what they are inside of: it scatters, has a priority, or
 /// bounds an absorbing medium that does not refract. With `absorbing` it does, too, where it
 /// absorbs: in a scene of volumes, where a path that a volume scatters inside of it has come part
 /// of its way before, and where objects are inside of absorbing glass (scene/contents.h).
-bool asks_for_interiors(const Material& material, bool absorbing);
+bool asks_for_interiors(const Material& material, const GraphSet& graphs, bool absorbing);
+/// Appends the material that shades collisions inside of meshes if a material asks for interiors.
+/// Returns its number, else kInheritMaterial.
+uint32_t add_inside_material(std::vector<Material>& materials, const GraphSet& graphs,
+                             bool absorbing);
 /// The media of all materials; none where no material asks for them.
 std::vector<InteriorMedium<float>> make_interiors(std::span<const Material> materials,
                                                   const GraphSet& graphs, bool absorbing);

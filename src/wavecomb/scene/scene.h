@@ -65,6 +65,7 @@ struct SceneEdit {
 };
 
 class SceneBuilder;
+struct PlacedObjects;
 
 /// Geometry, materials, textures, lights and camera, checked and complete. Immutable; any number of
 /// renderers and threads may read it.
@@ -116,8 +117,10 @@ class Scene {
   /// anew with them. `threads`: 0: all.
   ///
   /// Costs microseconds for a camera, copies of the materials for a material, the light set where
-  /// lights or emission change, and tangents of meshes whose material asks for them anew. Throws
-  /// Error naming the object for bad values, as SceneBuilder does, and for ids that are not there.
+  /// lights or emission change, and tangents of meshes whose material asks for them anew. A
+  /// material that begins or ceases to absorb, or a light that moves, costs a search of what is
+  /// inside of absorbing glass. Throws Error naming the object for bad values, as SceneBuilder
+  /// does, and for ids that are not there.
   std::shared_ptr<const Scene> edited(const SceneEdit& edit, uint32_t threads = 0) const;
 
   /// The parts, to be compared with those of scenes that were made from one another.
@@ -133,6 +136,8 @@ class Scene {
         const Camera& camera);
   /// Works out which objects are in which sets, and which rays see them.
   void link();
+  /// SceneMaterials::in_glass of a scene with this geometry and other materials and lights.
+  bool needs_in_glass(std::span<const Material> materials, std::span<const Light> lights) const;
   /// A value for every light that kernels know: of_input(light) of the stage's, of_run(triangles)
   /// of those of meshes.
   template <typename T, typename OfInput, typename OfRun>
@@ -240,6 +245,9 @@ class SceneBuilder {
   /// none where neither moves.
   std::vector<Affine> composed(std::span<const Affine> outer, const Affine& still,
                                const Node& node) const;
+  /// Warns of glass whose absorption comes from a value graph, where that shows: in_glass
+  /// (SceneMaterials), or with objects or lights inside of it.
+  void warn_of_absorbing_graphs(const PlacedObjects& objects, bool in_glass);
   void make_records(SceneGeometry& geometry, uint32_t grey) const;
 
   uint32_t threads_;

@@ -106,8 +106,6 @@ struct SceneGeometry {
   uint32_t first_volume_material = 0;  ///< VolumeView::first_material
   /// WalkView::exit_material; kInheritMaterial: no material had a radius, and nobody can walk.
   uint32_t exit_material = kInheritMaterial;
-  /// InteriorView::event_material; kInheritMaterial: no material asked what paths are inside of.
-  uint32_t inside_material = kInheritMaterial;
   std::vector<StepRange> instance_motions;  ///< by instance record; empty where none moves
   bool moves() const {
     return mesh_motions.size() > 1 || !steps.empty() ||
@@ -132,11 +130,13 @@ struct SceneGeometry {
 
 /// Materials, and as lanes read them.
 struct SceneMaterials {
-  /// `textures`: those of the scene, which materials and graphs read. `exit_material`,
-  /// `inside_material`: of SceneGeometry.
+  /// `textures`: those of the scene, which materials and graphs read. `exit_material`: of
+  /// SceneGeometry. `in_glass`: see the member. Appends the material of collisions inside of meshes
+  /// to `materials` if it is needed.
   SceneMaterials(std::vector<Material> materials, std::shared_ptr<const GraphSet> graphs,
-                 std::span<const TexturePtr> textures, uint32_t exit_material,
-                 uint32_t inside_material);
+                 std::span<const TexturePtr> textures, uint32_t exit_material, bool in_glass);
+  /// All materials but the one of collisions inside of meshes.
+  std::vector<Material> given() const;
 
   std::vector<Material> materials;  ///< as they were told
   std::vector<Material> shaded;     ///< the same, settled (settled_material.h)
@@ -152,6 +152,13 @@ struct SceneMaterials {
   std::vector<ProgramParameterRecord> own;
   std::vector<WalkMedium<float>> walks;          ///< by material; empty where nobody walks
   std::vector<InteriorMedium<float>> interiors;  ///< by material; empty where nobody asks
+  /// InteriorView::event_material, the last material; kInheritMaterial if `interiors` is empty.
+  uint32_t inside_material = kInheritMaterial;
+  /// Whether paths need to know which absorbing glass they are inside of: it holds objects or
+  /// lights (scene/contents.h), or the scene has volumes.
+  bool in_glass = false;
+  /// Whether the absorption of some glass comes from a value graph (absorbs_by_graph).
+  bool has_absorbing_graphs = false;
   bool has_presence = false, has_emission = false;
 };
 
