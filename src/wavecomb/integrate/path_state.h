@@ -222,17 +222,36 @@ struct Vertex {
 /// A shadow ray ends at this share of the way to the light, and so before its surface.
 inline constexpr float kShadowReach = 0.9999f;
 
-/// c scaled down so that its luminance is at most `limit`; unchanged for limit 0 (off) and
-/// NaN-free: a contribution that is not finite is dropped.
+/// Limits a contribution so that its luminance is at most `limit` (0: no limit), and drops it if it
+/// is not finite.
+template <typename F>
+class ContributionLimit {
+ public:
+  ContributionLimit(const Color<F>& whole, float limit)
+      : finite_(is_finite(whole.x) & is_finite(whole.y) & is_finite(whole.z)),
+        limited_(limit > 0),
+        scale_(1.f) {
+    if (!limited_) return;
+    const F y = luminance(finite(whole));
+    scale_ = select(y > limit, F(limit / max(y, F(1e-30f))), F(1.f));
+  }
+  /// The share of the limited contribution that `part` has, which may be the whole.
+  Color<F> of(const Color<F>& part) const {
+    return limited_ ? finite(part) * scale_ : finite(part);
+  }
+
+ private:
+  Color<F> finite(const Color<F>& c) const { return select<F>(finite_, c, Color<F>(F(0.f))); }
+
+  Mask<F> finite_;
+  bool limited_;
+  F scale_;
+};
+
+/// A contribution, limited as a whole (ContributionLimit).
 template <typename F>
 inline Color<F> clean(const Color<F>& c, float limit) {
-  const Mask<F> ok = is_finite(c.x) & is_finite(c.y) & is_finite(c.z);
-  Color<F> r = select<F>(ok, c, Color<F>(F(0.f)));
-  if (limit > 0) {
-    const F y = luminance(r);
-    r = r * select(y > limit, F(limit / max(y, F(1e-30f))), F(1.f));
-  }
-  return r;
+  return ContributionLimit<F>(c, limit).of(c);
 }
 
 /// The limit for a contribution that light brings after `bounces` scatterings: direct light is

@@ -20,6 +20,8 @@ inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings
   return clean<F>(path.throughput * le, clamp_limit(settings, depth));
 }
 
+/// Calls add(i, radiance) for each infinite light i that `is_wanted`; the sum over all is
+/// environment_emission.
 template <typename F, typename IsWanted, typename Add>
 inline void split_environment(const SceneView& scene, const ShadeSettings& settings, uint32_t depth,
                               const PathState<F>& path, const Mask<F>& active,
@@ -29,16 +31,13 @@ inline void split_environment(const SceneView& scene, const ShadeSettings& setti
       path.throughput * escaped_radiance<F>(scene.lights, path.o, path.dir, path.pdf, delta, active,
                                             depth == 0, path.link, path.joined(), path.time,
                                             path.diffuse);
-  const Mask<F> ok = active & is_finite(all.x) & is_finite(all.y) & is_finite(all.z);
-  const float limit = clamp_limit(settings, depth);
-  const F y = luminance(all);
-  const F scale = limit > 0 ? select(y > limit, F(limit / max(y, F(1e-30f))), F(1.f)) : F(1.f);
+  const ContributionLimit<F> limit(all, clamp_limit(settings, depth));
   for (uint32_t i = 0; i < scene.lights.infinite_count; ++i) {
     if (!is_wanted(i)) continue;
     const Color<F> le =
         infinite_light_radiance<F>(scene.lights, i, path.o, path.dir, path.pdf, delta, active,
                                    depth == 0, path.link, path.joined(), path.time, path.diffuse);
-    add(i, select<F>(ok, path.throughput * le * scale, Color<F>(F(0.f))));
+    add(i, select<F>(active, limit.of(path.throughput * le), Color<F>(F(0.f))));
   }
 }
 
