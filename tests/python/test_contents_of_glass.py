@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is inside of absorbing glass after edits, and where a value graph drives the absorption."""
+"""Contents of absorbing glass after edits, and absorption that a value graph drives."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_interiors import absorbing, filled, glass_ball, quad
+from test_interiors import filled, glass_ball, quad
 
 import wavecomb
 from wavecomb import _core
