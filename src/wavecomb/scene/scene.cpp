@@ -7,6 +7,8 @@
 
 #include "wavecomb/core/error.h"
 #include "wavecomb/light/description/light_table.h"
+#include "wavecomb/medium/description/glass_contents.h"
+#include "wavecomb/medium/description/mesh_medium.h"
 #include "wavecomb/medium/description/volume_motion.h"
 #include "wavecomb/scene/camera/camera_table.h"
 #include "wavecomb/scene/parallel.h"
@@ -95,7 +97,7 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
   v.walks = {materials_->walks.empty() ? nullptr : materials_->walks.data(),
              geometry_->exit_material};
   v.interiors = {materials_->interiors.empty() ? nullptr : materials_->interiors.data(),
-                 geometry_->inside_material};
+                 materials_->inside_material};
   v.has_motion = geometry_->moves() || v.lights.motions;
   v.has_emissive_meshes = !lights_->emissive.empty();
   v.has_curves = std::any_of(meshes().begin(), meshes().end(),
@@ -121,6 +123,24 @@ void Scene::link() {
   view_.visibility = visibility_->data();
 }
 
+bool Scene::needs_in_glass(std::span<const Material> all_materials,
+                           std::span<const Light> all_lights) const {
+  if (!volumes().empty()) return true;
+  const auto test = [&](const Material& m) { return absorbs_inside(m, *materials_->graphs); };
+  const Glasses before = glasses_of(materials(), test), after = glasses_of(all_materials, test);
+  // The material of collisions inside of meshes may follow those of `after`.
+  const bool same_glass = std::equal(after.begin(), after.end(), before.begin());
+  const bool same_lights =
+      std::ranges::equal(lights(), all_lights, [](const Light& a, const Light& b) {
+        return a.kind == b.kind && same(a.to_world.t, b.to_world.t);
+      });
+  if (same_glass && same_lights) return materials_->in_glass;
+  const PlacedObjects objects{meshes(), groups(), instances(), geometry_->steps};
+  if (glass_holds_lights(after, objects, all_lights)) return true;
+  if (same_glass && !materials_->in_glass) return false;
+  return glass_holds_objects(after, objects);
+}
+
 std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threads) const {
   if (edit.camera) check_camera(*edit.camera);
   for (const auto& [id, material] : edit.materials) {
@@ -141,16 +161,21 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
 
   std::shared_ptr<const SceneMaterials> new_materials = materials_;
   bool shines_otherwise = !edit.lights.empty();
-  if (!edit.materials.empty()) {
+  std::vector<Light> all_lights;
+  if (!edit.materials.empty() || !edit.lights.empty()) {
+    all_lights = lights();
+    for (const auto& [i, light] : edit.lights) all_lights[i] = light;
     const bool any_mesh_lights = !geometry_->mesh_lights.empty();
-    std::vector<Material> all = materials();
+    std::vector<Material> all = materials_->given();
     for (const auto& [id, material] : edit.materials) {
       shines_otherwise = shines_otherwise || !same_emission(all[id], material, any_mesh_lights);
       all[id] = material;
     }
-    new_materials = std::make_shared<const SceneMaterials>(
-        std::move(all), materials_->graphs, geometry_->textures, geometry_->exit_material,
-        geometry_->inside_material);
+    const bool in_glass = needs_in_glass(all, all_lights);
+    if (!edit.materials.empty() || in_glass != materials_->in_glass)
+      new_materials = std::make_shared<const SceneMaterials>(std::move(all), materials_->graphs,
+                                                             geometry_->textures,
+                                                             geometry_->exit_material, in_glass);
   }
   std::shared_ptr<const SceneTangents> new_tangents = tangents_;
   if (new_materials->wants_tangents != materials_->wants_tangents)
@@ -159,14 +184,11 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
           std::make_shared<const SceneTangents>(*geometry_, *new_materials, tangents_.get());
     });
   std::shared_ptr<const SceneLights> new_lights = lights_;
-  if (shines_otherwise) {
-    std::vector<Light> all = lights();
-    for (const auto& [i, light] : edit.lights) all[i] = light;
+  if (shines_otherwise)
     with_threads(threads, [&] {
-      new_lights = std::make_shared<const SceneLights>(std::move(all), *geometry_, *new_materials,
-                                                       lights_.get());
+      new_lights = std::make_shared<const SceneLights>(std::move(all_lights), *geometry_,
+                                                       *new_materials, lights_.get());
     });
-  }
   std::shared_ptr<Scene> scene(new Scene(geometry_, std::move(new_materials), std::move(new_lights),
                                          std::move(new_tangents), links_,
                                          edit.camera.value_or(camera_)));

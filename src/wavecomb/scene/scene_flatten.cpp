@@ -103,6 +103,26 @@ void SceneBuilder::flatten(uint32_t group, const Instance& here, std::span<const
   }
 }
 
+void SceneBuilder::warn_of_absorbing_graphs(const PlacedObjects& objects, bool in_glass) {
+  const Glasses by_graph =
+      glasses_of(materials_, [&](const Material& m) { return absorbs_by_graph(m, graphs_); });
+  const auto first = std::ranges::find(by_graph, true);
+  if (first == by_graph.end()) return;
+  const Material& glass = materials_[static_cast<size_t>(first - by_graph.begin())];
+  const char* const advice =
+      "; absorption that a graph or texture drives acts where paths leave glass; use a constant "
+      "transmission color";
+  if (std::ranges::any_of(
+          materials_, [&](const Material& m) { return asks_for_interiors(m, graphs_, in_glass); }))
+    warnings_.push_back(quoted("material", glass.name) +
+                        " does not absorb, since the stage has media or objects inside of meshes" +
+                        advice);
+  else if (glass_holds_lights(by_graph, objects, lights_) || glass_holds_objects(by_graph, objects))
+    warnings_.push_back(quoted("material", glass.name) +
+                        " does not dim light on its way to objects or from lights inside of it" +
+                        advice);
+}
+
 void SceneBuilder::flatten_groups(SceneGeometry& geometry) {
   // Count first, because nested groups can have 2^n placements, most of which may contain nothing.
   std::vector<uint64_t> placements(groups_.size(), kUncounted);
@@ -163,19 +183,17 @@ uint32_t SceneBuilder::add_implicit_materials(SceneGeometry& geometry) {
     white.base_color = {1, 1, 1};
     materials_.push_back(white);
   }
-  // A material for collisions in media inside meshes.
-  const bool absorbing = !volumes_.empty() ||
-                         absorbing_glass_holds_objects(materials_, meshes_, groups_,
-                                                       geometry.instances, geometry.steps, lights_);
-  if (std::ranges::any_of(materials_,
-                          [&](const Material& m) { return asks_for_interiors(m, absorbing); })) {
-    geometry.inside_material = static_cast<uint32_t>(materials_.size());
-    Material inside;
-    inside.name = "inside of meshes";
-    inside.program = ProgramId::kVolume;
-    materials_.push_back(inside);
-  }
   return grey;
+}
+
+bool SceneBuilder::search_glass(const SceneGeometry& geometry) {
+  const PlacedObjects objects{meshes_, groups_, geometry.instances, geometry.steps};
+  const Glasses absorbing =
+      glasses_of(materials_, [&](const Material& m) { return absorbs_inside(m, graphs_); });
+  const bool in_glass = !volumes_.empty() || glass_holds_lights(absorbing, objects, lights_) ||
+                        glass_holds_objects(absorbing, objects);
+  warn_of_absorbing_graphs(objects, in_glass);
+  return in_glass;
 }
 
 void SceneBuilder::bind_materials(SceneGeometry& geometry, uint32_t grey) const {
@@ -214,6 +232,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   auto geometry = std::make_shared<SceneGeometry>();
   flatten_groups(*geometry);
   const uint32_t grey = add_implicit_materials(*geometry);
+  const bool in_glass = search_glass(*geometry);
   bind_materials(*geometry, grey);
   move_parts(*geometry);
   std::shared_ptr<const SceneMaterials> materials;
@@ -223,7 +242,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
     make_records(*geometry, grey);
     materials = std::make_shared<const SceneMaterials>(
         std::move(materials_), std::make_shared<const GraphSet>(std::exchange(graphs_, {})),
-        geometry->textures, geometry->exit_material, geometry->inside_material);
+        geometry->textures, geometry->exit_material, in_glass);
     lights =
         std::make_shared<const SceneLights>(std::move(lights_), *geometry, *materials, nullptr);
     tangents = std::make_shared<const SceneTangents>(*geometry, *materials, nullptr);

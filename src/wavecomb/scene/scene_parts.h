@@ -108,8 +108,6 @@ struct SceneGeometry {
   /// WalkView::exit_material; kInheritMaterial if no material has a subsurface radius, so that the
   /// scene has no subsurface random walks.
   uint32_t exit_material = kInheritMaterial;
-  /// InteriorView::event_material; kInheritMaterial if no material needs a medium stack.
-  uint32_t inside_material = kInheritMaterial;
   std::vector<StepRange> instance_motions;  ///< by instance record; empty if no instance moves
   bool moves() const {
     return mesh_motions.size() > 1 || !steps.empty() ||
@@ -134,11 +132,13 @@ struct SceneGeometry {
 
 /// Materials and their packed form.
 struct SceneMaterials {
-  /// Packs materials. `textures` are those of the scene, which materials and graphs read.
-  /// `exit_material` and `inside_material` are those of SceneGeometry.
+  /// Packs materials. `textures` are those of the scene, which materials and graphs read, and
+  /// `exit_material` is that of SceneGeometry. Appends the material of collisions inside of meshes
+  /// to `materials` if it is needed, which `in_glass` helps to decide (see the member).
   SceneMaterials(std::vector<Material> materials, std::shared_ptr<const GraphSet> graphs,
-                 std::span<const TexturePtr> textures, uint32_t exit_material,
-                 uint32_t inside_material);
+                 std::span<const TexturePtr> textures, uint32_t exit_material, bool in_glass);
+  /// All materials but the one of collisions inside of meshes.
+  std::vector<Material> given() const;
 
   std::vector<Material> materials;  ///< as the caller described them
   std::vector<Material> shaded;     ///< after simplification by settled() (simplified_material.h)
@@ -156,6 +156,13 @@ struct SceneMaterials {
   std::vector<WalkMedium<float>> walks;
   /// By material; empty if paths need no medium stack.
   std::vector<InteriorMedium<float>> interiors;
+  /// InteriorView::event_material, the last material; kInheritMaterial if `interiors` is empty.
+  uint32_t inside_material = kInheritMaterial;
+  /// Whether paths need to know which absorbing glass they are inside of: it holds objects or
+  /// lights (medium/description/glass_contents.h), or the scene has volumes.
+  bool in_glass = false;
+  /// Whether the absorption of some glass comes from a value graph (absorbs_by_graph).
+  bool has_absorbing_graphs = false;
   bool has_presence = false, has_emission = false;
 };
 

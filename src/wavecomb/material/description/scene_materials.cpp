@@ -109,9 +109,10 @@ TextureUseRecord make_use_record(const TextureUse& use) {
 
 SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const GraphSet> programs_,
                                std::span<const TexturePtr> textures, uint32_t exit_material,
-                               uint32_t inside_material)
-    : materials(std::move(all)), graphs(std::move(programs_)) {
+                               bool in_glass_)
+    : materials(std::move(all)), graphs(std::move(programs_)), in_glass(in_glass_) {
   const DenormalsOff denormals_off;  // same floating-point mode as in kernels
+  inside_material = add_inside_material(materials, *graphs, in_glass);
   for (const Material& m : materials) shaded.push_back(settled(m, *graphs, textures));
   const bool has_own = std::ranges::any_of(
       materials, [](const Material& m) { return info_of(m.program).own_count() > 0; });
@@ -136,10 +137,15 @@ SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const 
     wants_tangents.push_back(wavecomb::wants_tangents(m, *graphs) ? 1 : 0);
     has_presence = has_presence || m.needs_presence();
     has_emission = has_emission || m.emits();
+    has_absorbing_graphs = has_absorbing_graphs || absorbs_by_graph(m, *graphs);
   }
-  if (inside_material == kInheritMaterial) return;
-  // The scene has determined that paths need a medium stack.
-  interiors = make_interiors(shaded, *graphs, true);
+  if (inside_material != kInheritMaterial) interiors = make_interiors(shaded, *graphs, true);
+}
+
+std::vector<Material> SceneMaterials::given() const {
+  std::vector<Material> some = materials;
+  if (inside_material != kInheritMaterial) some.pop_back();
+  return some;
 }
 
 }  // namespace wavecomb

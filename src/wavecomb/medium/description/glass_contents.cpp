@@ -12,7 +12,6 @@
 #include "wavecomb/light/description/kind_info.h"
 #include "wavecomb/light/description/light.h"
 #include "wavecomb/material/description/material.h"
-#include "wavecomb/medium/description/mesh_medium.h"
 #include "wavecomb/medium/description/wide_map.h"
 #include "wavecomb/scene/object_bounds.h"
 
@@ -109,7 +108,7 @@ class Clipped {
   size_t count_ = 0;
 };
 
-/// An instance of an absorbing solid.
+/// An instance of a glass solid.
 struct Glass {
   Bounds bounds;  ///< in world space
   uint32_t mesh;
@@ -181,16 +180,12 @@ class GlassTree {
 
 class Search {
  public:
-  Search(std::span<const Material> materials, std::span<const Mesh> meshes,
-         std::span<const Group> groups, std::span<const Instance> instances,
-         std::span<const MatrixStep> steps)
-      : meshes_(meshes), groups_(groups), instances_(instances), steps_(steps) {
-    for (const Material& m : materials) absorbs_.push_back(absorbs_inside(m));
-    any_ = std::ranges::find(absorbs_, true) != absorbs_.end();
-  }
-
-  bool finds(std::span<const Light> lights) {
-    if (!any_) return false;
+  Search(const Glasses& glasses, const PlacedObjects& objects)
+      : meshes_(objects.meshes),
+        groups_(objects.groups),
+        instances_(objects.instances),
+        steps_(objects.steps),
+        glasses_(glasses) {
     std::vector<Glass> all;
     each_placed([&](uint32_t mesh, const Instance& instance) {
       if (!uses_glass(mesh, instance)) return false;
@@ -200,11 +195,16 @@ class Search {
       return false;
     });
     glass_.emplace(std::move(all));
-    for (const Light& light : lights)
-      if (!info_of(light.kind).has(light_trait::kInfinite) &&
-          is_in_glass(light.to_world.t, 0, nullptr))
-        return true;
+  }
+
+  bool finds_objects() {
     return each_placed([&](uint32_t mesh, const Instance& i) { return is_inside(mesh, i); });
+  }
+  bool finds_lights(std::span<const Light> lights) {
+    return std::ranges::any_of(lights, [&](const Light& light) {
+      return !info_of(light.kind).has(light_trait::kInfinite) &&
+             is_in_glass(light.to_world.t, 0, nullptr);
+    });
   }
 
  private:
@@ -240,7 +240,7 @@ class Search {
     if (m.is_curved()) return false;
     const auto is_glass = [&](uint32_t material) {
       const uint32_t worn = material == kInheritMaterial ? instance.material : material;
-      return worn < absorbs_.size() && absorbs_[worn];
+      return worn < glasses_.size() && glasses_[worn];
     };
     if (m.face_materials.empty()) return is_glass(m.material);
     tests_ += m.face_materials.size();
@@ -309,8 +309,7 @@ class Search {
   std::span<const Instance> instances_;
   std::span<const MatrixStep> steps_;
   const Instance world_;
-  std::vector<bool> absorbs_;
-  bool any_ = false;
+  const Glasses& glasses_;
   std::unordered_map<uint32_t, Shape> shapes_;
   std::optional<GlassTree> glass_;
   size_t tests_ = 0;
@@ -318,12 +317,20 @@ class Search {
 
 }  // namespace
 
-bool absorbing_glass_holds_objects(std::span<const Material> materials,
-                                   std::span<const Mesh> meshes, std::span<const Group> groups,
-                                   std::span<const Instance> instances,
-                                   std::span<const MatrixStep> steps,
-                                   std::span<const Light> lights) {
-  return Search(materials, meshes, groups, instances, steps).finds(lights);
+Glasses glasses_of(std::span<const Material> materials,
+                   const std::function<bool(const Material&)>& test) {
+  Glasses glasses;
+  for (const Material& m : materials) glasses.push_back(test(m));
+  return glasses;
+}
+
+bool glass_holds_objects(const Glasses& glasses, const PlacedObjects& objects) {
+  return std::ranges::count(glasses, true) > 0 && Search(glasses, objects).finds_objects();
+}
+
+bool glass_holds_lights(const Glasses& glasses, const PlacedObjects& objects,
+                        std::span<const Light> lights) {
+  return std::ranges::count(glasses, true) > 0 && Search(glasses, objects).finds_lights(lights);
 }
 
 }  // namespace wavecomb

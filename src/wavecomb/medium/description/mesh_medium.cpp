@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "wavecomb/geometry/mesh/mesh.h"
 #include "wavecomb/graph/graph.h"
 #include "wavecomb/graph/parameters/parameters.h"
 #include "wavecomb/material/description/material.h"
@@ -63,34 +64,60 @@ bool is_clear(const Material& m) {
          !m.needs_presence();
 }
 
-bool is_glass(const Material& m, const GraphSet& graphs) {
-  if (has_trait(m.program, program_trait::kGlass)) return true;
+/// Returns whether a material is a solid that may transmit light somewhere.
+bool may_transmit(const Material& m, const GraphSet& graphs) {
   return is_solid(m) && (m.openpbr.transmission_weight > 0 ||
                          graphs.drives(m.graph, graph_parameter("transmission_weight")));
 }
 
+bool is_glass(const Material& m, const GraphSet& graphs) {
+  return has_trait(m.program, program_trait::kGlass) || may_transmit(m, graphs);
+}
+
+bool drives_extinction(const Material& m, const GraphSet& graphs) {
+  constexpr uint32_t kFirst = graph_parameter("extinction");
+  return graphs.drives(m.graph, kFirst) || graphs.drives(m.graph, kFirst + 1) ||
+         graphs.drives(m.graph, kFirst + 2);
+}
+
 }  // namespace
 
-bool absorbs_inside(const Material& m) {
-  if (!is_solid(m) || !(m.openpbr.transmission_weight > 0) || m.graph != kNoGraph) return false;
+bool absorbs_by_graph(const Material& m, const GraphSet& graphs) {
+  return may_transmit(m, graphs) && drives_extinction(m, graphs);
+}
+
+bool absorbs_inside(const Material& m, const GraphSet& graphs) {
+  if (!may_transmit(m, graphs) || drives_extinction(m, graphs)) return false;
   InteriorMedium<float> medium{};
   set_medium(m.openpbr, medium);
   return is_any(medium.absorption);
 }
 
-bool asks_for_interiors(const Material& m, bool absorbing) {
+bool asks_for_interiors(const Material& m, const GraphSet& graphs, bool absorbing) {
   if (!is_solid(m)) return false;
   InteriorMedium<float> medium{};
   set_medium(m.openpbr, medium);
   if (m.openpbr.transmission_weight > 0 && is_any(medium.scattering)) return true;
-  if (absorbing && absorbs_inside(m)) return true;
+  if (absorbing && absorbs_inside(m, graphs)) return true;
   return m.openpbr.nested_priority != 0 || (is_clear(m) && is_any(medium.absorption));
+}
+
+uint32_t add_inside_material(std::vector<Material>& materials, const GraphSet& graphs,
+                             bool absorbing) {
+  if (std::ranges::none_of(
+          materials, [&](const Material& m) { return asks_for_interiors(m, graphs, absorbing); }))
+    return kInheritMaterial;
+  Material inside;
+  inside.name = "inside of meshes";
+  inside.program = ProgramId::kVolume;
+  materials.push_back(inside);
+  return static_cast<uint32_t>(materials.size() - 1);
 }
 
 std::vector<InteriorMedium<float>> make_interiors(std::span<const Material> materials,
                                                   const GraphSet& graphs, bool absorbing) {
-  if (std::ranges::none_of(materials,
-                           [&](const Material& m) { return asks_for_interiors(m, absorbing); }))
+  if (std::ranges::none_of(
+          materials, [&](const Material& m) { return asks_for_interiors(m, graphs, absorbing); }))
     return {};
   std::vector<InteriorMedium<float>> all(materials.size());
   for (size_t i = 0; i < all.size(); ++i) {

@@ -47,14 +47,23 @@ struct InteriorView {
   }
 };
 
-/// Returns whether a material is a solid that transmits light and absorbs part of it inside.
-bool absorbs_inside(const Material& material);
+/// Returns whether a material is a solid that transmits light, possibly by a value graph, and
+/// absorbs part of it inside with constant coefficients.
+bool absorbs_inside(const Material& material, const GraphSet& graphs);
+/// Returns whether a material is a solid that transmits light and whose absorption comes from a
+/// value graph. The graph is evaluated where a path leaves the glass, so the coefficients of a
+/// segment depend on its direction.
+bool absorbs_by_graph(const Material& material, const GraphSet& graphs);
 /// Returns whether a material needs paths to track a medium stack: it scatters inside, has a
 /// priority, or bounds an absorbing medium without refraction. If `absorbing` is set, absorption
 /// alone is enough. Set it for scenes with volumes, in which a path scattered by a volume inside
 /// the solid has covered part of its length before the collision, and for scenes with objects
 /// inside absorbing glass (medium/description/glass_contents.h).
-bool asks_for_interiors(const Material& material, bool absorbing);
+bool asks_for_interiors(const Material& material, const GraphSet& graphs, bool absorbing);
+/// Appends the material that shades collisions inside meshes, if a material needs a medium stack.
+/// Returns its index, or kInheritMaterial.
+uint32_t add_inside_material(std::vector<Material>& materials, const GraphSet& graphs,
+                             bool absorbing);
 /// Makes the media of all materials; empty if no material needs a medium stack.
 std::vector<InteriorMedium<float>> make_interiors(std::span<const Material> materials,
                                                   const GraphSet& graphs, bool absorbing);
