@@ -106,39 +106,13 @@ class PathTracer {
         if (!walk(key, depth, path, hit, came_out)) return depth;
         cone_at_origin = path.cone_width;
       }
-      if constexpr (Media::kAny) {
-        const Flight<F> flight = fly(key, depth, path, hit);
-        if constexpr (Media::kShines)
-          if (media_.shines())
-            add_glow(clean<F>(
-                path.throughput *
-                    media_.template emission<F>(
-                        {settings_.sampler, key, depth, path.o, path.dir, hit.t, time}, true),
-                clamp_limit(settings_, depth)));
-        path.throughput = path.throughput * flight.weight;
-        note_way(depth, flight, path.throughput);
-        if (flight.stopped) hit = {flight.t, 0.f, 0.f, 0, 0, kNoSurface, flight.material};
-      }
+      if constexpr (Media::kAny) pass_media(key, depth, path, hit);
       path.cone_width = fma(path.cone_spread, hit.t, cone_at_origin);
-      if (hit.inst == kNoHit) {
-        if (!settings_.sees_sky(depth)) return depth;
-        radiance_.sum += environment_emission<F>(scene, settings_, depth, path, true);
-        if (aovs_.wants_lights())
-          aovs_.add_environment<F>(scene, settings_, depth, kSlot, path, true);
+      if (hit.inst == kNoHit || hit.inst == kLightShape) {
+        add_ended(depth, path, hit);
         return depth;
       }
       const Vec3<F> p = fma(path.dir, hit.t, path.o);
-      if (hit.inst == kLightShape) {
-        if (depth == 0 && aovs_.wants_alpha()) aovs_.cover<F>(kSlot, true);
-        if (depth == 0) aovs_.hit_light<F>(*context_.camera, kSlot, p, time, hit.geom, true);
-        if (depth == 0 && aovs_.wants_motion())
-          aovs_.move<F>(
-              kSlot,
-              screen_motion_of_light<F>(scene.lights, *context_.camera, hit.geom, p, time, true),
-              true);
-        add(hit.geom, shape_emission<F>(scene, settings_, depth, hit.geom, hit.t, path, true));
-        return depth;
-      }
       const bool on_surface = hit.inst != kNoSurface;
       if (depth == 0 && on_surface && scene.visibility &&
           held_out<F>(scene, hit.inst, hit.geom, true))
@@ -148,17 +122,7 @@ class PathTracer {
       uint32_t material = on_surface ? rays_.material_of(hit, mesh) : hit.event_material;
       if constexpr (Media::kStreams)
         if (came_out && on_surface) material = media_.exit_material();
-      if (depth == 0 && on_surface)
-        aovs_.hit_surface<F>(*context_.camera, kSlot, p, time,
-                             {.inst = hit.inst, .geom = hit.geom, .material = material}, true);
-      if (depth == 0 && on_surface && aovs_.wants_motion())
-        aovs_.move<F>(
-            kSlot,
-            screen_motion_of_hit<F>(scene, *context_.camera,
-                                    {hit.inst, mesh, hit.prim, hit.u, hit.v, 0.f}, path.dir, true),
-            true);
-      if (depth == 0 && !on_surface)
-        aovs_.hit_volume<F>(*context_.camera, kSlot, p, time, volume_seen(material), true);
+      if (depth == 0) note_first_hit(path.dir, p, hit, mesh, material);
       if (on_surface && settings_.cost_aware && depth >= settings_.roulette_depth) {
         const F q = cost_aware_survival<F>(scene, *context_.roulette_costs, material, path, true);
         aovs_.survive<F>(depth, kSlot, q, true);
@@ -178,28 +142,8 @@ class PathTracer {
       if (context_.knows_inside()) {
         inside_.crossed = v.crossed;
       }
-      add(aovs.emitter, v.emitted);
-      if constexpr (!Media::kAny)
-        if (vertices_ && aovs.wants_events)
-          light_aovs_.offer<F>(kSlot, aovs_.expressions().states<F>(kSlot, true), offer_.note,
-                               true);
-      if (aovs.wants_events && (v.alive || v.has_shadow))
-        aovs_.expressions().scatter<F>(depth, kSlot, key, aovs, v.has_shadow, true);
-      aovs_.vertex<F>(depth, kSlot, aovs, path, true);
-      if (history_)
-        history_.vertex<F>(depth, kSlot,
-                           {.path = path, .t = hit.t, .material = material, .result = v},
-                           radiance(), true);
-      aovs_.end_depth(depth, radiance(), 1);
-      bool is_free = false;
-      if (v.has_shadow) {
-        clock_.enter(Phase::kShadow);
-        const bool links = context_.scene.lights.links.members != nullptr;
-        is_free = !rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth,
-                                  links ? &v.shadow_set : nullptr);
-        if (is_free || max_component(v.shade) > 0.f)
-          add_direct(key, depth, v, is_free, aovs_.group_of<F>(aovs.lit_by, true));
-      }
+      note_vertex(key, depth, {.path = path, .t = hit.t, .material = material, .result = v}, aovs);
+      const bool is_free = v.has_shadow && trace_shadow(key, depth, v, aovs);
       if constexpr (!Media::kAny)
         if (vertices_ && max_component(offer_.row.light) > 0.f) connect(depth);
       if (!probes_.empty() && aovs.light_weight >= 0.f)
@@ -209,6 +153,89 @@ class PathTracer {
       path.importance = importance;
       cone_at_origin = v.next.cone_width;
     }
+  }
+
+  /// Adds the emission of volumes along the ray of a path, and samples its free flight to `hit`,
+  /// which becomes the volume event if one stops it.
+  void pass_media(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit) {
+    const Flight<F> flight = fly(key, depth, path, hit);
+    if constexpr (Media::kShines)
+      if (media_.shines())
+        add_glow(clean<F>(
+            path.throughput * media_.template emission<F>(passage_of(key, depth, path, hit), true),
+            clamp_limit(settings_, depth)));
+    path.throughput = path.throughput * flight.weight;
+    note_way(depth, flight, path.throughput);
+    if (flight.stopped) hit = {flight.t, 0.f, 0.f, 0, 0, kNoSurface, flight.material};
+  }
+
+  /// Adds the light of a path that leaves the scene or hits the shape of a light.
+  void add_ended(uint32_t depth, const PathState<F>& path, const SingleHit& hit) {
+    const SceneView& scene = context_.scene;
+    const CameraSetup& camera = *context_.camera;
+    if (hit.inst == kNoHit) {
+      if (!settings_.sees_sky(depth)) return;
+      radiance_.sum += environment_emission<F>(scene, settings_, depth, path, true);
+      if (aovs_.wants_lights())
+        aovs_.add_environment<F>(scene, settings_, depth, kSlot, path, true);
+      return;
+    }
+    if (depth == 0) {
+      const Vec3<F> p = fma(path.dir, hit.t, path.o);
+      const F time = rays_.time();
+      if (aovs_.wants_alpha()) aovs_.cover<F>(kSlot, true);
+      aovs_.hit_light<F>(camera, kSlot, p, time, hit.geom, true);
+      if (aovs_.wants_motion())
+        aovs_.move<F>(
+            kSlot, screen_motion_of_light<F>(scene.lights, camera, hit.geom, p, time, true), true);
+    }
+    add(hit.geom, shape_emission<F>(scene, settings_, depth, hit.geom, hit.t, path, true));
+  }
+
+  /// Records for AOVs a camera ray along `dir` that hits a surface, or a volume event, at `p`.
+  void note_first_hit(const Vec3<F>& dir, const Vec3<F>& p, const SingleHit& hit, uint32_t mesh,
+                      uint32_t material) {
+    const CameraSetup& camera = *context_.camera;
+    const F time = rays_.time();
+    if (hit.inst == kNoSurface) {
+      aovs_.hit_volume<F>(camera, kSlot, p, time, volume_seen(material), true);
+      return;
+    }
+    aovs_.hit_surface<F>(camera, kSlot, p, time,
+                         {.inst = hit.inst, .geom = hit.geom, .material = material}, true);
+    if (aovs_.wants_motion())
+      aovs_.move<F>(
+          kSlot,
+          screen_motion_of_hit<F>(context_.scene, camera,
+                                  {hit.inst, mesh, hit.prim, hit.u, hit.v, 0.f}, dir, true),
+          true);
+  }
+
+  /// Adds the emission of a shaded vertex, and records the vertex.
+  void note_vertex(const SampleKey<F>& key, uint32_t depth, const ShadedVertex<F>& at,
+                   const VertexAovs<F>& aovs) {
+    const VertexResult<F>& v = at.result;
+    add(aovs.emitter, v.emitted);
+    if constexpr (!Media::kAny)
+      if (vertices_ && aovs.wants_events)
+        light_aovs_.offer<F>(kSlot, aovs_.expressions().states<F>(kSlot, true), offer_.note, true);
+    if (aovs.wants_events && (v.alive || v.has_shadow))
+      aovs_.expressions().scatter<F>(depth, kSlot, key, aovs, v.has_shadow, true);
+    aovs_.vertex<F>(depth, kSlot, aovs, at.path, true);
+    if (history_) history_.vertex<F>(depth, kSlot, at, radiance(), true);
+    aovs_.end_depth(depth, radiance(), 1);
+  }
+
+  /// Traces the shadow ray of a vertex, and adds its light sample. Returns whether the ray is free.
+  bool trace_shadow(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v,
+                    const VertexAovs<F>& aovs) {
+    clock_.enter(Phase::kShadow);
+    const bool links = context_.scene.lights.links.members != nullptr;
+    const bool is_free = !rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth,
+                                         links ? &v.shadow_set : nullptr);
+    if (is_free || max_component(v.shade) > 0.f)
+      add_direct(key, depth, v, is_free, aovs_.group_of<F>(aovs.lit_by, true));
+    return is_free;
   }
 
   /// Continues a ray that has entered a subsurface body as a random walk. A ray that hits no
