@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of materials and programs, from the core's tables (material/description/material_table.h).
+"""Parameters of materials and programs, from the core's tables.
+
+The tables are in material/description/material_table.h.
 
 They determine the keywords of ``SceneBuilder.add_material`` and its stub, the calls that a
 sandboxed process may make, and the material attributes that the loader reads.

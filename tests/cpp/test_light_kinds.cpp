@@ -48,6 +48,32 @@ double cylinder_irradiance(double length, double radius, const Vec3<float>& from
   return 3 * sum * length * radius * 2 * kPiD / kN / kN;
 }
 
+/// A kind that lacks members does not compile (light/kinds/kinds.h).
+struct KindWithoutEmission : FlatKind {
+  static LightKindInfo describe();
+  template <typename F>
+  static detail::KindSample<F> sample(const detail::LightQuery<F>& q);
+  template <typename F>
+  static detail::KindHit<F> hit(const detail::LightMeeting<F>& m);
+};
+struct KindWithEmission : KindWithoutEmission {
+  template <typename F>
+  static detail::KindEmission<F> emit(const detail::EmissionQuery<F>& q);
+  template <typename F>
+  static F emission_density(const detail::LightMeeting<F>& m);
+};
+static_assert(!LightKindClass<KindWithoutEmission> && LightKindClass<KindWithEmission>);
+
+TEST(LightKinds, VisitCallsTheClassOfTheKind) {
+  const auto is_infinite = [](LightKind kind) {
+    return visit(kind, []<typename Kind>(Kind) { return Kind::kIsInfinite; });
+  };
+  for (uint32_t k = 0; k < kLightKindCount; ++k) {
+    const auto kind = static_cast<LightKind>(k);
+    EXPECT_EQ(is_infinite(kind), info_of(kind).has(light_trait::kInfinite)) << k;
+  }
+}
+
 TEST(Cylinder, IrradianceIsTheSumOverItsSurface) {
   struct Case {
     float length, radius;

@@ -77,13 +77,20 @@ def test_a_program_is_in_its_own_units_alone(units_of: dict[str, set[str]], prog
     assert set(listed) == {path.stem for path in HEADERS.glob("*.h")}
     members = {"programs": [program], "variants": [program]}
     members["variants"] += [name for name, of in rows if of == program]
-    expected = {
-        f"{kind}_{member}_{width}.cpp.o"
+    kernels = {
+        f"{kind}_{member}_{width}.cpp"
         for kind, among, word, _ in kernel_rows()
         for member in members[among]
         for width in of_word[word]
     }
-    assert units_of[program] == expected
+    unity = sorted(BUILD.glob(f"CMakeFiles/wavecomb_core_*.dir/Unity/unity_{program}_cxx.cxx"))
+    if not unity:  # WAVECOMB_BATCH=OFF
+        assert units_of[program] == {f"{kernel}.o" for kernel in kernels}
+        return
+    # One unit of packets and one of scalar lanes, both of this program's kernels only.
+    assert units_of[program] == {f"unity_{program}_cxx.cxx.o"} and len(unity) == 2
+    included = re.findall(r'^#include ".*/lanes/(.*)"', "".join(map(Path.read_text, unity)), re.M)
+    assert sorted(included) == sorted(kernels)
 
 
 BODIES = ("guiding/lookup.inl", "graph/run.inl", "material/inputs/graph_inputs.inl",

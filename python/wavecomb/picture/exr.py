@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from wavecomb.errors import WavecombError
 from wavecomb.picture.cryptomatte import is_crypto
 from wavecomb.picture.files import is_whole_png, one_line, replacing, why_not_written
+from wavecomb.run import aovs
 
 Compression = Literal["none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"]
 COMPRESSIONS: tuple[str, ...] = get_args(Compression)
@@ -28,46 +29,10 @@ Window = tuple[int, int, int, int]
 """Column and row of the first pixel in the whole image, and the width and height of that image."""
 
 _HALF_MAX = 65504.0
-_SUFFIXES = {
-    "beauty": "RGB",
-    "albedo": "RGB",
-    "normal": "XYZ",
-    "depth": "Z",
-    "position": "XYZ",
-    "uv": "UV",
-    "variance": "RGB",
-    "guide_albedo": "RGB",
-    "guide_normal": "XYZ",
-    "depth_nearest": "Z",
-    "transmittance": "RGB",
-    "half_depth": "Z",
-    "motion": "UV",
-}
-_COLOURS = (
-    "beauty",
-    "albedo",
-    "normal",
-    "emission",
-    "direct",
-    "indirect",
-    "denoised",
-    "guide_albedo",
-    "guide_normal",
-    "unbiased",
-    "transmittance",
-    "by_bounces",
-    "by_light_samples",
-    "by_light_paths",
-)
-"""Layers that can be stored as half floats, besides those of light groups and expressions."""
-_EXACT = ("position", "material_id", "instance_id", "motion", "depth_nearest", "distance")
 ALPHA = "A"
 """Name of the alpha channel of R, G and B."""
 BAND = 64
 """Rows that are converted and written together: four blocks of an EXR file."""
-
-LAYER_ORDER = tuple(_SUFFIXES)
-"""Layers with special channel letters, in the order of a file."""
 
 
 def channel_names(layer: str, channels: int) -> list[str]:
@@ -79,7 +44,7 @@ def channel_names(layer: str, channels: int) -> list[str]:
     ['samples']
     """
     prefix = "" if layer == "beauty" else f"{layer}."
-    letters = _SUFFIXES.get(layer, "")
+    letters = aovs.letters(layer)
     if len(letters) == channels:
         return [prefix + letter for letter in letters]
     if channels == 1:
@@ -95,7 +60,7 @@ def is_exact(layer: str) -> bool:
     It would change ids. Positions far from 0 exceed its range, since dwaa treats every channel
     named Y as luminance.
     """
-    return is_crypto(layer) or layer in _EXACT
+    return is_crypto(layer) or aovs.content(layer) in ("exact", "id")
 
 
 def write_exr(
@@ -195,7 +160,7 @@ class Sheet:
 
 
 def _may_be_half(layer: str) -> bool:
-    return layer in _COLOURS or layer.startswith(("light_", "lpe_"))
+    return aovs.content(layer) in ("light", "colour", "direction")
 
 
 def check_options(name: str, layers: Any, compression: str, tile: int) -> None:

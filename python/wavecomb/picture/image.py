@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.machine import memory_bytes
-from wavecomb.picture.exr import LAYER_ORDER, bands_of, channel_names, write_bands, write_exr
+from wavecomb.picture.exr import bands_of, channel_names, write_bands, write_exr
 from wavecomb.picture.files import check_name, check_regular, one_line, problem_of
+from wavecomb.run import aovs
 
 __all__ = [
     "channel_names",
@@ -199,7 +200,7 @@ def read_layers(path: str | os.PathLike[str]) -> dict[str, Array]:
     order = {letter: k for k, letter in enumerate(["R", "G", "B", "A"])}
     for ids in groups.values():
         ids.sort(key=lambda k: order.get(names[k].rpartition(".")[2], len(order)))
-    known = list(LAYER_ORDER)
+    known = aovs.layer_order()
     names_in_order = sorted(groups, key=lambda name: known.index(name) if name in known else 99)
     return {name: np.ascontiguousarray(pixels[:, :, groups[name]]) for name in names_in_order}
 

@@ -14,18 +14,11 @@ from numpy.typing import NDArray
 from wavecomb.picture import image
 from wavecomb.picture.colour_maps import colour_map
 from wavecomb.picture.working_space import LUMINANCE
+from wavecomb.run import aovs
 
 Develop = Callable[[NDArray[Any]], NDArray[np.uint8]]
 """Converts linear Rec.709 (height, width, 3) to 8-bit codes."""
 
-RADIANCE = (
-    *("beauty", "denoised", "unbiased", "emission", "direct", "indirect"),
-    *("by_bounces", "by_light_samples", "by_light_paths"),
-)
-"""Layers that are displayed with exposure and tone mapping, besides light groups."""
-_COLOURS = ("albedo", "guide_albedo", "transmittance")
-_NORMALS = ("normal", "guide_normal")
-_IDS = ("material_id", "instance_id")
 _CRYPTO = ("crypto_", "Crypto")
 _UNITS = {
     "cost": "cost, ns per pixel",
@@ -86,7 +79,7 @@ class Shown:
 
 def is_light(layer: str) -> bool:
     """Returns whether a layer holds radiance, so that exposure and tone mapping apply."""
-    return layer in RADIANCE or layer.startswith(("light_", "lpe_"))
+    return aovs.content(layer) == "light"
 
 
 def show_layer(
@@ -109,14 +102,15 @@ def show_layer(
     array = np.asarray(layer)
     if is_light(name):
         return Shown(develop(array))
-    if name in _COLOURS:
+    content = aovs.content(name)
+    if content == "colour":
         return Shown(image.display(array))
-    if name in _NORMALS:
+    if content == "direction":
         return Shown(_codes(0.5 * array + 0.5))
-    if name in _IDS:
-        return Shown(id_colours(array.reshape(array.shape[:2])))
     if name.startswith(_CRYPTO):
         return Shown(id_colours(np.ascontiguousarray(array[:, :, 0], np.float32).view(np.uint32)))
+    if content == "id":
+        return Shown(id_colours(array.reshape(array.shape[:2])))
     if name == "uv":
         wide = np.zeros((*array.shape[:2], 3), np.float32)
         wide[:, :, :2] = array - np.floor(array)

@@ -31,6 +31,9 @@ class Aov:
     Attributes:
         name: Name for ``--aov`` and of the layer.
         channels: Number of channels of its layer; 0 if it has no numeric layer or several layers.
+        letters: Names of its channels in files, such as "XYZ"; "" for numbers or a single channel.
+        content: Meaning of its numbers: "light", "colour", "direction", "id", "exact" (data that
+            lossy compression would make useless) or "value".
         kind: How samples are combined per pixel: "mean", "mean_of_hits", "nearest", "coverage",
             "groups", "sum" or "median".
         title: Title in the window; "" if the window does not offer the layer.
@@ -38,6 +41,8 @@ class Aov:
 
     name: str
     channels: int
+    letters: str
+    content: str
     kind: str
     title: str
 
@@ -52,6 +57,48 @@ def core_aovs() -> Mapping[str, Aov]:
     from wavecomb import _core
 
     return rows_by_name(Aov, _core.aov_table())
+
+
+_OTHERS = {
+    "beauty": ("RGB", "light"),
+    "denoised": ("RGB", "light"),
+    "unbiased": ("RGB", "light"),
+    "variance": ("RGB", "value"),
+}
+"""Letters and content of layers that are no AOVs."""
+
+
+def letters(layer: str) -> str:
+    """Returns names of a layer's channels in files; "" for numbers or a single channel.
+
+    >>> letters("normal")
+    'XYZ'
+    """
+    if layer in _OTHERS:
+        return _OTHERS[layer][0]
+    row = core_aovs().get(layer)
+    return row.letters if row else ""
+
+
+def content(layer: str) -> str:
+    """Returns the meaning of a layer's numbers (Aov.content); "value" for unknown layers.
+
+    >>> content("by_bounces"), content("position")
+    ('light', 'exact')
+    """
+    if layer in _OTHERS:
+        return _OTHERS[layer][1]
+    row = core_aovs().get(layer)
+    if row:
+        return row.content
+    return "light" if layer.startswith((LIGHT, "lpe_")) else "value"
+
+
+@cache
+def layer_order() -> tuple[str, ...]:
+    """Returns layers with named channels, in the order of a file."""
+    named = tuple(name for name, row in core_aovs().items() if row.letters)
+    return ("beauty", *named, "variance")
 
 
 @cache

@@ -145,9 +145,9 @@ template <typename F>
       any_light[&LightRecord::kind], others, [&](LightKind kind, const Mask<F>& lanes) {
         const detail::LightReader<F> reader(view.lights, light, lanes);
         const F one = visit(kind, [&]<typename Kind>(Kind) {
-          const F density = Kind::template emission_density<F>({view, reader, from, dir, t, lanes});
-          if (!view.aim) return density;
-          return F(density * detail::aim_of_kind<Kind, F>(view, reader, from, dir, t));
+          const F even = Kind::template emission_density<F>({view, reader, from, dir, t, lanes});
+          if (!view.aim) return even;
+          return F(even * detail::aim_of_kind<Kind, F>(view, reader, from, dir, t));
         });
         put(one, reader.pick_pdf(), lanes);
       });
