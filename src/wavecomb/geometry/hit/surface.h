@@ -91,9 +91,10 @@ WAVECOMB_INLINE void set_smooth_normal(const SceneView& scene, const MeshHit<F>&
 
 /// Sets uv, dpdu, uv_per_length and handedness.
 template <typename F>
-WAVECOMB_INLINE void set_uv(const SceneView& scene, const MeshHit<F>& hit,
-                            const MeshReader<F>& mesh, const InstanceMaps<F>& maps,
-                            const TrianglePoint<F>& at, const Mask<F>& active, Surface<F>& s) {
+WAVECOMB_INLINE void set_triangle_uv(const SceneView& scene, const MeshHit<F>& hit,
+                                     const MeshReader<F>& mesh, const InstanceMaps<F>& maps,
+                                     const TrianglePoint<F>& at, const Mask<F>& active,
+                                     Surface<F>& s) {
   const UvTriangle<F> t = uv_triangle<F>(mesh, {at.i[0], at.i[1], at.i[2]}, hit.prim, active);
   const Vec2<F>&d1 = t.d1, &d2 = t.d2;
   s.uv = t.at(at.b1, at.b2);
@@ -184,7 +185,7 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   s.dpdu = Vec3<F>(F(0.f));
   s.handedness = maps.side;
   s.uv_per_length = F(0.f);
-  if (with_uv) detail::set_uv<F>(scene, hit, mesh, maps, at, active, s);
+  if (with_uv) detail::set_triangle_uv<F>(scene, hit, mesh, maps, at, active, s);
   if (kWithCurves && scene.has_curves) {
     const Mask<F> curved = lanes & not_(active);
     if (any(curved)) detail::setup_curved<F>(scene, hit, dir, with_uv, curved, s);
