@@ -183,7 +183,7 @@ def save(found: Comparison, folder: Path) -> None:
     """Write both images as EXR files, and side by side with z as a PNG."""
     from agreement import picture_of
 
-    from wavecomb.picture.exr import write_exr
+    from wavecomb.image.files.exr import write_exr
 
     for name, batches in (("ours", found.ours), ("naive", found.naive)):
         layers = {"beauty": batches.mean(axis=0).astype(np.float32)}
