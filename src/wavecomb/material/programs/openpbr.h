@@ -6,6 +6,7 @@
 #include "wavecomb/material/lobes/eon.h"
 #include "wavecomb/material/lobes/fuzz.h"
 #include "wavecomb/material/lobes/lambert.h"
+#include "wavecomb/material/lobes/lobe_choice.h"
 #include "wavecomb/material/lobes/microfacet_reflection.h"
 #include "wavecomb/material/lobes/openpbr_base.h"
 #include "wavecomb/material/lobes/openpbr_coat.h"
@@ -184,24 +185,14 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   }
 
   BsdfSample<F> sample(const View& view, const F& u_lobe, const F& u, const F& v) const {
-    // Choose a lobe; `left` is the remainder of the sample value, rescaled to [0, 1).
-    F from = F(0.f), left = F(0.f);
-    Mask<F> open = Mask<F>(true);
-    const auto choose = [&](const F& p) {
-      const F to = from + p;
-      const Mask<F> here = open & (u_lobe < to) & (p > 0.f);
-      left = select(here, F(F(u_lobe - from) / max(p, F(1e-20f))), left);
-      open = open & not_(here);
-      from = to;
-      return here;
-    };
-    const Mask<F> is_diffuse = choose(view.p_diffuse);
+    LobeChoice<F> choice{u_lobe};
+    const Mask<F> is_diffuse = choice.next(view.p_diffuse);
     Mask<F> is_back(false), is_fuzz(false), is_coat(false);
-    if constexpr (kBack) is_back = choose(view.p_back);
-    if constexpr (kFuzz) is_fuzz = choose(view.p_fuzz);
-    if constexpr (kCoat) is_coat = choose(view.p_coat);
-    const Mask<F> is_base = choose(view.p_base) | (open & (view.p_base > 0.f));
-    left = clamp(left, F(0.f), F(kOneMinusEpsilon));
+    if constexpr (kBack) is_back = choice.next(view.p_back);
+    if constexpr (kFuzz) is_fuzz = choice.next(view.p_fuzz);
+    if constexpr (kCoat) is_coat = choice.next(view.p_coat);
+    const Mask<F> is_base = choice.next(view.p_base) | (choice.open & (view.p_base > 0.f));
+    const F left = clamp(choice.left, F(0.f), F(kOneMinusEpsilon));
 
     const Vec3<F>& o = view.o;
     Vec3<F> wi(F(0.f), F(0.f), F(1.f));
@@ -237,28 +228,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     BsdfSample<F> s = empty_sample<F>();
     s.weight = select<F>(valid, e.f_cos * F(1.f / select(valid, e.pdf, F(1.f))), s.weight);
     s.pdf = select(valid, e.pdf, F(0.f));
-    if (any(delta)) {
-      const auto facet = base_.facet(view.base, o.z);
-      const F p_up = facet.reflect_share();
-      const F p_way = select(refracted, F(1.f - p_up), p_up);
-      const Color<F> base =
-          select<F>(refracted, facet.transmit * base_.radiance_scale(view.base), facet.reflect) *
-          below(view, wi);
-      F p_lobe = view.p_base * p_way;
-      Color<F> f = base;
-      if constexpr (kCoat) {
-        p_lobe = select(delta_coat, view.p_coat, p_lobe);
-        f = select<F>(delta_coat, Color<F>(F(view.under_fuzz * coat_reflectance(view, o.z))), base);
-      }
-      const F p = max(p_lobe, F(1e-20f));
-      s.weight = select<F>(delta, f * F(1.f / p), s.weight);
-      s.pdf = select(delta, p, s.pdf);
-      s.is_delta = delta;
-      // A sample that carries no light is invalid, for example after almost complete absorption.
-      const Mask<F> nothing = delta & is_black(s.weight);
-      s.pdf = select(nothing, F(0.f), s.pdf);
-      s.is_delta = s.is_delta & not_(nothing);
-    }
+    if (any(delta)) weigh_deltas(view, wi, delta, delta_coat, refracted, s);
     const Mask<F> good = s.pdf > 0.f;
     s.wi = select<F>(good, from_view(view, wi), Vec3<F>(F(0.f), F(0.f), F(1.f)));
     if constexpr (Base::kGlass) {
@@ -272,6 +242,34 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   }
 
  private:
+  /// Sets weight and pdf of the samples `delta` along `wi`, which are in the smooth lobes of coat
+  /// (`delta_coat`) or base.
+  WAVECOMB_INLINE void weigh_deltas(const View& view, const Vec3<F>& wi, const Mask<F>& delta,
+                                    const Mask<F>& delta_coat, const Mask<F>& refracted,
+                                    BsdfSample<F>& s) const {
+    const F& z = view.o.z;
+    const auto facet = base_.facet(view.base, z);
+    const F p_up = facet.reflect_share();
+    const F p_way = select(refracted, F(1.f - p_up), p_up);
+    const Color<F> base =
+        select<F>(refracted, facet.transmit * base_.radiance_scale(view.base), facet.reflect) *
+        below(view, wi);
+    F p_lobe = view.p_base * p_way;
+    Color<F> f = base;
+    if constexpr (kCoat) {
+      p_lobe = select(delta_coat, view.p_coat, p_lobe);
+      f = select<F>(delta_coat, Color<F>(F(view.under_fuzz * coat_reflectance(view, z))), base);
+    }
+    const F p = max(p_lobe, F(1e-20f));
+    s.weight = select<F>(delta, f * F(1.f / p), s.weight);
+    s.pdf = select(delta, p, s.pdf);
+    s.is_delta = delta;
+    // A sample that carries no light is invalid, for example after almost complete absorption.
+    const Mask<F> nothing = delta & is_black(s.weight);
+    s.pdf = select(nothing, F(0.f), s.pdf);
+    s.is_delta = s.is_delta & not_(nothing);
+  }
+
   bool has_coat() const {
     if constexpr (kCoat) return any(Mask<F>(coat_.weight > 0.f));
     return false;
