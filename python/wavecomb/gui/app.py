@@ -38,7 +38,7 @@ def _qt_says(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
             line = NO_DISPLAY
         elif "platform plugin" in line or "display" in line:
             missing = missing_libraries()
-            why = libraries_message(missing) if missing else line
+            why = libraries_message(missing) if missing else f"{line} (try `wavecomb doctor`)"
             line = f"no window can be opened: {why}"
         sys.stderr.write(f"error: {line}\n")
         sys.stderr.flush()
