@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from sitting import RESULTS, ROOT, log, ratio, show, stage_file, summary, write_result
 
 import wavecomb
-from wavecomb.picture.compare import TRIMMED_SHARE, luminance
+from wavecomb.image.compare.comparison import TRIMMED_SHARE, luminance
 
 STAGES = ("caustics", "pool", "lens", "prism", "landscape", "mixed", "dragon")
 WAYS: dict[str, dict[str, Any]] = {

@@ -57,7 +57,7 @@ def small_tasks(stage: Path, workers: int, count: int) -> dict[str, float]:
     have opened the stage before the clock starts. Both write the same files.
     """
     from wavecomb import farm
-    from wavecomb.farm import assemble, client
+    from wavecomb.farm import assembly, client
     from wavecomb.farm.machine_class import machine_class
     from wavecomb.farm.rendering import Renderer
 
@@ -77,12 +77,12 @@ def small_tasks(stage: Path, workers: int, count: int) -> dict[str, float]:
         found["rendering_ms"] = 1e3 * (time.perf_counter() - start) / (len(tasks) - workers)
         started: list[tuple[float, int]] = []
 
-        def show(at: assemble.Outcome) -> None:
+        def show(at: assembly.Outcome) -> None:
             done = at.tasks_done
             if (done >= workers and not started) or (done == len(tasks) and len(started) == 1):
                 started.append((time.perf_counter(), done))
 
-        where = client.Where("local", workers)
+        where = client.ClusterSpec("local", workers)
         client.run(jobs[1], where, threads=1, show=show)
         (begin, first), (end, last) = started
         found["wall_ms"] = 1e3 * (end - begin) / (last - first)
@@ -109,7 +109,7 @@ def moving(stage: Path, place: Path, frames: int) -> Path:
 
 def differing(place: Path, frames: int) -> int:
     """Number of frames whose two images differ in any layer."""
-    from wavecomb.picture.image import read_layers
+    from wavecomb.image.files.image import read_layers
 
     found = 0
     for frame in range(1, frames + 1):

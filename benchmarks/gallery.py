@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from wavecomb.picture.files import replacing
+from wavecomb.image.files.output_file import replacing
 from wavecomb.version import version
 
 ASSETS = Path(__file__).resolve().parents[2] / "shared" / "assets" / "usd"

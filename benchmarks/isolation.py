@@ -21,7 +21,7 @@ import tempfile
 import time
 from pathlib import Path
 
-NOTHING = "import sys; from wavecomb.run.isolate import supervisor; "
+NOTHING = "import sys; from wavecomb.run.isolation import supervisor; "
 WAYS = {
     "nothing": lambda stage, how: [
         "-c",

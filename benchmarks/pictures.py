@@ -10,7 +10,7 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from wavecomb.picture.files import replacing
+from wavecomb.image.files.output_file import replacing
 
 Pixels = NDArray[np.float32]
 

@@ -33,9 +33,9 @@ from reference_scenes.stage import Inexpressible
 from reference_scenes.why import LISTED, WHY
 
 import wavecomb
-from wavecomb.picture.compare import compare
-from wavecomb.picture.files import replacing
-from wavecomb.picture.working_space import to_rec709
+from wavecomb.image.compare.comparison import compare
+from wavecomb.image.files.output_file import replacing
+from wavecomb.image.working_space import to_rec709
 
 ASSETS = Path(__file__).resolve().parents[2] / "shared" / "assets"
 EDGE = 128

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import wavecomb
-from wavecomb.picture.files import replacing
+from wavecomb.image.files.output_file import replacing
 
 GLASS = {"transmission_weight": 1.0, "specular_roughness": 0.0}
 GOLD = {"base_metalness": 1.0, "base_color": (0.94, 0.78, 0.34), "specular_roughness": 0.3}

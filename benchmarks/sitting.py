@@ -19,7 +19,7 @@ import numpy as np
 from scipy import stats
 
 import wavecomb
-from wavecomb.picture.files import replacing
+from wavecomb.image.files.output_file import replacing
 from wavecomb.run.stats import SORTING, machine
 from wavecomb.scenes import write_scene
 

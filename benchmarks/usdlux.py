@@ -34,7 +34,7 @@ from pictures import read, shrunk, white_of, write_row
 from usdlux_judge import Verdict, judge
 
 import wavecomb
-from wavecomb.picture.files import replacing
+from wavecomb.image.files.output_file import replacing
 
 ASSETS = Path(__file__).resolve().parents[2] / "shared" / "assets"
 CAMERAS = {"iesTest": ("/cameras/iesTop", "/cameras/iesBottom")}

@@ -32,7 +32,7 @@ sys.path.insert(0, str(ROOT / "benchmarks"))
 from pictures import white_of, write_row
 from sitting import ratio, show, summary, write_result
 
-from wavecomb.picture.compare import trimmed_mean
+from wavecomb.image.compare.comparison import trimmed_mean
 
 STAGES = ("caustics", "lens", "pool", "prism", "landscape")
 COLUMNS: dict[str, tuple[str, dict[str, Any]]] = {
@@ -176,7 +176,7 @@ def samples(process: Process, args: argparse.Namespace) -> int:
 def reference(job: Job, args: argparse.Namespace) -> tuple[Image, NDArray[np.bool_]]:
     """A converged image, and a mask of pixels whose light comes mostly from light paths."""
     import wavecomb
-    from wavecomb.picture.compare import luminance
+    from wavecomb.image.compare.comparison import luminance
 
     made = wavecomb.render(
         wavecomb.load(job.stage).scene, size=(args.size, args.size),

@@ -114,7 +114,7 @@ def differ(ours: Any, theirs: Any) -> dict[str, Any]:
 
 def show(path: Path, names: list[str], found: Noise) -> None:
     """Write a PNG: above, each renderer's image at equal samples; below, its converged image."""
-    from wavecomb.picture.image import write_png
+    from wavecomb.image.files.image import write_png
 
     rows = [np.concatenate([f(n) for n in names], axis=1) for f in (found.noisy, found.converged)]
     write_png(path, np.concatenate(rows).astype(np.float32))

@@ -17,12 +17,14 @@ from wavecomb import isa
 isa.install()
 
 if TYPE_CHECKING:
+    from wavecomb import scenes
     from wavecomb._core import Scene, SceneBuilder, Settings
     from wavecomb.api import load, render
-    from wavecomb.errors import WavecombError
-    from wavecomb.picture import cryptomatte
-    from wavecomb.picture.compare import Comparison, compare
-    from wavecomb.picture.rendered import Picture
+    from wavecomb.errors import Error, WavecombError
+    from wavecomb.image import cryptomatte
+    from wavecomb.image.compare.comparison import Comparison, compare
+    from wavecomb.image.rendered import Picture
+    from wavecomb.renderer import Renderer
     from wavecomb.run.sequence import render_frames
     from wavecomb.scheduling import SchedulingPolicy
     from wavecomb.window import Window, view
@@ -31,7 +33,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Comparison",
+    "Error",
     "Picture",
+    "Renderer",
     "Scene",
     "SceneBuilder",
     "SchedulingPolicy",
@@ -44,19 +48,22 @@ __all__ = [
     "load",
     "render",
     "render_frames",
+    "scenes",
     "view",
 ]
 
 _HOMES = {
-    "Comparison": "wavecomb.picture.compare",
-    "Picture": "wavecomb.picture.rendered",
+    "Comparison": "wavecomb.image.compare.comparison",
+    "Error": "wavecomb.errors",
+    "Picture": "wavecomb.image.rendered",
+    "Renderer": "wavecomb.renderer",
     "Scene": "wavecomb._core",
     "SceneBuilder": "wavecomb._core",
     "SchedulingPolicy": "wavecomb.scheduling",
     "Settings": "wavecomb._core",
     "WavecombError": "wavecomb.errors",
     "Window": "wavecomb.window",
-    "compare": "wavecomb.picture.compare",
+    "compare": "wavecomb.image.compare.comparison",
     "load": "wavecomb.api",
     "render": "wavecomb.api",
     "render_frames": "wavecomb.run.sequence",
@@ -70,7 +77,12 @@ def __getattr__(name: str) -> Any:
 
         value: Any = version()
     elif name == "cryptomatte":
-        from wavecomb.picture import cryptomatte as value
+        from wavecomb.image import cryptomatte as value
+    elif name == "scenes":
+        # A from-import would call this function again.
+        from importlib import import_module
+
+        value = import_module("wavecomb.scenes")
     elif name in _HOMES:
         from importlib import import_module
 

@@ -7,20 +7,25 @@ import os
 import signal
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
+from wavecomb.arguments import check_arguments, check_source
 from wavecomb.errors import WavecombError
+from wavecomb.image.rendered import Picture, picture_of
 from wavecomb.load_options import LoadOptions, split
-from wavecomb.picture.rendered import Picture, picture_of
 from wavecomb.run import aovs as aov_names
-from wavecomb.run import catchers, live
-from wavecomb.run.learned import check_taught, learned_of
+from wavecomb.run import catchers, live_view
+from wavecomb.run.callbacks import CheckpointSink, Sink, Watcher
+from wavecomb.run.guiding_file import check_trains_field, learned_of
 from wavecomb.run.settings import DEFAULT_SIZE, check_memory, check_options, prepare
-from wavecomb.run.watcher import CheckpointSink, Sink, Watcher
 
 if TYPE_CHECKING:
+    from pxr import Usd
+    from typing_extensions import Unpack
+
     from wavecomb._core import Result, Scene, Settings
-    from wavecomb.run.live import Shown
+    from wavecomb.keywords import LoadKeywords, RenderKeywords
+    from wavecomb.run.live_view import ProgressDisplays
     from wavecomb.scheduling import SchedulingPolicy
     from wavecomb.usd import LoadedStage
 
@@ -28,19 +33,20 @@ Progress = Callable[[int, int], "bool | None"]
 
 
 def load(
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | Usd.Stage,
     options: LoadOptions | None = None,
     *,
     progress: Callable[[int, int], None] | None = None,
     isolate: bool | None = None,
     load_limit: float | None = None,
     memory_limit: float | None = None,
-    **changes: Any,
+    **changes: Unpack[LoadKeywords],
 ) -> LoadedStage:
     """Reads a USD stage.
 
     Args:
-        path: .usd, .usda, .usdc or .usdz.
+        path: .usd, .usda, .usdc or .usdz; or a ``Usd.Stage``, also one in memory or with unsaved
+            edits. Of that, only the session layer changes, if ``variants`` are given.
         options: Load options.
         progress: Called as progress(prims read, prims found so far) at intervals.
         isolate: Deprecated and without effect: a stage is read in the calling process.
@@ -59,13 +65,15 @@ def load(
     Raises:
         WavecombError: The stage cannot be rendered; the one-line message names the file or prim.
     """
+    check_source(path)
     chosen = LoadOptions.of(options, changes)
     chosen.check()
     warn_deprecated(isolate=isolate, load_limit=load_limit, memory_limit=memory_limit)
     import_usd()
     from wavecomb.usd import load_stage
 
-    return load_stage(Path(path), chosen, progress=progress)
+    source = Path(path) if isinstance(path, (str, os.PathLike)) else path
+    return load_stage(source, chosen, progress=progress)
 
 
 def warn_deprecated(**given: object) -> None:
@@ -96,7 +104,7 @@ def import_usd() -> None:
 
 
 def render(
-    source: str | os.PathLike[str] | LoadedStage | Scene,
+    source: str | os.PathLike[str] | Usd.Stage | LoadedStage | Scene,
     *,
     size: tuple[int, int] | None = None,
     spp: int = 64,
@@ -109,12 +117,12 @@ def render(
     resume: str | os.PathLike[str] | None = None,
     learn_from: str | os.PathLike[str] | bytes | Picture | None = None,
     isolate: bool | None = None,
-    **options: Any,
+    **options: Unpack[RenderKeywords],
 ) -> Picture:
-    """Renders a stage file, a loaded stage or a scene of ``SceneBuilder``.
+    """Renders a stage, from a file or open, or a scene of ``SceneBuilder``.
 
     Args:
-        source: A path, a result of ``load``, or a ``Scene``.
+        source: A path, a ``Usd.Stage``, a result of ``load``, or a ``Scene``.
         size: Width and height in pixels; by default those of a path's render settings, else 600 x
             600.
         spp: Samples per pixel; with ``adaptive`` or ``noise`` the maximum.
@@ -151,16 +159,16 @@ def render(
     ...     wavecomb.render(stage, spp=4, seed=seed).save(f"mixed{seed}.exr")
 
     Raises:
-        WavecombError: The stage cannot be rendered, or the policy, the costs or the checkpoint is
-            invalid.
-        wavecomb._core.Error: A setting is invalid.
+        wavecomb.Error: The stage cannot be rendered, or an argument is invalid.
     """
     from wavecomb.run.stats import make_stats
 
     warn_deprecated(isolate=isolate)
+    check_source(source, also=("scene", "instanced_triangles"))
+    check_arguments(size, spp, aovs, options)
     loading, settings = split(options, without=("size", "threads"))
     check_options(size, spp, settings)
-    if isinstance(source, (str, os.PathLike)):
+    if is_unread(source):
         size, aovs = _asked_for(source, size, aovs, settings, loading)
     own, profile, names, chosen = prepare(size or DEFAULT_SIZE, spp, policy, costs, aovs, settings)
     scene, loaded, stage = _resolve(source, loading, chosen)
@@ -177,11 +185,11 @@ def render(
         names = aov_names.with_others(names, [catchers.LAYER])
     learned = learned_of(learn_from)
     if learned is not None:
-        check_taught(chosen, "learn_from")
+        check_trains_field(chosen, "learn_from")
     again = loaded if loaded is source else None
     told, asked = (progress, False) if callable(progress) else (None, progress)
     space = "rec709" if loaded is None else loaded.working_space
-    with live.watching(asked, space) as shown:
+    with live_view.watching(asked, space) as shown:
         watcher, state = _keeping(scene, chosen, names, stage, checkpoint, every, resume, shown)
         result, is_built = _render(
             scene, again, chosen, told, own, profile, watcher, state, learned
@@ -191,19 +199,24 @@ def render(
     if not has_catchers or picture.cancelled:
         return picture
 
-    def of_catchers(how: Mapping[str, str]) -> Result:
+    def render_catchers(how: Mapping[str, str]) -> Result:
         size = chosen.width, chosen.height
         options = LoadOptions.of(None, {**loading, "size": size, "threads": chosen.threads, **how})
-        scene = load(str(stage), options).scene
+        scene = load(source, options).scene
         return _render(
-            scene, None, catchers.of_catchers(chosen), None, own, None, None, None, learned
+            scene, None, catchers.catcher_settings(chosen), None, own, None, None, None, learned
         )[0]
 
-    return catchers.caught(picture, of_catchers)
+    return catchers.with_catcher_shadows(picture, render_catchers)
+
+
+def is_unread(source: Any) -> TypeGuard[str | os.PathLike[str] | Usd.Stage]:
+    """Returns whether a source is a path or an open stage, not a scene."""
+    return not (hasattr(source, "scene") or hasattr(source, "instanced_triangles"))
 
 
 def _asked_for(
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | Usd.Stage,
     size: tuple[int, int] | None,
     aovs: Iterable[str] | None,
     settings: dict[str, Any],
@@ -215,7 +228,8 @@ def _asked_for(
     import_usd()
     from wavecomb.usd import peek_products
 
-    choice = peek_products(os.fspath(path), **asked)[0][0]
+    unread = os.fspath(path) if isinstance(path, (str, os.PathLike)) else path
+    choice = peek_products(unread, **asked)[0][0]
     chosen = size or choice.resolution or DEFAULT_SIZE
     region = choice.region(*chosen)
     if region is not None and "region" not in settings:
@@ -233,7 +247,7 @@ def _keeping(
     checkpoint: str | os.PathLike[str] | None,
     every: float,
     resume: str | os.PathLike[str] | None,
-    shown: Shown | None,
+    shown: ProgressDisplays | None,
 ) -> tuple[Watcher | None, dict[str, Any] | None]:
     """Returns a watcher for checkpoints and progress, and the state from which to continue."""
     sinks: list[Sink] = [] if shown is None else list(shown.sinks)
@@ -260,15 +274,16 @@ def _warn(line: str) -> None:
 
 
 def _resolve(
-    source: str | os.PathLike[str] | LoadedStage | Scene,
+    source: str | os.PathLike[str] | Usd.Stage | LoadedStage | Scene,
     loading: Mapping[str, Any],
     settings: Settings,
 ) -> tuple[Scene, LoadedStage | None, str | None]:
-    if isinstance(source, (str, os.PathLike)):
+    if is_unread(source):
         size = settings.width, settings.height
         options = LoadOptions.of(None, {**loading, "size": size, "threads": settings.threads})
         loaded = load(source, options)
-        return loaded.scene, loaded, os.fspath(source)
+        is_path = isinstance(source, (str, os.PathLike))
+        return loaded.scene, loaded, os.fspath(source) if is_path else str(loaded.stage_path)
     if loading:
         raise TypeError(f"{', '.join(loading)}: give this to load(): the stage is loaded already")
     loaded_scene: Any = getattr(source, "scene", None)

@@ -246,12 +246,19 @@ def _extra(name: str) -> Check:
 
 
 def _display() -> Check:
-    from wavecomb.gui.needs import NO_DISPLAY, has_display
+    """Starts Qt on the display."""
+    from wavecomb.gui.needs import NO_DISPLAY, has_display, start_qt
 
-    if has_display():
-        return Check("display", OK, "a window can be opened", False)
-    what, _, do = NO_DISPLAY.partition(": ")
-    return Check("display", MISSING, what, False, do)
+    if not has_display():
+        what, _, do = NO_DISPLAY.partition(": ")
+        return Check("display", MISSING, what, False, do)
+    if missing_modules("gui"):
+        return Check("display", OK, "found; Qt is not installed", False)
+    platform, problem = start_qt()
+    if platform:
+        return Check("display", OK, f"Qt opens a window ({platform})", False)
+    what, found, do = problem.partition(": apt ")
+    return Check("display", BROKEN, what, False, f"apt {do}" if found else "")
 
 
 def _machine() -> list[Check]:

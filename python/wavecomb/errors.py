@@ -3,8 +3,20 @@
 
 from __future__ import annotations
 
+from typing import Any
 
-class WavecombError(Exception):
+
+class Error(Exception):
+    """Base class of all errors that Wavecomb raises on purpose, also of those of its core.
+
+    >>> try:  # doctest: +SKIP
+    ...     wavecomb.render("shot.usd", spp=0)
+    ... except wavecomb.Error as error:
+    ...     print(error)
+    """
+
+
+class WavecombError(Error):
     """Invalid input; the one-line message names the prim, file or option and says what to do.
 
     The command line prints it without a traceback and exits with ``EXIT_CODE``.
@@ -15,3 +27,18 @@ class WavecombError(Exception):
     def __init__(self, message: str) -> None:
         """Folds the message to one line."""
         super().__init__(" ".join(str(message).split()))
+
+
+class ArgumentError(WavecombError, TypeError):
+    """An argument of a Python function has the wrong name or type; the message has an example."""
+
+
+def join_core(core: Any) -> None:
+    """Makes the errors of a native module subclasses of ``Error``.
+
+    Args:
+        core: The module ``wavecomb._core``. Its class ``Error`` is a ValueError, which the core
+            creates without knowing this package.
+    """
+    if not issubclass(core.Error, Error):
+        core.Error.__bases__ = (ValueError, Error)

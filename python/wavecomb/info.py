@@ -67,8 +67,8 @@ def machine_info() -> dict[str, Any]:
     from wavecomb import _core, vdb
     from wavecomb.isa import library_info
     from wavecomb.machine import memory_bytes, usable_cores
-    from wavecomb.run.isolate import sandbox
-    from wavecomb.run.isolate.memory import machine_limit
+    from wavecomb.run.isolation import sandbox
+    from wavecomb.run.isolation.memory import machine_limit
 
     return {
         "cores": usable_cores(),

@@ -21,7 +21,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from wavecomb.errors import WavecombError
+from wavecomb.errors import WavecombError, join_core
 
 ISAS = ("x86-64-v4", "x86-64-v3", "x86-64-v2", "armv8-a")
 """Supported instruction sets, best first."""
@@ -125,8 +125,17 @@ def library_text() -> str:
     return f"library {info['library']}{of}: {info['isa']}, lanes {lanes}"
 
 
+class CoreLoader(ExtensionFileLoader):
+    """Loader of ``wavecomb._core`` that makes its errors subclasses of ``wavecomb.Error``."""
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Initializes the module."""
+        super().exec_module(module)
+        join_core(module)
+
+
 class Finder:
-    """Import finder for ``wavecomb._core`` in a portable build, and for nothing else."""
+    """Import finder for ``wavecomb._core``, and for nothing else."""
 
     @staticmethod
     def find_spec(
@@ -136,11 +145,18 @@ class Finder:
         if name != CORE or path is None:
             return None
         chosen = chosen_library(path)
-        if chosen is None:
+        if chosen is not None:
+            file: str | None = str(chosen[1])
+        else:
+            others = (one for one in sys.meta_path if one is not Finder)
+            found = (one.find_spec(name, path, target) for one in others)
+            file = next((spec.origin for spec in found if spec is not None), None)
+            if file is not None and os.path.dirname(file) not in path:
+                return None
+        if file is None or not file.endswith(tuple(EXTENSION_SUFFIXES)):
             return None
-        file = str(chosen[1])
         # The module and its classes are named after this name, not after the folder.
-        return spec_from_file_location(name, file, loader=ExtensionFileLoader(name, file))
+        return spec_from_file_location(name, file, loader=CoreLoader(name, file))
 
 
 def install() -> None:

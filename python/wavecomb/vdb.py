@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from wavecomb import vdb_writer
 from wavecomb.errors import WavecombError
-from wavecomb.run.isolate import memory
+from wavecomb.run.isolation import memory
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -197,7 +197,7 @@ def read(
     with _errors(plugin, path, head.name):
         # The tree and its bricks are in memory at the same time.
         found = plugin.bricks(
-            str(path), head.number, memory.room() // 2, background_is_zero, not whole
+            str(path), head.number, memory.available_bytes() // 2, background_is_zero, not whole
         )
     names = ("origins", "values", "kind", "voxels", "not_finite", "negative", "least", "greatest")
     return Bricks(

@@ -22,7 +22,7 @@ from wheels import RENDER, ROOT, package, succeed
 
 import wavecomb
 from wavecomb import isa
-from wavecomb.picture.image import read_layers
+from wavecomb.image.files.image import read_layers
 
 TOOL = ROOT / "tools" / "empty_root"
 NEWER = {"bookworm": "trixie", "jammy": "noble"}

@@ -17,7 +17,7 @@ import pytest
 from parts import needs
 from wheels import RENDER, ROOT, package, succeed
 
-from wavecomb.picture.image import read_layers
+from wavecomb.image.files.image import read_layers
 
 
 @pytest.fixture(scope="module")

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from wavecomb.farm import Folder
-from wavecomb.farm.assemble import finish_image
+from wavecomb.farm.assembly import finish_image
 from wavecomb.farm.rendering import Renderer
-from wavecomb.picture.image import read_layers, read_metadata
+from wavecomb.image.files.image import read_layers, read_metadata
 
 TIMES = ("wavecomb:render_seconds", "DateTime")
 """Header entries that differ between any two renders."""
@@ -31,11 +31,11 @@ MACHINE = "wavecomb-test"
 """Machine class in tests that render in this process."""
 
 
-def render_all(folder: Folder, image: int = 0, looks: int = 0) -> None:
+def render_all(folder: Folder, image: int = 0, checks: int = 0) -> None:
     """Renders all tiles of an image in this process."""
     renderer = Renderer(folder.job, threads=1, learned=folder.learned())
     for task in folder.job.tasks_of(image):
-        renderer.render(task, folder.part(task), MACHINE, looks)
+        renderer.render(task, folder.part(task), MACHINE, checks)
 
 
 def work(folder: Folder) -> None:

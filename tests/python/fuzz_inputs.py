@@ -194,7 +194,7 @@ def ply_bytes(form: str) -> bytes:
 def left_over(what: str) -> bytes:
     """Returns a file that a render of ``BALL`` writes. "exr" has seed 1 and "exr2" seed 2."""
     import wavecomb
-    from wavecomb.run.costs import save_costs
+    from wavecomb.run.cost_profile import save_costs
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

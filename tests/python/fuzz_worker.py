@@ -26,10 +26,10 @@ OUTCOMES = ("rendered", "warned", "refused", "wrong")
 def read(case: Path) -> tuple[str, str]:
     """Reads an input that is not a stage, as its name requires. Returns (outcome, message)."""
     import wavecomb
-    from wavecomb.picture.merge import merge
-    from wavecomb.run.costs import load_costs
+    from wavecomb.image.merge import merge
+    from wavecomb.run.cost_profile import load_costs
     from wavecomb.scenes import SceneError
-    from wavecomb.scenes.meshfile import load_dragon
+    from wavecomb.scenes.models.mesh_file import load_dragon
 
     stage = case.with_name("stage.usda")
     small = {"size": (8, 8), "spp": 1, "threads": 1}
@@ -118,17 +118,17 @@ def give_up(answers: TextIO, line: str) -> NoReturn:
 
 def main() -> None:
     """Answers requests until stdin ends."""
-    from wavecomb.run.isolate import patience, trail
-    from wavecomb.run.isolate.supervisor import CHATTER
+    from wavecomb.run.isolation import progress_notes, time_limit
+    from wavecomb.run.isolation.supervisor import CHATTER
 
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     limit = int(sys.argv[1])
     if limit:
         resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
     answers = os.fdopen(os.dup(1), "w")
-    trail.follow(trail.new_page())
-    patience.limit_s = LOAD_LIMIT_S
-    patience.on_end = functools.partial(give_up, answers)
+    progress_notes.start(progress_notes.new_page())
+    time_limit.limit_s = LOAD_LIMIT_S
+    time_limit.end_process = functools.partial(give_up, answers)
     judge(sys.argv[2])  # imports everything, so that the first case takes no longer
     with tempfile.TemporaryFile() as spilt:
         written = watch_writes(os.path.realpath(os.path.dirname(sys.argv[2])))

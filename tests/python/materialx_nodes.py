@@ -13,8 +13,8 @@ from pxr import Usd, UsdShade
 
 from wavecomb.usd.graphs.values import POINT_SIZE, assemble, fit
 from wavecomb.usd.materialx.library import WIDTHS, library
-from wavecomb.usd.materialx.nodes.call import NodeCall
 from wavecomb.usd.materialx.nodes.network import Networks
+from wavecomb.usd.materialx.nodes.node import NodeCall
 from wavecomb.usd.materialx.prims import usd_type, usd_value
 from wavecomb.usd.stage.report import LoadReport
 

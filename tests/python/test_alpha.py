@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 import wavecomb
 from wavecomb.cli import main
-from wavecomb.picture.image import display, read_image, read_layers
+from wavecomb.image.files.image import display, read_image, read_layers
 
 pytest.importorskip("wavecomb._core")
 

@@ -16,8 +16,8 @@ from usd_recorder import QUAD, load, write
 import wavecomb
 from wavecomb.cli import main
 from wavecomb.errors import WavecombError
-from wavecomb.picture import cryptomatte
-from wavecomb.picture.image import read_layers, read_metadata
+from wavecomb.image import cryptomatte
+from wavecomb.image.files.image import read_layers, read_metadata
 from wavecomb.run import aovs
 
 _core = pytest.importorskip("wavecomb._core")
@@ -210,7 +210,7 @@ def test_positions_lie_where_the_matrices_say(picture: wavecomb.Picture) -> None
 
 
 def test_matrices_are_finite_without_a_far_plane() -> None:
-    from wavecomb.picture.output import scene_metadata
+    from wavecomb.image.files.render_output import scene_metadata
 
     builder = wavecomb.SceneBuilder()
     builder.set_camera(np.eye(4), window=(-0.5, 0.5, -0.5, 0.5), far_clip=float("inf"))

@@ -13,9 +13,9 @@ from fake_core import Fake, install
 
 import wavecomb
 from wavecomb.errors import WavecombError
+from wavecomb.image.files.image import read_image, read_layers
 from wavecomb.load_options import LoadOptions
-from wavecomb.picture.image import read_image, read_layers
-from wavecomb.run.costs import load_costs, save_costs
+from wavecomb.run.cost_profile import load_costs, save_costs
 from wavecomb.run.stats import COUNTS, MEMORY, PHASES, write_stats
 
 

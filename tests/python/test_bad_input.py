@@ -14,7 +14,7 @@ import forks
 import numpy as np
 import pytest
 
-from wavecomb.picture.image import read_layers
+from wavecomb.image.files.image import read_layers
 
 pytest.importorskip("wavecomb._core")
 

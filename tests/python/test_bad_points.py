@@ -6,7 +6,7 @@ import pytest
 from usd_recorder import load, said
 
 import wavecomb
-from wavecomb.usd.geometry.bad_points import steadied
+from wavecomb.usd.geometry.invalid_points import replace_invalid_steps
 
 NAN = float("nan")
 
@@ -67,7 +67,7 @@ def test_a_bad_point_that_no_face_uses_costs_nothing(tmp_path):
 
 def test_a_mesh_of_bad_faces_alone_is_left_out(tmp_path):
     scene, loaded = load(tmp_path, grid(2, 4))
-    assert "mesh left out: its points are not finite or absurdly far away: /M" in said(loaded)
+    assert "mesh left out: its points are not finite or too far away: /M" in said(loaded)
     assert not scene.meshes
 
 
@@ -118,7 +118,7 @@ def test_bad_points_of_particles_are_left_out(tmp_path):
             int64[] ids = [7, 8, 9]
         }""",
     )
-    what = "warning: 2 of 3 points left out: they are not finite or absurdly far away: /P"
+    what = "warning: 2 of 3 points left out: they are not finite or too far away: /P"
     assert what in said(loaded)
     (points,) = scene.meshes
     assert points["radii"].tolist() == [0, 1, 0]
@@ -130,11 +130,11 @@ def test_points_that_are_bad_at_a_step_of_the_shutter():
     middle = np.full((3, 3), 0.5, np.float32)
     first[1, 0] = middle[1, 1] = np.nan
     last[2] = first[2] = middle[2] = np.inf
-    found = steadied([first, middle, last])
+    found = replace_invalid_steps([first, middle, last])
     assert [shape[1].tolist() for shape in found] == [[1, 1, 1]] * 3
     assert [shape[2].tolist() for shape in found] == [[0] * 3, [0.5] * 3, [1] * 3]
     same = [np.zeros((2, 3), np.float32)] * 2
-    assert steadied(same)[0] is same[0]
+    assert replace_invalid_steps(same)[0] is same[0]
 
 
 def test_the_picture_has_the_other_faces(tmp_path):

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import wavecomb
-from wavecomb.picture.image import read_layers
+from wavecomb.image.files.image import read_layers
 from wavecomb.scenes import write_scene
 
 SIZE = (150, 200)

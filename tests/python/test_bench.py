@@ -118,7 +118,7 @@ def test_variants_of_a_renderer_share_a_golden_picture() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("[golden]", "[golden", "is no TOML"),
+        ("[golden]", "[golden", "is not TOML"),
         ("repetitions = 2", "repetitions = 0", "repetitions: must be at least 1"),
         ("repetitions = 2", "repetitions = 'x'", "must be a whole number"),
         ("warm_up = 0", "warmup = 0", "warmup: no such key; there are stage, golden"),
@@ -188,7 +188,7 @@ def test_stages_of_a_folder(tmp_path: Path) -> None:
     kept.write_text(naming_folder(suite, tmp_path).text)
     assert load_suite(kept).stages["mine"].file == (tmp_path / "mine.usda").resolve()
     (tmp_path / "mixed.usda").write_text("#usda 1.0\n")
-    with pytest.raises(WavecombError, match="mixed has the name of another stage"):
+    with pytest.raises(WavecombError, match="mixed has the same name as another stage"):
         with_folder(suite, tmp_path)
 
 

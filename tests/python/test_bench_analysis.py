@@ -12,10 +12,10 @@ import pytest
 import scipy.stats
 from bench_results import POLICY_FACTORS, policy_rows, runs_of, write_folder
 
-from wavecomb.bench.analysis_costs import calibration, material_costs
-from wavecomb.bench.analysis_data import Results, cells, load
-from wavecomb.bench.analysis_factorial import effects
-from wavecomb.bench.analysis_interval import (
+from wavecomb.bench.analysis.costs import calibration, material_costs
+from wavecomb.bench.analysis.data import Results, cells, load
+from wavecomb.bench.analysis.factorial import effects
+from wavecomb.bench.analysis.interval import (
     Estimate,
     bootstrap,
     holm,
@@ -23,7 +23,7 @@ from wavecomb.bench.analysis_interval import (
     to_column,
     verdict,
 )
-from wavecomb.bench.analysis_ratios import order_effects, ratios, regrets
+from wavecomb.bench.analysis.ratios import order_effects, ratios, regrets
 from wavecomb.errors import WavecombError
 
 

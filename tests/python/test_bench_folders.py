@@ -11,7 +11,7 @@ import pytest
 from bench_results import MACHINE, runs_of, write_folder
 from click.testing import CliRunner
 
-from wavecomb.bench.folders import compare_folders
+from wavecomb.bench.analysis.folder_changes import compare_folders
 from wavecomb.cli import main
 from wavecomb.errors import WavecombError
 

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from bench_results import everything, policy_rows, runs_of, write_folder
 
-from wavecomb.bench.analysis_data import load
-from wavecomb.bench.report import LARGEST_PNG, LARGEST_SVG, build, equality, warnings_of
-from wavecomb.bench.report_parts import number, table
-from wavecomb.picture.image import read_image
+from wavecomb.bench.analysis.data import load
+from wavecomb.bench.reports.page import LARGEST_PNG, LARGEST_SVG, build, equality, warnings_of
+from wavecomb.bench.reports.parts import number, table
+from wavecomb.image.files.image import read_image
 
 HTML = "{http://www.w3.org/1999/xhtml}"
 
@@ -272,7 +272,7 @@ def test_warnings(tmp_path: Path) -> None:
 
 def test_nothing_heavy_is_imported_for_a_render() -> None:
     code = (
-        "import sys, wavecomb.cli, wavecomb.picture.compare, wavecomb.bench; "
+        "import sys, wavecomb.cli, wavecomb.image.compare.comparison, wavecomb.bench; "
         "print([m for m in ('pandas', 'matplotlib', 'scipy', 'jinja2') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

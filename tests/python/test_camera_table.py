@@ -124,7 +124,7 @@ def test_what_is_missing_or_unknown_is_named() -> None:
 
 def test_lists_that_stand_elsewhere_are_the_tables() -> None:
     from wavecomb.load_options import PROJECTIONS
-    from wavecomb.usd.stage.choice import CONFORMS
+    from wavecomb.usd.render_settings.values import CONFORMS
 
     assert camera_parameters()["projection"].choices == PROJECTIONS
     assert camera_parameters()["conform"].choices == CONFORMS

@@ -12,7 +12,7 @@ from usd_recorder import load, said, write
 
 import wavecomb
 from wavecomb import _core
-from wavecomb.picture.output import fitted_window, scene_metadata
+from wavecomb.image.files.render_output import fitted_window, scene_metadata
 from wavecomb.usd import load_stage
 
 LENS = """float focalLength = 40

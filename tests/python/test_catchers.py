@@ -13,7 +13,7 @@ from usd_recorder import write
 
 import wavecomb
 from wavecomb.cli import main
-from wavecomb.picture.image import read_layers
+from wavecomb.image.files.image import read_layers
 
 SIZE, SPP = (80, 60), 16
 STAGE = """#usda 1.0
@@ -132,7 +132,7 @@ def test_what_does_not_go_with_it(options: list[str], says: str, tmp_path: Path)
         run = CliRunner().invoke(
             main, ["render", str(stage), "-o", "b.exr", "--catcher", "/Floor", *options]
         )
-    assert run.exit_code == 2 and f"shadow catchers do not go with {says}" in run.stderr
+    assert run.exit_code == 2 and f"shadow catchers cannot be combined with {says}" in run.stderr
     assert not (tmp_path / "b.exr").exists()
 
 

@@ -20,7 +20,7 @@ from stopping import StopAt
 import wavecomb
 from wavecomb.cli import main
 from wavecomb.errors import WavecombError
-from wavecomb.picture.image import read_layers
+from wavecomb.image.files.image import read_layers
 from wavecomb.run.aovs import core_aovs
 from wavecomb.run.checkpoint import load_checkpoint, save_checkpoint
 
@@ -253,7 +253,7 @@ def test_damaged_files_are_refused(cornell: Any, tmp_path: Path) -> None:
     }.items():
         broken = tmp_path / f"{name}.ckpt"
         broken.write_bytes(content)
-        with pytest.raises(WavecombError, match=f"{name}.ckpt: is no checkpoint, or is damaged"):
+        with pytest.raises(WavecombError, match=f"{name}.ckpt: is not a checkpoint, or is damaged"):
             load_checkpoint(broken)
     with pytest.raises(FileNotFoundError, match="no such file"):
         load_checkpoint(tmp_path / "none.ckpt")
@@ -364,7 +364,7 @@ def test_a_timed_render_is_not_resumed_without_end(stage: Path, tmp_path: Path) 
 
 @pytest.mark.slow
 def test_a_disk_that_is_full_does_not_end_a_render(cornell: Any, tmp_path: Path) -> None:
-    from wavecomb.run.watcher import CheckpointSink, Watcher
+    from wavecomb.run.callbacks import CheckpointSink, Watcher
 
     warnings: list[str] = []
     sink = CheckpointSink(tmp_path / "gone" / "a.ckpt", 0.0, {})

@@ -11,7 +11,7 @@ import pytest
 import wavecomb
 from wavecomb.scenes import write_scene
 from wavecomb.scenes.caustics import LENS_FOCUS, lens, water
-from wavecomb.scenes.mesh import face_areas, signed_volume
+from wavecomb.scenes.models.mesh import face_areas, signed_volume
 
 
 def test_the_lens_is_two_caps_that_face_outwards() -> None:

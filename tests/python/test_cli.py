@@ -19,7 +19,7 @@ from fake_core import Error, Fake, install
 from parts import needs
 
 from wavecomb.cli import main
-from wavecomb.picture.image import read_layers, read_metadata, write_exr
+from wavecomb.image.files.image import read_layers, read_metadata, write_exr
 
 
 @pytest.fixture
@@ -90,6 +90,7 @@ def test_render_writes_everything(fake: Fake, stage: str, tmp_path: Path) -> Non
     assert document["schema"] == "wavecomb-statistics/1"
     seconds = {"load": 0.25, "build": 0.1, "render": 0.5}
     others = dict.fromkeys(("first_samples", "resumed", "denoise"), 0.0)
+    assert document["seconds"].pop("write") > 0.0
     assert document["seconds"] == {**seconds, **others}
     assert document["counts"]["samples"] == 4800
     assert sorted(path.name for path in tmp_path.iterdir()) == [
@@ -106,11 +107,11 @@ def test_defaults(fake: Fake, stage: str, tmp_path: Path) -> None:
 
 
 def test_summary_and_warnings(fake: Fake, stage: str, tmp_path: Path) -> None:
-    result = run("render", stage, "-o", tmp_path / "a.exr", "--size", 8, 8)
+    result = run("render", stage, "-o", tmp_path / "a.exr", "--size", 8, 8, "--verbose")
     assert "load 0.250 s, build 0.100 s, render 0.500 s" in result.stdout
     assert "trace" in result.stdout
     assert "60.0" in result.stdout
-    assert "peak memory 123 MB" in result.stdout
+    assert "memory   123 MB" in result.stdout
     assert result.stdout.count("volumes: /Smoke") == 1
     assert "note: no light: /" in result.stdout
     assert result.stderr.splitlines() == [
@@ -156,7 +157,7 @@ def test_interrupt_before_the_first_sample(fake: Fake, stage: str, tmp_path: Pat
         (["--size", -5, 10], "size -5 x 10"),
         (["--size", 65537, 10], "from 1 to 65536"),
         pytest.param(["--size", 65536, 65536, "--denoise"], "GiB of memory", marks=needs("pyoidn")),
-        (["--size", "x", 10], "'x' is not a valid integer"),
+        (["--size", "x", 10], "'x' is no size"),
         (["--spp", 0], "0 samples per pixel"),
         (["--camera", "/Nowhere"], "no camera /Nowhere there are: /Camera"),
         (["--lanes", 4], "setting lanes: 4 is not built"),
@@ -169,14 +170,14 @@ def test_interrupt_before_the_first_sample(fake: Fake, stage: str, tmp_path: Pat
         (["--variant", "red"], "must be PRIM{SET}=NAME"),
         (["--camera", ""], "--camera is empty"),
         (["--png", "a.exr"], "must end in .png"),
-        (["--png", "/nowhere/a.png"], "/nowhere does not exist"),
-        (["--stats", "/nowhere/a.json"], "/nowhere does not exist"),
+        (["--png", "/proc/nowhere/a.png"], "/proc/nowhere/a.png: cannot be written"),
+        (["--stats", "/proc/nowhere/a.json"], "/proc/nowhere/a.json: cannot be written"),
         (["--nonsense"], "No such option"),
         (["--policy", "best"], "'best' is not one of"),
         (["--roulette", "russian"], "'russian' is not one of"),
         (["--ray-order", "hilbert"], "'hilbert' is not one of"),
         (["--costs", "mesured"], "one of auto, measured, model, or a file whose name ends in"),
-        (["--costs", "/nowhere/a.json"], "/nowhere does not exist"),
+        (["--costs", "/proc/nowhere/a.json"], "/proc/nowhere/a.json: cannot be written"),
         (["--cost-weight", -0.5], "at least 0"),
     ],
 )
@@ -192,12 +193,12 @@ def test_bad_options(
 @pytest.mark.parametrize(
     ("output", "says"),
     [
-        ("/nowhere/a.exr", "/nowhere does not exist"),
+        ("/proc/nowhere/a.exr", "/proc/nowhere/a.exr: cannot be written"),
         ("{tmp}", "must end in .exr"),
         ("{tmp}/folder.exr", "is a folder"),
         ("{tmp}/stage.usda/a.exr", "is not a folder"),
         ("{tmp}/pipe.exr", "is not a regular file"),
-        ("a.png", "must end in .exr"),
+        ("a.jpg", "must end in .exr or .png"),
     ],
 )
 def test_bad_output(fake: Fake, stage: str, tmp_path: Path, output: str, says: str) -> None:
@@ -256,12 +257,12 @@ def test_cost_profile_is_written_and_read(fake: Fake, stage: str, tmp_path: Path
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("", "is no cost profile"),
-        ("[" * 100_000, "is no cost profile"),
-        ("\x00\xff", "is no cost profile"),
+        ("", "is not a cost profile"),
+        ("[" * 100_000, "is not a cost profile"),
+        ("\x00\xff", "is not a cost profile"),
         ("[]", "no schema wavecomb-costs/1"),
         ('{"materials": {}, "textures": {}}', "no schema wavecomb-costs/1"),
-        ('{"schema": "wavecomb-costs/1", "materials": {}}', "textures is no table"),
+        ('{"schema": "wavecomb-costs/1", "materials": {}}', "textures is not a table"),
         ('{"schema": "wavecomb-costs/1", "materials": [1], "textures": {}}', "materials is no"),
         *(
             (
@@ -300,7 +301,7 @@ def test_summary_of_scheduling(fake: Fake, stage: str, tmp_path: Path) -> None:
         for i in range(9)
     ]  # fmt: skip
     fake.stats = {
-        "settings": {"policy": "adaptive"},
+        "settings": {"policy": "adaptive", "width": 8, "height": 8},
         "phases_s": {"trace": 1.0, "keys": 0.1, "sort": 0.1, "shade": 1.8},
         "counts": {
             **{"samples": 100, "rays": 250, "shadow_rays": 100, "records": 9000},
@@ -316,7 +317,7 @@ def test_summary_of_scheduling(fake: Fake, stage: str, tmp_path: Path) -> None:
     }
     result = run(
         *("render", stage, "-o", tmp_path / "a.exr", "--size", 8, 8),
-        *("--stats", tmp_path / "a.json"),
+        *("--stats", tmp_path / "a.json", "--verbose"),
     )
     for text in (
         "policy adaptive: sorting 10 % of shading with it, lanes 80 % full",
@@ -381,7 +382,7 @@ def test_scene(tmp_path: Path) -> None:
         (["cornell"], "give a NAME and -o FILE"),
         (["nonsense", "-o", "a.usda"], "no scene 'nonsense'"),
         (["cornell", "-o", "a.txt"], ".usda, .usdc or .usd"),
-        (["cornell", "-o", "/nowhere/a.usda"], "/nowhere does not exist"),
+        (["cornell", "-o", "/proc/nowhere/a.usda"], "/proc/nowhere/a.usda: cannot be written"),
         (["cornell", "-o", "a.usda", "--triangles", "0"], "--triangles"),
         (["cornell-dragon", "-o", "a.usda", "--dragon", "no.obj"], "no.obj"),
         (["heavy", "-o", "a.usda", "--plain"], "heavy has no plain form"),
@@ -415,11 +416,11 @@ def test_compare(tmp_path: Path) -> None:
     assert document["mean_signed"] == pytest.approx([0.25 / 24] * 3)
     assert run("compare", b, a, "--tolerance", 0.3).exit_code == 0
     assert run("compare", b, a, "--tolerance", 0.2).exit_code == 1
-    assert "only pictures of one size" in error_line(run("compare", a, other))
+    assert "only images of the same size" in error_line(run("compare", a, other))
     assert "no such file" in error_line(run("compare", a, tmp_path / "no.exr"))
     assert "must end in .png" in error_line(run("compare", a, b, "--heatmap", "h.exr"))
     other.write_text("no picture")
-    assert "cannot be read as a picture" in error_line(run("compare", a, other))
+    assert "cannot be read as an image" in error_line(run("compare", a, other))
 
 
 @pytest.mark.parametrize("command", [[], ["render"], ["info"], ["scene"], ["compare"]])
@@ -514,7 +515,7 @@ def test_lane_widths_that_are_not_built(tmp_path: Path) -> None:
     built = _core.lane_widths()
     assert len(built) == 1 or built[0] == 1
     shown = "|".join(["auto", *(str(width) for width in built)])
-    assert f"--lanes [{shown}]" in wavecomb("render", "--help").stdout
+    assert f"--lanes [{shown}]" in wavecomb("render", "--help-all").stdout
     stage, out = tmp_path / "stage.usdc", tmp_path / "a.exr"
     assert wavecomb("scene", "cornell", "-o", stage).returncode == 0
     for width in (1, 4, 8, 16):

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wavecomb.picture.colour_maps import colour_map, signed_colour_map
-from wavecomb.picture.compare import compare, luminance
-from wavecomb.picture.heatmap import LEAST_WIDTH, heat_map, write_heat_map
-from wavecomb.picture.image import read_image, srgb_from_linear, write_exr
+from wavecomb.image.colour_maps import colour_map, signed_colour_map
+from wavecomb.image.compare.comparison import compare, luminance
+from wavecomb.image.compare.heatmap import MIN_WIDTH, heat_map, write_heat_map
+from wavecomb.image.files.image import read_image, srgb_from_linear, write_exr
 
 
 @pytest.fixture
@@ -101,14 +101,14 @@ def test_one_channel() -> None:
 
 
 def test_sizes_must_agree() -> None:
-    with pytest.raises(ValueError, match="picture A is 3 x 2 with 3 channels"):
+    with pytest.raises(ValueError, match="image A is 3 x 2 with 3 channels"):
         compare(np.ones((2, 3, 3)), np.ones((3, 2, 3)))
     with pytest.raises(ValueError, match="shape"):
         compare(np.ones(3), np.ones(3))
 
 
 def test_is_exported() -> None:
-    import wavecomb.picture.heatmap
+    import wavecomb.image.compare.heatmap
 
     assert wavecomb.compare is compare
     assert callable(wavecomb.compare)
@@ -170,5 +170,5 @@ def test_small_heat_maps(shape: tuple[int, int, int], kind: str) -> None:
     a = np.zeros(shape, np.float32)
     for b in (a, a + 1):
         heat = heat_map(a, b, kind)
-        assert heat.shape[1] == LEAST_WIDTH
+        assert heat.shape[1] == MIN_WIDTH
         assert (heat[shape[0] :] == 1).all(axis=2).any()

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from parts import not_here
 
-from wavecomb.picture.image import read_image
+from wavecomb.image.files.image import read_image
 
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build" / "editable"

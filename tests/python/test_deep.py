@@ -315,7 +315,7 @@ def test_the_command_goes_on(tmp_path: Path) -> None:
     size = ("--size", "32", "24", "--spp")
     deep("half.exr", *size, "4", "--checkpoint", state)
     refused = run("--resume", state)
-    assert refused.exit_code == 2 and "give --deep FILE.exr, too" in refused.stderr
+    assert refused.exit_code == 2 and "also give --deep FILE.exr" in refused.stderr
     more = deep("more.exr", "--resume", state, "--spp", "8")
     whole = deep("whole.exr", *size, "8")
     assert np.array_equal(_flattened(more), _flattened(whole))

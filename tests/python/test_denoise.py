@@ -13,7 +13,7 @@ from fake_core import install
 import wavecomb
 from wavecomb.cli import main
 from wavecomb.errors import WavecombError
-from wavecomb.picture.image import read_image, read_layers
+from wavecomb.image.files.image import read_image, read_layers
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def test_denoised_is_nearer_to_the_truth(pictures: Any) -> None:
 @pytest.mark.slow
 def test_guides_keep_detail(pictures: Any) -> None:
     """Denoising keeps a pattern that only the albedo guide resolves."""
-    from wavecomb.picture.denoise import denoise
+    from wavecomb.image.denoise import denoise
 
     rng = np.random.default_rng(1)
     y, x = np.mgrid[0:96, 0:96]
@@ -132,7 +132,7 @@ def test_guides_are_kept_from_files_unless_asked_for(tmp_path: Path) -> None:
 
 
 def test_broken_pixels_are_filled_in(pictures: Any) -> None:
-    from wavecomb.picture.denoise import denoise
+    from wavecomb.image.denoise import denoise
 
     noisy, clean = pictures
     beauty = noisy.beauty.copy()
@@ -169,6 +169,6 @@ def test_a_missing_extra_is_said_before_anything(
     assert "pip install 'pyoidn>=2.5'" in result.stderr
     assert not fake.loaded
     with pytest.raises(WavecombError, match=r"denoising needs pyoidn"):
-        from wavecomb.picture.denoise import check_denoiser
+        from wavecomb.image.denoise import check_denoiser
 
         check_denoiser()

@@ -17,6 +17,7 @@ from wavecomb import doctor
 from wavecomb.cli import main
 from wavecomb.errors import WavecombError
 from wavecomb.extras import EXTRAS, check_installed, install_command, missing_modules
+from wavecomb.gui import needs as qt
 
 try:
     import tomllib
@@ -112,3 +113,32 @@ def test_install_commands_name_the_packages_of_an_extra(extra: str) -> None:
     assert command.startswith("pip install '")
     assert set(re.findall(r"'([A-Za-z][\w-]*)[<>=~!]", command)) == names
     assert len(re.findall("'", command)) == 2 * len(names)
+
+
+def test_qt_libraries_that_are_missing_come_with_their_packages(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """ldd's list names what is missing; doctor and the window name the packages."""
+    ldd = tmp_path / "ldd"
+    ldd.write_text(
+        "#!/bin/sh\n"
+        "echo '  libxcb-icccm.so.4 => not found'\n"
+        "echo '  libxcb-keysyms.so.1 => not found'\n"
+        "echo '  libc.so.6 => /lib/libc.so.6 (0x0)'\n"
+    )
+    ldd.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+    missing = qt.missing_libraries("libqxcb.so")
+    assert missing == ["libxcb-icccm.so.4", "libxcb-keysyms.so.1"]
+    assert qt.libraries_message(missing).endswith("apt install libxcb-icccm4 libxcb-keysyms1")
+
+
+@needs("PySide6.QtWidgets")
+def test_the_display_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("QT_QPA_PLATFORM", "offscreen")
+    assert doctor._display().text == "Qt opens a window (offscreen)"
+    monkeypatch.setenv("QT_QPA_PLATFORM", "nonsense")
+    assert doctor._display().state == "broken"
+    monkeypatch.setattr(qt, "missing_libraries", lambda: ["libxcb-icccm.so.4"])
+    found = doctor._display()
+    assert (found.state, found.do) == ("broken", "apt install libxcb-icccm4")

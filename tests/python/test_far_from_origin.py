@@ -23,9 +23,9 @@ from wavecomb.usd.stage.origin import (
     POSITIONS,
     STORED,
     WORLD,
-    around,
     find_origin,
-    moved_to,
+    to_scene_space,
+    world_to_scene,
 )
 
 pytestmark = needs("wavecomb._core")
@@ -349,12 +349,12 @@ def test_origins(x: float) -> None:
     }}""")
     found = find_origin(usd, Usd.TimeCode(0), usd.GetPrimAtPath("/C"), ["default"])
     if abs(x) < NEAR:
-        assert found == WORLD and around(found) is IDENTITY
+        assert found == WORLD and world_to_scene(found) is IDENTITY
         matrices = np.eye(4)
-        assert moved_to(matrices, found) is matrices
+        assert to_scene_space(matrices, found) is matrices
     else:
         assert abs(found[0] - x) <= CELL / 2 and found[0] % CELL == 0 and found[1:] == (0, 0)
-        moved = np.array(Gf.Matrix4d(1).SetTranslate((x, 5, 0)) * around(found))
+        moved = np.array(Gf.Matrix4d(1).SetTranslate((x, 5, 0)) * world_to_scene(found))
         assert moved[3, 0] == x - found[0]
 
 

@@ -18,22 +18,22 @@ from parts import needs
 import wavecomb
 from wavecomb.errors import WavecombError
 from wavecomb.farm import Folder, status, submit
-from wavecomb.farm.assemble import NarrowBorder, check_cover, finish_image, is_finished, join
+from wavecomb.farm.assembly import NarrowBorder, check_cover, finish_image, is_finished, join
 from wavecomb.farm.job import Job, Task
-from wavecomb.farm.part import DamagedPart, has_part, load_part, read_part
 from wavecomb.farm.planning import refresh, with_files
 from wavecomb.farm.rendering import Renderer
+from wavecomb.farm.tile_file import InvalidTile, has_tile, load_tile, read_tile
 from wavecomb.farm.tiling import (
     border,
     choose_tiles,
+    error_checks,
     grown,
     layout,
-    looks,
-    most_looks,
+    max_error_checks,
     parse_tile,
     tiles_of,
 )
-from wavecomb.picture.image import read_layers
+from wavecomb.image.files.image import read_layers
 from wavecomb.run.aovs import names
 
 pytestmark = needs("wavecomb._core")
@@ -97,7 +97,7 @@ def test_a_border_is_good_for_all_looks(stage: Path) -> None:
     """An adaptive render that never converges checks its error as often as the border allows."""
     settings = {"spp": 200, "min_spp": 16}
     picture = wavecomb.render(stage, size=(8, 8), adaptive=1e-6, **settings)
-    assert looks(settings) < picture.stats["passes"] <= most_looks(settings)
+    assert error_checks(settings) < picture.stats["passes"] <= max_error_checks(settings)
     assert border({**settings, "adaptive": 0.1}, 3) == 14 and border(settings, 3) == 0
     assert grown((4, 0, 8, 4), 3, (0, 0, 9, 9)) == (1, 0, 9, 7)
 
@@ -109,7 +109,7 @@ def test_a_folder_is_whole_or_absent(stage: Path, tmp_path: Path) -> None:
     folder = job(stage, tmp_path)
     assert Folder(folder.path).job == folder.job
     assert len(list(folder.job.tasks())) == folder.job.task_count() == 6
-    with pytest.raises(WavecombError, match="is there already"):
+    with pytest.raises(WavecombError, match="already exists"):
         job(stage, tmp_path)
     assert sorted(os.listdir(tmp_path)) == ["a.farm"] and os.listdir(folder.path) == ["job.json"]
     with pytest.raises(WavecombError, match="is no folder of a job"):
@@ -183,7 +183,7 @@ def test_a_job_reads_back_as_it_is(stage: Path, tmp_path: Path) -> None:
 def test_what_a_farm_refuses(stage: Path, tmp_path: Path) -> None:
     for options, said in (
         ({"time_limit": 5.0}, "--time-limit"),
-        ({"noise": 0.1, "spp": 64}, "--noise 0.1: is of the whole picture"),
+        ({"noise": 0.1, "spp": 64}, "--noise 0.1: applies to the whole image"),
         ({"allocate": "error", "spp": 64}, "--allocate error"),
         ({"roulette": "cost-aware", "costs": "measured"}, "--costs measured"),
     ):
@@ -198,27 +198,27 @@ def test_what_a_farm_refuses(stage: Path, tmp_path: Path) -> None:
 def test_a_key_names_all_that_decides_pixels(stage: Path, tmp_path: Path) -> None:
     found = job(stage, tmp_path, frames="1-2").job
     task = Task(0, 0)
-    key = found.part_key(task, MACHINE)
+    key = found.tile_key(task, MACHINE)
     shot = found.shots[0]
     others = [
-        found.part_key(Task(0, 1), MACHINE),
-        found.part_key(Task(1, 0), MACHINE),
-        found.part_key(task, "another machine"),
-        dataclasses.replace(found, version="0").part_key(task, MACHINE),
-        dataclasses.replace(found, files=()).part_key(task, MACHINE),
-        dataclasses.replace(found, learned="x").part_key(task, MACHINE),
-        dataclasses.replace(found, costs={"m": {"a": 1.0}}).part_key(task, MACHINE),
+        found.tile_key(Task(0, 1), MACHINE),
+        found.tile_key(Task(1, 0), MACHINE),
+        found.tile_key(task, "another machine"),
+        dataclasses.replace(found, version="0").tile_key(task, MACHINE),
+        dataclasses.replace(found, files=()).tile_key(task, MACHINE),
+        dataclasses.replace(found, learned="x").tile_key(task, MACHINE),
+        dataclasses.replace(found, costs={"m": {"a": 1.0}}).tile_key(task, MACHINE),
         dataclasses.replace(
             found, shots=(dataclasses.replace(shot, settings={**shot.settings, "seed": 9}),)
-        ).part_key(task, MACHINE),
+        ).tile_key(task, MACHINE),
         dataclasses.replace(
             found, shots=(dataclasses.replace(shot, aovs=(*shot.aovs, "uv")),)
-        ).part_key(task, MACHINE),
+        ).tile_key(task, MACHINE),
     ]
     assert len({key, *others}) == len(others) + 1
     threads = dataclasses.replace(shot, settings={**shot.settings, "threads": 7})
     more = dataclasses.replace(found, shots=(threads,), exposure=1.0, tries=9)
-    assert more.part_key(task, MACHINE) == key, "these change no pixel of a part"
+    assert more.tile_key(task, MACHINE) == key, "these change no pixel of a part"
     assert more.output_key(0) != found.output_key(0)
 
 
@@ -226,12 +226,12 @@ def test_a_stage_file_that_changes_changes_keys(stage: Path, tmp_path: Path) -> 
     here = tmp_path / "cornell.usdc"
     shutil.copy(stage, here)
     folder = job(here, tmp_path)
-    key = folder.job.part_key(Task(0, 0), MACHINE)
+    key = folder.job.tile_key(Task(0, 0), MACHINE)
     assert refresh(folder, with_files(folder.job)) == 0
     with here.open("ab") as file:
         file.write(b"\0")
     assert refresh(folder, with_files(folder.job)) == 1
-    assert Folder(folder.path).job.part_key(Task(0, 0), MACHINE) != key
+    assert Folder(folder.path).job.tile_key(Task(0, 0), MACHINE) != key
 
 
 # ---- parts ---------------------------------------------------------------------------------------
@@ -241,7 +241,7 @@ def test_a_tile_holds_its_own_pixels(stage: Path, tmp_path: Path) -> None:
     folder = job(stage, tmp_path, size=(400, 400), spp=1, tiles="4x4")
     task = Task(0, 5)
     Renderer(folder.job, threads=1).render(task, folder.part(task), MACHINE)
-    part = read_part(folder.part(task))
+    part = read_tile(folder.part(task))
     assert part.layers["beauty"].shape == (100, 100, 3)
     assert part.layers["samples"].dtype == np.uint32
     whole = wavecomb.render(stage, size=(400, 400), spp=1).stats["memory_bytes"]["film"]
@@ -268,19 +268,19 @@ def test_a_part_counts_only_if_it_is_right(stage: Path, tmp_path: Path) -> None:
     folder = job(stage, tmp_path)
     render_all(folder)
     task, tile = Task(0, 2), folder.job.rectangles(0)[2]
-    file, key = folder.part(task), folder.job.part_key(task, MACHINE)
-    assert load_part(file, key, tile).tile == tile
-    assert not has_part(file, folder.job.part_key(task, "another machine"), tile)
-    assert not has_part(file, key, tile, looks=3), "its border is too narrow"
+    file, key = folder.part(task), folder.job.tile_key(task, MACHINE)
+    assert load_tile(file, key, tile).tile == tile
+    assert not has_tile(file, folder.job.tile_key(task, "another machine"), tile)
+    assert not has_tile(file, key, tile, checks=3), "its border is too narrow"
     good = file.read_bytes()
     for what, data in damages(good, folder.part(Task(0, 1)).read_bytes()).items():
         file.unlink(missing_ok=True)
         if data is not None:
             file.write_bytes(data)
-        assert not has_part(file, key, tile), what
-        with pytest.raises(DamagedPart):
-            load_part(file, key, tile)
-        assert finish_image(folder, 0, MACHINE) == {"again": [2], "looks": 0}, what
+        assert not has_tile(file, key, tile), what
+        with pytest.raises(InvalidTile):
+            load_tile(file, key, tile)
+        assert finish_image(folder, 0, MACHINE) == {"again": [2], "checks": 0}, what
         assert not (tmp_path / "a.exr").exists()
         assert status(folder).tasks_done == 5, what
     file.write_bytes(good)
@@ -292,13 +292,13 @@ def test_bits_of_a_part_that_flip_anywhere_are_found(stage: Path, tmp_path: Path
     folder = job(stage, tmp_path, size=(8, 8), spp=1, tiles="1x1")
     render_all(folder)
     file = folder.part(Task(0, 0))
-    good, first = file.read_bytes(), read_part(file)
+    good, first = file.read_bytes(), read_tile(file)
     found, steps = 0, range(0, len(good), max(1, len(good) // 200))
     for place in steps:
         file.write_bytes(good[:place] + bytes([good[place] ^ 0x10]) + good[place + 1 :])
         try:
-            part = read_part(file, (8, 8))
-        except DamagedPart:
+            part = read_tile(file, (8, 8))
+        except InvalidTile:
             found += 1
             continue
         if part.key != first.key:
@@ -348,13 +348,13 @@ def test_a_border_that_was_too_narrow(stage: Path, tmp_path: Path) -> None:
     """A border that was too narrow is detected and widened."""
     options = {"size": (64, 48), "spp": 48, "adaptive": 0.03}
     folder = job(stage, tmp_path, **options)
-    render_all(folder, looks=1)
-    parts = (read_part(folder.part(task)) for task in folder.job.tasks_of(0))
+    render_all(folder, checks=1)
+    parts = (read_tile(folder.part(task)) for task in folder.job.tasks_of(0))
     with pytest.raises(NarrowBorder, match="is wide enough for 1 error checks"):
         join(folder.job, 0, parts)
     found = finish_image(folder, 0, MACHINE)
-    assert found["again"] == list(range(6)) and found["looks"] > 5
-    render_all(folder, looks=found["looks"])
+    assert found["again"] == list(range(6)) and found["checks"] > 5
+    render_all(folder, checks=found["checks"])
     assert finish_image(folder, 0, MACHINE)["files"]
     wavecomb.render(stage, **options).save(tmp_path / "whole.exr")
     same(tmp_path / "a.exr", tmp_path / "whole.exr")

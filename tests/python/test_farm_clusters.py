@@ -20,7 +20,7 @@ from parts import needs
 
 from wavecomb import farm
 from wavecomb.errors import WavecombError
-from wavecomb.farm.clusters import parse_address, parse_where
+from wavecomb.farm.clusters import parse_address, parse_cluster
 from wavecomb.farm.folder import Folder
 
 pytestmark = needs("wavecomb._core", "distributed", "cryptography")
@@ -50,7 +50,7 @@ def one_process(stage: Path, place: Path, spp: int = 4) -> Path:
 )
 def test_addresses_that_are_open_to_others(text: str) -> None:
     with pytest.raises(WavecombError, match="is neither an address of this machine nor tls://"):
-        parse_where(f"dask:{text}")
+        parse_cluster(f"dask:{text}")
 
 
 def test_addresses() -> None:
@@ -70,8 +70,8 @@ def test_addresses() -> None:
         parse_address("tls://h:99999")
     assert parse_address("[::1]:8786") == "tcp://[::1]:8786"
     assert parse_address("localhost:8786") == "tcp://localhost:8786"
-    assert parse_where("dask:tls://farm:8786").address == "tls://farm:8786"
-    assert parse_where("slurm").workers == 4 and parse_where("slurm:9").workers == 9
+    assert parse_cluster("dask:tls://farm:8786").address == "tls://farm:8786"
+    assert parse_cluster("slurm").workers == 4 and parse_cluster("slurm:9").workers == 9
     for text in (
         "slurm:0",
         "slurm:x",
@@ -83,7 +83,7 @@ def test_addresses() -> None:
         "local:²",
     ):
         with pytest.raises(WavecombError, match=f"--on {text}: must be"):
-            parse_where(text)
+            parse_cluster(text)
 
 
 # ---- Dask ----------------------------------------------------------------------------------------
@@ -429,4 +429,4 @@ def test_slurm_that_refuses(stage: Path, tmp_path: Path, slurm: Path) -> None:
     assert done.returncode == 2 and "sbatch gave no job number: 'hello'" in done.stderr
     (slurm / "sbatch").unlink()
     done = forks.wavecomb(*words)
-    assert done.returncode == 2 and "the command sbatch is not here" in done.stderr
+    assert done.returncode == 2 and "the command sbatch is not installed" in done.stderr

@@ -184,7 +184,7 @@ def test_missing_files(stage: Path, tmp_path: Path) -> None:
         'def DomeLight "D" {\n asset inputs:texture:file = @gone.png@\n}\n'
     )
     words = ("farm", "submit", here, "-o", tmp_path / "a.exr", *SMALL, "--on", "none")
-    one_line(run(*words), "file gone.png is not there: /D.inputs:texture:file (--no-strict")
+    one_line(run(*words), "file gone.png does not exist: /D.inputs:texture:file (--no-strict")
     assert not (tmp_path / "a.farm").exists()
     assert run(*words, "--no-strict").returncode == 0
     done = run("farm", "task", tmp_path / "a.farm")

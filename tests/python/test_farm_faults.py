@@ -23,7 +23,7 @@ from parts import needs, not_here
 
 from wavecomb import farm
 from wavecomb.errors import WavecombError
-from wavecomb.farm.assemble import Outcome
+from wavecomb.farm.assembly import Outcome
 from wavecomb.farm.client import Run, _Batch
 from wavecomb.farm.clusters import Cluster
 from wavecomb.farm.folder import Folder
@@ -312,7 +312,7 @@ def test_a_full_disk_on_one_worker(stage: Path, tmp_path: Path) -> None:
         folder, Cluster(client, "--on x"), Outcome(16, 1), show=lambda out: None,
         warn=lambda line: None, is_stopped=lambda: False,
     )  # fmt: skip
-    run._machine, run._looks[0], run._missing[0] = "wavecomb-x", 0, set(range(16))
+    run._machine, run._checks[0], run._missing[0] = "wavecomb-x", 0, set(range(16))
     full = {"done": [], "failed": [], "full": "p.exr: cannot be written: No space left",
             "warnings": [], "seconds": 0.1, "worker": "one"}  # fmt: skip
     future = _Future(full)
@@ -321,11 +321,11 @@ def test_a_full_disk_on_one_worker(stage: Path, tmp_path: Path) -> None:
     run._fetch(future)
     run._take(*run._ended.get(timeout=1))
     assert [batch.tiles for batch in run._ready] == [[Task(0, 3)]] and not run._out.failed
-    run._look()
+    run._query_workers()
     assert run._capacity() == 1
     run._check()
     client.amounts["two"] = 0
-    run._next_look = 0.0
-    run._look()
+    run._next_query = 0.0
+    run._query_workers()
     with pytest.raises(WavecombError, match="No space left"):
         run._check()

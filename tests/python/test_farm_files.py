@@ -99,7 +99,7 @@ def test_all_files_are_listed(folder: Path) -> None:
         assert one.sha256 == hashlib.sha256(data).hexdigest()
     missing = " ".join(lacking)
     assert len(lacking) == 3, missing
-    for name in ("gone.png is not there: /V/A.inputs:file", "nowhere.usda", "nowhere.mtlx"):
+    for name in ("gone.png does not exist: /V/A.inputs:file", "nowhere.usda", "nowhere.mtlx"):
         assert name in missing
 
 

@@ -17,7 +17,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.run.frame_names import fill, frame_text, has_place, parse_frames
 from wavecomb.run.sequence import Frames
 from wavecomb.usd import LoadReport, load_stage, open_stage
-from wavecomb.usd.stage.frame_cache import FrameCache, Varying
+from wavecomb.usd.stage.frame_cache import AnimatedAttributes, FrameCache
 
 SMALL = {"size": (24, 24), "spp": 1}
 
@@ -219,7 +219,7 @@ def test_each_frame_is_what_it_is_alone(shot, vary):
 @pytest.mark.parametrize("vary", CHANGES)
 def test_what_only_moves_views(shot, vary):
     vary(shot)
-    assert Varying(shot).is_view_only == (
+    assert AnimatedAttributes(shot).is_view_only == (
         vary in (vary_camera, vary_lens, vary_near_surfaces, vary_nothing)
     )
 
@@ -227,7 +227,7 @@ def test_what_only_moves_views(shot, vary):
 def test_a_camera_that_carries_something_is_no_view_only(shot):
     vary_camera(shot)
     cube(shot, "/World/Rig/Flag", 0, (1, 1, 1))
-    assert not Varying(shot).is_view_only
+    assert not AnimatedAttributes(shot).is_view_only
 
 
 def test_what_a_shader_reads_of_a_rig_is_no_view_only(shot):
@@ -236,7 +236,7 @@ def test_what_a_shader_reads_of_a_rig_is_no_view_only(shot):
     shader.CreateAttribute("inputs:roughness", Sdf.ValueTypeNames.Float).SetConnections(
         [Sdf.Path("/World/Rig/Camera.focalLength")]
     )
-    assert not Varying(shot).is_view_only
+    assert not AnimatedAttributes(shot).is_view_only
 
 
 def test_arrays_that_do_not_change_are_shared(shot):
@@ -327,7 +327,7 @@ def test_value_clips(tmp_path):
     api.SetClipTimes([(1, 1), (4, 4)])
     stage.Save()
     path = tmp_path / "clips.usda"
-    assert not Varying(open_stage(path)).is_view_only
+    assert not AnimatedAttributes(open_stage(path)).is_view_only
     tops = []
     for frame in (1, 2, 3, 4):
         scene = load_stage(path, frame=frame, builder_factory=Recorder).scene

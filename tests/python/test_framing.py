@@ -8,10 +8,10 @@ import pytest
 from pxr import Gf, Usd, UsdGeom
 
 import wavecomb
-from wavecomb.picture.output import camera_window
+from wavecomb.image.files.render_output import camera_window
 from wavecomb.usd.cameras import framing
 from wavecomb.usd.cameras.camera import Lens, frame_points
-from wavecomb.usd.stage.group import Group
+from wavecomb.usd.instances.group import Group
 
 SIZES = [(120, 120), (208, 117), (117, 208), (300, 75)]
 

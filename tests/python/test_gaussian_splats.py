@@ -18,7 +18,7 @@ from usd_recorder import Recorder, said
 import wavecomb
 from wavecomb import _core
 from wavecomb.cli import main
-from wavecomb.picture.image import linear_from_srgb
+from wavecomb.image.files.image import linear_from_srgb
 from wavecomb.scenes import write_scene
 from wavecomb.scenes.splats import basis, linear_harmonics
 from wavecomb.usd import load_stage

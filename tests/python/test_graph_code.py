@@ -11,7 +11,7 @@ from graph_reference import FORMULAS, evaluate
 
 from wavecomb import _core
 from wavecomb.usd.graphs import values
-from wavecomb.usd.graphs.surface import linear
+from wavecomb.usd.graphs.surface_parameters import linear
 from wavecomb.usd.graphs.values import (
     INPUTS,
     POINT_SIZE,

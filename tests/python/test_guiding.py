@@ -14,8 +14,8 @@ from stopping import StopAt
 
 import wavecomb
 from wavecomb.cli import main
-from wavecomb.picture.directions import density_map, map_directions
-from wavecomb.picture.image import read_image
+from wavecomb.image.directions import density_map, map_directions
+from wavecomb.image.files.image import read_image
 from wavecomb.scenes import write_scene
 
 _core = pytest.importorskip("wavecomb._core")

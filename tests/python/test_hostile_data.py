@@ -22,11 +22,11 @@ from test_usd_mtlx import GOLD, write
 import wavecomb
 from wavecomb import WavecombError
 from wavecomb.cli import main
-from wavecomb.picture.archive import ArchiveError, read_archive
-from wavecomb.picture.exr import write_exr
+from wavecomb.image.files.archive import ArchiveError, read_archive
+from wavecomb.image.files.exr import write_exr
 from wavecomb.run.checkpoint import load_checkpoint, save_checkpoint
-from wavecomb.scenes import meshfile
-from wavecomb.scenes.meshfile import load_dragon
+from wavecomb.scenes.models import mesh_file
+from wavecomb.scenes.models.mesh_file import load_dragon
 from wavecomb.usd import load_stage
 from wavecomb.usd.lights.ies import IesTable
 from wavecomb.usd.materialx.files import MtlxError, read_document
@@ -110,7 +110,7 @@ def test_archives_that_are_no_checkpoints(stage: Path, tmp_path: Path, kind: str
     file = tmp_path / "a.ckpt"
     ARCHIVES[kind](file)
     out = tmp_path / "o.exr"
-    says("a.ckpt: is no checkpoint, or is damaged", "render", stage, "-o", out, "--resume", file)
+    says("a.ckpt: is not a checkpoint, or is damaged", "render", stage, "-o", out, "--resume", file)
     says("exists and is not a checkpoint", "render", stage, "-o", out, "--checkpoint", file)
     assert os.listdir(tmp_path) == ["a.ckpt"]
 
@@ -121,8 +121,16 @@ def test_archives_that_are_no_checkpoints(stage: Path, tmp_path: Path, kind: str
     [
         # It would decompress to 128 MB, and otherwise be a valid archive.
         ({"header": text("{}"), "a": npy(np.zeros(1 << 24))}, zipfile.ZIP_DEFLATED, "compressed"),
-        ({"header": text("{}"), "a": lying_npy("(1000,)")}, zipfile.ZIP_STORED, "holds more than"),
-        ({"header": text("{}"), "a": lying_npy("(-1,)", b"1")}, zipfile.ZIP_STORED, "holds more"),
+        (
+            {"header": text("{}"), "a": lying_npy("(1000,)")},
+            zipfile.ZIP_STORED,
+            "declares more data than",
+        ),
+        (
+            {"header": text("{}"), "a": lying_npy("(-1,)", b"1")},
+            zipfile.ZIP_STORED,
+            "declares more",
+        ),
     ],
 )
 def test_archives_are_looked_at_before_they_are_read(
@@ -156,7 +164,7 @@ def test_parts_that_overlap(whole: Path, tmp_path: Path) -> None:
             target.filelist.append(again)
             target.NameToInfo[again.filename] = again
         target._didModify = True
-    with pytest.raises(WavecombError, match="is no checkpoint, or is damaged"):
+    with pytest.raises(WavecombError, match="is not a checkpoint, or is damaged"):
         load_checkpoint(file)
 
 
@@ -228,12 +236,12 @@ def exr(
 @pytest.mark.parametrize(
     ("attributes", "words"),
     [
-        ({"wavecomb__settings": "[" * DEEP}, "does not say what settings"),
-        ({"wavecomb__settings": "[1]"}, "does not say what settings"),
+        ({"wavecomb__settings": "[" * DEEP}, "has no render settings"),
+        ({"wavecomb__settings": "[1]"}, "has no render settings"),
         ({"wavecomb__settings": json.dumps({"width": 1 << 40, "height": 4, "seed": 1})}, "width"),
-        ({"wavecomb__seeds": "[" * DEEP}, "does not say what settings"),
-        ({"wavecomb__seeds": "{}"}, "does not say what settings"),
-        ({"wavecomb__seeds": "[1e999]"}, "does not say what settings"),
+        ({"wavecomb__seeds": "[" * DEEP}, "has no render settings"),
+        ({"wavecomb__seeds": "{}"}, "has no render settings"),
+        ({"wavecomb__seeds": "[1e999]"}, "has no render settings"),
         ({"layers": {"beauty": (4, 4, 3), "samples": (4, 4, 3)}}, "layer samples is 4 x 4 with 3"),
         ({"layers": {"beauty": (4, 1, 3), "samples": (4, 1, 1)}}, "layer beauty is 1 x 4"),
         (
@@ -316,10 +324,10 @@ def test_profiles_that_lie(tmp_path: Path) -> None:
     assert len(report.warnings) == 5
     lines = [finding.line() for finding in report.warnings]
     for words in (
-        "it says that it has 31623 x 31623 values",
-        "it says that it has 1e+09 vertical angles",
-        "it says that it has 1e+09 tilt angles",
-        "no regular file",
+        "it declares 31623 x 31623 values",
+        "it declares 1e+09 vertical angles",
+        "it declares 1e+09 tilt angles",
+        "not a regular file",
     ):
         assert any(words in line for line in lines), lines
     assert time.process_time() - start < SOON_S
@@ -407,7 +415,7 @@ def test_a_mesh_without_properties(tmp_path: Path) -> None:
 
 
 def test_a_mesh_that_unpacks_without_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(meshfile, "MAX_UNPACKED", 1 << 20)
+    monkeypatch.setattr(mesh_file, "MAX_UNPACKED", 1 << 20)
     file = tmp_path / "a.obj.gz"
     file.write_bytes(gzip.compress(bytes(1 << 24)))
     with pytest.raises(WavecombError, match=r"a\.obj\.gz.* unpacks to more than 1 MB"):

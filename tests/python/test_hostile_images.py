@@ -15,8 +15,8 @@ import OpenImageIO as oiio
 import pytest
 from parts import only_where
 
-from wavecomb.usd.looks import pixels
-from wavecomb.usd.looks.pixels import TextureError, read_image
+from wavecomb.usd.materials import pixels
+from wavecomb.usd.materials.pixels import TextureError, read_image
 
 WIDTH, HEIGHT = 70, 150
 
@@ -111,7 +111,7 @@ def test_a_decoder_that_crashes_leaves_nothing(tmp_path: Path) -> None:
     path = package(tmp_path / "p.usdz", "a.png", (tmp_path / "a.png").read_bytes())
     code = (
         "import os, signal, sys, OpenImageIO as oiio\n"
-        "from wavecomb.usd.looks import pixels\n"
+        "from wavecomb.usd.materials import pixels\n"
         "oiio.ImageInput.open = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
         "pixels.read_image(sys.argv[1])"
     )

@@ -12,9 +12,9 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
-from wavecomb.picture import image
-from wavecomb.picture.files import check_writable, replacing
-from wavecomb.picture.private_folder import remove_abandoned
+from wavecomb.image.files import image
+from wavecomb.image.files.output_file import check_writable, replacing
+from wavecomb.image.files.private_folder import remove_abandoned
 
 
 @pytest.fixture
@@ -199,7 +199,8 @@ def test_links_are_followed(tmp_path: Path) -> None:
 def test_an_abandoned_folder_is_removed(tmp_path: Path) -> None:
     """The temporary folder of a killed process is not locked, so it can be removed."""
     code = (
-        "import os, sys; from pathlib import Path; from wavecomb.picture.files import replacing\n"
+        "import os, sys; from pathlib import Path\n"
+        "from wavecomb.image.files.output_file import replacing\n"
         "with replacing(sys.argv[1]) as part:\n"
         "    part.write_text('cut off'); os.kill(os.getpid(), 9)"
     )

@@ -135,7 +135,7 @@ def test_nested_instances_hand_primvars_down(tmp_path):
 
 
 def test_too_many_looks_are_listed(tmp_path, monkeypatch):
-    monkeypatch.setattr("wavecomb.usd.stage.instance_looks.MOST_LOOKS", 3)
+    monkeypatch.setattr("wavecomb.usd.instances.instance_materials.MAX_VARIATIONS", 3)
     text = PROTO + "".join(instance(f"I{k}", k, wear(f"[0.{k + 1}]")) for k in range(5))
     scene, loaded = load(tmp_path, text)
     assert "primvars of instances in more than 3 ways" in said(loaded)

@@ -500,7 +500,7 @@ def test_what_volumes_miss_in_cloudy_glass_is_said(tmp_path: Path) -> None:
     from usd_recorder import load, said
 
     volume = 'def Volume "V" { float3[] extent = [(-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)] }\n'
-    what = "unseen by light that was scattered there"
+    what = "light scattered there ignores them"
     scene, loaded = load(tmp_path, LIQUID + volume)
     assert scene.volumes and f"{what}: /M" in said(loaded).replace(" at ", ": ")
     clear = LIQUID.replace("(0.1, 0.2, 0.3)", "(0, 0, 0)")

@@ -20,7 +20,7 @@ from parts import needs, not_here, only_where
 import wavecomb
 from wavecomb import isa
 from wavecomb.errors import WavecombError
-from wavecomb.picture.image import read_layers
+from wavecomb.image.files.image import read_layers
 
 V2, V3, V4 = "x86-64-v2", "x86-64-v3", "x86-64-v4"
 BUILT = list(isa.libraries(wavecomb.__path__))
@@ -90,7 +90,7 @@ def test_import_of_one_library_is_left_alone(
 ) -> None:
     monkeypatch.delenv(isa.VARIABLE, raising=False)
     assert isa.Finder.find_spec(isa.CORE, [str(tmp_path)]) is None
-    assert isa.Finder.find_spec("wavecomb.picture.image", [str(tmp_path)]) is None
+    assert isa.Finder.find_spec("wavecomb.image.files.image", [str(tmp_path)]) is None
     monkeypatch.setenv(isa.VARIABLE, V3)
     with pytest.raises(WavecombError, match=r"x86-64-v3 was not built; this build has one library"):
         isa.Finder.find_spec(isa.CORE, [str(tmp_path)])

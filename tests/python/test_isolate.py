@@ -13,11 +13,13 @@ from pathlib import Path
 import pytest
 from parts import only_where
 
-from wavecomb.run.isolate import patience, trail
+from wavecomb.run.isolation import progress_notes, time_limit
 
 pytestmark = only_where(sys.platform == "linux", "isolation is for Linux")
 
-SUPERVISED = "from wavecomb.run.isolate import supervisor, trail; supervisor.supervise()\n"
+SUPERVISED = (
+    "from wavecomb.run.isolation import progress_notes, supervisor; supervisor.supervise()\n"
+)
 
 GOOD = '#usda 1.0\ndef Sphere "Ball" {}\n'
 
@@ -66,7 +68,7 @@ def test_exit_codes_and_streams_pass_through(code: int) -> None:
     ],
 )
 def test_a_crash_is_one_line_and_code_2(deed: str, words: str) -> None:
-    code, out, err = finished(f"trail.note('reading', '/A')\n{deed}")
+    code, out, err = finished(f"progress_notes.note('reading', '/A')\n{deed}")
     assert (code, out) == (2, "")
     assert err.startswith("error: ") and err.count("\n") == 1
     assert words in err and "/A" in err
@@ -167,8 +169,8 @@ def test_the_command_says_where_usd_crashed(tmp_path: Path) -> None:
 
 def test_an_image_library_that_crashes_is_named_with_its_file(tmp_path: Path) -> None:
     code = (
-        "trail.note('reading', '/A')\n"
-        "trail.note('decoding', 'sky.exr', 'image')\n"
+        "progress_notes.note('reading', '/A')\n"
+        "progress_notes.note('decoding', 'sky.exr', 'image')\n"
         "import os; os.abort()"
     )
     _, _, err = finished(code)
@@ -189,20 +191,20 @@ def test_composition_without_end(tmp_path: Path) -> None:
 
 
 def test_limit_follows_the_layers() -> None:
-    assert patience.allowed_s(0) == patience.BASE_S
-    assert patience.allowed_s(10 * patience.BYTES_PER_S) == patience.BASE_S + 10
+    assert time_limit.allowed_s(0) == time_limit.BASE_S
+    assert time_limit.allowed_s(10 * time_limit.BYTES_PER_S) == time_limit.BASE_S + 10
 
 
 def test_notes_cost_nothing_without_a_parent(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert not trail.is_expendable()
-    trail.note("reading", "/A")
-    page = trail.new_page()
+    assert not progress_notes.is_expendable()
+    progress_notes.note("reading", "/A")
+    page = progress_notes.new_page()
     try:
-        assert trail.read(trail.open_page(page)) == ""
-        monkeypatch.setattr(trail, "_page", trail.open_page(page))
-        trail.note("reading", "/" + "A" * 5000)
-        trail.note("decoding", "b.png", "image")
-        text = trail.read(trail.open_page(page))
+        assert progress_notes.read(progress_notes.open_page(page)) == ""
+        monkeypatch.setattr(progress_notes, "_page", progress_notes.open_page(page))
+        progress_notes.note("reading", "/" + "A" * 5000)
+        progress_notes.note("decoding", "b.png", "image")
+        text = progress_notes.read(progress_notes.open_page(page))
         assert text.startswith("reading /AAA") and text.endswith(", decoding b.png")
     finally:
         os.close(page)

@@ -18,7 +18,7 @@ import pytest
 from parts import needs
 from test_texture_limit import MOVING_CAMERA, textured, write_image
 
-from wavecomb.picture.image import read_layers
+from wavecomb.image.files.image import read_layers
 from wavecomb.run.checkpoint import load_checkpoint
 
 pytestmark = needs("wavecomb._core")

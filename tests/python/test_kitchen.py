@@ -10,7 +10,7 @@ import pytest
 from pxr import Usd, UsdGeom, UsdShade
 
 from wavecomb.scenes import write_scene
-from wavecomb.scenes.kitchen_looks import LOOKS
+from wavecomb.scenes.rooms.kitchen_materials import MATERIALS
 
 TOP = 0.92
 
@@ -70,11 +70,12 @@ def test_most_materials_are_glossy_and_all_are_worn(kitchen: Usd.Stage) -> None:
         for prim in kitchen.Traverse(Usd.TraverseInstanceProxies())
         if prim.IsA(UsdGeom.Mesh)
     }
-    unworn = set(LOOKS) - worn
+    unworn = set(MATERIALS) - worn
     assert not unworn
     glossy = [
         name for name in worn
-        if "roughness" in LOOKS[name].textures or float(LOOKS[name].inputs["roughness"]) <= 0.46
+        if "roughness" in MATERIALS[name].textures
+        or float(MATERIALS[name].inputs["roughness"]) <= 0.46
     ]  # fmt: skip
     assert len(glossy) >= 25
 

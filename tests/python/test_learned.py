@@ -14,8 +14,8 @@ from click.testing import CliRunner
 import wavecomb
 from wavecomb.cli import main
 from wavecomb.errors import WavecombError
-from wavecomb.picture.image import read_image
-from wavecomb.run.learned import load_learned, save_learned
+from wavecomb.image.files.image import read_image
+from wavecomb.run.guiding_file import load_learned, save_learned
 from wavecomb.scenes import write_scene
 
 pytest.importorskip("wavecomb._core")
@@ -107,7 +107,7 @@ def test_what_is_no_good_ends_in_a_line(
     done = run("render", stage, "-o", out, "--guiding", "on", "--learn-from", tmp_path / "gone")
     assert done.exit_code == 2 and "no such file" in done.output and not out.exists()
     done = run("render", stage, "-o", out, "--guiding", "on", "--learn-from", "before")
-    assert done.exit_code == 2 and "give --frames, too" in done.output
+    assert done.exit_code == 2 and "also give --frames" in done.output
     done = run("render", stage, "-o", out, "--learn-to", tmp_path / "b.learned")
     assert done.exit_code == 2 and "this render trains no guiding field" in done.output
 

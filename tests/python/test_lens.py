@@ -14,7 +14,7 @@ from usd_recorder import load, said, write
 
 import wavecomb
 from wavecomb.cli import main
-from wavecomb.picture.exr import write_exr
+from wavecomb.image.files.exr import write_exr
 
 SIZE = (64, 48)
 CAMERA = """#usda 1.0

@@ -308,7 +308,7 @@ def test_what_is_not_done_is_listed(tmp_path):
         "round corners of light barns (square)",
         "light filters of dome lights",
     ]
-    assert "light filter /Gone is not there" in said(loaded)
+    assert "light filter /Gone does not exist" in said(loaded)
 
 
 def test_filters_are_placed_with_their_lights(tmp_path):

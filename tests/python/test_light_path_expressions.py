@@ -13,7 +13,7 @@ from usd_recorder import load, write
 
 import wavecomb
 from wavecomb.cli import main
-from wavecomb.picture.image import read_layers
+from wavecomb.image.files.image import read_layers
 from wavecomb.run import expressions
 
 _core = pytest.importorskip("wavecomb._core")

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 import wavecomb
 from wavecomb.cli import main
-from wavecomb.picture.image import read_image
+from wavecomb.image.files.image import read_image
 from wavecomb.scenes import write_scene
 
 _core = pytest.importorskip("wavecomb._core")

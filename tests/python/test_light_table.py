@@ -208,7 +208,7 @@ def test_an_added_row_is_in_the_stub(with_rows: None) -> None:
 
 def test_an_added_row_is_read_from_a_stage_and_is_a_field(with_rows: None) -> None:
     from wavecomb.gui.scene.light_inputs import inputs_of, light_inputs
-    from wavecomb.usd.looks.parameters import light_values
+    from wavecomb.usd.materials.parameters import light_values
 
     stage = Usd.Stage.CreateInMemory()
     prim = UsdLux.DiskLight.Define(stage, "/D").GetPrim()

@@ -84,7 +84,7 @@ def test_what_was_chosen_before_is_kept() -> None:
      ("frame", float("nan"))],
 )  # fmt: skip
 def test_damaged_files_are_refused(key: str, value: Any) -> None:
-    with pytest.raises(WavecombError, match=f"the checkpoint's {key} is no good"):
+    with pytest.raises(WavecombError, match=f"the checkpoint's {key} is invalid"):
         StageOptions(run()["values"]).completed({key: value})
 
 

@@ -20,12 +20,12 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 from usd_recorder import Recorder
 
 import wavecomb
-from wavecomb.picture.image import write_png
+from wavecomb.image.files.image import write_png
 from wavecomb.usd import load_stage
 from wavecomb.usd.geometry.primvar import authored_names
 from wavecomb.usd.geometry.shapes import read_shape
-from wavecomb.usd.looks import pixels
-from wavecomb.usd.looks.pixels import Image, ReadAhead, TextureError, is_finite
+from wavecomb.usd.materials import pixels
+from wavecomb.usd.materials.pixels import Image, ReadAhead, TextureError, is_finite
 
 LINUX = only_where(sys.platform == "linux", "reads /proc")
 
@@ -300,7 +300,7 @@ from wavecomb import _core, api
 from wavecomb.run.settings import make_settings
 from wavecomb.cli.reporting import make_reporter
 from wavecomb.run.progress import Interrupt
-from wavecomb.run.watcher import Watcher
+from wavecomb.run.callbacks import Watcher
 loaded = api.load(sys.argv[1])
 with Interrupt(), make_reporter(None, quiet=False).rendering() as bar:
     _core.render(loaded.scene, make_settings((8, 8), 1), watcher=Watcher(reporter=bar))

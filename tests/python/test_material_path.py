@@ -13,8 +13,8 @@ from usd_recorder import QUAD, load
 import wavecomb
 import wavecomb.usd.materialx.nodes.network
 import wavecomb.usd.materialx.surfaces.openpbr
-from wavecomb.usd.looks.assign import Assigner
-from wavecomb.usd.looks.material import MaterialTable
+from wavecomb.usd.materials.assignment import Assigner
+from wavecomb.usd.materials.material import MaterialTable
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = Path(wavecomb.__file__).parent

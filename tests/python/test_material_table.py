@@ -19,8 +19,8 @@ from wavecomb.material_table import (
     preview_programs,
     programs,
 )
-from wavecomb.usd.looks.parameters import material_parameters as traced_parameters
-from wavecomb.usd.looks.preview import INPUTS, PreviewReader
+from wavecomb.usd.materials.parameters import material_parameters as traced_parameters
+from wavecomb.usd.materials.preview_surface import INPUTS, PreviewReader
 from wavecomb.usd.stage.report import LoadReport
 
 ROOT = Path(__file__).parents[2]

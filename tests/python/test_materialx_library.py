@@ -16,8 +16,8 @@ import pytest
 from materialx_nodes import Node, patterns, points, run
 
 from wavecomb.usd.materialx.library import WIDTHS, definition_of, flat_graph, library
-from wavecomb.usd.materialx.nodes.body import Body
 from wavecomb.usd.materialx.nodes.network import PER_COMPONENT, primitive, support_of
+from wavecomb.usd.materialx.nodes.node_graphs import ExpandedGraph
 from wavecomb.usd.materialx.nodes.table import CATEGORIES
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "material-graphs.md"
@@ -113,7 +113,7 @@ def test_what_is_written_here_is_the_library_s_graph(identifier):
     for output in patterns()[identifier]:
         ours = node.value(output)
         graph = flat_graph(identifier, CATEGORIES)
-        theirs = Body(node.call(output), graph).output(output)
+        theirs = ExpandedGraph(node.call(output), graph).output(output)
         if ours == theirs:  # identical value graphs
             continue
         assert np.array_equal(run(ours, at), run(theirs, at), equal_nan=True), output

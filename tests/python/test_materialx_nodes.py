@@ -11,7 +11,7 @@ from graph_reference import perlin
 from materialx_nodes import Node, points, run
 from pxr import Gf, Sdf, UsdShade
 
-from wavecomb.usd.graphs.surface import plain_use
+from wavecomb.usd.graphs.surface_parameters import plain_use
 from wavecomb.usd.materialx.nodes import images
 
 AT = points()
@@ -145,7 +145,7 @@ def test_blackbody_is_a_colour_of_the_working_space():
     node = Node("ND_blackbody").give(temperature="3000")
     node.textures.working = "acescg"
     there = node.networks.in_working_space().node(node.shader, "out", "colour")
-    from wavecomb.picture.working_space import from_rec709
+    from wavecomb.image.working_space import from_rec709
 
     rec709 = node.run(AT[:1])
     assert np.allclose(run(there, AT[:1]), from_rec709(rec709, "acescg"), atol=1e-5)

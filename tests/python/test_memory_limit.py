@@ -18,7 +18,7 @@ from pxr import Usd, UsdGeom, Vt
 
 import wavecomb
 from wavecomb import WavecombError
-from wavecomb.run.isolate import memory
+from wavecomb.run.isolation import memory
 
 pytestmark = only_where(sys.platform == "linux", "the limit is Linux's")
 
@@ -144,13 +144,13 @@ def test_the_machine_s_limit_is_that_of_its_group(
 
 
 def test_a_damaged_value_is_not_taken_for_a_bomb(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(memory.trail, "is_expendable", lambda: True)
+    monkeypatch.setattr(memory.progress_notes, "is_expendable", lambda: True)
     monkeypatch.setattr(resource, "getrlimit", lambda _: (10**10, 10**10))
     error = ValueError("exception thrown unpacking a value, returning an empty VtValue")
-    assert not memory.ran_out(error, lambda: 100_000)
-    assert memory.ran_out(error, lambda: 2_000_000)
-    assert not memory.ran_out(ValueError("other"), lambda: 2_000_000)
-    assert memory.ran_out(MemoryError(), int)
+    assert not memory.is_exhausted(error, lambda: 100_000)
+    assert memory.is_exhausted(error, lambda: 2_000_000)
+    assert not memory.is_exhausted(ValueError("other"), lambda: 2_000_000)
+    assert memory.is_exhausted(MemoryError(), int)
 
 
 def test_meshes_that_cannot_fit_are_told_before_they_are_read(
@@ -164,6 +164,6 @@ def test_meshes_that_cannot_fit_are_told_before_they_are_read(
     stage.Save()
     file = tmp_path / "large.usdc"
     wavecomb.load(file)
-    monkeypatch.setattr(memory, "room", lambda: 1_000_000)
+    monkeypatch.setattr(memory, "available_bytes", lambda: 1_000_000)
     with pytest.raises(WavecombError, match=r"large.usdc: .*100,000 points .* 2 MB where 1 MB"):
         wavecomb.load(file)

@@ -15,9 +15,9 @@ from click.testing import CliRunner
 import wavecomb
 from wavecomb.cli import main
 from wavecomb.errors import WavecombError
-from wavecomb.picture import cryptomatte
-from wavecomb.picture.image import read_layers, read_metadata, write_exr
-from wavecomb.picture.merge import merge
+from wavecomb.image import cryptomatte
+from wavecomb.image.files.image import read_layers, read_metadata, write_exr
+from wavecomb.image.merge import merge
 
 _core = pytest.importorskip("wavecomb._core")
 
@@ -214,8 +214,8 @@ def drop_samples(metadata: dict[str, Any], layers: dict[str, Any]) -> None:
         (change({"alpha": True}), "b.exr: alpha is True, that of "),
         (set_("wavecomb:stage", "other.usd"), "b.exr: the stage is other.usd, that of "),
         (set_("wavecomb:scene", "0123"), "b.exr: its stage is not that of "),
-        (drop_settings, "b.exr: does not say what settings made it"),
-        (drop_layer, "b.exr: has no layer albedo, which the other picture has"),
+        (drop_settings, "b.exr: has no render settings"),
+        (drop_layer, "b.exr: has no layer albedo, which the other image has"),
         (drop_samples, "b.exr: has no layer samples, which merging needs"),
     ],
 )
@@ -260,7 +260,7 @@ def test_files_are_kept_from_harm(files: list[Path]) -> None:
     before = files[0].read_bytes()
     for arguments, message in (
         ([*map(str, files), "-o", str(files[0])], "is one of the pictures"),
-        ([str(files[0]), "-o", "out.exr"], "two pictures or more"),
+        ([str(files[0]), "-o", "out.exr"], "at least two images"),
         ([*map(str, files), "-o", "out.png"], "must end in .exr"),
         ([str(files[0])] * 2 + ["-o", "out.exr"], "has seed 1, as "),
     ):

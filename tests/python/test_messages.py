@@ -18,8 +18,8 @@ pytest.importorskip("wavecomb._core")
 import wavecomb
 from wavecomb.cli.group import SYNONYMS
 from wavecomb.errors import WavecombError
-from wavecomb.picture import files
-from wavecomb.picture.exr import write_exr
+from wavecomb.image.files import output_file
+from wavecomb.image.files.exr import write_exr
 
 STAGE = '#usda 1.0\ndef Sphere "Ball" {}\n'
 
@@ -41,7 +41,7 @@ def refused(done: subprocess.CompletedProcess[str], *said: str) -> None:
         (("--size", "0", "10"), "size 0 x 10"),
         (("--wave-size", "3"), "wave_size"),
         (("-o", "a.jpg"), "a.jpg: the name must end in .exr"),
-        (("-o", "gone/a.exr"), "gone"),
+        (("-o", "/proc/gone/a.exr"), "/proc/gone/a.exr: cannot be written"),
         (("--png", "b.exr"), "b.exr: the name must end in .png"),
     ],
 )
@@ -184,7 +184,7 @@ def Mesh "Plain" {
 @pytest.mark.parametrize(
     ("folder", "said"),
     [("./", "no tile wood.<UDIM>.png is in the folder {0}"),
-     ("./tex/", "the folder of its tiles, {0}/tex, is not there")],
+     ("./tex/", "the folder of its tiles, {0}/tex, does not exist")],
 )  # fmt: skip
 def test_messages_about_stages_name_folders_and_counts(
     tmp_path: Path, folder: str, said: str
@@ -206,8 +206,8 @@ signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
 import numpy as np
 from wavecomb.errors import WavecombError
-from wavecomb.picture.exr import write_exr
-from wavecomb.picture.image import write_png
+from wavecomb.image.files.exr import write_exr
+from wavecomb.image.files.image import write_png
 noise = np.random.default_rng(1).random((300, 300, 3), np.float32)
 for write, name in ((lambda: write_exr(sys.argv[1] + "/a.exr", {"beauty": noise}), "a.exr"),
                     (lambda: write_png(sys.argv[1] + "/a.png", noise), "a.png")):
@@ -232,7 +232,7 @@ def test_a_file_that_the_system_cuts_short_says_why(tmp_path: Path) -> None:
 def test_a_full_disk_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Writes to ``/dev/full`` fail as on a full disk."""
     part: Any = "/dev/full"
-    assert files.why_not_written(part, "Write error").startswith("the disk is full")
+    assert output_file.why_not_written(part, "Write error").startswith("the disk is full")
     good = tmp_path / "a"
     good.write_bytes(b"")
-    assert files.why_not_written(good, "Write error") == "Write error"
+    assert output_file.why_not_written(good, "Write error") == "Write error"

@@ -9,7 +9,7 @@ from usd_recorder import QUAD, Recorder, load, said, write
 import wavecomb
 from wavecomb.cli import main
 from wavecomb.errors import WavecombError
-from wavecomb.picture.image import read_layers
+from wavecomb.image.files.image import read_layers
 from wavecomb.usd import load_stage
 
 HEADER = """#usda 1.0

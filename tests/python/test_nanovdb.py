@@ -188,10 +188,10 @@ def test_more_than_there_is_room_for_is_one_line(
     made = noise(1)
     made["boxes"] = [((0, 0, 0), (1023, 1023, 1023), 0.5)]
     nvdb.write(path, [{"name": "density", **made}])
-    monkeypatch.setattr("wavecomb.run.isolate.memory.room", lambda: 4_000_000_000)
+    monkeypatch.setattr("wavecomb.run.isolation.memory.available_bytes", lambda: 4_000_000_000)
     with pytest.raises(WavecombError, match=r"107\d million voxels take 4.3 GB; there is room for"):
         read_all(path)
-    monkeypatch.setattr("wavecomb.run.isolate.memory.room", lambda: 1000)
+    monkeypatch.setattr("wavecomb.run.isolation.memory.available_bytes", lambda: 1000)
     with pytest.raises(WavecombError, match=r"the grid takes 0\.0 GB; there is room for"):
         read_all(path)
 

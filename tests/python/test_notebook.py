@@ -20,10 +20,10 @@ from parts import needs
 import wavecomb
 from wavecomb import window
 from wavecomb.errors import WavecombError
-from wavecomb.picture.embedded import encoded, smaller
-from wavecomb.picture.image import display, read_codes
-from wavecomb.picture.rendered import Picture
-from wavecomb.run import live
+from wavecomb.image.embedded import encode_image, shrink
+from wavecomb.image.files.image import display, read_codes
+from wavecomb.image.rendered import Picture
+from wavecomb.run import live_view
 
 
 def picture(width: int = 40, height: int = 24, **more: Any) -> Picture:
@@ -85,16 +85,16 @@ def test_it_says_what_it_is_in_a_line() -> None:
 def test_large_pictures_are_made_smaller() -> None:
     wide = np.zeros((10, 4001, 3), np.float32)
     wide[:, ::2] = 2.0
-    small = smaller(wide, 1600)
+    small = shrink(wide, 1600)
     assert small.shape == (3, 1333, 3)
     assert small.mean() == pytest.approx(1.0, rel=1e-3)
-    assert smaller(wide[:, :100], 1600).shape == (10, 100, 3)
-    assert smaller(np.ones((1, 5000, 3)), 100).shape == (1, 100, 3)
+    assert shrink(wide[:, :100], 1600).shape == (10, 100, 3)
+    assert shrink(np.ones((1, 5000, 3)), 100).shape == (1, 100, 3)
 
 
 def test_jpeg_is_close_and_small() -> None:
     codes = np.tile(np.linspace(0, 255, 256).astype(np.uint8)[None, :, None], (64, 1, 3))
-    jpeg = encoded(codes, "jpeg")
+    jpeg = encode_image(codes, "jpeg")
     assert jpeg[:2] == b"\xff\xd8" and len(jpeg) < codes.size / 8
 
 
@@ -121,7 +121,7 @@ def notebook(monkeypatch: pytest.MonkeyPatch) -> Handle:
     ipython.get_ipython = lambda: SimpleNamespace(kernel=object())  # type: ignore[attr-defined]
     for name, module in (("IPython", ipython), ("IPython.display", outputs), ("ipywidgets", None)):
         monkeypatch.setitem(sys.modules, name, module)
-    monkeypatch.setattr(live, "FIRST_S", 0.0)
+    monkeypatch.setattr(live_view, "FIRST_S", 0.0)
     return handle
 
 
@@ -166,8 +166,8 @@ def test_widgets_are_taken_where_they_are(
     widgets = SimpleNamespace(**dict.fromkeys(kinds, widget))
     monkeypatch.setitem(sys.modules, "ipywidgets", widgets)
     monkeypatch.setattr(sys.modules["IPython.display"], "display", lambda what: None)
-    view = live.make_view()
-    assert isinstance(view, live.Widgets)
+    view = live_view.make_view()
+    assert isinstance(view, live_view.WidgetView)
     view.bar(0.25, "25 %")
     view.picture(b"png")
     bar, text, image, _, everything = made
@@ -177,11 +177,11 @@ def test_widgets_are_taken_where_they_are(
 
 
 def test_no_notebook_no_progress(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert not live.in_notebook()
-    with live.watching(None) as shown:
+    assert not live_view.in_notebook()
+    with live_view.watching(None) as shown:
         assert shown is None
-    monkeypatch.setattr(live, "progress_console", lambda: None)
-    with live.watching(True) as shown:
+    monkeypatch.setattr(live_view, "progress_console", lambda: None)
+    with live_view.watching(True) as shown:
         assert shown is None
 
 

@@ -13,11 +13,11 @@ from click.testing import CliRunner
 
 from wavecomb.cli import compare as command
 from wavecomb.cli import main
-from wavecomb.picture.compare import compare, trimmed_mean
-from wavecomb.picture.heatmap import KINDS
-from wavecomb.picture.image import linear_from_srgb, write_exr
-from wavecomb.picture.perceptual import METRICS, flip, measure, psnr, ssim
-from wavecomb.picture.ztest import sidak, z_test
+from wavecomb.image.compare.comparison import compare, trimmed_mean
+from wavecomb.image.compare.heatmap import KINDS
+from wavecomb.image.compare.perceptual import METRICS, flip, measure, psnr, ssim
+from wavecomb.image.compare.z_test import sidak, z_test
+from wavecomb.image.files.image import linear_from_srgb, write_exr
 
 RNG = np.random.default_rng
 
@@ -139,7 +139,7 @@ def test_what_metrics_refuse() -> None:
         ssim(small, small)
     with pytest.raises(ValueError, match="black"):
         flip(small + 1, small, high_range=True)
-    with pytest.raises(ValueError, match="one size"):
+    with pytest.raises(ValueError, match="same size"):
         flip(small, picture())
 
 
@@ -247,7 +247,7 @@ def test_the_command_offers_what_there_is() -> None:
 
 @pytest.mark.parametrize("kind", [*KINDS, "z"])
 def test_command_maps(files: dict[str, str], tmp_path: Path, kind: str) -> None:
-    from wavecomb.picture.image import read_image
+    from wavecomb.image.files.image import read_image
 
     out = tmp_path / "map.png"
     extra = ("--variance-b", files["variance"])

@@ -12,10 +12,10 @@ from wavecomb.usd.geometry.mesh_arrays import (
     IDENTITY,
     MeshError,
     bake,
+    bake_and_triangulate,
     bake_normals,
     extent,
-    place,
-    plain,
+    transform_shape,
 )
 from wavecomb.usd.geometry.shapes import SHAPES, read_shape
 from wavecomb.usd.geometry.triangulate import triangulate
@@ -41,7 +41,7 @@ def test_the_short_way_gives_the_same_bits(size: int, count: int) -> None:
     counts = np.full(count, size, np.int32)
     indices = rng.integers(0, count, size * count).astype(np.int32)
     for matrix in matrices(rng):
-        found = plain(points, counts, indices, matrix)
+        found = bake_and_triangulate(points, counts, indices, matrix)
         assert found is not None
         positions, bounds, topology = found
         wanted = points if matrix == IDENTITY else bake(points, matrix)
@@ -78,7 +78,7 @@ SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
 )
 def test_anything_else_is_left_to_the_long_way(counts: list[int], indices: list[int]) -> None:
     faces = np.array(counts, np.int32), np.array(indices, np.int32)
-    assert plain(SQUARE, *faces, IDENTITY) is None
+    assert bake_and_triangulate(SQUARE, *faces, IDENTITY) is None
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1.1e18, -3e38])
@@ -87,9 +87,9 @@ def test_points_that_are_nowhere_are_left_to_it(value: float, axis: int) -> None
     points = SQUARE.copy()
     points[3, axis] = value  # no triangle uses this point
     faces = np.array([3], np.int32), np.array([0, 1, 2], np.int32)
-    assert plain(points, *faces, IDENTITY) is None
-    assert plain(SQUARE, *faces, IDENTITY) is not None
-    assert plain(SQUARE, *faces, Gf.Matrix4d(1e30)) is None
+    assert bake_and_triangulate(points, *faces, IDENTITY) is None
+    assert bake_and_triangulate(SQUARE, *faces, IDENTITY) is not None
+    assert bake_and_triangulate(SQUARE, *faces, Gf.Matrix4d(1e30)) is None
 
 
 def test_points_that_no_triangle_has() -> None:
@@ -108,7 +108,7 @@ def test_shapes_are_placed_with_the_bits_of_the_long_way(kind: str) -> None:
     assert shape is not None
     assert shape.positions.dtype == shape.normals.dtype == np.float32
     for matrix in matrices(np.random.default_rng(SEED)):
-        positions, normals, bounds = place(shape.positions, shape.normals, matrix)
+        positions, normals, bounds = transform_shape(shape.positions, shape.normals, matrix)
         wanted = bake(shape.positions, matrix)
         assert positions.tobytes() == wanted.tobytes()
         assert normals.tobytes() == bake_normals(shape.normals, matrix).tobytes()
@@ -117,5 +117,5 @@ def test_shapes_are_placed_with_the_bits_of_the_long_way(kind: str) -> None:
 
 def test_shapes_that_are_nowhere_say_so() -> None:
     far = Gf.Matrix4d().SetTranslate(Gf.Vec3d(0, 2e18, 0))
-    with pytest.raises(MeshError, match="absurdly far away"):
-        place(SQUARE, SQUARE, far)
+    with pytest.raises(MeshError, match="too far away"):
+        transform_shape(SQUARE, SQUARE, far)

@@ -14,7 +14,7 @@ from pxr import Sdf, Usd, UsdShade
 
 import wavecomb
 from wavecomb.scenes import SCENES, SceneError, write_scene
-from wavecomb.scenes import materials as looks
+from wavecomb.scenes.authoring import materials as looks
 
 SMALL = {"triangles": 12_000, "teapot_level": 4, "texture_size": 64, "texture_mb": 0.5}
 NOT_PLAIN = {

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from fake_core import install
 
 from wavecomb.cli import main
-from wavecomb.picture.image import read_image
+from wavecomb.image.files.image import read_image
 from wavecomb.run.progress import (
     Interrupt,
     ProgressBar,
@@ -74,7 +74,7 @@ def test_bar_says_all_of_it() -> None:
     with ProgressBar(console) as bar:
         bar.show(status(500, error=0.0312))
     shown = text.getvalue()
-    for part in ("50%", "pass 2", "250 samples/s", "1 k rays/s", "error 3.1 %", "2.0 s left"):
+    for part in ("50%", "pass 2", "250 samples/s", "1 k rays/s", "error 3.1 %", "2 s left"):
         assert part in shown, part
 
 
@@ -141,16 +141,19 @@ def test_samples_that_an_ending_asks_for(
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (["--min-spp", 4], "--min-spp is for adaptive renders: give --adaptive or --noise, too"),
-        (["--max-spp", 4], "--max-spp is for adaptive renders"),
+        (
+            ["--min-spp", 4],
+            "--min-spp applies to adaptive renders: also give --adaptive or --noise",
+        ),
+        (["--max-spp", 4], "--max-spp applies to adaptive renders"),
         (["--noise", 0.1, "--spp", 4, "--max-spp", 5], "--spp is 4 and --max-spp 5"),
         (["--noise", 0], "must be above 0"),
         (["--time-limit", -1], "must be above 0"),
-        (["--every", 5], "--every is for checkpoints: give --checkpoint or --resume, too"),
-        (["--preview-every", 5], "--preview-every is for previews: give --preview, too"),
+        (["--every", 5], "--every applies to checkpoints: also give --checkpoint or --resume"),
+        (["--preview-every", 5], "--preview-every applies to previews: also give --preview"),
         (["--preview", "a.exr"], "--preview a.exr: the name must end in .png"),
         (["--resume", "none.ckpt"], "none.ckpt: no such file"),
-        (["--checkpoint", "no/such/a.ckpt"], "does not exist"),
+        (["--checkpoint", "/proc/no/a.ckpt"], "cannot be written"),
     ],
 )
 def test_bad_options(

@@ -11,7 +11,7 @@ import pytest
 from parts import needs
 
 import wavecomb
-from wavecomb.picture.image import write_png, write_png_codes
+from wavecomb.image.files.image import write_png, write_png_codes
 
 pytestmark = needs("wavecomb._core")
 

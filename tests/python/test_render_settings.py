@@ -14,8 +14,8 @@ from usd_recorder import load, said, write
 
 import wavecomb
 from wavecomb.cli import main
-from wavecomb.picture.image import read_layers, read_metadata
-from wavecomb.usd.stage.render_settings import RenderChoice, aov_of, read_choices
+from wavecomb.image.files.image import read_layers, read_metadata
+from wavecomb.usd.render_settings.reader import ProductSettings, aov_of, read_product_settings
 from wavecomb.usd.stage.report import LoadReport
 
 WORLD = """
@@ -56,10 +56,14 @@ def stage_text(settings: str, *, folder: Path | str = "out") -> str:
     )
 
 
-def choices_of(tmp_path: Path, settings: str, **options) -> tuple[list[RenderChoice], LoadReport]:
+def choices_of(
+    tmp_path: Path, settings: str, **options
+) -> tuple[list[ProductSettings], LoadReport]:
     report = LoadReport()
     stage = Usd.Stage.Open(str(write(tmp_path, stage_text(settings))))
-    return read_choices(stage, options.get("wanted"), options.get("product"), report), report
+    return read_product_settings(
+        stage, options.get("wanted"), options.get("product"), report
+    ), report
 
 
 def run(*arguments) -> tuple[int, str]:
@@ -91,11 +95,11 @@ def test_what_is_no_good_is_named_and_left_out(tmp_path):
         'uniform token aspectRatioConformPolicy = "squeeze"\n'
         'uniform token[] includedPurposes = ["default", "odd"]',
     )
-    assert choice == RenderChoice(settings="/Render/S", purposes=("default",))
+    assert choice == ProductSettings(settings="/Render/S", purposes=("default",))
     lines = "\n".join(report.lines())
     for name in ("resolution", "pixelAspectRatio", "dataWindowNDC", "aspectRatioConformPolicy"):
         assert f"{name} of render settings is invalid: left out: /Render/S" in lines
-    assert "render settings name /Ball, which is no camera: /Render/S" in lines
+    assert "render settings name /Ball, which is not a camera: /Render/S" in lines
     assert "no purpose 'odd'" in lines
 
 
@@ -109,12 +113,12 @@ def test_what_is_no_good_is_named_and_left_out(tmp_path):
     ],
 )
 def test_data_windows(window, region):
-    assert RenderChoice(data_window=window).region(20, 10) == region
+    assert ProductSettings(data_window=window).region(20, 10) == region
 
 
 def test_data_window_without_a_pixel():
-    choice = RenderChoice("/Render/S", data_window=(0.01, 0, 0.02, 1))
-    with pytest.raises(wavecomb.WavecombError, match="/Render/S: dataWindowNDC holds no pixel"):
+    choice = ProductSettings("/Render/S", data_window=(0.01, 0, 0.02, 1))
+    with pytest.raises(wavecomb.WavecombError, match="/Render/S: dataWindowNDC contains no pixel"):
         choice.region(20, 10)
 
 
@@ -189,16 +193,16 @@ def test_which_settings(tmp_path):
     path = write(tmp_path, text)
     report = LoadReport()
     stage = Usd.Stage.Open(str(path))
-    assert read_choices(stage, None, None, report) == [RenderChoice()]
+    assert read_product_settings(stage, None, None, report) == [ProductSettings()]
     assert "several render settings" in "\n".join(report.lines())
-    assert read_choices(stage, "T", None, report)[0].camera == "/A"
-    assert read_choices(stage, "/Render/S", None, report)[0].camera == "/B"
+    assert read_product_settings(stage, "T", None, report)[0].camera == "/A"
+    assert read_product_settings(stage, "/Render/S", None, report)[0].camera == "/B"
     with pytest.raises(wavecomb.WavecombError, match="--render-settings U: no such prim"):
-        read_choices(stage, "U", None, report)
+        read_product_settings(stage, "U", None, report)
     stage.RemovePrim(Sdf.Path("/Render/S"))
-    assert read_choices(stage, None, None, report)[0].resolution == (8, 8)
+    assert read_product_settings(stage, None, None, report)[0].resolution == (8, 8)
     with pytest.raises(wavecomb.WavecombError, match="--product X: no such product"):
-        read_choices(stage, None, "X", report)
+        read_product_settings(stage, None, "X", report)
 
 
 def test_all_products_are_rendered_of_one_scene(tmp_path):
@@ -253,7 +257,7 @@ def test_render_from_python_takes_the_first_product(tmp_path):
         ("", (), "-o is missing, and the stage has no render product"),
         (PRODUCTS.replace("one.exr", "one.jpg"), (), "/Render/One: productName out/one.jpg must"),
         (PRODUCTS, ("--png", "a.png"), "--png a.png: is of one picture and the stage has 2"),
-        (PRODUCTS.replace("two.exr", "one.exr"), (), "productName out/one.exr is that of several"),
+        (PRODUCTS.replace("two.exr", "one.exr"), (), "productName out/one.exr is used by several"),
         ("uniform int2 resolution = (70000, 2)", ("-o", "a.exr"), "/Render/S: size 70000 x 2"),
         ("", ("-o", "a.exr", "--product", "X"), "--product X: no such product"),
         ("", ("-o", "a.exr", "--render-settings", "X"), "--render-settings X: no such prim"),

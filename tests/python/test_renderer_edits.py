@@ -315,7 +315,7 @@ def test_regions_that_cannot_be(
 
 
 def test_a_checkpoint_is_of_its_region(cornell: Path, tmp_path: Path) -> None:
-    from wavecomb.picture.image import read_layers
+    from wavecomb.image.files.image import read_layers
 
     out, state = tmp_path / "part.exr", tmp_path / "part.ckpt"
     given = ["render", str(cornell), "-o", str(out), "--quiet", "--size", "16", "16"]
@@ -331,4 +331,4 @@ def test_a_checkpoint_is_of_its_region(cornell: Path, tmp_path: Path) -> None:
     assert samples[3:12, 2:9].min() == 4
     assert samples.sum() == 4 * 9 * 7
     timed = run_cli(*given[:4], *given[5:], *region, "--spp", "4", "--time-limit", "60")
-    assert "4 samples a pixel" in timed.output, timed.output
+    assert "4 per pixel" in timed.output, timed.output

@@ -13,8 +13,8 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
 import wavecomb
 from wavecomb.scenes import write_scene
-from wavecomb.scenes.room_looks import LOOKS, ROOM_TEXTURES
-from wavecomb.scenes.shapes import disc, pillow, rounded_box, tube, turned
+from wavecomb.scenes.models.shapes import disc, pillow, rounded_box, tube, turned
+from wavecomb.scenes.rooms.room_materials import MATERIALS, ROOM_TEXTURES
 
 SMALL: dict[str, Any] = {"triangles": 12_000, "teapot_level": 4, "texture_size": 64}
 ROOM = ((0.0, 0.0, 0.0), (5.0, 2.7, 4.0))
@@ -57,18 +57,18 @@ def test_the_room_is_furnished(stage: Usd.Stage) -> None:
 
 
 def test_every_material_is_bound_and_plain(stage: Usd.Stage) -> None:
-    assert len(LOOKS) >= 12
-    assert {look_of(mesh) for mesh in meshes(stage)} == set(LOOKS)
+    assert len(MATERIALS) >= 12
+    assert {look_of(mesh) for mesh in meshes(stage)} == set(MATERIALS)
     for prim in stage.GetPrimAtPath("/World/Looks").GetChildren():
         assert not prim.GetAttribute("wavecomb:program")
         surface = UsdShade.Shader(stage.GetPrimAtPath(f"{prim.GetPath()}/Surface"))
         assert surface.GetIdAttr().Get() == "UsdPreviewSurface"
         assert not surface.GetInput("useSpecularWorkflow") and not surface.GetInput("specularColor")
-    inputs = [info.inputs for info in LOOKS.values()]
+    inputs = [info.inputs for info in MATERIALS.values()]
     assert any(values.get("metallic") == 1.0 for values in inputs)
     assert any(values.get("clearcoat", 0.0) != 0.0 for values in inputs)
     assert any(values.get("opacity", 1.0) == 0.0 for values in inputs)
-    assert any("normal" in info.textures for info in LOOKS.values())
+    assert any("normal" in info.textures for info in MATERIALS.values())
 
 
 def test_plain_changes_nothing(room: Path, tmp_path: Path) -> None:
@@ -211,7 +211,7 @@ def test_the_picture_is_neither_dark_nor_burnt(room: Path) -> None:
     ids=["box", "cushioned box", "turned", "tube", "pillow"],
 )
 def test_shapes_are_closed_and_face_outwards(mesh: Any) -> None:
-    from wavecomb.scenes.mesh import face_areas, signed_volume
+    from wavecomb.scenes.models.mesh import face_areas, signed_volume
 
     assert face_areas(mesh.points, mesh.faces).min() > 0.0
     assert signed_volume(mesh.points, mesh.faces) > 0.0

@@ -20,7 +20,7 @@ from click.testing import CliRunner
 from parts import needs, not_here, only_where
 
 from wavecomb.cli import main
-from wavecomb.run.isolate import memory, sandbox, supervisor
+from wavecomb.run.isolation import memory, sandbox, supervisor
 
 pytestmark = [only_where(sys.platform == "linux", "the sandbox is for Linux"), needs("bin:bwrap")]
 
@@ -28,8 +28,8 @@ STAGE = '#usda 1.0\ndef Sphere "S" {\n    double radius = 1\n}\n'
 
 PARENT = """
 import sys
-from wavecomb.run.isolate import memory, supervisor
-from wavecomb.run.isolate.outputs import Outputs
+from wavecomb.run.isolation import memory, supervisor
+from wavecomb.run.isolation.outputs import Outputs
 place, reads, code = sys.argv[1:4]
 supervisor.choices.words = (place,)
 supervisor.choices.reads = tuple(reads.split(":")) if reads else ()
@@ -40,7 +40,7 @@ supervisor.run_in_sandbox(Outputs((place + "/out/a.exr",)), program=code)
 CHILD = """
 import json, os, signal, socket, subprocess, sys, threading
 from pathlib import Path
-from wavecomb.picture import files
+from wavecomb.image import files
 place = Path(sys.argv[1])
 own = Path(os.environ["TMPDIR"])
 tried = {}
@@ -167,7 +167,7 @@ def test_only_outputs_get_a_name(place: Path) -> None:
     tried = child(
         place,
         """
-from wavecomb.picture.files import check_writable, replacing
+from wavecomb.image.files.output_file import check_writable, replacing
 def write(name):
     with replacing(place / name, durable=True) as part:
         part.write_text("an image")
@@ -280,7 +280,8 @@ def test_signals_reach_the_child_once(place: Path, number: int) -> None:
     ],
 )
 def test_a_crash_is_one_line(place: Path, deed: str, words: str) -> None:
-    code = f"from wavecomb.run.isolate import trail\ntrail.note('reading', '/A')\n{deed}"
+    imports = "from wavecomb.run.isolation import progress_notes\n"
+    code = f"{imports}progress_notes.note('reading', '/A')\n{deed}"
     done = subprocess.run(
         [sys.executable, "-c", PARENT, str(place), "", CHILD + code],
         capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False,
@@ -297,7 +298,7 @@ def test_shared_mappings_count_as_memory(place: Path) -> None:
         not_here("no control group may be made here")
     group.close()
     code = PARENT.replace(
-        "supervisor.choices.words", "memory.ask(300)\nsupervisor.choices.words", 1
+        "supervisor.choices.words", "memory.request_limit(300)\nsupervisor.choices.words", 1
     )
     done = subprocess.run(
         [sys.executable, "-c", code, str(place), "", CHILD + """
@@ -340,8 +341,10 @@ def test_a_render_as_people_make_it(place: Path) -> None:
     made |= {f"f.00{i}{layer}.exr" for i in (1, 2) for layer in ("", ".normal")}
     assert set(os.listdir(place / "out")) - {"p.png"} == made
     assert set(os.listdir(place / "shot")) == {"s.usda", "d.exr"}
-    stderr = run(*boxed, "-o", place / "nowhere/a.exr", code=2).stderr
-    assert "nowhere does not exist; make it first" in stderr and stderr.count("\n") == 1
+    run(*boxed, "-o", place / "new/folder/a.exr")
+    assert os.listdir(place / "new/folder") == ["a.exr"]
+    stderr = run(*boxed, "-o", place / "shot/d.exr/a.exr", code=2).stderr
+    assert "d.exr is not a folder" in stderr and stderr.count("\n") == 1
 
 
 @pytest.mark.slow
@@ -368,7 +371,7 @@ def test_required_and_not_there(place: Path, monkeypatch: pytest.MonkeyPatch) ->
     result = CliRunner().invoke(main, words)
     assert result.exit_code == 2 and "there is no child process" in result.stderr
     monkeypatch.setattr(sandbox, "obstacle", lambda: "bubblewrap is not installed")
-    monkeypatch.setattr(supervisor, "is_wise", lambda: True)
+    monkeypatch.setattr(supervisor, "can_fork", lambda: True)
     result = CliRunner().invoke(main, words)
     assert result.exit_code == 2
     assert result.stderr == "error: --sandbox on: bubblewrap is not installed\n"

@@ -18,14 +18,14 @@ from pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
 import wavecomb
 from wavecomb.scenes import SceneError, write_scene
-from wavecomb.scenes.dragon import MIN_TRIANGLES, dragon
-from wavecomb.scenes.materials import PROGRAMS
-from wavecomb.scenes.mesh import Mesh, face_areas, signed_volume
-from wavecomb.scenes.meshfile import TARGET_DIAGONAL, load_dragon
-from wavecomb.scenes.stage import StageWriter
-from wavecomb.scenes.sweep import Tube, tube_mesh
-from wavecomb.scenes.teapot import teapot, teapot_patches
-from wavecomb.scenes.textures import TEXTURES, sky
+from wavecomb.scenes.authoring.materials import PROGRAMS
+from wavecomb.scenes.authoring.stage import StageWriter
+from wavecomb.scenes.authoring.textures import TEXTURES, sky
+from wavecomb.scenes.models.dragon import MIN_TRIANGLES, dragon
+from wavecomb.scenes.models.mesh import Mesh, face_areas, signed_volume
+from wavecomb.scenes.models.mesh_file import TARGET_DIAGONAL, load_dragon
+from wavecomb.scenes.models.sweep import Tube, tube_mesh
+from wavecomb.scenes.models.teapot import teapot, teapot_patches
 from wavecomb.usd import LoadedStage
 
 SMALL = {

@@ -125,7 +125,8 @@ def test_every_setting_has_its_option() -> None:
 
 
 def test_an_added_row_is_an_option(with_rows: None) -> None:
-    from wavecomb.cli.setting_options import SettingCommand, setting_options
+    from wavecomb.cli.command import SettingCommand
+    from wavecomb.cli.setting_options import setting_options
 
     got: dict[str, Any] = {}
 
@@ -134,7 +135,7 @@ def test_an_added_row_is_an_option(with_rows: None) -> None:
     def command(**chosen: Any) -> None:
         got.update({name: value for name, value in chosen.items() if value is not None})
 
-    shown = CliRunner().invoke(command, ["--help"]).output
+    shown = CliRunner().invoke(command, ["--help-all"]).output
     for row in ADDED:
         assert row.option in shown
         assert row.help in shown
@@ -161,11 +162,11 @@ def test_an_added_row_is_a_field_of_the_window(with_rows: None) -> None:
 
 
 def test_an_added_row_is_kept_in_checkpoints_where_it_shows(with_rows: None) -> None:
-    from wavecomb.run.checkpoint import picture_settings
+    from wavecomb.run.checkpoint import image_settings
 
     values = {name: row.default for name, row in settings().items()}
     values |= {row.name: row.default for row in ADDED}
-    kept = picture_settings(values)
+    kept = image_settings(values)
     assert {"tea_time", "biscuit", "milk"} <= kept.keys()  # same.BITS lacks biscuit
     assert "cups" not in kept
 

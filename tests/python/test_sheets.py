@@ -15,10 +15,10 @@ import pytest
 from click.testing import CliRunner, Result
 
 from wavecomb.cli import main
-from wavecomb.picture.collect import collect, pictures_of
-from wavecomb.picture.compare_folders import pair_up
-from wavecomb.picture.image import display, read_codes, write_exr, write_png
-from wavecomb.picture.thumbnails import Look, contact_sheet, fitted, wipe
+from wavecomb.image.compare.folders import pair_up
+from wavecomb.image.files.collection import collect, images_of
+from wavecomb.image.files.image import display, read_codes, write_exr, write_png
+from wavecomb.image.thumbnails import DisplayOptions, contact_sheet, fit_image, wipe
 from wavecomb.run.frame_names import matching
 
 RED, GREEN, BLUE = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
@@ -69,8 +69,8 @@ def test_frames_that_are_there(tmp_path: Path) -> None:
 def test_pictures_of_folders_and_files(frames: Path, tmp_path: Path) -> None:
     (frames / ".hidden.exr").touch()
     (frames / "notes.txt").touch()
-    assert list(pictures_of(str(frames))) == [f"shot.{k:04d}.exr" for k in (8, 9, 10, 11)]
-    assert list(pictures_of(str(frames / "shot.####.exr"))) == ["8", "9", "10", "11"]
+    assert list(images_of(str(frames))) == [f"shot.{k:04d}.exr" for k in (8, 9, 10, 11)]
+    assert list(images_of(str(frames / "shot.####.exr"))) == ["8", "9", "10", "11"]
     one = str(frames / "shot.0009.exr")
     assert list(collect([one])) == [one]
     assert "no such file" in failed("sheet", tmp_path / "no.exr", "-o", tmp_path / "a.png")
@@ -78,7 +78,7 @@ def test_pictures_of_folders_and_files(frames: Path, tmp_path: Path) -> None:
         "sheet", frames / "other.####.exr", "-o", tmp_path / "a.png"
     )
     (tmp_path / "empty").mkdir()
-    assert "no picture in it" in failed("sheet", tmp_path / "empty", "-o", tmp_path / "a.png")
+    assert "no image in it" in failed("sheet", tmp_path / "empty", "-o", tmp_path / "a.png")
 
 
 # ---- sheets and pages ----------------------------------------------------------------------------
@@ -87,7 +87,7 @@ def test_pictures_of_folders_and_files(frames: Path, tmp_path: Path) -> None:
 def test_contact_sheet_has_each_picture_in_its_place(frames: Path, tmp_path: Path) -> None:
     out = tmp_path / "sheet.png"
     result = run("sheet", frames / "shot.####.exr", "-o", out, "--columns", 3, "--width", 48)
-    assert result.exit_code == 0 and "4 pictures" in result.stdout, result.output
+    assert result.exit_code == 0 and "4 images" in result.stdout, result.output
     sheet = read_codes(out)
     assert sheet.shape == (2 * (27 + 20 + 12) + 12, 3 * 60 + 12, 3)
     for k, colour in enumerate((RED, GREEN, BLUE, RED)):
@@ -99,22 +99,22 @@ def test_contact_sheet_has_each_picture_in_its_place(frames: Path, tmp_path: Pat
 
 def test_sheet_is_as_the_layer_is_shown(frames: Path) -> None:
     files = {"a": str(frames / "shot.0008.exr")}
-    plain = contact_sheet(files, Look(), width=48)
-    dark = contact_sheet(files, Look(exposure=-1.0), width=48)
+    plain = contact_sheet(files, DisplayOptions(), width=48)
+    dark = contact_sheet(files, DisplayOptions(exposure=-1.0), width=48)
     assert plain[20, 20].tolist() == [255, 0, 0] and dark[20, 20].tolist() == [188, 0, 0]
-    depth = contact_sheet(files, Look("depth"), width=48)
+    depth = contact_sheet(files, DisplayOptions("depth"), width=48)
     assert len(set(depth[20, 20].tolist())) > 1  # false colours
     with pytest.raises(Exception, match="has no layer normal; there are beauty, depth"):
-        contact_sheet(files, Look("normal"), width=48)
+        contact_sheet(files, DisplayOptions("normal"), width=48)
 
 
 def test_pictures_are_made_smaller_in_linear_light() -> None:
     stripes = np.zeros((40, 80, 3), np.uint8)
     stripes[:, ::2] = 255
-    small = fitted(stripes, 20, 100)
+    small = fit_image(stripes, 20, 100)
     assert small.shape == (10, 20, 3)
     assert abs(int(small[5, 10, 0]) - 188) <= 2  # half of the linear light
-    assert fitted(stripes, 100, 100) is stripes
+    assert fit_image(stripes, 100, 100) is stripes
 
 
 def test_page_holds_all_pictures_and_fetches_nothing(frames: Path, tmp_path: Path) -> None:
@@ -180,12 +180,12 @@ def test_folders_and_sequences(frames: Path, others: Path, tmp_path: Path, patte
     lines = result.stdout.splitlines()
     assert lines[0] == f"{name(8)}: equal, bit for bit"
     assert lines[1].startswith(f"{name(9)}: different: 0.0772 % of pixels")
-    assert "only pictures of one size" in lines[2]
+    assert "only images of the same size" in lines[2]
     assert lines[3:] == [f"{name(11)}: only in A", f"{name(12)}: only in B",
                          "1 of 3 pairs pass; 2 have no other"]  # fmt: skip
     text = page.read_text()
     assert text.count("<figure>") == 3  # A, B and their difference for the one pair that differs
-    assert "1 of 3 pairs pass, 2 pictures have no other" in text
+    assert "1 of 3 pairs pass, 2 images have no counterpart" in text
     document = json.loads(run("compare", a, b, "--json").stdout)
     assert [one["passed"] for one in document["pairs"]] == [True, False, False]
     assert document["only_a"] == [name(11)] and document["passed"] is False
@@ -230,8 +230,8 @@ def test_compare_refuses(frames: Path, others: Path, tmp_path: Path) -> None:
     assert "must end in .html" in failed("compare", one, one, "--page", tmp_path / "a.txt")
     (tmp_path / "elsewhere").mkdir()
     write_png(tmp_path / "elsewhere" / "a.png", flat(RED))
-    assert "no picture of one name" in failed("compare", frames, tmp_path / "elsewhere")
-    assert "is one picture, and" in failed("compare", frames, one)
+    assert "no images with the same name" in failed("compare", frames, tmp_path / "elsewhere")
+    assert "is one image, but" in failed("compare", frames, one)
 
 
 def test_both_work_in_their_sandbox(frames: Path, others: Path, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, Vt
 
 import wavecomb
 from wavecomb.usd import load_stage
-from wavecomb.usd.geometry.strands import even, lay_out
+from wavecomb.usd.geometry.strands import hash_to_unit, lay_out
 
 pytest.importorskip("wavecomb._core")
 
@@ -110,7 +110,7 @@ def test_what_is_kept_of_a_layout() -> None:
 
 
 def test_numbers_look_random() -> None:
-    x = even(np.arange(100_000))
+    x = hash_to_unit(np.arange(100_000))
     counts = np.histogram(x, bins=50, range=(0, 1))[0]
     assert ((counts - 2000) ** 2 / 2000).sum() < 85  # chi-square with 49 degrees of freedom: 0.1 %
     assert abs(np.corrcoef(x[1:], x[:-1])[0, 1]) < 0.01

@@ -171,7 +171,7 @@ main(sys.argv[2:])
 """
 
 
-IN_ALL = ("click", "wavecomb.cli.group", "wavecomb.run.faults", "wavecomb.cli.render")
+IN_ALL = ("click", "wavecomb.cli.group", "wavecomb.run.error_messages", "wavecomb.cli.render")
 LATER = ("numpy", "wavecomb._core", "pxr.Usd", "OpenImageIO", "wavecomb.cli.summary")
 
 

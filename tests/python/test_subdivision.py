@@ -12,7 +12,7 @@ from usd_recorder import load, said, write
 from wavecomb import _core
 from wavecomb.cli import main
 from wavecomb.errors import WavecombError
-from wavecomb.usd.geometry import surfaces
+from wavecomb.usd.geometry import subdivision
 
 FACE_VARYING = ("none", "cornersOnly", "cornersPlus1", "cornersPlus2", "boundaries", "all")
 
@@ -547,7 +547,7 @@ def test_automatic_levels_follow_the_size_in_the_picture(tmp_path):
         levels.append(level_of(loaded))
     assert levels == [5, 6, 7]
     _, loaded = load(tmp_path, text, subdivision="auto", size=(60000, 60000))
-    assert level_of(loaded) == surfaces.AUTO_LEVEL
+    assert level_of(loaded) == subdivision.AUTO_LEVEL
     far = CAMERA.replace("(0.5, 0.5, 4)", "(0.5, 0.5, 400)") + mesh(QUAD, [[0, 1, 2, 3]])
     recorder, loaded = load(tmp_path, far, subdivision="auto", size=(200, 200))
     assert level_of(loaded) == 0 and len(recorder.mesh("/M")["positions"]) == 4
@@ -572,7 +572,7 @@ def test_the_largest_instance_counts(tmp_path):
 
 
 def test_memory_bounds_automatic_levels(tmp_path, monkeypatch):
-    monkeypatch.setattr(surfaces, "AUTO_TRIANGLES", 1000)
+    monkeypatch.setattr(subdivision, "AUTO_TRIANGLES", 1000)
     text = CAMERA + mesh(QUAD, [[0, 1, 2, 3]]) + mesh(QUAD, [[0, 1, 2, 3]], name="N")
     recorder, loaded = load(tmp_path, text, subdivision="auto", size=(800, 800))
     assert 0 < sum(len(mesh["indices"]) for mesh in recorder.meshes) <= 1000
@@ -580,7 +580,7 @@ def test_memory_bounds_automatic_levels(tmp_path, monkeypatch):
 
 
 def test_a_level_beyond_memory_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(surfaces, "machine_limit", lambda: 1 << 30)
+    monkeypatch.setattr(subdivision, "machine_limit", lambda: 1 << 30)
     with pytest.raises(WavecombError, match=r"subdivision 10: .* choose a lower level"):
         load(tmp_path, mesh(*grid(4, 4)), subdivision=10)
 
@@ -673,7 +673,7 @@ def test_cages_go_as_soon_as_they_are_refined(tmp_path, monkeypatch):
     int[] faceVertexIndices = [0,1,2,3]
 """
     cages, alive = [], []
-    add, refine = surfaces.Surfaces.add, surfaces.Surfaces._refine
+    add, refine = subdivision.SubdivisionSurfaces.add, subdivision.SubdivisionSurfaces._refine
 
     def noted_add(self, group, number, draw, mesh, worn):
         cages.append(weakref.ref(mesh.cage))
@@ -683,9 +683,9 @@ def test_cages_go_as_soon_as_they_are_refined(tmp_path, monkeypatch):
         alive.append(sum(cage() is not None for cage in cages))
         refine(self, batch)
 
-    monkeypatch.setattr(surfaces.Surfaces, "add", noted_add)
-    monkeypatch.setattr(surfaces.Surfaces, "_refine", noted_refine)
-    monkeypatch.setattr(surfaces, "_BATCH_TRIANGLES", 1)
+    monkeypatch.setattr(subdivision.SubdivisionSurfaces, "add", noted_add)
+    monkeypatch.setattr(subdivision.SubdivisionSurfaces, "_refine", noted_refine)
+    monkeypatch.setattr(subdivision, "_BATCH_TRIANGLES", 1)
     text = "".join(f'def Mesh "M{k}" {{ {body} }}\n' for k in range(4))
     load(tmp_path, text, subdivision=1)
     assert alive == [4, 3, 2, 1]

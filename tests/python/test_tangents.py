@@ -10,7 +10,7 @@ import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
 import wavecomb
-from wavecomb.picture.image import write_png
+from wavecomb.image.files.image import write_png
 
 
 def new_stage(path: Path, eye: tuple[float, float, float]) -> Usd.Stage:

@@ -8,8 +8,8 @@ from usd_recorder import QUAD, Recorder, load, said, write
 
 from wavecomb import WavecombError, _core
 from wavecomb.usd import load_stage
-from wavecomb.usd.looks.colour_space import halve
-from wavecomb.usd.looks.texture_limit import pyramid_bytes
+from wavecomb.usd.materials.colour_space import halve
+from wavecomb.usd.materials.texture_limit import pyramid_bytes
 
 
 class NoStore:
@@ -110,7 +110,7 @@ def test_what_is_small_in_the_picture_goes_first(tmp_path, stage):
     assert at(1.02 * WHOLE / 1e6)[0] == {"Near": 256, "Far": 32}
     got, words = at(0.2 * WHOLE / 1e6)
     assert got["Near"] == 64 and got["Far"] <= 4
-    assert "2 of them coarser than the picture shows" in at(0.01 * WHOLE / 1e6)[1]
+    assert "2 of them coarser than the image shows" in at(0.01 * WHOLE / 1e6)[1]
 
 
 def test_the_scene_takes_what_was_planned(tmp_path, stage, monkeypatch):

@@ -23,7 +23,7 @@ from wavecomb import WavecombError, _core, vdb
 from wavecomb.machine import temporary_folder
 from wavecomb.run.sequence import Frames
 from wavecomb.usd import load_stage
-from wavecomb.usd.looks.pixels import ReadAhead
+from wavecomb.usd.materials.pixels import ReadAhead
 
 LIMIT_MB = 2.0
 TEXTURES, SIZE = 9, 512

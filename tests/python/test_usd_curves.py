@@ -232,7 +232,7 @@ def test_texture_coordinates(tmp_path):
     # Without texture coordinates, u runs along the curve.
     scene, loaded = load(tmp_path, text + body.replace("primvars:st", "primvars:other"))
     assert np.allclose(scene.meshes[0]["uvs"][:, :, 0], [[0, 1], [0, 0.5], [0.5, 1]])
-    assert "made up" in said(loaded)
+    assert "generated" in said(loaded)
 
 
 def test_curves_are_instanced(tmp_path):

@@ -10,11 +10,11 @@ from pxr import Gf, Sdf, Usd
 from usd_recorder import QUAD, Recorder, write
 
 import wavecomb
-from wavecomb.picture.image import write_png
+from wavecomb.image.files.image import write_png
 from wavecomb.usd import load_stage, open_stage
-from wavecomb.usd.looks.parameters import as_stored, light_values, material_parameters
-from wavecomb.usd.looks.surface import DEFAULTS
-from wavecomb.usd.looks.surface_values import surface_values
+from wavecomb.usd.materials.parameters import as_stored, light_values, material_parameters
+from wavecomb.usd.materials.surface import DEFAULTS
+from wavecomb.usd.materials.surface_values import surface_values
 from wavecomb.usd.materialx.surfaces.inputs import definitions
 from wavecomb.usd.materialx.surfaces.openpbr import MODELS, layers_of
 
@@ -113,7 +113,7 @@ def test_materials_in_instances_are_named_by_the_instance(tmp_path):
 
 
 def test_textures_are_shared_until_their_file_changes(path, tmp_path, monkeypatch):
-    from wavecomb.usd.looks import pixels
+    from wavecomb.usd.materials import pixels
 
     read = []
     real = pixels._read_file

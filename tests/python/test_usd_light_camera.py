@@ -155,7 +155,7 @@ def test_what_lights_ask_for_and_do_not_get(tmp_path):
         "light filter PortalLight",
         "curves as lights (only their materials emit)",
     ]
-    assert len(scene.lights) == 2 and "/Glow is no PortalLight" in said(loaded)
+    assert len(scene.lights) == 2 and "/Glow is not a PortalLight" in said(loaded)
     assert scene.lights[0]["portals"].shape == (1, 4, 4)
 
 
@@ -320,7 +320,7 @@ def test_predicates_of_expressions(tmp_path, predicate, rules, words):
 
 def test_expressions_are_evaluated_at_so_many_prims(tmp_path, monkeypatch):
     """The number of visited prims is limited, since nested instances can be billions."""
-    monkeypatch.setattr("wavecomb.usd.stage.collections.MOST_PRIMS", 5)
+    monkeypatch.setattr("wavecomb.usd.stage.collections.MAX_PRIMS", 5)
     scene, loaded = load(tmp_path, _EXPRESSIONS)
     assert "membershipExpression beyond 5 prims (cut there)" in said(loaded)
     first = {"/Set/heroBox", "/Set/heroBox/Inner"}

@@ -456,7 +456,7 @@ def test_display_colours(tmp_path):
 
 
 def test_many_colours_become_few_materials(tmp_path):
-    from wavecomb.usd.stage.instance_looks import MAX_COLOURS, quantise
+    from wavecomb.usd.instances.instance_materials import MAX_COLOURS, quantise
 
     colours = np.random.default_rng(1).random((5000, 3))
     palette, index = quantise(colours)

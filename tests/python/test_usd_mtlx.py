@@ -13,11 +13,11 @@ from parts import asset
 from pxr import Sdf, Usd, UsdShade
 from usd_recorder import Recorder
 
-from wavecomb.picture.image import write_png
+from wavecomb.image.files.image import write_png
 from wavecomb.usd import LoadReport, load_stage, mtlx, open_stage
 from wavecomb.usd.materialx.files import MAX_DEPTH, MtlxError
 from wavecomb.usd.materialx.references import translate
-from wavecomb.usd.stage.diagnostics import captured
+from wavecomb.usd.stage.diagnostics import capture_diagnostics
 
 GOLD = """<?xml version="1.0"?>
 <materialx version="1.38" colorspace="lin_rec709">
@@ -68,7 +68,7 @@ def value(stage: Usd.Stage, path: str, name: str) -> object:
 
 def said(stage: Usd.Stage) -> list[str]:
     report = LoadReport()
-    mtlx.tell(stage, report)
+    mtlx.report_problems(stage, report)
     return [finding.line() for finding in report.warnings]
 
 
@@ -88,7 +88,7 @@ def folder(tmp_path: Path) -> Path:
 
 def test_every_arc_composes(folder: Path) -> None:
     report = LoadReport()
-    with captured(report):
+    with capture_diagnostics(report):
         stage = open_stage(folder / "stage.usda")
     assert not report.warnings
     assert not said(stage)
@@ -155,9 +155,9 @@ def test_missing_and_broken_files_are_named(tmp_path: Path) -> None:
         'def "B" ( references = @./bad.mtlx@</MaterialX> ) {\n}\n',
     )
     report = LoadReport()
-    with captured(report):
+    with capture_diagnostics(report):
         stage = open_stage(file)
-    mtlx.tell(stage, report)
+    mtlx.report_problems(stage, report)
     lines = sorted(finding.line() for finding in report.warnings)
     assert len(lines) == 2
     assert "bad.mtlx cannot be read (it is <html>, not <materialx>): /B" in lines[0]
@@ -166,7 +166,7 @@ def test_missing_and_broken_files_are_named(tmp_path: Path) -> None:
 
 def test_a_stage_that_is_open_is_not_changed(folder: Path) -> None:
     report = LoadReport()
-    with captured(report):
+    with capture_diagnostics(report):
         stage = Usd.Stage.Open(str(folder / "inner.usda"))
     assert len(said(stage)) == 1
     assert "give Wavecomb its file instead" in said(stage)[0]
@@ -269,7 +269,7 @@ def test_graphs_and_includes(tmp_path: Path) -> None:
     assert image.GetInput("file").Get().path == f"{tmp_path}/tex/a.png"
     assert image.GetInput("file").GetAttr().GetColorSpace() == "acescg"
     assert sorted(finding.what for finding in report.warnings) == [
-        "MaterialX connection leads nowhere (left out)",
+        "MaterialX connection has no target (left out)",
         "MaterialX value 'much' is no float (left out)",
     ]
 
@@ -307,7 +307,7 @@ def test_looks(tmp_path: Path) -> None:
     assert value(stage, "/MaterialX/Looks/plain/Materials/mb", "specular_roughness") is None
     assert sorted(finding.what for finding in report.warnings) == [
         "MaterialX geometry /d* is no path of a prim (left out)",
-        "MaterialX material None is not there (not assigned)",
+        "MaterialX material None does not exist (not assigned)",
     ]
     stage = open_stage(tmp_path / "s.usda")
     bound, _ = UsdShade.MaterialBindingAPI(stage.GetPrimAtPath("/M/world/a")).ComputeBoundMaterial()
@@ -320,7 +320,10 @@ def test_looks(tmp_path: Path) -> None:
     ("text", "why"),
     [
         ("", "not XML"),
-        ("<materialx>" + "<a>" * MAX_DEPTH + "</a>" * MAX_DEPTH + "</materialx>", "inside of each"),
+        (
+            "<materialx>" + "<a>" * MAX_DEPTH + "</a>" * MAX_DEPTH + "</materialx>",
+            "elements are nested",
+        ),
         ('<!DOCTYPE x [<!ENTITY a "b">]><materialx/>', "entities"),
         (
             '<materialx xmlns:xi="http://www.w3.org/2001/XInclude">'
@@ -330,7 +333,7 @@ def test_looks(tmp_path: Path) -> None:
         (
             '<materialx xmlns:xi="http://www.w3.org/2001/XInclude">'
             '<xi:include href="none.mtlx"/></materialx>',
-            "which is not there",
+            "which does not exist",
         ),
     ],
 )

@@ -242,7 +242,8 @@ def test_payloads_are_loaded_by_patterns(tmp_path, payloads, names, left):
 @pytest.mark.parametrize(
     ("payloads", "says"),
     [
-        (["/World/Sofa"], "has no such payload"), (["none", "/World"], "goes with no pattern"),
+        (["/World/Sofa"], "has no such payload"),
+        (["none", "/World"], "cannot be combined with a pattern"),
         (["World"], "absolute path"),
     ],
 )  # fmt: skip

@@ -236,7 +236,7 @@ def test_tetrahedra_are_drawn_by_their_surface(tmp_path, more, faces, volume):
          "point3f[] points = [(0, 0, 0), (1, 0, 0)] }", "as many tangents"),
         (sphere(points=[(0, 0, 0)]), "9 x 5 control points, and there are 1"),
         ('def TetMesh "T" {\n point3f[] points = [(0, 0, 0)]\n'
-         "int4[] tetVertexIndices = [(0, 1, 2, 3)] }", "points that are not there"),
+         "int4[] tetVertexIndices = [(0, 1, 2, 3)] }", "points that do not exist"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_drawn_is_left_out(tmp_path, text, says):

@@ -321,7 +321,7 @@ def test_a_shader_that_is_not_known_is_said(tmp_path: Path) -> None:
     text = volume(field(), BOUND) + material('uniform token info:id = "PxrVolume"', "")
     found, _, report = the_volume(tmp_path, text)
     assert found["extinction"] == (1, 1, 1)
-    assert "not supported: volume shader PxrVolume (default taken): /M" in report
+    assert "not supported: volume shader PxrVolume (default used): /M" in report
 
 
 @with_vdb
@@ -377,7 +377,7 @@ def test_what_is_left_out(tmp_path: Path) -> None:
     vdb.write(tmp_path / "a.vdb", [grid(0), grid((1, 1, 1), 3, name="flow")])
     cases = {
         volume(field()): "empty grid 'density': left out",
-        volume(field(file="gone.vdb")): "gone.vdb is not there",
+        volume(field(file="gone.vdb")): "gone.vdb is missing",
         volume(field(more='token fieldName = "smoke"')): "has no grid 'smoke' 0 (there are 'd",
         volume(field(more='token fieldName = "flow"')): "",
         volume(field().replace("OpenVDBAsset", "Field3DAsset")): "Field3DAsset as a volume field",
@@ -433,11 +433,11 @@ def test_torus_of_arnold(tmp_path: Path) -> None:
     (found,) = loaded.scene.volumes
     assert found["density"] is not None
     missing = load_stage(tmp_path / "s.usda", builder_factory=Recorder, frame=1)
-    assert not missing.scene.volumes and "plane01.vdb is not there" in said(missing)
+    assert not missing.scene.volumes and "plane01.vdb is missing" in said(missing)
 
 
 def test_files_of_volumes_are_listed(tmp_path: Path) -> None:
-    from wavecomb.usd.stage.dependencies import dependencies
+    from wavecomb.usd.layers.dependencies import dependencies
 
     (tmp_path / "a.vdb").write_bytes(b"x")
     times = "asset filePath.timeSamples = { 1: @./a.vdb@, 2: @./gone.vdb@ }"

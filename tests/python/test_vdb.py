@@ -264,7 +264,7 @@ def test_more_than_there_is_room_for_is_one_line(
 ) -> None:
     path = tmp_path / "a.vdb"
     vdb.write(path, [{"name": "d", **noise(200)}])
-    monkeypatch.setattr("wavecomb.run.isolate.memory.room", lambda: 100_000)
+    monkeypatch.setattr("wavecomb.run.isolation.memory.available_bytes", lambda: 100_000)
     with pytest.raises(WavecombError, match="there is room for"):
         vdb.read(path, vdb.grid_heads(path)[0])
 
@@ -284,7 +284,7 @@ def test_a_thousand_million_voxels_are_one_line(
     huge(path)
     (info,) = vdb.grids(path)
     assert info.voxels >= 1024**3
-    monkeypatch.setattr("wavecomb.run.isolate.memory.room", lambda: 4_000_000_000)
+    monkeypatch.setattr("wavecomb.run.isolation.memory.available_bytes", lambda: 4_000_000_000)
     with pytest.raises(WavecombError, match=r"107\d million voxels take 4.3 GB; there is room for"):
         vdb.read(path, vdb.grid_heads(path)[0])
 

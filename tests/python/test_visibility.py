@@ -57,7 +57,7 @@ def _render(folder: Path, says: str = "", **options: Any) -> wavecomb.Picture:
 
 
 def _covered(picture: wavecomb.Picture, name: str) -> np.ndarray[Any, Any]:
-    from wavecomb.picture import cryptomatte
+    from wavecomb.image import cryptomatte
 
     pairs = picture.aovs["crypto_object"]
     return cryptomatte.matte(pairs, wavecomb._core.crypto_id(name))

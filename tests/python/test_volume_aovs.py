@@ -175,8 +175,8 @@ def test_nothing_between_surfaces_lets_all_through(tmp_path: Path) -> None:
 
 
 def test_merged_depths_are_between(tmp_path: Path, loaded: Any) -> None:
-    from wavecomb.picture.image import read_layers
-    from wavecomb.picture.merge import merge
+    from wavecomb.image.files.image import read_layers
+    from wavecomb.image.merge import merge
 
     paths = []
     for seed in (1, 2):

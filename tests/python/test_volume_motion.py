@@ -208,7 +208,7 @@ def test_what_does_not_move_is_said(tmp_path: Path) -> None:
     bad = grid(1.0, 3, name="v")
     bad["values"][0, 0, 0, 0] = np.inf
     vdb.write(tmp_path / "a.vdb", [grid(0.5), bad])
-    with pytest.raises(wavecomb.WavecombError, match="infinite or none"):
+    with pytest.raises(wavecomb.WavecombError, match="infinite or NaN"):
         the_volume(tmp_path, stage(field() + field("v")), frame=1, shutter=(0, 1))
 
 

@@ -8,10 +8,10 @@ from usd_recorder import QUAD, Recorder, load, write
 
 import wavecomb
 from wavecomb import WavecombError
-from wavecomb.picture.image import linear_from_srgb, read_image, read_metadata
-from wavecomb.picture.working_space import CHROMATICITIES, from_rec709, to_rec709
+from wavecomb.image.files.image import linear_from_srgb, read_image, read_metadata
+from wavecomb.image.working_space import CHROMATICITIES, from_rec709, to_rec709
 from wavecomb.usd import load_stage
-from wavecomb.usd.looks.colour_space import convert_colour
+from wavecomb.usd.materials.colour_space import convert_colour
 
 RED = (0.9, 0.2, 0.1)
 STAGE = f"""

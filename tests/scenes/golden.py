@@ -83,7 +83,7 @@ class Golden:
 
     def reference(self) -> tuple[Array, Array]:
         """Read the mean and its variance, each (height, width, 3)."""
-        from wavecomb.picture.image import read_image
+        from wavecomb.image.files.image import read_image
 
         mean, variance = (
             read_image(self.folder / name).astype(np.float64) for name in ("ref.exr", "ref_var.exr")
@@ -92,7 +92,7 @@ class Golden:
 
     def update(self) -> None:
         """Render the reference again with the reference integrator."""
-        from wavecomb.picture.image import write_exr
+        from wavecomb.image.files.image import write_exr
 
         made = self.batches(
             REFERENCE_BATCHES, REFERENCE_SEED, self.reference_spp, integrator="reference"

@@ -180,7 +180,7 @@ def save_pictures(name: str, a: Array, b: Array, z: Array) -> Path:
 
 def picture_of(path: Path, a: Array, b: Array, z: Array) -> None:
     """Write a, b and z, see ``save_pictures``."""
-    from wavecomb.picture.image import write_png
+    from wavecomb.image.files.image import write_png
 
     mean_a, mean_b = a.mean(axis=0), b.mean(axis=0)
     scale = 0.8 / max(float(np.percentile(mean_b, 98)), 1e-6)

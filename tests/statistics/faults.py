@@ -98,8 +98,13 @@ FAULTS = (
         (
             (
                 CORE + "medium/description/glass_contents.cpp",
-                "if (!any_) return false;",
-                "if (!any_ || meshes_.size() < 1000000) return false;",
+                "> 0 && Search(glasses, objects).finds_objects();",
+                "> 1000000 && Search(glasses, objects).finds_objects();",
+            ),
+            (
+                CORE + "medium/description/glass_contents.cpp",
+                "> 0 && Search(glasses, objects).finds_lights(lights);",
+                "> 1000000 && Search(glasses, objects).finds_lights(lights);",
             ),
         ),
     ),

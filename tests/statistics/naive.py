@@ -71,6 +71,8 @@ class Comparison:
         ours: Images of Wavecomb, (n, height, width, 3).
         naive: Images of the naive integrator.
         z: Deviates of blocks and of the whole image, flat; positive if Wavecomb is brighter.
+        events: Number of contributions of size ``contribution`` that make up each difference, flat.
+        contribution: Largest ``typical_contribution`` of a pixel in either image, per channel.
         difference: Relative difference of the mean image per channel.
         error: Standard error of ``difference``.
     """
@@ -78,6 +80,8 @@ class Comparison:
     ours: Array
     naive: Array
     z: Array
+    events: Array
+    contribution: Array
     difference: Array
     error: Array
 
@@ -88,11 +92,23 @@ class Comparison:
 
     def of_mean(self) -> Comparison:
         """The comparison of the image means only."""
-        return replace(self, z=self.z[-3:])
+        return replace(self, z=self.z[-3:], events=self.events[-3:])
 
     def is_fault(self, scenes: int) -> bool:
         """Whether the difference exceeds chance, given the number of scenes tested."""
         return self.worst > limit(self.z.size * scenes)
+
+    def is_sure(self, scenes: int) -> bool:
+        """Whether a difference exceeds normal noise and also what a few rare paths can make.
+
+        Welch's t takes the variance from the batches. Where a few paths carry most of the light, a
+        render that has found none of them has a small variance and the wrong mean. If both renders
+        expect the same number of such paths, all n found ones are in the same render with a
+        probability of 2^(1 - n).
+        """
+        tests = self.z.size * scenes
+        beyond = (np.abs(self.z) > limit(tests)) & (self.events > 1.0 - np.log2(level(tests)))
+        return bool(beyond.any())
 
     def __str__(self) -> str:
         parts = zip(self.difference, self.error, strict=True)
@@ -100,13 +116,47 @@ class Comparison:
         return f"largest |z| {self.worst:.1f}, mean difference {text} %"
 
 
+def level(tests: int) -> float:
+    """Level of one of this number of tests, by Sidak's correction."""
+    return float(-np.expm1(np.log1p(-LEVEL) / tests))
+
+
 def limit(tests: int) -> float:
-    """Limit of |z| for this number of tests, by Sidak's correction."""
-    return float(stats.norm.isf((1.0 - (1.0 - LEVEL) ** (1.0 / tests)) / 2.0))
+    """Limit of |z| for this number of tests."""
+    return float(stats.norm.isf(level(tests) / 2.0))
 
 
-def judge(ours: Array, naive: Array, *, tolerance: float = 0.0) -> Comparison:
-    """Compare two images given as batches; ``tolerance`` is a relative difference to ignore."""
+def typical_contribution(batches: Array, samples: int) -> Array:
+    """Contribution of a path, averaged with the contribution as weight, (height, width, 3).
+
+    It is the ratio of variance to mean of single samples, which is E[x^2] / E[x] for rare paths. If
+    all light comes from paths of one contribution, it is that contribution.
+
+    Args:
+        batches: Images, (n, height, width, 3).
+        samples: Number of samples per pixel of each.
+    """
+    mean = np.abs(batches.mean(axis=0))
+    return np.where(mean > 0, samples * batches.var(axis=0, ddof=1) / np.maximum(mean, 1e-300), 0.0)
+
+
+def judge(
+    ours: Array,
+    naive: Array,
+    *,
+    tolerance: float = 0.0,
+    samples: int = 1,
+    contribution: Array | float = 0.0,
+) -> Comparison:
+    """Compare two images given as batches.
+
+    Args:
+        ours: Images of one side, (n, height, width, 3).
+        naive: Images of the other side.
+        tolerance: Relative difference to ignore.
+        samples: Number of samples per pixel of a batch, for ``Comparison.events``.
+        contribution: Least value of ``Comparison.contribution``, from earlier comparisons.
+    """
 
     def tested(x: Array) -> Array:
         n, height, width, _ = x.shape
@@ -115,16 +165,25 @@ def judge(ours: Array, naive: Array, *, tolerance: float = 0.0) -> Comparison:
         return np.concatenate([blocks, x.mean(axis=(1, 2))], axis=1)
 
     a, b = tested(ours), tested(naive)
-    level = np.maximum(np.maximum(np.abs(a.mean(axis=0)), np.abs(b.mean(axis=0))), 1e-6)
+    mean_a, mean_b = a.mean(axis=0), b.mean(axis=0)
+    brightness = np.maximum(np.maximum(np.abs(mean_a), np.abs(mean_b)), 1e-6)
     error2 = a.var(axis=0, ddof=1) / len(a) + b.var(axis=0, ddof=1) / len(b)
-    noisy = error2 > (1e-5 * level) ** 2
-    z = welch(a, b, tolerance * level, noisy)
-    relative = (a.mean(axis=0) - b.mean(axis=0)) / level
+    noisy = error2 > (1e-5 * brightness) ** 2
+    z = welch(a, b, tolerance * brightness, noisy)
+    relative = (mean_a - mean_b) / brightness
     # Without noise, only rounding may differ.
     z = np.where(
         noisy, z, np.where(np.abs(relative) > tolerance + 1e-3, 99.0 * np.sign(relative), 0.0)
     )
-    return Comparison(ours, naive, z, relative[-3:], (np.sqrt(error2) / level)[-3:])
+    typical = [typical_contribution(x, samples).max(axis=(0, 1)) for x in (ours, naive)]
+    largest = np.maximum(np.maximum(*typical), contribution)
+    # A contribution changes the mean of a block by its size over the samples of the block.
+    counts = np.full(a.shape[1], len(a) * samples * BLOCK**2)
+    counts[-3:] = len(a) * samples * ours[0, ..., 0].size
+    size = np.maximum(np.resize(largest, a.shape[1]), 1e-300)
+    excess = np.maximum(np.abs(mean_a - mean_b) - tolerance * brightness, 0.0)
+    error = (np.sqrt(error2) / brightness)[-3:]
+    return Comparison(ours, naive, z, excess * counts / size, largest, relative[-3:], error)
 
 
 def compare(scene: RandomScene, *, more: int = 1, first_seed: int = 0) -> Comparison:
@@ -183,7 +242,7 @@ def save(found: Comparison, folder: Path) -> None:
     """Write both images as EXR files, and side by side with z as a PNG."""
     from agreement import picture_of
 
-    from wavecomb.picture.exr import write_exr
+    from wavecomb.image.files.exr import write_exr
 
     for name, batches in (("ours", found.ours), ("naive", found.naive)):
         layers = {"beauty": batches.mean(axis=0).astype(np.float32)}

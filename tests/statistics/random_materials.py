@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from wavecomb.picture.image import write_png_codes
+from wavecomb.image.files.image import write_png_codes
 
 
 def number(value: float) -> str:

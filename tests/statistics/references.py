@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "build" / "references"
-MOST_BYTES = 300_000_000
+MAX_BYTES = 300_000_000
 """Size of the cache; beyond it, the least recently used images are removed."""
 
 Image = NDArray[np.float32]
@@ -37,7 +37,7 @@ Image = NDArray[np.float32]
 class Cache:
     """Arrays stored in a folder by key."""
 
-    def __init__(self, folder: Path, most_bytes: int = MOST_BYTES) -> None:
+    def __init__(self, folder: Path, most_bytes: int = MAX_BYTES) -> None:
         self._folder = folder
         self._most_bytes = most_bytes
 

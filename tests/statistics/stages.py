@@ -277,7 +277,7 @@ def sky(directions: Array) -> Array:
 
 def write_sky(folder: Path, height: int = 128) -> Path:
     """Write ``sky`` as an EXR file."""
-    from wavecomb.scenes.textures import write_image
+    from wavecomb.scenes.authoring.textures import write_image
 
     path = folder / "sky.exr"
     write_image(path, sky(latlong_directions(height)).astype(np.float32), "float")

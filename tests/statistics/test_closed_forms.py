@@ -250,7 +250,7 @@ def test_dome_orientation(shot: Any, tmp_path: Path, turn: tuple[float, float]) 
 
 def test_texture_orientation(shot: Any, tmp_path: Path) -> None:
     """USD: (0, 0) is the lower left of the image, v points up. 2 x 2 texels on a quad facing us."""
-    from wavecomb.scenes.textures import write_image
+    from wavecomb.scenes.authoring.textures import write_image
 
     image = np.array([[(1, 0, 0), (0, 1, 0)], [(0, 0, 1), (1, 1, 0)]], np.float32)
     path = tmp_path / "map.exr"

@@ -19,7 +19,7 @@ from stages import camera, ground, material, matrix, moved, numbers, turned, wri
 
 import wavecomb
 from wavecomb import _core
-from wavecomb.scenes.textures import write_image
+from wavecomb.scenes.authoring.textures import write_image
 
 ALBEDO = 0.6
 SQUARE = [(-0.5, 0.5, 0), (0.5, 0.5, 0), (0.5, -0.5, 0), (-0.5, -0.5, 0)]

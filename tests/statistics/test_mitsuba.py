@@ -115,7 +115,7 @@ def test_dome_with_a_small_sun(check: Check, recorded: Any, tmp_path: Path) -> N
     """Importance sampling of the image: most light comes from a few pixels."""
     from stages import latlong_directions, sky
 
-    from wavecomb.scenes.textures import write_image
+    from wavecomb.scenes.authoring.textures import write_image
 
     directions = latlong_directions(64)
     towards = np.array((0.5, 0.7, 0.4)) / np.linalg.norm((0.5, 0.7, 0.4))
@@ -318,7 +318,7 @@ def test_orthographic(check: Check, recorded: Any, tmp_path: Path) -> None:
 
 def test_texture(check: Check, recorded: Any, tmp_path: Path) -> None:
     """A magnified image without symmetry, bilinear, directly lit (bounces use filtered texels)."""
-    from wavecomb.scenes.textures import write_image
+    from wavecomb.scenes.authoring.textures import write_image
 
     rng = np.random.default_rng(5)
     image = rng.uniform(0.05, 0.95, (5, 7, 3)).astype(np.float32)

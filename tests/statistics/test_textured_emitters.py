@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from stages import camera, ground, light, material, matrix, moved, numbers, turned, write_stage
 
 import wavecomb
-from wavecomb.scenes.textures import write_image
+from wavecomb.scenes.authoring.textures import write_image
 
 ALBEDO = 0.6
 SIZE = 64

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from stages import camera, ground, light, material, moved, turned, write_stage
 
 import wavecomb
-from wavecomb.scenes.textures import write_image
+from wavecomb.scenes.authoring.textures import write_image
 
 Array = NDArray[np.float64]
 

@@ -23,8 +23,8 @@ from wavecomb.bench.process import run_worker
 from wavecomb.bench.results import ResultFolder
 from wavecomb.bench.suite_model import WAVECOMB, Golden, StageSource, Suite
 from wavecomb.errors import WavecombError
-from wavecomb.picture.files import replacing
-from wavecomb.run.costs import save_costs
+from wavecomb.image.files.output_file import replacing
+from wavecomb.run.cost_profile import save_costs
 
 
 def stage_file(source: StageSource, name: str, folder: Path) -> Path:

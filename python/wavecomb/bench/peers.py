@@ -72,7 +72,7 @@ def run_peer(
     """Renders with a peer in a fresh process and writes the image to ``image``."""
     width, height = config.settings["size"]
     if width != height:
-        raise WavecombError(f"{config.name}: peers render square pictures only; change its size")
+        raise WavecombError(f"{config.name}: peers render square images only; change its size")
     kind, options = _KINDS[config.renderer]
     depth = config.settings.get("max_depth", 8)
     command = processes.command(

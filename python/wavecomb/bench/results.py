@@ -15,7 +15,7 @@ from typing import Any
 from wavecomb.bench.columns import header_line, row_line
 from wavecomb.bench.suite_model import Suite
 from wavecomb.errors import WavecombError
-from wavecomb.picture.files import reason, replacing
+from wavecomb.image.files.output_file import reason, replacing
 
 SCHEMA = "wavecomb-bench/1"
 FOLDERS = ("images", "golden", "trace", "stages")

@@ -137,7 +137,7 @@ class Sitting:
             self.event("begin", number=index + 1, run=run.run_id, seconds=rest)
             row = self._one(run)
             estimator.learn(run.config, row["wall_s"])
-            self._tell(row, index + 1, left, estimator)
+            self._report_run(row, index + 1, left, estimator)
         self._end()
         self.event("done", folder=str(self.folder.path), whole=whole, failed=self._failed())
         return whole
@@ -277,7 +277,7 @@ class Sitting:
     def _relative(self, path: Path) -> str:
         return path.relative_to(self.folder.path).as_posix()
 
-    def _tell(
+    def _report_run(
         self, row: dict[str, Any], number: int, left: Sequence[Run], estimator: Estimator
     ) -> None:
         seconds_left = estimator.total(left[number:])

@@ -20,8 +20,8 @@ from wavecomb.bench.suite_model import (
     with_folder,
 )
 from wavecomb.errors import WavecombError
+from wavecomb.image.files.output_file import check_regular, reason
 from wavecomb.options import settings
-from wavecomb.picture.files import check_regular, reason
 
 
 class Table:
@@ -150,7 +150,7 @@ def load_suite(path: Path) -> Suite:
         why = "" if error.strerror is None else f"{path}: cannot be read: "
         raise WavecombError(why + reason(error)) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise WavecombError(f"{path}: is no TOML: {error}") from error
+        raise WavecombError(f"{path}: is not TOML: {error}") from error
     top = Table(path, "", document)
     stages = {
         name: _stage(top.below(f"stage.{name}", entry)) for name, entry in top.tables("stage")

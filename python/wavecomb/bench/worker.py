@@ -38,7 +38,7 @@ def main() -> None:
     try:
         result = {"status": "ok", "error": "", **run(job)}
     except Exception as error:
-        from wavecomb.run.faults import describe
+        from wavecomb.run.error_messages import describe
 
         result = {"status": "failed", "error": " ".join(describe(error).split())}
     with os.fdopen(answer, "w", encoding="utf-8") as out:
@@ -49,7 +49,7 @@ def run(job: Job) -> dict[str, Any]:
     """Loads the stage, warms up, renders and compares the image."""
     from wavecomb import api
     from wavecomb.bench.counters import Switch
-    from wavecomb.run.costs import load_costs
+    from wavecomb.run.cost_profile import load_costs
     from wavecomb.run.stats import plain
 
     settings = dict(job["settings"])
@@ -94,7 +94,7 @@ def judge_picture(beauty: Any, spp: float, golden: dict[str, Any] | None) -> dic
 
     import numpy as np
 
-    from wavecomb.picture.compare import compare
+    from wavecomb.image.compare.comparison import compare
 
     digest = hashlib.sha256(np.ascontiguousarray(beauty).tobytes()).hexdigest()
     result: dict[str, Any] = {"picture_sha256": digest}
@@ -113,7 +113,7 @@ def judge_picture(beauty: Any, spp: float, golden: dict[str, Any] | None) -> dic
 def _save(path: Path, beauty: Any) -> None:
     import numpy as np
 
-    from wavecomb.picture.files import replacing
+    from wavecomb.image.files.output_file import replacing
 
     with replacing(path) as part:
         np.save(part, np.ascontiguousarray(beauty, dtype=np.float32))

@@ -107,10 +107,10 @@ class AovOptions:
         Light groups are known only after the stage is loaded, so the file names of ``light_groups``
         are not checked here.
         """
-        from wavecomb.picture import cryptomatte
-        from wavecomb.picture.exr import check_options
-        from wavecomb.picture.files import check_writable
-        from wavecomb.picture.output import split_names
+        from wavecomb.image import cryptomatte
+        from wavecomb.image.files.exr import check_options
+        from wavecomb.image.files.output_file import check_writable
+        from wavecomb.image.files.render_output import split_names
 
         layers = [cryptomatte.LEVELS.get(name, name) for name in aovs]
         layers = [f"{name}00" if name in cryptomatte.LEVELS.values() else name for name in layers]

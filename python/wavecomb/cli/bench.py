@@ -184,7 +184,7 @@ def report_command(folder: str, markdown: str | None) -> None:
     if not (Path(folder) / "runs.csv").is_file():
         raise WavecombError(f"{folder}: holds no runs.csv; `wavecomb bench run` makes it")
     try:
-        build = import_module("wavecomb.bench.report").build
+        build = import_module("wavecomb.bench.reports.page").build
     except ImportError as error:
         raise WavecombError(
             f"bench report: {error.name} is missing; run `{install_command('bench')}`"
@@ -210,7 +210,7 @@ def compare_command(before: str, after: str, metric: str, as_json: bool) -> None
     two folders do not share their rounds, so changes of the machine between them affect the ratios;
     warnings name the known ones.
     """
-    from wavecomb.bench.folders import compare_folders, lines_of
+    from wavecomb.bench.analysis.folder_changes import compare_folders, lines_of
 
     found = compare_folders(Path(before), Path(after), metric)
     if as_json:

@@ -107,18 +107,18 @@ def compare_command(
     Exit codes: 0 equal (or within --tolerance, or the z-test finds no difference), 1 different, 2
     an error.
     """
-    from wavecomb.picture.collect import is_many
+    from wavecomb.image.files.collection import is_many
 
     many = is_many(a) or is_many(b)
     enter_to_read((heatmap, page, wipe))
     from wavecomb.errors import WavecombError
-    from wavecomb.picture.compare import compare
-    from wavecomb.picture.files import check_writable
-    from wavecomb.picture.thumbnails import Look
+    from wavecomb.image.compare.comparison import compare
+    from wavecomb.image.files.output_file import check_writable
+    from wavecomb.image.thumbnails import DisplayOptions
 
     # Pages and wipes show the beauty, not the denoised layer, because the metrics compare the
     # beauty.
-    look = Look(denoised=False, exposure=exposure, tone_map=tone_map)
+    look = DisplayOptions(denoised=False, exposure=exposure, tone_map=tone_map)
     for name, file, ending in (("--page", page, ".html"), ("--wipe", wipe, ".png")):
         if file is not None and not file.lower().endswith(ending):
             raise WavecombError(f"{name} {file}: the name must end in {ending}")
@@ -145,7 +145,7 @@ def compare_command(
         result = compare(a, b)
         measured = _measure(a, b, metrics, exposure)
         if testing:
-            from wavecomb.picture.ztest import z_test
+            from wavecomb.image.compare.z_test import z_test
 
             test = z_test(
                 a, b, variance_a=variance_a, variance_b=variance_b, significance=significance
@@ -195,14 +195,14 @@ def _write_looks(
 def _measure(a: str, b: str, metrics: tuple[str, ...], exposure: float) -> dict[str, float]:
     if not metrics:
         return {}
-    from wavecomb.picture.perceptual import METRICS, measure
+    from wavecomb.image.compare.perceptual import METRICS, measure
 
     return {name: measure(name, a, b, exposure) for name in METRICS if name in metrics}
 
 
 def _write_map(path: str, a: str, b: str, kind: str, exposure: float, test: Any) -> None:
-    from wavecomb.picture.heatmap import KINDS, write_heat_map, z_map
-    from wavecomb.picture.image import write_png
+    from wavecomb.image.compare.heatmap import KINDS, write_heat_map, z_map
+    from wavecomb.image.files.image import write_png
 
     if kind == "z":
         write_png(path, z_map(test))

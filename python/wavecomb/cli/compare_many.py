@@ -9,16 +9,16 @@ import os
 import click
 
 from wavecomb.errors import WavecombError
-from wavecomb.picture.compare import Comparison
-from wavecomb.picture.compare_folders import Folders, PairResult, as_plain, pair_up
-from wavecomb.picture.files import replacing
-from wavecomb.picture.heatmap import KINDS, Kind
-from wavecomb.picture.thumbnails import Look
+from wavecomb.image.compare.comparison import Comparison
+from wavecomb.image.compare.folders import FolderPair, PairResult, as_plain, pair_up
+from wavecomb.image.compare.heatmap import KINDS, Kind
+from wavecomb.image.files.output_file import replacing
+from wavecomb.image.thumbnails import DisplayOptions
 
 
 def compare_many(
     a: str, b: str, *, tolerance: float | None, as_json: bool, page: str | None, kind: str,
-    look: Look,
+    look: DisplayOptions,
 ) -> bool:  # fmt: skip
     """Compares all pairs of images and prints the results.
 
@@ -68,11 +68,11 @@ def _line(one: PairResult, tolerance: float | None) -> str:
 
 
 def write_page(
-    page: str, results: list[PairResult], sources: tuple[str, str], folders: Folders | None,
-    tolerance: float | None, kind: str, look: Look,
+    page: str, results: list[PairResult], sources: tuple[str, str], folders: FolderPair | None,
+    tolerance: float | None, kind: str, look: DisplayOptions,
 ) -> None:  # fmt: skip
     """Writes an HTML page of compared pairs, replacing the file only when complete."""
-    from wavecomb.picture.compare_folders import compare_page
+    from wavecomb.image.compare.folders import compare_page
 
     chosen: Kind = next((one for one in KINDS if one == kind), "absolute")
     text = compare_page(
@@ -82,23 +82,25 @@ def write_page(
         part.write_text(text, encoding="utf-8")
 
 
-def write_pair_page(page: str, a: str, b: str, found: Comparison, kind: str, look: Look) -> None:
+def write_pair_page(
+    page: str, a: str, b: str, found: Comparison, kind: str, look: DisplayOptions
+) -> None:
     """Writes an HTML page of two images from their finished comparison."""
     result = PairResult("", a, b, found)
     write_page(page, [result], (a, b), None, None, kind, look)
 
 
-def write_wipe(file: str, a: str, b: str, at: float, look: Look) -> None:
+def write_wipe(file: str, a: str, b: str, at: float, look: DisplayOptions) -> None:
     """Writes a PNG with A left and B right of a vertical line.
 
     Raises:
         WavecombError: The images differ in size.
     """
-    from wavecomb.picture.image import write_png_codes
-    from wavecomb.picture.thumbnails import wipe
+    from wavecomb.image.files.image import write_png_codes
+    from wavecomb.image.thumbnails import wipe
 
     shown = look.codes(a), look.codes(b)
     if shown[0].shape != shown[1].shape:
-        raise WavecombError(f"{a} and {b}: only pictures of one size can be wiped")
+        raise WavecombError(f"{a} and {b}: only images of the same size can be wiped")
     names = (os.path.basename(a), os.path.basename(b))
     write_png_codes(file, wipe(*shown, at, names if names[0] != names[1] else ("A", "B")))

@@ -76,11 +76,11 @@ def resume_command(
 
     If files of the stage have changed since, all images are rendered again.
     """
-    from wavecomb.farm.clusters import parse_where
+    from wavecomb.farm.clusters import parse_cluster
     from wavecomb.farm.job import Job
     from wavecomb.farm.planning import refresh
 
-    where = parse_where(on)
+    where = parse_cluster(on)
     folder = opened(job, maps)
     short = replace(folder.job, files=(), images=folder.job.images[:1])
     found = Job.of(ask_plan({"again": short.as_json()})["job"], job)
@@ -98,7 +98,7 @@ def resume_command(
 @AS_JSON
 def status_command(job: str, maps: tuple[str, ...], as_json: bool) -> None:
     """Report how many tiles and images of JOB are finished. Reads and verifies each file."""
-    from wavecomb.farm.assemble import status
+    from wavecomb.farm.assembly import status
 
     folder = opened(job, maps)
     out = status(folder)

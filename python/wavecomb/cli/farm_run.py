@@ -16,8 +16,8 @@ from wavecomb.errors import WavecombError
 from wavecomb.run.progress import Interrupt, progress_console, time_text
 
 if TYPE_CHECKING:
-    from wavecomb.farm.assemble import Outcome
-    from wavecomb.farm.clusters import Where
+    from wavecomb.farm.assembly import Outcome
+    from wavecomb.farm.clusters import ClusterSpec
     from wavecomb.farm.folder import Folder
 
 _SHOW_S = 0.5
@@ -36,7 +36,7 @@ DASHBOARD = click.option(
 
 def run_job(
     folder: Folder,
-    where: Where,
+    where: ClusterSpec,
     *,
     threads: int = 0,
     dashboard: int | None = None,

@@ -12,6 +12,7 @@ from typing import Any
 import click
 
 from wavecomb import processes
+from wavecomb.cli.command import SettingCommand
 from wavecomb.cli.farm_run import DASHBOARD, ON, run_job
 from wavecomb.cli.farm_tiles import check_options, job_of
 from wavecomb.cli.frames import frame_options
@@ -19,7 +20,7 @@ from wavecomb.cli.options import examples, isolation_options, stage_options
 from wavecomb.cli.planning import Asked, prepare
 from wavecomb.cli.render import picture_options
 from wavecomb.cli.sandbox import enter_to_read, enter_to_render
-from wavecomb.cli.setting_options import Real, SettingCommand
+from wavecomb.cli.setting_options import Real
 from wavecomb.errors import WavecombError
 
 _PLAN_S = 4 * 3600.0
@@ -31,7 +32,7 @@ _PLAN_S = 4 * 3600.0
     cls=SettingCommand,
     epilog=examples(
         "wavecomb farm submit shot.usd -o out/shot.####.exr --frames 1-48 --on local:4",
-        "wavecomb farm submit shot.usd -o shot.exr --size 3840 2160 --tiles 8x4 --on local:4",
+        "wavecomb farm submit shot.usd -o shot.exr --size 3840x2160 --tiles 8x4 --on local:4",
         "wavecomb farm submit /share/shot.usd -o /share/shot.exr --on dask:tls://HOST:8786",
     ),
 )
@@ -80,14 +81,14 @@ def submit_command(
     Takes the options of `wavecomb render`. Images equal those of one process bit for bit. Ctrl-C
     keeps finished tiles, and `wavecomb farm resume` continues. See docs/farm.md.
     """
-    from wavecomb.farm.clusters import parse_where
+    from wavecomb.farm.clusters import parse_cluster
     from wavecomb.farm.folder import Folder
     from wavecomb.farm.job import Job
     from wavecomb.farm.planning import default_folder
     from wavecomb.farm.tiling import parse_tiles
     from wavecomb.path_maps import parse_maps
 
-    where = parse_where(on)
+    where = parse_cluster(on)
     parse_tiles(options["tiles"])
     parse_maps(options["maps"])
     if options["isa"] is not None:
@@ -99,7 +100,7 @@ def submit_command(
     path = job or default_folder(options["output"], options["stage"], options["output_dir"])
     if os.path.lexists(path):
         raise WavecombError(
-            f"{path}: is there already: `wavecomb farm resume` continues a job, and --job names "
+            f"{path}: already exists: `wavecomb farm resume` continues a job, and --job names "
             "another folder"
         )
     told = ask_plan({**options, "workers": where.workers})
@@ -168,7 +169,7 @@ def plan_command(text: str) -> None:
     }
     asked = Asked.take(request)
     enter_to_render(
-        asked.written(), asked.output, asked.output_dir, asked.frames, asked.source.frame,
+        asked.written(), asked.image, asked.output_dir, asked.frames, asked.source.frame,
         split=asked.layers.split, gpu=False,
     )  # fmt: skip
     prepared = prepare(asked)

@@ -16,8 +16,9 @@ import click
 
 from wavecomb.cli.options import warn
 from wavecomb.cli.planning import Asked, Prepared
+from wavecomb.cli.size import is_png
 from wavecomb.errors import WavecombError
-from wavecomb.run.learned import BEFORE
+from wavecomb.run.guiding_file import BEFORE
 
 if TYPE_CHECKING:
     from wavecomb.farm.job import Job
@@ -74,8 +75,8 @@ def check_tile(text: str, options: dict[str, Any]) -> tuple[int, int]:
         raise WavecombError(f"--tile {text}: must be I/N; tiles inside the file are --exr-tile")
     found = parse_tile(text)
     check_options(options, "--tile")
-    if options["output"] is None:
-        raise WavecombError("--tile: needs -o, because the tile is written beside it")
+    if options["output"] is None or is_png(options["output"]):
+        raise WavecombError("--tile: needs -o FILE.exr, because the tile is written beside it")
     return found
 
 
@@ -96,6 +97,8 @@ def job_of(prepared: Prepared, asked: Asked, **more: Any) -> Job:
     for index, (plan, numbers, job) in enumerate(prepared.jobs):
         source = plan.source(prepared.source)
         names = plan.names
+        if names.output is None:
+            raise WavecombError(f"{names.image}: a farm writes EXR files; give -o FILE.exr")
         shots.append(
             shot_of(
                 job.settings.to_dict(), job.aovs, source.for_load(None), names.output, names.png,
@@ -124,7 +127,7 @@ def render_tile(prepared: Prepared, asked: Asked, tile: tuple[int, int]) -> list
     from wavecomb.farm.planning import complete
     from wavecomb.farm.rendering import Renderer
     from wavecomb.farm.tiling import layout
-    from wavecomb.picture.files import replacing
+    from wavecomb.image.files.output_file import replacing
 
     index, count = tile
     learned = prepared.learning.given
@@ -154,9 +157,9 @@ def assemble_tiles(output: str) -> list[str]:
     Raises:
         WavecombError: Tiles are missing or damaged, or differ in settings, files or machines.
     """
-    from wavecomb.farm.assemble import NarrowBorder, join, write_image
+    from wavecomb.farm.assembly import NarrowBorder, join, write_image
     from wavecomb.farm.job import Job, Task
-    from wavecomb.farm.part import DamagedPart, read_part
+    from wavecomb.farm.tile_file import InvalidTile, read_tile
 
     names = tile_names(output)
     if not names:
@@ -164,10 +167,10 @@ def assemble_tiles(output: str) -> list[str]:
             f"{output}: has no tiles beside it; `wavecomb render -o {output} --tile I/N` makes them"
         )
     try:
-        first = read_part(names[0])
+        first = read_tile(names[0])
         job = Job.of(first.job, names[0])
         same = [i for i in range(len(job.images))
-                if job.part_key(Task(i, first.number), first.machine) == first.key]  # fmt: skip
+                if job.tile_key(Task(i, first.number), first.machine) == first.key]  # fmt: skip
         if not same:
             raise WavecombError(f"{names[0]}: does not belong to the job in its header")
         image, count = same[0], job.tile_count(same[0])
@@ -179,8 +182,8 @@ def assemble_tiles(output: str) -> list[str]:
 
         def parts() -> Any:
             for index, name in enumerate(wanted):
-                part = read_part(name)
-                if part.key != job.part_key(Task(image, index), first.machine):
+                part = read_tile(name)
+                if part.key != job.tile_key(Task(image, index), first.machine):
                     raise WavecombError(
                         f"{name}: is of other settings, files or machines than {names[0]}: render "
                         "it again"
@@ -192,7 +195,7 @@ def assemble_tiles(output: str) -> list[str]:
         raise WavecombError(
             f"{error}: give --tile 1/1, or --on local to `wavecomb farm submit`, which does that"
         ) from None
-    except DamagedPart as error:
+    except InvalidTile as error:
         raise WavecombError(str(error)) from None
     where = os.path.dirname(os.path.abspath(output))
     if os.path.realpath(job.place(job.names(image)["output"])) != os.path.realpath(output):

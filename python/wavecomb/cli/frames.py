@@ -16,7 +16,7 @@ from wavecomb.cli.reporting import Done
 from wavecomb.cli.setting_options import add_options, option
 from wavecomb.cli.shots import FrameShot
 from wavecomb.errors import WavecombError
-from wavecomb.run.faults import describe
+from wavecomb.run.error_messages import describe
 from wavecomb.run.frame_names import frame_text, has_place, parse_frames
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def check_frames(
     """Returns the frames of a sequence, or None for a single image. Raises WavecombError."""
     if text is None:
         if skip:
-            raise WavecombError("--skip-existing is for sequences: give --frames, too")
+            raise WavecombError("--skip-existing applies to sequences: also give --frames")
         return None
     if source.frame is not None:
         raise WavecombError("--frame is one frame and --frames are several; give one of them")

@@ -15,8 +15,8 @@ import click
 
 from wavecomb import terminal
 from wavecomb.errors import WavecombError
-from wavecomb.run.faults import describe
-from wavecomb.run.isolate import supervisor
+from wavecomb.run.error_messages import describe
+from wavecomb.run.isolation import supervisor
 from wavecomb.run.progress import keep_interrupts, was_interrupted
 
 ERROR = 2
@@ -168,6 +168,8 @@ SYNONYMS = {
     "--height": "--size",
     "--out": "--output",
     "--outfile": "--output",
+    "--output-file": "--output",
+    "--output-image": "--output",
     "--destination": "--output",
     "--image": "--output",
     "--bounces": "--max-depth",

@@ -40,8 +40,8 @@ def info_command(stage: str | None, machine: bool, as_json: bool, **options: Any
     if stage is None:
         raise click.UsageError("Missing argument 'STAGE'.")
     from wavecomb.info import print_info, stage_info
-    from wavecomb.run.isolate.outputs import Outputs
-    from wavecomb.run.isolate.supervisor import enter
+    from wavecomb.run.isolation.outputs import Outputs
+    from wavecomb.run.isolation.supervisor import enter
 
     source = StageOptions.take(options)
     enter(Outputs())

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import signal
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -16,29 +17,38 @@ from wavecomb.cli.reporting import Done
 from wavecomb.cli.shots import Shot
 from wavecomb.run import aovs as aov_names
 from wavecomb.run.frame_names import fill
-from wavecomb.run.learned import Learning
+from wavecomb.run.guiding_file import Learning
 
 if TYPE_CHECKING:
     from wavecomb.cli.reporting import Reporter
-    from wavecomb.picture.rendered import Picture
+    from wavecomb.image.rendered import Picture
     from wavecomb.run.checkpoint import Checkpoint
     from wavecomb.usd import LoadedStage
 
 
 @dataclass(frozen=True)
 class Names:
-    """File names of one image. In a sequence, they hold placeholders for the frame."""
+    """File names of one image. In a sequence, they hold placeholders for the frame.
 
-    output: str
+    ``output`` is the EXR; None if only a PNG is written.
+    """
+
+    output: str | None
     png: str | None
     stats: str | None
     deep: str | None = None
 
+    @property
+    def image(self) -> str:
+        """The EXR, or the PNG if that is the only image."""
+        image = self.output or self.png
+        assert image is not None
+        return image
+
     def at(self, frame: float) -> Names:
         """Returns the file names for a frame."""
-        others = (self.png, self.stats, self.deep)
-        filled = (None if name is None else fill(name, frame) for name in others)
-        return Names(fill(self.output, frame), *filled)
+        names = (self.output, self.png, self.stats, self.deep)
+        return Names(*(None if name is None else fill(name, frame) for name in names))
 
     def all(self) -> list[str]:
         """Returns all file names that are not None, in the order in which files are written."""
@@ -76,11 +86,11 @@ class Job:
         ``keeps_stopped`` says whether an image in bands is still written if the render is stopped
         after its first sample.
         """
-        from wavecomb.picture.rendered import picture_of
+        from wavecomb.image.rendered import picture_of
         from wavecomb.run.bands import band_rows
+        from wavecomb.run.callbacks import Watcher
         from wavecomb.run.progress import Interrupt
         from wavecomb.run.settings import check_memory
-        from wavecomb.run.watcher import Watcher
 
         with self.reporter.loading(self.stage) as progress:
             loaded = shot.load(progress)
@@ -128,17 +138,17 @@ class Job:
     ) -> Picture:
         """Adds the shadows on catchers to an image; leaves them out if the render was stopped."""
         from wavecomb.run import catchers
-        from wavecomb.run.watcher import Watcher
+        from wavecomb.run.callbacks import Watcher
 
         def render(how: Mapping[str, str]) -> Any:
             shot.load(None, **how)
             watcher = Watcher(is_stopped=is_stopped, warn=lambda line: warn([line]))
             return shot.render(
-                catchers.of_catchers(settings), None, None, None, watcher=watcher,
+                catchers.catcher_settings(settings), None, None, None, watcher=watcher,
                 learned=self.learning.given,
             )  # fmt: skip
 
-        with_shadows = catchers.caught(picture, render)
+        with_shadows = catchers.with_catcher_shadows(picture, render)
         return replace(picture, cancelled=True) if is_stopped() else with_shadows
 
     def _run_bands(
@@ -148,19 +158,19 @@ class Job:
 
         If stopped, fills the rest with empty bands.
         """
-        from wavecomb.picture.growing import GrowingFiles
-        from wavecomb.picture.rendered import picture_of, window_of
+        from wavecomb.image.files.band_writer import BandFiles
+        from wavecomb.image.rendered import picture_of, window_of
         from wavecomb.run.bands import render_bands, sum_stats, without_samples
+        from wavecomb.run.callbacks import Watcher
         from wavecomb.run.progress import Interrupt
-        from wavecomb.run.settings import picture_size
+        from wavecomb.run.settings import image_size
         from wavecomb.run.stats import write_stats
-        from wavecomb.run.watcher import Watcher
 
-        settings, height = self.settings.to_dict(), picture_size(self.settings)[1]
+        settings, height = self.settings.to_dict(), image_size(self.settings)[1]
         parts: list[dict[str, Any]] = []
         costs: Any = None
         broken = 0
-        files = GrowingFiles(
+        files = BandFiles(
             names.output,
             names.png,
             height=height,
@@ -229,7 +239,7 @@ class Job:
         Returns:
             The sinks that save them, the state to resume or None, and its render time in seconds.
         """
-        from wavecomb.run.watcher import CheckpointSink, PreviewSink, Sink
+        from wavecomb.run.callbacks import CheckpointSink, PreviewSink, Sink
 
         sinks: list[Sink] = []
         state, seconds = None, 0.0
@@ -269,18 +279,31 @@ class Job:
         picture = done.picture
         _warn_of_broken(_broken_pixels(picture))
         if denoise:
-            picture = picture.with_denoised(threads=self.settings.threads)
-        written = [str(name) for name in picture.save(names.output, **self.layers.file_options())]
+            with self.reporter.working("denoising"):
+                picture = picture.with_denoised(threads=self.settings.threads)
+        start = time.perf_counter()
+        with self.reporter.working("writing"):
+            written = self._save(picture, names)
+        seconds = {**picture.stats["seconds"], "write": time.perf_counter() - start}
+        stats = {**picture.stats, "seconds": seconds}
+        if names.stats is not None:
+            write_stats(names.stats, stats)
+            written.append(names.stats)
+        return replace(done, stats=stats, picture=picture), written
+
+    def _save(self, picture: Picture, names: Names) -> list[str]:
+        """Writes the image files; returns their names."""
+        written: list[str] = []
+        if names.output is not None:
+            files = picture.save(names.output, **self.layers.file_options())
+            written += map(str, files)
         if names.png is not None:
             picture.save(names.png, exposure=self.exposure, tone_map=self.tone_map)
             written.append(names.png)
         if names.deep is not None:
             picture.save_deep(names.deep, half=self.layers.half)
             written.append(names.deep)
-        if names.stats is not None:
-            write_stats(names.stats, picture.stats)
-            written.append(names.stats)
-        return replace(done, stats=picture.stats, picture=picture), written
+        return written
 
 
 class _NotKept(Exception):

@@ -35,11 +35,11 @@ def merge_command(pictures: tuple[str, ...], output: str, png: str | None, **opt
     layers, or that have the same seed, are refused.
     """
     from wavecomb.errors import WavecombError
-    from wavecomb.picture.files import check_writable
-    from wavecomb.picture.image import write_png
-    from wavecomb.picture.merge import merge
-    from wavecomb.picture.output import save_layers
-    from wavecomb.picture.working_space import to_rec709
+    from wavecomb.image.files.image import write_png
+    from wavecomb.image.files.output_file import check_writable
+    from wavecomb.image.files.render_output import save_layers
+    from wavecomb.image.merge import merge
+    from wavecomb.image.working_space import to_rec709
 
     layers = AovOptions.take(options)
     enter_to_read((output, png), split=output if layers.split else None)

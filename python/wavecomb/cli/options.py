@@ -14,7 +14,7 @@ from wavecomb.load_options import Row, given, rows
 
 if TYPE_CHECKING:
     from wavecomb.usd import LoadedStage
-    from wavecomb.usd.stage.choice import RenderChoice
+    from wavecomb.usd.render_settings.values import ProductSettings
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -25,7 +25,7 @@ def examples(*lines: str) -> str:
 
 
 def _isolate(context: click.Context, parameter: click.Parameter, value: str) -> None:
-    from wavecomb.run.isolate import supervisor
+    from wavecomb.run.isolation import supervisor
 
     supervisor.choices.isolate = value
 
@@ -33,26 +33,26 @@ def _isolate(context: click.Context, parameter: click.Parameter, value: str) -> 
 def _set_load_limit(
     context: click.Context, parameter: click.Parameter, value: float | None
 ) -> None:
-    from wavecomb.run.isolate import patience
+    from wavecomb.run.isolation import time_limit
 
-    patience.limit_s = value
+    time_limit.limit_s = value
 
 
 def _limit_memory(context: click.Context, parameter: click.Parameter, value: float | None) -> None:
-    from wavecomb.run.isolate import memory
+    from wavecomb.run.isolation import memory
 
     if not context.resilient_parsing:
-        memory.ask(value)
+        memory.request_limit(value)
 
 
 def _ask_sandbox(context: click.Context, parameter: click.Parameter, value: str) -> None:
-    from wavecomb.run.isolate import supervisor
+    from wavecomb.run.isolation import supervisor
 
     supervisor.choices.sandbox = value
 
 
 def _ask_reads(context: click.Context, parameter: click.Parameter, value: tuple[str, ...]) -> None:
-    from wavecomb.run.isolate import supervisor
+    from wavecomb.run.isolation import supervisor
 
     supervisor.choices.reads = value
 
@@ -214,7 +214,7 @@ class StageOptions:
         options.pop("frame", None)
         return options if size is None else {**options, "size": size}
 
-    def peek(self, stage: str) -> tuple[list[RenderChoice], Any]:
+    def peek(self, stage: str) -> tuple[list[ProductSettings], Any]:
         """Reads the stage's render settings.
 
         Returns:

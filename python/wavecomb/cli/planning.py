@@ -15,17 +15,18 @@ from wavecomb.cli.options import StageOptions
 from wavecomb.cli.products import Plan, plan_products
 from wavecomb.cli.purpose import PurposeOptions
 from wavecomb.cli.reporting import Reporter, make_reporter
+from wavecomb.cli.size import ImageSize, Percent, is_png
 from wavecomb.errors import WavecombError
 from wavecomb.options import settings as known_settings
 from wavecomb.run import aovs as aov_names
 from wavecomb.run.frame_names import fill, has_place
-from wavecomb.run.learned import BEFORE, ENDING, Learning, check_taught, learned_of
+from wavecomb.run.guiding_file import BEFORE, ENDING, Learning, check_trains_field, learned_of
 
 if TYPE_CHECKING:
     from wavecomb.run.checkpoint import Checkpoint
-    from wavecomb.usd.stage.choice import RenderChoice
+    from wavecomb.usd.render_settings.values import ProductSettings
 
-Peek = Callable[[StageOptions, str], "tuple[list[RenderChoice], Any]"]
+Peek = Callable[[StageOptions, str], "tuple[list[ProductSettings], Any]"]
 """Type of ``StageOptions.peek``: reads the render settings of a stage."""
 
 
@@ -37,7 +38,8 @@ class Asked:
         stage: File of the stage.
         output: -o.
         output_dir: --output-dir.
-        png: --png.
+        png: --png, or -o if that is a PNG.
+        png_alone: Whether -o is a PNG, so that no EXR is written.
         deep: --deep.
         stats_file: --stats.
         size: --size.
@@ -45,6 +47,7 @@ class Asked:
         exposure: --exposure.
         tone_map: --tone-map.
         quiet: --quiet.
+        verbose: --verbose.
         costs: --costs.
         learn_from: --learn-from.
         learn_to: --learn-to.
@@ -63,11 +66,12 @@ class Asked:
     png: str | None
     deep: str | None
     stats_file: str | None
-    size: tuple[int, int] | None
+    size: ImageSize | None
     spp: int | None
     exposure: float
     tone_map: Any
     quiet: bool
+    verbose: bool
     costs: str | None
     learn_from: str | None
     learn_to: str | None
@@ -78,6 +82,7 @@ class Asked:
     purpose: PurposeOptions
     layers: AovOptions
     chosen: dict[str, Any]
+    png_alone: bool = False
 
     @classmethod
     def take(cls, options: dict[str, Any]) -> Asked:
@@ -85,6 +90,23 @@ class Asked:
         source = StageOptions.take(options)
         purpose = PurposeOptions.take(options)
         layers = AovOptions.take(options)
+        if is_png(options["output"]):
+            if options["png"] is not None:
+                raise WavecombError(
+                    f"-o {options['output']}: is a PNG, and so is --png {options['png']}; give "
+                    "-o FILE.exr, or leave out one of them"
+                )
+            options["png"], options["output"] = options["output"], None
+            options["png_alone"] = True
+        view, display = options.pop("ocio_view", None), options.pop("ocio_display", None)
+        if view is not None:
+            from wavecomb import ocio
+
+            if options["tone_map"] not in (None, "clamp"):
+                raise WavecombError("--ocio-view and --tone-map are both for the PNG; give one")
+            options["tone_map"] = ocio.tone_map(view, display)
+        elif display is not None:
+            raise WavecombError("--ocio-display is for --ocio-view: give that, too")
         names = [field.name for field in fields(cls)]
         own = {name: options.pop(name) for name in names if name in options}
         chosen = {name: value for name, value in options.items() if value is not None}
@@ -119,6 +141,11 @@ class Asked:
         return replace(self, purpose=purpose, costs=costs, **changes)
 
     @property
+    def image(self) -> str | None:
+        """The image that -o names, an EXR or a PNG; None if the stage names it."""
+        return self.png if self.png_alone else self.output
+
+    @property
     def whole(self) -> str:
         """An option that needs the whole image in memory, or "" if there is none."""
         return self.purpose.whole or ("" if self.deep is None else "--deep")
@@ -131,14 +158,14 @@ class Asked:
         if self.learn_from != BEFORE:
             return Learning(learned_of(self.learn_from))
         if self.frames is None:
-            raise WavecombError("--learn-from before: is for sequences: give --frames, too")
+            raise WavecombError("--learn-from before: applies to sequences: also give --frames")
         return Learning(follows=True)
 
     def check_learning(self, settings: Any) -> None:
         """Raises WavecombError if path guiding learns nothing with such settings."""
         for option, given in (("--learn-from", self.learn_from), ("--learn-to", self.learn_to)):
             if given is not None:
-                check_taught(settings, f"{option} {given}")
+                check_trains_field(settings, f"{option} {given}")
 
     def check_deep(self) -> None:
         """Raises WavecombError if --aov requests deep samples, which are not a layer."""
@@ -155,7 +182,7 @@ class Asked:
         if had and self.deep is None:
             raise WavecombError(
                 f"{self.purpose.resume}: is of a render with a deep picture: "
-                "give --deep FILE.exr, too"
+                "also give --deep FILE.exr"
             )
         if self.deep is not None and not had:
             raise WavecombError(
@@ -194,7 +221,7 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
         WavecombError: An option, a file or a setting is invalid.
     """
     from wavecomb.run.bands import band_rows
-    from wavecomb.run.settings import keeps_error
+    from wavecomb.run.settings import has_error_layers
 
     asked = _with_frame(asked, peek)
     purpose, layers, source = asked.purpose, asked.layers, asked.source
@@ -211,11 +238,11 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
         return numbers
 
     asked.check_deep()
-    beside = Names("", asked.png, asked.stats_file, asked.deep)
-    if asked.output is not None:
+    beside = Names(None, asked.png, asked.stats_file, asked.deep)
+    if asked.output is not None or asked.png_alone:
         checked(replace(beside, output=asked.output))
     if purpose.denoise:
-        from wavecomb.picture.denoise import check_denoiser
+        from wavecomb.image.denoise import check_denoiser
 
         check_denoiser()
     resumed = purpose.load()
@@ -226,9 +253,9 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
     learning = asked.learning()
     chosen |= purpose.settings(asked.spp, resumed)
     if asked.size is not None:
-        chosen["width"], chosen["height"] = asked.size
+        chosen["size"] = asked.size
     if resumed is not None:
-        chosen = {**_without_overscan(resumed.settings), **chosen}
+        chosen = {**_earlier(resumed.settings, sized=asked.size is None), **chosen}
         source = source.completed(resumed.source)
     kept = chosen.pop("aovs", aov_names.for_core(aov_names.DEFAULT))
     if resumed is not None:
@@ -236,11 +263,13 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
     before = None if resumed is None else resumed.aovs
     _check_settings(chosen)
     choices, opened = peek(source, asked.stage)
-    plans = plan_products(choices, asked.output, beside, purpose, asked.frames, asked.output_dir)
-    if asked.frames is None and any(has_place(plan.names.output) for plan in plans):
+    plans = plan_products(
+        choices, asked.output, beside, purpose, asked.output_dir, png_alone=asked.png_alone
+    )
+    if asked.frames is None and any(has_place(plan.names.image) for plan in plans):
         frame = choices[0].first_frame if source.frame is None else source.frame
         plans = [replace(plan, names=plan.names.at(frame)) for plan in plans]
-    reporter = make_reporter(purpose.progress, asked.quiet)
+    reporter = make_reporter(purpose.progress, asked.quiet, asked.verbose)
 
     def fits(settings: Any, aovs: Any) -> None:
         band_rows(settings, aovs, asked.film_memory, whole=asked.whole, tile=layers.tile)
@@ -253,16 +282,20 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
         settings = plan.settings(
             chosen, aov_names.with_others(aovs, others), resumed is not None, fits
         )
-        shows_errors = keeps_error(settings) and aovs == aov_names.DEFAULT
+        shows_errors = has_error_layers(settings) and aovs == aov_names.DEFAULT
         further = (*("denoised",) * purpose.denoise, *aov_names.ERRORS * shows_errors)
         asked.check_learning(settings)
-        layers.check(plan.names.output, (*aovs, *further))
-        if layers.split:
-            plan.check_split((*aovs, *further), numbers)
-        return Job(
+        job = Job(
             asked.stage, settings, aovs, profile, layers, reporter, asked.exposure,
             asked.tone_map, asked.film_memory, learning,
         )  # fmt: skip
+        if plan.names.output is None:
+            check_png_alone(asked, plan.names.image)
+            return job
+        layers.check(plan.names.output, (*aovs, *further))
+        if layers.split:
+            plan.check_split((*aovs, *further), numbers)
+        return job
 
     # Check all products before rendering the first.
     all_numbers = [checked(plan.names, plan) for plan in plans]
@@ -271,6 +304,21 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
         for plan, numbers in zip(plans, all_numbers, strict=True)
     ]
     return Prepared(asked, source, resumed, jobs, learning, opened, reporter)
+
+
+def check_png_alone(asked: Asked, png: str) -> None:
+    """Raises WavecombError if options describe an EXR file, but only a PNG is written."""
+    layers = asked.layers
+    for option, given in (
+        ("--aov", layers.aovs),
+        ("--half", layers.half),
+        ("--split-aovs", layers.split),
+        ("--exr-tile", layers.tile),
+    ):
+        if given:
+            raise WavecombError(
+                f"{option}: is for EXR files, and {png} is the only image: give -o FILE.exr"
+            )
 
 
 def _check_settings(chosen: dict[str, Any]) -> None:
@@ -283,6 +331,9 @@ def _check_settings(chosen: dict[str, Any]) -> None:
     known = dict(chosen)
     width, height = known.pop("width", None), known.pop("height", None)
     size = None if width is None or height is None else (width, height)
+    size = known.pop("size", size)
+    if isinstance(size, Percent):
+        size = None
     check_options(size, known.pop("spp"), known)
 
 
@@ -303,19 +354,24 @@ def _with_frame(asked: Asked, peek: Peek) -> Asked:
     return asked.at(frame)
 
 
-def _without_overscan(settings: dict[str, Any]) -> dict[str, Any]:
-    """Returns settings with the displayed image size, without overscan, for ``make_settings``."""
+def _earlier(settings: dict[str, Any], *, sized: bool) -> dict[str, Any]:
+    """Returns settings of a resumed render for ``make_settings``.
+
+    Args:
+        settings: Settings of the checkpoint.
+        sized: Whether to include the size of the displayed image, without overscan.
+    """
     beyond = 2 * settings.get("overscan", 0)
-    out = dict(settings)
-    for name in ("width", "height"):
-        if name in out:
-            out[name] -= beyond
-    return out
+    edges: dict[str, Any] = {
+        name: settings[name] - beyond for name in ("width", "height") if name in settings
+    }
+    out = {name: value for name, value in settings.items() if name not in edges}
+    return {**out, **edges} if sized else out
 
 
 def _check_outputs(asked: Asked, names: Names, purpose: PurposeOptions) -> None:
     """Raises WavecombError if an output file cannot be written or is named twice."""
-    from wavecomb.picture.files import check_writable
+    from wavecomb.image.files.output_file import check_writable
 
     outputs = [
         (names.output, "-o", ".exr"),
@@ -329,7 +385,8 @@ def _check_outputs(asked: Asked, names: Names, purpose: PurposeOptions) -> None:
     ]
     for name, option, ending in outputs:
         if name is not None and ending is not None and not name.lower().endswith(ending):
-            raise WavecombError(f"{option} {name}: the name must end in {ending}")
+            endings = ".exr or .png" if option == "-o" else ending
+            raise WavecombError(f"{option} {name}: the name must end in {endings}")
         if option == "--costs" and name is not None and not name.lower().endswith(".json"):
             sources = known_settings()["costs"].choices
             raise WavecombError(
@@ -350,6 +407,6 @@ def _read_costs(costs_file: str | None) -> dict[str, dict[str, float]] | None:
     """Returns the cost profile in a file, or None if the file does not exist yet."""
     if costs_file is None or not os.path.exists(costs_file):
         return None
-    from wavecomb.run.costs import load_costs
+    from wavecomb.run.cost_profile import load_costs
 
     return load_costs(costs_file)

@@ -13,20 +13,21 @@ from wavecomb.cli.job import Names
 from wavecomb.cli.options import StageOptions
 from wavecomb.cli.purpose import PurposeOptions
 from wavecomb.cli.shots import FrameShot
+from wavecomb.cli.size import Percent
 from wavecomb.errors import WavecombError
 from wavecomb.run import aovs as aov_names
 from wavecomb.run.expressions import layer_of
 
 if TYPE_CHECKING:
     from wavecomb.run.sequence import Frames
-    from wavecomb.usd.stage.choice import RenderChoice
+    from wavecomb.usd.render_settings.values import ProductSettings
 
 
 @dataclass(frozen=True)
 class Plan:
     """One render product, with the choices of the stage and its output files."""
 
-    choice: RenderChoice
+    choice: ProductSettings
     names: Names
     folder: str | None = None
     """Folder that the image must stay in if the stage chose its name; None if the user did."""
@@ -40,9 +41,9 @@ class Plan:
         if self.folder is None:
             return
         within = os.path.realpath(self.folder)
-        target = os.path.realpath(names.output)
+        target = os.path.realpath(names.image)
         if os.path.commonpath([within, target]) != within or within == target:
-            name = self.choice.output or names.output
+            name = self.choice.output or names.image
             raise WavecombError(
                 f"{self.choice.product}: productName {name} leaves the folder {within}: give "
                 "-o FILE.exr, or --output-dir with the folder for images"
@@ -50,10 +51,12 @@ class Plan:
 
     def check_split(self, aovs: Sequence[str], frames: Sequence[float] | None) -> None:
         """Does ``check_place`` for the files of --split-aovs, one for each layer and frame."""
-        from wavecomb.picture.output import split_names
+        from wavecomb.image.files.render_output import split_names
 
+        if self.names.output is None:
+            return
         for names in [self.names] if frames is None else map(self.names.at, frames):
-            for file in split_names(names.output, [layer_of(name) for name in aovs]).values():
+            for file in split_names(names.image, [layer_of(name) for name in aovs]).values():
                 self.check_place(replace(names, output=str(file)))
 
     def aovs(self, layers: AovOptions, before: Sequence[str] | None) -> tuple[str, ...]:
@@ -73,7 +76,8 @@ class Plan:
         """Builds checked render settings.
 
         Args:
-            chosen: Settings from the options and from the resumed render.
+            chosen: Settings from the options and from the resumed render; "size" is that of
+                --size.
             aovs: AOVs to keep.
             resumed: Whether a render is resumed, which fixes size and region.
             fits: As in ``make_settings``.
@@ -83,6 +87,8 @@ class Plan:
         chosen = dict(chosen)
         width, height = self.choice.resolution or DEFAULT_SIZE
         size = chosen.pop("width", width), chosen.pop("height", height)
+        asked = chosen.pop("size", size)
+        size = asked.of((width, height)) if isinstance(asked, Percent) else asked
         if "region" not in chosen and not resumed and (region := self.choice.region(*size)):
             chosen["region"] = region
             chosen["crop"] = True  # the data window of the files is the one that the stage defines
@@ -105,12 +111,13 @@ class Plan:
 
 
 def plan_products(
-    choices: Sequence[RenderChoice],
+    choices: Sequence[ProductSettings],
     output: str | None,
     beside: Names,
     purpose: PurposeOptions,
-    frames: str | None,
     folder: str | None = None,
+    *,
+    png_alone: bool = False,
 ) -> list[Plan]:
     """Plans the images to render: the first render product with ``-o``, else all.
 
@@ -119,23 +126,26 @@ def plan_products(
         output: File of -o, or None.
         beside: Other output files, from the options.
         purpose: Options of ``purpose_options``.
-        frames: --frames, or None.
         folder: Folder for images that the stage names, which they must not leave; None means the
             working folder.
+        png_alone: Whether -o names a PNG, the only image.
 
     Raises:
         WavecombError: An image has no file name, or an option applies to one image only.
     """
-    if output is not None:
+    if output is not None or png_alone:
         if folder is not None:
             raise WavecombError("--output-dir is for pictures that the stage names; -o names one")
         return [Plan(choices[0], replace(beside, output=output))]
     plans = []
     for choice in choices:
         if choice.output is None:
+            if beside.png is not None and len(choices) == 1:
+                plans.append(Plan(choice, beside))
+                continue
             prim = choice.product
             where = f"{prim} has no productName" if prim else "the stage has no render product"
-            raise WavecombError(f"-o is missing, and {where}: give -o FILE.exr")
+            raise WavecombError(f"-o is missing, and {where}: give -o FILE.exr or -o FILE.png")
         if not choice.output.lower().endswith(".exr"):
             raise WavecombError(
                 f"{choice.product}: productName {choice.output} must end in .exr; give -o FILE.exr"
@@ -158,7 +168,7 @@ def plan_products(
                 )
         seen: set[str] = set()
         for plan in plans:
-            target = os.path.realpath(plan.names.output)
+            target = os.path.realpath(plan.names.image)
             if target in seen:
                 raise WavecombError(
                     f"productName {plan.choice.output} is used by several render products; "

@@ -80,9 +80,11 @@ class PurposeOptions:
         """Removes these options from a command's arguments."""
         every, preview_every = options["every"], options["preview_every"]
         if every is not None and options["checkpoint"] is None and options["resume"] is None:
-            raise WavecombError("--every is for checkpoints: give --checkpoint or --resume, too")
+            raise WavecombError(
+                "--every applies to checkpoints: also give --checkpoint or --resume"
+            )
         if preview_every is not None and options["preview"] is None:
-            raise WavecombError("--preview-every is for previews: give --preview, too")
+            raise WavecombError("--preview-every applies to previews: also give --preview")
         options["every"] = 120.0 if every is None else every
         options["preview_every"] = 10.0 if preview_every is None else preview_every
         return cls(**{field.name: options.pop(field.name) for field in fields(cls)})
@@ -123,8 +125,8 @@ class PurposeOptions:
         for name in ("min_spp", "max_spp"):
             if getattr(self, name) is not None and not is_adaptive:
                 raise WavecombError(
-                    f"--{name.replace('_', '-')} is for adaptive renders: "
-                    "give --adaptive or --noise, too"
+                    f"--{name.replace('_', '-')} applies to adaptive renders: "
+                    "also give --adaptive or --noise"
                 )
         if None not in (spp, self.max_spp) and spp != self.max_spp:
             raise WavecombError(f"--spp is {spp} and --max-spp {self.max_spp}; give one of them")

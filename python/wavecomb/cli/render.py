@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from wavecomb.cli.aovs import aov_options
+from wavecomb.cli.command import SettingCommand
 from wavecomb.cli.farm_tiles import TILE, check_tile, render_tile, tile_name
 from wavecomb.cli.frames import frame_options, open_frames, render_sequence
 from wavecomb.cli.job import how_far
@@ -16,14 +17,15 @@ from wavecomb.cli.planning import Asked, prepare
 from wavecomb.cli.purpose import purpose_options
 from wavecomb.cli.reporting import Done
 from wavecomb.cli.sandbox import enter_to_render
-from wavecomb.cli.setting_options import SettingCommand, add_options, option, setting_options
+from wavecomb.cli.setting_options import add_options, option, setting_options
 from wavecomb.cli.shots import Shot, Still
-from wavecomb.run.learned import save_learned
+from wavecomb.cli.size import SizeType
+from wavecomb.run.guiding_file import save_learned
 
 picture_options = add_options(
     option(
-        "-o --output FILE.exr", "path",
-        "Image with all layers.  [default: the productName of each render product]",
+        "-o --output FILE.exr|.png", "path",
+        "Image with all layers, or only a PNG.  [default: the productName of render products]",
     ),
     option(
         "--output-dir DIR", "path",
@@ -31,7 +33,7 @@ picture_options = add_options(
         "[default: the working folder]",
     ),
     aov_options,
-    option("--png FILE", "path", "Also write an image for display."),
+    option("--png FILE.png", "path", "Also write an image for display."),
     option(
         "--deep FILE.exr", "path", "Also write colour and alpha by depth (docs/deep.md)."
     ),
@@ -40,8 +42,9 @@ picture_options = add_options(
         name="stats_file",
     ),
     option(
-        "--size W H", click.INT,
-        "Image size in pixels.  [default: of the render settings, else 600 600]", nargs=2,
+        "--size WxH|N%", SizeType(),
+        "Image size in pixels, such as 640x360, or a part of the stage's.  "
+        "[default: of the render settings, else 600x600]",
     ),
     option(
         "--region X0 Y0 X1 Y1", click.INT,
@@ -77,7 +80,15 @@ picture_options = add_options(
         "--tone-map", click.Choice(["clamp", "neutral"]),
         "Tone mapping of the PNG: clip, or roll off highlights.  [default: clamp]", default="clamp",
     ),
+    option(
+        "--ocio-view NAME", "text",
+        "Show the PNG and previews through a view of $OCIO, such as AgX or an ACES view.",
+    ),
+    option(
+        "--ocio-display NAME", "text", "Display of --ocio-view.  [default: an sRGB screen]"
+    ),
     option("--quiet", "flag", "Print only warnings and errors."),
+    option("--verbose", "flag", "Also print phases, materials and predictions at the end."),
 )  # fmt: skip
 """Image, duration and files: options of all commands that render images."""
 
@@ -86,8 +97,8 @@ picture_options = add_options(
     "render",
     cls=SettingCommand,
     epilog=examples(
-        "wavecomb render shot.usd -o shot.exr",
-        "wavecomb render shot.usd -o shot.exr --png shot.png --size 1920 1080 --spp 256",
+        "wavecomb render shot.usd -o shot.png",
+        "wavecomb render shot.usd -o shot.exr --png shot.png --size 1920x1080 --spp 256",
         "wavecomb render shot.usd -o shot.exr --camera /World/Cam --frame 101 --stats shot.json",
         "wavecomb render shot.usd -o shot.####.exr --frames 1-48 --skip-existing",
         "wavecomb render shot.usd -o shot.exr --noise 0.02 --denoise --png shot.png",
@@ -95,7 +106,7 @@ picture_options = add_options(
         "wavecomb render shot.usd -o shot.exr --spp 4096 --checkpoint shot.ckpt",
         "wavecomb render shot.usd -o shot.exr --resume shot.ckpt",
         "wavecomb render shot.usd -o shot.exr --policy adaptive --costs shot-costs.json",
-        "wavecomb render shot.usd -o shot.exr --size 7680 4320 --tile 3/8",
+        "wavecomb render shot.usd -o shot.exr --size 7680x4320 --tile 3/8",
     ),
 )
 @stage_options
@@ -117,7 +128,7 @@ def render_command(part: str | None, **options: Any) -> None:
     if chosen_tile is not None:
         written = (*written, tile_name(str(asked.output), *chosen_tile))
     enter_to_render(
-        written, asked.output, asked.output_dir, asked.frames, asked.source.frame,
+        written, asked.image, asked.output_dir, asked.frames, asked.source.frame,
         split=asked.layers.split, gpu=asked.purpose.denoise,
     )  # fmt: skip
     prepared = prepare(asked)
@@ -162,12 +173,12 @@ def render_command(part: str | None, **options: Any) -> None:
             files.append(asked.learn_to)
         reporter.finished(done, done.report, files)
         if done.stopped is not None:
-            kept = f"{plan.names.output} holds what was done"
+            kept = f"{plan.names.image} holds what was done"
             click.echo(f"stopped {how_far(done)}; {kept}", err=True)
             raise click.exceptions.Exit(128 + done.stopped)
 
 
 def _save_costs(costs_file: str, done: Done) -> None:
-    from wavecomb.run.costs import save_costs
+    from wavecomb.run.cost_profile import save_costs
 
     save_costs(costs_file, done.costs)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from wavecomb.cli.summary import print_summary
+from wavecomb.cli.summary import print_summary, times_text
 from wavecomb.run.progress import (
     LoadProgress,
     ProgressBar,
@@ -24,11 +24,8 @@ from wavecomb.run.progress import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from wavecomb.picture.rendered import Picture
+    from wavecomb.image.rendered import Picture
     from wavecomb.usd import LoadReport
-
-TIMES = ("load", "build", "render")
-"""Timings of a frame that are printed, by name in the statistics."""
 
 
 class Reporter:
@@ -51,6 +48,10 @@ class Reporter:
         """Returns the progress display of the render, a context manager."""
         return Silent()
 
+    def working(self, what: str) -> contextlib.AbstractContextManager[Any]:
+        """Shows that the image is processed after the render: "denoising" or "writing"."""
+        return contextlib.nullcontext()
+
     def finished(self, done: Done, report: LoadReport, files: Sequence[str]) -> None:
         """Reports that all files are written."""
 
@@ -58,8 +59,9 @@ class Reporter:
 class Summary(Reporter):
     """Reporter that shows a progress bar on a console and prints a summary at the end."""
 
-    def __init__(self, console: Console | None) -> None:
+    def __init__(self, console: Console | None, *, verbose: bool = False) -> None:
         self._console = console
+        self._verbose = verbose
         self._frame = self._place = ""
 
     def loading(self, stage: str) -> contextlib.AbstractContextManager[LoadProgress | None]:
@@ -74,6 +76,12 @@ class Summary(Reporter):
             return Silent()
         return ProgressBar(self._console, f"{self._place}rendering")
 
+    def working(self, what: str) -> contextlib.AbstractContextManager[Any]:
+        """Shows a bar without an end."""
+        if self._console is None:
+            return super().working(what)
+        return loading_bar(self._console, f"{self._place}{what}")
+
     def begins(self, frame: str, number: int, count: int) -> None:
         """Makes progress bars name the frame."""
         self._frame = f"frame {frame} ({number} of {count})"
@@ -81,11 +89,7 @@ class Summary(Reporter):
 
     def ended(self, done: Done, files: Sequence[str]) -> None:
         """Prints a line with timings and files of a frame."""
-        from wavecomb.run.progress import time_text
-
-        seconds = done.stats["seconds"]
-        times = ", ".join(f"{name} {time_text(seconds[name])}" for name in TIMES)
-        click.echo(f"{self._frame}: {times}; wrote {', '.join(files)}")
+        click.echo(f"{self._frame}: {times_text(done.stats['seconds'])}; wrote {', '.join(files)}")
 
     def said(self, line: str) -> None:
         """Prints the line."""
@@ -96,7 +100,7 @@ class Summary(Reporter):
         if self._frame:
             click.echo(f"{self._frame}:")
             files = [f"{len(files)} files"]
-        print_summary(done.stats, report, files)
+        print_summary(done.stats, report, files, verbose=self._verbose)
 
 
 class Lines(Reporter):
@@ -134,13 +138,13 @@ class Lines(Reporter):
         )
 
 
-def make_reporter(progress: str | None, quiet: bool) -> Reporter:
-    """Returns the reporter for ``--progress`` and ``--quiet``."""
+def make_reporter(progress: str | None, quiet: bool, verbose: bool = False) -> Reporter:
+    """Returns the reporter for ``--progress``, ``--quiet`` and ``--verbose``."""
     if progress == "json":
         return Lines()
     if quiet:
         return Reporter()
-    return Summary(None if progress == "off" else progress_console())
+    return Summary(None if progress == "off" else progress_console(), verbose=verbose)
 
 
 @dataclass(frozen=True)

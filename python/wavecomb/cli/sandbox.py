@@ -34,8 +34,8 @@ def enter_to_render(
         split: Whether each layer gets a separate file.
         gpu: Whether denoising may use GPU devices.
     """
-    from wavecomb.run.isolate.outputs import Outputs
-    from wavecomb.run.isolate.supervisor import enter
+    from wavecomb.run.isolation.outputs import Outputs
+    from wavecomb.run.isolation.supervisor import enter
 
     given = [name for name in names if name is not None]
     single = () if frame is None else (frame,)
@@ -58,7 +58,21 @@ def enter_to_render(
             parts.append((where, f"{stem}.", ending))
     if output is None:
         trees.append((os.path.abspath(folder or os.curdir), ".exr"))
-    enter(Outputs(tuple(filled), tuple(dict.fromkeys(parts)), tuple(trees)), gpu=gpu)
+    outputs = Outputs(tuple(filled), tuple(dict.fromkeys(parts)), tuple(trees))
+    _make_folders(given)
+    enter(outputs, gpu=gpu)
+
+
+def _make_folders(names: Iterable[str]) -> None:
+    """Creates the missing folders of files, which the sandboxed process cannot do."""
+    for name in names:
+        folder = os.path.dirname(os.path.realpath(name))
+        if not has_place(folder) and not os.path.exists(folder):
+            try:
+                os.makedirs(folder, exist_ok=True)
+            except OSError as error:
+                why = error.strerror or str(error)
+                raise OSError(f"{name}: cannot be written: {why}") from error
 
 
 def enter_to_read(outputs: Iterable[str | None], *, split: str | None = None) -> None:
@@ -68,8 +82,8 @@ def enter_to_read(outputs: Iterable[str | None], *, split: str | None = None) ->
         outputs: Files to write.
         split: One of these that may become a file for each layer.
     """
-    from wavecomb.run.isolate.outputs import Outputs
-    from wavecomb.run.isolate.supervisor import enter
+    from wavecomb.run.isolation.outputs import Outputs
+    from wavecomb.run.isolation.supervisor import enter
 
     parts: tuple[tuple[str, str, str], ...] = ()
     if split is not None:

@@ -75,7 +75,7 @@ def scene_command(name: str | None, output: str | None, list_: bool, **options: 
         return
     if name is None or output is None:
         raise click.UsageError("give a NAME and -o FILE, or --list")
-    from wavecomb.picture.files import check_writable
+    from wavecomb.image.files.output_file import check_writable
 
     check_writable(output)
     chosen = {key: value for key, value in options.items() if value is not None}

@@ -22,18 +22,7 @@ ASKED_FOR_ELSEWHERE = (
 _METAVARS = {"integer": "N", "number": "X", "text": "TEXT"}
 
 
-class SettingCommand(click.Command):
-    """Command with ``setting_options``. Loads the core only when its options are needed."""
-
-    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        """Returns the parameters, with the settings at the position of ``setting_options``."""
-        params: list[click.Parameter] = []
-        for one in super().get_params(ctx):
-            params += one.options() if isinstance(one, _Settings) else [one]
-        return params
-
-
-class _Settings(click.Option):
+class SettingPlaceholder(click.Option):
     """Placeholder for the options of settings in a command's list of parameters."""
 
     def __init__(self, only: Iterable[str] | None) -> None:
@@ -55,11 +44,11 @@ class _Settings(click.Option):
 def setting_options(only: Iterable[str] | None = None) -> Callable[[F], F]:
     """Adds an option for each setting in ``only``, by default all without a hand-written option.
 
-    For a ``SettingCommand``. The value of an option that is not given is None.
+    For a ``SettingCommand`` (cli/command.py). The value of an option that is not given is None.
     """
 
     def decorate(command: F) -> F:
-        command.__dict__.setdefault("__click_params__", []).append(_Settings(only))
+        command.__dict__.setdefault("__click_params__", []).append(SettingPlaceholder(only))
         return command
 
     return decorate
@@ -133,6 +122,12 @@ class Real(click.ParamType):
         return number
 
 
+def _first_integer(least: float, above: bool) -> int | None:
+    """Returns the smallest valid integer, None without a limit."""
+    bound = _bound(least)
+    return bound + 1 if above and bound is not None else bound
+
+
 def _bound(number: float) -> int | None:
     return int(number) if math.isfinite(number) else None
 
@@ -175,7 +170,7 @@ def row_option(
         "text": str,
         "file": click.Path(),
         "number": Real(least, above=above),
-        "integer": click.IntRange(_bound(least), _bound(most)),
+        "integer": click.IntRange(_first_integer(least, above), _bound(most)),
         "pair": Real(least, above=above),
         "choice": click.Choice(choices),
         "switch": click.Choice(["on", "off"]),

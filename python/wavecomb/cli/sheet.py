@@ -52,9 +52,9 @@ def sheet_command(pictures: tuple[str, ...], output: str, **options: Any) -> Non
     """
     enter_to_read((output,))
     from wavecomb.errors import WavecombError
-    from wavecomb.picture.collect import collect
-    from wavecomb.picture.files import check_writable
-    from wavecomb.picture.thumbnails import Look
+    from wavecomb.image.files.collection import collect
+    from wavecomb.image.files.output_file import check_writable
+    from wavecomb.image.thumbnails import DisplayOptions
 
     ending = os.path.splitext(output)[1].lower()
     if ending not in (".png", ".html"):
@@ -63,7 +63,9 @@ def sheet_command(pictures: tuple[str, ...], output: str, **options: Any) -> Non
     if os.path.realpath(output) in map(os.path.realpath, found.values()):
         raise WavecombError(f"-o {output}: is one of the pictures")
     check_writable(output)
-    look = Look(options["layer"], exposure=options["exposure"], tone_map=options["tone_map"])
+    look = DisplayOptions(
+        options["layer"], exposure=options["exposure"], tone_map=options["tone_map"]
+    )
     if ending == ".png":
         _write_sheet(found, output, look, options)
     else:
@@ -74,11 +76,11 @@ def sheet_command(pictures: tuple[str, ...], output: str, **options: Any) -> Non
 
 def _write_sheet(found: dict[str, str], output: str, look: Any, options: dict[str, Any]) -> None:
     from wavecomb.errors import WavecombError
-    from wavecomb.picture.image import write_png_codes
-    from wavecomb.picture.thumbnails import MOST, contact_sheet
+    from wavecomb.image.files.image import write_png_codes
+    from wavecomb.image.thumbnails import MAX_IMAGES, contact_sheet
 
-    if len(found) > MOST:
-        raise WavecombError(f"{len(found)} images: a sheet holds at most {MOST}")
+    if len(found) > MAX_IMAGES:
+        raise WavecombError(f"{len(found)} images: a sheet holds at most {MAX_IMAGES}")
     columns, width = options["columns"] or 0, options["width"] or 240
     write_png_codes(output, contact_sheet(found, look, width=width, columns=columns))
 
@@ -87,11 +89,11 @@ def _write_page(
     found: dict[str, str], output: str, look: Any, title: str, options: dict[str, Any]
 ) -> None:
     from wavecomb.errors import WavecombError
-    from wavecomb.picture.files import replacing
-    from wavecomb.picture.pages import MOST_FRAMES, sequence_page
+    from wavecomb.image.files.output_file import replacing
+    from wavecomb.image.pages import MAX_FRAMES, sequence_page
 
-    if len(found) > MOST_FRAMES:
-        raise WavecombError(f"{len(found)} images: a page holds at most {MOST_FRAMES}")
+    if len(found) > MAX_FRAMES:
+        raise WavecombError(f"{len(found)} images: a page holds at most {MAX_FRAMES}")
     text = sequence_page(
         found, look, title=title, fps=options["fps"], width=options["width"] or 960,
         kind="png" if options["lossless"] else "jpeg",

@@ -18,32 +18,51 @@ MOST_DEPTHS = 8
 MOST_LIGHTS = 5
 
 
-def print_summary(stats: Mapping[str, Any], report: LoadReport, files: Sequence[str]) -> None:
-    """Prints the figures of a render in a few lines and small tables."""
+SECONDS = {
+    "load": "load", "build": "build", "render": "render", "denoise": "denoising",
+    "write": "writing",
+}  # fmt: skip
+"""Timings in the statistics that add up to the time of an image, with their names in the summary.
+"""
+
+
+def times_text(seconds: Mapping[str, float]) -> str:
+    """Returns the time of an image and its parts, without parts that took no time.
+
+    >>> times_text({"load": 0.5, "build": 0.1, "render": 61.0, "denoise": 0.0, "write": 0.2})
+    '1 min 02 s: load 0.500 s, build 0.100 s, render 1 min 01 s, writing 0.200 s'
+    """
+    from wavecomb.run.progress import time_text
+
+    parts = {said: seconds.get(name, 0.0) for name, said in SECONDS.items()}
+    shown = (f"{said} {time_text(value)}" for said, value in parts.items() if value > 0.0)
+    return f"{time_text(sum(parts.values()))}: {', '.join(shown)}"
+
+
+def print_summary(
+    stats: Mapping[str, Any], report: LoadReport, files: Sequence[str], *, verbose: bool = False
+) -> None:
+    """Prints time, samples, memory, warnings and files of a render.
+
+    Args:
+        stats: Statistics of the render.
+        report: Report of the loaded stage.
+        files: Files that were written.
+        verbose: Whether to print phases, programs, materials and predictions as well.
+    """
     from rich.markup import escape
 
     from wavecomb import terminal
-    from wavecomb.run.progress import count_text, time_text
 
     console = terminal.console(highlight=False, soft_wrap=True)
-    seconds, counts = stats["seconds"], stats["counts"]
-    rays = counts["rays"] + counts["shadow_rays"]
-    console.print(
-        ", ".join(f"{name} {time_text(seconds[name])}" for name in ("load", "build", "render"))
-    )
-    console.print(
-        f"{count_text(counts['samples'])} samples, {count_text(stats['samples_per_s'])}/s; "
-        f"{count_text(rays)} rays, {count_text(stats['rays_per_s'])}/s; "
-        f"peak memory {stats['peak_rss_bytes'] / 1e6:,.0f} MB{_memory(stats['memory_bytes'])}"
-    )
-    for line in _sampling_lines(stats):
-        console.print(line)
-    if lights := light_line(stats["light_calibration"]):
-        console.print(escape(lights))
-    for line in _scheduling_lines(stats):
-        console.print(escape(line))
-    _phases(console, stats)
-    _programs_and_materials(console, stats)
+    console.print(f"time     {times_text(stats['seconds'])}")
+    console.print(f"samples  {_samples_text(stats)}")
+    more = _memory(stats["memory_bytes"]) if verbose else ""
+    console.print(f"memory   {stats['peak_rss_bytes'] / 1e6:,.0f} MB{more}")
+    if verbose:
+        _details(console, stats)
+    if report.warnings:
+        console.print(f"warnings {len(report.warnings)}, listed above")
     if report.unsupported:
         console.print("not supported, left out:")
         for finding in report.unsupported:
@@ -51,6 +70,44 @@ def print_summary(stats: Mapping[str, Any], report: LoadReport, files: Sequence[
     for finding in report.notes:
         console.print(f"note: {escape(finding.line())}")
     console.print("wrote " + escape(", ".join(files)))
+
+
+def _samples_text(stats: Mapping[str, Any]) -> str:
+    """Returns number and rate of samples, passes and error."""
+    from wavecomb.run.progress import count_text, time_text
+    from wavecomb.run.stats import rendered_pixels
+
+    settings, count, before = (
+        stats["settings"],
+        stats["counts"]["samples"],
+        stats["resumed_samples"],
+    )
+    mean = (before + count) / rendered_pixels(settings)
+    text = f"{mean:.3g} per pixel, {count_text(count)}, {count_text(stats['samples_per_s'])}/s"
+    if before:
+        took = time_text(stats["seconds"]["resumed"])
+        text += f"; resumed after {took} and {count_text(before)}"
+    if stats["error"] is not None:
+        text += f"; mean relative error {_percent(stats['error'])}"
+    return text
+
+
+def _details(console: Console, stats: Mapping[str, Any]) -> None:
+    """Prints rays, predictions, scheduling, phases, programs and materials."""
+    from rich.markup import escape
+
+    from wavecomb.run.progress import count_text
+
+    rays = stats["counts"]["rays"] + stats["counts"]["shadow_rays"]
+    console.print(f"{count_text(rays)} rays, {count_text(stats['rays_per_s'])}/s")
+    for line in _sampling_lines(stats):
+        console.print(escape(line))
+    if lights := light_line(stats["light_calibration"]):
+        console.print(escape(lights))
+    for line in _scheduling_lines(stats):
+        console.print(escape(line))
+    _phases(console, stats)
+    _programs_and_materials(console, stats)
 
 
 def _memory(parts: Mapping[str, int]) -> str:
@@ -68,11 +125,6 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
 
     lines: list[str] = []
     settings, before = stats["settings"], stats["resumed_samples"]
-    if before:
-        lines.append(
-            f"resumed after {time_text(stats['seconds']['resumed'])} and "
-            f"{count_text(before)} samples"
-        )
     if allotted := stats.get("allotment"):
         line = (
             f"samples by {settings['allocate']}: {allotted['least']} to {allotted['most']} per "
@@ -105,10 +157,7 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
     ]
     if any(settings.get(name) for name in ("adaptive", "noise", "time_limit")):
         mean = (before + stats["counts"]["samples"]) / rendered_pixels(settings)
-        line = f"{stats['passes']} passes, {mean:.3g} samples a pixel"
-        if stats["error"] is not None:
-            line += f"; mean relative error {_percent(stats['error'])}"
-        lines.append(line)
+        lines.append(f"{stats['passes']} passes, {mean:.3g} samples per pixel")
     return lines
 
 

@@ -7,8 +7,12 @@ from typing import Any
 
 import click
 
+from wavecomb.cli.command import SettingCommand
 from wavecomb.cli.options import StageOptions, examples, optional_stage
-from wavecomb.cli.setting_options import SettingCommand, setting_options
+from wavecomb.cli.setting_options import setting_options
+from wavecomb.cli.size import ImageSize, Percent, SizeType
+
+DEFAULT_SIZE = (960, 540)
 
 
 @click.command(
@@ -16,23 +20,22 @@ from wavecomb.cli.setting_options import SettingCommand, setting_options
     cls=SettingCommand,
     epilog=examples(
         "wavecomb view shot.usd",
-        "wavecomb view shot.usd --size 1280 720 --spp 256 --camera /World/Cam",
+        "wavecomb view shot.usd --size 1280x720 --spp 256 --camera /World/Cam",
         "wavecomb view shot.usd --variant '/World/Car{paint}=red' --policy adaptive",
     ),
 )
 @optional_stage
 @click.option(
     "--size",
-    nargs=2,
-    type=int,
-    default=(960, 540),
-    metavar="W H",
-    help="Image size in pixels.  [default: 960 540]",
+    type=SizeType(),
+    default="960x540",
+    metavar="WxH|N%",
+    help="Image size in pixels, or a part of the default.  [default: 960x540]",
 )
 @click.option("--spp", type=int, metavar="N", help="Samples per pixel.  [default: 64]")
 @setting_options(("max_depth", "seed", "threads", "policy", "ray_order", "roulette"))
 @click.option("--denoise", is_flag=True, help="Denoise the image.")
-def view_command(stage: str | None, size: tuple[int, int], denoise: bool, **options: Any) -> None:
+def view_command(stage: str | None, size: ImageSize, denoise: bool, **options: Any) -> None:
     """Open STAGE in a window to navigate, edit and compare.
 
     Without STAGE the window opens empty. See docs/window.md.
@@ -43,7 +46,7 @@ def view_command(stage: str | None, size: tuple[int, int], denoise: bool, **opti
     needed("PySide6.QtWidgets", "the window", extra="gui")
     needed("pyqtgraph", "the window", extra="gui")
     if denoise:
-        from wavecomb.picture.denoise import check_denoiser
+        from wavecomb.image.denoise import check_denoiser
 
         check_denoiser()
     from wavecomb.gui.setup import Setup
@@ -54,7 +57,8 @@ def view_command(stage: str | None, size: tuple[int, int], denoise: bool, **opti
         name = "--working-space" if source["texture_limit"] is None else "--texture-limit"
         raise WavecombError(f"{name} is not for the window: leave it out, or use wavecomb render")
     chosen = {name: value for name, value in options.items() if value is not None}
-    setup = Setup().changed(width=size[0], height=size[1], denoise=denoise, **chosen)
+    width, height = size.of(DEFAULT_SIZE) if isinstance(size, Percent) else size
+    setup = Setup().changed(width=width, height=height, denoise=denoise, **chosen)
     from wavecomb.gui.app import run
 
     code = run(

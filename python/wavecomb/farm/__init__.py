@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from wavecomb.farm.api import run, submit
-    from wavecomb.farm.assemble import status
+    from wavecomb.farm.assembly import status
     from wavecomb.farm.folder import Folder
 
 __all__ = ["Folder", "run", "status", "submit"]
@@ -22,7 +22,7 @@ __all__ = ["Folder", "run", "status", "submit"]
 _HOMES = {
     "Folder": "wavecomb.farm.folder",
     "run": "wavecomb.farm.api",
-    "status": "wavecomb.farm.assemble",
+    "status": "wavecomb.farm.assembly",
     "submit": "wavecomb.farm.api",
 }
 

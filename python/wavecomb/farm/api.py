@@ -85,7 +85,7 @@ def submit(
         aov_names.with_others(tuple(aovs or aov_names.DEFAULT), guides), settings,
     )  # fmt: skip
     if own is not None:
-        raise WavecombError("policy: a farm needs a name, not an object of this process")
+        raise WavecombError("policy: a farm needs the name of a policy, not an object")
     LoadOptions.of(None, loading).check()
     kept = names if not denoise else aov_names.expand(tuple(aovs or aov_names.DEFAULT))
     done = Job(
@@ -124,10 +124,10 @@ def run(
         KeyboardInterrupt: ``progress`` stopped the run. Finished tiles are kept.
     """
     from wavecomb.farm.client import run as run_job
-    from wavecomb.farm.clusters import parse_where
+    from wavecomb.farm.clusters import parse_cluster
 
     folder = job if isinstance(job, Folder) else Folder(job)
-    where = parse_where(on or f"local:{workers}")
+    where = parse_cluster(on or f"local:{workers}")
     stopped = [False]
 
     def is_stopped() -> bool:
@@ -160,8 +160,8 @@ def render_task(folder: Folder, image: int, tile: str) -> list[str]:
     """
     from wavecomb.api import import_usd
     from wavecomb.farm.machine_class import machine_class
-    from wavecomb.farm.part import has_part
-    from wavecomb.farm.rendering import Renderer, check_files, looks_for, use_job_maps
+    from wavecomb.farm.rendering import Renderer, check_files, error_checks_for, use_job_maps
+    from wavecomb.farm.tile_file import has_tile
 
     job = folder.job
     number, count = parse_tile(tile)
@@ -171,15 +171,15 @@ def render_task(folder: Folder, image: int, tile: str) -> list[str]:
         raise WavecombError(f"--tile {tile}: images of this job have {job.tile_count(image - 1)}")
     task, machine = Task(image - 1, number), machine_class()
     rectangle = job.rectangles(task.image)[number]
-    looks = looks_for(job.shot(task.image)) if count > 1 else 0
-    key = job.part_key(task, machine)
-    if has_part(folder.part(task), key, rectangle, looks):
+    checks = error_checks_for(job.shot(task.image)) if count > 1 else 0
+    key = job.tile_key(task, machine)
+    if has_tile(folder.part(task), key, rectangle, checks):
         return []
     import_usd()
     use_job_maps(job)
     check_files(job)
     renderer = Renderer(job, learned=folder.learned())
-    renderer.render(task, folder.part(task), machine, looks)
+    renderer.render(task, folder.part(task), machine, checks)
     return list(renderer.warnings)
 
 
@@ -189,7 +189,7 @@ def assemble_job(folder: Folder) -> tuple[list[str], list[str]]:
     Returns:
         Files that were written, and a line for each image with missing tiles.
     """
-    from wavecomb.farm.assemble import finish_image, is_finished, machine_of
+    from wavecomb.farm.assembly import finish_image, is_finished, machine_of
 
     job, written, lacking = folder.job, [], []
     for image in range(len(job.images)):

@@ -12,19 +12,19 @@ from dataclasses import dataclass
 from typing import Any
 
 from wavecomb.errors import WavecombError
-from wavecomb.farm.assemble import Outcome, is_finished, machine_of
-from wavecomb.farm.clusters import Cluster, Where, connected
+from wavecomb.farm.assembly import Outcome, is_finished, machine_of
+from wavecomb.farm.clusters import Cluster, ClusterSpec, connected
 from wavecomb.farm.folder import Folder
 from wavecomb.farm.job import Task, hashed
 from wavecomb.farm.machine_class import PREFIX
-from wavecomb.farm.part import has_part
+from wavecomb.farm.tile_file import has_tile
 
 _TURN_S = 0.2
-_LOOK_S = 1.0
+_QUERY_S = 1.0
 """Time between queries of the list of workers, in seconds."""
 _BATCH_S = 0.5
 """Time that a batch of small tiles should take, in seconds."""
-_LEAST_BATCHES = 4
+_MIN_BATCHES = 4
 """Smallest number of batches for each worker, so that workers end at about the same time."""
 _RETRY_S = 5.0
 """Time between rescheduling of tasks that wait for a worker, in seconds."""
@@ -63,14 +63,14 @@ class Run:
         self._ready: deque[_Batch] = deque()
         self._tiles: deque[Task] = deque()
         self._missing: dict[int, set[int]] = {}
-        self._looks: dict[int, int] = {}
+        self._checks: dict[int, int] = {}
         self._flying: dict[Any, _Batch] = {}
         self._ended: queue.SimpleQueue[tuple[Any, dict[str, Any] | None]] = queue.SimpleQueue()
         self._attempts = 0
         self._seconds = 0.0
         self._warned: set[str] = set()
         self._workers: dict[str, Any] = {}
-        self._next_look = 0.0
+        self._next_query = 0.0
         self._progressed = False
         self._alone_since: float | None = None
         self._next_retry = 0.0
@@ -81,7 +81,7 @@ class Run:
 
     def work(self, images: list[int]) -> None:
         """Renders the missing tiles of these images and writes the images."""
-        from wavecomb.farm.rendering import looks_for
+        from wavecomb.farm.rendering import error_checks_for
         from wavecomb.farm.tasks import FarmPlugin, restart_stale
 
         self._cluster.client.register_plugin(FarmPlugin(self._job.isa, self._job.hang_s))
@@ -91,13 +91,13 @@ class Run:
         restart_stale(self._cluster.client, self._cluster.what, self._job)
         for image in images:
             shot, tiles = self._job.shot(image), self._job.rectangles(image)
-            self._looks[image] = looks_for(shot) if len(tiles) > 1 else 0
+            self._checks[image] = error_checks_for(shot) if len(tiles) > 1 else 0
             missing = {
                 task.tile
                 for task, tile in zip(self._job.tasks_of(image), tiles, strict=True)
-                if not has_part(
-                    self._folder.part(task), self._job.part_key(task, self._machine), tile,
-                    self._looks[image],
+                if not has_tile(
+                    self._folder.part(task), self._job.tile_key(task, self._machine), tile,
+                    self._checks[image],
                 )
             }  # fmt: skip
             self._missing[image] = missing
@@ -120,15 +120,15 @@ class Run:
             if until is not None and time.monotonic() > until:
                 raise WavecombError(f"{self._cluster.what}: no workers came in {limit:.0f} s")
             self._cluster.check(False)
-            self._look(0.0)
+            self._query_workers(0.0)
             time.sleep(_TURN_S)
         return True
 
-    def _look(self, every: float = _LOOK_S) -> None:
+    def _query_workers(self, every: float = _QUERY_S) -> None:
         """Queries the scheduler for its workers, at most every ``every`` seconds."""
-        if time.monotonic() < self._next_look:
+        if time.monotonic() < self._next_query:
             return
-        self._next_look = time.monotonic() + every
+        self._next_query = time.monotonic() + every
         info = self._cluster.client.scheduler_info(n_workers=-1)
         self._workers = {} if info is None else dict(info.get("workers", {}))
 
@@ -150,7 +150,7 @@ class Run:
         """Chooses the machine class of this run: most finished tiles first, then most workers."""
         # lets workers that start together all register
         time.sleep(_TURN_S if self._cluster.wait_s else 0.0)
-        self._look(0.0)
+        self._query_workers(0.0)
         found = self._classes()
         parts = dict.fromkeys(found, 0)
         if len(found) > 1:
@@ -177,7 +177,7 @@ class Run:
                 self._out.stopped = True
                 client.cancel(list(self._flying), reason="wavecomb farm was stopped")
                 return
-            self._look()
+            self._query_workers()
             while len(self._flying) < self._capacity() and self._submit():
                 pass
             try:
@@ -224,9 +224,9 @@ class Run:
         else:
             return False
         # Two clients of one scheduler must use the same key for the same work.
-        tiles = [(task.image, task.tile, self._looks[task.image]) for task in batch.tiles]
+        tiles = [(task.image, task.tile, self._checks[task.image]) for task in batch.tiles]
         name = hashed([self._common[0], self._job.id, self._machine, tiles, batch.image,
-                       batch.attempt, self._looks.get(batch.image)])  # fmt: skip
+                       batch.attempt, self._checks.get(batch.image)])  # fmt: skip
         what: Any = tiles if tiles else batch.image
         future = self._cluster.client.submit(
             render_tiles if tiles else assemble_image, *self._common, self._machine, what,
@@ -240,7 +240,7 @@ class Run:
 
     def _batch_size(self) -> int:
         wanted = _BATCH_S / self._seconds if self._seconds else 1
-        most = len(self._tiles) / (_LEAST_BATCHES * max(1, self._capacity()))
+        most = len(self._tiles) / (_MIN_BATCHES * max(1, self._capacity()))
         return max(1, int(min(wanted, most)))
 
     def _again(self, tiles: list[Task]) -> None:
@@ -314,7 +314,7 @@ class Run:
             self._out.images_done += 1
             self._progressed = True
             return
-        self._looks[image] = max(result["looks"], self._looks[image])
+        self._checks[image] = max(result["checks"], self._checks[image])
         self._missing[image] |= set(result["again"])
         self._out.tasks_done -= len(result["again"])
         self._again([Task(image, tile) for tile in result["again"]])
@@ -344,7 +344,7 @@ class Run:
     def _leave_out(self, worker: str, why: str) -> None:
         """Withdraws queued tasks from a worker whose disk is full."""
         self._full = why
-        self._next_look = 0.0
+        self._next_query = 0.0
         client = self._cluster.client
         held = set(client.processing(workers=[worker]).get(worker, ()))
         for future in [one for one in self._flying if one.key in held]:
@@ -355,7 +355,7 @@ class Run:
 
 def run(
     folder: Folder,
-    where: Where,
+    where: ClusterSpec,
     *,
     threads: int = 0,
     dashboard: int | None = None,

@@ -28,7 +28,7 @@ from wavecomb.extras import needed
 from wavecomb.farm.worker import write_certificates
 from wavecomb.machine import usable_cores
 
-MOST_WORKERS = 1024
+MAX_WORKERS = 1024
 DASK_WAIT_S = 60.0
 """Time to wait for the first worker of an existing Dask cluster, in seconds."""
 _SLURM_WORKERS = 4
@@ -37,14 +37,14 @@ _ANSWER_S = 60.0
 """Time limit for sbatch, squeue and scancel, in seconds."""
 _ASK_S = 10.0
 """Time between calls of squeue, in seconds."""
-_MOST_STARTS = 5
+_MAX_STARTS = 5
 """Largest number of worker starts in a row without any progress."""
 _END_S = 5.0
 _SCRIPT = '#!/bin/sh\nexec "$@" --nthreads "${SLURM_CPUS_PER_TASK:-1}"\n'
 
 
 @dataclass(frozen=True)
-class Where:
+class ClusterSpec:
     """Cluster that ``--on`` names.
 
     Attributes:
@@ -58,21 +58,21 @@ class Where:
     address: str = ""
 
 
-def parse_where(text: str) -> Where:
+def parse_cluster(text: str) -> ClusterSpec:
     """Parses the value of ``--on``. Raises WavecombError if it is invalid.
 
-    >>> parse_where("local:4")
-    Where(kind='local', workers=4, address='')
+    >>> parse_cluster("local:4")
+    ClusterSpec(kind='local', workers=4, address='')
     """
     kind, colon, rest = text.partition(":")
     if kind == "dask" and colon:
-        return Where("dask", address=parse_address(rest))
+        return ClusterSpec("dask", address=parse_address(rest))
     if kind == "none" and not colon:
-        return Where("none")
+        return ClusterSpec("none")
     if kind in ("local", "slurm") and (
-        not colon or (re.fullmatch(r"[0-9]{1,4}", rest) and 1 <= int(rest) <= MOST_WORKERS)
+        not colon or (re.fullmatch(r"[0-9]{1,4}", rest) and 1 <= int(rest) <= MAX_WORKERS)
     ):
-        return Where(kind, int(rest or (_SLURM_WORKERS if kind == "slurm" else 1)))
+        return ClusterSpec(kind, int(rest or (_SLURM_WORKERS if kind == "slurm" else 1)))
     raise WavecombError(
         f"--on {text}: must be local, local:N with N workers, dask:tls://HOST:PORT, slurm:N, or "
         "none: only write the job"
@@ -138,7 +138,7 @@ class Cluster:
         """Ends the workers that this process started."""
 
 
-class _Started(Cluster):
+class _LocalWorkers(Cluster):
     """Local workers in a process that is restarted when it ends."""
 
     def __init__(self, client: Any, what: str, words: list[str], log: Path) -> None:
@@ -162,7 +162,7 @@ class _Started(Cluster):
         self._starts = 1 if progressed else self._starts
         if self._process.poll() is None:
             return
-        if self._starts >= _MOST_STARTS:
+        if self._starts >= _MAX_STARTS:
             said = self._log.read_text(errors="replace").strip().splitlines() or ["no reason given"]
             raise WavecombError(f"{self.what}: workers ended {self._starts} times: {said[-1]}")
         self._start()
@@ -175,7 +175,7 @@ class _Started(Cluster):
             self._process.wait(_END_S)
 
 
-class _Slurm(Cluster):
+class _SlurmWorkers(Cluster):
     """Array of Slurm jobs, one for each worker. Replaces workers that end."""
 
     wait_s = None
@@ -216,7 +216,7 @@ class _Slurm(Cluster):
             there = 0
         if there >= self._count:
             return
-        if self._starts >= _MOST_STARTS:
+        if self._starts >= _MAX_STARTS:
             raise WavecombError(f"{self.what}: Slurm's jobs end without finishing anything")
         self._submit(self._count - there)
 
@@ -229,7 +229,7 @@ class _Slurm(Cluster):
 
 @contextlib.contextmanager
 def connected(
-    where: Where, folder: Path, *, threads: int = 0, tries: int, hang_s: float,
+    where: ClusterSpec, folder: Path, *, threads: int = 0, tries: int, hang_s: float,
     dashboard: int | None = None,
 ) -> Iterator[Cluster]:  # fmt: skip
     """Connects to a cluster, or starts one, for the duration of a ``with`` block.
@@ -299,11 +299,11 @@ def connected(
             each = threads or max(1, usable_cores() // where.workers)
             words += ["--host", "127.0.0.1", "--nworkers", str(where.workers)]
             words += ["--nthreads", str(each)]
-            cluster = _Started(client, what, words, place / "log")
+            cluster = _LocalWorkers(client, what, words, place / "log")
         else:
             script = place / "worker.sh"
             script.write_text(_SCRIPT)
-            cluster = _Slurm(client, what, script, words, where.workers)
+            cluster = _SlurmWorkers(client, what, script, words, where.workers)
         stack.callback(cluster.close)
         yield cluster
 
@@ -338,7 +338,7 @@ def _ask(*words: str) -> str:
             words, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_ANSWER_S
         )
     except FileNotFoundError:
-        raise WavecombError(f"--on slurm: the command {words[0]} is not here") from None
+        raise WavecombError(f"--on slurm: the command {words[0]} is not installed") from None
     except (OSError, subprocess.TimeoutExpired) as error:
         raise WavecombError(f"--on slurm: {words[0]}: {error}") from None
     if done.returncode:

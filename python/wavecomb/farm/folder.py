@@ -14,7 +14,7 @@ from typing import Any
 
 from wavecomb.errors import WavecombError
 from wavecomb.farm.job import Job, Task
-from wavecomb.picture.files import replacing
+from wavecomb.image.files.output_file import replacing
 
 JOB_FILE = "job.json"
 LEARNED_FILE = "guide.learned"
@@ -52,11 +52,11 @@ class Folder:
             folder.mkdir(parents=True)
         except FileExistsError:
             raise WavecombError(
-                f"{os.fspath(path)}: is there already: `wavecomb farm resume` continues a job, "
+                f"{os.fspath(path)}: already exists: `wavecomb farm resume` continues a job, "
                 "and --job names another folder"
             ) from None
         if learned is not None:
-            from wavecomb.run.learned import save_learned
+            from wavecomb.run.guiding_file import save_learned
 
             save_learned(folder / LEARNED_FILE, learned)
         write_json(folder / JOB_FILE, job.as_json())
@@ -86,7 +86,7 @@ class Folder:
         """
         if self.job.learned is None:
             return None
-        from wavecomb.run.learned import load_learned
+        from wavecomb.run.guiding_file import load_learned
 
         return load_learned(self.path / LEARNED_FILE)
 

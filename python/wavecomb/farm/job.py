@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 from wavecomb.errors import WavecombError
-from wavecomb.farm.tiling import MOST_TILES, Rectangle, tiles_of
+from wavecomb.farm.tiling import MAX_TILES, Rectangle, tiles_of
 from wavecomb.path_maps import Pair, here, mapped
 from wavecomb.run.frame_names import fill, frame_text
 from wavecomb.version import version
@@ -217,7 +217,7 @@ class Job:
         )  # fmt: skip
         return found
 
-    def part_key(self, task: Task, machine: str) -> str:
+    def tile_key(self, task: Task, machine: str) -> str:
         """Returns a hash of all inputs that determine the pixels of a tile."""
         tile = self.rectangles(task.image)[task.tile]
         return hashed({"image": self.image_key(task.image, machine), "tile": tile})
@@ -246,7 +246,7 @@ class Job:
                 with ``name``.
         """
         if not isinstance(value, Mapping) or value.get("kind") != KIND:
-            raise WavecombError(f"{name}: is no job of `wavecomb farm submit`")
+            raise WavecombError(f"{name}: is not a job of `wavecomb farm submit`")
         if value.get("format") != FORMAT:
             raise WavecombError(
                 f"{name}: is a job of format {value.get('format')!s:.20}, and this version of "
@@ -272,15 +272,17 @@ def _checked(cls: type[Job], value: Mapping[str, Any]) -> Job:
     for shot, frame in _list(given["images"], "images"):
         _whole(shot, 0, len(shots) - 1, "an image's shot")
         images.append((shot, None if frame is None else _real(frame, "an image's frame")))
-    columns, rows = (_whole(n, 1, MOST_TILES, "tiles") for n in given["tiles"])
+    columns, rows = (_whole(n, 1, MAX_TILES, "tiles") for n in given["tiles"])
     files = tuple(StageFile(**one) for one in given["files"])
     for one in files:
         if not (isinstance(one.path, str) and isinstance(one.sha256, str)):
             raise ValueError("files: must have path and sha256")
     if not (isinstance(given["stage"], str) and isinstance(given["folder"], str)):
         raise ValueError("stage and folder: must be names")
-    if given["tone_map"] not in ("clamp", "neutral"):
-        raise ValueError("tone_map: must be clamp or neutral")
+    if given["tone_map"] not in ("clamp", "neutral") and not str(given["tone_map"]).startswith(
+        "ocio:"
+    ):
+        raise ValueError("tone_map: must be clamp, neutral or ocio:VIEW")
     job = cls(
         **{
             **given, "shots": shots, "images": tuple(images), "files": files,

@@ -15,7 +15,7 @@ from wavecomb import processes
 from wavecomb.errors import WavecombError
 from wavecomb.extras import needed
 from wavecomb.farm.folder import Folder
-from wavecomb.picture.files import replacing
+from wavecomb.image.files.output_file import replacing
 
 _NOTICE_S = 30
 

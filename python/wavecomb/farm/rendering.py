@@ -9,15 +9,15 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.errors import WavecombError
-from wavecomb.farm.assemble import file_hash
+from wavecomb.farm.assembly import file_hash
 from wavecomb.farm.job import Job, Shot, StageFile, Task
-from wavecomb.farm.tiling import Rectangle, border, grown, most_looks
+from wavecomb.farm.tiling import Rectangle, border, grown, max_error_checks
+from wavecomb.image.rendered import Picture, picture_of
 from wavecomb.path_maps import here, use_maps
-from wavecomb.picture.rendered import Picture, picture_of
 from wavecomb.run.bands import without_samples
+from wavecomb.run.callbacks import Reporter, Watcher
 from wavecomb.run.sequence import Frames
 from wavecomb.run.settings import check_memory
-from wavecomb.run.watcher import Reporter, Watcher
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 _ABSENT = re.compile(r"(texture|MaterialX file|IES profile) .* cannot be read|cannot open layer")
 """Warnings about missing files of the stage."""
-_MOST_NAMED = 3
+_MAX_NAMED = 3
 
 
 class Stopped(Exception):
@@ -76,7 +76,7 @@ class Renderer:
         task: Task,
         path: Path,
         machine: str,
-        looks: int = 0,
+        checks: int = 0,
         *,
         with_job: bool = False,
         replacing: Any = None,
@@ -87,9 +87,9 @@ class Renderer:
             task: The tile.
             path: File of the tile.
             machine: Class of this machine.
-            looks: Number of error checks that a border must allow for; 0 chooses a likely number.
+            checks: Number of error checks that a border must allow for; 0 chooses a likely number.
             with_job: Whether the file also stores the job.
-            replacing: As in ``save_part``.
+            replacing: As in ``save_tile``.
 
         Returns:
             Counts for the progress display.
@@ -98,15 +98,15 @@ class Renderer:
             Stopped: ``is_stopped`` cancelled the render.
             WavecombError: The stage or the settings cannot be rendered.
         """
-        from wavecomb.farm.part import replacing_quickly, save_part
+        from wavecomb.farm.tile_file import replacing_quickly, save_tile
 
         shot, tile = self.job.shot(task.image), self.job.rectangles(task.image)[task.tile]
-        settings, rendered, looks = self._settings(task.image, shot, tile, looks)
+        settings, rendered, checks = self._settings(task.image, shot, tile, checks)
         check_memory(settings, shot.aovs)
         picture, frames = self._render(task, shot, settings)
-        save_part(
-            path, picture, key=self.job.part_key(task, machine), number=task.tile, tile=tile,
-            rendered=rendered, machine=machine, looks=looks,
+        save_tile(
+            path, picture, key=self.job.tile_key(task, machine), number=task.tile, tile=tile,
+            rendered=rendered, machine=machine, checks=checks,
             empty=self._empty(task, shot, frames, picture),
             job=self.job.as_json() if with_job else None,
             replacing=replacing or replacing_quickly,
@@ -114,7 +114,7 @@ class Renderer:
         return {"samples": picture.stats["counts"]["samples"]}
 
     def _settings(
-        self, image: int, shot: Shot, tile: Rectangle, looks: int
+        self, image: int, shot: Shot, tile: Rectangle, checks: int
     ) -> tuple[Settings, Rectangle, int]:
         """Returns a tile's settings, the rectangle to render and the error checks it allows for."""
         from wavecomb import _core
@@ -122,9 +122,9 @@ class Renderer:
         chosen = {**shot.settings, "threads": self._threads or shot.settings.get("threads", 0)}
         if self.job.tile_count(image) == 1:
             return _core.Settings(**chosen), _whole(shot), 0
-        looks = looks_for(shot, looks)
-        rendered = grown(tile, border(shot.settings, looks), shot.region)
-        return _core.Settings(**{**chosen, "region": rendered, "crop": True}), rendered, looks
+        checks = error_checks_for(shot, checks)
+        rendered = grown(tile, border(shot.settings, checks), shot.region)
+        return _core.Settings(**{**chosen, "region": rendered, "crop": True}), rendered, checks
 
     def _render(self, task: Task, shot: Shot, settings: Settings) -> tuple[Picture, Frames]:
         frames = self._frames(task, settings.threads)
@@ -202,14 +202,14 @@ def _whole(shot: Shot) -> Rectangle:
     return 0, 0, int(shot.settings["width"]), int(shot.settings["height"])
 
 
-def looks_for(shot: Shot, looks: int = 0) -> int:
+def error_checks_for(shot: Shot, checks: int = 0) -> int:
     """Returns the number of error checks that borders allow for.
 
-    This is ``looks`` or, if that is 0, a likely number. Renders that are not adaptive need 0.
+    This is ``checks`` or, if that is 0, a likely number. Renders that are not adaptive need 0.
     """
     if not shot.is_adaptive:
         return 0
-    return looks or most_looks(shot.settings)
+    return checks or max_error_checks(shot.settings)
 
 
 def list_files(
@@ -228,7 +228,7 @@ def list_files(
     from wavecomb.api import import_usd
 
     import_usd()
-    from wavecomb.usd.stage.dependencies import dependencies
+    from wavecomb.usd.layers.dependencies import dependencies
 
     session = None if session_layer is None else Path(session_layer)
     found = dependencies(Path(stage), variants, session)
@@ -259,6 +259,6 @@ def check_files(job: Job) -> None:
         except OSError as error:
             lines.append(f"{name} is not on this machine: {error.strerror}")
     if lines:
-        more = len(lines) - _MOST_NAMED
-        lines = lines[:_MOST_NAMED] + [f"and {more} more files"] * (more > 0)
+        more = len(lines) - _MAX_NAMED
+        lines = lines[:_MAX_NAMED] + [f"and {more} more files"] * (more > 0)
         raise WavecombError("; ".join(lines))

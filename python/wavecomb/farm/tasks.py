@@ -24,7 +24,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.path_maps import VARIABLE, Pair, here, mapped, use_maps
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-_LEAST_FREE = 1 << 16
+_MIN_FREE = 1 << 16
 """Free bytes below which a disk counts as full, because libraries do not report why a write
 failed."""
 _LOOK_S = 1.0
@@ -137,24 +137,24 @@ def render_tiles(
         or ""; ``warnings``, lines; ``seconds``, the time taken; ``worker``, its address.
     """
     from wavecomb.farm.job import Task
-    from wavecomb.farm.part import has_part
     from wavecomb.farm.rendering import Stopped
+    from wavecomb.farm.tile_file import has_tile
 
     started = time.monotonic()
     out: dict[str, Any] = {"done": [], "failed": [], "full": "", "warnings": []}
     out["worker"] = _begin()
     with progress:
         renderer, of = _renderer(folder, maps, job)
-        for image, number, looks in tiles:
+        for image, number, checks in tiles:
             progress.note()
             if _is_cancelled():
                 break
             task = Task(image, number)
-            path, key = of.part(task), of.job.part_key(task, machine)
+            path, key = of.part(task), of.job.tile_key(task, machine)
             tile = of.job.rectangles(image)[number]
             try:
-                if not has_part(path, key, tile, looks):
-                    renderer.render(task, path, machine, looks)
+                if not has_tile(path, key, tile, checks):
+                    renderer.render(task, path, machine, checks)
                 out["done"].append((image, number))
             except Stopped:
                 break
@@ -177,13 +177,13 @@ def assemble_image(
     """Joins the tiles of an image and writes its files; takes the arguments of ``render_tiles``.
 
     Returns:
-        A dictionary: ``again``, tiles that must be rendered first; ``looks``, the number of error
+        A dictionary: ``again``, tiles that must be rendered first; ``checks``, the number of error
         checks that their borders must allow for, or 0; ``full``, why nothing can be written here,
         or ""; ``worker``, its address.
     """
-    from wavecomb.farm.assemble import finish_image
+    from wavecomb.farm.assembly import finish_image
 
-    out: dict[str, Any] = {"again": [], "looks": 0, "full": ""}
+    out: dict[str, Any] = {"again": [], "checks": 0, "full": ""}
     out["worker"] = _begin()
     with progress:
         of = _folder(folder, maps, job)
@@ -244,7 +244,7 @@ def is_full(error: OSError, path: Path) -> bool:
         found = os.statvfs(path.parent)
     except OSError:
         return False
-    return found.f_bavail * found.f_frsize < _LEAST_FREE
+    return found.f_bavail * found.f_frsize < _MIN_FREE
 
 
 def _begin() -> str:

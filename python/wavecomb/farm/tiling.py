@@ -16,9 +16,9 @@ from wavecomb.errors import WavecombError
 Rectangle = tuple[int, int, int, int]
 """Rectangle (x0, y0, x1, y1) in pixels of the whole image, without column x1 and row y1."""
 
-MOST_TILES = 9999
+MAX_TILES = 9999
 """Largest number of columns or rows of an image."""
-LEAST_EDGE = 64
+MIN_EDGE = 64
 """Smallest edge of tiles that ``choose_tiles`` chooses, in pixels."""
 TILES_OF_A_WORKER = 4
 """Number of tiles of an image for each worker, so that workers end at about the same time."""
@@ -86,7 +86,7 @@ def layout(count: int, region: Rectangle) -> tuple[int, int]:
     fits = [
         (n, count // n)
         for n in range(1, count + 1)
-        if count % n == 0 and n <= min(width, MOST_TILES) and count // n <= min(height, MOST_TILES)
+        if count % n == 0 and n <= min(width, MAX_TILES) and count // n <= min(height, MAX_TILES)
     ]
     if not fits:
         raise WavecombError(
@@ -114,15 +114,15 @@ def choose_tiles(
     width = min(x1 - x0 for x0, _, x1, _ in regions)
     height = min(y1 - y0 for _, y0, _, y1 in regions)
     wanted = TILES_OF_A_WORKER * workers
-    columns = max(1, min(width // LEAST_EDGE, round((wanted * width / height) ** 0.5)))
-    rows = max(1, min(height // LEAST_EDGE, -(-wanted // columns)))
+    columns = max(1, min(width // MIN_EDGE, round((wanted * width / height) ** 0.5)))
+    rows = max(1, min(height // MIN_EDGE, -(-wanted // columns)))
     return columns, rows
 
 
-def looks(settings: Mapping[str, Any]) -> int:
+def error_checks(settings: Mapping[str, Any]) -> int:
     """Returns the number of error checks before all pixels of an adaptive render have all samples.
 
-    >>> looks({"spp": 64, "min_spp": 16})
+    >>> error_checks({"spp": 64, "min_spp": 16})
     3
     """
     spp = int(settings["spp"])
@@ -135,12 +135,12 @@ def looks(settings: Mapping[str, Any]) -> int:
     return count
 
 
-def most_looks(settings: Mapping[str, Any]) -> int:
+def max_error_checks(settings: Mapping[str, Any]) -> int:
     """Returns the number of error checks that the border of an adaptive tile allows for.
 
-    It is 4 more than ``looks``, because pixels that resume late take further checks.
+    It is 4 more than ``error_checks``, because pixels that resume late take further checks.
     """
-    return looks(settings) + 4
+    return error_checks(settings) + 4
 
 
 def border(settings: Mapping[str, Any], count: int) -> int:
@@ -185,25 +185,25 @@ def _costs_matter(settings: Mapping[str, Any]) -> bool:
 def needs_whole(settings: Mapping[str, Any]) -> str:
     """Returns why images cannot be divided into tiles, or "" if they can."""
     if settings.get("noise"):
-        return f"--noise {settings['noise']:g}: is of the whole picture"
+        return f"--noise {settings['noise']:g}: applies to the whole image"
     if settings.get("allocate", "even") != "even":
-        return f"--allocate {settings['allocate']}: shares samples out over the whole picture"
+        return f"--allocate {settings['allocate']}: distributes samples over the whole image"
     if settings.get("firefly", "keep") != "keep":
         return f"--firefly {settings['firefly']}: depends on neighbouring pixels"
     return ""
 
 
-def is_better_whole(settings: Mapping[str, Any], is_taught: bool = False) -> bool:
+def is_better_whole(settings: Mapping[str, Any], has_guiding_field: bool = False) -> bool:
     """Returns whether each tile has a high cost in addition to its pixels.
 
     This is the case for a border, for training a guiding field, and for tracing all light paths.
-    ``is_taught`` says that the guiding field is already trained.
+    ``has_guiding_field`` says that the guiding field is already trained.
     """
     learns = settings.get("guiding", "off") != "off" or settings.get("roulette") == "efficient"
     return (
         bool(settings.get("adaptive"))
         or settings.get("transport") in ("light", "bdpt", "auto")
-        or (learns and not is_taught)
+        or (learns and not has_guiding_field)
     )
 
 

@@ -23,7 +23,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 from wavecomb.errors import WavecombError
 from wavecomb.gui import theme
 from wavecomb.gui.messages import install_hooks
-from wavecomb.gui.needs import NO_DISPLAY, has_display
+from wavecomb.gui.needs import NO_DISPLAY, has_display, libraries_message, missing_libraries
 from wavecomb.gui.setup import Setup
 
 
@@ -37,7 +37,9 @@ def _qt_says(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
         if "platform plugin" in line and not has_display():
             line = NO_DISPLAY
         elif "platform plugin" in line or "display" in line:
-            line = f"no window can be opened: {line}"
+            missing = missing_libraries()
+            why = libraries_message(missing) if missing else f"{line} (try `wavecomb doctor`)"
+            line = f"no window can be opened: {why}"
         sys.stderr.write(f"error: {line}\n")
         sys.stderr.flush()
         os._exit(2)
@@ -72,7 +74,7 @@ def run(
     """Shows the window until it is closed, and returns the exit code."""
     application = make_application()
     from wavecomb.gui.main_window import MainWindow
-    from wavecomb.usd.stage.diagnostics import Listening
+    from wavecomb.usd.stage.diagnostics import DiagnosticListener
 
     window = MainWindow(setup)
     theme.apply(str(window.settings.value("theme", theme.SYSTEM)))
@@ -85,7 +87,7 @@ def run(
     beat = QTimer(window)
     beat.start(200)
     # USD also reports problems during edits and when panels read the stage. Add them to the notes.
-    listening = Listening()
+    listening = DiagnosticListener()
     beat.timeout.connect(lambda: window.session.note_words(listening.take()))
     window.show()
     if stage is not None:

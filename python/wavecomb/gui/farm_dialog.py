@@ -113,7 +113,7 @@ class FarmDialog(QDialog):
             options.pop("frame", None)
         self.folder = None
         self.say("reading the stage \u2026")
-        self._start([], module="wavecomb.farm.from_json", text=json.dumps(wanted))
+        self._start([], module="wavecomb.farm.json_submission", text=json.dumps(wanted))
 
     def _start(self, words: list[str], **how: str) -> None:
         self._is_resuming = bool(words)

@@ -11,7 +11,7 @@ from typing import Any
 from pxr import Sdf, Usd
 
 from wavecomb.usd import LoadedStage
-from wavecomb.usd.looks.texture import TextureCache
+from wavecomb.usd.materials.texture import TextureCache
 
 
 @dataclass(frozen=True)
@@ -83,13 +83,13 @@ def read(request: Request) -> Read:
         WavecombError: The stage cannot be rendered.
     """
     from wavecomb.usd import LoadReport, mtlx, open_editable
-    from wavecomb.usd.stage.diagnostics import captured
+    from wavecomb.usd.stage.diagnostics import capture_diagnostics
 
     usd = request.usd
     if usd is None:
         usd = open_editable(request.source.path, request.source.variants)
     elif request.fresh:
-        with captured(LoadReport()):
+        with capture_diagnostics(LoadReport()):
             mtlx.reload(usd)
     return Read(_load(request, _overrides(request, usd)), usd)
 
@@ -111,10 +111,10 @@ def _options(request: Request) -> dict[str, Any]:
 def _load(request: Request, overrides: Sdf.Layer | None) -> LoadedStage:
     """Loads the scene from a second stage, so that the window's stage stays usable meanwhile."""
     from wavecomb.usd import LoadReport, load_stage, open_stage
-    from wavecomb.usd.stage.diagnostics import captured
+    from wavecomb.usd.stage.diagnostics import capture_diagnostics
 
     said = LoadReport()
-    with captured(said):
+    with capture_diagnostics(said):
         stage = open_stage(request.source.path, overrides=overrides)
     loaded = load_stage(stage, reuse=request.textures, **_options(request))
     loaded.report.absorb(said)

@@ -137,7 +137,7 @@ def install_hooks(tell: Callable[[str], None]) -> Callable[[], None]:
 
 def fault_line(error: BaseException, report: Path | None) -> str:
     """Returns the line that reports an internal error."""
-    from wavecomb.run.faults import describe
+    from wavecomb.run.error_messages import describe
 
     core = describe(error) if isinstance(error, Exception) else str(error)
     if not core.startswith("internal:"):

@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
+from collections.abc import Sequence
 
 from wavecomb.errors import WavecombError
 from wavecomb.extras import check_installed
@@ -20,6 +22,98 @@ def has_display() -> bool:
     if not sys.platform.startswith("linux"):
         return True
     return any(os.environ.get(n) for n in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"))
+
+
+_PACKAGES = {
+    "libglib-2.0.so.0": "libglib2.0-0",
+    "libgthread-2.0.so.0": "libglib2.0-0",
+    "libz.so.1": "zlib1g",
+}
+"""Packages of Debian and Ubuntu whose names do not follow from the library."""
+
+
+def package_of(library: str) -> str:
+    """Returns the Debian package of a shared library, by Debian's naming rule.
+
+    >>> package_of("libxcb-icccm.so.4"), package_of("libdbus-1.so.3"), package_of("libGL.so.1")
+    ('libxcb-icccm4', 'libdbus-1-3', 'libgl1')
+    """
+    if library in _PACKAGES:
+        return _PACKAGES[library]
+    name, _, version = library.lower().partition(".so.")
+    return f"{name}-{version}" if name[-1:].isdigit() else f"{name}{version}"
+
+
+def missing_libraries(plugin: str | None = None) -> list[str]:
+    """Returns the system libraries that Qt's X11 plug-in lacks; none where that is unknown.
+
+    Args:
+        plugin: File of the plug-in, by default that of PySide6.
+    """
+    import importlib.util
+    import subprocess
+
+    if not sys.platform.startswith("linux"):
+        return []
+    if plugin is None:
+        found = importlib.util.find_spec("PySide6")
+        if found is None or found.origin is None:
+            return []
+        folder = os.path.dirname(found.origin)
+        plugin = os.path.join(folder, "Qt", "plugins", "platforms", "libqxcb.so")
+    try:
+        listed = subprocess.run(
+            ["ldd", plugin], capture_output=True, text=True, timeout=30, check=False
+        ).stdout
+    except (OSError, subprocess.SubprocessError):
+        return []
+    lines = (line.split(" => ") for line in listed.splitlines() if "not found" in line)
+    return sorted({words[0].strip() for words in lines if len(words) == 2})
+
+
+def libraries_message(libraries: Sequence[str]) -> str:
+    """Returns a message that names missing libraries and the command that installs them.
+
+    >>> libraries_message(["libxcb-icccm.so.4"])
+    'Qt needs system libraries that are missing: apt install libxcb-icccm4'
+    """
+    packages = dict.fromkeys(map(package_of, libraries))
+    return f"Qt needs system libraries that are missing: apt install {' '.join(packages)}"
+
+
+_START = """
+from PySide6.QtWidgets import QApplication
+print("platform:", QApplication(["wavecomb"]).platformName())
+"""
+
+
+def start_qt(timeout: float = 60.0) -> tuple[str, str]:
+    """Starts Qt in another process, which a missing library would end.
+
+    Args:
+        timeout: Time limit in seconds.
+
+    Returns:
+        The name of Qt's platform, such as "xcb", and "" for the problem; or "" and the problem.
+    """
+    import subprocess
+
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _START], capture_output=True, text=True, timeout=timeout,
+            check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return "", f"Qt does not start within {timeout:g} s"
+    for line in done.stdout.splitlines():
+        if line.startswith("platform: ") and done.returncode == 0:
+            return line.removeprefix("platform: "), ""
+    if libraries := missing_libraries():
+        return "", libraries_message(libraries)
+    said = [line for line in done.stderr.splitlines() if line.strip()]
+    # Qt's messages begin with a category, such as "qt.qpa.xcb: ".
+    why = said[0].strip() if said else f"Qt ended with code {done.returncode}"
+    return "", re.sub(r"^qt\.[\w.]+: ", "", why)
 
 
 def check_window() -> None:

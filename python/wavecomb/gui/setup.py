@@ -12,7 +12,7 @@ from wavecomb.run import aovs as aov_names
 
 if TYPE_CHECKING:
     from wavecomb._core import Settings
-    from wavecomb.run.costs import Profile
+    from wavecomb.run.cost_profile import Profile
     from wavecomb.scheduling import SchedulingPolicy
 
 Region = tuple[int, int, int, int]
@@ -46,7 +46,7 @@ class Setup(_Rows):
         denoise: Whether frames are also denoised.
         region: Rectangle x0, y0, x1, y1 of pixels to render, without x1 and y1; None renders all.
         own_policy: A policy object that replaces ``policy``, or None.
-        profile: Initial costs from ``wavecomb.run.costs.load_costs``, or None.
+        profile: Initial costs from ``wavecomb.run.cost_profile.load_costs``, or None.
     """
 
     aovs: tuple[str, ...] = aov_names.DEFAULT

@@ -18,7 +18,7 @@ import shiboken6
 from PySide6.QtCore import QObject, Signal, SignalInstance
 
 from wavecomb.gui.bridge import Port, port
-from wavecomb.run.faults import describe
+from wavecomb.run.error_messages import describe
 
 Job = Callable[[], Any]
 Outcome = tuple[Any, str | None]

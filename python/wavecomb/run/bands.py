@@ -16,13 +16,13 @@ import numpy as np
 
 from wavecomb.errors import WavecombError
 from wavecomb.run import aovs as aov_names
-from wavecomb.run.isolate.memory import machine_limit
-from wavecomb.run.settings import check_memory, keeps_error, picture_bytes, picture_size
+from wavecomb.run.isolation.memory import machine_limit
+from wavecomb.run.settings import check_memory, has_error_layers, image_bytes, image_size
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Settings
-    from wavecomb.picture.rendered import Picture
-    from wavecomb.run.watcher import Reporter, Status
+    from wavecomb.image.rendered import Picture
+    from wavecomb.run.callbacks import Reporter, Status
 
 STEP = 64
 """Band heights are multiples of this, or of the tile height."""
@@ -57,21 +57,21 @@ def band_rows(
     """
     machine = machine_limit()
     most = megabytes * 1e6 if megabytes is not None else machine and 0.5 * machine
-    needed = picture_bytes(settings, aovs, light_groups)
+    needed = image_bytes(settings, aovs, light_groups)
     if most is None or needed <= most:
         return None
     if not whole:
         whole = _needs_all(settings, aovs)
     if whole and megabytes is not None:
         raise WavecombError(
-            f"--film-memory {megabytes:g}: the picture takes {needed / 1e6:.0f} MB and {whole} "
+            f"--film-memory {megabytes:g}: the image takes {needed / 1e6:.0f} MB and {whole} "
             "needs all of it at once: leave that out, or give more memory"
         )
     if whole:
         check_memory(settings, aovs, light_groups)
         return None
     step = tile or STEP
-    height = picture_size(settings)[1]
+    height = image_size(settings)[1]
     rows = max(step, int(most / (needed / height)) // step * step)
     return None if rows >= height else rows
 
@@ -84,8 +84,8 @@ def _needs_all(settings: Settings, aovs: Sequence[str]) -> str:
         return f"--allocate {settings.allocate}"
     if settings.firefly != "keep":
         return f"--firefly {settings.firefly}"
-    if keeps_error(settings):
-        return "a picture with errors (--adaptive, --noise, --aov error, --aov variance)"
+    if has_error_layers(settings):
+        return "an image with errors (--adaptive, --noise, --aov error, --aov variance)"
     if any(name in aov_names.of_kind("coverage") for name in aovs):
         return "a Cryptomatte"
     if settings.region is not None and not settings.crop:
@@ -111,7 +111,7 @@ def render_bands(
 
     x0, y0, x1, y1 = settings.region or (0, 0, settings.width, settings.height)
     total = (x1 - x0) * (y1 - y0) * settings.spp
-    shown = None if reporter is None else _Whole(reporter, total)
+    shown = None if reporter is None else _BandReporter(reporter, total)
     for row in range(y0, y1, rows):
         region = (x0, row, x1, min(row + rows, y1))
         band = _core.Settings(**{**settings.to_dict(), "region": region, "crop": True})
@@ -130,7 +130,7 @@ def without_samples(
     from wavecomb import _core
 
     of_one_pixel = {
-        "width": picture_size(settings)[0], "height": max(rows, 2), "region": (0, 0, 1, 1),
+        "width": image_size(settings)[0], "height": max(rows, 2), "region": (0, 0, 1, 1),
         "overscan": 0, "crop": False, "spp": 1, "costs": "model", "light_weights": "power",
         "allocate": "even",
     }  # fmt: skip
@@ -148,7 +148,7 @@ def without_samples(
     return replace(picture, aovs=aovs, **{name: empty(getattr(picture, name)) for name in names})
 
 
-class _Whole:
+class _BandReporter:
     """Reporter that combines the progress of bands."""
 
     def __init__(self, reporter: Reporter, samples: int) -> None:

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.errors import WavecombError
-from wavecomb.picture.working_space import LUMINANCE
+from wavecomb.image.working_space import LUMINANCE
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Settings
-    from wavecomb.picture.rendered import Picture
+    from wavecomb.image.rendered import Picture
 
 LAYER = "alpha"
 """The AOV that receives shadows."""
@@ -46,8 +46,8 @@ def check(settings: Settings, given: Mapping[str, Any]) -> None:
     for option, value in {**refused, **given}.items():
         if value:
             raise WavecombError(
-                f"shadow catchers do not go with {option}: three renders make the picture; leave "
-                "one of them out"
+                f"shadow catchers cannot be combined with {option}, since the image combines three "
+                "renders; leave one of them out"
             )
 
 
@@ -60,7 +60,7 @@ def with_alpha(settings: Settings) -> Settings:
     return _core.Settings(**{**settings.to_dict(), "aovs": [*settings.aovs, LAYER]})
 
 
-def of_catchers(settings: Settings) -> Settings:
+def catcher_settings(settings: Settings) -> Settings:
     """Returns the settings for the two renders of catchers."""
     from wavecomb import _core
 
@@ -68,12 +68,14 @@ def of_catchers(settings: Settings) -> Settings:
     return _core.Settings(**{**settings.to_dict(), **own})
 
 
-def caught(picture: Picture, render: Callable[[Mapping[str, str]], Result]) -> Picture:
+def with_catcher_shadows(
+    picture: Picture, render: Callable[[Mapping[str, str]], Result]
+) -> Picture:
     """Returns the image with the shadows on its catchers.
 
     Args:
         picture: Image without catchers; it has the AOV alpha.
-        render: Loads the stage with replaced options and renders it with ``of_catchers``.
+        render: Loads the stage with replaced options and renders it with ``catcher_settings``.
     """
     lit, bare = (_light_of(render(how)) for how in PASSES)
     alpha = with_shadows(picture.aovs[LAYER], lit[1], lit[0], bare[0])

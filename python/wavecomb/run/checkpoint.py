@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wavecomb.errors import WavecombError
+from wavecomb.image.files.archive import ArchiveError, read_kind, write_archive
 from wavecomb.options import settings as known_settings
-from wavecomb.picture.archive import ArchiveError, read_kind, write_archive
 from wavecomb.run import aovs as aov_names
 from wavecomb.run.stats import plain
 from wavecomb.version import version
@@ -43,7 +43,7 @@ class Checkpoint:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Settings of the render that affect the image; see ``picture_settings``."""
+        """Settings of the render that affect the image; see ``image_settings``."""
         return dict(self.header["settings"])
 
     @property
@@ -62,7 +62,7 @@ class Checkpoint:
         return float(self.header["seconds"])
 
 
-def picture_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
+def image_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Returns the settings that affect the image.
 
     A time limit is excluded, since it affects only the number of samples.
@@ -102,7 +102,7 @@ def make_header(
         "stage": stage,
         "source": plain(source),
         "aovs": list(aovs),
-        "settings": plain(picture_settings(settings.to_dict())),
+        "settings": plain(image_settings(settings.to_dict())),
         "scene": _fingerprint(scene, settings),
     }
 
@@ -136,7 +136,7 @@ def load_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
         _check_header(header)
         state["pass.target"] = _check_state(state)
     except ArchiveError as error:
-        raise WavecombError(f"{name}: is no checkpoint, or is damaged; start anew") from error
+        raise WavecombError(f"{name}: is not a checkpoint, or is damaged; start again") from error
     return Checkpoint(name, header, state)
 
 
@@ -165,7 +165,7 @@ def _check_header(header: dict[str, Any]) -> None:
     from wavecomb import _core
 
     settings = header["settings"]
-    known = picture_settings(
+    known = image_settings(
         {
             **_core.Settings().to_dict(),
             "roulette": "cost-aware",
@@ -245,7 +245,7 @@ def build_note(checkpoint: Checkpoint, header: Mapping[str, Any]) -> str | None:
         if checkpoint.header[key] != header[key]:
             return (
                 f"{checkpoint.path}: was made by another build ({key} "
-                f"{checkpoint.header[key]}, now {header[key]}); the picture may differ in last bits"
+                f"{checkpoint.header[key]}, now {header[key]}); the image may differ in last bits"
             )
     return None
 

@@ -15,24 +15,24 @@ from wavecomb.load_options import LoadOptions
 from wavecomb.usd import mtlx
 from wavecomb.usd.cameras.camera import camera_motion, read_camera
 from wavecomb.usd.geometry.shutter import find_motion
-from wavecomb.usd.stage.choice import RenderChoice
-from wavecomb.usd.stage.diagnostics import captured
+from wavecomb.usd.layers.opening import open_stage
+from wavecomb.usd.render_settings.values import ProductSettings
+from wavecomb.usd.render_settings.view import check_view, view_settings
+from wavecomb.usd.stage.diagnostics import capture_diagnostics
 from wavecomb.usd.stage.frame_cache import FrameCache
 from wavecomb.usd.stage.load import load_stage
-from wavecomb.usd.stage.opening import open_stage
-from wavecomb.usd.stage.origin import find_origin, moved_to
+from wavecomb.usd.stage.origin import find_origin, to_scene_space
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.stage.times import frame_number, time_code
-from wavecomb.usd.stage.view_options import check_view, seen_on
+from wavecomb.usd.stage.time_codes import frame_number, time_code
 
 if TYPE_CHECKING:
     from pxr import Usd
 
-    from wavecomb.usd.stage.loaded import LoadedStage
+    from wavecomb.usd.stage.load_result import LoadedStage
 
 
 @dataclass(frozen=True)
-class Seen:
+class CameraUpdate:
     """Camera and metadata of another frame, for a scene that is otherwise unchanged.
 
     Attributes:
@@ -46,7 +46,7 @@ class Seen:
     camera: dict[str, Any] | None
     camera_path: str | None
     shutter: tuple[float, float] | None
-    render: RenderChoice
+    render: ProductSettings
     frame: float | None
 
     def as_dict(self) -> dict[str, Any]:
@@ -65,12 +65,12 @@ class FrameReader:
         check_view(options)
         opening = LoadReport()
         layer = None if options.session_layer is None else Path(options.session_layer)
-        with captured(opening):
+        with capture_diagnostics(opening):
             self._stage: Usd.Stage = open_stage(
                 path, options.variants, mask=options.mask, session_layer=layer,
                 payloads=options.payloads,
             )  # fmt: skip
-            mtlx.tell(self._stage, opening)
+            mtlx.report_problems(self._stage, opening)
             self._cache = FrameCache(self._stage, opening)
         self._before: LoadedStage | None = None
 
@@ -90,48 +90,54 @@ class FrameReader:
         self._before = load_stage(self._stage, here, cache=self._cache, **how)
         return self._before
 
-    def look(self, options: LoadOptions) -> Seen | None:
+    def read_camera(self, options: LoadOptions) -> CameraUpdate | None:
         """Returns the changes at a frame if at most the camera changes; None otherwise."""
         before, when = self._before, time_code(self._stage, options.frame)
         if before is None:
             return None
-        seen = self._look(before, when, options)
-        if seen is not None:
-            changes = {name: value for name, value in seen.as_dict().items() if name != "camera"}
+        settings = self._read_camera(before, when, options)
+        if settings is not None:
+            changes = {
+                name: value for name, value in settings.as_dict().items() if name != "camera"
+            }
             self._before = replace(before, **changes)
-        return seen
+        return settings
 
-    def _look(self, before: LoadedStage, when: Usd.TimeCode, options: LoadOptions) -> Seen | None:
+    def _read_camera(
+        self, before: LoadedStage, when: Usd.TimeCode, options: LoadOptions
+    ) -> CameraUpdate | None:
         number = frame_number(when)
         if not self._cache.varying.is_view_only and before.frame != number:
             return None
         if before.leaves_out_levels:
             # Another view needs other mip levels of textures.
             return None
-        told = LoadReport()
-        seen = seen_on(self._stage, options, told)
-        if before.camera_path is None or seen.camera is None:
+        report = LoadReport()
+        settings = view_settings(self._stage, options, report)
+        if before.camera_path is None or settings.camera is None:
             # The default view frames the geometry; it does not apply if an authored camera is
             # invalid.
-            is_same = before.camera_path is None and seen.camera is None
-            if not is_same or before.render != seen.choice:
+            is_same = before.camera_path is None and settings.camera is None
+            if not is_same or before.render != settings.choice:
                 return None
-            return Seen(None, before.camera_path, before.shutter, before.render, number)
-        origin = find_origin(self._stage, when, seen.camera, seen.purposes)
+            return CameraUpdate(None, before.camera_path, before.shutter, before.render, number)
+        origin = find_origin(self._stage, when, settings.camera, settings.purposes)
         if origin != before.origin:
             # The scene would be built around another point.
             return None
-        to_world = np.array(UsdGeom.XformCache(when).GetLocalToWorldTransform(seen.camera))
-        to_world = moved_to(to_world, origin)
-        view = read_camera(seen.camera, to_world, when, told, seen.lens)
-        motion = find_motion(seen.camera, when, seen.blur, told)
+        to_world = np.array(UsdGeom.XformCache(when).GetLocalToWorldTransform(settings.camera))
+        to_world = to_scene_space(to_world, origin)
+        view = read_camera(settings.camera, to_world, when, report, settings.lens)
+        motion = find_motion(settings.camera, when, settings.blur, report)
         shutter = None if motion is None else motion.shutter
-        if view is None or not {*told.lines()} <= {*before.report.lines()}:
+        if view is None or not {*report.lines()} <= {*before.report.lines()}:
             return None
         if not self._cache.varying.is_view_only and shutter != before.shutter:
             return None
         if not self._cache.has_same_levels(view, options.size):
             return None
-        moves = camera_motion(seen.camera, motion, origin)
+        moves = camera_motion(settings.camera, motion, origin)
         camera = {"transform": view.transform, **camera_defaults(), **view.options, "motion": moves}
-        return Seen(camera, str(seen.camera.GetPath()), shutter, seen.choice, number)
+        return CameraUpdate(
+            camera, str(settings.camera.GetPath()), shutter, settings.choice, number
+        )

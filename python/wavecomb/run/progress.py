@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import signal
 import sys
@@ -66,6 +67,16 @@ def speed(status: Mapping[str, Any]) -> dict[str, Any]:
         "rays_per_s": status["rays"] / seconds if seconds > 0.0 else 0.0,
         "seconds_left": (status["samples_total"] - done) / rate if rate > 0.0 else None,
     }
+
+
+def left_text(seconds: float) -> str:
+    """Formats a time left in whole seconds, rounded up.
+
+    >>> left_text(0.2), left_text(59.1), left_text(7322)
+    ('1 s left', '1 min 00 s left', '2 h 02 min left')
+    """
+    whole = math.ceil(seconds)
+    return f"{whole} s left" if whole < 60 else f"{time_text(whole)} left"
 
 
 _earlier: list[int] = []
@@ -164,23 +175,40 @@ class Silent:
         """Does nothing."""
 
 
-def figures(status: Mapping[str, Any]) -> list[str]:
-    """Returns the figures next to a bar: passes, rates, error, time left.
+def figures(status: Mapping[str, Any], columns: int = 200) -> list[str]:
+    """Returns the figures next to a bar, the most important first: time left, error, rates, passes.
 
     Args:
         status: Values of ``Snapshot.status`` in _core.pyi.
+        columns: Space for them; those that do not fit are left out.
     """
     rates = speed(status)
-    said = [
-        f"pass {status['passes']}",
-        f"{count_text(rates['samples_per_s'])} samples/s",
-        f"{count_text(rates['rays_per_s'])} rays/s",
-    ]
+    said = []
+    if rates["seconds_left"] is not None:
+        said.append(left_text(rates["seconds_left"]))
     if status["error"] is not None:
         said.append(f"error {100 * status['error']:.2g} %")
-    if rates["seconds_left"] is not None:
-        said.append(f"{time_text(rates['seconds_left'])} left")
+    said += [
+        f"{count_text(rates['samples_per_s'])} samples/s",
+        f"{count_text(rates['rays_per_s'])} rays/s",
+        f"pass {status['passes']}",
+    ]
+    while len(said) > 1 and len(", ".join(said)) > columns:
+        said.pop()
     return said
+
+
+MOST_BAR, LEAST_BAR = 40, 10
+"""Columns of a progress bar on a wide and on a narrow terminal."""
+
+
+def bar_width(columns: int) -> int:
+    """Returns the width of a progress bar on a terminal.
+
+    >>> bar_width(60), bar_width(100), bar_width(160)
+    (15, 25, 40)
+    """
+    return max(LEAST_BAR, min(MOST_BAR, columns // 4))
 
 
 class ProgressBar(Silent):
@@ -192,9 +220,12 @@ class ProgressBar(Silent):
     def __init__(self, console: Console, title: str = "rendering") -> None:
         from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
+        width = bar_width(console.width)
+        # The title, the bar and the percentage, each with a space.
+        self._space = console.width - (len(title) + 1) - (width + 1) - 5
         self._bar = Progress(
             TextColumn(title, markup=False),
-            BarColumn(),
+            BarColumn(width),
             TaskProgressColumn(),
             TextColumn("{task.fields[figures]}"),
             console=console,
@@ -221,7 +252,7 @@ class ProgressBar(Silent):
             self._task,
             completed=status["samples_done"],
             total=status["samples_total"],
-            figures=", ".join(figures(status)),
+            figures=", ".join(figures(status, self._space)),
         )
         self._bar.refresh()
 
@@ -237,7 +268,7 @@ def loading_bar(console: Console, title: str) -> Iterator[LoadProgress]:
 
     bar = Progress(
         TextColumn("{task.description}", markup=False),
-        BarColumn(),
+        BarColumn(bar_width(console.width)),
         TextColumn("{task.fields[figures]}"),
         console=console,
         transient=True,

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wavecomb import _core
+from wavecomb.image.rendered import picture_of
 from wavecomb.load_options import LoadOptions, split
-from wavecomb.picture.rendered import picture_of
 from wavecomb.run.aovs import DEEP, with_others
-from wavecomb.run.catchers import LAYER, caught, of_catchers, with_alpha
+from wavecomb.run.catchers import LAYER, catcher_settings, with_alpha, with_catcher_shadows
 from wavecomb.run.catchers import check as check_catchers
 from wavecomb.run.frame_names import parse_frames
 from wavecomb.run.settings import check_memory, prepare
@@ -22,7 +22,7 @@ from wavecomb.run.stats import make_stats
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Settings
-    from wavecomb.picture.rendered import Picture
+    from wavecomb.image.rendered import Picture
     from wavecomb.usd import LoadedStage
 
 
@@ -80,7 +80,7 @@ class Frames:
         # Different renders of a stage with catchers see different prims.
         is_same = self._renderer is not None and options.catch == self._caught
         self._caught = options.catch
-        loaded = self._seen_anew(options) if is_same else None
+        loaded = self._with_camera(options) if is_same else None
         if loaded is None:
             # Release these first, since two sets of acceleration structures would double the
             # memory.
@@ -91,17 +91,17 @@ class Frames:
         self._loaded = replace(loaded, seconds=seconds, stage_path=self._path)
         return self._loaded
 
-    def _seen_anew(self, options: LoadOptions) -> LoadedStage | None:
+    def _with_camera(self, options: LoadOptions) -> LoadedStage | None:
         """Returns the current scene with its camera at a frame.
 
         Returns None if more than the camera changes.
         """
         before, renderer = self._loaded, self._renderer
         assert before is not None and renderer is not None
-        seen = self._reader.look(options)
-        if seen is None:
+        update = self._reader.read_camera(options)
+        if update is None:
             return None
-        found = seen.as_dict()
+        found = update.as_dict()
         camera = found.pop("camera")
         if camera is not None:
             renderer.edit(camera=camera)
@@ -202,13 +202,15 @@ def _pictures(
         result = shots.render(settings, progress, policy, profile)
         picture = picture_of(result, shots.stats(result), scene=scene, aovs=names)
         if loaded.catchers and not picture.cancelled:
-            picture = _caught(shots, frame, settings, picture)
+            picture = _with_catcher_shadows(shots, frame, settings, picture)
         yield frame, picture
 
 
-def _caught(shots: Frames, frame: float, settings: Settings, picture: Picture) -> Picture:
+def _with_catcher_shadows(
+    shots: Frames, frame: float, settings: Settings, picture: Picture
+) -> Picture:
     def render(how: Mapping[str, str]) -> Result:
         shots.load(frame, **how)
-        return shots.render(of_catchers(settings))
+        return shots.render(catcher_settings(settings))
 
-    return caught(picture, render)
+    return with_catcher_shadows(picture, render)

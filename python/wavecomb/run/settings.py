@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.run import aovs as aov_names
-from wavecomb.run.isolate.memory import machine_limit
+from wavecomb.run.isolation.memory import machine_limit
 
 if TYPE_CHECKING:
     from wavecomb._core import Settings
@@ -53,7 +53,7 @@ def prepare(
     if isinstance(costs, str):
         settings["costs"] = costs
     elif costs is not None:
-        from wavecomb.run.costs import check_costs
+        from wavecomb.run.cost_profile import check_costs
 
         profile = check_costs(costs)
     names = aov_names.DEFAULT if aovs is None else aov_names.expand(aovs)
@@ -121,7 +121,7 @@ def check_memory(settings: Settings, aovs: Sequence[str], light_groups: int = 1)
     """
     from wavecomb.errors import WavecombError
 
-    needed, there = picture_bytes(settings, aovs, light_groups), machine_limit()
+    needed, there = image_bytes(settings, aovs, light_groups), machine_limit()
     if there is not None and needed > 0.8 * there:
         raise WavecombError(
             f"size {settings.width} x {settings.height}: needs about {needed / 2**30:.0f} GiB of "
@@ -129,24 +129,24 @@ def check_memory(settings: Settings, aovs: Sequence[str], light_groups: int = 1)
         )
 
 
-def picture_bytes(settings: Settings, aovs: Sequence[str], light_groups: int = 1) -> int:
+def image_bytes(settings: Settings, aovs: Sequence[str], light_groups: int = 1) -> int:
     """Returns the bytes of film and image; the arguments are the same as for ``check_memory``."""
     others = [name for name in aovs if name not in aov_names.ERRORS]
     each = aov_names.bytes_per_pixel(others, light_groups)
-    each += _ERROR_BYTES_PER_PIXEL * keeps_error(settings)
+    each += _ERROR_BYTES_PER_PIXEL * has_error_layers(settings)
     each += _CASCADE_BYTES_PER_PIXEL * (settings.firefly != "keep")
     if settings.transport != "path":
-        sums = 1 + keeps_error(settings) + aov_names.splat_layers(aovs, light_groups)
+        sums = 1 + has_error_layers(settings) + aov_names.splat_layers(aovs, light_groups)
         # Each pixel also stores the samples of its light path.
         each += _SPLAT_BYTES_PER_PIXEL * sums + 4
         each += _VISIBLE_BYTES_PER_PIXEL * (settings.merge_radius > 0)
     if aov_names.DEEP in settings.aovs:
         each += _DEEP_BYTES_PER_PIXEL + _DEEP_BYTES_PER_SAMPLE * settings.deep_samples
-    width, height = picture_size(settings)
+    width, height = image_size(settings)
     return width * height * each
 
 
-def picture_size(settings: Settings) -> tuple[int, int]:
+def image_size(settings: Settings) -> tuple[int, int]:
     """Returns width and height of the image, which may be cropped."""
     if not settings.crop or settings.region is None:
         return settings.width, settings.height
@@ -154,7 +154,7 @@ def picture_size(settings: Settings) -> tuple[int, int]:
     return x1 - x0, y1 - y0
 
 
-def keeps_error(settings: Settings) -> bool:
+def has_error_layers(settings: Settings) -> bool:
     """Returns whether a render with these settings has the layers error and variance."""
     return bool(
         settings.adaptive or settings.noise or settings.error or settings.allocate != "even"

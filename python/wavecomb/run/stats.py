@@ -11,14 +11,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wavecomb.image.files.output_file import replacing
+from wavecomb.image.working_space import header_of
 from wavecomb.machine import memory_bytes, usable_cores
-from wavecomb.picture.files import replacing
-from wavecomb.picture.working_space import header_of
 from wavecomb.version import version
 
 if TYPE_CHECKING:
     from wavecomb._core import Result
-    from wavecomb.usd.stage.loaded import LoadedStage
+    from wavecomb.usd.stage.load_result import LoadedStage
 
 SCHEMA = "wavecomb-statistics/1"
 PHASES = (
@@ -83,6 +83,7 @@ def make_stats(
             "first_samples": 0.0,
             "resumed": float(resumed_s),
             "denoise": 0.0,
+            "write": 0.0,
             **seconds,
         },
         "phases_s": phases,
@@ -169,7 +170,7 @@ def write_stats(path: str | os.PathLike[str], stats: Mapping[str, Any]) -> None:
         part.write_text(text, encoding="utf-8")
 
 
-def picture_metadata(stats: Mapping[str, Any]) -> dict[str, Any]:
+def image_metadata(stats: Mapping[str, Any]) -> dict[str, Any]:
     """Returns the statistics that are stored in the header of an image."""
     number = stats["version"] if "version" in stats else version()
     metadata: dict[str, Any] = {"Software": f"Wavecomb {number}"}

@@ -10,8 +10,9 @@ import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from wavecomb.scenes.authoring.stage import StageWriter
 from wavecomb.scenes.candles import build_candles
 from wavecomb.scenes.caustics import (
     build_caustics,
@@ -20,22 +21,24 @@ from wavecomb.scenes.caustics import (
     build_pool,
     build_prism,
 )
-from wavecomb.scenes.cornell import build_cornell, build_cornell_dragon
+from wavecomb.scenes.cornell_box import build_cornell, build_cornell_dragon
 from wavecomb.scenes.drinks import build_drinks
 from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.hair import build_fur, build_head
 from wavecomb.scenes.heavy import build_heavy
-from wavecomb.scenes.kitchen import build_kitchen
 from wavecomb.scenes.lights import build_lights, build_studio
 from wavecomb.scenes.mixed import build_dragon, build_mixed
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.room import build_room
+from wavecomb.scenes.rooms.kitchen import build_kitchen
+from wavecomb.scenes.rooms.room import build_room
 from wavecomb.scenes.splats import build_splats
 from wavecomb.scenes.spread import build_spread
-from wavecomb.scenes.stage import StageWriter
 from wavecomb.scenes.volumes import build_clouds, build_fog, build_smoke
 
-__all__ = ["SCENES", "SceneError", "SceneInfo", "SceneOptions", "write_scene"]
+if TYPE_CHECKING:
+    from pxr import Usd
+
+__all__ = ["SCENES", "SceneError", "SceneInfo", "SceneOptions", "cornell", "write_scene"]
 
 
 @dataclass(frozen=True)
@@ -111,3 +114,15 @@ def write_scene(name: str, path: Path, **options: Any) -> None:
         writer.save(f"Wavecomb scene {name}: {info.summary}")
     except OSError as error:
         raise SceneError(f"{path}: cannot write the scene: {error}") from error
+
+
+def cornell() -> Usd.Stage:
+    """Returns the Cornell box as a stage in memory, for a first image in three lines.
+
+    >>> import wavecomb
+    >>> image = wavecomb.render(wavecomb.scenes.cornell())  # doctest: +SKIP
+    >>> image.save("cornell.png")  # doctest: +SKIP
+    """
+    writer = StageWriter(Path("cornell.usda"), SCENES["cornell"].metres_per_unit)
+    build_cornell(writer, SceneOptions())
+    return writer.stage

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from wavecomb.scenes import materials as looks
+from wavecomb.scenes.authoring import materials
+from wavecomb.scenes.authoring.material_network import Network
+from wavecomb.scenes.authoring.materials import Colour
+from wavecomb.scenes.authoring.stage import StageWriter
 from wavecomb.scenes.caustics import ball
-from wavecomb.scenes.materials import Colour
-from wavecomb.scenes.network import Network
+from wavecomb.scenes.models.shapes import placed, turned
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.shapes import placed, turned
-from wavecomb.scenes.stage import StageWriter
 
 _FLAME = (95.0, 48.0, 16.0)
 _CANDLES = (
@@ -72,9 +72,9 @@ def _candle(writer: StageWriter, name: str, at: tuple[float, float, float], radi
 
 def build_candles(writer: StageWriter, options: SceneOptions) -> None:
     """Builds the table, the candles and the ball, in a dim room."""
-    writer.material("Table", looks.plastic((0.17, 0.08, 0.045), 0.3))
-    writer.material("Wick", looks.diffuse((0.03, 0.025, 0.02)))
-    writer.material("Flame", looks.emissive(_FLAME))
+    writer.material("Table", materials.plastic((0.17, 0.08, 0.045), 0.3))
+    writer.material("Wick", materials.diffuse((0.03, 0.025, 0.02)))
+    writer.material("Flame", materials.emissive(_FLAME))
     wax, marble = {"specular_roughness": 0.35, "specular_ior": 1.44}, {"specular_roughness": 0.12}
     below_surface(writer, "Wax", (0.93, 0.83, 0.66), (0.9, 0.45, 0.22), **wax)
     below_surface(writer, "Marble", (0.78, 0.8, 0.74), (0.5, 0.62, 0.44), **marble)

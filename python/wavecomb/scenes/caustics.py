@@ -10,11 +10,11 @@ import math
 
 import numpy as np
 
-from wavecomb.scenes import materials as looks
-from wavecomb.scenes.mesh import FloatArray, Mesh, grid_mesh, merge, normalized
+from wavecomb.scenes.authoring import materials
+from wavecomb.scenes.authoring.stage import StageWriter
+from wavecomb.scenes.models.mesh import FloatArray, Mesh, grid_mesh, merge, normalized
+from wavecomb.scenes.models.shapes import placed, turn_about, turned
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.shapes import placed, turn_about, turned
-from wavecomb.scenes.stage import StageWriter
 
 _LAMP_RADIUS = 0.08
 _LAMP_RADIANCE = (900.0, 860.0, 780.0)
@@ -44,14 +44,14 @@ def ring(radius: float, thickness: float, height: float, level: int) -> Mesh:
 
 def build_caustics(writer: StageWriter, options: SceneOptions) -> None:
     """Builds a floor and a wall, a ball and a ring, and a small light."""
-    writer.material("Floor", looks.diffuse((0.62, 0.60, 0.57)))
-    writer.material("Wall", looks.diffuse((0.35, 0.42, 0.50)))
+    writer.material("Floor", materials.diffuse((0.62, 0.60, 0.57)))
+    writer.material("Wall", materials.diffuse((0.35, 0.42, 0.50)))
     h = _HALF
     wall = [[-h, 0, -3.0], [h, 0, -3.0], [h, h, -3.0], [-h, h, -3.0]]
     writer.floor("Floor", h, "Floor")
     writer.quad("/World/Set/Wall", wall, "Wall")
-    writer.material("Glass", looks.CLEAR_GLASS)
-    writer.material("Gold", looks.metal((1.00, 0.71, 0.29), 0.1, (1.0, 0.94, 0.78)))
+    writer.material("Glass", materials.CLEAR_GLASS)
+    writer.material("Gold", materials.metal((1.00, 0.71, 0.29), 0.1, (1.0, 0.94, 0.78)))
     level = 2 * options.teapot_level
     for name, mesh, material in (
         ("Ball", placed(ball(0.8, level), (-1.1, 0.81, 0.0)), "Glass"),
@@ -105,8 +105,8 @@ def build_landscape(writer: StageWriter, options: SceneOptions) -> None:
 
     Nearly all light of the sun falls outside of the camera's view.
     """
-    writer.material("Soil", looks.diffuse((0.45, 0.40, 0.33)))
-    writer.material("Glass", looks.CLEAR_GLASS)
+    writer.material("Soil", materials.diffuse((0.45, 0.40, 0.33)))
+    writer.material("Glass", materials.CLEAR_GLASS)
     level = options.teapot_level
     writer.mesh("/World/Set/Land", land(16 * level), "Soil")
     writer.mesh(
@@ -157,9 +157,9 @@ def build_pool(writer: StageWriter, options: SceneOptions) -> None:
     sun and once towards the camera. Neither camera paths nor light paths can sample such a
     connection.
     """
-    writer.material("Stone", looks.diffuse((0.55, 0.53, 0.50)))
-    writer.material("Tiles", looks.diffuse((0.35, 0.62, 0.68)))
-    writer.material("Water", looks.dielectric((1.0, 1.0, 1.0), 0.0, _WATER_IOR))
+    writer.material("Stone", materials.diffuse((0.55, 0.53, 0.50)))
+    writer.material("Tiles", materials.diffuse((0.35, 0.62, 0.68)))
+    writer.material("Water", materials.dielectric((1.0, 1.0, 1.0), 0.0, _WATER_IOR))
     points, faces = _basin()
     writer.polygons("/World/Set/Basin", points[:8], faces[:5], "Tiles")
     writer.polygons("/World/Set/Rim", points, faces[5:], "Stone")
@@ -195,9 +195,9 @@ def lens(level: int) -> Mesh:
 
 def build_lens(writer: StageWriter, options: SceneOptions) -> None:
     """Builds a lens between a small light and a wall, and a floor."""
-    writer.material("Matt", looks.diffuse((0.6, 0.6, 0.6)))
-    writer.material("Dark", looks.diffuse((0.04, 0.04, 0.04)))
-    writer.material("Glass", looks.CLEAR_GLASS)
+    writer.material("Matt", materials.diffuse((0.6, 0.6, 0.6)))
+    writer.material("Dark", materials.diffuse((0.04, 0.04, 0.04)))
+    writer.material("Glass", materials.CLEAR_GLASS)
     far, h, up = 2.0 * LENS_FOCUS, 6.0, 1.4
     floor = [[-9, 0, h], [far, 0, h], [far, 0, -h], [-9, 0, -h]]
     wall = [[far, 0, h], [far, 2 * h, h], [far, 2 * h, -h], [far, 0, -h]]
@@ -211,8 +211,8 @@ def build_lens(writer: StageWriter, options: SceneOptions) -> None:
 
 def build_prism(writer: StageWriter, options: SceneOptions) -> None:
     """Builds an upright prism on a floor, a wall behind it, and the sun."""
-    writer.material("Matt", looks.diffuse((0.6, 0.58, 0.55)))
-    writer.material("Glass", looks.CLEAR_GLASS)
+    writer.material("Matt", materials.diffuse((0.6, 0.58, 0.55)))
+    writer.material("Glass", materials.CLEAR_GLASS)
     h = 6.0
     floor = [[-h, 0, h], [h, 0, h], [h, 0, -2.5], [-h, 0, -2.5]]
     wall = [[-h, 0, -2.5], [h, 0, -2.5], [h, h, -2.5], [-h, h, -2.5]]

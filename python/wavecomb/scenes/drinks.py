@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from wavecomb.scenes import materials as looks
-from wavecomb.scenes.materials import Colour
-from wavecomb.scenes.mesh import FloatArray
-from wavecomb.scenes.network import Network
+from wavecomb.scenes.authoring import materials
+from wavecomb.scenes.authoring.material_network import Network
+from wavecomb.scenes.authoring.materials import Colour
+from wavecomb.scenes.authoring.stage import StageWriter
+from wavecomb.scenes.models.mesh import FloatArray
+from wavecomb.scenes.models.shapes import placed, turned
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.shapes import placed, turned
-from wavecomb.scenes.stage import StageWriter
 
 _RADIUS, _HEIGHT, _WALL, _FOOT = 3.0, 10.5, 0.32, 1.0
 _OVERLAP = 0.1
@@ -80,8 +80,8 @@ def _serve(
 
 def build_drinks(writer: StageWriter, options: SceneOptions) -> None:
     """Builds the glasses in front of a window."""
-    writer.material("Table", looks.plastic((0.32, 0.26, 0.2), 0.35))
-    writer.material("Wall", looks.diffuse((0.5, 0.52, 0.55)))
+    writer.material("Table", materials.plastic((0.32, 0.26, 0.2), 0.35))
+    writer.material("Wall", materials.diffuse((0.5, 0.52, 0.55)))
     _glassy(writer, "Glass", 1.52, dielectric_priority=("integer", 1))
     writer.floor("Table", 60.0, "Table")
     wall = [[-60, 0, -22], [60, 0, -22], [60, 60, -22], [-60, 60, -22]]

@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, UsdGeom, Vt
 
-from wavecomb.scenes import materials as looks
+from wavecomb.scenes.authoring import materials
+from wavecomb.scenes.authoring.material_network import Network
+from wavecomb.scenes.authoring.stage import StageWriter
 from wavecomb.scenes.candles import below_surface
-from wavecomb.scenes.mesh import FloatArray, Mesh, grid_mesh, normalized, without_flat_faces
-from wavecomb.scenes.network import Network
+from wavecomb.scenes.models.mesh import FloatArray, Mesh, grid_mesh, normalized, without_flat_faces
+from wavecomb.scenes.models.relief import ramp
+from wavecomb.scenes.models.shapes import turned
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.relief import ramp
-from wavecomb.scenes.shapes import turned
-from wavecomb.scenes.stage import StageWriter
 
 HEAD_LEVEL = 96
 """Number of cells from pole to pole."""
@@ -143,7 +143,7 @@ def _lamps(writer: StageWriter, strength: float) -> None:
 
 
 def _floor(writer: StageWriter, height: float) -> None:
-    writer.material("Floor", looks.diffuse((0.16, 0.17, 0.19)))
+    writer.material("Floor", materials.diffuse((0.16, 0.17, 0.19)))
     writer.floor("Floor", 12.0, "Floor", height)
 
 
@@ -173,7 +173,7 @@ def fur_strands(rng: np.random.Generator, count: int) -> tuple[FloatArray, Float
 def build_fur(writer: StageWriter, options: SceneOptions) -> None:
     """Builds an egg with stripes of dark and light fur, lighter at the tips."""
     rng = np.random.default_rng([options.seed, 21])
-    writer.material("Skin", looks.diffuse((0.16, 0.10, 0.07)))
+    writer.material("Skin", materials.diffuse((0.16, 0.10, 0.07)))
     angle = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 65)
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(65)], axis=1)
     profile = _egg(ring)[:, :2]

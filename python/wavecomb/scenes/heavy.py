@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 from pxr import UsdShade
 
-from wavecomb.scenes import materials as looks
+from wavecomb.scenes.authoring import materials
+from wavecomb.scenes.authoring.material_network import Network
+from wavecomb.scenes.authoring.patterns import Image
+from wavecomb.scenes.authoring.stage import StageWriter
+from wavecomb.scenes.authoring.textures import TextureInfo
 from wavecomb.scenes.errors import SceneError
-from wavecomb.scenes.network import Network
+from wavecomb.scenes.models.stones import TILE, build_field, check_field, grey_pattern, texture_edge
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.patterns import Image
-from wavecomb.scenes.stage import StageWriter
-from wavecomb.scenes.stones import TILE, build_field, check_field, grey_pattern, texture_edge
-from wavecomb.scenes.textures import TextureInfo
 
 MAX_MATERIALS = 1024
 MAX_TEXTURE_MB = 8192.0
@@ -94,7 +94,7 @@ def _material(
     for which, colour in zip("ab", colours, strict=True):
         maps[which] = _define(writer, f"{name.lower()}_{which}", edge, index, colour)
     if index % (len(_KINDS) + 1) == 0:
-        return writer.material(name, looks.diffuse((0.5, 0.5, 0.5), maps["a"]))
+        return writer.material(name, materials.diffuse((0.5, 0.5, 0.5), maps["a"]))
     kind = _KINDS[index % (len(_KINDS) + 1) - 1]
     maps["r"] = _define(writer, f"{name.lower()}_r", edge, index, None)
     net = Network(writer.stage, f"/World/Looks/{name}")

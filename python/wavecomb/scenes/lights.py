@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, UsdGeom, UsdLux
 
-from wavecomb.scenes import materials as looks
+from wavecomb.scenes.authoring import materials
+from wavecomb.scenes.authoring.stage import BOX, BOX_CORNERS, StageWriter
 from wavecomb.scenes.errors import SceneError
+from wavecomb.scenes.models.teapot import teapot
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.stage import BOX, BOX_CORNERS, StageWriter
-from wavecomb.scenes.teapot import teapot
 
 MAX_LIGHTS = 200_000
 _LENGTH, _HALF_WIDTH, _HEIGHT = 60.0, 5.0, 12.0
@@ -120,7 +120,7 @@ def _mesh(
     tint = 0.55 + 0.45 * np.cos(2.0 * np.pi * (hue / _SIGN_COLOURS + np.array([0, 1, 2]) / 3.0))
     material = f"Glow_{hue:02d}_{step + 100:03d}"
     emission = tuple(float(v) for v in tint * 2.0 ** (step / 2.0))
-    writer.material(material, looks.emissive((emission[0], emission[1], emission[2])))
+    writer.material(material, materials.emissive((emission[0], emission[1], emission[2])))
     path = f"/World/Objects/{name}"
     if kind == "Sign":
         writer.box(path, place, half, material)
@@ -130,7 +130,7 @@ def _mesh(
 
 def _street(writer: StageWriter, rng: np.random.Generator) -> None:
     """Adds the ground, facades with bays, and the end of the street."""
-    writer.material("Asphalt", looks.diffuse((0.22, 0.22, 0.24)))
+    writer.material("Asphalt", materials.diffuse((0.22, 0.22, 0.24)))
     far = _LENGTH + 2.0
     ground: list[list[float]] = [[-30, 0, 8], [30, 0, 8], [30, 0, -far], [-30, 0, -far]]
     writer.quad("/World/Set/Ground", ground, "Asphalt")
@@ -142,7 +142,7 @@ def _street(writer: StageWriter, rng: np.random.Generator) -> None:
             width = float(rng.uniform(5.0, 9.0))
             name = f"Wall_{house % 4}"
             shade = 0.35 + 0.12 * (house % 4)
-            writer.material(name, looks.diffuse((shade, 0.92 * shade, 0.8 * shade)))
+            writer.material(name, materials.diffuse((shade, 0.92 * shade, 0.8 * shade)))
             x0, x1 = side * _HALF_WIDTH, side * (_HALF_WIDTH + 6.0)
             top = _HEIGHT + float(rng.uniform(0.0, 4.0))
             corners = [[x, y, w] for x in (x0, x1) for y in (0.0, top) for w in (z - width, z)]
@@ -156,12 +156,12 @@ _COLUMNS, _ROWS, _PITCH = 10, 9, 2.6
 _GROUND_HALF = 13.5
 _TEAPOT_SCALE = 0.36
 _LOOKS = {
-    "Clay": looks.TERRACOTTA,
-    "Chalk": looks.CHALK,
-    "BluePlastic": looks.BLUE_PLASTIC,
-    "YellowPlastic": looks.YELLOW_PLASTIC,
-    "Bronze": looks.BRONZE,
-    "Copper": looks.COPPER,
+    "Clay": materials.TERRACOTTA,
+    "Chalk": materials.CHALK,
+    "BluePlastic": materials.BLUE_PLASTIC,
+    "YellowPlastic": materials.YELLOW_PLASTIC,
+    "Bronze": materials.BRONZE,
+    "Copper": materials.COPPER,
 }
 
 
@@ -172,7 +172,7 @@ def build_studio(writer: StageWriter, options: SceneOptions) -> None:
     the image, which BSDF sampling finds as well.
     """
     rng = np.random.default_rng([options.seed, 3])
-    writer.material("Floor", looks.diffuse((0.35, 0.34, 0.33)))
+    writer.material("Floor", materials.diffuse((0.35, 0.34, 0.33)))
     writer.floor("Floor", _GROUND_HALF, "Floor")
     for name, info in _LOOKS.items():
         writer.material(name, info)

@@ -10,11 +10,11 @@ import math
 
 import numpy as np
 
-from wavecomb.scenes import materials as looks
-from wavecomb.scenes.materials import MaterialInfo
+from wavecomb.scenes.authoring import materials
+from wavecomb.scenes.authoring.materials import MaterialInfo
+from wavecomb.scenes.authoring.stage import StageWriter
+from wavecomb.scenes.models.teapot import teapot
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.stage import StageWriter
-from wavecomb.scenes.teapot import teapot
 
 _ROW_SIZES = (14, 13, 12, 11, 10, 9, 8, 7, 6)
 """Number of objects in each row, from the back: a fan of 90 that fills the camera's view."""
@@ -25,32 +25,32 @@ _GROUND_HALF = 600.0
 _TILE_REPEAT_LENGTH = 6.0
 
 _TEAPOT_LOOKS: dict[str, MaterialInfo] = {
-    "Porcelain": looks.PORCELAIN,
-    "Copper": looks.COPPER,
-    "Checker": looks.CHECKER,
-    "BluePlastic": looks.BLUE_PLASTIC,
-    "Marble": looks.MARBLE,
-    "Walnut": looks.WALNUT,
-    "Steel": looks.STEEL,
-    "Terracotta": looks.TERRACOTTA,
-    "Hammered": looks.HAMMERED,
-    "YellowPlastic": looks.YELLOW_PLASTIC,
-    "Cloth": looks.CLOTH,
-    "ClearGlass": looks.CLEAR_GLASS,
+    "Porcelain": materials.PORCELAIN,
+    "Copper": materials.COPPER,
+    "Checker": materials.CHECKER,
+    "BluePlastic": materials.BLUE_PLASTIC,
+    "Marble": materials.MARBLE,
+    "Walnut": materials.WALNUT,
+    "Steel": materials.STEEL,
+    "Terracotta": materials.TERRACOTTA,
+    "Hammered": materials.HAMMERED,
+    "YellowPlastic": materials.YELLOW_PLASTIC,
+    "Cloth": materials.CLOTH,
+    "ClearGlass": materials.CLEAR_GLASS,
 }
 _DRAGON_LOOKS: dict[str, MaterialInfo] = {
-    "Gold": looks.GOLD,
-    "Jade": looks.JADE,
-    "Lacquer": looks.LACQUER,
-    "Bronze": looks.BRONZE,
-    "TealPlastic": looks.TEAL_PLASTIC,
-    "AmberGlass": looks.AMBER_GLASS,
-    "Chalk": looks.CHALK,
-    "Silver": looks.SILVER,
-    "Marble": looks.MARBLE,
-    "FrostedGlass": looks.FROSTED_GLASS,
-    "Walnut": looks.WALNUT,
-    "Ember": looks.EMBER,
+    "Gold": materials.GOLD,
+    "Jade": materials.JADE,
+    "Lacquer": materials.LACQUER,
+    "Bronze": materials.BRONZE,
+    "TealPlastic": materials.TEAL_PLASTIC,
+    "AmberGlass": materials.AMBER_GLASS,
+    "Chalk": materials.CHALK,
+    "Silver": materials.SILVER,
+    "Marble": materials.MARBLE,
+    "FrostedGlass": materials.FROSTED_GLASS,
+    "Walnut": materials.WALNUT,
+    "Ember": materials.EMBER,
 }
 
 
@@ -64,13 +64,13 @@ def _dealt(names: list[str], count: int, rng: np.random.Generator) -> list[str]:
 
 def _set(writer: StageWriter, options: SceneOptions) -> None:
     """Adds the ground, the mirror, lights and camera."""
-    writer.material("Floor", looks.FLOOR)
+    writer.material("Floor", materials.FLOOR)
     half = _GROUND_HALF
     uv = np.array([[-half, -half], [half, -half], [half, half], [-half, half]])
     writer.floor("Ground", half, "Floor", uv=uv / _TILE_REPEAT_LENGTH)
 
-    writer.material("Mirror", looks.MIRROR)
-    writer.material("Frame", looks.BRONZE)
+    writer.material("Mirror", materials.MIRROR)
+    writer.material("Frame", materials.BRONZE)
     back = -(len(_ROW_SIZES) - 1) * _PITCH_Z - 3.0
     width, low, high, lean = 15.5, 0.35, 6.6, 0.15
     bottom, top = [[x, low, back] for x in (-width, width)], back + lean

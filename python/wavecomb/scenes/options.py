@@ -6,9 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from wavecomb.scenes.dragon import dragon
 from wavecomb.scenes.errors import SceneError
-from wavecomb.scenes.mesh import Mesh
+from wavecomb.scenes.models.dragon import dragon
+from wavecomb.scenes.models.mesh import Mesh
 
 
 @dataclass(frozen=True)
@@ -80,6 +80,6 @@ class SceneOptions:
         """Returns the dragon to use: the built-in one, or the file's mesh scaled to its size."""
         if self.dragon is None:
             return dragon(self.triangles)
-        from wavecomb.scenes.meshfile import load_dragon
+        from wavecomb.scenes.models.mesh_file import load_dragon
 
         return load_dragon(Path(self.dragon))

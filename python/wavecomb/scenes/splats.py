@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Vt
 
-from wavecomb.scenes import materials as looks
+from wavecomb.scenes.authoring import materials
+from wavecomb.scenes.authoring.stage import StageWriter
 from wavecomb.scenes.errors import SceneError
-from wavecomb.scenes.mesh import FloatArray, Mesh, face_areas, normalized
+from wavecomb.scenes.models.mesh import FloatArray, Mesh, face_areas, normalized
+from wavecomb.scenes.models.ply import ply_vertices
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.ply import ply_vertices
-from wavecomb.scenes.stage import StageWriter
 
 _COUNTS = {0: 0, 9: 1, 24: 2, 45: 3}
 """Degree of the spherical harmonics, by the number of coefficients after the first, over all
@@ -118,7 +118,7 @@ def linear_harmonics(harmonics: FloatArray) -> FloatArray:
     Decodes the colours in directions all over the sphere, with negative values set to 0, and fits
     harmonics by least squares.
     """
-    from wavecomb.picture.image import linear_from_srgb
+    from wavecomb.image.files.image import linear_from_srgb
 
     turn = np.arange(_DIRECTIONS) * (np.pi * (3.0 - 5.0**0.5))
     z = 1.0 - (2.0 * np.arange(_DIRECTIONS) + 1.0) / _DIRECTIONS
@@ -221,8 +221,8 @@ def build_splats(writer: StageWriter, options: SceneOptions) -> None:
         add_splats(writer, "/World/Objects/Capture", capture)
         return
     rng = np.random.default_rng([options.seed, 77])
-    writer.material("Floor", looks.diffuse((0.42, 0.41, 0.39)))
-    writer.material("Mirror", looks.MIRROR)
+    writer.material("Floor", materials.diffuse((0.42, 0.41, 0.39)))
+    writer.material("Mirror", materials.MIRROR)
     writer.floor("Floor", 14.0, "Floor")
     mirror = [[-2.2, 0.05, -1.9], [2.6, 0.05, -1.6], [2.6, 2.6, -1.7], [-2.2, 2.6, -2.0]]
     writer.quad("/World/Set/Mirror", mirror, "Mirror")

@@ -16,15 +16,15 @@ from dataclasses import replace
 import numpy as np
 from pxr import UsdShade
 
-from wavecomb.scenes import materials as looks
+from wavecomb.scenes.authoring import materials
+from wavecomb.scenes.authoring.material_network import Network
+from wavecomb.scenes.authoring.materials import Colour, MaterialInfo
+from wavecomb.scenes.authoring.patterns import Image
+from wavecomb.scenes.authoring.stage import StageWriter
+from wavecomb.scenes.authoring.textures import TextureInfo
 from wavecomb.scenes.errors import SceneError
-from wavecomb.scenes.materials import Colour, MaterialInfo
-from wavecomb.scenes.network import Network
+from wavecomb.scenes.models.stones import TILE, build_field, check_field, grey_pattern, texture_edge
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.patterns import Image
-from wavecomb.scenes.stage import StageWriter
-from wavecomb.scenes.stones import TILE, build_field, check_field, grey_pattern, texture_edge
-from wavecomb.scenes.textures import TextureInfo
 
 MAX_MATERIALS = 4096
 MAX_TEXTURE_MB = 4096.0
@@ -70,15 +70,15 @@ def octaves(options: SceneOptions, index: int) -> int:
 
 
 def _principled(colour: Colour) -> MaterialInfo:
-    return looks.principled({"diffuseColor": colour, "roughness": 0.35, "ior": 1.5})
+    return materials.principled({"diffuseColor": colour, "roughness": 0.35, "ior": 1.5})
 
 
 _PROGRAMS = (
     _principled,
-    lambda colour: looks.diffuse(colour),
-    lambda colour: looks.plastic(colour, 0.15),
-    lambda colour: looks.metal(colour, 0.25),
-    lambda colour: looks.dielectric(colour, 0.1),
+    lambda colour: materials.diffuse(colour),
+    lambda colour: materials.plastic(colour, 0.15),
+    lambda colour: materials.metal(colour, 0.25),
+    lambda colour: materials.dielectric(colour, 0.1),
 )
 """Functions that make a material from its colour. The first ``programs`` of them are used in
 turn."""

@@ -17,12 +17,12 @@ from pxr import Gf, UsdLux, UsdVol
 
 from wavecomb import vdb
 from wavecomb.errors import WavecombError
-from wavecomb.scenes import materials as looks
+from wavecomb.scenes.authoring import materials
+from wavecomb.scenes.authoring.material_network import Network
+from wavecomb.scenes.authoring.materials import Colour
+from wavecomb.scenes.authoring.stage import StageWriter
 from wavecomb.scenes.errors import SceneError
-from wavecomb.scenes.materials import Colour
-from wavecomb.scenes.network import Network
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.stage import StageWriter
 
 Points = NDArray[np.float32]
 
@@ -191,7 +191,7 @@ class _Volumes:
 
 
 def _ground(writer: StageWriter, half: float, colour: Colour) -> None:
-    writer.material("Ground", looks.diffuse(colour))
+    writer.material("Ground", materials.diffuse(colour))
     writer.floor("Ground", half, "Ground")
 
 
@@ -234,7 +234,7 @@ def build_smoke(writer: StageWriter, options: SceneOptions) -> None:
     """Builds smoke that rises over an ember, in front of a wall."""
     volumes = _Volumes(writer)
     _ground(writer, 8.0, (0.3, 0.3, 0.3))
-    writer.material("Brick", looks.diffuse((0.32, 0.16, 0.12)))
+    writer.material("Brick", materials.diffuse((0.32, 0.16, 0.12)))
     writer.box("/World/Objects/Hearth", (0.0, 0.06, 0.0), (0.35, 0.06, 0.35), "Brick")
     density = smoke_density(options.seed)
     low, high = (-1.6, 0.0, -1.6), (1.6, 4.0, 1.6)
@@ -307,8 +307,8 @@ def build_fog(writer: StageWriter, options: SceneOptions) -> None:
     """Builds a street lamp and a window in homogeneous fog, with posts in front of them."""
     volumes = _Volumes(writer)
     _ground(writer, 14.0, (0.2, 0.2, 0.21))
-    writer.material("Post", looks.diffuse((0.12, 0.1, 0.09)))
-    writer.material("House", looks.diffuse((0.4, 0.36, 0.3)))
+    writer.material("Post", materials.diffuse((0.12, 0.1, 0.09)))
+    writer.material("House", materials.diffuse((0.4, 0.36, 0.3)))
     rng = np.random.default_rng([options.seed, 53])
     for index in range(9):
         x, z = -6.0 + 1.5 * index, -1.5 - 2.0 * float(rng.random())

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads USD stages into scenes: ``load_stage("shot.usd").scene``.
 
-``stage`` opens and traverses stages and builds groups; ``geometry``, ``lights``, ``cameras`` and
-``volumes`` read one kind of prim each; ``looks``, ``graphs`` and ``materialx`` convert shader
-networks to programs with parameters.
+``layers`` opens stages, ``render_settings`` reads their settings, ``stage`` loads them into a
+scene, and ``instances`` builds groups. ``geometry``, ``lights``, ``cameras`` and ``volumes`` read
+one kind of prim each; ``materials``, ``graphs`` and ``materialx`` convert shader networks to
+programs with parameters.
 
 Names are imported on first use, since most of them load OpenUSD.
 """
@@ -14,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from wavecomb.errors import WavecombError
+    from wavecomb.usd.layers.opening import open_editable, open_stage
+    from wavecomb.usd.render_settings.products import peek_products
     from wavecomb.usd.stage.load import load_stage
-    from wavecomb.usd.stage.loaded import LoadedStage
-    from wavecomb.usd.stage.opening import open_editable, open_stage
-    from wavecomb.usd.stage.peek import peek_products
+    from wavecomb.usd.stage.load_result import LoadedStage
     from wavecomb.usd.stage.report import Finding, LoadReport
 
 __all__ = [
@@ -34,12 +35,12 @@ __all__ = [
 _HOMES = {
     "Finding": "wavecomb.usd.stage.report",
     "LoadReport": "wavecomb.usd.stage.report",
-    "LoadedStage": "wavecomb.usd.stage.loaded",
+    "LoadedStage": "wavecomb.usd.stage.load_result",
     "WavecombError": "wavecomb.errors",
     "load_stage": "wavecomb.usd.stage.load",
-    "open_editable": "wavecomb.usd.stage.opening",
-    "open_stage": "wavecomb.usd.stage.opening",
-    "peek_products": "wavecomb.usd.stage.peek",
+    "open_editable": "wavecomb.usd.layers.opening",
+    "open_stage": "wavecomb.usd.layers.opening",
+    "peek_products": "wavecomb.usd.render_settings.products",
 }
 
 

@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any
 from pxr import Usd, UsdShade
 
 from wavecomb.usd.graphs.values import Expressions, Value
-from wavecomb.usd.looks.network import shader_id, source_of
-from wavecomb.usd.stage.unread import unread_mtlx
+from wavecomb.usd.layers.unopened_materialx import unopened_materialx
+from wavecomb.usd.materials.network import shader_id, source_of
 
 if TYPE_CHECKING:
-    from wavecomb.usd.graphs.surface import Networks
-    from wavecomb.usd.looks.surface import InputDefinition, Surface
-    from wavecomb.usd.looks.texture import TextureTable
+    from wavecomb.usd.graphs.surface_parameters import Networks
+    from wavecomb.usd.materials.surface import InputDefinition, Surface
+    from wavecomb.usd.materials.texture import TextureTable
     from wavecomb.usd.stage.report import LoadReport
 
 ABSENT = "MaterialX without the Python package materialx (pip install materialx)"
@@ -54,14 +54,14 @@ def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
     """Makes a stage use the MaterialX files that its layers name.
 
     Changes the layers in memory, which then can no longer be saved. Unreadable files stay missing;
-    ``tell`` reports them. The call is fast if no such file is missing.
+    ``report_problems`` reports them. The call is fast if no such file is missing.
 
     Args:
         stage: The stage.
         everywhere: Whether to include unselected variants, which takes a pass over all layers.
             Selecting them later, on any thread, then changes no layer.
     """
-    if (everywhere or any(True for _ in unread_mtlx(stage))) and is_there():
+    if (everywhere or any(True for _ in unopened_materialx(stage))) and is_there():
         from wavecomb.usd.materialx import references
 
         references.resolve(stage, everywhere=everywhere)
@@ -77,17 +77,17 @@ def reload(stage: Usd.Stage) -> None:
     references.reload(stage)
 
 
-def tell(stage: Usd.Stage, report: LoadReport) -> None:
+def report_problems(stage: Usd.Stage, report: LoadReport) -> None:
     """Reports MaterialX files that are missing, and problems of translated ones."""
     read_none = "wavecomb.usd.materialx.references" not in sys.modules
-    if read_none and not any(True for _ in unread_mtlx(stage)):
+    if read_none and not any(True for _ in unopened_materialx(stage)):
         return
     if is_there():
         from wavecomb.usd.materialx import references
 
-        references.tell(stage, report)
+        references.report_problems(stage, report)
         return
-    for error, _ in unread_mtlx(stage):
+    for error, _ in unopened_materialx(stage):
         report.warn(f"{ABSENT}: files left out", str(error.rootSite.path))
 
 

@@ -76,6 +76,38 @@ inline F truth(const Mask<F>& m) {
   return select(m, F(1.f), F(0.f));
 }
 
+/// Returns a / b; 0 for b = 0.
+template <typename F>
+inline F quotient(const F& a, const F& b) {
+  const Mask<F> none = b == 0.f;
+  return select(none, F(0.f), F(a / select(none, F(1.f), b)));
+}
+/// Returns a - b floor(a / b); 0 for b = 0.
+template <typename F>
+inline F modulo(const F& a, const F& b) {
+  const Mask<F> none = b == 0.f;
+  const F whole = floor(F(a / select(none, F(1.f), b)));
+  return select(none, F(0.f), F(a - F(b * whole)));
+}
+/// Returns the cubic from 0 at x = low to 1 at x = high; a step if both are equal.
+template <typename F>
+inline F smoothstep(const F& x, const F& low, const F& high) {
+  const F range = high - low;
+  const Mask<F> none = range == 0.f;
+  const F step = select(x < low, F(0.f), F(1.f));
+  const F t = wavecomb::clamp(F(F(x - low) / select(none, F(1.f), range)), F(0.f), F(1.f));
+  return select(none, step, F(F(t * t) * fma(t, F(-2.f), F(3.f))));
+}
+template <typename F>
+inline F sign_of(const F& a) {
+  return select(a > 0.f, F(1.f), F(select(a < 0.f, F(-1.f), F(0.f))));
+}
+/// Returns the logarithm of a number clamped to the positive normal range.
+template <typename F>
+inline F bounded_log(const F& a) {
+  return wavecomb::log(wavecomb::clamp(a, F(1.17549435e-38f), F(3.4e38f)));
+}
+
 /// Returns x^y; 1 for y = 0, and 0 for x < 0 otherwise.
 template <typename F>
 inline F power(const F& x, const F& y) {
@@ -93,9 +125,9 @@ inline void noise_values(const F (&p)[N], uint32_t width, F* out) {
   noise::perlin<3, F>(p, value);
   for (uint32_t i = 0; i < width && i < 3; ++i) out[i] = value[i];
   if (width < 4) return;
-  constexpr float kNoiseOffset[3] = {19.f, 73.f, 29.f};
+  constexpr float kElsewhere[3] = {19.f, 73.f, 29.f};
   F q[N];
-  for (size_t i = 0; i < N; ++i) q[i] = p[i] + kNoiseOffset[i];
+  for (size_t i = 0; i < N; ++i) q[i] = p[i] + kElsewhere[i];
   noise::perlin<1, F>(q, out + 3);
 }
 
@@ -117,14 +149,182 @@ inline void octaves(const F (&p)[3], uint32_t count, const F& lacunarity, const 
 template <typename F>
 inline void fractal_values(const F (&p)[3], uint32_t width, uint32_t count, const F& lacunarity,
                            const F& diminish, F* out) {
-  const F offset_point[3] = {p[0] + 19.f, p[1] + 193.f, p[2] + 17.f};
+  const F elsewhere[3] = {p[0] + 19.f, p[1] + 193.f, p[2] + 17.f};
   if (width < 3) {
     octaves<1, F>(p, count, lacunarity, diminish, out);
-    if (width == 2) octaves<1, F>(offset_point, count, lacunarity, diminish, out + 1);
+    if (width == 2) octaves<1, F>(elsewhere, count, lacunarity, diminish, out + 1);
     return;
   }
   octaves<3, F>(p, count, lacunarity, diminish, out);
-  if (width == 4) octaves<1, F>(offset_point, count, lacunarity, diminish, out + 3);
+  if (width == 4) octaves<1, F>(elsewhere, count, lacunarity, diminish, out + 3);
+}
+
+/// Operation of a graph with its operands and results. An operation reads its operands while it
+/// writes results, so check_graph forbids overlap.
+template <typename F>
+struct GraphStep {
+  const GraphOp& code;
+  const float* constants;  ///< of the program
+  const F* registers;
+  F* to;           ///< first result
+  uint32_t width;  ///< number of results
+
+  /// Returns component `i` of operand `k`.
+  WAVECOMB_INLINE F in(uint32_t k, uint32_t i) const {
+    const uint32_t from = code.from[k] + ((code.steps >> k & 1u) != 0 ? i : 0u);
+    return (from & kGraphConstant) != 0 ? F(constants[from & (kGraphConstant - 1u)])
+                                        : registers[from];
+  }
+  WAVECOMB_INLINE Vec3<F> vec3(uint32_t k) const { return {in(k, 0), in(k, 1), in(k, 2)}; }
+  // Apply a function of one, two or three operands to each component.
+  template <typename Function>
+  WAVECOMB_INLINE void one(const Function& f) const {
+    for (uint32_t i = 0; i < width; ++i) to[i] = f(in(0, i));
+  }
+  template <typename Function>
+  WAVECOMB_INLINE void two(const Function& f) const {
+    for (uint32_t i = 0; i < width; ++i) to[i] = f(in(0, i), in(1, i));
+  }
+  template <typename Function>
+  WAVECOMB_INLINE void three(const Function& f) const {
+    for (uint32_t i = 0; i < width; ++i) to[i] = f(in(0, i), in(1, i), in(2, i));
+  }
+  WAVECOMB_INLINE void put(const Vec3<F>& v) const {
+    const F c[3] = {v.x, v.y, v.z};
+    for (uint32_t i = 0; i < width && i < 3; ++i) to[i] = c[i];
+  }
+};
+
+/// Runs arithmetic on components. Returns false for other operations.
+template <typename F>
+WAVECOMB_INLINE bool run_arithmetic(const GraphStep<F>& op) {
+  switch (static_cast<GraphCode>(op.code.code)) {
+    case GraphCode::kAdd:
+      op.two([](const F& a, const F& b) { return F(a + b); });
+      return true;
+    case GraphCode::kSubtract:
+      op.two([](const F& a, const F& b) { return F(a - b); });
+      return true;
+    case GraphCode::kMultiply:
+      op.two([](const F& a, const F& b) { return F(a * b); });
+      return true;
+    case GraphCode::kDivide:
+      op.two([](const F& a, const F& b) { return quotient<F>(a, b); });
+      return true;
+    case GraphCode::kModulo:
+      op.two([](const F& a, const F& b) { return modulo<F>(a, b); });
+      return true;
+    case GraphCode::kPower:
+      op.two([](const F& a, const F& b) { return power<F>(a, b); });
+      return true;
+    case GraphCode::kMin:
+      op.two([](const F& a, const F& b) { return wavecomb::min(a, b); });
+      return true;
+    case GraphCode::kMax:
+      op.two([](const F& a, const F& b) { return wavecomb::max(a, b); });
+      return true;
+    case GraphCode::kAtan2:
+      op.two([](const F& a, const F& b) { return wavecomb::atan2(a, b); });
+      return true;
+    case GraphCode::kLess:
+      op.two([](const F& a, const F& b) { return truth<F>(a < b); });
+      return true;
+    case GraphCode::kEqual:
+      op.two([](const F& a, const F& b) { return truth<F>(a == b); });
+      return true;
+    case GraphCode::kMix:
+      op.three([](const F& a, const F& b, const F& c) { return fma(F(b - a), c, a); });
+      return true;
+    case GraphCode::kClamp:
+      op.three([](const F& a, const F& b, const F& c) { return wavecomb::clamp(a, b, c); });
+      return true;
+    case GraphCode::kSelect:
+      op.three([](const F& a, const F& b, const F& c) { return F(select(a != 0.f, b, c)); });
+      return true;
+    case GraphCode::kSmoothstep:
+      op.three([](const F& x, const F& a, const F& b) { return smoothstep<F>(x, a, b); });
+      return true;
+    case GraphCode::kAbs:
+      op.one([](const F& a) { return wavecomb::abs(a); });
+      return true;
+    case GraphCode::kFloor:
+      op.one([](const F& a) { return wavecomb::floor(a); });
+      return true;
+    case GraphCode::kSign:
+      op.one([](const F& a) { return sign_of<F>(a); });
+      return true;
+    case GraphCode::kSqrt:
+      op.one([](const F& a) { return safe_sqrt(a); });
+      return true;
+    case GraphCode::kExp:
+      op.one([](const F& a) { return wavecomb::exp(a); });
+      return true;
+    case GraphCode::kLog:
+      op.one([](const F& a) { return bounded_log<F>(a); });
+      return true;
+    case GraphCode::kSin:
+      op.one([](const F& a) { return sincos_radians<F>(a).sin; });
+      return true;
+    case GraphCode::kCos:
+      op.one([](const F& a) { return sincos_radians<F>(a).cos; });
+      return true;
+    case GraphCode::kAcos:
+      op.one([](const F& a) { return wavecomb::acos(a); });
+      return true;
+    default:
+      return false;
+  }
+}
+
+/// Runs procedural patterns. Returns false for other operations.
+template <typename F>
+WAVECOMB_INLINE bool run_pattern(const GraphStep<F>& op) {
+  switch (static_cast<GraphCode>(op.code.code)) {
+    case GraphCode::kNoise2: {
+      const F p[2] = {op.in(0, 0), op.in(0, 1)};
+      noise_values<F>(p, op.width, op.to);
+      return true;
+    }
+    case GraphCode::kNoise3: {
+      const F p[3] = {op.in(0, 0), op.in(0, 1), op.in(0, 2)};
+      noise_values<F>(p, op.width, op.to);
+      return true;
+    }
+    case GraphCode::kFractal3: {
+      const F p[3] = {op.in(0, 0), op.in(0, 1), op.in(0, 2)};
+      const F lacunarity = op.in(1, 0), diminish = op.in(2, 0);
+      fractal_values<F>(p, op.width, op.code.number, lacunarity, diminish, op.to);
+      return true;
+    }
+    case GraphCode::kCell2: {
+      const F p[2] = {op.in(0, 0), op.in(0, 1)};
+      for (uint32_t i = 0; i < op.width; ++i)
+        op.to[i] = op.width == 1 ? noise::cell<F>(p) : noise::cell<F>(p, i);
+      return true;
+    }
+    case GraphCode::kCell3: {
+      const F p[3] = {op.in(0, 0), op.in(0, 1), op.in(0, 2)};
+      for (uint32_t i = 0; i < op.width; ++i)
+        op.to[i] = op.width == 1 ? noise::cell<F>(p) : noise::cell<F>(p, i);
+      return true;
+    }
+    case GraphCode::kWorley2: {
+      const F p[2] = {op.in(0, 0), op.in(0, 1)};
+      const noise::Worley<F> w = noise::worley<F>(p, op.in(1, 0));
+      for (uint32_t i = 0; i < op.width; ++i)
+        op.to[i] = op.code.number == 1 ? w.cell : w.nearest[i];
+      return true;
+    }
+    case GraphCode::kWorley3: {
+      const F p[3] = {op.in(0, 0), op.in(0, 1), op.in(0, 2)};
+      const noise::Worley<F> w = noise::worley<F>(p, op.in(1, 0));
+      for (uint32_t i = 0; i < op.width; ++i)
+        op.to[i] = op.code.number == 1 ? w.cell : w.nearest[i];
+      return true;
+    }
+    default:
+      return false;
+  }
 }
 
 }  // namespace detail
@@ -133,195 +333,46 @@ template <typename F>
 [[gnu::noinline]] void run_graph(const GraphView& view, const GraphProgram& program,
                                  const TextureView* textures, const GraphPoint<F>& at,
                                  const Mask<F>& active, F* registers) {
-  const float* const constants = view.constants + program.first_constant;
   const GraphOp* const end = view.ops + program.first_op + program.op_count;
   for (const GraphOp* next = view.ops + program.first_op; next != end; ++next) {
-    const GraphOp& op = *next;
-    F* const to = registers + op.to;
-    const uint32_t width = op.width;
-    const auto in = [&](uint32_t k, uint32_t i) {
-      const uint32_t from = op.from[k] + ((op.steps >> k & 1u) != 0 ? i : 0u);
-      return (from & kGraphConstant) != 0 ? F(constants[from & (kGraphConstant - 1u)])
-                                          : registers[from];
-    };
-    // An operation reads its operands while it writes results, so check_graph forbids overlap.
-    const auto one = [&](const auto& f) {
-      for (uint32_t i = 0; i < width; ++i) to[i] = f(in(0, i));
-    };
-    const auto two = [&](const auto& f) {
-      for (uint32_t i = 0; i < width; ++i) to[i] = f(in(0, i), in(1, i));
-    };
-    const auto three = [&](const auto& f) {
-      for (uint32_t i = 0; i < width; ++i) to[i] = f(in(0, i), in(1, i), in(2, i));
-    };
-    const auto put = [&](const Vec3<F>& v) {
-      const F c[3] = {v.x, v.y, v.z};
-      for (uint32_t i = 0; i < width && i < 3; ++i) to[i] = c[i];
-    };
-    const auto vec3 = [&](uint32_t k) { return Vec3<F>(in(k, 0), in(k, 1), in(k, 2)); };
-    const F zero(0.f);
-    switch (static_cast<GraphCode>(op.code)) {
+    const detail::GraphStep<F> op{*next, view.constants + program.first_constant, registers,
+                                  registers + next->to, next->width};
+    if (detail::run_arithmetic<F>(op) || detail::run_pattern<F>(op)) continue;
+    switch (static_cast<GraphCode>(next->code)) {
       case GraphCode::kCopy:
-        for (uint32_t i = 0; i < width; ++i) to[i] = in(i, 0);
+        for (uint32_t i = 0; i < op.width; ++i) op.to[i] = op.in(i, 0);
         break;
       case GraphCode::kInput:
-        put(detail::input_value<F>(at, static_cast<GraphInput>(op.number)));
+        op.put(detail::input_value<F>(at, static_cast<GraphInput>(op.code.number)));
         break;
       case GraphCode::kImage: {
-        const GraphImage& image = view.images[program.first_image + op.number];
-        const Texel<F> texel = lookup<F>(textures[image.texture], in(0, 0), in(0, 1),
+        const GraphImage& image = view.images[program.first_image + op.code.number];
+        const Texel<F> texel = lookup<F>(textures[image.texture], op.in(0, 0), op.in(0, 1),
                                          at.footprint.scaled(F(image.stretch)), active);
         const F c[4] = {texel.r, texel.g, texel.b, texel.a};
-        for (uint32_t i = 0; i < width; ++i) to[i] = c[i];
+        for (uint32_t i = 0; i < op.width; ++i) op.to[i] = c[i];
         break;
       }
-      case GraphCode::kAdd:
-        two([](const F& a, const F& b) { return F(a + b); });
-        break;
-      case GraphCode::kSubtract:
-        two([](const F& a, const F& b) { return F(a - b); });
-        break;
-      case GraphCode::kMultiply:
-        two([](const F& a, const F& b) { return F(a * b); });
-        break;
-      case GraphCode::kDivide:
-        two([&](const F& a, const F& b) {
-          const Mask<F> none = b == 0.f;
-          return F(select(none, zero, F(a / select(none, F(1.f), b))));
-        });
-        break;
-      case GraphCode::kModulo:
-        two([&](const F& a, const F& b) {
-          const Mask<F> none = b == 0.f;
-          const F quotient = floor(F(a / select(none, F(1.f), b)));
-          return F(select(none, zero, F(a - F(b * quotient))));
-        });
-        break;
-      case GraphCode::kPower:
-        two([](const F& a, const F& b) { return detail::power<F>(a, b); });
-        break;
-      case GraphCode::kMin:
-        two([](const F& a, const F& b) { return wavecomb::min(a, b); });
-        break;
-      case GraphCode::kMax:
-        two([](const F& a, const F& b) { return wavecomb::max(a, b); });
-        break;
-      case GraphCode::kAtan2:
-        two([](const F& a, const F& b) { return wavecomb::atan2(a, b); });
-        break;
-      case GraphCode::kLess:
-        two([](const F& a, const F& b) { return detail::truth<F>(a < b); });
-        break;
-      case GraphCode::kEqual:
-        two([](const F& a, const F& b) { return detail::truth<F>(a == b); });
-        break;
-      case GraphCode::kMix:
-        three([](const F& a, const F& b, const F& c) { return fma(F(b - a), c, a); });
-        break;
-      case GraphCode::kClamp:
-        three([](const F& a, const F& b, const F& c) { return wavecomb::clamp(a, b, c); });
-        break;
-      case GraphCode::kSelect:
-        three([](const F& a, const F& b, const F& c) { return F(select(a != 0.f, b, c)); });
-        break;
-      case GraphCode::kSmoothstep:
-        three([](const F& x, const F& low, const F& high) {
-          const F range = high - low;
-          const Mask<F> none = range == 0.f;
-          const F step = select(x < low, F(0.f), F(1.f));
-          const F t = wavecomb::clamp(F(F(x - low) / select(none, F(1.f), range)), F(0.f), F(1.f));
-          return F(select(none, step, F(F(t * t) * fma(t, F(-2.f), F(3.f)))));
-        });
-        break;
-      case GraphCode::kAbs:
-        one([](const F& a) { return wavecomb::abs(a); });
-        break;
-      case GraphCode::kFloor:
-        one([](const F& a) { return wavecomb::floor(a); });
-        break;
-      case GraphCode::kSign:
-        one([](const F& a) {
-          return F(select(a > 0.f, F(1.f), F(select(a < 0.f, F(-1.f), F(0.f)))));
-        });
-        break;
-      case GraphCode::kSqrt:
-        one([](const F& a) { return safe_sqrt(a); });
-        break;
-      case GraphCode::kExp:
-        one([](const F& a) { return wavecomb::exp(a); });
-        break;
-      case GraphCode::kLog:
-        one([](const F& a) {
-          return wavecomb::log(wavecomb::clamp(a, F(1.17549435e-38f), F(3.4e38f)));
-        });
-        break;
-      case GraphCode::kSin:
-        one([](const F& a) { return detail::sincos_radians<F>(a).sin; });
-        break;
-      case GraphCode::kCos:
-        one([](const F& a) { return detail::sincos_radians<F>(a).cos; });
-        break;
-      case GraphCode::kAcos:
-        one([](const F& a) { return wavecomb::acos(a); });
-        break;
       case GraphCode::kDot: {
-        F sum = in(0, 0) * in(1, 0);
-        for (uint32_t i = 1; i < width; ++i) sum = fma(in(0, i), in(1, i), sum);
-        to[0] = sum;
+        F sum = op.in(0, 0) * op.in(1, 0);
+        for (uint32_t i = 1; i < op.width; ++i) sum = fma(op.in(0, i), op.in(1, i), sum);
+        op.to[0] = sum;
         break;
       }
       case GraphCode::kCross:
-        put(cross(vec3(0), vec3(1)));
+        op.put(cross(op.vec3(0), op.vec3(1)));
         break;
       case GraphCode::kRgbToHsv:
-        put(detail::rgb_to_hsv<F>(vec3(0)));
+        op.put(detail::rgb_to_hsv<F>(op.vec3(0)));
         break;
       case GraphCode::kHsvToRgb:
-        put(detail::hsv_to_rgb<F>(vec3(0)));
+        op.put(detail::hsv_to_rgb<F>(op.vec3(0)));
         break;
-      case GraphCode::kNoise2: {
-        const F p[2] = {in(0, 0), in(0, 1)};
-        detail::noise_values<F>(p, width, to);
-        break;
-      }
-      case GraphCode::kNoise3: {
-        const F p[3] = {in(0, 0), in(0, 1), in(0, 2)};
-        detail::noise_values<F>(p, width, to);
-        break;
-      }
-      case GraphCode::kFractal3: {
-        const F p[3] = {in(0, 0), in(0, 1), in(0, 2)};
-        const F lacunarity = in(1, 0), diminish = in(2, 0);
-        detail::fractal_values<F>(p, width, op.number, lacunarity, diminish, to);
-        break;
-      }
-      case GraphCode::kCell2: {
-        const F p[2] = {in(0, 0), in(0, 1)};
-        for (uint32_t i = 0; i < width; ++i)
-          to[i] = width == 1 ? noise::cell<F>(p) : noise::cell<F>(p, i);
-        break;
-      }
-      case GraphCode::kCell3: {
-        const F p[3] = {in(0, 0), in(0, 1), in(0, 2)};
-        for (uint32_t i = 0; i < width; ++i)
-          to[i] = width == 1 ? noise::cell<F>(p) : noise::cell<F>(p, i);
-        break;
-      }
-      case GraphCode::kWorley2: {
-        const F p[2] = {in(0, 0), in(0, 1)};
-        const noise::Worley<F> w = noise::worley<F>(p, in(1, 0));
-        for (uint32_t i = 0; i < width; ++i) to[i] = op.number == 1 ? w.cell : w.nearest[i];
-        break;
-      }
-      case GraphCode::kWorley3: {
-        const F p[3] = {in(0, 0), in(0, 1), in(0, 2)};
-        const noise::Worley<F> w = noise::worley<F>(p, in(1, 0));
-        for (uint32_t i = 0; i < width; ++i) to[i] = op.number == 1 ? w.cell : w.nearest[i];
-        break;
-      }
       case GraphCode::kAttribute:
-        one([](const F& a) { return a; });
-        read_attribute<F>(view.attributes, op.number, width, at.mesh_position, active, to);
+        op.one([](const F& a) { return a; });
+        read_attribute<F>(view.attributes, op.code.number, op.width, at.place, active, op.to);
+        break;
+      default:
         break;
     }
   }

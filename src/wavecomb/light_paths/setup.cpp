@@ -52,6 +52,9 @@ LightPathConflict light_path_conflict(const Scene& scene) {
     return {
         "media inside of meshes",
         "a stage without transmission scatter, priorities and objects inside of absorbing glass"};
+  if (scene.material_part()->has_absorbing_graphs)
+    return {"glass whose absorption comes from a value graph",
+            "a stage with constant transmission colors"};
   if (!scene.volumes().empty())
     return {"volumes, such as '" + scene.volumes()[0].name + "'", "a stage without them"};
   return {};

@@ -291,17 +291,36 @@ struct Vertex {
 /// the light's surface.
 inline constexpr float kShadowRayFraction = 0.9999f;
 
-/// Returns `c`, scaled down to a luminance of at most `limit` (0 means no limit). Returns black if
-/// `c` is not finite.
+/// Limit of a contribution: scales it to a luminance of at most `limit` (0 means no limit), and
+/// drops it if it is not finite.
+template <typename F>
+class ContributionLimit {
+ public:
+  ContributionLimit(const Color<F>& whole, float limit)
+      : finite_(is_finite(whole.x) & is_finite(whole.y) & is_finite(whole.z)),
+        limited_(limit > 0),
+        scale_(1.f) {
+    if (!limited_) return;
+    const F y = luminance(finite(whole));
+    scale_ = select(y > limit, F(limit / max(y, F(1e-30f))), F(1.f));
+  }
+  /// Returns the limited contribution of `part`, a summand of the whole or the whole itself.
+  Color<F> of(const Color<F>& part) const {
+    return limited_ ? finite(part) * scale_ : finite(part);
+  }
+
+ private:
+  Color<F> finite(const Color<F>& c) const { return select<F>(finite_, c, Color<F>(F(0.f))); }
+
+  Mask<F> finite_;
+  bool limited_;
+  F scale_;
+};
+
+/// Returns `c`, limited by ContributionLimit.
 template <typename F>
 inline Color<F> clean(const Color<F>& c, float limit) {
-  const Mask<F> ok = is_finite(c.x) & is_finite(c.y) & is_finite(c.z);
-  Color<F> r = select<F>(ok, c, Color<F>(F(0.f)));
-  if (limit > 0) {
-    const F y = luminance(r);
-    r = r * select(y > limit, F(limit / max(y, F(1e-30f))), F(1.f));
-  }
-  return r;
+  return ContributionLimit<F>(c, limit).of(c);
 }
 
 /// Returns the luminance limit of a contribution after `bounces` scatterings. Direct light has

@@ -4,8 +4,6 @@
 
 #include <utility>
 
-#include "wavecomb/aov/path_aovs.h"
-#include "wavecomb/aov/screen_motion.h"
 #include "wavecomb/geometry/hit/hit_material.h"
 #include "wavecomb/guiding/lookup.h"
 #include "wavecomb/light_paths/camera_connection.h"
@@ -14,8 +12,8 @@
 #include "wavecomb/path/path_history.h"
 #include "wavecomb/path/shading_record.h"
 #include "wavecomb/path/steps/emit.h"
-#include "wavecomb/path/steps/escape.h"
 #include "wavecomb/path/steps/survive.h"
+#include "wavecomb/reference/path_recorder.h"
 #include "wavecomb/reference/reference.h"
 #include "wavecomb/reference/single_rays.h"
 #include "wavecomb/wave/kernels/program_dispatch.h"
@@ -25,19 +23,12 @@ namespace wavecomb {
 /// Traces camera paths one at a time and depth first. `Media` samples the volumes, media and
 /// subsurface random walks between mesh surfaces (path/media.h).
 template <typename Media>
-class PathTracer {
-  using F = float;
-
+class PathTracer : PathRecorder {
  public:
   PathTracer(const WaveContext& context, ReferenceWorker& worker, const Media& media)
-      : context_(context),
+      : PathRecorder(context, worker),
         media_(media),
-        settings_(camera_shade_settings(context)),
         clock_(worker.clock),
-        counts_(worker.counts),
-        rays_(context, worker.counts, worker.aovs),
-        aovs_(worker.aovs),
-        history_(worker.history),
         light_aovs_(worker.light_aovs),
         vertices_(worker.light_vertices),
         visible_(worker.visible) {}
@@ -77,23 +68,10 @@ class PathTracer {
   uint32_t trace_path(uint32_t pixel, uint32_t sample) {
     const SceneView& scene = context_.scene;
     const SampleKey<F> key = make_sample_key<F>(pixel, sample, context_.settings->seed);
-    const Sample4<F> r = sample_4d<F>(settings_.sampler, key, kCameraSet);
-    const auto x = static_cast<F>(pixel & 0xffffu), y = static_cast<F>(pixel >> 16);
-    const F time = context_.moves() ? camera_time<F>(*context_.camera, x, y,
-                                                     path_time<F>(settings_.sampler, key))
-                                    : 0.f;
-    rays_.begin(key, time);
-    const CameraRay<F> ray = camera_ray<F>(*context_.camera, x, y, r, true, time);
-    aovs_.begin<F>(*context_.camera, r, kSlot, true);
+    PathState<F> path;
+    const CameraRay<F> ray = begin_path(key, pixel, path);
+    const F time = rays_.time(), importance = path.importance;
     F cone_at_origin = ray.width;
-    const F importance =
-        context_.uses_pixel_importance() ? pixel_importance<F>(*context_.guide, x, y, true) : 0.f;
-    PathState<F> path{.dir = ray.d,
-                      .throughput = Color<F>(1.f),
-                      .cone_spread = ray.spread,
-                      .o = ray.o,
-                      .importance = importance};
-    ++counts_.samples;
 
     for (uint32_t depth = 0;; ++depth) {
       path.time = time;
@@ -101,64 +79,28 @@ class PathTracer {
       const F tfar = depth == 0 && context_.camera->has_far ? ray.tfar : kInfinity;
       SingleHit hit = rays_.intersect(path.o, path.dir, tfar, depth);
       clock_.enter(Phase::kShade);
-      bool left_body = false;
+      bool came_out = false;
       if (path.enters_body) {
-        if (!walk(key, depth, path, hit, left_body)) return depth;
+        if (!walk(key, depth, path, hit, came_out)) return depth;
         cone_at_origin = path.cone_width;
       }
-      if constexpr (Media::kAny) {
-        const Flight<F> flight = sample_flight(key, depth, path, hit);
-        if constexpr (Media::kHasEmission)
-          if (media_.has_emission())
-            add_volume_emission(clean<F>(
-                path.throughput *
-                    media_.template emission<F>(
-                        {settings_.sampler, key, depth, path.o, path.dir, hit.t, time}, true),
-                clamp_limit(settings_, depth)));
-        path.throughput = path.throughput * flight.weight;
-        record_segment(depth, flight, path.throughput);
-        if (flight.stopped) hit = {flight.t, 0.f, 0.f, 0, 0, kNoSurface, flight.material};
-      }
+      if constexpr (Media::kAny) pass_media(key, depth, path, hit);
       path.cone_width = fma(path.cone_spread, hit.t, cone_at_origin);
-      if (hit.inst == kNoHit) {
-        if (!settings_.adds_environment(depth)) return depth;
-        radiance_.sum += environment_emission<F>(scene, settings_, depth, path, true);
-        if (aovs_.wants_lights())
-          aovs_.add_environment<F>(scene, settings_, depth, kSlot, path, true);
+      if (hit.inst == kNoHit || hit.inst == kLightShape) {
+        add_ended(depth, path, hit);
         return depth;
       }
       const Vec3<F> p = fma(path.dir, hit.t, path.o);
-      if (hit.inst == kLightShape) {
-        if (depth == 0 && aovs_.wants_alpha()) aovs_.cover<F>(kSlot, true);
-        if (depth == 0) aovs_.hit_light<F>(*context_.camera, kSlot, p, time, hit.geom, true);
-        if (depth == 0 && aovs_.wants_motion())
-          aovs_.move<F>(
-              kSlot,
-              screen_motion_of_light<F>(scene.lights, *context_.camera, hit.geom, p, time, true),
-              true);
-        add(hit.geom, shape_emission<F>(scene, settings_, depth, hit.geom, hit.t, path, true));
-        return depth;
-      }
       const bool on_surface = hit.inst != kNoSurface;
       if (depth == 0 && on_surface && scene.visibility &&
-          is_holdout<F>(scene, hit.inst, hit.geom, true))
+          held_out<F>(scene, hit.inst, hit.geom, true))
         return depth;
       if (depth == 0 && aovs_.wants_alpha()) aovs_.cover<F>(kSlot, true);
       const uint32_t mesh = on_surface ? rays_.mesh_of(hit) : 0;
       uint32_t material = on_surface ? rays_.material_of(hit, mesh) : hit.event_material;
       if constexpr (Media::kStreams)
-        if (left_body && on_surface) material = media_.exit_material();
-      if (depth == 0 && on_surface)
-        aovs_.hit_surface<F>(*context_.camera, kSlot, p, time,
-                             {.inst = hit.inst, .geom = hit.geom, .material = material}, true);
-      if (depth == 0 && on_surface && aovs_.wants_motion())
-        aovs_.move<F>(
-            kSlot,
-            screen_motion_of_hit<F>(scene, *context_.camera,
-                                    {hit.inst, mesh, hit.prim, hit.u, hit.v, 0.f}, path.dir, true),
-            true);
-      if (depth == 0 && !on_surface)
-        aovs_.hit_volume<F>(*context_.camera, kSlot, p, time, volume_hit(material), true);
+        if (came_out && on_surface) material = media_.exit_material();
+      if (depth == 0) note_first_hit(path.dir, p, hit, mesh, material);
       if (on_surface && settings_.cost_aware && depth >= settings_.roulette_depth) {
         const F q = cost_aware_survival<F>(scene, *context_.roulette_costs, material, path, true);
         aovs_.survive<F>(depth, kSlot, q, true);
@@ -170,40 +112,20 @@ class PathTracer {
       if (context_.joins_light() && depth == 0 && on_surface)
         path.ratio =
             first_ratio<F>(*context_.camera, context_.light_path_share(), p, path.dir, time, true);
-      if (context_.has_medium_stack()) {
-        path.outer = medium_stack_.outer;
-        path.medium = medium_stack_.medium;
+      if (context_.knows_inside()) {
+        path.outer = inside_.outer;
+        path.medium = inside_.medium;
       }
       const VertexResult<F> v = shade(key, depth, hit, mesh, material, path, aovs);
-      if (context_.has_medium_stack()) {
-        medium_stack_.crossed = v.crossed;
+      if (context_.knows_inside()) {
+        inside_.crossed = v.crossed;
       }
-      add(aovs.emitter, v.emitted);
-      if constexpr (!Media::kAny)
-        if (vertices_ && aovs.wants_events)
-          light_aovs_.offer<F>(kSlot, aovs_.expressions().states<F>(kSlot, true), offer_.scattering,
-                               true);
-      if (aovs.wants_events && (v.alive || v.has_shadow))
-        aovs_.expressions().scatter<F>(depth, kSlot, key, aovs, v.has_shadow, true);
-      aovs_.vertex<F>(depth, kSlot, aovs, path, true);
-      if (history_)
-        history_.vertex<F>(depth, kSlot,
-                           {.path = path, .t = hit.t, .material = material, .result = v},
-                           radiance(), true);
-      aovs_.end_depth(depth, radiance(), 1);
-      bool is_free = false;
-      if (v.has_shadow) {
-        clock_.enter(Phase::kShadow);
-        const bool links = context_.scene.lights.links.members != nullptr;
-        is_free = !rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth,
-                                  links ? &v.shadow_set : nullptr);
-        if (is_free || max_component(v.shadow_tint) > 0.f)
-          add_direct(key, depth, v, is_free, aovs_.group_of<F>(aovs.light_id, true));
-      }
+      note_vertex(key, depth, {.path = path, .t = hit.t, .material = material, .result = v}, aovs);
+      const bool is_free = v.has_shadow && trace_shadow(key, depth, v, aovs);
       if constexpr (!Media::kAny)
         if (vertices_ && max_component(offer_.row.light) > 0.f) connect(depth);
       if (!probes_.empty() && aovs.light_weight >= 0.f)
-        record_choice(v, aovs, is_free ? luminance(v.direct) : 0.f);
+        note_choice(v, aovs, is_free ? luminance(v.direct) : 0.f);
       if (!v.alive) return depth + 1;
       path = v.next;
       path.importance = importance;
@@ -211,11 +133,73 @@ class PathTracer {
     }
   }
 
+  /// Samples the camera ray of a path and its time.
+  CameraRay<F> begin_path(const SampleKey<F>& key, uint32_t pixel, PathState<F>& path) {
+    const Sample4<F> r = sample_4d<F>(settings_.sampler, key, kCameraSet);
+    const auto x = static_cast<F>(pixel & 0xffffu), y = static_cast<F>(pixel >> 16);
+    const F time = context_.moves() ? camera_time<F>(*context_.camera, x, y,
+                                                     path_time<F>(settings_.sampler, key))
+                                    : 0.f;
+    rays_.begin(key, time);
+    const CameraRay<F> ray = camera_ray<F>(*context_.camera, x, y, r, true, time);
+    aovs_.begin<F>(*context_.camera, r, kSlot, true);
+    path = {.dir = ray.d,
+            .throughput = Color<F>(1.f),
+            .cone_spread = ray.spread,
+            .o = ray.o,
+            .importance = context_.weighs_pixels()
+                              ? picture_importance<F>(*context_.guide, x, y, true)
+                              : 0.f};
+    ++counts_.samples;
+    return ray;
+  }
+
+  /// Adds the emission of volumes along the ray of a path, and samples its free flight to `hit`,
+  /// which becomes the volume event if one stops it.
+  void pass_media(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit) {
+    const Flight<F> flight = fly(key, depth, path, hit);
+    if constexpr (Media::kShines)
+      if (media_.shines())
+        add_glow(clean<F>(
+            path.throughput * media_.template emission<F>(passage_of(key, depth, path, hit), true),
+            clamp_limit(settings_, depth)));
+    path.throughput = path.throughput * flight.weight;
+    note_way(depth, flight, path.throughput);
+    if (flight.stopped) hit = {flight.t, 0.f, 0.f, 0, 0, kNoSurface, flight.material};
+  }
+
+  /// Adds the emission of a shaded vertex, and records the vertex.
+  void note_vertex(const SampleKey<F>& key, uint32_t depth, const ShadedVertex<F>& at,
+                   const VertexAovs<F>& aovs) {
+    const VertexResult<F>& v = at.result;
+    add(aovs.emitter, v.emitted);
+    if constexpr (!Media::kAny)
+      if (vertices_ && aovs.wants_events)
+        light_aovs_.offer<F>(kSlot, aovs_.expressions().states<F>(kSlot, true), offer_.note, true);
+    if (aovs.wants_events && (v.alive || v.has_shadow))
+      aovs_.expressions().scatter<F>(depth, kSlot, key, aovs, v.has_shadow, true);
+    aovs_.vertex<F>(depth, kSlot, aovs, at.path, true);
+    if (history_) history_.vertex<F>(depth, kSlot, at, radiance(), true);
+    aovs_.end_depth(depth, radiance(), 1);
+  }
+
+  /// Traces the shadow ray of a vertex, and adds its light sample. Returns whether the ray is free.
+  bool trace_shadow(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v,
+                    const VertexAovs<F>& aovs) {
+    clock_.enter(Phase::kShadow);
+    const bool links = context_.scene.lights.links.members != nullptr;
+    const bool is_free = !rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth,
+                                         links ? &v.shadow_set : nullptr);
+    if (is_free || max_component(v.shade) > 0.f)
+      add_direct(key, depth, v, is_free, aovs_.group_of<F>(aovs.lit_by, true));
+    return is_free;
+  }
+
   /// Continues a ray that has entered a subsurface body as a random walk. A ray that hits no
-  /// surface of that body continues unchanged. Sets `left_body` if the walk has left the body.
+  /// surface of that body continues unchanged. Sets `came_out` if the walk has left the body.
   /// Returns false if the path is terminated.
   bool walk(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit,
-            bool& left_body) {
+            bool& came_out) {
     path.enters_body = false;
     path.receiver = 0u;
     path.cone_width = 0.f;
@@ -223,82 +207,42 @@ class PathTracer {
     if constexpr (Media::kStreams) {
       PresenceKeys keys = rays_.keys();
       keys.object = &object;
-      return media_.walk(passage_of(key, depth, path, hit), keys, path, hit, left_body);
+      return media_.walk(passage_of(key, depth, path, hit), keys, path, hit, came_out);
     }
     return true;
   }
 
   /// Returns the ray segment of a path to `hit`. It refers to the path and the hit.
-  MediumQuery<F> passage_of(const SampleKey<F>& key, uint32_t depth, const PathState<F>& path,
-                            const SingleHit& hit) const {
+  Passage<F> passage_of(const SampleKey<F>& key, uint32_t depth, const PathState<F>& path,
+                        const SingleHit& hit) const {
     return {settings_.sampler, key, depth, path.o, path.dir, hit.t, rays_.time()};
   }
 
   /// Samples the free flight of a path along its ray segment to `hit`.
-  Flight<F> sample_flight(const SampleKey<F>& key, uint32_t depth, PathState<F>& path,
-                          SingleHit& hit) {
+  Flight<F> fly(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit) {
     if constexpr (Media::kStreams)
-      if (context_.has_medium_stack())
-        return media_.sample_nested_flight(passage_of(key, depth, path, hit), rays_.keys(), path,
-                                           hit, medium_stack_);
-    return media_.template sample_flight<F>(passage_of(key, depth, path, hit), path.throughput,
-                                            true);
-  }
-
-  void record_choice(const VertexResult<F>& v, const VertexAovs<F>& aovs, F contribution) {
-    if (probe_count_ == probes_.size()) return;
-    probes_[probe_count_++] = {
-        aovs.light_id,
-        contribution,
-        aovs.light_weight,
-        {aovs.light_position.x, aovs.light_position.y, aovs.light_position.z},
-        v.next.receiver};
-  }
-
-  /// Adds the contribution `c` of `light` to the radiance. `light` is kNoLight for emission of
-  /// other surfaces.
-  void add(uint32_t light, const Color<F>& c) {
-    radiance_.sum += c;
-    if (aovs_.wants_lights()) aovs_.add_light<F>(kSlot, light, c, true);
-  }
-
-  /// Adds the emission `c` of volumes to the radiance.
-  void add_volume_emission(const Color<F>& c) {
-    radiance_.sum += c;
-    if (aovs_.wants_lights()) aovs_.add_volume_emission<F>(kSlot, c, true);
-  }
-  /// Records the ray segment for AOVs. `throughput` is the throughput of the path after the flight.
-  void record_segment(uint32_t depth, const Flight<F>& flight, const Color<F>& throughput) {
-    const bool straight = !flight.stopped && !flight.has_scattered;
-    if (depth == 0 && aovs_.wants_transmittance())
-      aovs_.pass<F>(kSlot, straight ? throughput : Color<F>(0.f), true);
-    if (aovs_.expressions() && flight.has_scattered) aovs_.expressions().walk<F>(kSlot, true);
-  }
-  /// Returns the volume, or the mesh filled with a medium, whose event `material` has stopped the
-  /// path.
-  VolumeHit<F> volume_hit(uint32_t material) const {
-    const SceneView& scene = context_.scene;
-    if (context_.has_medium_stack() && material == scene.nested_media.event_material)
-      return {0, medium_stack_.object, medium_stack_.medium, true};
-    return {material - scene.volumes.first_material, 0, material, false};
+      if (context_.knows_inside())
+        return media_.fly_inside(passage_of(key, depth, path, hit), rays_.keys(), path, hit,
+                                 inside_);
+    return media_.template fly<F>(passage_of(key, depth, path, hit), path.throughput, true);
   }
 
   /// Adds the light sample of `v`, whose light is in `group`. Volumes always attenuate it, and
   /// media inside meshes do if the shadow ray is free. If an object blocks the ray, only the
-  /// fraction v.shadow_tint (the shadow colour of the light) remains.
+  /// fraction v.shade (the shadow colour of the light) remains.
   void add_direct(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v, bool is_free,
                   uint32_t group) {
     Color<F> c = v.direct;
     if constexpr (Media::kAny) {
-      const F t = v.shadow_tfar * (1.f / kShadowRayFraction);
+      const F t = v.shadow_tfar * (1.f / kShadowReach);
       c = c * media_.template transmittance<F>(
                   {settings_.sampler, key, depth, v.shadow_o, v.shadow_d, t, rays_.time()}, true);
       if constexpr (Media::kStreams)
-        if (is_free && context_.has_medium_stack())
-          c = c * media_.nested_transmittance(rays_.keys(), rays_.time(), medium_stack_, v.shadow_o,
-                                              v.shadow_d, t);
+        if (is_free && context_.knows_inside())
+          c = c *
+              media_.pass_inside(rays_.keys(), rays_.time(), inside_, v.shadow_o, v.shadow_d, t);
     }
-    if (!is_free) c = c * v.shadow_tint;
+    if (!is_free) c = c * v.shade;
     radiance_.sum += c;
     if (aovs_.wants_lights()) aovs_.add_direct<F>(kSlot, group, c, true);
     if (aovs_.wants_light_samples()) aovs_.add_light_sample<F>(kSlot, c, true);
@@ -314,12 +258,12 @@ class PathTracer {
     const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, rays_.time()};
     const bool joins = settings_.joins_light, connects = joins && vertices_;
     if (connects) offer_ = offer_for<F>(vertices_, kSlot, depth, settings_.max_depth, true);
-    MergePointOffer<F> visible;
+    VisibleOffer<F> visible;
     constexpr auto& kernels = kShadeVertex<F, typename Media::template Programs<F>>;
     const VertexResult<F> v = kernels[scene.material_program[material]](
         {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, path, &aovs, true,
          context_.guide, connects ? &offer_ : nullptr, joins && visible_ ? &visible : nullptr});
-    if (visible.stored) store_row<MergePoint, F>(visible_.rows, kSlot, visible.row, true);
+    if (visible.seen) store_row<VisiblePoint, F>(visible_.rows, kSlot, visible.row, true);
     return v;
   }
 
@@ -344,7 +288,7 @@ class PathTracer {
                                    hit.t, at.material, state, &aovs, true},
                                   setup, & target)
                                   .v;
-    if (aovs.wants_events) light_aovs_.record_connection<F>(kSlot, aovs.light_scattering, true);
+    if (aovs.wants_events) light_aovs_.link<F>(kSlot, aovs.lit, true);
     if (!v.has_shadow) return;
     clock_.enter(Phase::kShadow);
     const uint32_t no_set = 0;
@@ -352,29 +296,18 @@ class PathTracer {
     if (rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, links ? &no_set : nullptr))
       return;
     radiance_.sum += v.direct;
-    aovs_.add_connection<F>(depth, kSlot, from.light, v.direct, true);
+    aovs_.add_link<F>(depth, kSlot, from.light, v.direct, true);
     if (light_aovs_.wants_events())
       light_aovs_.connect<F>(aovs_.expressions(), kSlot, v.direct, true);
   }
 
-  static constexpr uint32_t kSlot = kOnlySlot;
-  const WaveContext& context_;
   [[maybe_unused]] const Media& media_;
-  const ShadeSettings settings_, light_settings_ = settings_.of_light_paths();
+  const ShadeSettings light_settings_ = settings_.of_light_paths();
   PhaseClock& clock_;
-  Counts& counts_;
-  SingleRays rays_;
-  PathAovs& aovs_;
-  PathHistory& history_;
   LightPathAovs& light_aovs_;
-  LightVertices& vertices_;        ///< vertices of the light path; empty without connections
-  const MergePointRows& visible_;  ///< point where light paths may be merged
-  ConnectionOffer<F> offer_;       ///< connection that the current vertex offers
-  RadianceRow<F> radiance_;
-  MediumStackRow<F>
-      medium_stack_{};            ///< medium stack of the path, if the scene has nested dielectrics
-  std::span<LightProbe> probes_;  ///< sampled lights of the path; empty if unused
-  uint32_t probe_count_ = 0;
+  LightVertices& vertices_;     ///< vertices of the light path; empty without connections
+  const VisibleRows& visible_;  ///< point where light paths may be merged
+  ConnectionOffer<F> offer_;    ///< connection that the current vertex offers
 };
 
 }  // namespace wavecomb

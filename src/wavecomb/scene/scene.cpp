@@ -7,6 +7,8 @@
 
 #include "wavecomb/core/error.h"
 #include "wavecomb/light/description/light_table.h"
+#include "wavecomb/medium/description/glass_contents.h"
+#include "wavecomb/medium/description/mesh_medium.h"
 #include "wavecomb/medium/description/volume_motion.h"
 #include "wavecomb/scene/camera/camera_table.h"
 #include "wavecomb/scene/parallel.h"
@@ -94,8 +96,8 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
                std::ranges::any_of(geometry_->volume_records, &VolumeRecord::emits)};
   v.walks = {materials_->walks.empty() ? nullptr : materials_->walks.data(),
              geometry_->exit_material};
-  v.nested_media = {materials_->nested_media.empty() ? nullptr : materials_->nested_media.data(),
-                    geometry_->event_material};
+  v.interiors = {materials_->interiors.empty() ? nullptr : materials_->interiors.data(),
+                 materials_->inside_material};
   v.has_motion = geometry_->moves() || v.lights.motions;
   v.has_emissive_meshes = !lights_->emissive.empty();
   v.has_curves = std::any_of(meshes().begin(), meshes().end(),
@@ -116,9 +118,27 @@ void Scene::link() {
   // Bounce rays must be able to hit emitters that are sampled as lights, since their MIS weights
   // assume that they can.
   for (size_t i = 0; i < lights_->emissive.size(); ++i)
-    if (lights_->emissive[i] != kNoLight) visibility[i] |= kVisibleToBounces;
+    if (lights_->emissive[i] != kNoLight) visibility[i] |= kSeenByBounces;
   visibility_ = std::make_shared<const std::vector<uint32_t>>(std::move(visibility));
   view_.visibility = visibility_->data();
+}
+
+bool Scene::needs_in_glass(std::span<const Material> all_materials,
+                           std::span<const Light> all_lights) const {
+  if (!volumes().empty()) return true;
+  const auto test = [&](const Material& m) { return absorbs_inside(m, *materials_->graphs); };
+  const Glasses before = glasses_of(materials(), test), after = glasses_of(all_materials, test);
+  // The material of collisions inside of meshes may follow those of `after`.
+  const bool same_glass = std::equal(after.begin(), after.end(), before.begin());
+  const bool same_lights =
+      std::ranges::equal(lights(), all_lights, [](const Light& a, const Light& b) {
+        return a.kind == b.kind && same(a.to_world.t, b.to_world.t);
+      });
+  if (same_glass && same_lights) return materials_->in_glass;
+  const PlacedObjects objects{meshes(), groups(), instances(), geometry_->steps};
+  if (glass_holds_lights(after, objects, all_lights)) return true;
+  if (same_glass && !materials_->in_glass) return false;
+  return glass_holds_objects(after, objects);
 }
 
 std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threads) const {
@@ -140,17 +160,22 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
   }
 
   std::shared_ptr<const SceneMaterials> new_materials = materials_;
-  bool emission_changed = !edit.lights.empty();
-  if (!edit.materials.empty()) {
+  bool shines_otherwise = !edit.lights.empty();
+  std::vector<Light> all_lights;
+  if (!edit.materials.empty() || !edit.lights.empty()) {
+    all_lights = lights();
+    for (const auto& [i, light] : edit.lights) all_lights[i] = light;
     const bool any_mesh_lights = !geometry_->mesh_lights.empty();
-    std::vector<Material> all = materials();
+    std::vector<Material> all = materials_->given();
     for (const auto& [id, material] : edit.materials) {
-      emission_changed = emission_changed || !same_emission(all[id], material, any_mesh_lights);
+      shines_otherwise = shines_otherwise || !same_emission(all[id], material, any_mesh_lights);
       all[id] = material;
     }
-    new_materials = std::make_shared<const SceneMaterials>(
-        std::move(all), materials_->graphs, geometry_->textures, geometry_->exit_material,
-        geometry_->event_material);
+    const bool in_glass = needs_in_glass(all, all_lights);
+    if (!edit.materials.empty() || in_glass != materials_->in_glass)
+      new_materials = std::make_shared<const SceneMaterials>(std::move(all), materials_->graphs,
+                                                             geometry_->textures,
+                                                             geometry_->exit_material, in_glass);
   }
   std::shared_ptr<const SceneTangents> new_tangents = tangents_;
   if (new_materials->wants_tangents != materials_->wants_tangents)
@@ -159,14 +184,11 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
           std::make_shared<const SceneTangents>(*geometry_, *new_materials, tangents_.get());
     });
   std::shared_ptr<const SceneLights> new_lights = lights_;
-  if (emission_changed) {
-    std::vector<Light> all = lights();
-    for (const auto& [i, light] : edit.lights) all[i] = light;
+  if (shines_otherwise)
     with_threads(threads, [&] {
-      new_lights = std::make_shared<const SceneLights>(std::move(all), *geometry_, *new_materials,
-                                                       lights_.get());
+      new_lights = std::make_shared<const SceneLights>(std::move(all_lights), *geometry_,
+                                                       *new_materials, lights_.get());
     });
-  }
   std::shared_ptr<Scene> scene(new Scene(geometry_, std::move(new_materials), std::move(new_lights),
                                          std::move(new_tangents), links_,
                                          edit.camera.value_or(camera_)));
@@ -231,7 +253,7 @@ SceneBytes Scene::bytes() const {
          materials_->graphs->ops, materials_->graphs->constants, materials_->graphs->images,
          materials_->graphs->outputs) +
       of(lights_->emissive, lights_->mesh_lights, set.mesh_lights, set.records, set.triangles,
-         set.triangle_uvs, set.power_bins, set.powers, set.portals, set.portal_groups, set.shapings,
+         set.triangle_uvs, set.pick_bins, set.powers, set.portals, set.portal_groups, set.shapings,
          set.ies, set.ies_numbers, set.filters, set.shadows, set.motions, set.motion_steps) +
       lights_->tree_bytes() + g.names.bytes();
   std::set<const void*> grids;

@@ -66,6 +66,7 @@ struct SceneEdit {
 };
 
 class SceneBuilder;
+struct PlacedObjects;
 
 /// Geometry, materials, textures, lights and camera, checked and complete. Immutable; any number of
 /// renderers and threads may read it.
@@ -122,8 +123,10 @@ class Scene {
   /// scene built from scratch with these values. `threads`: 0 uses all.
   ///
   /// A camera edit takes microseconds. A material edit copies the materials. An edit of lights or
-  /// of emission rebuilds the light set. If a new material needs tangents, they are computed.
-  /// Throws Error naming the object for invalid values, as SceneBuilder does, and for unknown ids.
+  /// of emission rebuilds the light set. If a new material needs tangents, they are computed. A
+  /// material that begins or ceases to absorb, or a light that moves, costs a search of the
+  /// contents of absorbing glass. Throws Error naming the object for invalid values, as
+  /// SceneBuilder does, and for unknown ids.
   std::shared_ptr<const Scene> edited(const SceneEdit& edit, uint32_t threads = 0) const;
 
   /// Returns the parts of the scene, to be compared with those of scenes derived by edits.
@@ -139,6 +142,8 @@ class Scene {
         const Camera& camera);
   /// Computes the sets that each object belongs to, and the rays that see it.
   void link();
+  /// Returns SceneMaterials::in_glass of a scene with this geometry and other materials and lights.
+  bool needs_in_glass(std::span<const Material> materials, std::span<const Light> lights) const;
   /// Returns a value for every light of the light set: of_input(light) for lights of the stage,
   /// of_run(triangles) for the triangle lights of meshes.
   template <typename T, typename OfInput, typename OfRun>
@@ -257,6 +262,12 @@ class SceneBuilder {
   /// Adds the materials that no caller adds: for meshes without one, for collisions in volumes and
   /// media, and for exit points of random walks. Returns the index of the first, which is grey.
   uint32_t add_implicit_materials(SceneGeometry& geometry);
+  /// Returns SceneMaterials::in_glass, and warns of glass whose absorption comes from a value
+  /// graph.
+  bool search_glass(const SceneGeometry& geometry);
+  /// Warns of glass whose absorption comes from a value graph, if that is visible: with `in_glass`
+  /// (SceneMaterials), or with objects or lights inside it.
+  void warn_of_absorbing_graphs(const PlacedObjects& objects, bool in_glass);
   /// Gives instances without a material the grey one. Throws Error for materials that were never
   /// added.
   void bind_materials(SceneGeometry& geometry, uint32_t grey) const;

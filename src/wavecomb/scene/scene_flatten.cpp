@@ -35,16 +35,16 @@ constexpr uint32_t kMaxNesting = 4096;
 
 uint64_t SceneBuilder::count_placements(uint32_t group, uint32_t depth,
                                         std::vector<uint64_t>& of_group) const {
-  constexpr uint64_t kInProgress = ~uint64_t{0} - 1;
+  constexpr uint64_t kUnderWay = ~uint64_t{0} - 1;
   uint64_t& known = of_group[group];
-  if (known == kInProgress)
+  if (known == kUnderWay)
     throw Error(quoted("group", groups_[group].name) +
                 " holds itself; break the cycle of instances");
   if (known != kUncounted) return known;
   if (depth > kMaxNesting)
     throw Error("groups are nested more than " + std::to_string(kMaxNesting) +
                 " deep; flatten some");
-  known = kInProgress;
+  known = kUnderWay;
   uint64_t count = group != 0 && !groups_[group].meshes.empty() ? 1 : 0;
   for (const Node& node : children_[group]) {
     count += count_placements(node.child, depth + 1, of_group);
@@ -58,7 +58,7 @@ uint64_t SceneBuilder::count_placements(uint32_t group, uint32_t depth,
 
 uint32_t common_segments(uint32_t a, uint32_t b) {
   const uint32_t both = std::lcm(a, b);
-  return both < kMaxSteps / 2 ? both : std::max(a, b);
+  return both < kMostSteps / 2 ? both : std::max(a, b);
 }
 
 std::vector<Affine> SceneBuilder::composed(std::span<const Affine> outer, const Affine& still,
@@ -103,22 +103,42 @@ void SceneBuilder::flatten(uint32_t group, const Instance& here, std::span<const
   }
 }
 
+void SceneBuilder::warn_of_absorbing_graphs(const PlacedObjects& objects, bool in_glass) {
+  const Glasses by_graph =
+      glasses_of(materials_, [&](const Material& m) { return absorbs_by_graph(m, graphs_); });
+  const auto first = std::ranges::find(by_graph, true);
+  if (first == by_graph.end()) return;
+  const Material& glass = materials_[static_cast<size_t>(first - by_graph.begin())];
+  const char* const advice =
+      "; absorption that a graph or texture drives acts where paths leave glass; use a constant "
+      "transmission color";
+  if (std::ranges::any_of(
+          materials_, [&](const Material& m) { return asks_for_interiors(m, graphs_, in_glass); }))
+    warnings_.push_back(quoted("material", glass.name) +
+                        " does not absorb, since the stage has media or objects inside of meshes" +
+                        advice);
+  else if (glass_holds_lights(by_graph, objects, lights_) || glass_holds_objects(by_graph, objects))
+    warnings_.push_back(quoted("material", glass.name) +
+                        " does not dim light on its way to objects or from lights inside of it" +
+                        advice);
+}
+
 void SceneBuilder::flatten_groups(SceneGeometry& geometry) {
   // Count first, because nested groups can have 2^n placements, most of which may contain nothing.
   std::vector<uint64_t> placements(groups_.size(), kUncounted);
   std::vector<Instance> flat;
   flat.reserve(count_placements(0, 0, placements));
   flatten(0, {0, Affine{}, kInheritMaterial, kNoName, {}}, {}, placements, flat, geometry);
-  const auto is_invertible = [](const Affine& m) {
+  const auto sound = [](const Affine& m) {
     const float det = m.determinant();
     return finite(m) && std::isfinite(det) && std::abs(det) > 1e-35f;
   };
   geometry.placements.shrink_to_fit();
   const size_t singular = std::erase_if(flat, [&](const Instance& i) {
-    bool valid = i.motion.moves() || is_invertible(i.to_world);
+    bool good = i.motion.moves() || sound(i.to_world);
     for (uint32_t k = 0; i.motion.moves() && k <= i.motion.segments; ++k)
-      valid = valid && is_invertible(geometry.steps[i.motion.first + k].affine());
-    return !valid;
+      good = good && sound(geometry.steps[i.motion.first + k].affine());
+    return !good;
   });
   geometry.instances = std::move(flat);
   if (singular > 0)
@@ -128,12 +148,11 @@ void SceneBuilder::flatten_groups(SceneGeometry& geometry) {
   SceneCounts counts{.meshes = meshes_.size(),
                      .materials = materials_.size() + 2 + volumes_.size(),
                      .instances = geometry.instances.size(),
-                     .instanced_meshes = groups_[0].meshes.size(),
+                     .placed = groups_[0].meshes.size(),
                      .placements = geometry.placements.size(),
                      .steps = geometry.steps.size()};
   for (const Group& group : groups_) counts.grouped += group.meshes.size();
-  for (const Instance& i : geometry.instances)
-    counts.instanced_meshes += groups_[i.group].meshes.size();
+  for (const Instance& i : geometry.instances) counts.placed += groups_[i.group].meshes.size();
   check_counts(counts);
 }
 
@@ -164,19 +183,17 @@ uint32_t SceneBuilder::add_implicit_materials(SceneGeometry& geometry) {
     white.base_color = {1, 1, 1};
     materials_.push_back(white);
   }
-  // A material for collisions in media inside meshes.
-  const bool absorbing = !volumes_.empty() || absorbing_glass_contains_objects(
-                                                  materials_, meshes_, groups_, geometry.instances,
-                                                  geometry.steps, lights_);
-  if (std::ranges::any_of(materials_,
-                          [&](const Material& m) { return needs_medium_stack(m, absorbing); })) {
-    geometry.event_material = static_cast<uint32_t>(materials_.size());
-    Material inside;
-    inside.name = "inside of meshes";
-    inside.program = ProgramId::kVolume;
-    materials_.push_back(inside);
-  }
   return grey;
+}
+
+bool SceneBuilder::search_glass(const SceneGeometry& geometry) {
+  const PlacedObjects objects{meshes_, groups_, geometry.instances, geometry.steps};
+  const Glasses absorbing =
+      glasses_of(materials_, [&](const Material& m) { return absorbs_inside(m, graphs_); });
+  const bool in_glass = !volumes_.empty() || glass_holds_lights(absorbing, objects, lights_) ||
+                        glass_holds_objects(absorbing, objects);
+  warn_of_absorbing_graphs(objects, in_glass);
+  return in_glass;
 }
 
 void SceneBuilder::bind_materials(SceneGeometry& geometry, uint32_t grey) const {
@@ -215,6 +232,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   auto geometry = std::make_shared<SceneGeometry>();
   flatten_groups(*geometry);
   const uint32_t grey = add_implicit_materials(*geometry);
+  const bool in_glass = search_glass(*geometry);
   bind_materials(*geometry, grey);
   move_parts(*geometry);
   std::shared_ptr<const SceneMaterials> materials;
@@ -224,7 +242,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
     make_records(*geometry, grey);
     materials = std::make_shared<const SceneMaterials>(
         std::move(materials_), std::make_shared<const GraphSet>(std::exchange(graphs_, {})),
-        geometry->textures, geometry->exit_material, geometry->event_material);
+        geometry->textures, geometry->exit_material, in_glass);
     lights =
         std::make_shared<const SceneLights>(std::move(lights_), *geometry, *materials, nullptr);
     tangents = std::make_shared<const SceneTangents>(*geometry, *materials, nullptr);

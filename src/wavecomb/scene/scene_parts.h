@@ -105,11 +105,9 @@ struct SceneGeometry {
   std::vector<MatrixStep> steps;  ///< transforms of all moving instances
   std::vector<VolumeRecord> volume_records;
   uint32_t first_volume_material = 0;  ///< VolumeView::first_material
-  /// SubsurfaceView::exit_material; kInheritMaterial if no material has a subsurface radius, so
-  /// that the scene has no subsurface random walks.
+  /// WalkView::exit_material; kInheritMaterial if no material has a subsurface radius, so that the
+  /// scene has no subsurface random walks.
   uint32_t exit_material = kInheritMaterial;
-  /// MeshMediaView::event_material; kInheritMaterial if no material needs a medium stack.
-  uint32_t event_material = kInheritMaterial;
   std::vector<StepRange> instance_motions;  ///< by instance record; empty if no instance moves
   bool moves() const {
     return mesh_motions.size() > 1 || !steps.empty() ||
@@ -124,26 +122,26 @@ struct SceneGeometry {
   /// returns whether one did. `inherited` is the material of the instance.
   template <typename Test>
   bool any_material(uint32_t mesh, uint32_t inherited, const Test& test) const {
-    const auto bound_material = [&](uint32_t m) {
-      return test(m == kInheritMaterial ? inherited : m);
-    };
-    if (meshes[mesh].face_materials.empty()) return bound_material(meshes[mesh].material);
+    const auto worn = [&](uint32_t m) { return test(m == kInheritMaterial ? inherited : m); };
+    if (meshes[mesh].face_materials.empty()) return worn(meshes[mesh].material);
     for (uint32_t m : face_materials[mesh])
-      if (bound_material(m)) return true;
+      if (worn(m)) return true;
     return false;
   }
 };
 
 /// Materials and their packed form.
 struct SceneMaterials {
-  /// Packs materials. `textures` are those of the scene, which materials and graphs read.
-  /// `exit_material` and `event_material` are those of SceneGeometry.
+  /// Packs materials. `textures` are those of the scene, which materials and graphs read, and
+  /// `exit_material` is that of SceneGeometry. Appends the material of collisions inside of meshes
+  /// to `materials` if it is needed, which `in_glass` helps to decide (see the member).
   SceneMaterials(std::vector<Material> materials, std::shared_ptr<const GraphSet> graphs,
-                 std::span<const TexturePtr> textures, uint32_t exit_material,
-                 uint32_t event_material);
+                 std::span<const TexturePtr> textures, uint32_t exit_material, bool in_glass);
+  /// All materials but the one of collisions inside of meshes.
+  std::vector<Material> given() const;
 
   std::vector<Material> materials;  ///< as the caller described them
-  std::vector<Material> shaded;  ///< after simplification by simplified() (simplified_material.h)
+  std::vector<Material> shaded;     ///< after simplification by settled() (simplified_material.h)
   std::shared_ptr<const GraphSet> graphs;
   std::vector<MaterialRecord> records;
   std::vector<TextureUseRecord> uses;
@@ -155,9 +153,16 @@ struct SceneMaterials {
   /// By material; empty if no program has specific parameters.
   std::vector<ProgramParameterRecord> own;
   /// By material; empty if there are no subsurface random walks.
-  std::vector<SubsurfaceMedium<float>> walks;
+  std::vector<WalkMedium<float>> walks;
   /// By material; empty if paths need no medium stack.
-  std::vector<MeshMedium<float>> nested_media;
+  std::vector<InteriorMedium<float>> interiors;
+  /// InteriorView::event_material, the last material; kInheritMaterial if `interiors` is empty.
+  uint32_t inside_material = kInheritMaterial;
+  /// Whether paths need to know which absorbing glass they are inside of: it holds objects or
+  /// lights (medium/description/glass_contents.h), or the scene has volumes.
+  bool in_glass = false;
+  /// Whether the absorption of some glass comes from a value graph (absorbs_by_graph).
+  bool has_absorbing_graphs = false;
   bool has_presence = false, has_emission = false;
 };
 
@@ -187,8 +192,8 @@ struct SceneLights {
 
  private:
   mutable std::once_flag grown_;
-  mutable LightTree lazy_tree_;
-  mutable std::atomic<uint64_t> lazy_bytes_{0};
+  mutable LightTree late_tree_;
+  mutable std::atomic<uint64_t> late_bytes_{0};
 };
 
 }  // namespace wavecomb

@@ -181,7 +181,7 @@ def write_stage(folder):
     """Writes the stage and its texture, and returns the stage's path."""
     import numpy as np
 
-    from wavecomb.picture.image import write_png
+    from wavecomb.image.files.image import write_png
 
     rows = np.linspace(0.1, 0.9, 16, dtype=np.float32)
     write_png(folder / "wood.png", np.broadcast_to(rows[:, None, None], (16, 16, 3)).copy())

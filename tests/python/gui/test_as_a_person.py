@@ -18,7 +18,7 @@ from person import Person, screen
 from pxr import Sdf
 
 import wavecomb.usd
-from wavecomb.usd.stage.diagnostics import captured
+from wavecomb.usd.stage.diagnostics import capture_diagnostics
 from wavecomb.usd.stage.report import LoadReport
 
 pytestmark = needs("bin:Xvfb", "bin:xdotool", "bin:openbox")
@@ -148,7 +148,7 @@ def save(person, tmp_path, slot, value):
             "/", lambda at: values.append(at) if at.IsPropertyPath() else None
         )
         (where,) = values
-        with captured(LoadReport()):
+        with capture_diagnostics(LoadReport()):
             stage = wavecomb.usd.open_stage(layer)
         assert np.allclose(stage.GetAttributeAtPath(where).Get(), value)
     person.key("ctrl+shift+s")

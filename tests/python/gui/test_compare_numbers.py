@@ -12,9 +12,9 @@ from wavecomb.errors import WavecombError
 from wavecomb.gui.compare.differences import numbers, pixel_rows, rows, verdict
 from wavecomb.gui.compare.flip_process import FlipProcess
 from wavecomb.gui.compare.picture_sides import Side, common_layers, pair, problem, read_side
-from wavecomb.picture.compare import compare
-from wavecomb.picture.image import write_exr, write_png
-from wavecomb.picture.perceptual import flip
+from wavecomb.image.compare.comparison import compare
+from wavecomb.image.compare.perceptual import flip
+from wavecomb.image.files.image import write_exr, write_png
 
 RNG = np.random.default_rng
 
@@ -46,7 +46,7 @@ def test_files_are_read_with_all_layers(tmp_path: Path) -> None:
     ("name", "content", "says"),
     [
         ("missing.exr", None, "no such file"),
-        ("bad.exr", b"nonsense", "cannot be read as a picture"),
+        ("bad.exr", b"nonsense", "cannot be read as an image"),
         ("bad.npy", b"nonsense", "bad.npy"),
         ("flat.npy", "array", "has the shape"),
     ],

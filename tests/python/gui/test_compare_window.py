@@ -11,8 +11,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QTableWidget, QToolButton
 
 from wavecomb.gui.compare.window import CompareWindow
-from wavecomb.picture.compare import compare
-from wavecomb.picture.image import write_exr
+from wavecomb.image.compare.comparison import compare
+from wavecomb.image.files.image import write_exr
 
 KEYS = Qt.Key
 LEFT = Qt.MouseButton.LeftButton

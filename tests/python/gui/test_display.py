@@ -4,11 +4,13 @@
 import numpy as np
 import pytest
 
+from wavecomb import ocio
 from wavecomb.errors import WavecombError
 from wavecomb.gui.swatch import to_qimage
-from wavecomb.gui.viewport import display, ocio
+from wavecomb.gui.viewport import display
 from wavecomb.gui.viewport.display import Look
-from wavecomb.picture import image, layer_view
+from wavecomb.image import layer_view
+from wavecomb.image.files import image
 
 
 @pytest.fixture

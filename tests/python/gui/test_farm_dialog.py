@@ -9,7 +9,7 @@ from pxr import Sdf
 from wavecomb.errors import WavecombError
 from wavecomb.farm import Folder, status
 from wavecomb.gui.farm_job import describe
-from wavecomb.picture.image import read_layers
+from wavecomb.image.files.image import read_layers
 
 
 def test_a_job_is_what_is_shown(cornell_window, tmp_path):
@@ -62,7 +62,7 @@ def test_sent_and_watched(cornell_window, qtbot, tmp_path):
     # The dialog reports what cannot be sent.
     dialog.begin()
     qtbot.waitUntil(lambda: dialog.send.isEnabled(), timeout=60000)
-    assert "is there already" in dialog.state.text()
+    assert "already exists" in dialog.state.text()
     dialog.close()
 
 

@@ -6,7 +6,7 @@ import pytest
 from conftest import wait_final
 
 from wavecomb.gui.viewport.learned_panel import field_text, light_rows
-from wavecomb.picture.directions import density_map, map_directions, map_point, square_points
+from wavecomb.image.directions import density_map, map_directions, map_point, square_points
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -266,7 +266,7 @@ def test_digits_are_typed_where_they_were_begun(qtbot):
     field = NumberField("x", Range(0.0, 10.0, 0.0, 1.0))
     qtbot.addWidget(field)
     field.show()
-    from wavecomb.usd.looks.parameters import as_stored
+    from wavecomb.usd.materials.parameters import as_stored
 
     def back(value):
         if differs(field.value(), as_stored(value)):
@@ -306,14 +306,14 @@ def test_what_usd_says_goes_to_the_notes(new_session, qtbot, final, tmp_path, ca
 def test_what_usd_says_on_this_thread(new_session, qtbot, final, tmp_path, capfd):
     from pxr import Tf
 
-    from wavecomb.usd.stage.diagnostics import Listening
+    from wavecomb.usd.stage.diagnostics import DiagnosticListener
 
     session = new_session(width=SIZE, height=SIZE, spp=1)
     panel = ScenePanel(session)
     qtbot.addWidget(panel)
     with qtbot.waitSignal(session.opened, timeout=20000):
         session.open(write_referring(tmp_path))
-    listening = Listening()
+    listening = DiagnosticListener()
     try:
         assert listening.take() is None
         Tf.Warn("something odd")

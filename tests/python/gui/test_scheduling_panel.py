@@ -267,7 +267,7 @@ def test_costs_from_a_file(
     file.write_text("{}")
     panel.load_profile(str(file))
     assert "no cost profile" in messages[0] and session.setup.profile is None
-    from wavecomb.run.costs import save_costs
+    from wavecomb.run.cost_profile import save_costs
 
     save_costs(file, {"materials": {"/World/Looks/White": 50.0}, "textures": {}})
     panel.load_profile(str(file))

@@ -12,7 +12,7 @@ import pytest
 from wavecomb import _core
 from wavecomb.gui.viewport import navigate
 from wavecomb.gui.viewport.engine import reduced_scale
-from wavecomb.picture.image import read_layers
+from wavecomb.image.files.image import read_layers
 
 
 class Watched:

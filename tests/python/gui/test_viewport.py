@@ -196,7 +196,7 @@ def test_zoom_about_the_cursor_and_back(viewport):
 
 @pytest.mark.slow
 def test_at_100_percent_the_screen_has_the_pixels_of_the_picture(viewport, qtbot):
-    from wavecomb.picture import image
+    from wavecomb.image.files import image
 
     viewport.set_zoom(1.0)
     viewport.repaint()

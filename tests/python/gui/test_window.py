@@ -97,7 +97,7 @@ def test_controls_of_the_render(cornell_window, qtbot):
 
 
 def test_exposure_and_view_change_what_is_shown(cornell_window, qtbot):
-    from wavecomb.picture import image
+    from wavecomb.image.files import image
 
     window = cornell_window
     window.viewport.set_zoom(1.0)
@@ -139,7 +139,7 @@ def test_layers_and_their_legend(cornell_window, qtbot):
 
 @pytest.mark.slow
 def test_png_of_a_heat_map_is_what_is_shown(cornell_window, qtbot, tmp_path):
-    from wavecomb.picture.image import read_image, srgb_from_linear
+    from wavecomb.image.files.image import read_image, srgb_from_linear
 
     window, path = cornell_window, tmp_path / "depth.png"
     window.display.choose_layer("depth")

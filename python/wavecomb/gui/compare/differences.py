@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.gui.compare.picture_sides import Side, pair
-from wavecomb.picture.compare import Comparison, compare
-from wavecomb.picture.perceptual import psnr
-from wavecomb.picture.ztest import ZTest, z_test
+from wavecomb.image.compare.comparison import Comparison, compare
+from wavecomb.image.compare.perceptual import psnr
+from wavecomb.image.compare.z_test import ZTest, z_test
 
 MAPS = {
     "absolute": "Absolute",

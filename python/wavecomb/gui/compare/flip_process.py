@@ -64,7 +64,7 @@ class FlipProcess:
 
 def main() -> int:
     """Runs the job in the separate process."""
-    from wavecomb.picture.perceptual import flip
+    from wavecomb.image.compare.perceptual import flip
 
     job = np.load(io.BytesIO(sys.stdin.buffer.read()), allow_pickle=False)
     try:

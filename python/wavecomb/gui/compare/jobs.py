@@ -17,9 +17,9 @@ from wavecomb.gui.compare.picture_sides import Side, pair, problem
 from wavecomb.gui.swatch import to_qimage
 from wavecomb.gui.viewport.display import Look, show
 from wavecomb.gui.worker import Worker
-from wavecomb.picture import image
-from wavecomb.picture.heatmap import Kind, Scale, scale_of, z_scale
-from wavecomb.picture.layer_view import Legend, Shown
+from wavecomb.image.compare.heatmap import Kind, Scale, scale_of, z_scale
+from wavecomb.image.files import image
+from wavecomb.image.layer_view import DisplayLayer, Legend
 
 
 @dataclass(frozen=True)
@@ -191,7 +191,9 @@ class Jobs(QObject):
             pixels, scale = result
             self.map.emit(to_qimage(pixels), scale)
 
-    def _take_images(self, key: object, pictures: tuple[Shown | None, Shown | None]) -> None:
+    def _take_images(
+        self, key: object, pictures: tuple[DisplayLayer | None, DisplayLayer | None]
+    ) -> None:
         a, b = (to_qimage(one.pixels) if one is not None else None for one in pictures)
         self.images.emit(a, b)
 
@@ -229,7 +231,7 @@ def _map(
     return image.display(scale.pixels()), scale
 
 
-def _images(ask: Ask) -> tuple[Shown | None, Shown | None]:
+def _images(ask: Ask) -> tuple[DisplayLayer | None, DisplayLayer | None]:
     """Returns both displayed images; false colours use a common scale."""
     layers = [
         _drawable(side.layer(ask.look.layer)) if side is not None else None

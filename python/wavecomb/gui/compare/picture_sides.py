@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.errors import WavecombError
-from wavecomb.picture.compare import layers_of
-from wavecomb.picture.files import reason
+from wavecomb.image.compare.comparison import layers_of
+from wavecomb.image.files.output_file import reason
 
 if TYPE_CHECKING:
     from wavecomb.gui.viewport.frames import Frame
@@ -78,7 +78,7 @@ def read_side(path: Path) -> Side:
         text = str(error) if error.errno is None else f"{path}: {reason(error)}"
         raise WavecombError(text) from error
     except ValueError as error:
-        raise WavecombError(f"{path}: cannot be read as a picture: {error}") from error
+        raise WavecombError(f"{path}: cannot be read as an image: {error}") from error
     width, height = Side("", layers).size
     variance = layers.get("variance")
     note = f"{width} x {height}"

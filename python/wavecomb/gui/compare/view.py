@@ -21,8 +21,8 @@ from wavecomb.gui import theme
 from wavecomb.gui.compare.layout import DIFFERENCE, THREE, WIPE, A, B, D, Layout
 from wavecomb.gui.swatch import to_qimage
 from wavecomb.gui.widgets import TakesFiles
-from wavecomb.picture import image
-from wavecomb.picture.heatmap import Scale
+from wavecomb.image.compare.heatmap import Scale
+from wavecomb.image.files import image
 
 
 def paint_label(

@@ -32,7 +32,7 @@ from wavecomb.gui.compare.view import CompareView
 from wavecomb.gui.viewport import display
 from wavecomb.gui.viewport.display import Look
 from wavecomb.gui.widgets import named, real, set_text_colour, tool
-from wavecomb.picture.heatmap import Scale
+from wavecomb.image.compare.heatmap import Scale
 
 if TYPE_CHECKING:
     from PySide6.QtGui import QImage

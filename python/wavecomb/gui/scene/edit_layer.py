@@ -9,7 +9,7 @@ from pathlib import Path
 from pxr import Sdf, Usd
 
 from wavecomb.errors import WavecombError
-from wavecomb.picture.files import replacing
+from wavecomb.image.files.output_file import replacing
 
 _NOT_REPEATED = frozenset(
     {"subLayers", "subLayerOffsets", "comment", "documentation", "customLayerData", "owner"}

@@ -12,7 +12,7 @@ from pxr import Gf, Sdf, Usd
 from wavecomb.gui.scene.form_model import COLOUR, NUMBER, SWITCH, Range
 from wavecomb.light_table import EDITABLE, LightParameter, light_parameters, of_kind
 from wavecomb.usd.lights.light import KINDS
-from wavecomb.usd.looks.parameters import as_stored
+from wavecomb.usd.materials.parameters import as_stored
 
 _TYPES = {
     NUMBER: Sdf.ValueTypeNames.Float,

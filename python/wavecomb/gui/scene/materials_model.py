@@ -25,7 +25,7 @@ from wavecomb.material_table import material_parameters as known_parameters
 if TYPE_CHECKING:
     from wavecomb._core import Scene
     from wavecomb.gui.scene.scene_edits import SceneEdits
-    from wavecomb.usd.looks.parameters import Parameter
+    from wavecomb.usd.materials.parameters import Parameter
 
 NAME, PROGRAM, RECORDS, COST = range(4)
 HEADERS = ("Material", "Program", "Records", "ns")

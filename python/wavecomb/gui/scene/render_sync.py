@@ -14,14 +14,14 @@ from pxr import Sdf, Usd
 
 from wavecomb.gui.scene.light_inputs import BRIGHTNESS, LightInput, inputs_of, light_inputs
 from wavecomb.gui.scene.stage_edits import Key, StageEdits, Step
-from wavecomb.usd.looks.parameters import (
+from wavecomb.usd.materials.parameters import (
     IN_INSTANCE,
     Parameter,
     as_stored,
     light_values,
     material_parameters,
 )
-from wavecomb.usd.looks.surface_values import surface_values
+from wavecomb.usd.materials.surface_values import surface_values
 
 if TYPE_CHECKING:
     from wavecomb.gui.viewport.session import Session

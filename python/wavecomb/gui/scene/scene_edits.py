@@ -17,8 +17,8 @@ from wavecomb.gui.scene.light_inputs import light_inputs
 from wavecomb.gui.scene.render_sync import RenderSync
 from wavecomb.gui.scene.stage_edits import Key, Opinion, Solo, StageEdits, Step
 from wavecomb.gui.scene.visibility import HIDDEN, HIDDEN_ABOVE, show, state, uneditable
-from wavecomb.usd.looks.parameters import as_stored
-from wavecomb.usd.stage.times import code_of
+from wavecomb.usd.materials.parameters import as_stored
+from wavecomb.usd.stage.time_codes import code_of
 
 if TYPE_CHECKING:
     from wavecomb.gui.viewport.session import Session

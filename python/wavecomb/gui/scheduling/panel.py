@@ -35,7 +35,7 @@ from wavecomb.gui.scheduling.work_group import WorkGroup
 from wavecomb.gui.viewport.picture_light import PictureLight
 from wavecomb.gui.viewport.session import Session, Setup
 from wavecomb.gui.widgets import ask_file, named, tool
-from wavecomb.run.faults import describe
+from wavecomb.run.error_messages import describe
 
 _POLICY_FILTER = "Python (*.py);;All files (*)"
 _PROFILE_FILTER = "Cost profile (*.json);;All files (*)"
@@ -229,7 +229,7 @@ class SchedulingPanel(QScrollArea):
 
     def load_profile(self, path: str) -> None:
         """Starts renders with the costs in a file. Errors are shown as messages."""
-        from wavecomb.run.costs import load_costs
+        from wavecomb.run.cost_profile import load_costs
 
         try:
             profile = load_costs(path)

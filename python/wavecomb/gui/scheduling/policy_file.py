@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from wavecomb.errors import WavecombError
-from wavecomb.picture.files import check_regular
+from wavecomb.image.files.output_file import check_regular
 from wavecomb.scheduling import SchedulingPolicy, check_policy
 
 

@@ -25,7 +25,7 @@ from wavecomb.gui.scheduling.run_table import COLUMNS, LEFT, TIPS, Row, as_csv, 
 from wavecomb.gui.table_model import Table
 from wavecomb.gui.viewport.session import Session
 from wavecomb.gui.widgets import ask_file, named
-from wavecomb.picture.files import reason, replacing
+from wavecomb.image.files.output_file import reason, replacing
 
 NOTE = (
     f"Rates are over the whole time with these settings; those in brackets are over less than "

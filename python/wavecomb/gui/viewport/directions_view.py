@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from wavecomb.gui import theme
 from wavecomb.gui.swatch import to_qimage
-from wavecomb.picture.layer_view import heat
+from wavecomb.image.layer_view import heat
 
 
 class DirectionsView(QWidget):

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.gui.viewport import ocio
+from wavecomb import ocio
 from wavecomb.gui.viewport.frames import Frame
-from wavecomb.picture import image
-from wavecomb.picture.layer_view import Shown, show_layer
+from wavecomb.image.files import image
+from wavecomb.image.layer_view import DisplayLayer, show_layer
 
 LINEAR, NEUTRAL = "Linear", "Neutral"
 _NAN = (255, 0, 255)
@@ -49,7 +49,7 @@ def views() -> list[str]:
 def develop(rgb: NDArray[Any], exposure: float, view: str) -> NDArray[np.uint8]:
     """Converts linear Rec.709 to 8-bit values.
 
-    "Linear" and "Neutral" are ``wavecomb.picture.image.display`` with "clamp" and "neutral".
+    "Linear" and "Neutral" are ``wavecomb.image.files.image.display`` with "clamp" and "neutral".
 
     Raises:
         WavecombError: There is no such view.
@@ -65,7 +65,7 @@ def develop(rgb: NDArray[Any], exposure: float, view: str) -> NDArray[np.uint8]:
     return pixels
 
 
-def show(layer: NDArray[Any], look: Look) -> Shown:
+def show(layer: NDArray[Any], look: Look) -> DisplayLayer:
     """Converts a layer to screen pixels.
 
     Args:
@@ -86,7 +86,7 @@ class Developed:
 
     frame: Frame
     look: Look
-    shown: Shown
+    shown: DisplayLayer
 
 
 def develop_frame(frame: Frame, look: Look) -> Developed:

@@ -19,14 +19,15 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from wavecomb import ocio
 from wavecomb.gui import theme
-from wavecomb.gui.viewport import display, ocio
+from wavecomb.gui.viewport import display
 from wavecomb.gui.viewport.expression_dialog import ExpressionDialog
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.gui.viewport.session import Session, Setup
 from wavecomb.gui.viewport.viewport import Viewport
 from wavecomb.gui.widgets import caption, choice, named, real, set_quietly
-from wavecomb.picture.layer_view import SCALARS, is_light
+from wavecomb.image.layer_view import SCALARS, is_light
 from wavecomb.run import aovs as aov_names
 from wavecomb.run import expressions
 

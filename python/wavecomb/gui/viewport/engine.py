@@ -17,7 +17,7 @@ import numpy as np
 
 from wavecomb.gui.setup import Setup
 from wavecomb.gui.viewport.frames import Frame, enlarged, layers_of_result, layers_of_snapshot
-from wavecomb.run.faults import describe
+from wavecomb.run.error_messages import describe
 
 if TYPE_CHECKING:
     from wavecomb._core import Renderer, Result, Snapshot
@@ -266,7 +266,7 @@ class Engine:
         result: Result,
         statistics: dict[str, Any],
     ) -> Frame:
-        from wavecomb.picture.rendered import picture_of
+        from wavecomb.image.rendered import picture_of
 
         aovs = task.setup.aovs
         picture = picture_of(result, statistics, scene=renderer.scene, aovs=aovs)

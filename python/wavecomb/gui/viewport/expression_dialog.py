@@ -22,7 +22,7 @@ from wavecomb.gui.setup import Setup
 from wavecomb.gui.viewport.session import Session
 from wavecomb.gui.widgets import choice, named, set_text_colour
 from wavecomb.run import expressions
-from wavecomb.run.faults import describe
+from wavecomb.run.error_messages import describe
 
 OWN = "custom"
 """Entry that stands for an unnamed expression."""

@@ -15,7 +15,7 @@ from wavecomb.run.expressions import layer_of
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Snapshot
-    from wavecomb.picture.rendered import Picture
+    from wavecomb.image.rendered import Picture
 
 Array = NDArray[Any]
 _FIELDS = ("albedo", "normal", "depth", "samples", "error", "variance")
@@ -109,7 +109,7 @@ def denoised_frame(frame: Frame) -> tuple[Frame, Any]:
 
     Returns None as image if guide layers are missing.
     """
-    from wavecomb.picture.denoise import denoise
+    from wavecomb.image.denoise import denoise
 
     albedo = frame.layers.get("guide_albedo")
     normal = frame.layers.get("guide_normal")

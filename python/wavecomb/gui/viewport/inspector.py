@@ -23,7 +23,7 @@ from wavecomb.gui.viewport.cursor_panel import CursorPanel
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.gui.viewport.session import Session
 from wavecomb.gui.widgets import named
-from wavecomb.picture.rendered import NOWHERE, in_world
+from wavecomb.image.rendered import NOWHERE, in_world
 
 _LATER_MS = 30
 _SEEN = (

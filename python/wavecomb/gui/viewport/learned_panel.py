@@ -15,7 +15,7 @@ from wavecomb.gui.viewport.cursor_panel import CursorPanel
 from wavecomb.gui.viewport.directions_view import DirectionsView
 from wavecomb.gui.viewport.navigate import UPS
 from wavecomb.gui.viewport.session import Session, Setup
-from wavecomb.picture.directions import density_map, map_point
+from wavecomb.image.directions import density_map, map_point
 
 _LATER_MS = 40
 _HEIGHT = 128

@@ -21,7 +21,7 @@ from wavecomb.gui.setup import Setup
 from wavecomb.gui.viewport.engine import Edit, Engine, Task
 from wavecomb.gui.viewport.frames import Frame, denoised_frame
 from wavecomb.gui.worker import Worker
-from wavecomb.run.faults import describe
+from wavecomb.run.error_messages import describe
 
 if TYPE_CHECKING:
     from wavecomb._core import Renderer

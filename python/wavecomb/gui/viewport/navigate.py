@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.camera_table import camera_defaults, camera_parameters
-from wavecomb.picture.output import camera_window
+from wavecomb.image.files.render_output import camera_window
 from wavecomb.usd.cameras.framing import fit, fit_flat
 
 Matrix = NDArray[np.float64]

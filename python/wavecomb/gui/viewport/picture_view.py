@@ -18,7 +18,7 @@ from PySide6.QtWidgets import QWidget
 
 from wavecomb.gui import theme
 from wavecomb.gui.swatch import to_qimage
-from wavecomb.picture.layer_view import Legend, ramp
+from wavecomb.image.layer_view import Legend, ramp
 
 _BEHIND = QColor(0, 0, 0, 190)
 _TEXT = QColor(240, 240, 240)

@@ -97,7 +97,7 @@ class RenderBar(QToolBar):
     def _denoise_toggled(self, on: bool) -> None:
         if on:
             from wavecomb.errors import WavecombError
-            from wavecomb.picture.denoise import check_denoiser
+            from wavecomb.image.denoise import check_denoiser
 
             try:
                 check_denoiser()

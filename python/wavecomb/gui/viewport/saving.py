@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from wavecomb.errors import WavecombError
 from wavecomb.gui.viewport.display import LINEAR, NEUTRAL, Look, develop_frame
 from wavecomb.gui.viewport.frames import Frame, denoised_frame
-from wavecomb.picture.image import Transfer, write_png_codes
-from wavecomb.picture.output import scene_metadata
-from wavecomb.picture.rendered import NOWHERE, Picture, in_world
+from wavecomb.image.files.image import Transfer, write_png_codes
+from wavecomb.image.files.render_output import scene_metadata
+from wavecomb.image.rendered import NOWHERE, Picture, in_world
 
 if TYPE_CHECKING:
     from wavecomb._core import Scene

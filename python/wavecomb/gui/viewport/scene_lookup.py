@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from wavecomb.gui.viewport.engine import Edit
 from wavecomb.gui.viewport.navigate import Pose, pose_of
-from wavecomb.usd.stage.origin import WORLD, Origin, moved_to
+from wavecomb.usd.stage.origin import WORLD, Origin, to_scene_space
 
 if TYPE_CHECKING:
     from pxr import Usd
@@ -35,7 +35,7 @@ def camera_pose(
 
     from wavecomb.usd.cameras.camera import read_camera
     from wavecomb.usd.stage.report import LoadReport
-    from wavecomb.usd.stage.times import time_code
+    from wavecomb.usd.stage.time_codes import time_code
 
     if not Sdf.Path.IsValidPathString(path):
         return None
@@ -44,7 +44,7 @@ def camera_pose(
         return None
     code: Usd.TimeCode = time_code(usd, time)
     to_world = np.array(UsdGeom.XformCache(code).GetLocalToWorldTransform(prim))
-    view = read_camera(prim, moved_to(to_world, origin), code, LoadReport())
+    view = read_camera(prim, to_scene_space(to_world, origin), code, LoadReport())
     return None if view is None else pose_of(view.transform, view.options, path)
 
 
@@ -83,7 +83,7 @@ def prim_bounds(usd: Usd.Stage, loaded: LoadedStage, path: str) -> NDArray[np.fl
     """
     from pxr import Gf, Sdf, UsdGeom
 
-    from wavecomb.usd.stage.times import code_of
+    from wavecomb.usd.stage.time_codes import code_of
 
     plain = path.partition("[")[0]
     if not Sdf.Path.IsValidPathString(plain):

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom, UsdRender
 
 from wavecomb.errors import WavecombError
+from wavecomb.image.files.render_output import fitted_window
 from wavecomb.load_options import PROJECTIONS
-from wavecomb.picture.output import fitted_window
 from wavecomb.usd.cameras.framing import corners, fit, fit_flat, planes
 from wavecomb.usd.cameras.lens import lens_values, read_map
 from wavecomb.usd.geometry.shutter import Motion
-from wavecomb.usd.looks.network import number, pair, word
-from wavecomb.usd.stage.choice import CONFORMS
-from wavecomb.usd.stage.population import every
+from wavecomb.usd.layers.population import matching_prims
+from wavecomb.usd.materials.network import number, pair, word
+from wavecomb.usd.render_settings.values import CONFORMS
 from wavecomb.usd.stage.report import LoadReport
 
 Matrix = NDArray[np.float64]
@@ -32,7 +32,7 @@ _TENTH = 0.1
 _MAX_WINDOW = 1e30
 """Largest coordinate of a camera's window on the plane z = -1."""
 
-_LEAST_OF_WINDOW = 2.0**-16
+_MIN_WINDOW = 2.0**-16
 """Smallest size of a camera's window relative to its largest coordinate: 128 float32 steps."""
 
 ALL_ROUND = (-math.pi, math.pi, -0.5 * math.pi, 0.5 * math.pi)
@@ -120,7 +120,7 @@ def find_camera(stage: Usd.Stage, wanted: str | None) -> Usd.Prim | None:
     for prim in Usd.PrimRange.Stage(stage):
         if prim.GetTypeName() == "Camera":
             return prim
-    return next(every(stage, _is_camera), None)
+    return next(matching_prims(stage, _is_camera), None)
 
 
 def _is_camera(prim: Usd.Prim) -> bool:
@@ -133,7 +133,7 @@ MAX_CAMERAS = 1000
 
 def all_cameras(stage: Usd.Stage) -> list[Usd.Prim]:
     """Returns the cameras of the stage in stage order, including those inside instances."""
-    return list(islice(every(stage, _is_camera), MAX_CAMERAS))
+    return list(islice(matching_prims(stage, _is_camera), MAX_CAMERAS))
 
 
 def _named(stage: Usd.Stage, wanted: str) -> Usd.Prim:
@@ -216,7 +216,7 @@ def _is_window(window: tuple[float, ...]) -> bool:
     """Returns whether float32 can represent the window to about one pixel."""
     x0, x1, y0, y1 = window
     largest, smallest = max(map(abs, window)), min(x1 - x0, y1 - y0)
-    return largest <= _MAX_WINDOW and smallest >= max(_LEAST_OF_WINDOW * largest, 1.0 / _MAX_WINDOW)
+    return largest <= _MAX_WINDOW and smallest >= max(_MIN_WINDOW * largest, 1.0 / _MAX_WINDOW)
 
 
 def _exposure_scale(camera: UsdGeom.Camera, time: Usd.TimeCode, report: LoadReport) -> float:

@@ -12,7 +12,7 @@ from pxr import Usd
 
 from wavecomb.camera_table import camera_parameters
 from wavecomb.errors import WavecombError
-from wavecomb.picture.image import read_layers
+from wavecomb.image.files.image import read_layers
 from wavecomb.usd.stage.report import LoadReport
 
 _ARNOLD = "primvars:arnold:"
@@ -116,10 +116,12 @@ def read_map(path: str) -> list[list[float]]:
     layers = read_layers(path)
     plane = layers.get("beauty")
     if plane is None or plane.ndim != 3 or plane.shape[2] < 2:
-        raise WavecombError(f"{path}: an ST map has the channels R and G; this file has not")
+        raise WavecombError(
+            f"{path}: an ST map has the channels R and G; this file does not have them"
+        )
     values = np.asarray(plane[:, :, :2], np.float64)
     if not np.isfinite(values).all():
-        raise WavecombError(f"{path}: is no ST map: some of its values are not finite")
+        raise WavecombError(f"{path}: is not an ST map: some of its values are not finite")
     values = np.stack([values[:, :, 0], 1.0 - values[:, :, 1]], axis=2)
     nodes = _resampled(_resampled(values, 0), 1).astype(np.float32)
     four: list[list[float]] = nodes.reshape(-1, 4).tolist()

@@ -22,7 +22,7 @@ Attributes = dict[str, tuple[str, NDArray[np.float32]]]
 
 
 @dataclass(frozen=True)
-class Wanted:
+class PrimvarRequest:
     """A primvar that a bound material reads and that fits the mesh.
 
     Attributes:
@@ -70,7 +70,7 @@ def check_fit(primvar: Primvar, mesh: MeshArrays | CurveArrays, width: int) -> N
 
 
 def on_shape(
-    wanted: Mapping[str, Wanted], mesh: MeshArrays | CurveArrays, mirrored: bool
+    wanted: Mapping[str, PrimvarRequest], mesh: MeshArrays | CurveArrays, mirrored: bool
 ) -> Attributes:
     """Converts primvars to attributes of triangles, curve segments or points.
 
@@ -80,7 +80,7 @@ def on_shape(
 
 
 def _on_shape(
-    wanted: Wanted, mesh: MeshArrays | CurveArrays, mirrored: bool
+    wanted: PrimvarRequest, mesh: MeshArrays | CurveArrays, mirrored: bool
 ) -> tuple[str, NDArray[np.float32]]:
     primvar, width = wanted.primvar, wanted.width
     if wanted.is_constant or mesh.topology is None:
@@ -103,7 +103,7 @@ def _on_shape(
 class RefinedAttributes:
     """Primvars of a cage, refined to the triangles of the subdivided mesh."""
 
-    def __init__(self, wanted: Mapping[str, Wanted]) -> None:
+    def __init__(self, wanted: Mapping[str, PrimvarRequest]) -> None:
         self._wanted = wanted
         self._refined = [
             name

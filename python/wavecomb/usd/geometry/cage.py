@@ -13,7 +13,7 @@ from pxr import Gf, Usd
 
 from wavecomb.usd.geometry.primvar import Primvar, as_array, as_integers
 from wavecomb.usd.geometry.triangulate import Topology
-from wavecomb.usd.looks.network import word
+from wavecomb.usd.materials.network import word
 from wavecomb.usd.stage.report import LoadReport
 
 SCHEMES = ("catmullClark", "loop", "bilinear")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Usd
 
-from wavecomb.usd.geometry.bad_points import WHY, bad_points, steadied
+from wavecomb.usd.geometry.invalid_points import WHY, invalid_point_mask, replace_invalid_steps
 from wavecomb.usd.geometry.mesh_arrays import (
     IDENTITY,
     UV_NAMES,
@@ -32,7 +32,7 @@ from wavecomb.usd.geometry.primvar import (
     read_primvar,
 )
 from wavecomb.usd.geometry.shutter import Motion
-from wavecomb.usd.geometry.skeleton import points_at, points_now, step_times
+from wavecomb.usd.geometry.skeleton import points_at, points_at_time, step_times
 from wavecomb.usd.geometry.strands import StrandDetail, Strands, lay_out
 from wavecomb.usd.geometry.triangulate import MeshError
 from wavecomb.usd.stage.report import LoadReport
@@ -121,7 +121,7 @@ class CurveReader:
         strands = self._layout(prim, counts[:, 0].astype(np.intp), len(points))
         if strands is None:
             return None
-        bad = bad_points(points)
+        bad = invalid_point_mask(points)
         if bad.any():
             strands = self._without(bad, strands, prim)
         widths, kind = read_widths(prim, strands, self.time, self.report)
@@ -152,7 +152,7 @@ class CurveReader:
         """Returns the layout without curves that use an invalid point."""
         kept = strands.over_each(np.maximum, bad) == 0
         if not kept.any():
-            raise MeshError("their points are not finite or absurdly far away")
+            raise MeshError("their points are not finite or too far away")
         if not kept.all():
             what = f"{int((~kept).sum())} of {len(kept)} curves left out: {WHY}"
             self.report.warn(what, prim.GetPath())
@@ -246,7 +246,7 @@ def over_shutter(
     layout = shape.topology
     if found is None or len(found[0]) != layout.sizes["vertex"]:
         return shape
-    found = steadied(found)
+    found = replace_invalid_steps(found)
     if all(np.array_equal(points, found[0]) for points in found):
         return shape
     steps, normals = [], []
@@ -274,7 +274,7 @@ def read_points(prim: Usd.Prim, time: Usd.TimeCode) -> Array | None:
     Raises:
         MeshError: The values are not triples.
     """
-    points = as_array(points_now(prim, time))
+    points = as_array(points_at_time(prim, time))
     if points is None or len(points) == 0:
         return None
     if points.shape[1] != 3:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Tf, Usd
 
-from wavecomb.run.isolate import memory, patience, trail
+from wavecomb.run.isolation import memory, progress_notes, time_limit
 from wavecomb.usd.geometry.curves import CurveArrays, CurveReader, over_shutter
 from wavecomb.usd.geometry.mesh import MeshReader
 from wavecomb.usd.geometry.mesh_arrays import UV_NAMES, MeshArrays
@@ -16,9 +16,9 @@ from wavecomb.usd.geometry.nurbs_patch import PatchReader
 from wavecomb.usd.geometry.skeleton import Skeletons, deforms
 from wavecomb.usd.geometry.splats import PointReader, SplatArrays, SplatReader
 from wavecomb.usd.geometry.strands import StrandDetail
-from wavecomb.usd.geometry.surfaces import Surfaces
+from wavecomb.usd.geometry.subdivision import SubdivisionSurfaces
 from wavecomb.usd.geometry.triangulate import MeshError
-from wavecomb.usd.looks.assign import Draw
+from wavecomb.usd.materials.assignment import DrawItem
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.frame_cache import MeshCache
 from wavecomb.usd.stage.origin import problem_of
@@ -31,12 +31,12 @@ WORDS = {
     "mesh": "mesh", "patch": "NURBS patch", "shape": "mesh", "curves": "curves", "points": "points",
     "splats": "splats",
 }  # fmt: skip
-"""Names of gprims in messages, by ``Draw.kind``."""
+"""Names of gprims in messages, by ``DrawItem.kind``."""
 COUNTS = {
     "mesh": "meshes", "patch": "patches", "shape": "shapes", "curves": "curves", "points": "points",
     "splats": "splats",
 }  # fmt: skip
-"""Names of gprim counts in ``LoadReport``, by ``Draw.kind``."""
+"""Names of gprim counts in ``LoadReport``, by ``DrawItem.kind``."""
 
 
 class GprimReader:
@@ -45,7 +45,7 @@ class GprimReader:
     def __init__(
         self,
         context: LoadContext,
-        surfaces: Surfaces,
+        surfaces: SubdivisionSurfaces,
         skeletons: Skeletons,
         cache: MeshCache | None = None,
     ) -> None:
@@ -71,7 +71,11 @@ class GprimReader:
         return kind not in ("shape", "splats") and deforms(prim, self.skeletons.of(prim))
 
     def read(
-        self, draw: Draw, names: Sequence[str], in_world: bool, detail: StrandDetail | None = None
+        self,
+        draw: DrawItem,
+        names: Sequence[str],
+        in_world: bool,
+        detail: StrandDetail | None = None,
     ) -> MeshArrays | CurveArrays | None:
         """Reads a gprim in the space of its group; reports and returns None if nothing is drawn.
 
@@ -88,14 +92,14 @@ class GprimReader:
                 well.
         """
         kind, path = draw.kind, str(draw.prim.GetPath())
-        trail.note("reading", path)
+        progress_notes.note("reading", path)
         try:
             shape = self._read(kind, draw, names, detail if kind == "curves" else None)
         except MeshError as error:
             self.report.warn(f"{WORDS[kind]} left out: {error}", path)
             return None
         except (Tf.ErrorException, MemoryError) as error:
-            if memory.ran_out(error, lambda: patience.loaded_layers()[1]):
+            if memory.is_exhausted(error, lambda: time_limit.loaded_layers()[1]):
                 raise MemoryError from error
             what = "out of memory" if isinstance(error, MemoryError) else "USD cannot read it"
             self.report.warn(f"{WORDS[kind]} left out: {what}", path)
@@ -110,7 +114,7 @@ class GprimReader:
         return shape
 
     def _read(
-        self, kind: str, draw: Draw, names: Sequence[str], detail: StrandDetail | None
+        self, kind: str, draw: DrawItem, names: Sequence[str], detail: StrandDetail | None
     ) -> MeshArrays | CurveArrays | None:
         displaced = kind == "mesh" and self.surfaces.is_displaced(draw)
 

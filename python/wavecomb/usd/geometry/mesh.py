@@ -11,8 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
-from wavecomb.usd.geometry.bad_points import bad_points, steadied, without_bad
 from wavecomb.usd.geometry.cage import SCHEMES, Cage, read_rules, sharp_edges
+from wavecomb.usd.geometry.invalid_points import (
+    invalid_point_mask,
+    remove_invalid_points,
+    replace_invalid_steps,
+)
 from wavecomb.usd.geometry.mesh_arrays import (
     IDENTITY,
     TETRAHEDRA,
@@ -20,13 +24,13 @@ from wavecomb.usd.geometry.mesh_arrays import (
     Array,
     MeshArrays,
     bake,
+    bake_and_triangulate,
     bake_normals,
     check_matrix,
     extent,
     is_translation,
-    place,
-    plain,
     read_faces,
+    transform_shape,
 )
 from wavecomb.usd.geometry.primvar import (
     Primvar,
@@ -49,7 +53,7 @@ from wavecomb.usd.geometry.skeleton import (
     SkinError,
     matrix_at,
     points_at,
-    points_now,
+    points_at_time,
     skinned_points,
     step_times,
 )
@@ -59,7 +63,7 @@ from wavecomb.usd.geometry.triangulate import (
     smooth_normals,
     triangulate,
 )
-from wavecomb.usd.looks.network import word
+from wavecomb.usd.materials.network import word
 from wavecomb.usd.stage.report import LoadReport
 
 
@@ -109,7 +113,7 @@ class MeshReader:
         shape = read_shape(prim, self.time, names)
         if shape is None or len(shape.triangles) == 0:
             raise MeshError("no faces")
-        positions, normals, bounds = place(shape.positions, shape.normals, matrix)
+        positions, normals, bounds = transform_shape(shape.positions, shape.normals, matrix)
         triangles = shape.triangles[:, ::-1] if mirrored else shape.triangles
         return MeshArrays(positions, np.ascontiguousarray(triangles), normals, shape.uvs, bounds)
 
@@ -139,7 +143,7 @@ class MeshReader:
         get, time = prim.GetAttribute, self.time
         mirrored = check_matrix(matrix)
         skin = self._skin(prim)
-        value = points_now(prim, time) if "velocities" in names else get("points").Get(time)
+        value = points_at_time(prim, time) if "velocities" in names else get("points").Get(time)
         points = as_array(value)
         if skin is not None and points is not None and len(points):
             points = skinned_points(skin, value, time)
@@ -153,12 +157,12 @@ class MeshReader:
         flip = "orientation" in names and word(get("orientation").Get(time)) == "leftHanded"
         placed = None
         if not flip and holes is None:
-            placed = plain(points, counts, indices, matrix)
+            placed = bake_and_triangulate(points, counts, indices, matrix)
         has_bad = False
         if placed is None:
-            has_bad = bool(bad_points(points, matrix).any())
+            has_bad = bool(invalid_point_mask(points, matrix).any())
             if has_bad:
-                points, holes, what = without_bad(points, matrix, counts, indices, holes)
+                points, holes, what = remove_invalid_points(points, matrix, counts, indices, holes)
                 if what:
                     self.report.warn(f"mesh without {what}", prim.GetPath())
             placed = self._placed(prim, points, counts, indices, holes, flip, matrix)
@@ -230,7 +234,7 @@ class MeshReader:
         shapes = points_at(prim, skin, times, motion.frame, self.report)
         if shapes is None or len(shapes[0]) != len(mesh.positions):
             return mesh
-        shapes = steadied(shapes)
+        shapes = replace_invalid_steps(shapes)
         matrices = [matrix_at(track, matrix, time) for time in times]
         if track is None and all(np.array_equal(shape, shapes[0]) for shape in shapes):
             return mesh

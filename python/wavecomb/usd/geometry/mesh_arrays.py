@@ -27,7 +27,7 @@ UV_NAMES = ("st", "UVMap", "st0", "st1", "uv", "map1")
 _CHUNK = 1 << 18
 _NO_TURN = Gf.Matrix3d(1.0)
 
-_NOWHERE = "a point is not finite or absurdly far away"
+_NOWHERE = "a point is not finite or too far away"
 
 
 @dataclass
@@ -88,7 +88,7 @@ def bake(points: Array, matrix: Gf.Matrix4d) -> Array:
     return out
 
 
-def plain(
+def bake_and_triangulate(
     points: Array, counts: NDArray[np.int32], indices: NDArray[np.int32], matrix: Gf.Matrix4d
 ) -> tuple[Array, Array, Topology] | None:
     """Transforms and triangulates a mesh that consists only of triangles or only of quads.
@@ -109,7 +109,9 @@ def plain(
     return positions, bounds, topology
 
 
-def place(points: Array, normals: Array, matrix: Gf.Matrix4d) -> tuple[Array, Array, Array]:
+def transform_shape(
+    points: Array, normals: Array, matrix: Gf.Matrix4d
+) -> tuple[Array, Array, Array]:
     """Transforms points and normals (n, 3) of a shape and returns them with their bounds (2, 3).
 
     Equivalent to ``bake``, ``bake_normals`` and ``extent``, but in one call.
@@ -183,7 +185,7 @@ def _surface(prim: Usd.Prim, time: Usd.TimeCode) -> Ints:
             return np.empty(0, np.int32)
         points = prim.GetAttribute("points").Get(time)
         if tetrahedra.min() < 0 or tetrahedra.max() >= len(points or ()):
-            raise MeshError("tetVertexIndices name points that are not there")
+            raise MeshError("tetVertexIndices name points that do not exist")
         values = as_array(UsdGeom.TetMesh.ComputeSurfaceFaces(UsdGeom.TetMesh(prim), time))
     if values is None or values.shape != (len(values), 3):
         return np.empty(0, np.int32)

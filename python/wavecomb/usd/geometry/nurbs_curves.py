@@ -26,7 +26,7 @@ PARTS = 8
 
 
 @dataclass(frozen=True)
-class _Piece:
+class _BezierConversion:
     """Conversion of one curve to Bezier segments.
 
     Attributes:
@@ -46,7 +46,7 @@ class NurbsStrands(Strands):
         pieces: Conversion of each curve.
     """
 
-    pieces: tuple[_Piece, ...] = ()
+    pieces: tuple[_BezierConversion, ...] = ()
 
     def only(self, kept: NDArray[np.bool_] | slice) -> NurbsStrands:
         """Returns a subset of the curves."""
@@ -117,11 +117,11 @@ def hermite_strands(
     if not bad.any():
         return strands
     good = strands.over_each(np.maximum, bad) == 0
-    _say_left_out(prim, report, good, "their tangents are not finite")
+    _report_invalid(prim, report, good, "their tangents are not finite")
     return replace(strands, **{name: getattr(strands, name)[good] for name in PER_CURVE})
 
 
-def _say_left_out(prim: Usd.Prim, report: LoadReport, good: NDArray[np.bool_], why: str) -> None:
+def _report_invalid(prim: Usd.Prim, report: LoadReport, good: NDArray[np.bool_], why: str) -> None:
     if not good.any():
         raise MeshError(why)
     report.warn(f"{int((~good).sum())} of {len(good)} curves left out: {why}", prim.GetPath())
@@ -160,8 +160,8 @@ def nurbs_strands(
     if len(weights) not in (0, int(counts.sum())):
         raise MeshError(f"{int(counts.sum())} points have {len(weights)} pointWeights")
     first_knot, first = np.cumsum(counts + orders) - counts - orders, np.cumsum(counts) - counts
-    known: dict[bytes, _Piece | str] = {}
-    found: list[_Piece | str] = []
+    known: dict[bytes, _BezierConversion | str] = {}
+    found: list[_BezierConversion | str] = []
     for i, (count, order) in enumerate(zip(counts.tolist(), orders.tolist(), strict=True)):
         mine = knots[first_knot[i] : first_knot[i] + count + order]
         heavy = weights[first[i] : first[i] + count] if len(weights) else None
@@ -170,14 +170,14 @@ def nurbs_strands(
                               [] if span is None else span]).tobytes()  # fmt: skip
         if key not in known:
             try:
-                known[key] = _piece(Spline.of(mine, order, count, span), heavy)
+                known[key] = _bezier_conversion(Spline.of(mine, order, count, span), heavy)
             except MeshError as error:
                 known[key] = str(error)
         found.append(known[key])
     good = np.array([not isinstance(one, str) for one in found])
     if not good.all():
         whys = list(dict.fromkeys(one for one in found if isinstance(one, str)))
-        _say_left_out(prim, report, good, "; ".join(whys[:3]))
+        _report_invalid(prim, report, good, "; ".join(whys[:3]))
     # Curves that are left out are counted, so that primvar arrays for all curves still fit.
     segments = np.array(
         [max(counts[i] - orders[i] + 1, 0) if isinstance(one, str) else len(one.shares)
@@ -196,7 +196,7 @@ def nurbs_strands(
     )  # fmt: skip
 
 
-def _piece(spline: Spline, weights: Floats | None) -> _Piece:
+def _bezier_conversion(spline: Spline, weights: Floats | None) -> _BezierConversion:
     """Computes the conversion of a curve to Bezier segments."""
     parts = 1 if spline.order <= 4 and weights is None else PARTS
     size = spline.ends[:, 1:] - spline.ends[:, :1]
@@ -209,7 +209,7 @@ def _piece(spline: Spline, weights: Floats | None) -> _Piece:
     end, arrive = rational(*spline.weights(span, at[:, 1:].ravel()), heavy)
     third = np.repeat(size[:, 0] / (3.0 * parts), parts)[:, None]
     shares = np.stack([begin, begin + third * leave, end - third * arrive, end], axis=1)
-    return _Piece(shares, columns)
+    return _BezierConversion(shares, columns)
 
 
 Floats = NDArray[np.float64]

@@ -23,9 +23,9 @@ from wavecomb.usd.geometry.mesh_arrays import (
 from wavecomb.usd.geometry.nurbs_curves import Floats, Spline
 from wavecomb.usd.geometry.primvar import PrimvarError, as_array, first_primvar
 from wavecomb.usd.geometry.shutter import Motion
-from wavecomb.usd.geometry.skeleton import points_at, points_now, step_times
+from wavecomb.usd.geometry.skeleton import points_at, points_at_time, step_times
 from wavecomb.usd.geometry.triangulate import MeshError, Topology, smooth_normals
-from wavecomb.usd.looks.network import number, word
+from wavecomb.usd.materials.network import number, word
 from wavecomb.usd.stage.report import LoadReport
 
 PARTS = 8
@@ -107,7 +107,7 @@ class PatchReader:
             MeshError: The patch is invalid.
         """
         mirrored = check_matrix(matrix)
-        points = as_array(points_now(prim, self.time))
+        points = as_array(points_at_time(prim, self.time))
         if points is None or len(points) == 0:
             return None
         if points.shape[1] != 3:
@@ -117,7 +117,7 @@ class PatchReader:
         if weights is not None and weights.shape != (len(points), 1):
             raise MeshError(f"{len(points)} points have {len(weights)} pointWeights")
         heavy = np.ones((len(points), 1)) if weights is None else weights.astype(np.float64)
-        self._say_what_is_missing(prim, uv_names)
+        self._report_unsupported(prim, uv_names)
         flip = word(prim.GetAttribute("orientation").Get(self.time)) == "leftHanded"
         topology = _triangles(*axes, flip)
         shapes = [points]
@@ -162,7 +162,7 @@ class PatchReader:
         u, v = (_axis(s, c, parts) for s, c in zip(splines, closed, strict=True))
         return u, v
 
-    def _say_what_is_missing(self, prim: Usd.Prim, uv_names: Sequence[str]) -> None:
+    def _report_unsupported(self, prim: Usd.Prim, uv_names: Sequence[str]) -> None:
         trims = as_array(prim.GetAttribute("trimCurve:counts").Get(self.time))
         if trims is not None and len(trims):
             what = "trim curves of NURBS patches (drawn whole)"

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from pxr import Usd, Vt
 
 from wavecomb.usd.geometry.triangulate import Topology
-from wavecomb.usd.looks.colour_space import colours_in_linear
-from wavecomb.usd.looks.network import holds_colour, space_of
+from wavecomb.usd.materials.colour_space import colours_in_linear
+from wavecomb.usd.materials.network import holds_colour, space_of
 from wavecomb.usd.stage.report import LoadReport
 
 

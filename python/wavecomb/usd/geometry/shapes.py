@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd
 
-from wavecomb.usd.looks.network import number as number_of
-from wavecomb.usd.looks.network import word
+from wavecomb.usd.materials.network import number as number_of
+from wavecomb.usd.materials.network import word
 
 Array = NDArray[np.float32]
 

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from pxr import Gf, Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
-from wavecomb.usd.looks.network import number
+from wavecomb.usd.materials.network import number
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.stage.times import frame_number
+from wavecomb.usd.stage.time_codes import frame_number
 
 Matrices = NDArray[np.float64]
 
-MOST_STEPS = 64
+MAX_STEPS = 64
 """Most motion steps that the user may request."""
 
 _CHOICES = (2, 3, 4, 5, 8)
@@ -56,8 +56,8 @@ class Blur:
                     f"shutter {' '.join(map(str, shutter))}: must be two numbers, when it opens "
                     "and when it closes, in time codes from the frame"
                 )
-        if steps is not None and not 2 <= steps <= MOST_STEPS:
-            raise WavecombError(f"motion steps {steps}: must be from 2 to {MOST_STEPS}")
+        if steps is not None and not 2 <= steps <= MAX_STEPS:
+            raise WavecombError(f"motion steps {steps}: must be from 2 to {MAX_STEPS}")
         return cls(shutter, steps, not motion_blur)
 
 
@@ -118,7 +118,7 @@ class Motion:
             cache = self._caches[time] = UsdGeom.XformCache(Usd.TimeCode(time))
         return cache
 
-    def follow(self, prim: Usd.Prim, parent: Track | None, above: Gf.Matrix4d) -> Track | None:
+    def track_of(self, prim: Usd.Prim, parent: Track | None, above: Gf.Matrix4d) -> Track | None:
         """Returns the animated transform of a prim; None if the prim is static.
 
         Args:

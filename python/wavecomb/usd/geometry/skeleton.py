@@ -11,9 +11,9 @@ from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 
 from wavecomb.usd.geometry.primvar import as_array
 from wavecomb.usd.geometry.shutter import Motion
-from wavecomb.usd.stage.population import holders
+from wavecomb.usd.layers.population import containing_prototypes
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.stage.times import frame_number
+from wavecomb.usd.stage.time_codes import frame_number
 
 if TYPE_CHECKING:
     from pxr import UsdSkel  # takes 8 ms; functions import it for stages with skeletons
@@ -152,7 +152,7 @@ class Skin:
         return xforms.GetLocalToWorldTransform(self.skeleton.GetPrim()) * inverse
 
 
-MOST_APART = 100_000
+MAX_SKINNED_INSTANCES = 100_000
 """Most instances that are read separately, since nested instancing can multiply them."""
 
 
@@ -193,7 +193,7 @@ class Skeletons:
         """Returns the skin of a mesh; None if it is not deformed."""
         return self._skins.get(prim.GetPath()) if self._skins else None
 
-    def keeps_apart(self, instance: Usd.Prim, prototype: Usd.Prim) -> bool:
+    def needs_own_prototype(self, instance: Usd.Prim, prototype: Usd.Prim) -> bool:
         """Returns whether an instance needs a separate prototype because of its animation."""
         # The prototype's root prim has no type; the instance has it.
         apart = (
@@ -204,8 +204,11 @@ class Skeletons:
         if not apart:
             return False
         self._apart += 1
-        if self._apart > MOST_APART:
-            what = f"more than {MOST_APART} skeletal instances: the rest use the first one's pose"
+        if self._apart > MAX_SKINNED_INSTANCES:
+            what = (
+                f"more than {MAX_SKINNED_INSTANCES} skeletal instances: the rest use the pose of "
+                "the first one"
+            )
             self.report.warn(what, instance.GetPath())
             return False
         return True
@@ -216,7 +219,9 @@ class Skeletons:
     def _holders(self, stage: Usd.Stage) -> set[Sdf.Path]:
         """Returns prototypes that contain a SkelRoot, also in nested instances."""
         if self._holding is None:
-            self._holding = holders(stage, lambda prim: prim.GetTypeName() == "SkelRoot")
+            self._holding = containing_prototypes(
+                stage, lambda prim: prim.GetTypeName() == "SkelRoot"
+            )
         return self._holding
 
 
@@ -268,7 +273,7 @@ def _has_velocities(prim: Usd.Prim) -> bool:
     return bool(velocities and velocities.HasAuthoredValue())
 
 
-def points_now(prim: Usd.Prim, time: Usd.TimeCode) -> Any:
+def points_at_time(prim: Usd.Prim, time: Usd.TimeCode) -> Any:
     """Returns the points at one time; velocities extrapolate from the preceding sample."""
     if frame_number(time) is not None and _has_velocities(prim):
         found = UsdGeom.PointBased(prim).ComputePointsAtTime(time, time)

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Usd
 
-from wavecomb.usd.geometry.bad_points import bad_points
 from wavecomb.usd.geometry.curves import (
     Array,
     CurveArrays,
@@ -21,6 +20,7 @@ from wavecomb.usd.geometry.curves import (
     thick_extent,
     uniform_scale,
 )
+from wavecomb.usd.geometry.invalid_points import invalid_point_mask
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY, bake, check_matrix
 from wavecomb.usd.geometry.primvar import as_array
 from wavecomb.usd.geometry.strands import lay_out_points
@@ -30,10 +30,10 @@ from wavecomb.usd.stage.report import LoadReport
 SPLATS = "ParticleField3DGaussianSplat"
 """Type name of Gaussian splat prims."""
 
-LEAST_SCALE, MOST_SCALE = 1e-9, 1e9
+MIN_SCALE, MAX_SCALE = 1e-9, 1e9
 """Range of scales that the core accepts."""
 
-_MOST_DEGREE = 3
+_MAX_DEGREE = 3
 _REACH = 3.0
 _SH = "radiance:sphericalHarmonics"
 
@@ -85,9 +85,9 @@ class SplatReader:
         with np.errstate(over="ignore", invalid="ignore"):
             sizes = np.einsum("ij,ij->i", turns, turns)
         bad = {
-            "middles that are not finite or absurdly far away": ~(np.abs(positions) < 1e18).all(1),
-            f"scales that are not from {LEAST_SCALE:g} to {MOST_SCALE:g}": ~(
-                (scales >= LEAST_SCALE) & (scales <= MOST_SCALE)
+            "middles that are not finite or too far away": ~(np.abs(positions) < 1e18).all(1),
+            f"scales that are not from {MIN_SCALE:g} to {MAX_SCALE:g}": ~(
+                (scales >= MIN_SCALE) & (scales <= MAX_SCALE)
             ).all(1),
             "orientations of length zero or not finite": ~((sizes > 1e-20) & (sizes < 1e20)),
             "opacities that are negative or not finite": ~((opacities >= 0) & (opacities < np.inf)),
@@ -159,10 +159,10 @@ class SplatReader:
         if values is None:
             return np.zeros((count, 1, 3), np.float32)
         harmonics = values[:wanted].reshape(count, -1, 3)
-        if degree > _MOST_DEGREE:
-            what = f"spherical harmonics of splats above degree {_MOST_DEGREE}"
+        if degree > _MAX_DEGREE:
+            what = f"spherical harmonics of splats above degree {_MAX_DEGREE}"
             self.report.missing(what, prim.GetPath())
-        return _plain(harmonics[:, : (_MOST_DEGREE + 1) ** 2])
+        return _plain(harmonics[:, : (_MAX_DEGREE + 1) ** 2])
 
 
 def _plain(values: NDArray[Any]) -> Array:
@@ -192,9 +192,9 @@ class PointReader:
         if positions is None:
             return None
         layout = lay_out_points(len(positions))
-        bad = bad_points(positions)
+        bad = invalid_point_mask(positions)
         if bad.all():
-            raise MeshError("their positions are not finite or absurdly far away")
+            raise MeshError("their positions are not finite or too far away")
         if matrix != IDENTITY:
             positions = bake(positions, matrix)
         widths, _ = read_widths(prim, layout, self.time, self.report)
@@ -204,7 +204,7 @@ class PointReader:
         if bad.any():
             what = f"{int(bad.sum())} of {len(bad)} points left out"
             where = prim.GetPath()
-            self.report.warn(f"{what}: they are not finite or absurdly far away", where)
+            self.report.warn(f"{what}: they are not finite or too far away", where)
             positions, radii = positions.copy(), radii.copy()
             positions[bad], radii[bad] = positions[np.flatnonzero(~bad)[0]], 0.0
         bounds = thick_extent(positions, radii)

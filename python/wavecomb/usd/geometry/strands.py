@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf
 
 from wavecomb.usd.geometry.primvar import Primvar, PrimvarError
-from wavecomb.usd.geometry.view_size import ViewSize
+from wavecomb.usd.geometry.screen_size import ViewSize
 from wavecomb.usd.stage.report import LoadReport
 
 Array = NDArray[np.float32]
@@ -320,7 +320,7 @@ def lay_out_points(count: int) -> Strands:
     return Strands("linear", "periodic", every, one, every, one, every, sizes)
 
 
-LEAST_SHARE = 1.0 / 256.0
+MIN_SHARE = 1.0 / 256.0
 """Smallest fraction of strands that is kept, however thin they are."""
 
 
@@ -357,8 +357,8 @@ class StrandDetail:
             matrix: Transform from the prim to the world.
         """
         share = np.clip(self._pixels(strands, points, widths, matrix) / self.target, 0.0, 1.0)
-        share = np.maximum(share, LEAST_SHARE)
-        kept = even(strands.kept) < share
+        share = np.maximum(share, MIN_SHARE)
+        kept = hash_to_unit(strands.kept) < share
         if not kept.any():
             kept[np.argmax(share)] = True
         if not kept.all():
@@ -381,7 +381,7 @@ class StrandDetail:
         return np.asarray(wide / np.maximum(nearest, 1e-30), np.float64)
 
 
-def even(numbers: NDArray[np.intp]) -> NDArray[np.float64]:
+def hash_to_unit(numbers: NDArray[np.intp]) -> NDArray[np.float64]:
     """Maps integers to pseudo-random numbers in [0, 1) with the finaliser of SplitMix64."""
     with np.errstate(over="ignore"):
         x = numbers.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)

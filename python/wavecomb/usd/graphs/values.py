@@ -291,7 +291,7 @@ class Expressions:
         """Returns a placeholder for a primvar, replaced per mesh; ``otherwise`` is its default."""
         return self._all(self._node(PRIMVAR, len(otherwise), (otherwise,), number))
 
-    def again(self, node: Node, operands: tuple[Value, ...]) -> Value:
+    def with_operands(self, node: Node, operands: tuple[Value, ...]) -> Value:
         """Returns a copy of a node with other operands."""
         if node.code == "input":
             return self.input(node.name)

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
-from wavecomb.usd.looks.colour_space import LINEAR, OCIO_NAMES, RAW, SRGB, canonical, convert
-from wavecomb.usd.looks.network import number, word
-from wavecomb.usd.looks.pixels import Image, read_image
-from wavecomb.usd.looks.texture import TextureTable
+from wavecomb.usd.instances.point_instancer import are_valid
+from wavecomb.usd.materials.colour_space import LINEAR, OCIO_NAMES, RAW, SRGB, canonical, convert
+from wavecomb.usd.materials.network import number, word
+from wavecomb.usd.materials.pixels import Image, read_image
+from wavecomb.usd.materials.texture import TextureTable
 from wavecomb.usd.stage.context import LoadContext
-from wavecomb.usd.stage.instancing import sound
 
 Matrices = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ class DomeReader:
         for path in relation.GetForwardedTargets() if relation else ():
             portal = prim.GetStage().GetPrimAtPath(path)
             if not portal or portal.GetTypeName() != "PortalLight":
-                self.report.warn(f"portal {path} is no PortalLight: left out", prim.GetPath())
+                self.report.warn(f"portal {path} is not a PortalLight: left out", prim.GetPath())
                 continue
             cache = UsdGeom.XformCache(self.time)
             dome = local @ np.array(cache.GetLocalToWorldTransform(prim))
@@ -93,7 +93,7 @@ class DomeReader:
             size = [abs(number(side, 1.0)) for side in sides]
             place = np.array(cache.GetLocalToWorldTransform(portal))
             square = np.diag((*size, 1.0, 1.0)) @ place
-            if not sound(np.stack([dome, square])).all():
+            if not are_valid(np.stack([dome, square])).all():
                 self.report.warn("portal left out: its transform has no inverse", path)
                 continue
             found.append(square @ np.linalg.inv(dome))
@@ -150,14 +150,16 @@ def to_latlong(pixels: NDArray[Any], form: str) -> NDArray[np.float32]:
         x, y, z = np.broadcast_arrays(
             ring * np.sin(lon), np.sin(lat)[:, None], ring * np.cos(lon)
         )  # fmt: skip
-        u, v, low, high = _place(x, y, z, form)
+        u, v, low, high = _image_coordinates(x, y, z, form)
         values = _bilinear(source, u, v, low, high)
         fine = values.reshape(last - first, n, 2 * rows, n, channels)
         out[first:last] = fine.mean(axis=(1, 3))
     return out
 
 
-def _place(x: Floats, y: Floats, z: Floats, form: str) -> tuple[Floats, Floats, Any, Any]:
+def _image_coordinates(
+    x: Floats, y: Floats, z: Floats, form: str
+) -> tuple[Floats, Floats, Any, Any]:
     """Maps directions to image coordinates in [0, 1]: u to the right, v down.
 
     Also returns the lowest and highest (u, v) that bilinear samples may read.

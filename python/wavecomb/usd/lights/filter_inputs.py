@@ -13,9 +13,9 @@ from typing import Any
 
 from pxr import Usd
 
-from wavecomb.picture.working_space import LUMINANCE
-from wavecomb.usd.looks.colour_space import Colour
-from wavecomb.usd.looks.network import colour, number, read_colour, word
+from wavecomb.image.working_space import LUMINANCE
+from wavecomb.usd.materials.colour_space import Colour
+from wavecomb.usd.materials.network import colour, number, read_colour, word
 from wavecomb.usd.stage.report import LoadReport
 
 _PREFIXES = (
@@ -110,7 +110,7 @@ class Gel:
     diffuse: float = 1.0
     specular: float = 1.0
 
-    def over(self, rgb: Colour) -> Colour:
+    def apply(self, rgb: Colour) -> Colour:
         """Applies the gel to a light's colour."""
         r, g, b = (c * t for c, t in zip(rgb, self.tint, strict=True))
         if self.saturation == 1:

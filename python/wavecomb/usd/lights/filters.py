@@ -26,8 +26,8 @@ from wavecomb.usd.lights.filter_inputs import (
     kind_of,
     plain_kind,
 )
-from wavecomb.usd.looks.network import asset_file, number, space_of
-from wavecomb.usd.looks.texture import TextureTable
+from wavecomb.usd.materials.network import asset_file, number, space_of
+from wavecomb.usd.materials.texture import TextureTable
 from wavecomb.usd.stage.collections import Collections
 from wavecomb.usd.stage.context import LoadContext
 
@@ -112,7 +112,7 @@ class FilterReader:
         found = [self._flaps(doors, light, "barndoor")] if has_doors else []
         for path, prim in prims:
             if prim is None:
-                self._report.warn(f"light filter {path} is not there", light.GetPath())
+                self._report.warn(f"light filter {path} does not exist", light.GetPath())
                 continue
             reader = self._readers.get(plain_kind(prim))
             if reader is None:

@@ -16,9 +16,9 @@ from wavecomb.usd.stage.context import LoadContext
 
 Floats = NDArray[np.float64]
 
-MOST_BYTES = 1 << 26
+MAX_BYTES = 1 << 26
 """Largest size of a profile in bytes."""
-_MOST_VALUES = 1 << 24
+_MAX_VALUES = 1 << 24
 _WORDS = re.compile(r"[^\s,]+")
 _TYPES = {1: "C", 2: "B", 3: "A"}
 
@@ -60,15 +60,15 @@ def parse_ies(text: str) -> IesProfile:
         pairs = _count(numbers, "tilt angles")
         _take(numbers, 2 * pairs, "tilt")
     elif tilt != "NONE":
-        raise IesError(f"its tilt is in another file ({tilt or 'no name'}), which is not read")
+        raise IesError(f"its tilt is in another file ({tilt or 'no name'}), which is not supported")
     _, _, factor = _take(numbers, 3, "head")
     rows, columns = _count(numbers, "vertical angles"), _count(numbers, "horizontal angles")
     kind = _TYPES.get(int(_take(numbers, 1, "head")[0]))
     if kind is None:
         raise IesError("its photometric type is not 1, 2 or 3")
     _, _, _, _, ballast, lamp, _ = _take(numbers, 7, "head")
-    if rows * columns > _MOST_VALUES:
-        raise IesError(f"it says that it has {rows} x {columns} values")
+    if rows * columns > _MAX_VALUES:
+        raise IesError(f"it declares {rows} x {columns} values")
     vertical = _ascending(_take(numbers, rows, "vertical angles"), "vertical")
     horizontal = _ascending(_take(numbers, columns, "horizontal angles"), "horizontal")
     candela = _take(numbers, rows * columns, "candela").reshape(columns, rows)
@@ -104,8 +104,8 @@ def _take(numbers: Iterator[float], n: int, what: str) -> Floats:
 
 def _count(numbers: Iterator[float], what: str) -> int:
     n = _take(numbers, 1, "head")[0]
-    if not 0 < n <= _MOST_VALUES or n != int(n):
-        raise IesError(f"it says that it has {n:g} {what}")
+    if not 0 < n <= _MAX_VALUES or n != int(n):
+        raise IesError(f"it declares {n:g} {what}")
     return int(n)
 
 
@@ -139,14 +139,14 @@ def _expand_c(vertical: Floats, horizontal: Floats, candela: Floats) -> IesProfi
             horizontal = np.append(0.0, horizontal)
             candela = np.append(seam[None], candela, axis=0)
     elif first != 0:
-        raise IesError(f"its horizontal angles begin at {first:g} degrees, which is not known")
+        raise IesError(f"its horizontal angles begin at {first:g} degrees, which is unsupported")
     elif last == 90:
         mirrored(90)
         mirrored(180)
     elif last == 180:
         mirrored(180)
     elif last < 180:
-        raise IesError(f"its horizontal angles end at {last:g} degrees, which is not known")
+        raise IesError(f"its horizontal angles end at {last:g} degrees, which is unsupported")
     if horizontal[-1] > 360:
         raise IesError("its horizontal angles go beyond 360 degrees")
     if horizontal[-1] < 360:
@@ -221,11 +221,11 @@ class IesTable:
     def _read(self, path: str) -> int | IesError:
         try:
             if not os.path.isfile(path) and os.path.exists(path):
-                raise IesError("it is no regular file")
-            if os.path.getsize(path) > MOST_BYTES:
+                raise IesError("it is not a regular file")
+            if os.path.getsize(path) > MAX_BYTES:
                 raise IesError("it is too large")
             with open(path, encoding="latin-1") as file:
-                profile = parse_ies(file.read(MOST_BYTES))
+                profile = parse_ies(file.read(MAX_BYTES))
         except IesError as error:
             return error
         except (OSError, ValueError, MemoryError) as error:

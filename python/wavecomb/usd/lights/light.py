@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
+from wavecomb.image.working_space import LUMINANCE, from_rec709
 from wavecomb.light_table import (
     EDITABLE,
     MESH,
@@ -19,12 +20,11 @@ from wavecomb.light_table import (
     light_parameters,
     of_kind,
 )
-from wavecomb.picture.working_space import LUMINANCE, from_rec709
 from wavecomb.usd.lights.dome import DomeReader
 from wavecomb.usd.lights.filter_inputs import Gel, gel_of
 from wavecomb.usd.lights.filters import Filter, FilterReader
-from wavecomb.usd.looks.colour_space import Colour
-from wavecomb.usd.looks.network import (
+from wavecomb.usd.materials.colour_space import Colour
+from wavecomb.usd.materials.network import (
     UDIM,
     asset_file,
     colour,
@@ -33,8 +33,8 @@ from wavecomb.usd.looks.network import (
     space_of,
     tile_files,
 )
-from wavecomb.usd.looks.pixels import Image
-from wavecomb.usd.looks.texture import TextureTable
+from wavecomb.usd.materials.pixels import Image
+from wavecomb.usd.materials.texture import TextureTable
 from wavecomb.usd.stage.collections import Collections, Rules
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.identity import LightGroups
@@ -216,7 +216,7 @@ class LightReader:
             kelvin = number(self._get(prim, "colorTemperature", 6500.0), 6500.0)
             tint = blackbody(kelvin)
         r, g, b = (float(c * t * power) for c, t in zip(base, tint, strict=True))
-        rgb = gel.over((r, g, b))
+        rgb = gel.apply((r, g, b))
         working = "rec709" if self.textures is None else self.textures.working
         r, g, b = (float(value) for value in from_rec709(np.array(rgb), working))
         # Colours outside the gamut of the working space are clipped.
@@ -241,14 +241,14 @@ class LightReader:
         options["radius"] = 0.0
         options["color"] = tuple(area * value for value in options["color"])
         if radius == 0 and not normalize:
-            self.report.note("sphere light of radius 0: taken as normalized", prim.GetPath())
+            self.report.note("sphere light of radius 0: treated as normalized", prim.GetPath())
 
     def _cylinder(self, prim: Usd.Prim, options: dict[str, Any], normalize: bool) -> bool:
         """Replaces a radius of 0 by a thin cylinder; returns whether the light is normalised."""
         length: float = options["length"]
         if options["radius"] == 0 and length > 0:
             self.report.note(
-                "cylinder light of radius 0: taken for a thin one, normalized", prim.GetPath()
+                "cylinder light of radius 0: treated as thin and normalized", prim.GetPath()
             )
             options["radius"], normalize = 1e-3 * length, True
         return normalize

@@ -9,10 +9,10 @@ import numpy as np
 from pxr import Sdf, UsdLux
 
 from wavecomb.usd.lights.light import LightReader
-from wavecomb.usd.looks.assign import Draw
-from wavecomb.usd.looks.material import MaterialTable
-from wavecomb.usd.looks.network import word
-from wavecomb.usd.looks.surface import Surface
+from wavecomb.usd.materials.assignment import DrawItem
+from wavecomb.usd.materials.material import MaterialTable
+from wavecomb.usd.materials.network import word
+from wavecomb.usd.materials.surface import Surface
 from wavecomb.usd.stage.context import LoadContext
 
 NO_RESPONSE = "noMaterialResponse"
@@ -49,10 +49,10 @@ class MeshLights:
         self._lights = lights
         self._materials = materials
 
-    def of(self, draw: Draw, kind: str) -> MeshLight | None:
+    def of(self, draw: DrawItem, kind: str) -> MeshLight | None:
         """Returns the mesh light of a gprim; None if it is not a light.
 
-        ``draw`` holds the gprim and its transform to its group; ``kind`` is ``Draw.kind``.
+        ``draw`` holds the gprim and its transform to its group; ``kind`` is ``DrawItem.kind``.
         """
         if not draw.prim.HasAPI(UsdLux.LightAPI):
             return None
@@ -67,7 +67,7 @@ class MeshLights:
         options = self._lights.read_mesh(draw.prim)
         material = None
         if sync == NO_RESPONSE:
-            material = self._lamp(self._lights.hidden)
+            material = self._light_material(self._lights.hidden)
             options["visible"] = not self._lights.hidden
         number = self._builder.add_mesh_light(np.array(draw.matrix), sync, **options)
         self.any = True
@@ -75,12 +75,12 @@ class MeshLights:
         kept = {"shadow_link", "shadow_color", "shadow_distance"} & options.keys()
         return MeshLight(number, material, sync == "independent" or bool(kept))
 
-    def say_moving(self, path: Sdf.Path) -> None:
+    def report_motion(self, path: Sdf.Path) -> None:
         """Reports features that do not work for a moving light that only light sampling finds."""
         what = "shadow settings and the sync mode independent of moving mesh lights"
         self._report.missing(what, path)
 
-    def _lamp(self, hidden: bool) -> int:
+    def _light_material(self, hidden: bool) -> int:
         """Returns the material of meshes without response: radiance 1, tinted in the core."""
         parameters = {"emission": (1.0, 1.0, 1.0)}
         if not hidden:

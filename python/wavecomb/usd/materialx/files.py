@@ -12,8 +12,8 @@ from xml.parsers import expat
 
 from pxr import Ar, UsdShade
 
+from wavecomb.image.files.output_file import kind_of
 from wavecomb.path_maps import mapped, own_maps
-from wavecomb.picture.files import kind_of
 from wavecomb.usd.materialx.library import library
 
 MAX_DEPTH = 64
@@ -92,7 +92,7 @@ def _read(path: str, above: tuple[str, ...], left: _Budget) -> Any:
         for name in includes:
             other = resolve(name, path)
             if not other:
-                raise MtlxError(f"it includes {name}, which is not there")
+                raise MtlxError(f"it includes {name}, which does not exist")
             if other in (*above, path):
                 raise MtlxError(f"it includes {name}, which includes it")
             left.files -= 1
@@ -120,12 +120,12 @@ def _read(path: str, above: tuple[str, ...], left: _Budget) -> Any:
 def _bytes(path: str, most: int) -> bytes:
     if not (Ar.IsPackageRelativePath(path) or "://" in path or os.path.isfile(path)):
         kind = kind_of(path)
-        raise MtlxError("it is no file" if kind is None else f"it is {kind}, not a regular file")
+        raise MtlxError("it is not a file" if kind is None else f"it is {kind}, not a regular file")
     asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(path))
     if not asset:
         raise MtlxError("it cannot be opened")
     if asset.GetSize() > most:
-        raise MtlxError(f"with what it includes it has more than {MAX_BYTES >> 20} MB")
+        raise MtlxError(f"it and its includes have more than {MAX_BYTES >> 20} MB")
     return bytes(asset.GetBuffer() or b"")
 
 
@@ -142,7 +142,7 @@ def _check(data: bytes) -> list[str]:
         if not open_elements and name != "materialx":
             raise MtlxError(f"it is <{name}>, not <materialx>")
         if len(open_elements) >= MAX_DEPTH:
-            raise MtlxError(f"more than {MAX_DEPTH} elements are inside of each other")
+            raise MtlxError(f"elements are nested more than {MAX_DEPTH} deep")
         open_elements.append(name)
         if name == _INCLUDE:
             includes.append(attributes.get("href", ""))

@@ -143,7 +143,9 @@ class Graphs:
             return spec
         prim = self._prims.define(path, "Shader")
         if nodedef is None:
-            self._prims.tell(node, f"MaterialX node {node.getCategory()} has no definition")
+            self._prims.report_skipped(
+                node, f"MaterialX node {node.getCategory()} has no definition"
+            )
         self._prims.identify(prim, node.getCategory() if nodedef is None else nodedef.getName())
         return prim
 
@@ -214,7 +216,7 @@ class Graphs:
                 return self.source(output, graph, container)
         else:
             return None
-        self._prims.tell(item, "MaterialX connection leads nowhere (left out)")
+        self._prims.report_skipped(item, "MaterialX connection has no target (left out)")
         return None
 
 

@@ -37,7 +37,7 @@ def library() -> Any:
 
 
 @dataclass(frozen=True)
-class Feed:
+class PortSource:
     """Source of a node input or graph output: a value, an interface input or a node output.
 
     Attributes:
@@ -61,7 +61,7 @@ class Feed:
 
 
 @dataclass(frozen=True)
-class Inner:
+class FlatNode:
     """A node of a flat graph.
 
     Attributes:
@@ -73,7 +73,7 @@ class Inner:
 
     category: str
     identifier: str
-    inputs: dict[str, Feed]
+    inputs: dict[str, PortSource]
     outputs: dict[str, str]
 
 
@@ -90,7 +90,7 @@ class Definition:
 
     identifier: str
     category: str
-    inputs: dict[str, Feed]
+    inputs: dict[str, PortSource]
     outputs: dict[str, str]
 
 
@@ -105,8 +105,8 @@ class FlatGraph:
     """
 
     definition: Definition
-    nodes: dict[str, Inner]
-    results: dict[str, Feed]
+    nodes: dict[str, FlatNode]
+    results: dict[str, PortSource]
 
 
 @functools.cache
@@ -149,14 +149,14 @@ def flat_graph(identifier: str, primitives: Collection[str]) -> FlatGraph | None
         graph.copyContentFrom(found)
         graph.removeAttribute("nodedef")
         graph.flattenSubgraphs("", lambda node: node.getCategory() not in primitives)
-        nodes = {node.getName(): _inner(node) for node in graph.getNodes()}
-        results = {output.getName(): _feed(output) for output in graph.getOutputs()}
+        nodes = {node.getName(): _flat_node(node) for node in graph.getNodes()}
+        results = {output.getName(): _port_source(output) for output in graph.getOutputs()}
     return FlatGraph(definition, _ordered(nodes), results)
 
 
-def _ordered(nodes: dict[str, Inner]) -> dict[str, Inner]:
+def _ordered(nodes: dict[str, FlatNode]) -> dict[str, FlatNode]:
     """Returns the nodes in evaluation order."""
-    done: dict[str, Inner] = {}
+    done: dict[str, FlatNode] = {}
     stack = [(name, False) for name in reversed(nodes)]
     while stack:
         name, ready = stack.pop()
@@ -169,30 +169,30 @@ def _ordered(nodes: dict[str, Inner]) -> dict[str, Inner]:
     return done
 
 
-def _inner(node: Any) -> Inner:
+def _flat_node(node: Any) -> FlatNode:
     nodedef = node.getNodeDef()
-    inputs = {item.getName(): _feed(item) for item in node.getInputs()}
+    inputs = {item.getName(): _port_source(item) for item in node.getInputs()}
     identifier = "" if nodedef is None else nodedef.getName()
     outputs = {"out": node.getType()} if nodedef is None else _outputs(nodedef)
-    return Inner(node.getCategory(), identifier, inputs, outputs)
+    return FlatNode(node.getCategory(), identifier, inputs, outputs)
 
 
 def _outputs(nodedef: Any) -> dict[str, str]:
     return {output.getName(): output.getType() for output in nodedef.getActiveOutputs()}
 
 
-def _feed(item: Any) -> Feed:
+def _port_source(item: Any) -> PortSource:
     node = item.getNodeName()
     if node:
-        return Feed(item.getType(), node=node, output=item.getOutputString())
+        return PortSource(item.getType(), node=node, output=item.getOutputString())
     interface = item.getInterfaceName()
     if interface:
-        return Feed(item.getType(), interface=interface)
-    return Feed(item.getType(), value=item.getValueString())
+        return PortSource(item.getType(), interface=interface)
+    return PortSource(item.getType(), value=item.getValueString())
 
 
-def _default(item: Any) -> Feed:
+def _default(item: Any) -> PortSource:
     place = item.getDefaultGeomProp()
     if place is None:
-        return Feed(item.getType(), value=item.getValueString())
-    return Feed(item.getType(), place=place.getGeomProp(), space=place.getSpace() or "object")
+        return PortSource(item.getType(), value=item.getValueString())
+    return PortSource(item.getType(), place=place.getGeomProp(), space=place.getSpace() or "object")

@@ -12,7 +12,7 @@ from pxr import Gf, Sdf, Tf, Vt
 from wavecomb.usd.materialx.files import image_file
 from wavecomb.usd.stage.report import LoadReport
 
-Tell = Callable[[Any, str], None]
+ReportSkipped = Callable[[Any, str], None]
 """Callback that receives a document element and a message about it."""
 
 TERMINALS = {
@@ -47,11 +47,13 @@ class Prims:
         report: Receives notes.
     """
 
-    def __init__(self, layer: Sdf.Layer, file: str, tell: Tell, report: LoadReport) -> None:
+    def __init__(
+        self, layer: Sdf.Layer, file: str, tell: ReportSkipped, report: LoadReport
+    ) -> None:
         self.report = report
         self.layer = layer
         self.file = file
-        self.tell = tell
+        self.report_skipped = tell
 
     def define(self, path: Sdf.Path, kind: str = "") -> Sdf.PrimSpec:
         """Defines a prim with a type, and its ancestors; returns it if it exists."""
@@ -108,13 +110,15 @@ class Prims:
         if not text:
             return
         if port.typeName != (usd_type(kind) or Sdf.ValueTypeNames.Token):
-            self.tell(element, f"MaterialX value of type {kind} for {port.typeName} (left out)")
+            self.report_skipped(
+                element, f"MaterialX value of type {kind} for {port.typeName} (left out)"
+            )
             return
         space = element.getActiveColorSpace()
         if kind == "filename":
             text, is_bare = image_file(element, self.file)
             if is_bare:
-                self.report.note("MaterialX fileprefix leads nowhere (left out)", self.file)
+                self.report.note("MaterialX fileprefix is not a folder (left out)", self.file)
             # Like OpenUSD, do not apply a document-wide linear Rec. 709 to images.
             is_said = space not in _PLAIN_SPACES or element.hasColorSpace()
             if makes_colour and is_said:
@@ -126,7 +130,7 @@ class Prims:
         try:
             port.default = usd_value(text, kind)
         except ValueError as error:
-            self.tell(element, f"MaterialX value {error} (left out)")
+            self.report_skipped(element, f"MaterialX value {error} (left out)")
 
 
 def connect(port: Sdf.AttributeSpec, source: Sdf.Path) -> None:

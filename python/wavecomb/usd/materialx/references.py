@@ -16,13 +16,13 @@ from typing import Any
 
 from pxr import Ar, Sdf, Tf, Usd
 
-from wavecomb.run.isolate import trail
+from wavecomb.run.isolation import progress_notes
+from wavecomb.usd.layers.unopened_materialx import unopened_materialx
 from wavecomb.usd.materialx.files import MtlxError, read_document
 from wavecomb.usd.materialx.graphs import Graphs
-from wavecomb.usd.materialx.looks import Materials, write_looks
+from wavecomb.usd.materialx.materials import Materials, write_looks
 from wavecomb.usd.materialx.prims import Prims
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.stage.unread import unread_mtlx
 
 MAX_ROUNDS = 16
 """Most passes over a stage, since a translated file may refer to further files."""
@@ -68,7 +68,7 @@ def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
     """Makes a stage use the MaterialX files that its layers name.
 
     Changes the layers in memory, which then can no longer be saved. Unreadable files stay missing;
-    ``tell`` reports them. The call is fast if no such file is missing.
+    ``report_problems`` reports them. The call is fast if no such file is missing.
 
     Args:
         stage: The stage.
@@ -77,7 +77,7 @@ def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
     """
     tried: set[tuple[str, str]] = set()
     for turn in range(MAX_ROUNDS):
-        if not (everywhere and turn == 0) and not any(True for _ in unread_mtlx(stage)):
+        if not (everywhere and turn == 0) and not any(True for _ in unopened_materialx(stage)):
             return
         with _lock, Ar.ResolverContextBinder(stage.GetPathResolverContext()):
             changes = _changes(stage, tried)
@@ -104,9 +104,9 @@ def reload(stage: Usd.Stage) -> None:
     resolve(stage, everywhere=True)
 
 
-def tell(stage: Usd.Stage, report: LoadReport) -> None:
+def report_problems(stage: Usd.Stage, report: LoadReport) -> None:
     """Reports MaterialX files that are missing, and problems of translated ones."""
-    for error, named in unread_mtlx(stage):
+    for error, named in unopened_materialx(stage):
         known = next((t for file, t in _translations.items() if _same(file, named)), None)
         why = known.error if known is not None and known.error else _why(named)
         place = str(error.rootSite.path)
@@ -154,7 +154,7 @@ def _translated(file: str) -> _Translation:
     known = _translations.get(file)
     if known is not None and known.stamp == stamp:
         return known
-    trail.note("translating", file)
+    progress_notes.note("translating", file)
     try:
         layer, report = translate(file)
         error = ""

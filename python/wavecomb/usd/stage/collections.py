@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
 
-from wavecomb.usd.stage.diagnostics import commentary
+from wavecomb.usd.stage.diagnostics import first_message
 from wavecomb.usd.stage.report import LoadReport
 
 Rules = dict[str, str]
 """Rule for each path: exclude, explicit (only that path) or expand (the path and all below it)."""
 
-MOST_PRIMS = 1 << 20
+MAX_PRIMS = 1 << 20
 """Most prims at which an expression is evaluated; nested instancing may create billions."""
 
 _RULES = {
@@ -46,7 +46,7 @@ class Collections:
             if _has_expression(collection) and not query.GetAsPathExpansionRuleMap():
                 return self._of_expression(collection, query)
         except Tf.ErrorException as error:
-            what = f"{name}: its membershipExpression cannot be evaluated ({commentary(error)})"
+            what = f"{name}: its membershipExpression cannot be evaluated ({first_message(error)})"
             self._report.warn(f"{what}: it has no members", prim.GetPath())
             return {}
         self._warn_of_ignored(collection, query, name)
@@ -70,7 +70,7 @@ class Collections:
         if expression not in self._by_expression:
             rules, is_whole = _evaluated(collection.GetPrim().GetStage(), query)
             if not is_whole:
-                what = f"membershipExpression beyond {MOST_PRIMS} prims (cut there)"
+                what = f"membershipExpression beyond {MAX_PRIMS} prims (cut there)"
                 self._report.missing(what, collection.GetPath())
             self._by_expression[expression] = rules
         return self._by_expression[expression]
@@ -117,7 +117,7 @@ def _evaluated(
     prims = Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
     walk = iter(prims)
     for count, prim in enumerate(walk):
-        if count >= MOST_PRIMS:
+        if count >= MAX_PRIMS:
             return rules, False
         # Materials are never members.
         if prim.IsA(UsdShade.NodeGraph):

@@ -42,7 +42,7 @@ _SAID = re.compile(r"Could not (open asset|load sublayer) @[^@]*\.mtlx\]*@", re.
 """Diagnostics that are dropped because ``usd.mtlx`` reports the same problem in more detail."""
 
 
-def _tell(report: LoadReport, text: str) -> None:
+def _add_to_report(report: LoadReport, text: str) -> None:
     """Adds one diagnostic to a report."""
     for form, words in _FORMS:
         match = form.search(text)
@@ -52,7 +52,7 @@ def _tell(report: LoadReport, text: str) -> None:
     report.warn(f"USD: {text}")
 
 
-def commentary(error: BaseException) -> str:
+def first_message(error: BaseException) -> str:
     """Returns the first message of a ``Tf.ErrorException``."""
     try:
         for item in error.args:
@@ -89,7 +89,7 @@ def _muted_stderr() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def captured(report: LoadReport) -> Iterator[None]:
+def capture_diagnostics(report: LoadReport) -> Iterator[None]:
     """Adds messages that USD's C++ code emits inside the block to the report as warnings."""
     trap_type = getattr(Tf, "DiagnosticTrap", None)
     if trap_type is None:
@@ -112,7 +112,7 @@ def _hooked(report: LoadReport) -> Iterator[None]:
     before = sys.excepthook
 
     def tell(kind: type[BaseException], error: BaseException, trace: Any) -> None:
-        _tell(report, plain(f"{kind.__name__}: {error}"))
+        _add_to_report(report, plain(f"{kind.__name__}: {error}"))
 
     sys.excepthook = tell
     try:
@@ -128,16 +128,16 @@ def _pass_on(trap: Any, report: LoadReport) -> None:
     # Reworded messages are grouped in the report, so they do not count towards the limit.
     known = [line for line in lines if any(f.search(line) for f, words in _FORMS if words)]
     for line in known:
-        _tell(report, line)
+        _add_to_report(report, line)
     lines = [line for line in lines if line not in set(known)]
     for line in lines[:MAX_LINES]:
-        _tell(report, line)
+        _add_to_report(report, line)
     if len(lines) > MAX_LINES:
         report.warn(f"USD: {len(lines) - MAX_LINES} more messages like these")
     trap.Clear()
 
 
-class Listening:
+class DiagnosticListener:
     """Capture of messages that USD's C++ code emits on this thread while the program runs.
 
     Does nothing with USD versions that have no ``Tf.DiagnosticTrap``.

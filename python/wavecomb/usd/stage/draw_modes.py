@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdShade
 
-from wavecomb.usd.looks.network import colour, word
+from wavecomb.usd.materials.network import colour, word
 from wavecomb.usd.stage.report import LoadReport
 
 MODES = ("origin", "bounds", "cards")
@@ -193,10 +193,14 @@ class DrawModes:
             subset.CreateIndicesAttr([place])
             subsets.append(subset.GetPrim())
             name = f"cardLook{_CARDS[number]}"
-            materials.append(self._look(mesh.GetPath().AppendChild(name), own, self._colour(prim)))
+            materials.append(
+                self._add_material(mesh.GetPath().AppendChild(name), own, self._colour(prim))
+            )
         return StandIn(mesh.GetPrim(), "mesh", tuple(subsets), tuple(materials))
 
-    def _look(self, path: Sdf.Path, texture: str | None, colour: Gf.Vec3f) -> UsdShade.Material:
+    def _add_material(
+        self, path: Sdf.Path, texture: str | None, colour: Gf.Vec3f
+    ) -> UsdShade.Material:
         """Creates a diffuse material with a texture that has cut-out alpha, or with a colour."""
         kinds = Sdf.ValueTypeNames
         material = UsdShade.Material.Define(self._stage, path)

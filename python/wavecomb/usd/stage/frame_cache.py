@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Gf, Sdf, Usd
 
-from wavecomb.usd.looks.texture import TextureCache
+from wavecomb.usd.materials.texture import TextureCache
 from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ class MeshCache:
     At the end of a frame, arrays that the frame did not use are removed.
     """
 
-    def __init__(self, varying: Varying) -> None:
+    def __init__(self, varying: AnimatedAttributes) -> None:
         self._varying = varying
         self._kept: dict[Any, tuple[MeshArrays | CurveArrays | None, LoadReport]] = {}
         self._used: dict[Any, tuple[MeshArrays | CurveArrays | None, LoadReport]] = {}
@@ -102,7 +102,7 @@ class FrameCache:
 
     def __init__(self, stage: Usd.Stage, opening: LoadReport) -> None:
         """``opening`` holds messages from opening the stage."""
-        self.varying = Varying(stage)
+        self.varying = AnimatedAttributes(stage)
         self.meshes = MeshCache(self.varying)
         self.refined = RefinedCache()
         self.has_same_levels: Callable[[View, tuple[int, int] | None], bool] = lambda view, size: (
@@ -128,7 +128,7 @@ _UNREAD = ("RenderSettings", "RenderProduct", "RenderVar", "RenderPass")
 """Types whose time-varying values are never read."""
 
 
-class Varying:
+class AnimatedAttributes:
     """Attributes of a stage whose values may change over time, found once.
 
     Includes time samples, splines and value clips, as USD reports them. The stage must not be

@@ -9,7 +9,7 @@ from typing import Any
 
 from pxr import Kind, Sdf, Usd, UsdGeom
 
-from wavecomb.usd.looks.assign import Parent
+from wavecomb.usd.materials.assignment import Parent
 from wavecomb.usd.stage.report import LoadReport
 
 OTHER = "other"

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from pxr import Tf, Usd, UsdGeom
 
 from wavecomb.errors import WavecombError
+from wavecomb.image.working_space import from_rec709
 from wavecomb.load_options import LoadOptions
 from wavecomb.machine import give_back_memory
-from wavecomb.picture.working_space import from_rec709
-from wavecomb.run.isolate import trail
-from wavecomb.run.isolate.memory import describe_limit
+from wavecomb.run.isolation import progress_notes
+from wavecomb.run.isolation.memory import describe_limit
 from wavecomb.usd import mtlx
 from wavecomb.usd.cameras.camera import (
     View,
@@ -29,32 +29,32 @@ from wavecomb.usd.cameras.camera import (
 )
 from wavecomb.usd.cameras.framing import corners, joined
 from wavecomb.usd.geometry.gprims import COUNTS
+from wavecomb.usd.geometry.screen_size import ViewSize
 from wavecomb.usd.geometry.shutter import find_motion
 from wavecomb.usd.geometry.strands import StrandDetail
-from wavecomb.usd.geometry.surfaces import Surfaces, parse_level
-from wavecomb.usd.geometry.view_size import ViewSize
+from wavecomb.usd.geometry.subdivision import SubdivisionSurfaces, parse_level
+from wavecomb.usd.instances.group import Group, changes_size, is_lit_by_emitters, placed_lights
+from wavecomb.usd.instances.group_builder import GroupBuilder, LoadProgress
+from wavecomb.usd.instances.volumes import add_volumes, report_grid_memory, report_ignored_volumes
+from wavecomb.usd.layers.opening import list_contents, open_stage, select_variants
+from wavecomb.usd.layers.population import report_unloaded_payloads
 from wavecomb.usd.lights.dome import Y_TO_Z, soft_dome
 from wavecomb.usd.lights.filters import add_filters
 from wavecomb.usd.lights.ies import IesTable
 from wavecomb.usd.lights.light import LightReader, LinkTable
-from wavecomb.usd.looks.material import MaterialTable
-from wavecomb.usd.looks.texture import MEGABYTE, TextureCache, TextureTable, texture_store
+from wavecomb.usd.materials.material import MaterialTable
+from wavecomb.usd.materials.texture import MEGABYTE, TextureCache, TextureTable, texture_store
+from wavecomb.usd.render_settings.view import ViewSettings, check_view, view_settings
 from wavecomb.usd.stage.context import LoadContext
-from wavecomb.usd.stage.diagnostics import NOT_TEXT, captured, commentary
+from wavecomb.usd.stage.diagnostics import NOT_TEXT, capture_diagnostics, first_message
 from wavecomb.usd.stage.frame_cache import FrameCache
-from wavecomb.usd.stage.group import Group, changes_size, light_what_is_drawn, placed_lights
-from wavecomb.usd.stage.groups import GroupBuilder, LoadProgress
 from wavecomb.usd.stage.identity import LightGroups
-from wavecomb.usd.stage.loaded import LoadedStage
-from wavecomb.usd.stage.opening import open_stage, select_variants, survey
-from wavecomb.usd.stage.origin import WORLD, Origin, find_origin, moved_to
-from wavecomb.usd.stage.population import tell_unloaded
-from wavecomb.usd.stage.ray_visibility import IGNORED, RayVisibility, check_there, set_catchers
+from wavecomb.usd.stage.load_result import LoadedStage
+from wavecomb.usd.stage.origin import WORLD, Origin, find_origin, to_scene_space
+from wavecomb.usd.stage.ray_visibility import IGNORED, RayVisibility, check_exists, set_catchers
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.stage.times import frame_number, time_code
-from wavecomb.usd.stage.traverse import Traversal
-from wavecomb.usd.stage.view_options import Seen, check_view, seen_on
-from wavecomb.usd.stage.volumes import add_volumes, say_cloudy, say_room
+from wavecomb.usd.stage.time_codes import frame_number, time_code
+from wavecomb.usd.stage.traversal import Traversal
 
 if TYPE_CHECKING:
     from wavecomb import _core
@@ -102,7 +102,7 @@ def load_stage(
     if cache is not None:
         reuse = cache.textures
     # Readers handle values that are not finite, so NumPy's warnings are disabled.
-    with captured(report), np.errstate(all="ignore"):
+    with capture_diagnostics(report), np.errstate(all="ignore"):
         store = None
         if builder_factory is None:
             from wavecomb import _core
@@ -120,17 +120,17 @@ def load_stage(
         except UnicodeDecodeError:
             raise WavecombError(f"{file}: {NOT_TEXT}") from None
         except Tf.ErrorException as error:
-            raise WavecombError(f"{file}: USD cannot read it: {commentary(error)}") from None
+            raise WavecombError(f"{file}: USD cannot read it: {first_message(error)}") from None
         except MemoryError:
             raise WavecombError(
                 f"{file}: out of memory while it was read{describe_limit()}"
             ) from None
-        trail.note("building the scene of", file)
+        progress_notes.note("building the scene of", file)
         try:
             scene = builder.build()
         except ValueError as error:
             raise WavecombError(f"{file}: {error}") from error
-        trail.note("rendering", file)
+        progress_notes.note("rendering", file)
     if cache is not None:
         cache.textures = textures.cache(scene)
         cache.end_frame()
@@ -155,7 +155,11 @@ def _file_of(source: str | Path | Usd.Stage) -> Path:
 def _opened(source: str | Path | Usd.Stage, options: LoadOptions) -> Usd.Stage:
     """Returns the open stage with the variants of the options."""
     if isinstance(source, Usd.Stage):
-        select_variants(source, options.variants or {})
+        target = source.GetEditTarget()
+        try:
+            select_variants(source, options.variants or {})
+        finally:
+            source.SetEditTarget(target)
         return source
     layer = None if options.session_layer is None else Path(options.session_layer)
     return open_stage(
@@ -186,7 +190,7 @@ class _Load:
         self._context = LoadContext(self._stage, time, builder, report, options)
         self.textures = TextureTable(self._context, reuse, store)
         self._materials = MaterialTable(self._context, self.textures, apart=editable)
-        self._surfaces = Surfaces(self._context, self._materials)
+        self._surfaces = SubdivisionSurfaces(self._context, self._materials)
 
     def run(self, cache: FrameCache | None, progress: LoadProgress | None) -> dict[str, Any]:
         """Fills the builder; returns fields of ``LoadedStage``."""
@@ -198,75 +202,81 @@ class _Load:
     def _run(self, cache: FrameCache | None, progress: LoadProgress | None) -> dict[str, Any]:
         c, textures = self._context, self.textures
         if cache is None:
-            mtlx.tell(c.stage, c.report)
-        tell_unloaded(c.stage, c.report)
-        found = survey(c.stage)
-        seen = seen_on(c.stage, c.options, c.report)
-        c.motion = find_motion(seen.camera, c.time, seen.blur, c.report)
-        c.purposes, c.binding_purposes = seen.purposes, seen.binding_purposes
-        c.origin = textures.origin = find_origin(c.stage, c.time, seen.camera, seen.purposes)
+            mtlx.report_problems(c.stage, c.report)
+        report_unloaded_payloads(c.stage, c.report)
+        found = list_contents(c.stage)
+        settings = view_settings(c.stage, c.options, c.report)
+        c.motion = find_motion(settings.camera, c.time, settings.blur, c.report)
+        c.purposes, c.binding_purposes = settings.purposes, settings.binding_purposes
+        c.origin = textures.origin = find_origin(
+            c.stage, c.time, settings.camera, settings.purposes
+        )
         groups = LightGroups(c.report)
         lights = LightReader(c, textures, groups, IesTable(c), LinkTable(c))
         rays = RayVisibility(c, IGNORED[c.options.catch])
         if c.options.texture_limit is not None and textures.store is None:
-            self._limit_textures(seen)
-        view = self._camera_view(seen, c.origin, c.report)
-        planes = frame_planes(c.up_axis, seen.lens, c.options.size)
+            self._limit_textures(settings)
+        view = self._camera_view(settings, c.origin, c.report)
+        planes = frame_planes(c.up_axis, settings.lens, c.options.size)
         c.framed = planes if view is None else None
         self._surfaces.cache = None if cache is None else cache.refined
-        groups_of = GroupBuilder(
+        group_builder = GroupBuilder(
             c, Traversal(c, lights, rays), self._materials, groups, self._surfaces,
-            None if cache is None else cache.meshes, progress,
+            cache=None if cache is None else cache.meshes, progress=progress,
             detail=self._strand_detail(view), notes_emitters=not found.lights,
         )  # fmt: skip
-        world = groups_of.world()
-        lit = bool(found.lights) or groups_of.mesh_lights.any or groups_of.volumes.glow
-        if self._materials.glows and not lit:
-            lit = groups_of.emits_otherwise or light_what_is_drawn(world, self._materials)
-        check_there(c.stage, "--holdout", c.options.holdouts)
+        world = group_builder.world()
+        lit = bool(found.lights) or group_builder.mesh_lights.any or group_builder.volumes.may_light
+        if self._materials.emits and not lit:
+            lit = group_builder.has_other_emission or is_lit_by_emitters(world, self._materials)
+        check_exists(c.stage, "--holdout", c.options.holdouts)
         for path in c.options.holdouts:
             c.builder.add_visibility(path, {"holdout": True})
         catchers = set_catchers(c.stage, c.options, rays.catchers, c.builder)
         light_paths = self._add_lights(world, lit)
         volumes = add_volumes(world, c)
-        say_room(volumes, c.options.texture_limit, c.report)
-        say_cloudy(volumes, self._materials.cloudy, c.report)
+        report_grid_memory(volumes, c.options.texture_limit, c.report)
+        report_ignored_volumes(volumes, self._materials.scattering_interiors, c.report)
         if not any(c.report.counts.get(kind) for kind in (*COUNTS.values(), "volumes")):
-            c.report.note("nothing to draw: the picture shows the environment only")
-        camera_path = None if view is None or seen.camera is None else str(seen.camera.GetPath())
-        outline = self._set_camera(seen, view, world, planes)
+            c.report.note("nothing to draw: the image shows the environment only")
+        camera_path = (
+            None if view is None or settings.camera is None else str(settings.camera.GetPath())
+        )
+        outline = self._set_camera(settings, view, world, planes)
         if cache is not None:
             cache.has_same_levels = partial(self._surfaces.has_same_levels, world)
         return {
             "camera_path": camera_path, "cameras": found.cameras, "lights": found.lights,
             "material_paths": self._materials.paths(), "light_paths": light_paths,
             "frame": frame_number(c.time), "shutter": c.motion and c.motion.shutter,
-            "render": seen.choice, "outline": outline, "volumes": volumes, "catchers": catchers,
+            "render": settings.choice, "outline": outline, "volumes": volumes, "catchers": catchers,
             "origin": c.origin,
         }  # fmt: skip
 
-    def _camera_view(self, seen: Seen, origin: Origin, report: LoadReport) -> View | None:
+    def _camera_view(
+        self, settings: ViewSettings, origin: Origin, report: LoadReport
+    ) -> View | None:
         """Returns the view of the camera prim relative to an origin.
 
         Returns None if there is no valid camera.
         """
-        if seen.camera is None:
+        if settings.camera is None:
             return None
         c = self._context
-        to_world = np.array(UsdGeom.XformCache(c.time).GetLocalToWorldTransform(seen.camera))
-        moved = moved_to(to_world, origin)
-        return read_camera(seen.camera, moved, c.time, report, seen.lens)
+        to_world = np.array(UsdGeom.XformCache(c.time).GetLocalToWorldTransform(settings.camera))
+        moved = to_scene_space(to_world, origin)
+        return read_camera(settings.camera, moved, c.time, report, settings.lens)
 
     def _set_camera(
-        self, seen: Seen, view: View | None, world: Group, planes: NDArray[np.float64]
+        self, settings: ViewSettings, view: View | None, world: Group, planes: NDArray[np.float64]
     ) -> NDArray[np.float64] | None:
         """Sets the camera and refines meshes for it; returns the outline that was framed."""
         c, outline = self._context, None
         if view is None:
             c.report.note("no camera: framed what is drawn")
             outline = joined(world.outlines, planes)
-            view = frame_points(outline, c.up_axis, seen.lens, c.options.size)
-        elif (moves := camera_motion(seen.camera, c.motion, c.origin)) is not None:
+            view = frame_points(outline, c.up_axis, settings.lens, c.options.size)
+        elif (moves := camera_motion(settings.camera, c.motion, c.origin)) is not None:
             view.options["motion"] = moves
         self._surfaces.finish(world, view)
         c.builder.set_camera(view.transform, **view.options)
@@ -278,17 +288,17 @@ class _Load:
         if c.options.strand_pixels <= 0:
             return None
         if view is None:
-            what = "strands are not thinned out: their width in pixels is unknown without a camera"
+            what = "strands are not simplified: their width in pixels is unknown without a camera"
             c.report.note(what)
             return None
         return StrandDetail(ViewSize(view, c.options.size), c.options.strand_pixels, c.report)
 
-    def _limit_textures(self, seen: Seen) -> None:
+    def _limit_textures(self, settings: ViewSettings) -> None:
         """Chooses the mip levels that textures leave out."""
-        from wavecomb.usd.looks.texture_limit import plan_levels
+        from wavecomb.usd.materials.texture_limit import plan_levels
 
         c = self._context
-        view = self._camera_view(seen, WORLD, LoadReport())
+        view = self._camera_view(settings, WORLD, LoadReport())
         if view is None:
             purposes = list(UsdGeom.Imageable.GetOrderedPurposeTokens())
             box = UsdGeom.BBoxCache(c.time, purposes).ComputeWorldBound(c.stage.GetPseudoRoot())
@@ -297,7 +307,7 @@ class _Load:
                 ends = np.array([bounds.GetMin(), bounds.GetMax()])
                 # Frame the ball inside the box, since the final view is never closer than that.
                 points = ends.mean(axis=0) + (corners(ends) - ends.mean(axis=0)) / np.sqrt(3.0)
-            view = frame_points(points, c.up_axis, seen.lens, c.options.size)
+            view = frame_points(points, c.up_axis, settings.lens, c.options.size)
         limit = float(c.options.texture_limit or 0) * MEGABYTE
         self.textures.drops = plan_levels(c, ViewSize(view, c.options.size), limit)
 
@@ -328,7 +338,7 @@ class _Load:
         if lit:
             c.report.note("no visible light; the scene is lit by emissive materials or not at all")
             return ()
-        if self._materials.glows:
+        if self._materials.emits:
             what = "no light except emissive materials that are too dim: added a soft dome"
             c.report.note(f"{what} (a light of intensity 0 keeps it off)")
         else:

@@ -93,14 +93,14 @@ def _snapped(place: NDArray[np.float64]) -> Origin:
     return float(x), float(y), float(z)
 
 
-def around(origin: Origin) -> Gf.Matrix4d:
+def world_to_scene(origin: Origin) -> Gf.Matrix4d:
     """Returns the transform from the world to the scene; ``IDENTITY`` itself for ``WORLD``."""
     if origin == WORLD:
         return IDENTITY
     return Gf.Matrix4d(1.0).SetTranslate(-Gf.Vec3d(*origin))
 
 
-def moved_to(matrices: NDArray[np.float64], origin: Origin) -> NDArray[np.float64]:
+def to_scene_space(matrices: NDArray[np.float64], origin: Origin) -> NDArray[np.float64]:
     """Converts transforms (..., 4, 4) to the world into transforms to the scene."""
     if origin == WORLD:
         return matrices

@@ -110,7 +110,7 @@ IGNORED = {
 """Kinds of visibility whose attributes are ignored, by ``LoadOptions.catch``."""
 
 
-def check_there(stage: Usd.Stage, option: str, paths: Iterable[str]) -> None:
+def check_exists(stage: Usd.Stage, option: str, paths: Iterable[str]) -> None:
     """Raises WavecombError if a path that an option gives is not a prim."""
     for path in paths:
         if not Sdf.Path.IsValidPathString(path) or not stage.GetPrimAtPath(path):
@@ -131,7 +131,7 @@ def set_catchers(
     Raises:
         WavecombError: A path that an option gives is not a prim.
     """
-    check_there(stage, "--catcher", options.catchers)
+    check_exists(stage, "--catcher", options.catchers)
     paths = tuple(dict.fromkeys((*authored, *options.catchers)))
     if not paths:
         return ()

@@ -15,11 +15,11 @@ from pxr import Usd, UsdVol
 
 from wavecomb import vdb
 from wavecomb.errors import WavecombError
-from wavecomb.picture.files import kind_of
-from wavecomb.picture.working_space import from_rec709
-from wavecomb.run.isolate import trail
+from wavecomb.image.files.output_file import kind_of
+from wavecomb.image.working_space import from_rec709
+from wavecomb.run.isolation import progress_notes
 from wavecomb.usd.lights.light import blackbody
-from wavecomb.usd.looks.network import asset_file, word
+from wavecomb.usd.materials.network import asset_file, word
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.volumes.info import GridFacts
@@ -102,7 +102,7 @@ class GridTable:
         """
         key = (field.file, field.grid or field.name, field.index, use, kelvin)
         if key not in self._known:
-            trail.note("reading", field.file)
+            progress_notes.note("reading", field.file)
             try:
                 self._known[key] = self._read(field, use, kelvin)
             except WavecombError as error:
@@ -118,7 +118,7 @@ class GridTable:
             table = None
             if not os.path.isfile(field.file):
                 kind = kind_of(field.file)
-                why = "not there" if kind is None else f"{kind}, not a regular file"
+                why = "missing" if kind is None else f"{kind}, not a regular file"
                 what = f"volume file {field.file} is {why}: field left out"
                 self._report.warn(what, field.prim)
             else:
@@ -178,7 +178,7 @@ class GridTable:
             self._report.note(what, field.prim)
         self._check_sign(found, named, use, field)
         if use == "colour" and found.greatest > 1:
-            self._report.note("colour above 1 of a volume: taken for 1", field.prim)
+            self._report.note("colour above 1 of a volume: 1 is used", field.prim)
             np.minimum(found.values, 1, out=found.values)
         background = self._background(found, head, use, field)
         values = self._values(found.values, use, kelvin)
@@ -204,7 +204,7 @@ class GridTable:
                 f"{use} has none"
             )
         how = "slightly " if is_slight else ""
-        self._report.note(f"{use} {how}below 0: taken for 0", field.prim)
+        self._report.note(f"{use} {how}below 0: 0 is used", field.prim)
         np.maximum(found.values, 0, out=found.values)
 
     def _background(self, found: vdb.Bricks, head: vdb.GridHead, use: str, field: Field) -> float:
@@ -324,7 +324,7 @@ def read_fields(volume: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> dic
             report.warn("volume field that names no file: left out", prim.GetPath())
             continue
         if prim.GetAttribute("xformOpOrder").HasAuthoredValue():
-            report.missing("transforms of volume fields of their own (left out)", prim.GetPath())
+            report.missing("transforms of volume fields (left out)", prim.GetPath())
         found[str(name)] = field
     return found
 

@@ -7,10 +7,15 @@ import math
 
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
 
-from wavecomb.usd.looks.network import shader_id
-from wavecomb.usd.looks.surface import Surface
+from wavecomb.usd.materials.network import shader_id
+from wavecomb.usd.materials.surface import Surface
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.volumes.look import DEFAULT_LOOK, WHITE, Colour, VolumeLook
+from wavecomb.usd.volumes.optical_properties import (
+    DEFAULT_PROPERTIES,
+    WHITE,
+    Colour,
+    OpticalProperties,
+)
 from wavecomb.usd.volumes.shaders import (
     CLOSURES,
     STANDARD,
@@ -33,7 +38,7 @@ def volume_shader(material: UsdShade.Material) -> UsdShade.Shader | None:
     return None
 
 
-class VolumeLooks:
+class VolumeMaterials:
     """The volume looks of materials; each is read once."""
 
     def __init__(self, time: Usd.TimeCode, metres_per_unit: float, report: LoadReport) -> None:
@@ -41,25 +46,25 @@ class VolumeLooks:
         self._time = time
         self._metres = metres_per_unit
         self._report = report
-        self._known: dict[Sdf.Path, VolumeLook] = {}
+        self._known: dict[Sdf.Path, OpticalProperties] = {}
 
-    def of(self, material: UsdShade.Material | None, volume: Usd.Prim) -> VolumeLook:
-        """Returns the look of a volume with a material; the default look if it is not supported."""
+    def of(self, material: UsdShade.Material | None, volume: Usd.Prim) -> OpticalProperties:
+        """Returns the properties of a volume; default ones if its material is not supported."""
         if material is None:
-            return DEFAULT_LOOK
+            return DEFAULT_PROPERTIES
         path = material.GetPath()
-        look = self._known.get(path)
-        if look is None:
+        properties = self._known.get(path)
+        if properties is None:
             try:
-                look = self._read(material, volume)
+                properties = self._read(material, volume)
             except (Tf.ErrorException, RecursionError):
-                what = "volume network cannot be read: default taken"
+                what = "volume network cannot be read: default used"
                 self._report.warn(what, path)
-                look = DEFAULT_LOOK
-            self._known[path] = look
-        return look
+                properties = DEFAULT_PROPERTIES
+            self._known[path] = properties
+        return properties
 
-    def _read(self, material: UsdShade.Material, volume: Usd.Prim) -> VolumeLook:
+    def _read(self, material: UsdShade.Material, volume: Usd.Prim) -> OpticalProperties:
         prim = material.GetPrim()
         inputs = Inputs(prim, self._time, self._report)
         unknown = ""
@@ -72,11 +77,11 @@ class VolumeLooks:
                 return ClosureReader(inputs, self._metres).read(shader)
             unknown = unknown or kind
         if unknown:
-            self._report.missing(f"volume shader {unknown} (default taken)", material.GetPath())
+            self._report.missing(f"volume shader {unknown} (default used)", material.GetPath())
         else:
-            what = "volume with a material without a volume shader: default taken"
+            what = "volume with a material without a volume shader: default used"
             self._report.warn(what, volume.GetPath())
-        return DEFAULT_LOOK
+        return DEFAULT_PROPERTIES
 
 
 def filling(material: UsdShade.Material, time: Usd.TimeCode, report: LoadReport) -> Surface | None:
@@ -88,25 +93,25 @@ def filling(material: UsdShade.Material, time: Usd.TimeCode, report: LoadReport)
     if volume_shader(material) is None:
         return None
     metres = UsdGeom.GetStageMetersPerUnit(prim.GetStage())
-    look = VolumeLooks(time, metres, report).of(material, prim)
-    if any(look.emission):
+    properties = VolumeMaterials(time, metres, report).of(material, prim)
+    if any(properties.emission):
         report.missing("emission of a volume in a mesh (left out)", prim.GetPath())
-    if look.density or look.colour:
-        report.missing("fields of a volume in a mesh (taken for 1)", prim.GetPath())
-    most = max(look.extinction)
+    if properties.density or properties.colour:
+        report.missing("fields of a volume in a mesh (1 is used)", prim.GetPath())
+    most = max(properties.extinction)
     depth = 1.0 / most if most > 0 else 1.0
-    red, green, blue = (math.exp(-e * depth) for e in look.extinction)
+    red, green, blue = (math.exp(-e * depth) for e in properties.extinction)
     scatter: Colour = (
-        look.extinction[0] * look.albedo[0] * depth,
-        look.extinction[1] * look.albedo[1] * depth,
-        look.extinction[2] * look.albedo[2] * depth,
+        properties.extinction[0] * properties.albedo[0] * depth,
+        properties.extinction[1] * properties.albedo[1] * depth,
+        properties.extinction[2] * properties.albedo[2] * depth,
     )
     layers = {
         "transmission_weight": 1.0,
         "transmission_color": (red, green, blue),
         "transmission_depth": depth,
         "transmission_scatter": scatter,
-        "transmission_scatter_anisotropy": look.anisotropy,
+        "transmission_scatter_anisotropy": properties.anisotropy,
     }
     parameters = {
         "ior": 1.0,

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from pxr import Usd, UsdShade
 
-from wavecomb.usd.looks.network import (
+from wavecomb.usd.materials.network import (
     MAX_DEPTH,
     colour,
     holds_colour,
@@ -23,13 +23,13 @@ from wavecomb.usd.looks.network import (
     word,
 )
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.volumes.look import (
+from wavecomb.usd.volumes.optical_properties import (
     BLACK,
     DENSITY,
     WHITE,
     Colour,
-    Driven,
-    VolumeLook,
+    FieldColour,
+    OpticalProperties,
     grey,
     product,
     share,
@@ -39,7 +39,7 @@ from wavecomb.usd.volumes.look import (
 CLOSURES = ("ND_volume", "ND_volume_volumeshader")
 """Identifiers of shaders that combine volume distribution functions (VDFs)."""
 
-_NOTHING = Driven()
+_NOTHING = FieldColour()
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ class Medium:
         anisotropy: Mean cosine of the phase function.
     """
 
-    absorption: Driven = _NOTHING
-    scattering: Driven = _NOTHING
+    absorption: FieldColour = _NOTHING
+    scattering: FieldColour = _NOTHING
     anisotropy: float = 0.0
 
 
@@ -64,24 +64,24 @@ class ClosureReader:
         self._inputs = inputs
         self._metres = metres_per_unit
 
-    def read(self, shader: UsdShade.Shader) -> VolumeLook:
-        """Returns the look of a ``volume`` shader."""
+    def read(self, shader: UsdShade.Shader) -> OpticalProperties:
+        """Returns the properties of a ``volume`` shader."""
         medium = self._medium(shader, "vdf", 0)
-        glow = self._glow(shader, "edf", 0)
+        emission_field = self._edf(shader, "edf", 0)
         absorption = medium.absorption.scaled(grey(self._metres))
         scattering = medium.scattering.scaled(grey(self._metres))
         both = self._sum(absorption, scattering)
-        return VolumeLook(
+        return OpticalProperties(
             extinction=both.colour,
             albedo=share(scattering.colour, both.colour),
             anisotropy=medium.anisotropy,
-            emission=glow.scaled(grey(self._metres)).colour,
+            emission=emission_field.scaled(grey(self._metres)).colour,
             density=both.field,
-            glow=glow.field,
+            emission_field=emission_field.field,
             name=str(self._inputs.material.GetPath()),
         )
 
-    def _sum(self, one: Driven, two: Driven) -> Driven:
+    def _sum(self, one: FieldColour, two: FieldColour) -> FieldColour:
         """Adds two values of the same field.
 
         If the fields differ, reports it and uses the second.
@@ -91,9 +91,9 @@ class ClosureReader:
         if two.is_black:
             return one
         if one.field != two.field:
-            what = "volume coefficients that read several fields (one taken for all)"
+            what = "volume coefficients that read several fields (one is used for all)"
             self._inputs.report.missing(what, self._inputs.material.GetPath())
-        return Driven(total(one.colour, two.colour), two.field or one.field)
+        return FieldColour(total(one.colour, two.colour), two.field or one.field)
 
     def _closure(self, shader: UsdShade.Shader, name: str) -> UsdShade.Shader | None:
         source = source_of(shader, name, self._inputs.time)
@@ -135,11 +135,11 @@ class ClosureReader:
             medium.anisotropy,
         )
 
-    def _driven_by(self, one: Driven, by: Driven) -> Driven:
+    def _driven_by(self, one: FieldColour, by: FieldColour) -> FieldColour:
         if one.field and by.field and not one.is_black:
-            what = "products of fields in a volume (the first taken)"
+            what = "products of fields in a volume (the first is used)"
             self._inputs.report.missing(what, self._inputs.material.GetPath())
-        return Driven(one.scaled(by.colour).colour, one.field or by.field)
+        return FieldColour(one.scaled(by.colour).colour, one.field or by.field)
 
     def _added(self, one: Medium, two: Medium) -> Medium:
         scattering = self._sum(one.scattering, two.scattering)
@@ -151,22 +151,22 @@ class ClosureReader:
             mean / sum(weight) if sum(weight) > 0 else 0.0,
         )
 
-    def _glow(self, shader: UsdShade.Shader, name: str, depth: int) -> Driven:
+    def _edf(self, shader: UsdShade.Shader, name: str, depth: int) -> FieldColour:
         """Returns the emitted radiance of the EDF that is connected to an input."""
         node = self._closure(shader, name)
         if node is None:
-            return Driven(BLACK)
+            return FieldColour(BLACK)
         kind = shader_id(node)
         if kind.startswith("ND_uniform_edf"):
             return self._inputs.driven(node, "color", WHITE)
         if kind.startswith("ND_multiply_edf") and depth < MAX_DEPTH:
             by = self._inputs.driven(node, "in2", WHITE)
-            return self._driven_by(self._glow(node, "in1", depth + 1), by)
+            return self._driven_by(self._edf(node, "in1", depth + 1), by)
         if kind.startswith("ND_add_edf") and depth < MAX_DEPTH:
-            one, two = (self._glow(node, each, depth + 1) for each in ("in1", "in2"))
+            one, two = (self._edf(node, each, depth + 1) for each in ("in1", "in2"))
             return self._sum(one, two)
         self._left_out(node)
-        return Driven(BLACK)
+        return FieldColour(BLACK)
 
     def _left_out(self, node: UsdShade.Shader) -> None:
         kind = shader_id(node) or "node without an id"
@@ -188,8 +188,8 @@ _OPAQUE = 1e-4
 """Smallest transparency; it gives an extinction coefficient of 9.2 per ``transparent_depth``."""
 
 
-def read_standard(shader: UsdShade.Shader, inputs: Inputs) -> VolumeLook:
-    """Returns the look of a ``standard_volume`` shader.
+def read_standard(shader: UsdShade.Shader, inputs: Inputs) -> OpticalProperties:
+    """Returns the properties of a ``standard_volume`` shader.
 
     At density 1, the transmittance over the length ``transparent_depth`` is ``transparent``. So the
     extinction coefficient is density * -ln(transparent) / transparent_depth per stage unit. Inputs
@@ -201,16 +201,16 @@ def read_standard(shader: UsdShade.Shader, inputs: Inputs) -> VolumeLook:
     scatter = inputs.driven(shader, "scatter_color", _HALF)
     weight = inputs.number(shader, "scatter", 1.0)
     albedo = _clamped(product(scatter.colour, grey(max(weight, 0.0))))
-    emission, glow, kelvin = _emission(shader, inputs)
-    _say_others(shader, inputs)
-    return VolumeLook(
+    emission, emission_field, kelvin = _emission(shader, inputs)
+    _report_unsupported(shader, inputs)
+    return OpticalProperties(
         extinction=product(dense.colour, _coefficient(transparent.colour, depth)),
         albedo=albedo,
         anisotropy=inputs.number(shader, "scatter_anisotropy", 0.0),
         emission=emission,
         density=dense.field or inputs.text(shader, "density_channel", DENSITY),
         colour=scatter.field or inputs.text(shader, "scatter_color_channel"),
-        glow=glow,
+        emission_field=emission_field,
         kelvin=kelvin,
         name=str(inputs.material.GetPath()),
     )
@@ -244,10 +244,10 @@ def _emission(shader: UsdShade.Shader, inputs: Inputs) -> tuple[Colour, str, flo
     kelvin = max(hot.colour[0] * inputs.number(shader, "blackbody_kelvin", 5000.0), 0.0)
     if not field or kelvin == 0.0:
         return BLACK, "", 0.0
-    return Driven(lit.colour).scaled(grey(intensity)).colour, field, kelvin
+    return FieldColour(lit.colour).scaled(grey(intensity)).colour, field, kelvin
 
 
-def _say_others(shader: UsdShade.Shader, inputs: Inputs) -> None:
+def _report_unsupported(shader: UsdShade.Shader, inputs: Inputs) -> None:
     """Reports authored inputs that are not supported."""
     for name in ("transparent_channel",):
         if inputs.text(shader, name):
@@ -288,39 +288,39 @@ class Inputs:
 
     def driven(
         self, shader: UsdShade.Shader, name: str, default: Colour = BLACK, depth: int = 0
-    ) -> Driven:
+    ) -> FieldColour:
         """Returns a non-negative colour, grey number or field, or a product of these."""
         source = source_of(shader, name, self.time)
         if source is None:
-            return Driven(default)
+            return FieldColour(default)
         if source.shader is None:
             rgb = colour(source.value, default)
             if holds_colour(source.attribute):
                 rgb = read_colour(rgb, source.attribute, self.report, self.material.GetPath())
             r, g, b = (max(c, 0.0) for c in rgb)
-            return Driven((r, g, b))
+            return FieldColour((r, g, b))
         return self._node(source.shader, name, default, depth + 1)
 
-    def _node(self, node: UsdShade.Shader, name: str, default: Colour, depth: int) -> Driven:
+    def _node(self, node: UsdShade.Shader, name: str, default: Colour, depth: int) -> FieldColour:
         kind = shader_id(node)
         for start, named in _READERS.items():
             if kind.startswith(start):
                 field = self.text(node, named)
                 scale = self.driven(node, "multiply", WHITE, depth) if depth < MAX_DEPTH else None
                 if field and scale is not None:
-                    return Driven(scale.colour, field)
+                    return FieldColour(scale.colour, field)
         if kind.startswith("ND_multiply_") and depth < MAX_DEPTH:
             one = self.driven(node, "in1", BLACK, depth)
             two = self.driven(node, "in2", WHITE, depth)
             if not (one.field and two.field):
-                return Driven(product(one.colour, two.colour), one.field or two.field)
+                return FieldColour(product(one.colour, two.colour), one.field or two.field)
         if kind.startswith("ND_constant_") and depth < MAX_DEPTH:
             return self.driven(node, "value", BLACK, depth)
         if kind.startswith("ND_convert_") and depth < MAX_DEPTH:
             return self.driven(node, "in", BLACK, depth)
         self._left_out(node, name)
-        return Driven(default)
+        return FieldColour(default)
 
     def _left_out(self, node: UsdShade.Shader, name: str) -> None:
         kind = shader_id(node) or "a node without an id"
-        self.report.missing(f"{kind} in {name} of a volume shader (default taken)", node.GetPath())
+        self.report.missing(f"{kind} in {name} of a volume shader (default used)", node.GetPath())

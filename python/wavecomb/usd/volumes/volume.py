@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdGeom, UsdVol
 
 from wavecomb import vdb
-from wavecomb.picture.working_space import from_rec709
-from wavecomb.usd.looks.assign import Draw
-from wavecomb.usd.looks.network import number
+from wavecomb.image.working_space import from_rec709
+from wavecomb.usd.materials.assignment import DrawItem
+from wavecomb.usd.materials.network import number
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.volumes.grids import Field, Grid, GridTable, read_fields
 from wavecomb.usd.volumes.info import GridFacts
-from wavecomb.usd.volumes.look import BLACK, Colour, VolumeLook
-from wavecomb.usd.volumes.material import VolumeLooks
+from wavecomb.usd.volumes.material import VolumeMaterials
+from wavecomb.usd.volumes.optical_properties import BLACK, Colour, OpticalProperties
 
 GLOW = 1e-4
 """Emission times size from which a volume counts as a light."""
 
-_MOST_ANISOTROPY = 0.999
+_MAX_ANISOTROPY = 0.999
 
 
 @dataclass(frozen=True)
@@ -35,20 +35,20 @@ class Volume:
         options: Arguments of ``SceneBuilder.add_volume`` except ``to_world``.
         corners: (8, 3) corners of its bounds in object space.
         grids: Descriptions of its grids.
-        glows: Whether it may light a scene by its emission.
+        may_light: Whether it may light a scene by its emission.
     """
 
     options: dict[str, Any]
     corners: NDArray[np.float64]
     grids: tuple[GridFacts, ...]
-    glows: bool
+    may_light: bool
 
 
 class VolumeReader:
     """Reader of the volumes of one stage.
 
     Attributes:
-        glow: Whether a volume may light the scene by its emission.
+        may_light: Whether a volume may light the scene by its emission.
     """
 
     def __init__(self, context: LoadContext) -> None:
@@ -57,10 +57,10 @@ class VolumeReader:
         self._velocities = VelocityReader(context)
         self._grids = GridTable(context)
         metres = UsdGeom.GetStageMetersPerUnit(context.stage)
-        self._looks = VolumeLooks(self._time, metres, self._report)
-        self.glow = False
+        self._materials = VolumeMaterials(self._time, metres, self._report)
+        self.may_light = False
 
-    def read(self, draw: Draw) -> Volume | None:
+    def read(self, draw: DrawItem) -> Volume | None:
         """Reads the volume of a prim; reports and returns None if there is nothing to render.
 
         Raises:
@@ -71,11 +71,11 @@ class VolumeReader:
         if not fields and UsdVol.Volume(prim).GetFieldPaths():
             # All of its fields are invalid, which has been reported.
             return None
-        look = self._looks.of(draw.material, prim)
+        properties = self._materials.of(draw.material, prim)
         if fields and not vdb.is_there():
             self._report.missing(f"Volume without {vdb.ABSENT}: left out", prim.GetPath())
             return None
-        density = self._density(prim, fields, look) if fields else None
+        density = self._density(prim, fields, properties) if fields else None
         corners = density.corners if density is not None else None
         options: dict[str, Any] = {"density": None if density is None else density.handle}
         if not fields:
@@ -89,35 +89,49 @@ class VolumeReader:
                                 for i in (0, 1) for j in (0, 1) for k in (0, 1)])  # fmt: skip
         if corners is None:
             return None
-        colour = self._named(fields, look.colour, "colour")
-        use = "temperature" if look.kelvin else "emission"
-        glow = self._named(fields, look.glow, use, look.kelvin) if any(look.emission) else None
+        colour = self._named(fields, properties.colour, "colour")
+        use = "temperature" if properties.kelvin else "emission"
+        emission_field = (
+            self._named(fields, properties.emission_field, use, properties.kelvin)
+            if any(properties.emission)
+            else None
+        )
         velocity = self._velocities.find(prim, fields, self._grids, self._time)
         if density is not None and velocity is not None:
             options |= {"velocity": velocity.grid.handle, "seconds": velocity.seconds}
-        emission = look.emission if glow is not None or not look.glow else BLACK
+        emission = (
+            properties.emission
+            if emission_field is not None or not properties.emission_field
+            else BLACK
+        )
         options |= {
             "color": None if colour is None else colour.handle,
-            "emission_grid": None if glow is None else glow.handle,
-            "extinction": self._working_colour(look.extinction),
-            "albedo": self._working_colour(look.albedo),
-            "anisotropy": self._anisotropy(look, prim),
+            "emission_grid": None if emission_field is None else emission_field.handle,
+            "extinction": self._working_colour(properties.extinction),
+            "albedo": self._working_colour(properties.albedo),
+            "anisotropy": self._anisotropy(properties, prim),
             "emission": self._working_colour(emission),
             "name": self._report.place(prim.GetPath()),
         }
-        blown = None if velocity is None else velocity.grid
-        used = tuple(grid.facts for grid in (density, colour, glow, blown) if grid is not None)
+        velocity_grid = None if velocity is None else velocity.grid
+        used = tuple(
+            grid.facts
+            for grid in (density, colour, emission_field, velocity_grid)
+            if grid is not None
+        )
         size = float(np.ptp(corners, axis=0).max())
-        glows = max(emission) * size > GLOW
-        self.glow = self.glow or glows
-        return Volume(options, corners, used, glows)
+        may_light = max(emission) * size > GLOW
+        self.may_light = self.may_light or may_light
+        return Volume(options, corners, used, may_light)
 
-    def _density(self, prim: Usd.Prim, fields: dict[str, Field], look: VolumeLook) -> Grid | None:
+    def _density(
+        self, prim: Usd.Prim, fields: dict[str, Field], properties: OpticalProperties
+    ) -> Grid | None:
         """Returns the density grid of a volume."""
-        field = self._grids.find(fields, look.density) if look.density else None
+        field = self._grids.find(fields, properties.density) if properties.density else None
         if field is None:
-            if look.density and look.density != "density":
-                what = f"volume without the field {look.density}: its density taken"
+            if properties.density and properties.density != "density":
+                what = f"volume without the field {properties.density}: its density used"
                 self._report.warn(what, prim.GetPath())
             field = fields.get("density") or self._grids.densest(fields)
         return None if field is None else self._grids.get(field, "density")
@@ -140,11 +154,11 @@ class VolumeReader:
         r, g, b = (max(float(c), 0.0) for c in from_rec709(np.array(colour), self._working))
         return (r, g, b)
 
-    def _anisotropy(self, look: VolumeLook, prim: Usd.Prim) -> float:
-        limited = min(max(look.anisotropy, -_MOST_ANISOTROPY), _MOST_ANISOTROPY)
-        if limited != look.anisotropy:
-            what = f"anisotropy {look.anisotropy:g} of a volume: {limited:g} taken"
-            self._report.warn(what, look.name or prim.GetPath())
+    def _anisotropy(self, properties: OpticalProperties, prim: Usd.Prim) -> float:
+        limited = min(max(properties.anisotropy, -_MAX_ANISOTROPY), _MAX_ANISOTROPY)
+        if limited != properties.anisotropy:
+            what = f"anisotropy {properties.anisotropy:g} of a volume: {limited:g} used"
+            self._report.warn(what, properties.name or prim.GetPath())
         return limited
 
 

@@ -2,6 +2,8 @@
 /// Shading points of hits.
 #pragma once
 
+#include <array>
+
 #include "wavecomb/geometry/hit/curve_surface.h"
 #include "wavecomb/geometry/hit/shading_normal.h"
 #include "wavecomb/geometry/hit/surface_reader.h"
@@ -9,6 +11,107 @@
 #include "wavecomb/geometry/hit/uv.h"
 
 namespace wavecomb {
+
+namespace detail {
+
+/// Hit point on a triangle in object space.
+template <typename F>
+struct TrianglePoint {
+  UInt<F> corner;              ///< index of the first corner
+  std::array<UInt<F>, 3> i;    ///< vertices
+  Vec3<F> p0, p1, p2, e1, e2;  ///< positions of the vertices, edges from the first
+  Vec3<F> p;                   ///< hit point
+  F b0, b1, b2;                ///< barycentrics
+  F safe_area2;                ///< twice the world area; 1 for degenerate triangles
+};
+
+/// Returns a bound of the rounding error: all terms of the interpolated point and, with a smaller
+/// weight, the triangle's corners, from which traversal subtracts the ray's origin. All axes count,
+/// since the products of traversal mix them.
+template <typename F>
+WAVECOMB_INLINE F rounding_offset(const InstanceMaps<F>& maps, const TrianglePoint<F>& at) {
+  const Vec3<F> q0 = abs3(at.p0), q1 = abs3(at.p1), q2 = abs3(at.p2);
+  const Vec3<F> size =
+      (q0 * abs(at.b0) + q1 * at.b1 + q2 * at.b2) + max(q0, max(q1, q2)) * F(0.25f);
+  const auto magnitude = [&](int i, const F& t) { return dot(abs3(maps.row[i]), size) + abs(t); };
+  return max(max(magnitude(0, maps.t.x), magnitude(1, maps.t.y)), magnitude(2, maps.t.z)) *
+         0x1p-20f;
+}
+
+/// Lanes with smooth normals, and whether to compute the terminator vector.
+template <typename F>
+struct SmoothLanes {
+  const Mask<F>& smooth;
+  bool with_terminator;
+};
+
+/// Sets ns from the normals of vertices or corners, and the terminator vector.
+template <bool kWithMotion, typename F>
+WAVECOMB_INLINE void set_smooth_normal(const SceneView& scene, const MeshHit<F>& hit,
+                                       const MeshReader<F>& mesh, const InstanceMaps<F>& maps,
+                                       const TrianglePoint<F>& at, const SmoothLanes<F>& lanes,
+                                       Surface<F>& s) {
+  using U = UInt<F>;
+  const auto& [smooth, with_terminator] = lanes;
+  const Mask<F> per_corner = Mask<F>((mesh.flags & kNormalsPerCorner) != U(0u));
+  const Mask<U> pick(per_corner);
+  const U a0 = select(pick, U(at.corner), at.i[0]), a1 = select(pick, U(at.corner + 1u), at.i[1]),
+          a2 = select(pick, U(at.corner + 2u), at.i[2]);
+  Vec3<F> n0 = mesh.vec3(&MeshRecord::normals, a0, smooth);
+  Vec3<F> n1 = mesh.vec3(&MeshRecord::normals, a1, smooth);
+  Vec3<F> n2 = mesh.vec3(&MeshRecord::normals, a2, smooth);
+  if (kWithMotion && scene.has_motion) [[unlikely]] {
+    const auto moved = moved_normals<F>(scene, hit.mesh, {a0, a1, a2}, hit.time, smooth);
+    n0 = moved[0];
+    n1 = moved[1];
+    n2 = moved[2];
+  }
+  const Vec3<F> n = maps.map_normal(fma(n2, at.b2, fma(n1, at.b1, Vec3<F>(n0 * at.b0))));
+  const F len2 = length_squared(n);
+  const Mask<F> good = smooth & (len2 > 0.f) & is_finite(len2);
+  Vec3<F> ns = n * F(1.f / sqrt(select(good, len2, F(1.f))));
+  const F side = dot(ns, s.ng);
+  ns = select<F>(side < 0.f, -ns, ns);
+  s.ns = select<F>(good, ns, s.ng);
+
+  if (with_terminator) {
+    // Project p to the tangent planes at the vertices and interpolate, on the side of the normals
+    // only.
+    const auto lift = [&](const Vec3<F>& q, const Vec3<F>& vertex_normal) {
+      const F n2len = length_squared(vertex_normal);
+      const F h = dot(Vec3<F>(at.p - q), vertex_normal) / select(n2len > 0.f, n2len, F(1.f));
+      return vertex_normal * min(h, F(0.f));
+    };
+    const Vec3<F> d = lift(at.p0, n0) * at.b0 + lift(at.p1, n1) * at.b1 + lift(at.p2, n2) * at.b2;
+    const Vec3<F> world = -maps.vector(d);
+    const Mask<F> outward = good & (side > 0.f) & (dot(world, s.ng) > 0.f);
+    s.terminator = select<F>(outward, world, Vec3<F>(F(0.f)));
+  }
+}
+
+/// Sets uv, dpdu, uv_per_length and handedness.
+template <typename F>
+WAVECOMB_INLINE void set_triangle_uv(const SceneView& scene, const MeshHit<F>& hit,
+                                     const MeshReader<F>& mesh, const InstanceMaps<F>& maps,
+                                     const TrianglePoint<F>& at, const Mask<F>& active,
+                                     Surface<F>& s) {
+  const UvTriangle<F> t = uv_triangle<F>(mesh, {at.i[0], at.i[1], at.i[2]}, hit.prim, active);
+  const Vec2<F>&d1 = t.d1, &d2 = t.d2;
+  s.uv = t.at(at.b1, at.b2);
+  const F det = fma(d1.x, d2.y, F(-(d1.y * d2.x)));
+  s.uv_per_length = sqrt(F(abs(det) / at.safe_area2));
+  const Mask<F> mirrored = det < 0.f;
+  s.handedness = select(mirrored, F(-maps.side), maps.side);
+  // dp/du = (d2.v e1 - d1.v e2) / det. Only its direction is used.
+  const Vec3<F> across = at.e1 * d2.y - at.e2 * d1.y;
+  Vec3<F> tangent = select<F>(mirrored, -across, across);
+  // A copy, so that the vertices can stay in registers.
+  if (scene.tangents)
+    tangent = smooth_tangent<F>(scene, hit, {at.i[0], at.i[1], at.i[2]}, tangent, active);
+  s.dpdu = maps.vector(tangent);
+}
+
+}  // namespace detail
 
 /// Computes the shading point of a hit. `dir` is the unit direction of the ray. `with_uv` computes
 /// uv, dpdu and uv_per_length, `with_terminator` the terminator vector. kWithCurves and kWithMotion
@@ -40,7 +143,7 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
     p0 = moved.p[0];
     p1 = moved.p[1];
     p2 = moved.p[2];
-    maps.set_instance(moved.instance);
+    maps.place(moved.instance);
     moved_size = moved.instance.size;
   }
   const F b1 = hit.u, b2 = hit.v, b0 = 1.f - b1 - b2;
@@ -54,16 +157,19 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   const F safe_area2 = select(area2 > 0.f, area2, F(1.f));
   s.ng = select<F>(area2 > 0.f, area_vector * F(1.f / safe_area2), -dir);
 
-  // Bound of the rounding error: all terms of the interpolated point and, with a smaller weight,
-  // the triangle's corners, from which traversal subtracts the ray's origin. All axes count, since
-  // the products of traversal mix them.
-  const Vec3<F> q0 = detail::abs3(p0), q1 = detail::abs3(p1), q2 = detail::abs3(p2);
-  const Vec3<F> size = (q0 * abs(b0) + q1 * b1 + q2 * b2) + max(q0, max(q1, q2)) * F(0.25f);
-  const auto magnitude = [&](int i, const F& t) {
-    return dot(detail::abs3(maps.row[i]), size) + abs(t);
-  };
-  s.offset =
-      max(max(magnitude(0, maps.t.x), magnitude(1, maps.t.y)), magnitude(2, maps.t.z)) * 0x1p-20f;
+  const detail::TrianglePoint<F> at{.corner = corner,
+                                    .i = {i0, i1, i2},
+                                    .p0 = p0,
+                                    .p1 = p1,
+                                    .p2 = p2,
+                                    .e1 = e1,
+                                    .e2 = e2,
+                                    .p = p,
+                                    .b0 = b0,
+                                    .b1 = b1,
+                                    .b2 = b2,
+                                    .safe_area2 = safe_area2};
+  s.offset = detail::rounding_offset<F>(maps, at);
   // Interpolation between motion steps adds rounding errors of the size of both steps.
   if (kWithMotion && scene.has_motion) [[unlikely]]
     s.offset = max(s.offset, F(moved_size * 0x1.4p-20f));
@@ -72,66 +178,19 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   s.terminator = Vec3<F>(F(0.f));
   const Mask<F> smooth =
       Mask<F>((mesh.flags & (kNormalsPerVertex | kNormalsPerCorner)) != U(0u)) & active;
-  if (any(smooth)) {
-    const Mask<F> per_corner = Mask<F>((mesh.flags & kNormalsPerCorner) != U(0u));
-    const Mask<U> selected(per_corner);
-    const U a0 = select(selected, U(corner), i0), a1 = select(selected, U(corner + 1u), i1),
-            a2 = select(selected, U(corner + 2u), i2);
-    Vec3<F> n0 = mesh.vec3(&MeshRecord::normals, a0, smooth);
-    Vec3<F> n1 = mesh.vec3(&MeshRecord::normals, a1, smooth);
-    Vec3<F> n2 = mesh.vec3(&MeshRecord::normals, a2, smooth);
-    if (kWithMotion && scene.has_motion) [[unlikely]] {
-      const auto moved = moved_normals<F>(scene, hit.mesh, {a0, a1, a2}, hit.time, smooth);
-      n0 = moved[0];
-      n1 = moved[1];
-      n2 = moved[2];
-    }
-    const Vec3<F> n = maps.map_normal(fma(n2, b2, fma(n1, b1, Vec3<F>(n0 * b0))));
-    const F len2 = length_squared(n);
-    const Mask<F> valid = smooth & (len2 > 0.f) & is_finite(len2);
-    Vec3<F> ns = n * F(1.f / sqrt(select(valid, len2, F(1.f))));
-    const F side = dot(ns, s.ng);
-    ns = select<F>(side < 0.f, -ns, ns);
-    s.ns = select<F>(valid, ns, s.ng);
-
-    if (with_terminator) {
-      // Project p to the tangent planes at the vertices and interpolate, on the side of the normals
-      // only.
-      const auto lift = [&](const Vec3<F>& q, const Vec3<F>& vertex_normal) {
-        const F n2len = length_squared(vertex_normal);
-        const F h = dot(Vec3<F>(p - q), vertex_normal) / select(n2len > 0.f, n2len, F(1.f));
-        return vertex_normal * min(h, F(0.f));
-      };
-      const Vec3<F> d = lift(p0, n0) * b0 + lift(p1, n1) * b1 + lift(p2, n2) * b2;
-      const Vec3<F> world = -maps.vector(d);
-      const Mask<F> outward = valid & (side > 0.f) & (dot(world, s.ng) > 0.f);
-      s.terminator = select<F>(outward, world, Vec3<F>(F(0.f)));
-    }
-  }
+  if (any(smooth))
+    detail::set_smooth_normal<kWithMotion, F>(scene, hit, mesh, maps, at, {smooth, with_terminator},
+                                              s);
   s.uv = {b1, b2};
   s.dpdu = Vec3<F>(F(0.f));
   s.handedness = maps.side;
   s.uv_per_length = F(0.f);
-  if (with_uv) {
-    const UvTriangle<F> t = uv_triangle<F>(mesh, {i0, i1, i2}, hit.prim, active);
-    const Vec2<F>&d1 = t.d1, &d2 = t.d2;
-    s.uv = t.at(b1, b2);
-    const F det = fma(d1.x, d2.y, F(-(d1.y * d2.x)));
-    s.uv_per_length = sqrt(F(abs(det) / safe_area2));
-    const Mask<F> mirrored = det < 0.f;
-    s.handedness = select(mirrored, F(-maps.side), maps.side);
-    // dp/du = (d2.v e1 - d1.v e2) / det. Only its direction is used.
-    const Vec3<F> across = e1 * d2.y - e2 * d1.y;
-    Vec3<F> tangent = select<F>(mirrored, -across, across);
-    if (scene.tangents)
-      tangent = detail::smooth_tangent<F>(scene, hit, {i0, i1, i2}, tangent, active);
-    s.dpdu = maps.vector(tangent);
-  }
+  if (with_uv) detail::set_triangle_uv<F>(scene, hit, mesh, maps, at, active, s);
   if (kWithCurves && scene.has_curves) {
     const Mask<F> curved = lanes & not_(active);
     if (any(curved)) detail::setup_curved<F>(scene, hit, dir, with_uv, curved, s);
   }
-  s.unadjusted = s.ns;
+  s.unbent = s.ns;
   s.ns = facing_normal<F>(dir, s.ng, s.ns);
   return s;
 }

@@ -12,7 +12,6 @@
 #include "wavecomb/light/description/kind_info.h"
 #include "wavecomb/light/description/light.h"
 #include "wavecomb/material/description/material.h"
-#include "wavecomb/medium/description/mesh_medium.h"
 #include "wavecomb/medium/description/wide_map.h"
 #include "wavecomb/scene/object_bounds.h"
 
@@ -25,7 +24,7 @@ using Point = Vec3<float>;
 /// inside the glass that stands on it.
 constexpr float kMargin = 1e-3f;
 /// Number of bounds and triangle tests after which the search gives up, about half a second.
-constexpr size_t kMaxTests = size_t{1} << 28;
+constexpr size_t kMostTests = size_t{1} << 28;
 
 bool overlap(const Bounds& a, const Bounds& b) {
   return a.lo.x < b.hi.x && b.lo.x < a.hi.x && a.lo.y < b.hi.y && b.lo.y < a.hi.y &&
@@ -93,15 +92,15 @@ class Clipped {
   /// Keeps the part of the polygon where `distance` is not negative.
   template <typename Distance>
   void cut(const Distance& distance) {
-    std::array<Point, 9> clipped;
+    std::array<Point, 9> kept;
     size_t n = 0;
     for (size_t i = 0; i < count_; ++i) {
       const Point &a = points_[i], &b = points_[(i + 1) % count_];
       const float da = distance(a), db = distance(b);
-      if (da >= 0) clipped[n++] = a;
-      if ((da >= 0) != (db >= 0)) clipped[n++] = a + (b - a) * (da / (da - db));
+      if (da >= 0) kept[n++] = a;
+      if ((da >= 0) != (db >= 0)) kept[n++] = a + (b - a) * (da / (da - db));
     }
-    points_ = clipped;
+    points_ = kept;
     count_ = n;
   }
 
@@ -109,7 +108,7 @@ class Clipped {
   size_t count_ = 0;
 };
 
-/// An instance of an absorbing solid.
+/// An instance of a glass solid.
 struct Glass {
   Bounds bounds;  ///< in world space
   uint32_t mesh;
@@ -128,7 +127,7 @@ class GlassTree {
   /// returns whether it did. Adds the number of tests to `tests`.
   template <typename Visit>
   bool any(const Bounds& bounds, size_t& tests, const Visit& visit) const {
-    return !all_.empty() && visit_node(0, bounds, tests, visit);
+    return !all_.empty() && any_below(0, bounds, tests, visit);
   }
 
  private:
@@ -163,13 +162,13 @@ class GlassTree {
   static Point centre(const Glass& g) { return (g.bounds.lo + g.bounds.hi) * 0.5f; }
 
   template <typename Visit>
-  bool visit_node(size_t number, const Bounds& bounds, size_t& tests, const Visit& visit) const {
+  bool any_below(size_t number, const Bounds& bounds, size_t& tests, const Visit& visit) const {
     const Node& node = nodes_[number];
     ++tests;
     if (!overlap(node.bounds, bounds)) return false;
     if (node.second != 0)
-      return visit_node(number + 1, bounds, tests, visit) ||
-             visit_node(node.second, bounds, tests, visit);
+      return any_below(number + 1, bounds, tests, visit) ||
+             any_below(node.second, bounds, tests, visit);
     for (size_t i = node.first; i < node.last; ++i, ++tests)
       if (overlap(all_[i].bounds, bounds) && visit(all_[i])) return true;
     return false;
@@ -181,30 +180,31 @@ class GlassTree {
 
 class Search {
  public:
-  Search(std::span<const Material> materials, std::span<const Mesh> meshes,
-         std::span<const Group> groups, std::span<const Instance> instances,
-         std::span<const MatrixStep> steps)
-      : meshes_(meshes), groups_(groups), instances_(instances), steps_(steps) {
-    for (const Material& m : materials) absorbs_.push_back(is_absorbing_solid(m));
-    any_ = std::ranges::find(absorbs_, true) != absorbs_.end();
-  }
-
-  bool contains_light(std::span<const Light> lights) {
-    if (!any_) return false;
+  Search(const Glasses& glasses, const PlacedObjects& objects)
+      : meshes_(objects.meshes),
+        groups_(objects.groups),
+        instances_(objects.instances),
+        steps_(objects.steps),
+        glasses_(glasses) {
     std::vector<Glass> all;
-    for_each_instance([&](uint32_t mesh, const Instance& instance) {
+    each_placed([&](uint32_t mesh, const Instance& instance) {
       if (!uses_glass(mesh, instance)) return false;
-      const Bounds bounds = instance_bounds(mesh, instance);
+      const Bounds bounds = placed_bounds(mesh, instance);
       if (!bounds.empty())
         all.push_back({bounds, mesh, &instance, WideMap(instance.to_world).inverse()});
       return false;
     });
     glass_.emplace(std::move(all));
-    for (const Light& light : lights)
-      if (!info_of(light.kind).has(light_trait::kInfinite) &&
-          is_in_glass(light.to_world.t, 0, nullptr))
-        return true;
-    return for_each_instance([&](uint32_t mesh, const Instance& i) { return is_inside(mesh, i); });
+  }
+
+  bool finds_objects() {
+    return each_placed([&](uint32_t mesh, const Instance& i) { return is_inside(mesh, i); });
+  }
+  bool finds_lights(std::span<const Light> lights) {
+    return std::ranges::any_of(lights, [&](const Light& light) {
+      return !info_of(light.kind).has(light_trait::kInfinite) &&
+             is_in_glass(light.to_world.t, 0, nullptr);
+    });
   }
 
  private:
@@ -217,7 +217,7 @@ class Search {
   /// Calls `visit` for all meshes of all instances until it returns true, and returns whether it
   /// did.
   template <typename Visit>
-  bool for_each_instance(const Visit& visit) {
+  bool each_placed(const Visit& visit) {
     for (const uint32_t mesh : groups_[0].meshes)
       if (visit(mesh, world_)) return true;
     for (const Instance& instance : instances_)
@@ -230,17 +230,17 @@ class Search {
     if (is_new) at->second.bounds = mesh_bounds(meshes_[mesh]);
     return at->second;
   }
-  Bounds instance_bounds(uint32_t mesh, const Instance& instance) {
+  Bounds placed_bounds(uint32_t mesh, const Instance& instance) {
     Bounds bounds;
-    add_instance_bounds(bounds, shape(mesh).bounds, instance, steps_);
+    add_placed(bounds, shape(mesh).bounds, instance, steps_);
     return bounds;
   }
   bool uses_glass(uint32_t mesh, const Instance& instance) {
     const Mesh& m = meshes_[mesh];
     if (m.is_curved()) return false;
     const auto is_glass = [&](uint32_t material) {
-      const uint32_t bound_material = material == kInheritMaterial ? instance.material : material;
-      return bound_material < absorbs_.size() && absorbs_[bound_material];
+      const uint32_t worn = material == kInheritMaterial ? instance.material : material;
+      return worn < glasses_.size() && glasses_[worn];
     };
     if (m.face_materials.empty()) return is_glass(m.material);
     tests_ += m.face_materials.size();
@@ -270,7 +270,7 @@ class Search {
   /// Returns whether part of a mesh instance is inside other glass.
   bool is_inside(uint32_t mesh, const Instance& instance) {
     const auto is_other = [&](const Glass& g) { return g.mesh != mesh || g.instance != &instance; };
-    const Bounds bounds = grown(instance_bounds(mesh, instance));
+    const Bounds bounds = grown(placed_bounds(mesh, instance));
     if (bounds.empty() || !glass_->any(bounds, tests_, is_other)) return false;
     if (uses_glass(mesh, instance) && is_hollow_glass(mesh)) return false;
     const Mesh& m = meshes_[mesh];
@@ -278,18 +278,18 @@ class Search {
     const auto in_glass = [&](const Point& p) { return is_in_glass(p, mesh, &instance); };
     if (m.is_curved()) {
       for (size_t i = 0; i < m.vertex_count(); ++i)
-        if (in_glass(at(i)) || tests_ > kMaxTests) return true;
+        if (in_glass(at(i)) || tests_ > kMostTests) return true;
       return false;
     }
     for (size_t t = 0; t + 2 < m.indices.size(); t += 3) {
       const std::array<Point, 3> triangle{at(m.indices[t]), at(m.indices[t + 1]),
                                           at(m.indices[t + 2])};
-      Bounds object_bounds;
-      for (const Point& p : triangle) object_bounds.add(p);
-      const bool found = glass_->any(grown(object_bounds), tests_, [&](const Glass& g) {
+      Bounds its;
+      for (const Point& p : triangle) its.add(p);
+      const bool found = glass_->any(grown(its), tests_, [&](const Glass& g) {
         return is_other(g) && Clipped(triangle, shrunk(g.bounds)).any(g.bounds, in_glass);
       });
-      if (found || tests_ > kMaxTests) return true;
+      if (found || tests_ > kMostTests) return true;
     }
     return false;
   }
@@ -309,8 +309,7 @@ class Search {
   std::span<const Instance> instances_;
   std::span<const MatrixStep> steps_;
   const Instance world_;
-  std::vector<bool> absorbs_;
-  bool any_ = false;
+  const Glasses& glasses_;
   std::unordered_map<uint32_t, Shape> shapes_;
   std::optional<GlassTree> glass_;
   size_t tests_ = 0;
@@ -318,12 +317,20 @@ class Search {
 
 }  // namespace
 
-bool absorbing_glass_contains_objects(std::span<const Material> materials,
-                                      std::span<const Mesh> meshes, std::span<const Group> groups,
-                                      std::span<const Instance> instances,
-                                      std::span<const MatrixStep> steps,
-                                      std::span<const Light> lights) {
-  return Search(materials, meshes, groups, instances, steps).contains_light(lights);
+Glasses glasses_of(std::span<const Material> materials,
+                   const std::function<bool(const Material&)>& test) {
+  Glasses glasses;
+  for (const Material& m : materials) glasses.push_back(test(m));
+  return glasses;
+}
+
+bool glass_holds_objects(const Glasses& glasses, const PlacedObjects& objects) {
+  return std::ranges::count(glasses, true) > 0 && Search(glasses, objects).finds_objects();
+}
+
+bool glass_holds_lights(const Glasses& glasses, const PlacedObjects& objects,
+                        std::span<const Light> lights) {
+  return std::ranges::count(glasses, true) > 0 && Search(glasses, objects).finds_lights(lights);
 }
 
 }  // namespace wavecomb

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Search for objects inside absorbing glass.
+/// Search for objects and lights inside glass.
 #pragma once
 
+#include <functional>
 #include <span>
+#include <vector>
 
 #include "wavecomb/scene/scene_parts.h"
 
@@ -11,18 +13,31 @@ namespace wavecomb {
 struct Light;
 struct Material;
 
-/// Returns whether an absorbing glass solid contains an object, a part of one, or the centre of a
-/// light. If so, light travels through the glass on segments that do not end at its surface, so
-/// paths have to track a medium stack (needs_medium_stack).
+/// Objects of a scene. Meshes of group 0 are in world space.
+struct PlacedObjects {
+  std::span<const Mesh> meshes;
+  std::span<const Group> groups;
+  std::span<const Instance> instances;
+  std::span<const MatrixStep> steps;
+};
+
+/// Whether to search the meshes of a material for contents, by material.
+using Glasses = std::vector<bool>;
+/// Returns the result of `test` for each material.
+Glasses glasses_of(std::span<const Material> materials,
+                   const std::function<bool(const Material&)>& test);
+
+/// Returns whether a closed mesh of glass contains an object or a part of one. If so, light travels
+/// through the glass on segments that do not end at its surface, so paths have to track a medium
+/// stack if the glass absorbs (asks_for_interiors).
 ///
-/// Meshes of group 0 of `groups` are in world space. The test uses the first time step of mesh
-/// shapes and instance transforms at mid-shutter. It tests vertices of curves, and a few points on
-/// the part of each triangle that lies within the bounds of the glass. If it would take longer than
-/// about half a second, it stops and returns true.
-bool absorbing_glass_contains_objects(std::span<const Material> materials,
-                                      std::span<const Mesh> meshes, std::span<const Group> groups,
-                                      std::span<const Instance> instances,
-                                      std::span<const MatrixStep> steps,
-                                      std::span<const Light> lights);
+/// The test uses the first time step of mesh shapes and instance transforms at mid-shutter. It
+/// tests vertices of curves, and a few points on the part of each triangle that lies within the
+/// bounds of the glass. If it would take longer than about half a second, it stops and returns
+/// true.
+bool glass_holds_objects(const Glasses& glasses, const PlacedObjects& objects);
+/// Returns whether a closed mesh of glass contains the centre of a light.
+bool glass_holds_lights(const Glasses& glasses, const PlacedObjects& objects,
+                        std::span<const Light> lights);
 
 }  // namespace wavecomb

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "wavecomb/geometry/mesh/mesh.h"
 #include "wavecomb/graph/graph.h"
 #include "wavecomb/graph/parameters/parameters.h"
 #include "wavecomb/material/description/material.h"
@@ -14,7 +15,7 @@ namespace {
 
 /// Lower limit of transmission colours, which keeps their logarithm finite.
 constexpr float kDarkestTransmission = 1e-6f;
-constexpr float kMaxMediumCosine = 0.99f;
+constexpr float kMostInteriorCosine = 0.99f;
 
 struct Coefficients {
   float absorption, scattering;
@@ -33,7 +34,7 @@ Coefficients raw_coefficients(float color, float scatter, float depth) {
   return {extinction - scattering, scattering};
 }
 
-void set_medium(const OpenPbr& o, MeshMedium<float>& out) {
+void set_medium(const OpenPbr& o, InteriorMedium<float>& out) {
   if (!(o.transmission_depth > 0)) return;
   const Vec3<float>&c = o.transmission_color, &s = o.transmission_scatter;
   Coefficients k[3] = {raw_coefficients(c.x, s.x, o.transmission_depth),
@@ -44,7 +45,7 @@ void set_medium(const OpenPbr& o, MeshMedium<float>& out) {
   out.absorption = {k[0].absorption - least, k[1].absorption - least, k[2].absorption - least};
   out.scattering = {k[0].scattering, k[1].scattering, k[2].scattering};
   out.anisotropy =
-      std::clamp(o.transmission_scatter_anisotropy, -kMaxMediumCosine, kMaxMediumCosine);
+      std::clamp(o.transmission_scatter_anisotropy, -kMostInteriorCosine, kMostInteriorCosine);
 }
 
 bool is_any(const Vec3<float>& v) {
@@ -63,43 +64,69 @@ bool is_clear(const Material& m) {
          !m.needs_presence();
 }
 
-bool is_glass(const Material& m, const GraphSet& graphs) {
-  if (has_trait(m.program, program_trait::kGlass)) return true;
+/// Returns whether a material is a solid that may transmit light somewhere.
+bool may_transmit(const Material& m, const GraphSet& graphs) {
   return is_solid(m) && (m.openpbr.transmission_weight > 0 ||
                          graphs.drives(m.graph, graph_parameter("transmission_weight")));
 }
 
+bool is_glass(const Material& m, const GraphSet& graphs) {
+  return has_trait(m.program, program_trait::kGlass) || may_transmit(m, graphs);
+}
+
+bool drives_extinction(const Material& m, const GraphSet& graphs) {
+  constexpr uint32_t kFirst = graph_parameter("extinction");
+  return graphs.drives(m.graph, kFirst) || graphs.drives(m.graph, kFirst + 1) ||
+         graphs.drives(m.graph, kFirst + 2);
+}
+
 }  // namespace
 
-bool is_absorbing_solid(const Material& m) {
-  if (!is_solid(m) || !(m.openpbr.transmission_weight > 0) || m.graph != kNoGraph) return false;
-  MeshMedium<float> medium{};
+bool absorbs_by_graph(const Material& m, const GraphSet& graphs) {
+  return may_transmit(m, graphs) && drives_extinction(m, graphs);
+}
+
+bool absorbs_inside(const Material& m, const GraphSet& graphs) {
+  if (!may_transmit(m, graphs) || drives_extinction(m, graphs)) return false;
+  InteriorMedium<float> medium{};
   set_medium(m.openpbr, medium);
   return is_any(medium.absorption);
 }
 
-bool needs_medium_stack(const Material& m, bool absorbing) {
+bool asks_for_interiors(const Material& m, const GraphSet& graphs, bool absorbing) {
   if (!is_solid(m)) return false;
-  MeshMedium<float> medium{};
+  InteriorMedium<float> medium{};
   set_medium(m.openpbr, medium);
   if (m.openpbr.transmission_weight > 0 && is_any(medium.scattering)) return true;
-  if (absorbing && is_absorbing_solid(m)) return true;
+  if (absorbing && absorbs_inside(m, graphs)) return true;
   return m.openpbr.nested_priority != 0 || (is_clear(m) && is_any(medium.absorption));
 }
 
-std::vector<MeshMedium<float>> make_mesh_media(std::span<const Material> materials,
-                                               const GraphSet& graphs, bool absorbing) {
-  if (std::ranges::none_of(materials,
-                           [&](const Material& m) { return needs_medium_stack(m, absorbing); }))
+uint32_t add_inside_material(std::vector<Material>& materials, const GraphSet& graphs,
+                             bool absorbing) {
+  if (std::ranges::none_of(
+          materials, [&](const Material& m) { return asks_for_interiors(m, graphs, absorbing); }))
+    return kInheritMaterial;
+  Material inside;
+  inside.name = "inside of meshes";
+  inside.program = ProgramId::kVolume;
+  materials.push_back(inside);
+  return static_cast<uint32_t>(materials.size() - 1);
+}
+
+std::vector<InteriorMedium<float>> make_interiors(std::span<const Material> materials,
+                                                  const GraphSet& graphs, bool absorbing) {
+  if (std::ranges::none_of(
+          materials, [&](const Material& m) { return asks_for_interiors(m, graphs, absorbing); }))
     return {};
-  std::vector<MeshMedium<float>> all(materials.size());
+  std::vector<InteriorMedium<float>> all(materials.size());
   for (size_t i = 0; i < all.size(); ++i) {
     const Material& m = materials[i];
-    MeshMedium<float>& out = all[i];
+    InteriorMedium<float>& out = all[i];
     out = {};
     out.ior = 1;
     if (!is_glass(m, graphs)) continue;
-    const BoundaryKind kind = is_clear(m) ? BoundaryKind::kClear : BoundaryKind::kRefracts;
+    const InteriorKind kind = is_clear(m) ? InteriorKind::kClear : InteriorKind::kRefracts;
     out.kind = static_cast<uint32_t>(kind);
     out.ior = m.ior;
     if (!is_solid(m)) continue;

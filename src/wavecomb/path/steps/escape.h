@@ -39,14 +39,11 @@ inline void split_environment(const SceneView& scene, const ShadeSettings& setti
                               const IsWanted& is_wanted, const Add& add) {
   const EscapedRay<F> ray = escaped_ray<F>(path, depth);
   const Color<F> all = path.throughput * escaped_radiance<F>(scene.lights, ray, active);
-  const Mask<F> ok = active & is_finite(all.x) & is_finite(all.y) & is_finite(all.z);
-  const float limit = clamp_limit(settings, depth);
-  const F y = luminance(all);
-  const F scale = limit > 0 ? select(y > limit, F(limit / max(y, F(1e-30f))), F(1.f)) : F(1.f);
+  const ContributionLimit<F> limit(all, clamp_limit(settings, depth));
   for (uint32_t i = 0; i < scene.lights.infinite_count; ++i) {
     if (!is_wanted(i)) continue;
     const Color<F> le = infinite_light_radiance<F>(scene.lights, i, ray, active);
-    add(i, select<F>(ok, path.throughput * le * scale, Color<F>(F(0.f))));
+    add(i, select<F>(active, limit.of(path.throughput * le), Color<F>(F(0.f))));
   }
 }
 

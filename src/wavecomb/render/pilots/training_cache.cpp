@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/wave/wave.h"
 
 namespace wavecomb {
 namespace {

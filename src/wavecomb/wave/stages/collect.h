@@ -34,36 +34,212 @@ template <typename F>
 
 /// Returns the volume events that stopped the flights of a packet.
 template <typename F>
-VolumeHit<F> volume_hit(const Wave& wave, const WaveContext& context, const UInt<F>& slot,
-                        const Flight<F>& flight) {
+VolumeSeen<F> volume_seen(const Wave& wave, const WaveContext& context, const UInt<F>& slot,
+                          const Flight<F>& flight) {
   using U = UInt<F>;
   const SceneView& scene = context.scene;
-  VolumeHit<F> volume_event{flight.material - scene.volumes.first_material, U(0u), flight.material,
-                            Mask<F>(false)};
-  if (!context.has_medium_stack()) return volume_event;
-  volume_event.in_mesh =
-      flight.stopped & Mask<F>(flight.material == U(scene.nested_media.event_material));
+  VolumeSeen<F> seen{flight.material - scene.volumes.first_material, U(0u), flight.material,
+                     Mask<F>(false)};
+  if (!context.knows_inside()) return seen;
+  seen.in_mesh = flight.stopped & Mask<F>(flight.material == U(scene.interiors.event_material));
   const auto of_path = [&](auto member) {
-    return gather_field<F>(wave.pool.medium_stacks, member, slot, volume_event.in_mesh);
+    return gather_field<F>(wave.pool.inside, member, slot, seen.in_mesh);
   };
-  volume_event.object = of_path(&MediumStackRow<float>::object);
-  volume_event.material = select(Mask<U>(volume_event.in_mesh),
-                                 of_path(&MediumStackRow<float>::medium), volume_event.material);
-  return volume_event;
+  seen.place = of_path(&InsideRow<float>::place);
+  seen.material = select(Mask<U>(seen.in_mesh), of_path(&InsideRow<float>::medium), seen.material);
+  return seen;
 }
 
 /// Records for AOVs how paths passed through volumes and media. `throughput` is the throughput
 /// after the flight.
 template <typename F>
-void record_segment(Wave& wave, uint32_t depth, const UInt<F>& slot, const Flight<F>& flight,
-                    const Color<F>& throughput, const Mask<F>& active) {
+void note_way(Wave& wave, uint32_t depth, const UInt<F>& slot, const Flight<F>& flight,
+              const Color<F>& throughput, const Mask<F>& active) {
   if (depth == 0 && wave.aovs.wants_transmittance())
-    wave.aovs.pass<F>(
-        slot, select<F>(flight.stopped | flight.has_scattered, Color<F>(F(0.f)), throughput),
-        active);
-  const Mask<F> has_scattered = active & flight.has_scattered;
-  if (wave.aovs.expressions() && any(has_scattered))
-    wave.aovs.expressions().template walk<F>(slot, has_scattered);
+    wave.aovs.pass<F>(slot, select<F>(flight.stopped | flight.walked, Color<F>(F(0.f)), throughput),
+                      active);
+  const Mask<F> walked = active & flight.walked;
+  if (wave.aovs.expressions() && any(walked))
+    wave.aovs.expressions().template walk<F>(slot, walked);
+}
+
+/// Packet of rays of a wave, from index `i` of the queue on, and what they hit.
+template <typename F>
+struct RayPacket {
+  size_t i;
+  Mask<F> active;
+  UInt<F> slot, inst;
+  Vec3<F> o, d;
+  F t;  ///< distance of the hit or volume event
+  // Lanes that leave the scene, hit the shape of a light, and hit a surface.
+  Mask<F> missed, shape, surface;
+  // Of the lanes that need them:
+  PathRow<F> path;
+  PathState<F> state;
+
+  RayPacket(const RayQueue& rays, const HitBuffer& hits, size_t at)
+      : i(at),
+        active(first_lanes<F>(rays.size - at)),
+        slot(load<UInt<F>>(rays.slot + at)),
+        inst(load<UInt<F>>(hits.inst + at)),
+        o(load<F>(rays.ox + at), load<F>(rays.oy + at), load<F>(rays.oz + at)),
+        d(load<F>(rays.dx + at), load<F>(rays.dy + at), load<F>(rays.dz + at)),
+        t(load<F>(hits.t + at)),
+        missed(active & Mask<F>(inst == UInt<F>(kNoHit))),
+        shape(active & Mask<F>(inst == UInt<F>(kLightShape))),
+        surface(active & not_(missed) & not_(shape)) {}
+
+  Vec3<F> end() const { return fma(d, t, o); }
+};
+
+/// Adds the emission of volumes along the rays of a packet, and samples its free flights. Needs
+/// `p.path`.
+template <typename F, typename Media>
+WAVECOMB_INLINE Flight<F> fly_packet(Wave& wave, const ShadeSettings& settings, uint32_t depth,
+                                     const Media& media, RayPacket<F>& p) {
+  if constexpr (Media::kShines)
+    if (media.shines()) {
+      const float* const times = wave.times.floats(0);
+      const F when = times ? load<F>(times + p.i) : F(0.f);
+      const Color<F> c =
+          clean<F>(p.path.throughput *
+                       media.template emission<F>(
+                           {settings.sampler, p.path.key, depth, p.o, p.d, p.t, when}, p.active),
+                   clamp_limit(settings, depth));
+      const Mask<F> bright = p.active & not_(is_black(c));
+      add_radiance<F>(wave.pool.radiance, p.slot, c, bright);
+      if (wave.aovs.wants_lights()) wave.aovs.add_glow<F>(p.slot, c, bright);
+    }
+  Flight<F> flight;
+  if constexpr (Media::kStreams)
+    flight = media.template flight<F>(wave, p.i, p.path.throughput);
+  else
+    flight = media.template fly<F>({settings.sampler, p.path.key, depth, p.o, p.d, p.t},
+                                   p.path.throughput, p.active);
+  flight.stopped = p.active & flight.stopped;
+  p.t = select(flight.stopped, flight.t, p.t);
+  p.path.throughput = p.path.throughput * flight.weight;
+  store_row<PathRow, F>(wave.pool.paths, p.slot, p.path, p.active);
+  const Mask<F> through = not_(flight.stopped);
+  note_way<F>(wave, depth, p.slot, flight, p.path.throughput, p.active);
+  p.missed = p.missed & through;
+  p.shape = p.shape & through;
+  p.surface = p.surface & through;
+  return flight;
+}
+
+/// Sets `p.state` of the lanes `wanted` from `p.path` and the pool.
+template <typename F>
+WAVECOMB_INLINE void load_arrival(const Wave& wave, const WaveContext& context, uint32_t depth,
+                                  const Mask<F>& wanted, RayPacket<F>& p) {
+  const PathPool& pool = wave.pool;
+  p.state = path_state<F>(p.path, p.t);
+  if (context.links() && depth > 0)
+    p.state.link = gather_field<F>(pool.cold, &PathColdRow<float>::link, p.slot, wanted);
+  if (context.joins_light() && depth > 0)
+    unpack_ratio<F>(gather<F>(pool.ratio, p.slot, wanted), p.state);
+  if (pool.diffuse && depth > 0) [[unlikely]]
+    p.state.diffuse = load_row<RadianceRow, F>(pool.diffuse, p.slot, wanted).sum;
+  if (context.scene.lights.motions) [[unlikely]]
+    p.state.time = gather_field<F>(pool.cold, &PathColdRow<float>::time, p.slot, wanted);
+}
+
+/// Adds the light of the paths that leave the scene or hit the shape of a light.
+template <typename F>
+WAVECOMB_INLINE void add_ended(Wave& wave, const WaveContext& context,
+                               const ShadeSettings& settings, uint32_t depth,
+                               const RayPacket<F>& p) {
+  using U = UInt<F>;
+  const Mask<F> ended = p.missed | p.shape;
+  if (none(ended)) return;
+  const SceneView& scene = context.scene;
+  const uint32_t* const geom = wave.hits.geom + p.i;
+  Color<F> c(F(0.f));
+  const bool is_lit = any(p.missed) && settings.sees_sky(depth);
+  if (is_lit)
+    c = select<F>(p.missed, environment_emission<F>(scene, settings, depth, p.state, p.missed), c);
+  if (any(p.shape)) {
+    const U light = load<U>(geom);
+    c = select<F>(p.shape, shape_emission<F>(scene, settings, depth, light, p.t, p.state, p.shape),
+                  c);
+  }
+  add_radiance<F>(wave.pool.radiance, p.slot, c, ended & not_(is_black(c)));
+  if (wave.aovs.wants_lights()) {
+    if (is_lit) wave.aovs.add_environment<F>(scene, settings, depth, p.slot, p.state, p.missed);
+    if (any(p.shape)) wave.aovs.add_light<F>(p.slot, load<U>(geom), c, p.shape);
+  }
+}
+
+/// Returns the shutter times of a packet of camera rays; 0 for a camera that does not move.
+template <typename F>
+WAVECOMB_INLINE F shutter_time(const Wave& wave, const WaveContext& context,
+                               const RayPacket<F>& p) {
+  return context.camera->moves()
+             ? gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, p.slot, p.active)
+             : F(0.f);
+}
+
+/// Records for AOVs the camera rays that hit the shape of a light.
+template <typename F>
+WAVECOMB_INLINE void note_shapes(Wave& wave, const WaveContext& context, const RayPacket<F>& p) {
+  using U = UInt<F>;
+  if (none(p.shape)) return;
+  const U light = load<U>(wave.hits.geom + p.i);
+  wave.aovs.hit_light<F>(*context.camera, p.slot, p.end(), shutter_time<F>(wave, context, p), light,
+                         p.shape);
+  if (wave.aovs.wants_motion()) [[unlikely]]
+    wave.aovs.move<F>(p.slot,
+                      screen_motion_of_light<F>(context.scene.lights, *context.camera, light,
+                                                p.end(), p.state.time, p.shape),
+                      p.shape);
+}
+
+/// Surface that the rays of a packet hit. Lanes without one are undefined.
+template <typename F>
+struct HitIds {
+  UInt<F> prim, geom, mesh;
+  UInt<F> inherited;  ///< InstanceRecord::material
+
+  HitIds(const SceneView& scene, const HitBuffer& hits, const RayPacket<F>& p)
+      : prim(load<UInt<F>>(hits.prim + p.i)), geom(load<UInt<F>>(hits.geom + p.i)) {
+    constexpr uint32_t kWords = sizeof(InstanceRecord) / 4;
+    constexpr uint32_t kGeometry = offsetof(InstanceRecord, geometry) / 4;
+    static_assert(offsetof(InstanceRecord, material) / 4 == kGeometry + 1);
+    const auto row = load_rows<2, F>(scene.instances, p.inst * kWords + kGeometry, p.surface);
+    inherited = float_bits<F>(row[1]);
+    mesh = gather<UInt<F>>(scene.geometry_mesh, float_bits<F>(row[0]) + geom,
+                           Mask<UInt<F>>(p.surface));
+  }
+};
+
+/// Returns the materials of the surfaces that a packet hits, or that subsurface random walks leave.
+template <typename F, typename Media>
+WAVECOMB_INLINE UInt<F> surface_material(const Wave& wave, const SceneView& scene,
+                                         [[maybe_unused]] const Media& media, const RayPacket<F>& p,
+                                         const HitIds<F>& ids) {
+  using U = UInt<F>;
+  const U material = hit_material<F>(scene, ids.inherited, ids.mesh, ids.prim, p.surface);
+  if constexpr (Media::kStreams)
+    if (media.has_walks())
+      return select(Mask<U>(media.template came_out<F>(wave, p.i)), U(media.exit_material()),
+                    material);
+  return material;
+}
+
+/// Records for AOVs the camera rays that hit surfaces.
+template <typename F>
+WAVECOMB_INLINE void note_surfaces(Wave& wave, const WaveContext& context, const RayPacket<F>& p,
+                                   const HitIds<F>& ids, const UInt<F>& material) {
+  wave.aovs.hit_surface<F>(*context.camera, p.slot, p.end(), shutter_time<F>(wave, context, p),
+                           {.inst = p.inst, .geom = ids.geom, .material = material}, p.surface);
+  if (wave.aovs.wants_motion()) [[unlikely]]
+    wave.aovs.move<F>(
+        p.slot,
+        screen_motion_of_hit<F>(context.scene, *context.camera,
+                                {p.inst, ids.mesh, ids.prim, load<F>(wave.hits.u + p.i),
+                                 load<F>(wave.hits.v + p.i), F(0.f)},
+                                p.d, p.surface),
+        p.surface);
 }
 
 /// Reads the ray queue and the hit buffer, and fills the shading queue in the order of the rays.
@@ -72,164 +248,72 @@ template <typename F, typename Media, bool kFromLights = false>
 void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settings, uint32_t depth,
              [[maybe_unused]] const Media& media) {
   using U = UInt<F>;
-  const RayQueue& rays = wave.rays;
+  using Q = ShadingQueue;
   const HitBuffer& hits = wave.hits;
   ShadingQueue& queue = wave.shading;
   const SceneView& scene = context.scene;
   const bool cost_aware = settings.cost_aware && depth >= settings.roulette_depth;
+  const bool is_first = !kFromLights && depth == 0;
+  const bool notes_hits = is_first && wave.aovs.wants_hits();
   queue.clear();
   size_t n = 0;
-  for (size_t i = 0; i < rays.size; i += kWidth<F>) {
-    const Mask<F> active = first_lanes<F>(rays.size - i);
-    const U inst = load<U>(hits.inst + i);
-    Mask<F> missed = active & Mask<F>(inst == U(kNoHit));
-    Mask<F> shape = active & Mask<F>(inst == U(kLightShape));
-    Mask<F> surface = active & not_(missed) & not_(shape);
-    F t = load<F>(hits.t + i);
-    const U slot = load<U>(rays.slot + i);
-    const Vec3<F> o{load<F>(rays.ox + i), load<F>(rays.oy + i), load<F>(rays.oz + i)};
-    const Vec3<F> d{load<F>(rays.dx + i), load<F>(rays.dy + i), load<F>(rays.dz + i)};
-    Mask<F> wanted = Media::kAny || cost_aware ? active : Mask<F>(missed | shape);
+  for (size_t i = 0; i < wave.rays.size; i += kWidth<F>) {
+    RayPacket<F> p(wave.rays, hits, i);
+    Mask<F> wanted = Media::kAny || cost_aware ? p.active : Mask<F>(p.missed | p.shape);
     if (kFromLights && !cost_aware) wanted = Mask<F>(false);
-    PathRow<F> path;
-    PathState<F> state;
     [[maybe_unused]] Flight<F> flight;
     if (any(wanted)) {
-      path = load_row<PathRow, F>(wave.pool.paths, slot, wanted);
-      if constexpr (Media::kAny) {
-        if constexpr (Media::kHasEmission)
-          if (media.has_emission()) {
-            const float* const times = wave.times.floats(0);
-            const F when = times ? load<F>(times + i) : F(0.f);
-            const Color<F> c = clean<F>(
-                path.throughput * media.template emission<F>(
-                                      {settings.sampler, path.key, depth, o, d, t, when}, active),
-                clamp_limit(settings, depth));
-            const Mask<F> bright = active & not_(is_black(c));
-            add_radiance<F>(wave.pool.radiance, slot, c, bright);
-            if (wave.aovs.wants_lights()) wave.aovs.add_volume_emission<F>(slot, c, bright);
-          }
-        if constexpr (Media::kStreams)
-          flight = media.template flight<F>(wave, i, path.throughput);
-        else
-          flight = media.template sample_flight<F>({settings.sampler, path.key, depth, o, d, t},
-                                                   path.throughput, active);
-        flight.stopped = active & flight.stopped;
-        t = select(flight.stopped, flight.t, t);
-        path.throughput = path.throughput * flight.weight;
-        store_row<PathRow, F>(wave.pool.paths, slot, path, active);
-        const Mask<F> through = not_(flight.stopped);
-        record_segment<F>(wave, depth, slot, flight, path.throughput, active);
-        missed = missed & through;
-        shape = shape & through;
-        surface = surface & through;
-      }
-      state = path_state<F>(path, t);
-      if (context.links() && depth > 0)
-        state.link = gather_field<F>(wave.pool.cold, &PathColdRow<float>::link, slot, wanted);
-      if (context.joins_light() && depth > 0)
-        unpack_ratio<F>(gather<F>(wave.pool.ratio, slot, wanted), state);
-      if (wave.pool.diffuse && depth > 0) [[unlikely]]
-        state.diffuse = load_row<RadianceRow, F>(wave.pool.diffuse, slot, wanted).sum;
-      if (scene.lights.motions) [[unlikely]]
-        state.time = gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot, wanted);
+      p.path = load_row<PathRow, F>(wave.pool.paths, p.slot, wanted);
+      if constexpr (Media::kAny) flight = fly_packet<F>(wave, settings, depth, media, p);
+      load_arrival<F>(wave, context, depth, wanted, p);
     }
-    if (const Mask<F> ended = missed | shape; !kFromLights && any(ended)) {
-      Color<F> c(F(0.f));
-      const bool is_lit = any(missed) && settings.adds_environment(depth);
-      if (is_lit)
-        c = select<F>(missed, environment_emission<F>(scene, settings, depth, state, missed), c);
-      if (any(shape)) {
-        const U light = load<U>(hits.geom + i);
-        c = select<F>(shape, shape_emission<F>(scene, settings, depth, light, t, state, shape), c);
-      }
-      add_radiance<F>(wave.pool.radiance, slot, c, ended & not_(is_black(c)));
-      if (wave.aovs.wants_lights()) {
-        if (is_lit) wave.aovs.add_environment<F>(scene, settings, depth, slot, state, missed);
-        if (any(shape)) wave.aovs.add_light<F>(slot, load<U>(hits.geom + i), c, shape);
-      }
-    }
-    if (!kFromLights && context.joins_light() && depth == 0) [[unlikely]]
-      begin_ratios<F>(wave, context, slot, o, d, t, surface);
-    if (!kFromLights && depth == 0 && scene.visibility) [[unlikely]]
-      surface = surface & not_(is_holdout<F>(scene, inst, load<U>(hits.geom + i), surface));
-    const bool records_hits = !kFromLights && depth == 0 && wave.aovs.wants_hits();
-    const auto time = [&] {
-      return context.camera->moves()
-                 ? gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot, active)
-                 : F(0.f);
-    };
-    if (records_hits && any(shape))
-      wave.aovs.hit_light<F>(*context.camera, slot, fma(d, t, o), time(), load<U>(hits.geom + i),
-                             shape);
-    if (records_hits && wave.aovs.wants_motion() && any(shape)) [[unlikely]]
-      wave.aovs.move<F>(
-          slot,
-          screen_motion_of_light<F>(scene.lights, *context.camera, load<U>(hits.geom + i),
-                                    fma(d, t, o), state.time, shape),
-          shape);
+    if (!kFromLights) add_ended<F>(wave, context, settings, depth, p);
+    if (is_first && context.joins_light()) [[unlikely]]
+      begin_ratios<F>(wave, context, p.slot, p.o, p.d, p.t, p.surface);
+    if (is_first && scene.visibility) [[unlikely]]
+      p.surface = p.surface & not_(held_out<F>(scene, p.inst, load<U>(hits.geom + i), p.surface));
+    if (notes_hits) note_shapes<F>(wave, context, p);
     const auto recorded = [&] {
       if constexpr (Media::kAny)
-        return Mask<F>(surface | flight.stopped);
+        return Mask<F>(p.surface | flight.stopped);
       else
-        return surface;
+        return p.surface;
     };
-    if (!kFromLights && depth == 0 && wave.aovs.wants_alpha())
-      wave.aovs.cover<F>(slot, shape | recorded());
+    if (is_first && wave.aovs.wants_alpha()) wave.aovs.cover<F>(p.slot, p.shape | recorded());
     if constexpr (Media::kAny)
-      if (records_hits)
-        wave.aovs.hit_volume<F>(*context.camera, slot, fma(d, t, o), time(),
-                                volume_hit<F>(wave, context, slot, flight), flight.stopped);
+      if (notes_hits)
+        wave.aovs.hit_volume<F>(*context.camera, p.slot, p.end(), shutter_time<F>(wave, context, p),
+                                volume_seen<F>(wave, context, p.slot, flight), flight.stopped);
     if (none(recorded())) continue;
 
-    const U prim = load<U>(hits.prim + i);
-    const U geom = load<U>(hits.geom + i);
-    constexpr uint32_t kWords = sizeof(InstanceRecord) / 4;
-    constexpr uint32_t kGeometry = offsetof(InstanceRecord, geometry) / 4;
-    static_assert(offsetof(InstanceRecord, material) / 4 == kGeometry + 1);
-    const auto row = load_rows<2, F>(scene.instances, inst * kWords + kGeometry, surface);
-    const U first = float_bits<F>(row[0]), inherited = float_bits<F>(row[1]);
-    const U mesh = gather<U>(scene.geometry_mesh, first + geom, Mask<U>(surface));
-    U material = hit_material<F>(scene, inherited, mesh, prim, surface);
-    if constexpr (Media::kAny) {
-      if constexpr (Media::kStreams)
-        if (media.has_subsurface())
-          material = select(Mask<U>(media.template left_body<F>(wave, i)), U(media.exit_material()),
-                            material);
+    const HitIds<F> ids(scene, hits, p);
+    U material = surface_material<F>(wave, scene, media, p, ids);
+    if constexpr (Media::kAny)
       material = select(Mask<U>(flight.stopped), flight.material, material);
-    }
     const U program = gather<U>(scene.material_variant, material, Mask<U>(recorded()));
-    if (records_hits)
-      wave.aovs.hit_surface<F>(*context.camera, slot, fma(d, t, o), time(),
-                               {.inst = inst, .geom = geom, .material = material}, surface);
-    if (records_hits && wave.aovs.wants_motion()) [[unlikely]]
-      wave.aovs.move<F>(
-          slot,
-          screen_motion_of_hit<F>(
-              scene, *context.camera,
-              {inst, mesh, prim, load<F>(hits.u + i), load<F>(hits.v + i), F(0.f)}, d, surface),
-          surface);
+    if (notes_hits) note_surfaces<F>(wave, context, p, ids, material);
     if (cost_aware) {
-      const F q = cost_aware_survival<F>(scene, *context.roulette_costs, material, state, surface);
-      if (!kFromLights) wave.aovs.survive<F>(depth, slot, q, surface);
-      surface = surface & (cost_aware_number<F>(path.key, depth) < q);
-      path.throughput *= F(1.f) / q;
+      const F q =
+          cost_aware_survival<F>(scene, *context.roulette_costs, material, p.state, p.surface);
+      if (!kFromLights) wave.aovs.survive<F>(depth, p.slot, q, p.surface);
+      p.surface = p.surface & (cost_aware_number<F>(p.path.key, depth) < q);
+      p.path.throughput *= F(1.f) / q;
       if (none(recorded())) continue;
-      store_row<PathRow, F>(wave.pool.paths, slot, path, surface);
+      store_row<PathRow, F>(wave.pool.paths, p.slot, p.path, p.surface);
     }
 
-    using Q = ShadingQueue;
     const Mask<U> on(recorded());
     const auto put = [&](uint32_t* column, const U& x) { compress_store<U>(column + n, x, on); };
-    put(queue.slot, slot);
+    put(queue.slot, p.slot);
     put(queue.uints(Q::kMaterial), material);
     put(queue.uints(Q::kProgram), program);
     if (context.wants_position)
-      put(queue.uints(Q::kPositionKey), position_key<F>(context.grid, fma(d, t, o)));
-    ShadingRecord<F> record{t,   load<F>(hits.u + i), load<F>(hits.v + i), prim, inst, mesh, geom,
-                            slot};
+      put(queue.uints(Q::kPositionKey), position_key<F>(context.grid, p.end()));
+    ShadingRecord<F> record{
+        p.t,   load<F>(hits.u + i), load<F>(hits.v + i), ids.prim, p.inst, ids.mesh, ids.geom,
+        p.slot};
     if constexpr (Media::kAny)
-      record = select_record<F>(flight.stopped, ShadingRecord<F>::event(t, slot), record);
+      record = select_record<F>(flight.stopped, ShadingRecord<F>::event(p.t, p.slot), record);
     n += compress_row<ShadingRecord, F>(queue.row(n), record, recorded());
   }
   queue.size = n;

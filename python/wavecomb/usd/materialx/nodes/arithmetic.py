@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 from wavecomb.usd.graphs.values import Expressions, Value, numbers
 from wavecomb.usd.materialx.library import WIDTHS
-from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
+from wavecomb.usd.materialx.nodes.node import Handler, NodeCall, adder
 
 NODES: dict[str, Handler] = {}
 _node = adder(NODES)

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 
-from wavecomb.usd.graphs.surface import NORMAL, NUMBER
+from wavecomb.usd.graphs.surface_parameters import NORMAL, NUMBER
 from wavecomb.usd.graphs.values import Value, fit, numbers
-from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
 from wavecomb.usd.materialx.nodes.images import read_image
+from wavecomb.usd.materialx.nodes.node import Handler, NodeCall, adder
 
 PREFIX = "arnold:"
 

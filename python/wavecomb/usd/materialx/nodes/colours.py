@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from wavecomb.usd.graphs.surface import COLOURS, in_working_space
+from wavecomb.usd.graphs.surface_parameters import COLOURS, in_working_space
 from wavecomb.usd.graphs.values import Expressions, Value, fit, numbers
-from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
+from wavecomb.usd.materialx.nodes.node import Handler, NodeCall, adder
 
 NODES: dict[str, Handler] = {}
 _node = adder(NODES)

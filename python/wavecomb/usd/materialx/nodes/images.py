@@ -11,12 +11,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from wavecomb.usd.graphs.surface import COLOURS, NORMAL, uv_matrix
+from wavecomb.usd.graphs.surface_parameters import COLOURS, NORMAL, uv_matrix
 from wavecomb.usd.graphs.values import Expressions, Value, fit, is_constant, numbers
-from wavecomb.usd.looks.network import asset_file, space_of
+from wavecomb.usd.materials.network import asset_file, space_of
 from wavecomb.usd.materialx.nodes.arithmetic import fract, weighted_sum
-from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
 from wavecomb.usd.materialx.nodes.colours import LUMA
+from wavecomb.usd.materialx.nodes.node import Handler, NodeCall, adder
 
 NODES: dict[str, Handler] = {}
 _node = adder(NODES)

@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdShade
 
-from wavecomb.picture.working_space import from_rec709
-from wavecomb.usd.graphs.surface import COLOURS, NORMAL
+from wavecomb.image.working_space import from_rec709
+from wavecomb.usd.graphs.surface_parameters import COLOURS, NORMAL
 from wavecomb.usd.graphs.values import Expressions, Value, fit, numbers
-from wavecomb.usd.looks.network import Source, holds_colour, read_colour, shader_id, source_of
+from wavecomb.usd.materials.network import Source, holds_colour, read_colour, shader_id, source_of
 from wavecomb.usd.materialx.library import WIDTHS, FlatGraph, definition_of, flat_graph
 from wavecomb.usd.materialx.nodes import arnold
-from wavecomb.usd.materialx.nodes.body import Body
-from wavecomb.usd.materialx.nodes.call import OF_MATRICES, Handler, NodeCall
+from wavecomb.usd.materialx.nodes.node import OF_MATRICES, Handler, NodeCall
+from wavecomb.usd.materialx.nodes.node_graphs import ExpandedGraph
 from wavecomb.usd.materialx.nodes.table import CATEGORIES, PRIMITIVES
 from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:
-    from wavecomb.usd.looks.texture import TextureTable
+    from wavecomb.usd.materials.texture import TextureTable
 
 MAX_DEPTH = 100
 """Longest chain of connected nodes."""
@@ -189,7 +189,7 @@ class Networks:
         declared = shader.GetOutput(output)
         if declared:
             width = _WIDTH_OF_TYPE.get(str(declared.GetTypeName()), width)
-        return NodeCall(self, _Authored(self, shader), category, identifier, output, width, kind)
+        return NodeCall(self, _StageInputs(self, shader), category, identifier, output, width, kind)
 
     def compiled(self, call: NodeCall) -> Value | None:
         """Compiles a node's output, of the stage or of a library graph."""
@@ -198,7 +198,7 @@ class Networks:
             value = handler(call)
         elif (graph := _graph_of(call)) is not None:
             is_wide = call.category in PER_COMPONENT and call.width > 1
-            value = Body(call, graph, call.width if is_wide else 0).output(call.output)
+            value = ExpandedGraph(call, graph, call.width if is_wide else 0).output(call.output)
         else:
             value = self._nearest(call)
         return None if value is None else fit(value, call.width or len(value))
@@ -210,12 +210,12 @@ class Networks:
         for name in (*first, *(name for name in given if name not in first)):
             value = call.given(name)
             if value is not None:
-                self._tell(call, f"its input {name} in its place")
+                self._report_unsupported(call, f"its input {name} in its place")
                 return value
-        self._tell(call, "left out")
+        self._report_unsupported(call, "left out")
         return None
 
-    def _tell(self, call: NodeCall, instead: str) -> None:
+    def _report_unsupported(self, call: NodeCall, instead: str) -> None:
         known = "" if call.identifier.startswith(arnold.PREFIX) else "MaterialX "
         what = f"{known}node {call.identifier or '(no info:id)'} ({instead})"
         self.report.missing(what, call.inputs.path)
@@ -261,7 +261,7 @@ def _graph_of(call: NodeCall) -> FlatGraph | None:
     return flat_graph(identifier, CATEGORIES)
 
 
-class _Authored:
+class _StageInputs:
     """Inputs of a shader of a stage; implements ``call.Inputs``."""
 
     def __init__(self, networks: Networks, shader: UsdShade.Shader) -> None:

@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-from wavecomb.usd.materialx.nodes import arithmetic, arnold, colours, images, places
-from wavecomb.usd.materialx.nodes.call import Handler
+from wavecomb.usd.materialx.nodes import arithmetic, arnold, colours, geometric, images
+from wavecomb.usd.materialx.nodes.node import Handler
 
 PRIMITIVES: dict[str, Handler] = {
     name: handler
-    for module in (arithmetic, arnold, colours, images, places)
+    for module in (arithmetic, arnold, colours, images, geometric)
     for name, handler in module.NODES.items()
 }
 

@@ -12,10 +12,10 @@ from typing import Any
 
 from pxr import UsdShade
 
-from wavecomb.picture.working_space import LUMINANCE
+from wavecomb.image.working_space import LUMINANCE
 from wavecomb.usd.graphs.values import fit, is_constant, numbers
-from wavecomb.usd.looks.network import colour, number, pair, shader_id, source_of, value_of
-from wavecomb.usd.looks.surface import Surface
+from wavecomb.usd.materials.network import colour, number, pair, shader_id, source_of, value_of
+from wavecomb.usd.materials.surface import Surface
 from wavecomb.usd.materialx.nodes.colours import color_divisor
 from wavecomb.usd.materialx.surfaces.openpbr import SurfaceReader
 

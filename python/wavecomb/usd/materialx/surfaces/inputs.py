@@ -10,11 +10,11 @@ import functools
 import math
 from typing import Any
 
-from wavecomb.usd.looks.surface import COLOUR, NUMBER, SWITCH, InputDefinition
+from wavecomb.usd.materials.surface import COLOUR, NUMBER, SWITCH, InputDefinition
 from wavecomb.usd.materialx.surfaces.openpbr import MODELS, LayerInputs, layers_of
 
 _KINDS = {"float": NUMBER, "color3": COLOUR, "boolean": SWITCH}
-_MOST = 1e6
+_MAX_VALUE = 1e6
 """Maximum of an input if MaterialX does not specify one."""
 
 _SHORT = (("index of refraction", "ior"), ("diffuse roughness", "roughness"))
@@ -95,13 +95,13 @@ def _definition(one: Any, model: str) -> InputDefinition:
         values = _numbers(one.getAttribute(attribute))
         return values[0] if values else otherwise
 
-    low, high = limit("uimin", 0.0), limit("uimax", 100.0 if "ior" in name.lower() else _MOST)
+    low, high = limit("uimin", 0.0), limit("uimax", 100.0 if "ior" in name.lower() else _MAX_VALUE)
     shown = 1.0 if kind == COLOUR else _SLIDERS.get(name, 1.0)
     soft_low = limit("uisoftmin", low)
     soft_high = limit("uisoftmax", high if one.getAttribute("uimax") else shown)
     if name.startswith("emiss") and kind == COLOUR:
         # Emission colours often exceed the maximum that MaterialX suggests for its user interface.
-        high = _MOST
+        high = _MAX_VALUE
     return InputDefinition(
         name, group, _label(one.getAttribute("uiname") or name, group), kind, one.getType(),
         default, low, high, soft_low, soft_high,

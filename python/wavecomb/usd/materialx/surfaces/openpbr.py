@@ -16,15 +16,15 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Usd, UsdShade
 
-from wavecomb.usd.graphs.surface import Drivers, sampled
+from wavecomb.usd.graphs.surface_parameters import Drivers, sampled
 from wavecomb.usd.graphs.values import Value, fit, is_constant, numbers
-from wavecomb.usd.looks.network import Colour, colour, holds_colour, number, source_of
-from wavecomb.usd.looks.surface import Surface
+from wavecomb.usd.materials.network import Colour, colour, holds_colour, number, source_of
+from wavecomb.usd.materials.surface import Surface
 from wavecomb.usd.materialx.nodes.network import Networks
 
 if TYPE_CHECKING:
-    from wavecomb.usd.graphs.surface import Drivers
-    from wavecomb.usd.looks.texture import TextureTable
+    from wavecomb.usd.graphs.surface_parameters import Drivers
+    from wavecomb.usd.materials.texture import TextureTable
     from wavecomb.usd.stage.report import LoadReport
 
 

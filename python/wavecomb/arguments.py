@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Checks of the arguments of ``wavecomb.render``, before any work begins."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
+from difflib import get_close_matches
+from numbers import Integral, Real
+from typing import Any
+
+from wavecomb.errors import ArgumentError
+from wavecomb.load_options import LoadOptions
+
+_SYNONYMS = {
+    "width": "size", "height": "size", "resolution": "size", "samples": "spp",
+    "samples_per_pixel": "spp", "sample_count": "spp", "bounces": "max_depth", "depth": "max_depth",
+    "layers": "aovs", "aov": "aovs", "passes": "aovs", "cam": "camera", "time": "frame",
+}  # fmt: skip
+"""Names of other renderers, each with the keyword of Wavecomb."""
+
+_EXAMPLES = {
+    "size": "size=(640, 360)", "spp": "spp=64", "aovs": 'aovs=["depth", "normal"]',
+    "max_depth": "max_depth=8", "camera": 'camera="/World/Camera"', "frame": "frame=101.0",
+}  # fmt: skip
+
+
+_ELSEWHERE = ("width", "height", "spp", "policy", "costs", "size")
+"""Settings and load options that are not among the further keywords of ``render``."""
+
+
+def keywords() -> set[str]:
+    """Returns the names of ``RenderKeywords`` (keywords.py), which is made from the same tables."""
+    from wavecomb.options import settings
+
+    return {*settings(), *(one.name for one in fields(LoadOptions)), "region"} - {*_ELSEWHERE}
+
+
+def check_source(source: Any, *, also: Iterable[str] = ()) -> None:
+    """Raises ArgumentError unless a source is a path, a stage, or has one of the attributes."""
+    if isinstance(source, (str, os.PathLike)) or hasattr(source, "GetRootLayer"):
+        return
+    if not any(hasattr(source, name) for name in also):
+        raise ArgumentError(
+            f"{type(source).__name__}: is nothing to read; give a file, such as "
+            'wavecomb.load("shot.usd"), or a Usd.Stage'
+        )
+
+
+def check_arguments(size: Any, spp: Any, aovs: Any, options: Mapping[str, Any]) -> None:
+    """Checks the types of arguments and the names of keywords.
+
+    Args:
+        size: Width and height, or None.
+        spp: Samples per pixel.
+        aovs: Names of layers, or None.
+        options: Further keywords.
+
+    Raises:
+        ArgumentError: The message names the argument and has an example.
+    """
+    names = keywords()
+    for name in options:
+        if name not in names:
+            raise _unknown(name, names)
+    if size is not None and not _is_pair(size):
+        raise _wrong("size", size, "width and height in pixels")
+    if isinstance(spp, bool) or not isinstance(spp, Integral):
+        raise _wrong("spp", spp, "a whole number of samples per pixel")
+    if isinstance(aovs, (str, bytes)) or not (aovs is None or isinstance(aovs, Iterable)):
+        raise _wrong("aovs", aovs, "a list of names")
+    from wavecomb.options import settings
+
+    kinds: dict[str, tuple[Any, str]] = {
+        "integer": (Integral, "a whole number"), "number": (Real, "a number"),
+        "flag": (bool, "True or False"), "choice": (str, "a text"), "text": (str, "a text"),
+    }  # fmt: skip
+    for name, value in options.items():
+        row = settings().get(name)
+        if row is None or value is None:
+            continue
+        kind, what = kinds[row.kind]
+        if not isinstance(value, kind) or (kind is not bool and isinstance(value, bool)):
+            default = row.default if row.default is not None else 1
+            raise _wrong(name, value, what, f"{name}={default!r}")
+
+
+def _is_pair(size: Any) -> bool:
+    try:
+        width, height = size
+    except (TypeError, ValueError):
+        return False
+    return all(isinstance(edge, Integral) for edge in (width, height))
+
+
+def _wrong(name: str, value: Any, what: str, example: str = "") -> ArgumentError:
+    return ArgumentError(f"{name}={value!r}: must be {what}, such as {example or _EXAMPLES[name]}")
+
+
+def _unknown(name: str, known: set[str]) -> ArgumentError:
+    near = get_close_matches(name, [*known, *_EXAMPLES, *_SYNONYMS], n=1, cutoff=0.7)
+    wanted = _SYNONYMS.get(name) or next((_SYNONYMS.get(one, one) for one in near), None)
+    if wanted is None:
+        return ArgumentError(f"{name}: is no keyword of render(); docs/command-line.md lists them")
+    return ArgumentError(f"{name}: is no keyword; did you mean {_EXAMPLES.get(wanted, wanted)}?")

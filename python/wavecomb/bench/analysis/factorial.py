@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Main effects and interactions of a factorial experiment, as ratios of geometric means."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wavecomb.bench.analysis.data import baseline_of, in_order, short_count
+from wavecomb.bench.analysis.interval import Array, bootstrap, holm, paired_p, verdict
+from wavecomb.extras import needed
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FACTORS = ("policy", "lanes", "wave_size", "roulette", "ray_order", "shadow_order")
+_UNITS = ("stage", "renderer", "width", "height", "spp", "threads", "max_depth")
+_WORDS = {"wave_size": "waves", "ray_order": "rays", "shadow_order": "shadow rays"}
+
+
+def factors_of(runs: pd.DataFrame) -> list[str]:
+    """Returns the factors that an experiment varies."""
+    return [name for name in FACTORS if runs[name].nunique() > 1]
+
+
+def effects(runs: pd.DataFrame, metric: str) -> pd.DataFrame:
+    """Computes the effect of each level of each factor, over all combinations of the other factors.
+
+    The main effect of level l of factor F against its baseline b, over the combinations c of all
+    other factors (and stages) in which both were run, is
+
+        effect(F = l) = exp(mean over c of [log T(l, c) - log T(b, c)])
+
+    and the interaction of F = l with G = m, the factor by which G = m changes it, is
+
+        effect(F = l, G = m) = effect(F = l | G = m) / effect(F = l | G = its baseline)
+
+    over those combinations of the rest in which all four were run. If the suite is not a full
+    factorial, other differences must not count as interaction.
+
+    T is the mean over rounds. Intervals resample rounds; p-values test the effects of single
+    rounds, with Holm's correction over all effects of the table.
+
+    Returns:
+        One row per effect: ``kind`` ("main" or "interaction"), ``factor``, ``level``, ``baseline``,
+        ``other``, ``other_level`` (interactions), ``name``, ``cells`` (number of pairs), ``n``,
+        ``ratio``, ``low``, ``high``, ``p``, ``verdict``.
+    """
+    pandas = needed("pandas", "the analysis")
+    runs = runs.dropna(subset=[metric])
+    keys = [*FACTORS, *_UNITS]
+    runs = runs.assign(**{key: runs[key].astype(object).fillna("") for key in keys})
+    table = runs.pivot_table(index="repetition", columns=keys, values=metric, aggfunc="mean")
+    levels = {f: in_order(f, sorted(runs[f].unique())) for f in factors_of(runs)}
+    base = {f: baseline_of(f, known) for f, known in levels.items()}
+    others = [
+        (f, level) for f, known in levels.items() if base[f] is not None
+        for level in known if level != base[f]
+    ]  # fmt: skip
+    pairs = [pair for pair in itertools.combinations(others, 2) if pair[0][0] != pair[1][0]]
+    # An effect is linear in the logarithms, so applying it to unit vectors yields its weights.
+    unit = pandas.DataFrame(np.eye(table.shape[1]), columns=table.columns)
+    terms, weights = [], []
+    for term in ((one,) for one in others), pairs:
+        for of in term:
+            found = unit
+            for factor, level in of:
+                found = _difference(found, factor, level, base[factor])
+            if found.shape[1]:
+                weights.append(found.mean(axis=1).to_numpy())
+                terms.append(_term(of, base, found.shape[1] * len(of)))
+    return pandas.DataFrame(_rows(terms, weights, table.to_numpy(np.float64)))
+
+
+def _difference(table: pd.DataFrame, factor: str, level: Any, base: Any) -> pd.DataFrame:
+    """Returns the differences between two levels of a factor, over combinations that have both."""
+    columns = table.columns.names
+    if level not in table.columns.unique(factor) or base not in table.columns.unique(factor):
+        return table.iloc[:, :0].droplevel(columns.index(factor), axis=1)
+    found = table.xs(level, axis=1, level=factor) - table.xs(base, axis=1, level=factor)
+    return found.dropna(axis=1)
+
+
+def _term(of: tuple[tuple[str, Any], ...], base: dict[str, Any], cells: int) -> dict[str, Any]:
+    (factor, level), (other, other_level) = of[0], of[1] if len(of) > 1 else ("", "")
+    return {
+        "kind": "interaction" if other else "main",
+        "factor": factor,
+        "level": level,
+        "baseline": base[factor],
+        "other": other,
+        "other_level": other_level,
+        "name": " × ".join(
+            f"{_WORDS.get(f, f)} {value if isinstance(value, str) else short_count(float(value))}"
+            for f, value in of
+        ),
+        "cells": cells,
+    }
+
+
+def _rows(terms: list[dict[str, Any]], weights: list[Array], values: Array) -> list[dict[str, Any]]:
+    """Estimates all effects at once, each from the columns that have a weight."""
+
+    def statistic(means: Array) -> Array:
+        logs = np.log(means)
+        return np.exp(np.stack([logs[..., w != 0] @ w[w != 0] for w in weights], axis=-1))
+
+    if not terms:
+        return []
+    per_round = statistic(values)
+    p_values = holm([paired_p(effect, np.ones(len(values))) for effect in per_round.T])
+    return [
+        {
+            **term,
+            "n": estimate.n,
+            **estimate.columns("ratio"),
+            "p": p,
+            "verdict": verdict(estimate, p, ("less", "more")),
+        }
+        for term, estimate, p in zip(
+            terms, bootstrap(values, statistic, positive=True), p_values, strict=True
+        )
+    ]

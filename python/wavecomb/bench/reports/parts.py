@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Parts of a report. The templates ``report.html.j2`` and ``report.md.j2`` render them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+from wavecomb.bench.figures.style import CaptionedFigure, fixed, lay_out, save, svg
+
+MAX_ROWS = 60
+"""Largest number of rows of a table that is not folded."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """Base class of everything below a heading.
+
+    Attributes:
+        kind: Name of the macro of the templates that renders it.
+        summary: If not empty, the part is folded behind this line; Markdown leaves it out.
+    """
+
+    kind: ClassVar[str]
+    summary: str = field(default="", kw_only=True)
+
+
+@dataclass(frozen=True)
+class Text(Part):
+    """A paragraph, or a heading with ``mark="heading"``. Other marks are CSS classes."""
+
+    kind = "text"
+    text: str
+    mark: str = ""
+
+
+@dataclass(frozen=True)
+class Lines(Part):
+    """A list of findings."""
+
+    kind = "lines"
+    lines: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Code(Part):
+    """Preformatted text."""
+
+    kind = "code"
+    text: str
+
+
+@dataclass(frozen=True)
+class Facts(Part):
+    """Names and values, which may be nested tables of names and values. Omits empty values."""
+
+    kind = "facts"
+    values: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell of a table.
+
+    Attributes:
+        text: The value.
+        note: Smaller text after the value, such as an interval.
+        mark: CSS classes: "word" for text, "better", "worse".
+    """
+
+    text: str
+    note: str = ""
+    mark: str = ""
+
+
+@dataclass(frozen=True)
+class Table(Part):
+    """A table whose first column holds the row headings; equal neighbours in it are merged.
+
+    Attributes:
+        caption: Title.
+        head: Titles of the columns.
+        rows: Cells.
+        note: Small text below.
+    """
+
+    kind = "table"
+    caption: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[Cell]]
+    note: str = ""
+
+    def groups(self) -> Iterator[tuple[str, list[Sequence[Cell]]]]:
+        """Yields the heads of rows with the remaining cells of their rows."""
+        for head, rows in itertools.groupby(self.rows, key=lambda row: row[0].text):
+            yield head, [row[1:] for row in rows]
+
+    def is_word(self, column: int) -> bool:
+        """Whether a column holds text."""
+        return any("word" in row[column].mark for row in self.rows)
+
+
+def table(
+    caption: str,
+    head: Sequence[str],
+    rows: Sequence[Sequence[Cell | str]],
+    note: str = "",
+    summary: str = "",
+) -> Table:
+    """Makes a table of cells and plain texts. Always folds a long one."""
+    filled = [[c if isinstance(c, Cell) else Cell(c) for c in row] for row in rows]
+    if not summary and len(rows) > MAX_ROWS:
+        summary = f"{caption} ({len(rows)} rows)"
+    return Table(caption, head, filled, note, summary=summary)
+
+
+@dataclass(frozen=True)
+class Figure(Part):
+    """A figure; its files are figures/NAME.svg and figures/NAME.png.
+
+    Attributes:
+        name: Unique in a report.
+        title: Short title.
+        caption: Content, unit, kind of whiskers, number of runs.
+        drawing: <svg> element.
+    """
+
+    kind = "figure"
+    name: str
+    title: str
+    caption: str
+    drawing: str
+
+
+@dataclass(frozen=True)
+class Viewer(Part):
+    """Images that can be flipped and subtracted; Markdown leaves it out.
+
+    Attributes:
+        title: Stage and frame.
+        images: Names and addresses.
+    """
+
+    kind = "viewer"
+    title: str
+    images: Sequence[tuple[str, str]]
+
+
+@dataclass
+class Section:
+    """Parts under a heading."""
+
+    title: str
+    parts: list[Part] = field(default_factory=list)
+
+    @property
+    def key(self) -> str:
+        """Anchor of the section in the page."""
+        return key_of(self.title)
+
+
+class Writer:
+    """Collects sections and findings, and saves figures as they are made."""
+
+    def __init__(self, figures: Path) -> None:
+        self.figures = figures
+        self.sections: list[Section] = []
+        self.findings: list[str] = []
+
+    def begin(self, title: str) -> None:
+        """Starts a section."""
+        self.sections.append(Section(title))
+
+    def add(self, *parts: Part | None) -> None:
+        """Adds parts to the section, skipping None."""
+        self.sections[-1].parts += [part for part in parts if part is not None]
+
+    def draw(self, drawn: CaptionedFigure | None) -> None:
+        """Adds a figure to the section, if there is one."""
+        if drawn is not None:
+            lay_out(drawn)
+            drawing = svg(drawn)
+            save(drawn, drawing, self.figures)
+            self.add(Figure(drawn.name, drawn.title, drawn.caption, drawing))
+
+
+def key_of(text: str) -> str:
+    """Converts text to an anchor of the page.
+
+    >>> key_of("Wave size, 4 K")
+    'wave-size-4-k'
+    """
+    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-") or "part"
+
+
+def number(value: float, digits: int = 3) -> str:
+    """Formats a number with a few significant digits, or as an en dash if it is unknown.
+
+    >>> number(0.00123456), number(1234567.0), number(12.0), number(float("nan"))
+    ('0.00123', '1,230,000', '12.0', '–')
+    """
+    if value is None or not math.isfinite(value):
+        return "–"
+    if value == 0.0:
+        return "0"
+    size = math.floor(math.log10(abs(value)))
+    if size < -4:
+        return f"{value:.{digits - 1}e}"
+    rounded = round(value, digits - 1 - size)
+    return f"{rounded:,.{max(0, digits - 1 - size)}f}"
+
+
+def interval(low: float, high: float, digits: int = 3) -> str:
+    """Formats an interval as [low, high], or as "" if it is unknown."""
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return ""
+    return f"[{fixed(low, digits)}, {fixed(high, digits)}]"

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Comparison of images: error metrics, perceptual metrics, statistical tests, heat maps."""

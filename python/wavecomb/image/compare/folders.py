@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compares the images of two folders or sequences, and writes a page with the results."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from wavecomb.errors import WavecombError
+from wavecomb.image.compare.comparison import Comparison, compare
+from wavecomb.image.compare.heatmap import Kind, heat_map
+from wavecomb.image.files.collection import images_of, is_many
+from wavecomb.image.files.image import display
+from wavecomb.image.pages import Cell, Pair, document, figure_text, pair_section, table
+from wavecomb.image.thumbnails import DisplayOptions, fit_image
+
+
+@dataclass(frozen=True)
+class PairResult:
+    """Comparison of two images with the same name.
+
+    Attributes:
+        name: Path inside the folders, or frame.
+        a: File of image A.
+        b: File of the reference image B.
+        result: Differences; None if the images cannot be compared.
+        problem: Reason why they cannot be compared, or "".
+    """
+
+    name: str
+    a: str
+    b: str
+    result: Comparison | None
+    problem: str = ""
+
+    def passed(self, tolerance: float | None) -> bool:
+        """Returns whether the images are equal, or within a tolerance."""
+        if self.result is None:
+            return False
+        within = tolerance is not None and self.result.within(tolerance)
+        return self.result.equal or within
+
+
+@dataclass(frozen=True)
+class FolderPair:
+    """Images of two folders or sequences.
+
+    Attributes:
+        pairs: Name -> files of A and B.
+        only_a: Names that only A has.
+        only_b: Names that only B has.
+    """
+
+    pairs: dict[str, tuple[str, str]]
+    only_a: tuple[str, ...]
+    only_b: tuple[str, ...]
+
+    def compared(self) -> Iterator[PairResult]:
+        """Compares each pair in turn; yields a result with a problem for unreadable images."""
+        for name, (a, b) in self.pairs.items():
+            try:
+                yield PairResult(name, a, b, compare(a, b))
+            except (OSError, ValueError) as error:
+                yield PairResult(name, a, b, None, " ".join(str(error).split()))
+
+
+def pair_up(a: str, b: str) -> FolderPair:
+    """Pairs images of two folders by their paths, or of two sequences by their frames.
+
+    Args:
+        a: A folder, or a name with a frame placeholder.
+        b: The reference, in the same form.
+
+    Raises:
+        WavecombError: A source does not exist, or the two have no name in common.
+    """
+    for one, other in ((a, b), (b, a)):
+        if not is_many(one):
+            raise WavecombError(f"{one} is one image, but {other} names several")
+    in_a, in_b = images_of(a), images_of(b)
+    pairs = {name: (file, in_b[name]) for name, file in in_a.items() if name in in_b}
+    if not pairs:
+        raise WavecombError(f"{a} and {b} have no images with the same name or frame")
+    only_a = tuple(name for name in in_a if name not in in_b)
+    only_b = tuple(name for name in in_b if name not in in_a)
+    return FolderPair(pairs, only_a, only_b)
+
+
+def as_plain(pair: PairResult, tolerance: float | None) -> dict[str, Any]:
+    """Returns the result of a pair for JSON."""
+    found = {} if pair.result is None else pair.result.to_dict()
+    passed = pair.passed(tolerance)
+    return {"name": pair.name, "a": pair.a, "b": pair.b, "passed": passed,
+            "problem": pair.problem or None, **found}  # fmt: skip
+
+
+# ---- Page with pairs of images under a wipe line, difference maps and figures --------------------
+
+
+MAX_PAIRS = 60
+"""Most pairs whose images are in a page, those with the largest differences; its table has all."""
+_HEAD = ("picture", "", "differ", "RMSE", "relMSE", "largest", "at")
+
+
+def compare_page(
+    results: Sequence[PairResult],
+    look: DisplayOptions,
+    *,
+    sources: tuple[str, str],
+    folders: FolderPair | None = None,
+    tolerance: float | None = None,
+    kind: Kind = "absolute",
+    width: int = 1600,
+) -> str:
+    """Returns a self-contained HTML page with comparisons.
+
+    Args:
+        results: Results of the pairs.
+        look: Display options of images.
+        sources: Names of A and of the reference B.
+        folders: The compared folders; None for a comparison of two files.
+        tolerance: Tolerance within which images pass.
+        kind: Kind of difference maps.
+        width: Largest width of images in the page, pixels.
+    """
+    ranked = [one for one in results if one.result is not None and not one.passed(tolerance)]
+    ranked.sort(key=lambda one: -_rmse(one))
+    if folders is None:
+        ranked = list(results)
+    shown = {one.name: f"pair-{k}" for k, one in enumerate(ranked[:MAX_PAIRS])}
+    sections = [
+        pair_section(_pair(one, look, kind, width), shown[one.name], _short(sources))
+        for one in results
+        if one.name in shown
+    ]
+    overview = "" if folders is None else _overview(results, folders, shown, tolerance)
+    good = sum(one.passed(tolerance) for one in results)
+    facts = f"A: {sources[0]}; B, the reference: {sources[1]}"
+    if folders is not None:
+        missing = len(folders.only_a) + len(folders.only_b)
+        facts += f"; {good} of {len(results)} pairs pass"
+        if missing:
+            facts += f", {missing} {'image has' if missing == 1 else 'images have'} no counterpart"
+    title = f"{_short(sources)[0]} and {_short(sources)[1]}"
+    return document(title, facts, overview + "".join(sections))
+
+
+def _short(sources: tuple[str, str]) -> tuple[str, str]:
+    """Returns short names of A and B that differ from each other."""
+    names = [os.path.basename(os.path.normpath(one)) for one in sources]
+    if names[0] != names[1]:
+        return names[0], names[1]
+    parents = [os.path.basename(os.path.dirname(os.path.abspath(one))) for one in sources]
+    if parents[0] != parents[1]:
+        return f"{parents[0]}/{names[0]}", f"{parents[1]}/{names[1]}"
+    return "A", "B"
+
+
+def _rmse(one: PairResult) -> float:
+    return 0.0 if one.result is None else one.result.rmse
+
+
+def _pair(one: PairResult, look: DisplayOptions, kind: Kind, width: int) -> Pair:
+    a, b = (fit_image(look.codes(file), width, 4 * width) for file in (one.a, one.b))
+    assert one.result is not None
+    difference = None
+    if not one.result.equal:
+        made = heat_map(one.a, one.b, kind, exposure=look.exposure)
+        difference = fit_image(display(made), max(width, a.shape[1]), 8 * width)
+    return Pair(one.name, _facts(one.result), a, b, difference)
+
+
+def _facts(found: Comparison) -> list[str]:
+    if found.equal:
+        return ["Equal, bit for bit."]
+    share = 100.0 * found.pixels_different / (found.width * found.height)
+    lines = [
+        f"{found.pixels_different} pixels differ ({share:.3g} %); RMSE {found.rmse:.4g}, "
+        f"relMSE {found.rel_mse:.4g}, largest {found.max_abs:.4g}"
+        + (f", of luminance at {found.luminance_max_at}" if found.luminance_max_at else "")
+    ]
+    differ = [name for name, entry in found.layers.items() if not entry["equal"]]
+    if differ:
+        lines.append(f"Layers that differ: {', '.join(differ)}")
+    for label, names in (("A", found.only_a), ("B", found.only_b)):
+        if names:
+            lines.append(f"Layers of {label} alone: {', '.join(names)}")
+    return lines
+
+
+def _overview(
+    results: Sequence[PairResult],
+    folders: FolderPair,
+    shown: dict[str, str],
+    tolerance: float | None,
+) -> str:
+    rows: list[list[Cell | str]] = []
+    for one in results:
+        found, name = one.result, Cell(one.name, shown.get(one.name, ""))
+        if found is None:
+            rows.append([name, Cell(one.problem, mark="bad word"), *[""] * 5])
+            continue
+        word = "equal" if found.equal else "within" if one.passed(tolerance) else "different"
+        mark = "good word" if one.passed(tolerance) else "bad word"
+        where = "" if found.luminance_max_at is None else str(found.luminance_max_at)
+        figures = (found.rmse, found.rel_mse, found.max_abs)
+        share = 100.0 * found.pixels_different / (found.width * found.height)
+        rows.append(
+            [name, Cell(word, mark=mark), f"{share:.3g} %", *map(figure_text, figures), where]
+        )
+    for label, names in (("A", folders.only_a), ("B", folders.only_b)):
+        rows += [[name, Cell(f"only in {label}", mark="bad word"), *[""] * 5] for name in names]
+    return table(_HEAD, rows)

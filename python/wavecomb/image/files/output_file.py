@@ -1,0 +1,258 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Writes output files atomically."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import shutil
+import stat
+import struct
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, Protocol
+
+from wavecomb.image.files.private_folder import PrivateFolder, remove_abandoned
+
+
+class Publisher(Protocol):
+    """Interface that renames files on behalf of a process without permission."""
+
+    def is_own(self, target: Path) -> bool:
+        """Returns whether a file is in a folder that this process may modify freely."""
+
+    def part_of(self, target: Path) -> Path:
+        """Returns a temporary name for a file."""
+
+    def check(self, target: Path) -> None:
+        """Raises OSError unless the file can be written now."""
+
+    def publish(self, part: Path, target: Path, *, durable: bool) -> None:
+        """Renames the temporary file."""
+
+
+publisher: Publisher | None = None
+
+
+def _publisher_of(target: Path) -> Publisher | None:
+    return None if publisher is None or publisher.is_own(target) else publisher
+
+
+def _target(path: str | os.PathLike[str]) -> Path:
+    """Returns the file behind symbolic links; raises OSError if it cannot be written."""
+    check_name(path)
+    target = Path(os.path.realpath(path))
+    if target.is_dir():
+        raise IsADirectoryError(f"{os.fspath(path)}: is a folder; give a file name")
+    if target.exists() and not target.is_file():
+        raise OSError(f"{os.fspath(path)}: is not a regular file; give another name")
+    if not target.parent.exists():
+        raise FileNotFoundError(
+            f"{os.fspath(path)}: the folder {target.parent} does not exist; make it first"
+        )
+    if not target.parent.is_dir():
+        raise NotADirectoryError(f"{os.fspath(path)}: {target.parent} is not a folder")
+    return target
+
+
+def reason(error: OSError) -> str:
+    """Returns the reason for an error, such as "Permission denied", else the whole message."""
+    return error.strerror or str(error)
+
+
+_ENDINGS = (".exr", ".png", ".jpg", ".jpeg", ".html", ".learned")
+
+
+def check_name(path: str | os.PathLike[str]) -> None:
+    """Raises OSError with a one-line message if libraries cannot open a file with this name.
+
+    USD and OpenImageIO require UTF-8 names and determine the format by the extension.
+    """
+    name = os.fspath(path)
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        raise OSError(f"{name}: the name is not UTF-8; rename the file or folder") from None
+    if "\0" in name:
+        raise OSError(f"{name}: the name holds a zero byte; give another name")
+    last = os.path.basename(name)
+    if last.lower() in _ENDINGS:
+        raise OSError(f"{name}: is only an ending; give a name before it, such as image{last}")
+
+
+def why_not_written(part: str | os.PathLike[str], said: str) -> str:
+    """Returns the reason why a library could not write a file: a full disk, or its own message.
+
+    Libraries do not report the system's error, so this function appends to the file to obtain it.
+
+    Args:
+        part: The incomplete file.
+        said: Message of the library.
+    """
+    try:
+        with open(part, "ab", 0) as file:
+            written = file.write(bytes(1 << 20))
+            if written < 1 << 20:
+                file.write(b"\0")
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            return "the disk is full, or its quota is used up; make space"
+        if error.errno in (errno.EFBIG, errno.EIO, errno.EROFS):
+            return reason(error)
+    return said
+
+
+def is_whole_png(path: str | os.PathLike[str]) -> bool:
+    """Returns whether the chunks of a PNG file are complete."""
+    with open(path, "rb") as file:
+        end = os.fstat(file.fileno()).st_size
+        place, kind = 8, b""
+        while place + 12 <= end and kind != b"IEND":
+            file.seek(place)
+            length, kind = struct.unpack(">I4s", file.read(8))
+            place += 12 + length
+    return kind == b"IEND" and place == end
+
+
+_KINDS = (
+    (stat.S_ISFIFO, "a FIFO"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+)
+
+
+def kind_of(path: str | os.PathLike[str]) -> str | None:
+    """Returns the kind of a special file, such as "a FIFO"; None for regular files and folders.
+
+    Opening a FIFO blocks until another process opens it for writing.
+    """
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):
+        return None
+    return next((kind for is_kind, kind in _KINDS if is_kind(mode)), None)
+
+
+def check_regular(path: str | os.PathLike[str]) -> None:
+    """Raises OSError with a one-line message for a special file (see ``kind_of``)."""
+    kind = kind_of(path)
+    if kind is not None:
+        raise OSError(f"{os.fspath(path)}: is {kind}, not a regular file; give a regular file")
+
+
+def one_line(message: str, name: str) -> str:
+    """Returns a library's message as one line without the file name, which the caller adds."""
+    line = " ".join(message.replace(f'"{name}"', "it").split())
+    return line.rstrip(".") or "unknown reason"
+
+
+def problem_of(library: Any) -> str:
+    """Returns the error message of OpenImageIO or of one of its readers.
+
+    The message quotes file content, which may not be valid text.
+    """
+    try:
+        return str(library.geterror())
+    except UnicodeDecodeError:
+        return "its header is damaged"
+
+
+def check_writable(path: str | os.PathLike[str]) -> None:
+    """Raises OSError with a one-line message unless the file can be written now.
+
+    Call this before long work. It creates missing folders, and creates and removes a private folder
+    next to the file.
+    """
+    check_name(path)
+    target = Path(os.path.realpath(path))
+    other = _publisher_of(target)
+    is_missing = not target.parent.exists()
+    try:
+        if is_missing and other is None:
+            target.parent.mkdir(parents=True, exist_ok=True)
+        if not is_missing or other is None:
+            _target(path)
+        if other is not None:
+            other.check(target)
+            return
+        PrivateFolder(target.parent).close()
+    except OSError as error:
+        why = reason(error)
+        if other is not None and "cannot be written: " in why:
+            raise OSError(why.replace(os.fspath(target), os.fspath(path))) from error
+        raise OSError(f"{os.fspath(path)}: cannot be written: {why}") from error
+
+
+def _sync(path: Path) -> None:
+    """Flushes a file or a folder's entries to disk."""
+    number = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(number)
+    finally:
+        os.close(number)
+
+
+def publish(part: Path, target: Path, *, durable: bool = False) -> None:
+    """Renames a finished file; copies it first if the target is on another file system."""
+    if durable:
+        _sync(part)
+    try:
+        os.replace(part, target)
+    except OSError as error:
+        if error.errno != errno.EXDEV:
+            raise
+        with PrivateFolder(target.parent) as folder:
+            beside = folder.path / target.name
+            shutil.copyfile(part, beside)
+            if durable:
+                _sync(beside)
+            os.replace(beside, target)
+    if durable:
+        _sync(target.parent)
+
+
+@contextlib.contextmanager
+def replacing(path: str | os.PathLike[str], *, durable: bool = False) -> Iterator[Path]:
+    """Yields a temporary file name; renames that file to ``path`` on success.
+
+    The temporary file is in a private folder next to ``path``. On an exception it is removed and
+    ``path`` remains unchanged. After a crash ``path`` is unchanged as well, and the next call for a
+    file in that folder removes the private folder.
+
+    Args:
+        path: The file.
+        durable: Whether to flush the file to disk before the renaming, for power failures.
+
+    >>> with replacing("/tmp/answer.txt") as part:
+    ...     _ = part.write_text("42")
+    """
+    target = _target(path)
+    other = _publisher_of(target)
+    try:
+        if other is not None:
+            part = other.part_of(target)
+            try:
+                yield part
+                other.publish(part, target, durable=durable)
+            finally:
+                with contextlib.suppress(OSError):
+                    part.unlink()
+            return
+        remove_abandoned(target.parent)
+        with PrivateFolder(target.parent) as folder:
+            part = folder.path / target.name
+            yield part
+            publish(part, target, durable=durable)
+    except OSError as error:
+        if error.errno is None:
+            raise
+        raise OSError(f"{os.fspath(path)}: cannot be written: {reason(error)}") from error
+
+
+@contextlib.contextmanager
+def replacing_all(paths: Iterable[str | os.PathLike[str]]) -> Iterator[list[Path]]:
+    """Replaces several files: renames none before all are written."""
+    with contextlib.ExitStack() as stack:
+        yield [stack.enter_context(replacing(path)) for path in paths]

@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Converts layers of an image for display: radiance as colours, other layers in suitable forms."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.image.colour_maps import colour_map
+from wavecomb.image.files import image
+from wavecomb.image.working_space import LUMINANCE
+from wavecomb.run import aovs
+
+Develop = Callable[[NDArray[Any]], NDArray[np.uint8]]
+"""Converts linear Rec.709 (height, width, 3) to 8-bit codes."""
+
+_CRYPTO = ("crypto_", "Crypto")
+_UNITS = {
+    "cost": "cost, ns per pixel",
+    "samples": "samples per pixel",
+    "error": "error of the pixel",
+    "variance": "variance, luminance",
+    "depth": "depth, scene units",
+    "half_depth": "depth to half opacity, scene units",
+    "guided_share": "share of bounces that are guided",
+    "survival": "survival probability of roulette",
+}
+_LOGARITHMIC = ("cost", "error", "variance")
+SCALARS = tuple(_UNITS)
+"""Layers that are displayed in false colours."""
+NOT_FINITE = (0, 255, 255)
+
+
+@dataclass(frozen=True)
+class Legend:
+    """Legend of false colours.
+
+    Attributes:
+        title: Quantity and unit.
+        low: Value of the darkest colour.
+        high: Value of the lightest colour.
+        logarithmic: Whether equal colour steps are equal ratios.
+    """
+
+    title: str
+    low: float
+    high: float
+    logarithmic: bool
+
+    def ticks(self, count: int = 5) -> list[tuple[float, str]]:
+        """Returns positions from 0 to 1 along the bar with their labels."""
+        out = []
+        for t in np.linspace(0.0, 1.0, count):
+            if self.logarithmic:
+                value = self.low * (self.high / self.low) ** t
+            else:
+                value = self.low + (self.high - self.low) * t
+            out.append((float(t), f"{value:.3g}"))
+        return out
+
+
+@dataclass(frozen=True)
+class DisplayLayer:
+    """A layer converted for display.
+
+    Attributes:
+        pixels: (height, width, 3) 8-bit codes.
+        legend: Legend of false colours; None for true colours.
+    """
+
+    pixels: NDArray[np.uint8]
+    legend: Legend | None = None
+
+
+def is_light(layer: str) -> bool:
+    """Returns whether a layer holds radiance, so that exposure and tone mapping apply."""
+    return aovs.content(layer) == "light"
+
+
+def show_layer(
+    layer: NDArray[Any],
+    name: str,
+    develop: Develop = image.display,
+    *,
+    low: float | None = None,
+    high: float | None = None,
+) -> DisplayLayer:
+    """Converts a layer for display.
+
+    Args:
+        layer: (height, width) or (height, width, channels).
+        name: Name of the AOV or of the layer in a file.
+        develop: Conversion of radiance.
+        low: Lower end of false colours; None derives it from the image.
+        high: Upper end of false colours; None derives it from the image.
+    """
+    array = np.asarray(layer)
+    if is_light(name):
+        return DisplayLayer(develop(array))
+    content = aovs.content(name)
+    if content == "colour":
+        return DisplayLayer(image.display(array))
+    if content == "direction":
+        return DisplayLayer(_codes(0.5 * array + 0.5))
+    if name.startswith(_CRYPTO):
+        return DisplayLayer(
+            id_colours(np.ascontiguousarray(array[:, :, 0], np.float32).view(np.uint32))
+        )
+    if content == "id":
+        return DisplayLayer(id_colours(array.reshape(array.shape[:2])))
+    if name == "uv":
+        wide = np.zeros((*array.shape[:2], 3), np.float32)
+        wide[:, :, :2] = array - np.floor(array)
+        return DisplayLayer(_codes(wide))
+    if name == "motion":
+        wide = np.zeros((*array.shape[:2], 3), np.float32)
+        wide[:, :, :2] = array / max(float(np.abs(array).max()), 1e-6)
+        return DisplayLayer(_codes(0.5 * wide + 0.5))
+    if name == "position":
+        return DisplayLayer(_codes(_stretched(array)))
+    if array.ndim == 3:
+        # A variance is infinite while it is unknown.
+        with np.errstate(invalid="ignore"):
+            array = array @ np.array(LUMINANCE, np.float32)
+    return heat(array, name, low, high)
+
+
+def heat(
+    values: NDArray[Any],
+    name: str,
+    low: float | None = None,
+    high: float | None = None,
+) -> DisplayLayer:
+    """Converts values to false colours; values that are not finite become cyan.
+
+    Args:
+        values: (height, width).
+        name: Name of a layer, which determines title and kind of scale, or another title.
+        low: Value of the darkest colour; None derives it from the image.
+        high: Value of the lightest colour; None derives it from the image.
+    """
+    wide = np.asarray(values, np.float64)
+    finite = np.isfinite(wide)
+    logarithmic = name in _LOGARITHMIC
+    usable = wide[finite & (wide > 0.0)] if logarithmic else wide[finite]
+    if usable.size == 0:
+        usable = np.array([1.0])
+    # Logarithmic scales exclude 1 % at both ends, so that one bright pixel does not darken all
+    # others.
+    ends = np.percentile(usable, (1.0, 99.0)) if logarithmic else (usable.min(), usable.max())
+    least = float(ends[0]) if low is None else low
+    most = float(ends[1]) if high is None else high
+    if logarithmic:
+        least = max(least, 1e-30)
+        most = max(most, least * 1.0001)
+        safe = np.maximum(np.where(finite, wide, least), 1e-300)
+        position = np.log(safe / least) / np.log(most / least)
+    else:
+        most = most if most > least else least + 1.0
+        position = (np.where(finite, wide, least) - least) / (most - least)
+    table = _table()
+    index = (np.clip(position, 0.0, 1.0) * (len(table) - 1) + 0.5).astype(np.intp)
+    pixels = table[index]
+    pixels[~finite] = NOT_FINITE
+    return DisplayLayer(pixels, Legend(_UNITS.get(name, name), least, most, logarithmic))
+
+
+def ramp(width: int) -> NDArray[np.uint8]:
+    """Returns the false colours from low to high (width, 3)."""
+    table = _table()
+    return table[np.linspace(0, len(table) - 1, width).astype(np.intp)]
+
+
+@functools.cache
+def _table() -> NDArray[np.uint8]:
+    return image.display(colour_map()[None])[0]
+
+
+def id_colours(ids: NDArray[Any]) -> NDArray[np.uint8]:
+    """Returns a distinct colour for each integer (h, w) -> (h, w, 3); 0 is black."""
+    mixed = ids.astype(np.uint32) * np.uint32(2654435761)
+    mixed ^= mixed >> np.uint32(15)
+    mixed *= np.uint32(2246822519)
+    mixed ^= mixed >> np.uint32(13)
+    channels = [(mixed >> np.uint32(shift)) & np.uint32(255) for shift in (0, 8, 16)]
+    pixels = (64 + np.stack(channels, axis=-1) * 3 // 4).astype(np.uint8)
+    pixels[ids == 0] = 0
+    return pixels
+
+
+def _stretched(array: NDArray[Any]) -> NDArray[np.float32]:
+    finite = np.where(np.isfinite(array), array, 0.0)
+    low = finite.min(axis=(0, 1))
+    size = np.maximum(finite.max(axis=(0, 1)) - low, 1e-20)
+    return ((finite - low) / size).astype(np.float32)
+
+
+def _codes(values: NDArray[Any]) -> NDArray[np.uint8]:
+    clean = np.clip(np.nan_to_num(values), 0.0, 1.0)
+    return np.floor(clean * 255.0 + 0.5).astype(np.uint8)

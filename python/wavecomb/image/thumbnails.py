@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Converts image files for display at a given size; contact sheets and wipes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.errors import WavecombError
+from wavecomb.image.files.image import (
+    display,
+    linear_from_srgb,
+    read_layers,
+    read_metadata,
+    srgb_from_linear,
+)
+from wavecomb.image.layer_view import is_light, show_layer
+from wavecomb.image.working_space import to_rec709
+
+if TYPE_CHECKING:
+    from wavecomb.image.files.image import Transfer
+
+
+@dataclass(frozen=True)
+class DisplayOptions:
+    """Display options of image files.
+
+    Attributes:
+        layer: Layer of the file; "" means its colours.
+        denoised: Whether colours are those of the layer denoised, if it exists, instead of beauty.
+        exposure: Exposure of radiance layers in stops.
+        tone_map: Tone mapping of radiance layers, "clamp" or "neutral".
+    """
+
+    layer: str = ""
+    denoised: bool = True
+    exposure: float = 0.0
+    tone_map: Transfer = "clamp"
+
+    def codes(self, file: str) -> NDArray[np.uint8]:
+        """Reads an image file as 8-bit sRGB codes (height, width, 3).
+
+        Raises:
+            WavecombError: The file lacks the layer.
+            OSError: The file cannot be read.
+        """
+        layers = read_layers(file)
+        is_better = self.denoised and "denoised" in layers
+        name = self.layer or ("denoised" if is_better else "beauty")
+        if not self.layer and name not in layers and len(layers) == 1:
+            name = next(iter(layers))
+        if name not in layers:
+            raise WavecombError(f"{file}: has no layer {name}; there are {', '.join(layers)}")
+        pixels = layers[name]
+        if not (self.layer and not is_light(name)) and pixels.shape[2] >= 3:
+            space = str(read_metadata(file).get("wavecomb:working_space", "rec709"))
+            return self.of_light(to_rec709(pixels[:, :, :3], space))
+        # Grey images have only R or Y.
+        if not self.layer:
+            return self.of_light(np.repeat(pixels[:, :, :1], 3, axis=2))
+        return show_layer(pixels if pixels.shape[2] > 1 else pixels[:, :, 0], name).pixels
+
+    def of_light(self, pixels: NDArray[Any]) -> NDArray[np.uint8]:
+        """Converts linear Rec.709 to 8-bit codes."""
+        return display(pixels, exposure=self.exposure, tone_map=self.tone_map)
+
+
+def fit_image(codes: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
+    """Reduces an image in linear light to fit into a rectangle; never enlarges it.
+
+    Args:
+        codes: 8-bit sRGB (h, w, 3).
+        width: Largest width.
+        height: Largest height.
+    """
+    import OpenImageIO as oiio
+
+    high, wide = codes.shape[:2]
+    share = min(width / wide, height / high)
+    if share >= 1.0:
+        return codes
+    wide, high = max(1, round(wide * share)), max(1, round(high * share))
+    linear = linear_from_srgb(codes.astype(np.float32) / np.float32(255.0))
+    source = oiio.ImageBuf(np.ascontiguousarray(linear))
+    made = oiio.ImageBufAlgo.resize(
+        source, filtername="lanczos3", roi=oiio.ROI(0, wide, 0, high, 0, 1, 0, 3), nthreads=1
+    )
+    pixels = np.asarray(made.get_pixels(oiio.FLOAT), np.float32).reshape(high, wide, 3)
+    encoded = srgb_from_linear(np.clip(pixels, 0.0, 1.0))
+    return np.floor(encoded * 255.0 + 0.5).astype(np.uint8)
+
+
+# ---- Contact sheets and wipes --------------------------------------------------------------------
+
+
+Codes = NDArray[np.uint8]
+
+MAX_IMAGES = 2000
+"""Most images of a contact sheet."""
+_PAPER = 24
+_GAP = 12
+_TEXT = 13
+_LABEL = 20
+_SHAPE = 1.6
+"""Approximate aspect ratio of a sheet if the number of columns is not given."""
+
+
+def contact_sheet(
+    pictures: Mapping[str, str], look: DisplayOptions, *, width: int = 240, columns: int = 0
+) -> Codes:
+    """Arranges small images in a grid, each with its name below.
+
+    Args:
+        pictures: Name -> file.
+        look: Display options.
+        width: Width of each image in pixels; the row height is that of the highest image.
+        columns: Images per row; 0 chooses a sheet that is clearly wider than high.
+
+    Returns:
+        8-bit sRGB codes (height, width, 3).
+
+    Raises:
+        WavecombError: A file lacks the layer.
+        OSError: A file cannot be read.
+    """
+    names = list(pictures)
+    small = [fit_image(look.codes(file), width, 4 * width) for file in pictures.values()]
+    high = max(one.shape[0] for one in small)
+    columns = min(columns or _columns(len(small), width, high), len(small))
+    rows = -(-len(small) // columns)
+    cell_w, cell_h = width + _GAP, high + _LABEL + _GAP
+    sheet = np.full((rows * cell_h + _GAP, columns * cell_w + _GAP, 3), _PAPER, np.uint8)
+    texts: list[tuple[int, int, str]] = []
+    for k, (name, picture) in enumerate(zip(names, small, strict=True)):
+        x = _GAP + k % columns * cell_w + (width - picture.shape[1]) // 2
+        y = _GAP + k // columns * cell_h + (high - picture.shape[0])
+        sheet[y : y + picture.shape[0], x : x + picture.shape[1]] = picture
+        texts.append((_GAP + k % columns * cell_w, y + picture.shape[0] + _TEXT + 2, name))
+    return _written(sheet, texts, width)
+
+
+def _columns(count: int, width: int, height: int) -> int:
+    wanted = math.sqrt(_SHAPE * count * (height + _LABEL + _GAP) / (width + _GAP))
+    return max(1, round(wanted))
+
+
+def wipe(a: Codes, b: Codes, at: float = 0.5, names: tuple[str, str] = ("A", "B")) -> Codes:
+    """Shows A to the left of a line and B to its right, with their names.
+
+    Args:
+        a: 8-bit sRGB codes (height, width, 3).
+        b: Image of the same size.
+        at: Position of the line, from 0 (left) to 1.
+        names: Names of A and B.
+    """
+    width = a.shape[1]
+    column = min(max(round(at * width), 0), width)
+    made = b.copy()
+    made[:, :column] = a[:, :column]
+    if 0 < column < width:
+        made[:, column - 1 : column + 1] = (255, 255, 255)
+    texts = []
+    if column > 0:
+        texts.append((6, _TEXT + 6, names[0]))
+    if column < width:
+        texts.append((max(width - _length(names[1]) - 6, column + 6), _TEXT + 6, names[1]))
+    return _written(made, texts, width, shadow=True)
+
+
+def _length(text: str) -> int:
+    """Returns the width of a text in pixels."""
+    import OpenImageIO as oiio
+
+    return int(oiio.ImageBufAlgo.text_size(text, _TEXT).width)
+
+
+def _written(
+    codes: Codes, texts: Sequence[tuple[int, int, str]], room: int, *, shadow: bool = False
+) -> Codes:
+    """Draws texts at positions (x, baseline); cuts the beginning of texts that do not fit."""
+    import OpenImageIO as oiio
+
+    canvas = oiio.ImageBuf(np.ascontiguousarray(codes))
+    edge: dict[str, Any] = {"shadow": 2} if shadow else {}
+    for x, y, text in texts:
+        while len(text) > 4 and _length(text) > room:
+            text = "…" + text[2:]
+        oiio.ImageBufAlgo.render_text(canvas, x, y, text, _TEXT, "", (0.9, 0.9, 0.9), **edge)
+    return np.asarray(canvas.get_pixels(oiio.UINT8), np.uint8).reshape(codes.shape)

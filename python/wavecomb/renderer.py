@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scene that stays ready to render while materials, lights and the camera change."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Any
+
+from wavecomb.api import is_unread, load
+from wavecomb.arguments import check_arguments, check_source
+from wavecomb.errors import ArgumentError, WavecombError
+from wavecomb.image.rendered import Picture, picture_of
+from wavecomb.run.settings import DEFAULT_SIZE, prepare
+
+if TYPE_CHECKING:
+    from pxr import Usd
+    from typing_extensions import Unpack
+
+    from wavecomb._core import Scene
+    from wavecomb.keywords import SettingKeywords, StageKeywords
+    from wavecomb.usd import LoadedStage
+
+Key = str | int
+Values = Mapping[str, Any]
+
+
+class Renderer:
+    """A scene with its acceleration structures, which can be edited and rendered again.
+
+    An edit of the camera, a material or a light takes milliseconds, and the next render starts
+    without loading or building. Only one thread may use the object.
+
+    >>> renderer = wavecomb.Renderer("shot.usd", size=(640, 360))  # doctest: +SKIP
+    >>> renderer.edit(materials={"/World/Looks/Car": {"roughness": 0.1}})  # doctest: +SKIP
+    >>> renderer.render(spp=16).save("shiny.png")  # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        source: str | os.PathLike[str] | Usd.Stage | LoadedStage | Scene,
+        *,
+        size: tuple[int, int] | None = None,
+        threads: int = 0,
+        **options: Unpack[StageKeywords],
+    ) -> None:
+        """Loads a stage, if it is not loaded yet, and builds acceleration structures.
+
+        Args:
+            source: A path, a ``Usd.Stage``, a result of ``load``, or a ``Scene``.
+            size: Width and height of images in pixels; by default 600 x 600.
+            threads: Threads for loading, building and edits; 0 means all.
+            **options: Fields of ``LoadOptions``, for a path or a ``Usd.Stage``.
+
+        Raises:
+            wavecomb.Error: The stage cannot be rendered, or an argument is invalid.
+        """
+        from wavecomb import _core
+
+        check_source(source, also=("scene", "instanced_triangles"))
+        check_arguments(size, 1, None, options)
+        self._size = size or DEFAULT_SIZE
+        self._loaded: LoadedStage | None = None
+        if is_unread(source):
+            source = load(source, size=self._size, threads=threads, **options)
+        elif options:
+            raise ArgumentError(f"{', '.join(options)}: give this to load(); the scene is loaded")
+        scene: Any = source
+        if hasattr(scene, "report"):
+            self._loaded, scene = scene, scene.scene
+        if self._loaded is not None and self._loaded.catchers:
+            raise WavecombError("a stage with shadow catchers takes three renders: use render()")
+        self._core = _core.Renderer(scene, threads)
+        self._is_built = True
+
+    @property
+    def scene(self) -> Scene:
+        """The edited scene: a new object after each edit, which shares unchanged data."""
+        return self._core.scene
+
+    @property
+    def materials(self) -> dict[str, list[int]]:
+        """Ids of materials by name: the paths of their prims, or the names in a ``SceneBuilder``.
+
+        A prim has several ids if meshes provide different primvars.
+        """
+        paths = () if self._loaded is None else self._loaded.material_paths
+        return _ids(paths or (name for name, _ in self.scene.materials))
+
+    @property
+    def lights(self) -> dict[str, list[int]]:
+        """Ids of lights by name, as for ``materials``."""
+        paths = () if self._loaded is None else self._loaded.light_paths
+        return _ids(paths or (name for name, _ in self.scene.lights))
+
+    def edit(
+        self,
+        *,
+        camera: Values | None = None,
+        materials: Mapping[Key, Values] | None = None,
+        lights: Mapping[Key, Values] | None = None,
+    ) -> None:
+        """Changes the scene; parameters that are not given keep their values.
+
+        Transforms are (4, 4) matrices from object to world space for row vectors, as in USD.
+
+        Args:
+            camera: Arguments of ``SceneBuilder.set_camera``: ``transform``, ``window``,
+                ``lens_radius`` ...
+            materials: Name or id of a material -> arguments of ``SceneBuilder.add_material``,
+                except program, name and textures.
+            lights: Name or id of a light -> arguments of ``SceneBuilder.add_light``, except kind,
+                name, texture and group: ``transform``, ``color``, ``radius`` ...
+
+        Raises:
+            wavecomb.Error: A name, a parameter or a value is invalid; nothing is changed.
+        """
+        self._core.edit(
+            camera=None if camera is None else dict(camera),
+            materials=_by_id("material", materials, self.materials),
+            lights=_by_id("light", lights, self.lights),
+        )
+
+    def render(
+        self,
+        *,
+        size: tuple[int, int] | None = None,
+        spp: int = 64,
+        aovs: Iterable[str] | None = None,
+        **settings: Unpack[SettingKeywords],
+    ) -> Picture:
+        """Renders the scene as it is now.
+
+        Args:
+            size: Width and height in pixels; by default that of the constructor.
+            spp: Samples per pixel; with ``adaptive`` or ``noise`` the maximum.
+            aovs: Layers besides beauty, as in ``wavecomb.render``.
+            **settings: Fields of ``wavecomb.Settings``.
+
+        Returns:
+            The image, bit-identical to that of a scene that was built with the edited values.
+
+        Raises:
+            wavecomb.Error: An argument is invalid.
+        """
+        from wavecomb.run.stats import make_stats
+
+        check_arguments(size, spp, aovs, settings)
+        own, costs, names, chosen = prepare(
+            size or self._size, spp, None, None, aovs, dict(settings)
+        )
+        result = self._core.render(chosen, None, own, costs)
+        stats = make_stats(result, loaded=self._loaded, is_built=self._is_built)
+        self._is_built = False
+        return picture_of(result, stats, scene=self.scene, aovs=names)
+
+    def __repr__(self) -> str:
+        return f"<wavecomb.Renderer of {self._loaded or self.scene}>"
+
+
+def _ids(names: Iterable[str]) -> dict[str, list[int]]:
+    found: dict[str, list[int]] = {}
+    for index, name in enumerate(names):
+        if name:
+            found.setdefault(name, []).append(index)
+    return found
+
+
+def _by_id(
+    kind: str, given: Mapping[Key, Values] | None, known: Mapping[str, list[int]]
+) -> dict[int, dict[str, Any]]:
+    """Replaces names by ids; raises WavecombError for an unknown name."""
+    out: dict[int, dict[str, Any]] = {}
+    for key, values in (given or {}).items():
+        if isinstance(key, str) and key not in known:
+            near = get_close_matches(key, known, n=3, cutoff=0.4) or list(known)[:5]
+            raise WavecombError(f"no {kind} {key}; there are {', '.join(near) or 'none'}")
+        for index in known[key] if isinstance(key, str) else [key]:
+            out[index] = dict(values)
+    return out

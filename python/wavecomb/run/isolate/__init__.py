@@ -1,8 +1,0 @@
-# SPDX-License-Identifier: Apache-2.0
-"""Isolates the caller from libraries that crash or hang on invalid files.
-
-``supervisor`` runs a command in a child process, ``sandbox`` builds the bubblewrap command for it,
-and ``outputs`` moves its finished files to their names. ``trail`` records the child's current
-activity for crash messages. ``memory`` limits its memory, and ``patience`` ends it if USD
-composition does not terminate. docs/decisions/sandbox.md describes the costs.
-"""

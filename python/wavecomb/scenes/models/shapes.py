@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Basic shapes of furniture: rounded boxes, bodies of revolution, tubes and pillows.
+
+All are closed meshes in metres. Texture coordinates are also in metres, with v along the grain.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from wavecomb.scenes.models.mesh import (
+    FloatArray,
+    Mesh,
+    grid_mesh,
+    merge,
+    normalized,
+    smooth_normals,
+    without_flat_faces,
+)
+from wavecomb.scenes.models.sweep import Tube, spline, tube_mesh
+
+Vector = Sequence[float] | FloatArray
+"""Sequence of two or three numbers."""
+
+_WELD_DIGITS = 6
+"""Number of decimals that points are rounded to, so that adjacent faces share points exactly."""
+_TUBE_LENGTH = 0.5
+"""Length of a tube of ``sweep`` per unit of texture coordinates, in metres."""
+
+
+def turn_about(axis: int, degrees: float) -> FloatArray:
+    """Returns the rotation matrix (3, 3) about axis x, y or z (0, 1 or 2).
+
+    Positive angles are counter-clockwise as seen from the tip of the axis.
+    """
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    matrix = np.eye(3)
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    matrix[i, i], matrix[i, j], matrix[j, i], matrix[j, j] = c, -s, s, c
+    return matrix
+
+
+def placed(mesh: Mesh, offset: Vector = (0.0, 0.0, 0.0), turn: FloatArray | None = None) -> Mesh:
+    """Returns the mesh rotated by a matrix (3, 3), then translated by (3,)."""
+    matrix = np.eye(3) if turn is None else turn
+    points = mesh.points.astype(np.float64) @ matrix.T + np.asarray(offset, float)
+    normals = mesh.normals.astype(np.float64) @ matrix.T
+    return replace(mesh, points=points.astype(np.float32), normals=normals.astype(np.float32))
+
+
+def grounded(mesh: Mesh) -> Mesh:
+    """Returns the mesh translated so that it stands on y = 0."""
+    return placed(mesh, (0.0, -float(mesh.points[:, 1].min()), 0.0))
+
+
+def mapped_flat(mesh: Mesh, across: int, up: int) -> Mesh:
+    """Returns the mesh with texture coordinates from 0 to 1 over its bounds along two axes."""
+    low, high = mesh.bounds
+    axes = [across, up]
+    uv = (mesh.points[:, axes] - low[axes]) / (high - low)[axes]
+    return Mesh(mesh.points, mesh.faces, mesh.normals, uv.astype(np.float32))
+
+
+def tapered(mesh: Mesh, foot: float) -> Mesh:
+    """Returns the mesh scaled towards the y axis: by ``foot`` at its lowest point, by 1 on top."""
+    low, high = mesh.bounds
+    height = (mesh.points[:, 1] - low[1]) / (high[1] - low[1])
+    points = mesh.points.copy()
+    points[:, [0, 2]] *= (foot + (1.0 - foot) * height)[:, None]
+    return Mesh(points, mesh.faces, mesh.normals, mesh.uv)
+
+
+def rounded_box(
+    low: Vector,
+    high: Vector,
+    radius: float = 0.003,
+    arc: int = 2,
+    bulge: Vector = (0.0, 0.0, 0.0),
+    uv_offset: Vector = (0.0, 0.0),
+) -> Mesh:
+    """Makes a box with rounded edges.
+
+    Args:
+        low: Lower corner (3,).
+        high: Upper corner (3,).
+        radius: Radius of the edges; at most half of the thinnest side.
+        arc: Cells on an eighth of a circle.
+        bulge: Height of the bulge of the faces across x, y and z, for upholstery.
+        uv_offset: Added to texture coordinates (2,), so that boards differ.
+    """
+    low, high, swell = (np.asarray(v, float) for v in (low, high, bulge))
+    half = 0.5 * (high - low)
+    radius = min(radius, 0.999 * float(half.min()))
+    cells = 8 if swell.any() else 1
+    rounding = np.linspace(0.0, 1.0, arc + 1)
+    lean = np.concatenate([-rounding[::-1], np.zeros(cells - 1), rounding])
+    end = np.ones(arc + 1)
+    place = np.concatenate([-end, np.linspace(-1.0, 1.0, cells + 1)[1:-1], end])
+    sides = []
+    for axis in range(3):
+        b, c = (axis + 1) % 3, (axis + 2) % 3
+        along, across = (b, c) if half[b] > half[c] else (c, b)
+        for sign in (-1.0, 1.0):
+            normals = np.empty((len(lean), len(lean), 3))
+            normals[..., axis], normals[..., b], normals[..., c] = sign, lean[:, None], lean
+            normals = normalized(normals)
+            points = np.empty_like(normals)
+            points[..., axis], points[..., b], points[..., c] = sign, place[:, None], place
+            points = points * (half - radius) + radius * normals
+            uv = (points + 0.5 * (low + high))[..., [across, along]] + np.asarray(uv_offset, float)
+            sides.append(grid_mesh(points, uv, normals, reverse=sign < 0.0))
+    box = merge(sides)
+    points = box.points.astype(np.float64)
+    if swell.any():
+        x, y, z = (1.0 - np.clip((points / half) ** 2, 0.0, 1.0)).T
+        points = points * (1.0 + swell / half * np.stack([y * z, z * x, x * y], axis=1))
+    welded = np.round(points + 0.5 * (low + high), _WELD_DIGITS).astype(np.float32)
+    rounded = smooth_normals(welded, box.faces) if swell.any() else box.normals
+    return Mesh(welded, box.faces, rounded, box.uv)
+
+
+def _lengths(curve: FloatArray) -> FloatArray:
+    """Returns the length of a polyline (n, k) up to each of its points, (n,)."""
+    steps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def turned(profile: Sequence[Vector] | FloatArray, columns: int, steps: int = 4) -> Mesh:
+    """Makes a body of revolution about y.
+
+    Args:
+        profile: Control points (radius, height) of a spline from axis to axis, upwards on the
+            outside. A point given twice is nearly a corner.
+        columns: Cells around.
+        steps: Cells between two control points.
+    """
+    control = np.asarray(profile, float)
+    curve = spline(control, np.linspace(0.0, 1.0, steps * (len(control) - 1) + 1))
+    radius, height = np.where(curve[:, 0] > 1e-9, curve[:, 0], 0.0), curve[:, 1]
+    turn = np.linspace(0.0, 2.0 * np.pi, columns + 1)
+    cosine, sine = np.cos(turn), np.sin(turn)
+    cosine[-1], sine[-1] = cosine[0], sine[0]
+    shape = (len(curve), columns + 1)
+    points = np.stack(
+        [radius[:, None] * cosine, np.broadcast_to(height[:, None], shape), radius[:, None] * sine],
+        axis=2,
+    )
+    arc = _lengths(curve)[:, None]
+    uv = np.stack(np.broadcast_arrays(turn * radius.max(), arc), axis=2)
+    return without_flat_faces(grid_mesh(points, uv), 1e-9)
+
+
+def disc(radius: float, height: float, columns: int) -> Mesh:
+    """Makes a flat disc at a height, facing up."""
+    return turned([(radius, height), (0.5 * radius, height), (0.0, height)], columns, 2)
+
+
+def tube(
+    points: Sequence[Vector],
+    width: float | Sequence[float],
+    columns: int = 12,
+    rings: int = 16,
+    height: float | Sequence[float] | None = None,
+    up: Vector = (0.0, 0.0, 1.0),
+) -> Mesh:
+    """Makes a closed tube with round ends along a spline.
+
+    Args:
+        points: Control points of the centre line, (k, 3).
+        width: Half width: one number, or one for each point.
+        columns: Cells around.
+        rings: Cells along.
+        height: Half height along ``up``; None makes it equal to the half width.
+        up: Direction that is not along the tube.
+    """
+    control = np.asarray(points, float)
+    wide = np.broadcast_to(np.asarray(width, float), len(control)).copy()
+    tall = wide if height is None else np.broadcast_to(np.asarray(height, float), len(control))
+    mesh = tube_mesh(Tube(control, wide, tall.copy(), np.asarray(up, float)), rings, columns)
+    around = math.pi * float(wide.mean() + tall.mean()) / float(mesh.uv[:, 0].max())
+    uv = mesh.uv * np.array([around, _TUBE_LENGTH], np.float32)
+    return Mesh(mesh.points, mesh.faces, mesh.normals, uv)
+
+
+def pillow(width: float, depth: float, thickness: float, cells: int = 20) -> Mesh:
+    """Makes a pillow in the xy plane, its front towards +z, centred at the origin."""
+    t = np.sin(0.5 * np.pi * np.linspace(-1.0, 1.0, cells + 1))
+    t[[0, -1]] = -1.0, 1.0
+    x, y = np.meshgrid(t, t, indexing="xy")
+    pinch = 0.07
+    flat = [
+        0.5 * width * x * (1.0 - pinch * (1.0 - y * y)),
+        0.5 * depth * y * (1.0 - pinch * (1.0 - x * x)),
+    ]
+    swell = 0.5 * thickness * np.sqrt((1.0 - x**4) * (1.0 - y**4))
+    # Texture coordinates follow the arc length along the middle, so that the cloth is not
+    # stretched.
+    middle = np.stack([flat[0][cells // 2], swell[cells // 2]], axis=1)
+    upright = np.stack([flat[1][:, cells // 2], swell[:, cells // 2]], axis=1)
+    uv = np.stack(np.meshgrid(_lengths(middle), _lengths(upright)), axis=2)
+    sides = []
+    for sign in (1.0, -1.0):
+        points = np.round(np.stack([*flat, sign * swell], 2), _WELD_DIGITS)
+        # Rows run up and columns right, so their cross product points away from +z.
+        sides.append(grid_mesh(points, uv, np.zeros(points.shape), reverse=sign > 0.0))
+    both = merge(sides)
+    return replace(both, normals=smooth_normals(both.points, both.faces))

@@ -1,0 +1,290 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Opens USD files as stages, with variants, masks, payloads and session layers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdRender, UsdUtils
+
+from wavecomb.errors import WavecombError
+from wavecomb.image.files.output_file import check_name, check_regular
+from wavecomb.path_maps import mapped, own_maps
+from wavecomb.run.isolation import progress_notes, time_limit
+from wavecomb.usd import mtlx
+from wavecomb.usd.layers.fifos import abort_on_fifo
+from wavecomb.usd.layers.population import load_payloads, matching_prims, populate
+from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
+from wavecomb.usd.stage.diagnostics import capture_diagnostics, first_message
+from wavecomb.usd.stage.report import LoadReport
+
+MAX_SURVEYED = 4096
+"""Most cameras and lights that are listed, since instancing can multiply them."""
+
+
+@dataclass(frozen=True)
+class StageContents:
+    """Cameras and lights of a stage in stage order, including invisible and instanced ones.
+
+    Attributes:
+        cameras: Prim paths of all cameras.
+        lights: Prim paths of all supported lights; the two together have at most ``MAX_SURVEYED``.
+    """
+
+    cameras: tuple[str, ...] = ()
+    lights: tuple[str, ...] = ()
+
+
+def list_contents(stage: Usd.Stage) -> StageContents:
+    """Lists cameras and lights in one pass over the stage."""
+    cameras: list[str] = []
+    lights: list[str] = []
+    kinds: dict[str, list[str] | None] = {}
+
+    def kind(prim: Usd.Prim) -> list[str] | None:
+        name = prim.GetTypeName()
+        if name not in kinds:
+            camera = cameras if prim.IsA(UsdGeom.Camera) else None
+            kinds[name] = lights if name in LIGHT_KINDS else camera
+        return kinds[name]
+
+    for prim in islice(matching_prims(stage, lambda prim: kind(prim) is not None), MAX_SURVEYED):
+        found = kind(prim)
+        if found is not None:
+            found.append(str(prim.GetPath()))
+    return StageContents(tuple(cameras), tuple(lights))
+
+
+_RENDER_RELATIONS = ("products", "orderedVars", "camera")
+
+
+def open_render_settings(
+    file: Path, wanted: str | None = None, session_layer: Path | None = None
+) -> Usd.Stage:
+    """Opens only the render settings of a file and the cameras that they name.
+
+    Keeping the returned stage alive until the whole stage is opened avoids reading its layers
+    twice.
+
+    Args:
+        file: .usd, .usda, .usdc or .usdz.
+        wanted: Path of settings that are not under /Render.
+        session_layer: File with opinions that are stronger than the stage's.
+
+    Raises:
+        WavecombError: A file does not exist or cannot be read.
+    """
+    with abort_on_fifo(), _layers(file, session_layer) as (root, session):
+        paths = {"/Render", wanted or "", _settings_path(root), _settings_path(session)}
+        kept = {path for path in map(_prim_path, paths) if path is not None}
+        mask = Usd.StagePopulationMask(sorted(kept))
+        stage = Usd.Stage.OpenMasked(root, session, mask, Usd.Stage.LoadAll)
+        # Settings name products, products name vars, and both name cameras. ExpandPopulationMask is
+        # not used, since it can deadlock with predicates written in Python.
+        for _ in range(2):
+            named = {path for path in _named_by(stage) if not mask.Includes(path)}
+            if not named:
+                break
+            for path in named:
+                mask.Add(path)
+            stage.SetPopulationMask(mask)
+    return stage
+
+
+@contextmanager
+def _layers(
+    file: Path, session_layer: Path | None, overrides: Sdf.Layer | None = None
+) -> Iterator[tuple[Sdf.Layer, Sdf.Layer]]:
+    """Yields the root and session layer of a stage, within the time limit for opening.
+
+    Arguments are the same as for ``open_stage``. Converts USD errors to WavecombError.
+    """
+    _check_file(file)
+    if session_layer is not None:
+        _check_file(session_layer)
+    progress_notes.note("opening", file)
+    try:
+        session = Sdf.Layer.CreateAnonymous("session.usda")
+        if overrides is not None:
+            session.TransferContent(overrides)
+        if session_layer is not None:
+            session.subLayerPaths.append(_session(session_layer).identifier)
+        with time_limit.limit_composition(file):
+            root = Sdf.Layer.FindOrOpen(str(file))
+            if not root:
+                raise WavecombError(f"{file}: cannot be read as USD")
+            change_layers((root, session))
+            yield root, session
+    except Tf.ErrorException as error:
+        raise WavecombError(f"{file}: cannot be read as USD: {first_message(error)}") from None
+
+
+def _named_by(stage: Usd.Stage) -> set[Sdf.Path]:
+    """Returns the prims that render settings and products refer to."""
+    return {
+        target.GetPrimPath()
+        for prim in stage.Traverse()
+        if prim.IsA(UsdRender.SettingsBase)
+        for name in _RENDER_RELATIONS
+        if prim.HasRelationship(name)
+        for target in prim.GetRelationship(name).GetForwardedTargets()
+    }
+
+
+def _settings_path(layer: Sdf.Layer) -> str:
+    value = layer.pseudoRoot.GetInfo("renderSettingsPrimPath")
+    return value if isinstance(value, str) else ""
+
+
+def _prim_path(text: str) -> Sdf.Path | None:
+    """Returns the absolute prim path that a text holds; None for any other text."""
+    if not text.startswith("/") or not Sdf.Path.IsValidPathString(text):
+        return None
+    path = Sdf.Path(text)
+    return path if path.IsPrimPath() else None
+
+
+def open_stage(
+    file: Path,
+    variants: Mapping[str, str] | None = None,
+    overrides: Sdf.Layer | None = None,
+    mask: Sequence[str] = (),
+    session_layer: Path | None = None,
+    payloads: Sequence[str] = (),
+) -> Usd.Stage:
+    """Opens the stage of a file.
+
+    Args:
+        file: .usd, .usda, .usdc or .usdz.
+        variants: Variant selections (``select_variants``).
+        overrides: Layer, such as another stage's session layer, that is copied into the session
+            layer.
+        mask: Paths of prims to keep with everything that they need (``populate``); empty means all.
+        session_layer: File with opinions that are stronger than the stage's; ``variants`` are
+            stronger still.
+        payloads: Patterns of prims whose payloads are loaded (``load_payloads``); empty means all.
+
+    Raises:
+        WavecombError: A file cannot be read, or a variant, prim or payload does not exist.
+    """
+    rule = Usd.Stage.LoadNone if payloads else Usd.Stage.LoadAll
+    with abort_on_fifo():
+        with _layers(file, session_layer, overrides) as (root, session):
+            stage = Usd.Stage.Open(root, session, rule)
+        if not stage:
+            raise WavecombError(f"{file}: cannot be read as USD")
+        mtlx.resolve(stage)
+        select_variants(stage, variants or {})
+        if variants:
+            mtlx.resolve(stage)
+        if payloads:
+            load_payloads(stage, payloads)
+            mtlx.resolve(stage)
+        if mask:
+            populate(stage, mask)
+    return stage
+
+
+def open_editable(
+    file: Path, variants: Mapping[str, str] | None = None, report: LoadReport | None = None
+) -> Usd.Stage:
+    """Opens a stage that can be inspected and edited while another copy of it is loaded.
+
+    Opens the stage like ``open_stage``, but also resolves MaterialX files in unselected variants.
+    So selecting them later changes no layer while another stage reads it on another thread.
+
+    Args:
+        file: .usd, .usda, .usdc or .usdz.
+        variants: Variant selections (``select_variants``).
+        report: Receives USD's messages; None discards them.
+    """
+    with capture_diagnostics(LoadReport() if report is None else report):
+        stage = open_stage(file, variants)
+        mtlx.resolve(stage, everywhere=True)
+        return stage
+
+
+def _check_file(file: Path) -> None:
+    try:
+        check_name(file)
+        check_regular(file)
+    except OSError as error:
+        raise WavecombError(str(error)) from None
+    if not file.exists():
+        raise WavecombError(f"{file}: no such file")
+    if file.is_dir():
+        raise WavecombError(f"{file}: is a folder; name the stage in it")
+    if not Usd.Stage.IsSupportedFile(str(file)):
+        raise WavecombError(f"{file}: not a USD file; use .usd, .usda, .usdc or .usdz")
+
+
+def _session(file: Path) -> Sdf.Layer:
+    """Returns the layer of a file; a stage that refers to it keeps it open."""
+    try:
+        layer = Sdf.Layer.FindOrOpen(str(file))
+    except Tf.ErrorException as error:
+        raise WavecombError(f"{file}: cannot be read as USD: {first_message(error)}") from None
+    if not layer:
+        raise WavecombError(f"{file}: cannot be read as USD")
+    return layer
+
+
+def select_variants(stage: Usd.Stage, variants: Mapping[str, str]) -> None:
+    """Selects variants in the session layer, such as ``{"/World/Car{paint}": "red"}``.
+
+    Raises:
+        WavecombError: The prim, variant set or variant does not exist.
+    """
+    if variants:
+        stage.SetEditTarget(stage.GetSessionLayer())
+    for key, choice in variants.items():
+        where, _, name = key.rpartition("{") if "{" in key else ("", "", key)
+        name = name.rstrip("}")
+        if where and not Sdf.Path.IsValidPathString(where):
+            raise WavecombError(f"variant {key}: {where} is not a prim path")
+        prim = stage.GetPrimAtPath(where) if where else stage.GetDefaultPrim()
+        if not prim:
+            raise WavecombError(f"variant {key}: no prim {where or '(the stage has no default)'}")
+        sets = prim.GetVariantSets()
+        if name not in sets.GetNames():
+            known = ", ".join(sets.GetNames()) or "none"
+            raise WavecombError(f"variant {key}: {prim.GetPath()} has the sets: {known}")
+        variant_set = sets.GetVariantSet(name)
+        if choice not in variant_set.GetVariantNames():
+            known = ", ".join(variant_set.GetVariantNames()) or "none"
+            raise WavecombError(f"variant {key}={choice}: there are {known}")
+        variant_set.SetVariantSelection(choice)
+
+
+_changed: dict[str, Sdf.Layer] = {}
+"""Changed layers by identifier. They are never released, since USD would read them again."""
+
+
+def change_layers(layers: Iterable[Sdf.Layer]) -> None:
+    """Applies this process's path maps to layers and to all layers that they name.
+
+    Changes layers in memory only, before they are composed: each absolute path of layers, textures
+    and other files. Relative paths remain valid.
+    """
+    pairs = own_maps()
+    if not pairs:
+        return
+    left = list(layers)
+    while left:
+        layer = left.pop()
+        if layer.identifier in _changed:
+            continue
+        _changed[layer.identifier] = layer
+        if layer.permissionToEdit:
+            UsdUtils.ModifyAssetPaths(layer, lambda path: mapped(path, pairs))
+        for name in layer.GetCompositionAssetDependencies():
+            if name and not name.lower().endswith(".mtlx"):
+                # USD reports unreadable layers when it composes them.
+                with suppress(Tf.ErrorException):
+                    other = Sdf.Layer.FindOrOpenRelativeToLayer(layer, name)
+                    if other:
+                        left.append(other)

@@ -1,0 +1,271 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Editable parameters of materials and lights, with the attributes that hold them.
+
+``wavecomb.usd.materials.material`` reads surfaces; this module finds the attribute behind each
+constant, so that programs such as the viewer can write a change back to the stage.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from pxr import Sdf, Usd, UsdGeom, UsdShade
+
+from wavecomb.light_table import EDITABLE, of_kind
+from wavecomb.material_table import own_parameters, programs
+from wavecomb.usd import mtlx
+from wavecomb.usd.geometry.mesh_arrays import IDENTITY
+from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
+from wavecomb.usd.lights.light import LightReader
+from wavecomb.usd.materials.colour_space import LINEAR, RAW, canonical
+from wavecomb.usd.materials.material import PREVIEW, surface_source
+from wavecomb.usd.materials.network import (
+    Source,
+    colour,
+    linear_colour,
+    number,
+    shader_id,
+    source_of,
+    space_of,
+    value_of,
+)
+from wavecomb.usd.materials.preview_surface import INPUTS, constant, program_of
+from wavecomb.usd.materials.surface import COLOUR, COLOUR_PARAMETERS, SWITCH, InputDefinition
+from wavecomb.usd.stage.context import LoadContext
+from wavecomb.usd.stage.identity import LightGroups
+from wavecomb.usd.stage.report import LoadReport
+
+IN_INSTANCE = "it is inside an instance, where USD does not accept opinions"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a material.
+
+    Attributes:
+        name: Keyword argument of ``SceneBuilder.add_material``, or input of the MaterialX shader.
+        value: Value that the loader reads: a number, a colour or a bool; None if it is driven.
+        attribute: Path of the attribute to author, which need not exist yet; None if there is none.
+        type_name: Type of that attribute.
+        driven_by: Driver of the value, such as "texture marble.png" or "primvar displayColor"; ""
+            for a constant.
+        reason: Why there is no attribute to author; "" if there is one.
+        definition: MaterialX definition of the input; None for UsdPreviewSurface.
+    """
+
+    name: str
+    value: Any = None
+    attribute: Sdf.Path | None = None
+    type_name: Sdf.ValueTypeName = Sdf.ValueTypeNames.Float
+    driven_by: str = ""
+    reason: str = ""
+    definition: InputDefinition | None = None
+
+    def authored(self, value: Any) -> Any:
+        """Converts a parameter value to the value that the attribute must hold."""
+        if isinstance(value, bool):
+            return value if self.type_name == Sdf.ValueTypeNames.Bool else int(value)
+        if isinstance(value, (tuple, list)):
+            return self.type_name.type.pythonClass(*(float(v) for v in value))
+        if _is_triple(self.type_name):
+            return self.type_name.type.pythonClass(*[float(value)] * 3)
+        return as_stored(float(value))
+
+
+def material_parameters(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Parameter]:
+    """Returns parameters of a material by name, in display order; empty if it has no surface."""
+    material = UsdShade.Material(prim)
+    kind, shader = surface_source(material) if material else ("", UsdShade.Shader())
+    if not kind:
+        return {}
+    tracer = _Tracer(prim, shader, time)
+    if kind != PREVIEW:
+        return tracer.materialx(kind)
+    return tracer.preview(program_of(prim, time, LoadReport()))
+
+
+class _Tracer:
+    """Search for the attributes behind the inputs of one surface shader."""
+
+    def __init__(self, prim: Usd.Prim, shader: UsdShade.Shader, time: Usd.TimeCode) -> None:
+        self._prim = prim
+        self._shader = shader
+        self._time = time
+
+    def preview(self, program: str) -> dict[str, Parameter]:
+        """Returns the parameters of a UsdPreviewSurface."""
+        wanted = programs()[program].reads
+        out: dict[str, Parameter] = {}
+        for name, (parameter, default) in INPUTS.items():
+            if parameter == "normal" or parameter not in wanted:
+                continue
+            if parameter == "base_color" and program == "dielectric":
+                default = (1.0, 1.0, 1.0)
+            out[parameter] = self._input(parameter, name, default)
+        for key, parameter in (("wavecomb:eta", "conductor_eta"), ("wavecomb:k", "conductor_k")):
+            attribute = self._prim.GetAttribute(key)
+            if program == "metal" and attribute and attribute.HasAuthoredValue():
+                black = (0.0, 0.0, 0.0)
+                value = colour(attribute.Get(self._time), black)
+                path, usual = attribute.GetPath(), Sdf.ValueTypeNames.Color3f
+                out[parameter] = self._constant(parameter, value, path, attribute, usual)
+        for row in own_parameters(program):
+            attribute = self._prim.GetAttribute(row.attribute) or None
+            given = None if attribute is None else attribute.Get(self._time)
+            now = row.in_range(number(given, row.default))
+            path = self._prim.GetPath().AppendProperty(row.attribute)
+            usual = Sdf.ValueTypeNames.Float
+            out[row.name] = self._constant(row.name, now, path, attribute, usual)
+        return out
+
+    def materialx(self, model_name: str) -> dict[str, Parameter]:
+        """Returns the inputs of a MaterialX surface that Wavecomb reads."""
+        known = mtlx.definitions(model_name, shader_id(self._shader))
+        return {name: self._own_input(one) for name, one in known.items()}
+
+    def _own_input(self, definition: InputDefinition) -> Parameter:
+        name, default = definition.name, definition.default
+        source = source_of(self._shader, name, self._time)
+        if source is not None and not source.is_value:
+            return Parameter(name, driven_by=self._driver(source), definition=definition)
+        attribute = None if source is None else source.attribute
+        value = default if source is None else source.value
+        if definition.kind == SWITCH:
+            value = bool(number(value, default))
+        elif definition.kind == COLOUR:
+            value = colour(value, default)
+            if (space := _other_space(attribute)) is not None:
+                return replace(self._encoded(name, value, attribute, space), definition=definition)
+        else:
+            value = number(value, default)
+        types = Sdf.ValueTypeNames
+        usual = {"color3": types.Color3f, "boolean": types.Bool}.get(
+            definition.type_name, types.Float
+        )
+        return replace(
+            self._constant(name, value, self._path_of(name, attribute), attribute, usual),
+            definition=definition,
+        )
+
+    def _path_of(self, name: str, attribute: Usd.Attribute | None) -> Sdf.Path:
+        """Returns the path of the attribute that holds an input's value or would hold it."""
+        own = self._shader.GetPath().AppendProperty(f"inputs:{name}")
+        return own if attribute is None else attribute.GetPath()
+
+    def _input(self, parameter: str, name: str, default: Any) -> Parameter:
+        source = source_of(self._shader, name, self._time)
+        if source is not None and not source.is_value:
+            return Parameter(parameter, driven_by=self._driver(source))
+        attribute = None if source is None else source.attribute
+        value = constant(parameter, default if source is None else source.value, default)
+        space = _other_space(attribute) if parameter in COLOUR_PARAMETERS else None
+        if space is not None:
+            return self._encoded(parameter, value, attribute, space)
+        wide = parameter in COLOUR_PARAMETERS
+        usual = Sdf.ValueTypeNames.Color3f if wide else Sdf.ValueTypeNames.Float
+        return self._constant(parameter, value, self._path_of(name, attribute), attribute, usual)
+
+    def _encoded(
+        self, parameter: str, value: Any, attribute: Usd.Attribute | None, space: str
+    ) -> Parameter:
+        """Returns a colour that cannot be edited because it is authored in another colour space."""
+        # The loader reports unknown colour spaces.
+        with contextlib.suppress(ValueError):
+            value = linear_colour(value, attribute)
+        return Parameter(parameter, value, reason=f"it is in the colour space {space}")
+
+    def _constant(
+        self,
+        parameter: str,
+        value: Any,
+        path: Sdf.Path,
+        attribute: Usd.Attribute | None,
+        usual: Sdf.ValueTypeName,
+    ) -> Parameter:
+        """Returns a parameter held by ``attribute``, or by a new attribute of the usual type."""
+        if self._prim.IsInstanceProxy() or self._prim.IsInPrototype():
+            return Parameter(parameter, value, reason=IN_INSTANCE)
+        if not path.HasPrefix(self._prim.GetPath()):
+            reason = f"it comes from {path}, outside of the material"
+            return Parameter(parameter, value, reason=reason)
+        if attribute is None:
+            return Parameter(parameter, value, path, usual)
+        type_name = attribute.GetTypeName()
+        if _is_triple(usual) != _is_triple(type_name):
+            return Parameter(parameter, value, reason=f"{path} is a {type_name}")
+        return Parameter(parameter, value, path, type_name)
+
+    def _driver(self, source: Source) -> str:
+        shader = source.shader
+        identifier = shader_id(shader) if shader is not None else ""
+        if shader is None or not identifier:
+            return "a shader without info:id"
+        if identifier.startswith("UsdPrimvarReader_"):
+            return f"primvar {value_of(shader, 'varname', self._time, '')}"
+        file = value_of(shader, "file", self._time)
+        if isinstance(file, Sdf.AssetPath):
+            return f"texture {os.path.basename(file.path)}"
+        return f"node {identifier} ({shader.GetPath().name})"
+
+
+def _is_triple(type_name: Sdf.ValueTypeName) -> bool:
+    value = type_name.defaultValue
+    return hasattr(value, "__len__") and not isinstance(value, str) and len(value) == 3
+
+
+class _AnyProfile:
+    """Substitute for the table of IES profiles that accepts every profile."""
+
+    def add(self, path: str, prim: Sdf.Path) -> int:
+        """Returns a dummy profile id."""
+        return 0
+
+
+def light_values(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any] | None:
+    """Returns the parameters that the loader passes to ``SceneBuilder.add_light``.
+
+    The light must be outside of instances. Returns numbers, colours and switches by the names of
+    ``wavecomb.light_table``: all parameters of this kind of light except its visibility. Returns
+    None if the prim is not a supported light.
+    """
+    if not prim or str(prim.GetTypeName()) not in LIGHT_KINDS:
+        return None
+    matrix = IDENTITY
+    xforms = UsdGeom.XformCache(time)
+    for path in prim.GetPath().GetPrefixes():
+        step = prim.GetStage().GetPrimAtPath(path)
+        if not step.IsA(UsdGeom.Xformable):
+            continue
+        own, resets = xforms.GetLocalTransformation(step)
+        if resets:
+            matrix = own
+        elif own != IDENTITY:
+            matrix = own * matrix
+    scale = abs(matrix.GetDeterminant3()) ** (1.0 / 3.0)
+    context = LoadContext(prim.GetStage(), time, None)  # type: ignore[arg-type]
+    reader = LightReader(context, None, LightGroups(context.report), _AnyProfile())
+    light = reader.read(prim, scale)
+    return {
+        row.name: light.options.get(row.name, row.default)
+        for row in of_kind(light.kind)
+        if row.kind in EDITABLE and row.name != "visible"
+    }
+
+
+def as_stored(value: Any) -> Any:
+    """Rounds a number or colour to float32, as the core stores it; returns a bool unchanged."""
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, (tuple, list)):
+        return tuple(float(np.float32(v)) for v in value)
+    return float(np.float32(value))
+
+
+def _other_space(attribute: Usd.Attribute | None) -> str | None:
+    """Returns the colour space of an attribute unless it is linear Rec.709 or unauthored."""
+    space = space_of(attribute)
+    return space if space and canonical(space) not in (LINEAR, RAW) else None

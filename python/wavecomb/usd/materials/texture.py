@@ -1,0 +1,396 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Adds image files to the scene as textures, each file once."""
+
+from __future__ import annotations
+
+import filecmp
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd
+
+from wavecomb.errors import WavecombError
+from wavecomb.image.working_space import from_rec709
+from wavecomb.machine import give_back_memory, temporary_folder
+from wavecomb.run.isolation import memory
+from wavecomb.usd.materials.colour_space import (
+    LINEAR,
+    OCIO_NAMES,
+    RAW,
+    SRGB,
+    canonical,
+    convert,
+    halve,
+    to_linear,
+)
+from wavecomb.usd.materials.network import UDIM, image_files, tile_files
+from wavecomb.usd.materials.pixels import Image, ReadAhead, TextureError, read_image, stamp_of
+from wavecomb.usd.stage.context import LoadContext
+from wavecomb.usd.stage.report import LoadReport
+
+if TYPE_CHECKING:
+    from wavecomb import _core
+
+_WRAPS = ("repeat", "clamp", "mirror", "black")
+
+CURVE = "sRGB curve"
+"""Pseudo colour space: the core decodes the sRGB curve, and pixels are not converted."""
+
+
+def checker() -> NDArray[np.uint8]:
+    """Returns the magenta and dark checker (16, 16, 3) that replaces missing textures."""
+    squares = (np.indices((16, 16)) // 2).sum(axis=0) % 2
+    return np.where(squares[..., None] == 0, (255, 0, 255), (40, 0, 40)).astype(np.uint8)
+
+
+Key = tuple[str, str, str, str]
+"""A plain texture: its file, the colour space of its pixels, and its wrap modes in s and t."""
+
+
+@dataclass
+class TiledImage:
+    """The images of a UDIM texture.
+
+    Attributes:
+            first: Image of the tile with the lowest number.
+            tiles: Tile numbers and files.
+    """
+
+    first: Image
+    tiles: tuple[tuple[int, str], ...]
+
+    def __post_init__(self) -> None:
+        """Copies the properties of the first tile; tiles do not wrap."""
+        self.channels, self.dtype = self.first.channels, self.first.dtype
+        self.wraps, self.automatic_srgb = ("clamp", "clamp"), self.first.automatic_srgb
+
+
+def _converts(space: str) -> bool:
+    """Returns whether pixels in this space must be converted before they are stored."""
+    return space not in (RAW, CURVE)
+
+
+def stored_type(image: Image, space: str) -> Any:
+    """Returns the stored type: the file's type, but half floats for converted 8-bit images."""
+    if image.dtype == np.uint8 and _converts(space):
+        return np.dtype(np.float16)
+    return image.dtype
+
+
+@dataclass(frozen=True)
+class TextureCache:
+    """The textures of a scene, which later scenes can share.
+
+    Attributes:
+        scene: The scene that holds them.
+        images: Source images by file, without pixels.
+        ids: Texture ids by file and options.
+        store: The store that limits their memory.
+    """
+
+    scene: _core.Scene
+    images: dict[str, Image]
+    ids: dict[tuple[Any, ...], int]
+    store: _core.TextureStore | None = None
+
+
+MEGABYTE = 1_000_000
+
+
+def texture_store(
+    limit: float | None, reuse: TextureCache | None, report: LoadReport
+) -> _core.TextureStore | None:
+    """Returns the store that limits textures to ``limit`` MB; None without a limit.
+
+    Returns the store of ``reuse`` if its limit is equal, so that shared textures count as well.
+
+    Raises:
+        WavecombError: The store cannot be created with this limit.
+    """
+    from wavecomb import _core
+
+    if limit is None:
+        return None
+    bytes_ = int(min(limit * MEGABYTE, 2**63))
+    if reuse is not None and reuse.store is not None and reuse.store.limit_bytes == bytes_:
+        return reuse.store
+    obstacle = _core.TextureStore.obstacle()
+    if obstacle:
+        report.note(f"texture limit {limit:g} MB: kept by leaving out mip levels, as {obstacle}")
+        return None
+    try:
+        return _core.TextureStore(bytes_, temporary_folder())
+    except ValueError as error:
+        raise WavecombError(str(error)) from None
+
+
+class TextureTable:
+    """The textures of a scene; equal textures are merged."""
+
+    def __init__(
+        self,
+        context: LoadContext,
+        reuse: TextureCache | None = None,
+        store: _core.TextureStore | None = None,
+    ) -> None:
+        """``reuse`` holds textures to share if their files have not changed.
+
+        ``store`` is the texture store of the builder. ``drops`` may be set to the number of finest
+        mip levels that each texture leaves out, and ``origin`` to the world position of the scene's
+        origin, for graphs. The table does not keep the context's stage, since it may outlive it.
+        """
+        self.store = store
+        self.working = context.options.working_space
+        self.origin = (0.0, 0.0, 0.0)
+        self._reuse = reuse
+        self._unchanged: dict[str, Image | None] = {}
+        self._builder, self._report = context.builder, context.report
+        # Images that are read ahead count as texture memory.
+        self._ahead = ReadAhead(
+            context.options.threads, None if store is None else store.limit_bytes // 4
+        )
+        self._images: dict[str, Image | TextureError] = {}
+        self._ids: dict[tuple[Any, ...], int] = {}
+        self._taken: dict[str, Image] = {}
+        self.drops: dict[Key, int] = {}
+        self._twins: dict[str, str] = {}
+        self._by_size: dict[int, list[str]] = {}
+
+    def expect(self, material: Usd.Prim, time: Usd.TimeCode) -> None:
+        """Starts reading the images of a material that will be used."""
+        files = [self._twin(file) for file in image_files(material, time)]
+        self._ahead.want(file for file in files if self._known(file) is None)
+
+    def _known(self, path: str) -> Image | None:
+        """Returns the image that the previous scene made of this file, unless the file changed."""
+        if self._reuse is None:
+            return None
+        if path not in self._unchanged:
+            image = self._reuse.images.get(path)
+            same = image is not None and image.stamp == stamp_of(path)
+            self._unchanged[path] = image if same else None
+        return self._unchanged[path]
+
+    def _twin(self, path: str) -> str:
+        """Returns the first requested file with the same bytes, usually the file itself."""
+        found = self._twins.get(path)
+        if found is None:
+            found = path
+            try:
+                if os.path.isfile(path):
+                    others = self._by_size.setdefault(os.path.getsize(path), [])
+                    same = (other for other in others if filecmp.cmp(other, path, shallow=False))
+                    found = next(same, path)
+                    if found is path:
+                        others.append(path)
+            except (OSError, ValueError):
+                # Reading the file will report the error.
+                pass
+            self._twins[path] = found
+        return found
+
+    def image(self, path: str, prim: object) -> Image | TiledImage | None:
+        """Returns the image of a file or UDIM pattern; warns and returns None if it is unreadable.
+
+        Reads files with equal bytes only once, and reads all tiles of a UDIM pattern.
+        """
+        if UDIM in path:
+            tiles = tile_files(path)
+            for _, tile in tiles:
+                first = self._image(self._twin(tile), prim)
+                if first is not None:
+                    return TiledImage(first, tuple(tiles))
+            if not tiles:
+                folder, name = os.path.split(path)
+                why = f"no tile {name} is in the folder {folder or os.curdir}"
+                if folder and not os.path.isdir(folder):
+                    why = f"the folder of its tiles, {folder}, does not exist"
+                self._report.warn(f"texture {path} cannot be read ({why})", prim)
+            return None
+        return self._image(self._twin(path), prim)
+
+    def _image(self, path: str, prim: object) -> Image | None:
+        found = self._images.get(path)
+        if found is None:
+            try:
+                found = self._known(path) or self._ahead.read(path)
+            except (TextureError, MemoryError, OSError, ValueError) as error:
+                if memory.is_exhausted(error, int):
+                    raise
+                found = TextureError(str(error) or "out of memory")
+            self._images[path] = found
+        if isinstance(found, TextureError):
+            name = path or "(no file name)"
+            self._report.warn(f"texture {name} cannot be read ({found})", prim)
+            return None
+        return found
+
+    def add(
+        self,
+        path: str,
+        image: Image | TiledImage,
+        colour_space: str,
+        wrap_s: str,
+        wrap_t: str,
+        *,
+        is_colour: bool = False,
+        missing: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0),
+    ) -> int:
+        """Returns the texture id of an image.
+
+        Args:
+            path: File that names the texture.
+            image: Result of ``image``.
+            colour_space: auto, or a name in OpenColorIO's built-in config.
+            wrap_s: repeat, clamp, mirror or black; any other value means black, as in UsdUVTexture.
+            wrap_t: The same for t.
+            is_colour: Whether the texture holds colours, which are converted to the working space.
+                For other data only an sRGB curve is decoded.
+            missing: Linear colour and alpha of UDIM tiles that do not exist.
+        """
+        if isinstance(image, TiledImage):
+            return self._add_tiles(path, image, colour_space, is_colour, missing)
+        path = self._twin(path)
+        space = self._space(path, image, colour_space, is_colour)
+        s, t = (mode if mode in _WRAPS else "black" for mode in (wrap_s, wrap_t))
+        texture: Key = (path, space, s, t)
+        key = (*texture, self.drops.get(texture, 0))
+        if key not in self._ids:
+            reuse = self._reuse
+            if reuse is not None and key in reuse.ids and image is self._known(path):
+                self._ids[key] = self._builder.share_texture(reuse.scene, reuse.ids[key])
+            else:
+                self._ids[key] = self._add(path, image, space, s, t)
+            self._report.tally("textures")
+        return self._ids[key]
+
+    def _add_tiles(
+        self,
+        path: str,
+        image: TiledImage,
+        colour_space: str,
+        is_colour: bool,
+        missing: tuple[float, ...],
+    ) -> int:
+        """Adds a texture of all readable tiles.
+
+        With auto, each tile uses its file's colour space.
+        """
+        tiles = []
+        for number, file in image.tiles:
+            tile = self._image(self._twin(file), path)
+            if tile is not None:
+                added = self.add(file, tile, colour_space, "clamp", "clamp", is_colour=is_colour)
+                tiles.append((number, added))
+        if is_colour:
+            r, g, b = from_rec709(np.array(missing[:3]), self.working)
+            missing = (float(r), float(g), float(b), missing[3])
+        key = (path, tuple(tiles), missing)
+        if key not in self._ids:
+            self._ids[key] = self._builder.add_tiles(path, tiles, missing)
+        return self._ids[key]
+
+    def _space(self, path: str, image: Image, colour_space: str, is_colour: bool) -> str:
+        """Returns OpenColorIO's name of the source colour space, RAW (no conversion) or CURVE."""
+        if colour_space == "auto":
+            space = SRGB if image.automatic_srgb else LINEAR
+        else:
+            known = canonical(colour_space)
+            if known is None:
+                self._report.missing(f"colour space {colour_space} (read as auto)", path)
+                return self._space(path, image, "auto", is_colour)
+            space = known
+        if space == SRGB and self.working == "rec709":
+            return CURVE
+        if not is_colour or image.channels < 3:
+            return CURVE if space == SRGB else RAW
+        return RAW if space == OCIO_NAMES[self.working] else space
+
+    def _as_stored(
+        self, path: str, image: Image, space: str, wraps: tuple[str, str]
+    ) -> NDArray[Any]:
+        """Takes the pixels of an image in their stored form, without its dropped mip levels."""
+        pixels = image.take()
+        dtype = stored_type(image, space)
+        if _converts(space):
+            top = 65504.0 if dtype == np.float16 else 3.4e38
+            linear = np.clip(convert(pixels, space, self.working), -top, top)
+            pixels = np.ascontiguousarray(linear, dtype)
+        elif space == CURVE and pixels.dtype != np.uint8:
+            colours = 3 if image.channels >= 3 else 1
+            linear = to_linear(pixels[..., :colours])
+            linear = np.concatenate([linear, pixels[..., colours:]], axis=2)
+            pixels = np.ascontiguousarray(linear, image.dtype)
+        for _ in range(self.drops.get((path, space, *wraps), 0)):
+            pixels = halve(pixels, space == CURVE)
+        return pixels
+
+    def _add(self, path: str, image: Image, space: str, wrap_s: str, wrap_t: str) -> int:
+        # Pixels are released once they are in the scene; a second use reads the file again.
+        here = image if image.is_here else read_image(path)
+        pixels = self._as_stored(path, here, space, (wrap_s, wrap_t))
+        if self.store is not None:
+            self.store.set_waiting(self._ahead.bytes)
+        try:
+            return self._builder.add_texture(
+                pixels, srgb=space == CURVE, wrap_s=wrap_s, wrap_t=wrap_t, name=path
+            )
+        # The texture store has no room for it.
+        except ValueError as error:
+            raise WavecombError(str(error)) from None
+        finally:
+            if self.store is not None:
+                # Without this the allocator would keep the memory of decoded images.
+                del pixels
+                give_back_memory()
+
+    def mean(self, number: int) -> NDArray[np.float64]:
+        """Returns a texture's linear mean (4,) by reading its file again; 1 if there is no file."""
+        key = next((key for key, known in self._ids.items() if known == number), ())
+        # Keys of UDIM textures have three elements.
+        if len(key) == 3:
+            means = [self.mean(tile) for _, tile in key[1]]
+            return np.asarray(np.mean(means, axis=0)) if means else np.ones(4)
+        if len(key) != 5:
+            return np.ones(4)
+        path, space, wrap_s, wrap_t, _ = key
+        try:
+            pixels = self._as_stored(path, read_image(path), space, (wrap_s, wrap_t))
+        except (TextureError, OSError, ValueError):
+            return np.ones(4)
+        values = pixels.astype(np.float32) / (255.0 if pixels.dtype == np.uint8 else 1.0)
+        colours = 3 if values.shape[2] >= 3 else 1
+        if space == CURVE and pixels.dtype == np.uint8:
+            values[..., :colours] = to_linear(values[..., :colours])
+        found = np.nan_to_num(values).mean(axis=(0, 1), dtype=np.float64)
+        alpha = found[colours] if len(found) > colours else 1.0
+        return np.array([*np.broadcast_to(found[:colours], 3), alpha])
+
+    def missing(self) -> int:
+        """Returns the texture id of the checker that replaces unreadable textures."""
+        key = ("", "checker")
+        if key not in self._ids:
+            self._ids[key] = self._builder.add_texture(
+                checker(), srgb=False, name="missing texture"
+            )
+        return self._ids[key]
+
+    def add_pixels(self, name: str, pixels: NDArray[Any]) -> int:
+        """Returns the texture id of generated pixels; colours are linear Rec.709."""
+        return self._builder.add_texture(
+            pixels, srgb=False, wrap_s="repeat", wrap_t="clamp", name=name
+        )
+
+    def cache(self, scene: _core.Scene) -> TextureCache:
+        """Returns the textures for later scenes to share; ``scene`` was built with this table."""
+        return TextureCache(scene, self._taken, self._ids, self.store)
+
+    def release(self) -> None:
+        """Releases the pixels that were read."""
+        images = {path: image for path, image in self._images.items() if isinstance(image, Image)}
+        self._taken = {path: image for path, image in images.items() if not image.is_here}
+        self._images.clear()
+        self._ahead.close()

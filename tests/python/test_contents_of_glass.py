@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Contents of absorbing glass after edits, and absorption that a value graph drives."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from test_interiors import filled, glass_ball, quad
+
+import wavecomb
+from wavecomb import _core
+from wavecomb.usd.graphs.values import PARAMETERS, Expressions, assemble, numbers
+
+SIGMA = np.array([0.3, 0.7, 1.1])
+GLASS, STONE = 0, 1
+"""Numbers of the materials."""
+LAMP = {"radius": 0.1, "color": (30, 28, 25)}
+
+
+def moved(x: float) -> Any:
+    matrix = np.eye(4)
+    matrix[3, 0] = x
+    return matrix
+
+
+def scene(
+    *, tinted: bool = True, stone: bool = True, lamp: float = 3.0, graph: Any = None, **layers: Any
+) -> Any:
+    """A ball of glass around the origin, with a grey card in it and a light at x = ``lamp``.
+
+    Args:
+        tinted: The glass absorbs.
+        stone: The card is inside of the glass, else beside it.
+        lamp: Position of the light.
+        graph: Adds a graph to a builder and returns its number.
+        layers: Of OpenPBR, of the glass.
+    """
+    builder = wavecomb.SceneBuilder()
+    more = {} if tinted else {"transmission_depth": 0.0, "transmission_color": (1, 1, 1)}
+    if graph is None:
+        ball = glass_ball(builder, **more, **layers)
+    else:
+        filled(builder, 1.5)
+        number = builder.add_material(
+            "openpbr", name="/Glass", ior=1.5, roughness=0.0, metallic=0.0, graph=graph(builder),
+            openpbr={"transmission_weight": 1.0, "transmission_depth": 1.0, **layers},
+        )  # fmt: skip
+        ball = mesh_ball(builder, number)
+    builder.add_to_group(0, ball)
+    quad(builder, 0.0 if stone else 5.0, 0.5)
+    builder.add_light("sphere", moved(lamp), **LAMP)
+    builder.add_light("dome", np.eye(4), color=(0.3, 0.3, 0.3))
+    camera = np.eye(4)
+    camera[3, 2] = 4.0
+    builder.set_camera(camera, window=(-0.4, 0.4, -0.4, 0.4))
+    return builder.build()
+
+
+def mesh_ball(builder: Any, material: int) -> int:
+    from wavecomb.scenes.caustics import ball
+
+    mesh = ball(1.0, 24)
+    return int(builder.add_mesh(mesh.points, mesh.faces.astype(np.uint32), material=material))
+
+
+def image(renderer: Any, **more: Any) -> bytes:
+    settings = _core.Settings(width=16, height=16, spp=4, max_depth=6, **more)
+    return bytes(renderer.render(settings).beauty.tobytes())
+
+
+def refuses_light_paths(renderer: Any) -> bool:
+    """Returns whether light paths are refused because of what is in absorbing glass."""
+    try:
+        image(renderer, transport="light")
+    except _core.Error as error:
+        assert "objects inside of absorbing glass" in str(error) and "\n" not in str(error)
+        return True
+    return False
+
+
+TINT = {"transmission_depth": 1.0, "transmission_color": tuple(np.exp(-SIGMA))}
+CLEAR = {"transmission_depth": 0.0, "transmission_color": (1, 1, 1)}
+FAR, INSIDE = 3.0, 0.5
+"""Positions of the light: beside the glass and in it."""
+
+
+@pytest.mark.parametrize(
+    ("before", "edit", "after"),
+    [
+        ({"tinted": False}, {"materials": {GLASS: TINT}}, {}),
+        ({}, {"materials": {GLASS: CLEAR}}, {"tinted": False}),
+        ({"stone": False}, {"lights": {0: {"transform": moved(INSIDE)}}},
+         {"stone": False, "lamp": INSIDE}),
+        ({"stone": False, "lamp": INSIDE}, {"lights": {0: {"transform": moved(FAR)}}},
+         {"stone": False}),
+        ({"lamp": INSIDE}, {"lights": {0: {"transform": moved(FAR)}}}, {}),
+        ({"tinted": False, "stone": False}, {"materials": {GLASS: TINT}}, {"stone": False}),
+        ({"tinted": False, "stone": False},
+         {"materials": {GLASS: TINT}, "lights": {0: {"transform": moved(INSIDE)}}},
+         {"stone": False, "lamp": INSIDE}),
+        ({"stone": False}, {"materials": {STONE: {"base_color": (0.1, 0.2, 0.3)}}}, None),
+    ],
+)  # fmt: skip
+def test_edits_search_glass_again(
+    before: dict[str, Any], edit: dict[str, Any], after: dict[str, Any] | None
+) -> None:
+    """An edited scene has the image and refuses what the scene built with these values does."""
+    renderer = _core.Renderer(scene(**before))
+    first = image(renderer)
+    count = len(renderer.scene.materials)
+    renderer.edit(**edit)
+    if after is None:
+        assert not refuses_light_paths(renderer)
+        assert len(renderer.scene.materials) == count
+        return
+    anew = _core.Renderer(scene(**after))
+    assert image(renderer) == image(anew) != first
+    assert refuses_light_paths(renderer) == refuses_light_paths(anew)
+    assert renderer.scene.materials == anew.scene.materials
+    holds = after.get("tinted", True) and (after.get("stone", True) or "lamp" in after)
+    assert refuses_light_paths(renderer) == holds
+
+
+@pytest.mark.parametrize("layer", ["transmission_scatter", "nested_priority"])
+def test_edits_that_need_media_inside_of_meshes(layer: str) -> None:
+    """Scattering and priorities, too, begin with an edit."""
+    value: Any = (0.5, 0.5, 0.5) if layer == "transmission_scatter" else 1.0
+    renderer = _core.Renderer(scene(stone=False))
+    first = image(renderer)
+    renderer.edit(materials={GLASS: {layer: value}})
+    anew = _core.Renderer(scene(stone=False, **{layer: value}))
+    assert image(renderer) == image(anew)
+    assert (image(renderer) != first) == (layer == "transmission_scatter")
+    with pytest.raises(_core.Error, match="media inside of meshes"):
+        image(renderer, transport="light")
+
+
+def graph_of(**driven: Any) -> Any:
+    """Returns a function that adds a graph which drives parameters by texture coordinates."""
+
+    def add(builder: Any) -> int:
+        make = Expressions()
+        u = make.op("abs", make.input("position")[:1])
+        parts: dict[int, Any] = {}
+        for name, factor in driven.items():
+            start, width = PARAMETERS[name]
+            value = make.op("multiply", u, numbers(factor))
+            parts |= dict.fromkeys(range(start, start + width), value[0])
+        made = assemble(parts)
+        return int(builder.add_graph(made.ops, made.constants, made.images, made.outputs))
+
+    return add
+
+
+def test_glass_with_a_graph_elsewhere_is_searched() -> None:
+    """Constant absorption counts whatever else a graph drives, be it the transmission."""
+    tint = {"transmission_color": tuple(np.exp(-SIGMA))}
+    for driven, weight in (("roughness", 1.0), ("transmission_weight", 0.0)):
+        for stone in (True, False):
+            made = scene(
+                graph=graph_of(**{driven: 0.5}), stone=stone, transmission_weight=weight, **tint
+            )
+            assert refuses_light_paths(_core.Renderer(made)) == stone, driven
+            assert not made.warnings
+
+
+def test_absorption_by_a_graph() -> None:
+    """Light paths are refused, and what is inside is said not to be dimmed."""
+    for stone, lamp in ((True, FAR), (False, INSIDE), (False, FAR)):
+        made = scene(graph=graph_of(extinction=1.0), stone=stone, lamp=lamp)
+        with pytest.raises(_core.Error, match="absorption comes from a value graph") as error:
+            image(_core.Renderer(made), transport="light")
+        assert "\n" not in str(error.value)
+        automatic = image(_core.Renderer(made), transport="auto")
+        assert automatic == image(_core.Renderer(made), transport="path")
+        said = [line for line in made.warnings if "/Glass" in line]
+        assert len(said) == (stone or lamp == INSIDE), made.warnings
+        assert all("does not dim light on its way to objects" in line for line in said)
+
+
+def test_absorption_by_a_graph_in_a_stage_of_media() -> None:
+    """Such glass does not absorb where paths track what they are inside of, which is said."""
+    made = scene(graph=graph_of(extinction=1.0), stone=False, nested_priority=1.0)
+    assert [line for line in made.warnings if "does not absorb" in line], made.warnings
