@@ -125,9 +125,9 @@ inline void noise_values(const F (&p)[N], uint32_t width, F* out) {
   noise::perlin<3, F>(p, value);
   for (uint32_t i = 0; i < width && i < 3; ++i) out[i] = value[i];
   if (width < 4) return;
-  constexpr float kElsewhere[3] = {19.f, 73.f, 29.f};
+  constexpr float kNoiseOffset[3] = {19.f, 73.f, 29.f};
   F q[N];
-  for (size_t i = 0; i < N; ++i) q[i] = p[i] + kElsewhere[i];
+  for (size_t i = 0; i < N; ++i) q[i] = p[i] + kNoiseOffset[i];
   noise::perlin<1, F>(q, out + 3);
 }
 
@@ -149,14 +149,14 @@ inline void octaves(const F (&p)[3], uint32_t count, const F& lacunarity, const 
 template <typename F>
 inline void fractal_values(const F (&p)[3], uint32_t width, uint32_t count, const F& lacunarity,
                            const F& diminish, F* out) {
-  const F elsewhere[3] = {p[0] + 19.f, p[1] + 193.f, p[2] + 17.f};
+  const F offset_point[3] = {p[0] + 19.f, p[1] + 193.f, p[2] + 17.f};
   if (width < 3) {
     octaves<1, F>(p, count, lacunarity, diminish, out);
-    if (width == 2) octaves<1, F>(elsewhere, count, lacunarity, diminish, out + 1);
+    if (width == 2) octaves<1, F>(offset_point, count, lacunarity, diminish, out + 1);
     return;
   }
   octaves<3, F>(p, count, lacunarity, diminish, out);
-  if (width == 4) octaves<1, F>(elsewhere, count, lacunarity, diminish, out + 3);
+  if (width == 4) octaves<1, F>(offset_point, count, lacunarity, diminish, out + 3);
 }
 
 /// Operation of a graph with its operands and results. An operation reads its operands while it
@@ -370,7 +370,7 @@ template <typename F>
         break;
       case GraphCode::kAttribute:
         op.one([](const F& a) { return a; });
-        read_attribute<F>(view.attributes, op.code.number, op.width, at.place, active, op.to);
+        read_attribute<F>(view.attributes, op.code.number, op.width, at.mesh_position, active, op.to);
         break;
       default:
         break;

@@ -33,7 +33,7 @@ class PathRecorder {
     const SceneView& scene = context_.scene;
     const CameraSetup& camera = *context_.camera;
     if (hit.inst == kNoHit) {
-      if (!settings_.sees_sky(depth)) return;
+      if (!settings_.adds_environment(depth)) return;
       radiance_.sum += environment_emission<F>(scene, settings_, depth, path, true);
       if (aovs_.wants_lights())
         aovs_.add_environment<F>(scene, settings_, depth, kSlot, path, true);
@@ -57,7 +57,7 @@ class PathRecorder {
     const CameraSetup& camera = *context_.camera;
     const F time = rays_.time();
     if (hit.inst == kNoSurface) {
-      aovs_.hit_volume<F>(camera, kSlot, p, time, volume_seen(material), true);
+      aovs_.hit_volume<F>(camera, kSlot, p, time, volume_hit(material), true);
       return;
     }
     aovs_.hit_surface<F>(camera, kSlot, p, time,
@@ -70,13 +70,14 @@ class PathRecorder {
           true);
   }
 
-  void note_choice(const VertexResult<F>& v, const VertexAovs<F>& aovs, F brought) {
+  void record_choice(const VertexResult<F>& v, const VertexAovs<F>& aovs, F brought) {
     if (probe_count_ == probes_.size()) return;
-    probes_[probe_count_++] = {aovs.lit_by,
-                               brought,
-                               aovs.light_weight,
-                               {aovs.lit_at.x, aovs.lit_at.y, aovs.lit_at.z},
-                               v.next.receiver};
+    probes_[probe_count_++] = {
+        aovs.light_id,
+        brought,
+        aovs.light_weight,
+        {aovs.light_position.x, aovs.light_position.y, aovs.light_position.z},
+        v.next.receiver};
   }
 
   /// Adds the contribution `c` of `light` to the radiance. `light` is kNoLight for emission of
@@ -87,12 +88,12 @@ class PathRecorder {
   }
 
   /// Adds the emission `c` of volumes to the radiance.
-  void add_glow(const Color<F>& c) {
+  void add_volume_emission(const Color<F>& c) {
     radiance_.sum += c;
-    if (aovs_.wants_lights()) aovs_.add_glow<F>(kSlot, c, true);
+    if (aovs_.wants_lights()) aovs_.add_volume_emission<F>(kSlot, c, true);
   }
   /// Records the ray segment for AOVs. `throughput` is the throughput of the path after the flight.
-  void note_way(uint32_t depth, const Flight<F>& flight, const Color<F>& throughput) {
+  void record_segment(uint32_t depth, const Flight<F>& flight, const Color<F>& throughput) {
     const bool straight = !flight.stopped && !flight.walked;
     if (depth == 0 && aovs_.wants_transmittance())
       aovs_.pass<F>(kSlot, straight ? throughput : Color<F>(0.f), true);
@@ -100,9 +101,9 @@ class PathRecorder {
   }
   /// Returns the volume, or the mesh filled with a medium, whose event `material` has stopped the
   /// path.
-  VolumeSeen<F> volume_seen(uint32_t material) const {
+  VolumeHit<F> volume_hit(uint32_t material) const {
     const SceneView& scene = context_.scene;
-    if (context_.knows_inside() && material == scene.interiors.event_material)
+    if (context_.has_medium_stack() && material == scene.nested_media.event_material)
       return {0, inside_.place, inside_.medium, true};
     return {material - scene.volumes.first_material, 0, material, false};
   }
@@ -115,7 +116,7 @@ class PathRecorder {
   PathAovs& aovs_;
   PathHistory& history_;
   RadianceRow<F> radiance_;
-  InsideRow<F> inside_{};         ///< medium stack of the path, if the scene has nested dielectrics
+  MediumStackRow<F> inside_{};    ///< medium stack of the path, if the scene has nested dielectrics
   std::span<LightProbe> probes_;  ///< sampled lights of the path; empty if unused
   uint32_t probe_count_ = 0;
 };

@@ -79,9 +79,9 @@ class PathTracer : PathRecorder {
       const F tfar = depth == 0 && context_.camera->has_far ? ray.tfar : kInfinity;
       SingleHit hit = rays_.intersect(path.o, path.dir, tfar, depth);
       clock_.enter(Phase::kShade);
-      bool came_out = false;
+      bool left_body = false;
       if (path.enters_body) {
-        if (!walk(key, depth, path, hit, came_out)) return depth;
+        if (!walk(key, depth, path, hit, left_body)) return depth;
         cone_at_origin = path.cone_width;
       }
       if constexpr (Media::kAny) pass_media(key, depth, path, hit);
@@ -93,13 +93,13 @@ class PathTracer : PathRecorder {
       const Vec3<F> p = fma(path.dir, hit.t, path.o);
       const bool on_surface = hit.inst != kNoSurface;
       if (depth == 0 && on_surface && scene.visibility &&
-          held_out<F>(scene, hit.inst, hit.geom, true))
+          is_holdout<F>(scene, hit.inst, hit.geom, true))
         return depth;
       if (depth == 0 && aovs_.wants_alpha()) aovs_.cover<F>(kSlot, true);
       const uint32_t mesh = on_surface ? rays_.mesh_of(hit) : 0;
       uint32_t material = on_surface ? rays_.material_of(hit, mesh) : hit.event_material;
       if constexpr (Media::kStreams)
-        if (came_out && on_surface) material = media_.exit_material();
+        if (left_body && on_surface) material = media_.exit_material();
       if (depth == 0) note_first_hit(path.dir, p, hit, mesh, material);
       if (on_surface && settings_.cost_aware && depth >= settings_.roulette_depth) {
         const F q = cost_aware_survival<F>(scene, *context_.roulette_costs, material, path, true);
@@ -112,20 +112,20 @@ class PathTracer : PathRecorder {
       if (context_.joins_light() && depth == 0 && on_surface)
         path.ratio =
             first_ratio<F>(*context_.camera, context_.light_path_share(), p, path.dir, time, true);
-      if (context_.knows_inside()) {
-        path.outer = inside_.outer;
-        path.medium = inside_.medium;
+      if (context_.has_medium_stack()) {
+        path.outer = medium_stack_.outer;
+        path.medium = medium_stack_.medium;
       }
       const VertexResult<F> v = shade(key, depth, hit, mesh, material, path, aovs);
-      if (context_.knows_inside()) {
-        inside_.crossed = v.crossed;
+      if (context_.has_medium_stack()) {
+        medium_stack_.crossed = v.crossed;
       }
       note_vertex(key, depth, {.path = path, .t = hit.t, .material = material, .result = v}, aovs);
       const bool is_free = v.has_shadow && trace_shadow(key, depth, v, aovs);
       if constexpr (!Media::kAny)
         if (vertices_ && max_component(offer_.row.light) > 0.f) connect(depth);
       if (!probes_.empty() && aovs.light_weight >= 0.f)
-        note_choice(v, aovs, is_free ? luminance(v.direct) : 0.f);
+        record_choice(v, aovs, is_free ? luminance(v.direct) : 0.f);
       if (!v.alive) return depth + 1;
       path = v.next;
       path.importance = importance;
@@ -147,8 +147,8 @@ class PathTracer : PathRecorder {
             .throughput = Color<F>(1.f),
             .cone_spread = ray.spread,
             .o = ray.o,
-            .importance = context_.weighs_pixels()
-                              ? picture_importance<F>(*context_.guide, x, y, true)
+            .importance = context_.uses_pixel_importance()
+                              ? pixel_importance<F>(*context_.guide, x, y, true)
                               : 0.f};
     ++counts_.samples;
     return ray;
@@ -157,14 +157,14 @@ class PathTracer : PathRecorder {
   /// Adds the emission of volumes along the ray of a path, and samples its free flight to `hit`,
   /// which becomes the volume event if one stops it.
   void pass_media(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit) {
-    const Flight<F> flight = fly(key, depth, path, hit);
-    if constexpr (Media::kShines)
-      if (media_.shines())
-        add_glow(clean<F>(
+    const Flight<F> flight = sample_flight(key, depth, path, hit);
+    if constexpr (Media::kHasEmission)
+      if (media_.has_emission())
+        add_volume_emission(clean<F>(
             path.throughput * media_.template emission<F>(passage_of(key, depth, path, hit), true),
             clamp_limit(settings_, depth)));
     path.throughput = path.throughput * flight.weight;
-    note_way(depth, flight, path.throughput);
+    record_segment(depth, flight, path.throughput);
     if (flight.stopped) hit = {flight.t, 0.f, 0.f, 0, 0, kNoSurface, flight.material};
   }
 
@@ -175,7 +175,8 @@ class PathTracer : PathRecorder {
     add(aovs.emitter, v.emitted);
     if constexpr (!Media::kAny)
       if (vertices_ && aovs.wants_events)
-        light_aovs_.offer<F>(kSlot, aovs_.expressions().states<F>(kSlot, true), offer_.note, true);
+        light_aovs_.offer<F>(kSlot, aovs_.expressions().states<F>(kSlot, true), offer_.scattering,
+                             true);
     if (aovs.wants_events && (v.alive || v.has_shadow))
       aovs_.expressions().scatter<F>(depth, kSlot, key, aovs, v.has_shadow, true);
     aovs_.vertex<F>(depth, kSlot, aovs, at.path, true);
@@ -190,16 +191,16 @@ class PathTracer : PathRecorder {
     const bool links = context_.scene.lights.links.members != nullptr;
     const bool is_free = !rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth,
                                          links ? &v.shadow_set : nullptr);
-    if (is_free || max_component(v.shade) > 0.f)
-      add_direct(key, depth, v, is_free, aovs_.group_of<F>(aovs.lit_by, true));
+    if (is_free || max_component(v.shadow_tint) > 0.f)
+      add_direct(key, depth, v, is_free, aovs_.group_of<F>(aovs.light_id, true));
     return is_free;
   }
 
   /// Continues a ray that has entered a subsurface body as a random walk. A ray that hits no
-  /// surface of that body continues unchanged. Sets `came_out` if the walk has left the body.
+  /// surface of that body continues unchanged. Sets `left_body` if the walk has left the body.
   /// Returns false if the path is terminated.
   bool walk(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit,
-            bool& came_out) {
+            bool& left_body) {
     path.enters_body = false;
     path.receiver = 0u;
     path.cone_width = 0.f;
@@ -207,42 +208,44 @@ class PathTracer : PathRecorder {
     if constexpr (Media::kStreams) {
       PresenceKeys keys = rays_.keys();
       keys.object = &object;
-      return media_.walk(passage_of(key, depth, path, hit), keys, path, hit, came_out);
+      return media_.walk(passage_of(key, depth, path, hit), keys, path, hit, left_body);
     }
     return true;
   }
 
   /// Returns the ray segment of a path to `hit`. It refers to the path and the hit.
-  Passage<F> passage_of(const SampleKey<F>& key, uint32_t depth, const PathState<F>& path,
-                        const SingleHit& hit) const {
+  MediumQuery<F> passage_of(const SampleKey<F>& key, uint32_t depth, const PathState<F>& path,
+                            const SingleHit& hit) const {
     return {settings_.sampler, key, depth, path.o, path.dir, hit.t, rays_.time()};
   }
 
   /// Samples the free flight of a path along its ray segment to `hit`.
-  Flight<F> fly(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit) {
+  Flight<F> sample_flight(const SampleKey<F>& key, uint32_t depth, PathState<F>& path,
+                          SingleHit& hit) {
     if constexpr (Media::kStreams)
-      if (context_.knows_inside())
-        return media_.fly_inside(passage_of(key, depth, path, hit), rays_.keys(), path, hit,
-                                 inside_);
-    return media_.template fly<F>(passage_of(key, depth, path, hit), path.throughput, true);
+      if (context_.has_medium_stack())
+        return media_.sample_nested_flight(passage_of(key, depth, path, hit), rays_.keys(), path,
+                                           hit, medium_stack_);
+    return media_.template sample_flight<F>(passage_of(key, depth, path, hit), path.throughput,
+                                            true);
   }
 
   /// Adds the light sample of `v`, whose light is in `group`. Volumes always attenuate it, and
   /// media inside meshes do if the shadow ray is free. If an object blocks the ray, only the
-  /// fraction v.shade (the shadow colour of the light) remains.
+  /// fraction v.shadow_tint (the shadow colour of the light) remains.
   void add_direct(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v, bool is_free,
                   uint32_t group) {
     Color<F> c = v.direct;
     if constexpr (Media::kAny) {
-      const F t = v.shadow_tfar * (1.f / kShadowReach);
+      const F t = v.shadow_tfar * (1.f / kShadowRayFraction);
       c = c * media_.template transmittance<F>(
                   {settings_.sampler, key, depth, v.shadow_o, v.shadow_d, t, rays_.time()}, true);
       if constexpr (Media::kStreams)
-        if (is_free && context_.knows_inside())
-          c = c *
-              media_.pass_inside(rays_.keys(), rays_.time(), inside_, v.shadow_o, v.shadow_d, t);
+        if (is_free && context_.has_medium_stack())
+          c = c * media_.nested_transmittance(rays_.keys(), rays_.time(), medium_stack_, v.shadow_o,
+                                              v.shadow_d, t);
     }
-    if (!is_free) c = c * v.shade;
+    if (!is_free) c = c * v.shadow_tint;
     radiance_.sum += c;
     if (aovs_.wants_lights()) aovs_.add_direct<F>(kSlot, group, c, true);
     if (aovs_.wants_light_samples()) aovs_.add_light_sample<F>(kSlot, c, true);
@@ -258,12 +261,12 @@ class PathTracer : PathRecorder {
     const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, rays_.time()};
     const bool joins = settings_.joins_light, connects = joins && vertices_;
     if (connects) offer_ = offer_for<F>(vertices_, kSlot, depth, settings_.max_depth, true);
-    VisibleOffer<F> visible;
+    MergePointOffer<F> visible;
     constexpr auto& kernels = kShadeVertex<F, typename Media::template Programs<F>>;
     const VertexResult<F> v = kernels[scene.material_program[material]](
         {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, path, &aovs, true,
          context_.guide, connects ? &offer_ : nullptr, joins && visible_ ? &visible : nullptr});
-    if (visible.seen) store_row<VisiblePoint, F>(visible_.rows, kSlot, visible.row, true);
+    if (visible.stored) store_row<MergePoint, F>(visible_.rows, kSlot, visible.row, true);
     return v;
   }
 
@@ -288,7 +291,7 @@ class PathTracer : PathRecorder {
                                    hit.t, at.material, state, &aovs, true},
                                   setup, & target)
                                   .v;
-    if (aovs.wants_events) light_aovs_.link<F>(kSlot, aovs.lit, true);
+    if (aovs.wants_events) light_aovs_.record_connection<F>(kSlot, aovs.light_scattering, true);
     if (!v.has_shadow) return;
     clock_.enter(Phase::kShadow);
     const uint32_t no_set = 0;
@@ -296,7 +299,7 @@ class PathTracer : PathRecorder {
     if (rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, links ? &no_set : nullptr))
       return;
     radiance_.sum += v.direct;
-    aovs_.add_link<F>(depth, kSlot, from.light, v.direct, true);
+    aovs_.add_connection<F>(depth, kSlot, from.light, v.direct, true);
     if (light_aovs_.wants_events())
       light_aovs_.connect<F>(aovs_.expressions(), kSlot, v.direct, true);
   }
@@ -305,9 +308,9 @@ class PathTracer : PathRecorder {
   const ShadeSettings light_settings_ = settings_.of_light_paths();
   PhaseClock& clock_;
   LightPathAovs& light_aovs_;
-  LightVertices& vertices_;     ///< vertices of the light path; empty without connections
-  const VisibleRows& visible_;  ///< point where light paths may be merged
-  ConnectionOffer<F> offer_;    ///< connection that the current vertex offers
+  LightVertices& vertices_;        ///< vertices of the light path; empty without connections
+  const MergePointRows& visible_;  ///< point where light paths may be merged
+  ConnectionOffer<F> offer_;       ///< connection that the current vertex offers
 };
 
 }  // namespace wavecomb

@@ -96,8 +96,8 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
                std::ranges::any_of(geometry_->volume_records, &VolumeRecord::emits)};
   v.walks = {materials_->walks.empty() ? nullptr : materials_->walks.data(),
              geometry_->exit_material};
-  v.interiors = {materials_->interiors.empty() ? nullptr : materials_->interiors.data(),
-                 materials_->inside_material};
+  v.nested_media = {materials_->nested_media.empty() ? nullptr : materials_->nested_media.data(),
+                    materials_->event_material};
   v.has_motion = geometry_->moves() || v.lights.motions;
   v.has_emissive_meshes = !lights_->emissive.empty();
   v.has_curves = std::any_of(meshes().begin(), meshes().end(),
@@ -118,7 +118,7 @@ void Scene::link() {
   // Bounce rays must be able to hit emitters that are sampled as lights, since their MIS weights
   // assume that they can.
   for (size_t i = 0; i < lights_->emissive.size(); ++i)
-    if (lights_->emissive[i] != kNoLight) visibility[i] |= kSeenByBounces;
+    if (lights_->emissive[i] != kNoLight) visibility[i] |= kVisibleToBounces;
   visibility_ = std::make_shared<const std::vector<uint32_t>>(std::move(visibility));
   view_.visibility = visibility_->data();
 }
@@ -126,7 +126,7 @@ void Scene::link() {
 bool Scene::needs_in_glass(std::span<const Material> all_materials,
                            std::span<const Light> all_lights) const {
   if (!volumes().empty()) return true;
-  const auto test = [&](const Material& m) { return absorbs_inside(m, *materials_->graphs); };
+  const auto test = [&](const Material& m) { return is_absorbing_solid(m, *materials_->graphs); };
   const Glasses before = glasses_of(materials(), test), after = glasses_of(all_materials, test);
   // The material of collisions inside of meshes may follow those of `after`.
   const bool same_glass = std::equal(after.begin(), after.end(), before.begin());
@@ -160,7 +160,7 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
   }
 
   std::shared_ptr<const SceneMaterials> new_materials = materials_;
-  bool shines_otherwise = !edit.lights.empty();
+  bool emission_changed = !edit.lights.empty();
   std::vector<Light> all_lights;
   if (!edit.materials.empty() || !edit.lights.empty()) {
     all_lights = lights();
@@ -168,7 +168,7 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
     const bool any_mesh_lights = !geometry_->mesh_lights.empty();
     std::vector<Material> all = materials_->given();
     for (const auto& [id, material] : edit.materials) {
-      shines_otherwise = shines_otherwise || !same_emission(all[id], material, any_mesh_lights);
+      emission_changed = emission_changed || !same_emission(all[id], material, any_mesh_lights);
       all[id] = material;
     }
     const bool in_glass = needs_in_glass(all, all_lights);
@@ -184,7 +184,7 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
           std::make_shared<const SceneTangents>(*geometry_, *new_materials, tangents_.get());
     });
   std::shared_ptr<const SceneLights> new_lights = lights_;
-  if (shines_otherwise)
+  if (emission_changed)
     with_threads(threads, [&] {
       new_lights = std::make_shared<const SceneLights>(std::move(all_lights), *geometry_,
                                                        *new_materials, lights_.get());
@@ -253,7 +253,7 @@ SceneBytes Scene::bytes() const {
          materials_->graphs->ops, materials_->graphs->constants, materials_->graphs->images,
          materials_->graphs->outputs) +
       of(lights_->emissive, lights_->mesh_lights, set.mesh_lights, set.records, set.triangles,
-         set.triangle_uvs, set.pick_bins, set.powers, set.portals, set.portal_groups, set.shapings,
+         set.triangle_uvs, set.power_bins, set.powers, set.portals, set.portal_groups, set.shapings,
          set.ies, set.ies_numbers, set.filters, set.shadows, set.motions, set.motion_steps) +
       lights_->tree_bytes() + g.names.bytes();
   std::set<const void*> grids;

@@ -35,16 +35,16 @@ constexpr uint32_t kMaxNesting = 4096;
 
 uint64_t SceneBuilder::count_placements(uint32_t group, uint32_t depth,
                                         std::vector<uint64_t>& of_group) const {
-  constexpr uint64_t kUnderWay = ~uint64_t{0} - 1;
+  constexpr uint64_t kInProgress = ~uint64_t{0} - 1;
   uint64_t& known = of_group[group];
-  if (known == kUnderWay)
+  if (known == kInProgress)
     throw Error(quoted("group", groups_[group].name) +
                 " holds itself; break the cycle of instances");
   if (known != kUncounted) return known;
   if (depth > kMaxNesting)
     throw Error("groups are nested more than " + std::to_string(kMaxNesting) +
                 " deep; flatten some");
-  known = kUnderWay;
+  known = kInProgress;
   uint64_t count = group != 0 && !groups_[group].meshes.empty() ? 1 : 0;
   for (const Node& node : children_[group]) {
     count += count_placements(node.child, depth + 1, of_group);
@@ -58,7 +58,7 @@ uint64_t SceneBuilder::count_placements(uint32_t group, uint32_t depth,
 
 uint32_t common_segments(uint32_t a, uint32_t b) {
   const uint32_t both = std::lcm(a, b);
-  return both < kMostSteps / 2 ? both : std::max(a, b);
+  return both < kMaxSteps / 2 ? both : std::max(a, b);
 }
 
 std::vector<Affine> SceneBuilder::composed(std::span<const Affine> outer, const Affine& still,
@@ -113,7 +113,7 @@ void SceneBuilder::warn_of_absorbing_graphs(const PlacedObjects& objects, bool i
       "; absorption that a graph or texture drives acts where paths leave glass; use a constant "
       "transmission color";
   if (std::ranges::any_of(
-          materials_, [&](const Material& m) { return asks_for_interiors(m, graphs_, in_glass); }))
+          materials_, [&](const Material& m) { return needs_medium_stack(m, graphs_, in_glass); }))
     warnings_.push_back(quoted("material", glass.name) +
                         " does not absorb, since the stage has media or objects inside of meshes" +
                         advice);
@@ -129,16 +129,16 @@ void SceneBuilder::flatten_groups(SceneGeometry& geometry) {
   std::vector<Instance> flat;
   flat.reserve(count_placements(0, 0, placements));
   flatten(0, {0, Affine{}, kInheritMaterial, kNoName, {}}, {}, placements, flat, geometry);
-  const auto sound = [](const Affine& m) {
+  const auto is_invertible = [](const Affine& m) {
     const float det = m.determinant();
     return finite(m) && std::isfinite(det) && std::abs(det) > 1e-35f;
   };
   geometry.placements.shrink_to_fit();
   const size_t singular = std::erase_if(flat, [&](const Instance& i) {
-    bool good = i.motion.moves() || sound(i.to_world);
+    bool valid = i.motion.moves() || is_invertible(i.to_world);
     for (uint32_t k = 0; i.motion.moves() && k <= i.motion.segments; ++k)
-      good = good && sound(geometry.steps[i.motion.first + k].affine());
-    return !good;
+      valid = valid && is_invertible(geometry.steps[i.motion.first + k].affine());
+    return !valid;
   });
   geometry.instances = std::move(flat);
   if (singular > 0)
@@ -148,11 +148,12 @@ void SceneBuilder::flatten_groups(SceneGeometry& geometry) {
   SceneCounts counts{.meshes = meshes_.size(),
                      .materials = materials_.size() + 2 + volumes_.size(),
                      .instances = geometry.instances.size(),
-                     .placed = groups_[0].meshes.size(),
+                     .instanced_meshes = groups_[0].meshes.size(),
                      .placements = geometry.placements.size(),
                      .steps = geometry.steps.size()};
   for (const Group& group : groups_) counts.grouped += group.meshes.size();
-  for (const Instance& i : geometry.instances) counts.placed += groups_[i.group].meshes.size();
+  for (const Instance& i : geometry.instances)
+    counts.instanced_meshes += groups_[i.group].meshes.size();
   check_counts(counts);
 }
 
@@ -189,7 +190,7 @@ uint32_t SceneBuilder::add_implicit_materials(SceneGeometry& geometry) {
 bool SceneBuilder::search_glass(const SceneGeometry& geometry) {
   const PlacedObjects objects{meshes_, groups_, geometry.instances, geometry.steps};
   const Glasses absorbing =
-      glasses_of(materials_, [&](const Material& m) { return absorbs_inside(m, graphs_); });
+      glasses_of(materials_, [&](const Material& m) { return is_absorbing_solid(m, graphs_); });
   const bool in_glass = !volumes_.empty() || glass_holds_lights(absorbing, objects, lights_) ||
                         glass_holds_objects(absorbing, objects);
   warn_of_absorbing_graphs(objects, in_glass);

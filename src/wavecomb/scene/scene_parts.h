@@ -105,8 +105,8 @@ struct SceneGeometry {
   std::vector<MatrixStep> steps;  ///< transforms of all moving instances
   std::vector<VolumeRecord> volume_records;
   uint32_t first_volume_material = 0;  ///< VolumeView::first_material
-  /// WalkView::exit_material; kInheritMaterial if no material has a subsurface radius, so that the
-  /// scene has no subsurface random walks.
+  /// SubsurfaceView::exit_material; kInheritMaterial if no material has a subsurface radius, so
+  /// that the scene has no subsurface random walks.
   uint32_t exit_material = kInheritMaterial;
   std::vector<StepRange> instance_motions;  ///< by instance record; empty if no instance moves
   bool moves() const {
@@ -122,10 +122,12 @@ struct SceneGeometry {
   /// returns whether one did. `inherited` is the material of the instance.
   template <typename Test>
   bool any_material(uint32_t mesh, uint32_t inherited, const Test& test) const {
-    const auto worn = [&](uint32_t m) { return test(m == kInheritMaterial ? inherited : m); };
-    if (meshes[mesh].face_materials.empty()) return worn(meshes[mesh].material);
+    const auto bound_material = [&](uint32_t m) {
+      return test(m == kInheritMaterial ? inherited : m);
+    };
+    if (meshes[mesh].face_materials.empty()) return bound_material(meshes[mesh].material);
     for (uint32_t m : face_materials[mesh])
-      if (worn(m)) return true;
+      if (bound_material(m)) return true;
     return false;
   }
 };
@@ -141,7 +143,7 @@ struct SceneMaterials {
   std::vector<Material> given() const;
 
   std::vector<Material> materials;  ///< as the caller described them
-  std::vector<Material> shaded;     ///< after simplification by settled() (simplified_material.h)
+  std::vector<Material> shaded;  ///< after simplification by simplified() (simplified_material.h)
   std::shared_ptr<const GraphSet> graphs;
   std::vector<MaterialRecord> records;
   std::vector<TextureUseRecord> uses;
@@ -153,11 +155,11 @@ struct SceneMaterials {
   /// By material; empty if no program has specific parameters.
   std::vector<ProgramParameterRecord> own;
   /// By material; empty if there are no subsurface random walks.
-  std::vector<WalkMedium<float>> walks;
+  std::vector<SubsurfaceMedium<float>> walks;
   /// By material; empty if paths need no medium stack.
-  std::vector<InteriorMedium<float>> interiors;
-  /// InteriorView::event_material, the last material; kInheritMaterial if `interiors` is empty.
-  uint32_t inside_material = kInheritMaterial;
+  std::vector<MeshMedium<float>> nested_media;
+  /// MeshMediaView::event_material, the last material; kInheritMaterial if `nested_media` is empty.
+  uint32_t event_material = kInheritMaterial;
   /// Whether paths need to know which absorbing glass they are inside of: it holds objects or
   /// lights (medium/description/glass_contents.h), or the scene has volumes.
   bool in_glass = false;
@@ -192,8 +194,8 @@ struct SceneLights {
 
  private:
   mutable std::once_flag grown_;
-  mutable LightTree late_tree_;
-  mutable std::atomic<uint64_t> late_bytes_{0};
+  mutable LightTree lazy_tree_;
+  mutable std::atomic<uint64_t> lazy_bytes_{0};
 };
 
 }  // namespace wavecomb

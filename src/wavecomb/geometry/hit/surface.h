@@ -54,9 +54,10 @@ WAVECOMB_INLINE void set_smooth_normal(const SceneView& scene, const MeshHit<F>&
   using U = UInt<F>;
   const auto& [smooth, with_terminator] = lanes;
   const Mask<F> per_corner = Mask<F>((mesh.flags & kNormalsPerCorner) != U(0u));
-  const Mask<U> pick(per_corner);
-  const U a0 = select(pick, U(at.corner), at.i[0]), a1 = select(pick, U(at.corner + 1u), at.i[1]),
-          a2 = select(pick, U(at.corner + 2u), at.i[2]);
+  const Mask<U> selected(per_corner);
+  const U a0 = select(selected, U(at.corner), at.i[0]),
+          a1 = select(selected, U(at.corner + 1u), at.i[1]),
+          a2 = select(selected, U(at.corner + 2u), at.i[2]);
   Vec3<F> n0 = mesh.vec3(&MeshRecord::normals, a0, smooth);
   Vec3<F> n1 = mesh.vec3(&MeshRecord::normals, a1, smooth);
   Vec3<F> n2 = mesh.vec3(&MeshRecord::normals, a2, smooth);
@@ -68,11 +69,11 @@ WAVECOMB_INLINE void set_smooth_normal(const SceneView& scene, const MeshHit<F>&
   }
   const Vec3<F> n = maps.map_normal(fma(n2, at.b2, fma(n1, at.b1, Vec3<F>(n0 * at.b0))));
   const F len2 = length_squared(n);
-  const Mask<F> good = smooth & (len2 > 0.f) & is_finite(len2);
-  Vec3<F> ns = n * F(1.f / sqrt(select(good, len2, F(1.f))));
+  const Mask<F> valid = smooth & (len2 > 0.f) & is_finite(len2);
+  Vec3<F> ns = n * F(1.f / sqrt(select(valid, len2, F(1.f))));
   const F side = dot(ns, s.ng);
   ns = select<F>(side < 0.f, -ns, ns);
-  s.ns = select<F>(good, ns, s.ng);
+  s.ns = select<F>(valid, ns, s.ng);
 
   if (with_terminator) {
     // Project p to the tangent planes at the vertices and interpolate, on the side of the normals
@@ -84,7 +85,7 @@ WAVECOMB_INLINE void set_smooth_normal(const SceneView& scene, const MeshHit<F>&
     };
     const Vec3<F> d = lift(at.p0, n0) * at.b0 + lift(at.p1, n1) * at.b1 + lift(at.p2, n2) * at.b2;
     const Vec3<F> world = -maps.vector(d);
-    const Mask<F> outward = good & (side > 0.f) & (dot(world, s.ng) > 0.f);
+    const Mask<F> outward = valid & (side > 0.f) & (dot(world, s.ng) > 0.f);
     s.terminator = select<F>(outward, world, Vec3<F>(F(0.f)));
   }
 }
@@ -143,7 +144,7 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
     p0 = moved.p[0];
     p1 = moved.p[1];
     p2 = moved.p[2];
-    maps.place(moved.instance);
+    maps.set_instance(moved.instance);
     moved_size = moved.instance.size;
   }
   const F b1 = hit.u, b2 = hit.v, b0 = 1.f - b1 - b2;
@@ -190,7 +191,7 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
     const Mask<F> curved = lanes & not_(active);
     if (any(curved)) detail::setup_curved<F>(scene, hit, dir, with_uv, curved, s);
   }
-  s.unbent = s.ns;
+  s.unadjusted = s.ns;
   s.ns = facing_normal<F>(dir, s.ng, s.ns);
   return s;
 }

@@ -68,8 +68,8 @@ struct alignas(32) LightMotion {
 static_assert(sizeof(LightMotion) == 32);
 /// Pose of a moving light at one step.
 struct alignas(32) LightStep {
-  float turn[4] = {0, 0, 0, 1};  ///< rotation from mid-shutter, a unit quaternion x y z w
-  float place[3] = {0, 0, 0};    ///< position of the pivot
+  float turn[4] = {0, 0, 0, 1};   ///< rotation from mid-shutter, a unit quaternion x y z w
+  float position[3] = {0, 0, 0};  ///< position of the pivot
   float pad = 0;
   bool operator==(const LightStep&) const = default;
 };
@@ -251,7 +251,8 @@ struct LightView {
   const TriangleLight* triangles = nullptr;
   const TriangleUvs* triangle_uvs = nullptr;
   PowerTable power_table;
-  /// Selection probability of each light if `power_table` does not use those of the records; else null.
+  /// Selection probability of each light if `power_table` does not use those of the records; else
+  /// null.
   const float* selection_pdf = nullptr;
   LightTreeView tree;
   bool by_tree = false;  ///< select lights by `tree` instead of `power_table`

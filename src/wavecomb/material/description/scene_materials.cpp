@@ -61,9 +61,9 @@ bool wants_tangents(const Material& m, const GraphSet& graphs) {
           (m.openpbr.anisotropy != 0 || graphs.drives(m.graph, graph_parameter("anisotropy"))));
 }
 
-ProgramParameterRecord make_own_record(const Material& m) {
+ProgramParameterRecord make_specific_record(const Material& m) {
   ProgramParameterRecord r{};
-  for (size_t i = 0; i < kMaxProgramParameters; ++i) r.value[i] = m.own_value(i);
+  for (size_t i = 0; i < kMaxProgramParameters; ++i) r.value[i] = m.specific_value(i);
   return r;
 }
 
@@ -112,39 +112,39 @@ SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const 
                                bool in_glass_)
     : materials(std::move(all)), graphs(std::move(programs_)), in_glass(in_glass_) {
   const DenormalsOff denormals_off;  // same floating-point mode as in kernels
-  inside_material = add_inside_material(materials, *graphs, in_glass);
-  for (const Material& m : materials) shaded.push_back(settled(m, *graphs, textures));
-  const bool has_own = std::ranges::any_of(
-      materials, [](const Material& m) { return info_of(m.program).own_count() > 0; });
+  event_material = add_inside_material(materials, *graphs, in_glass);
+  for (const Material& m : materials) shaded.push_back(simplified(m, *graphs, textures));
+  const bool has_specific = std::ranges::any_of(
+      materials, [](const Material& m) { return info_of(m.program).specific_count() > 0; });
   for (const Material& m : shaded) {
     records.push_back(make_material_record(m, *graphs));
-    if (has_own) own.push_back(make_own_record(m));
+    if (has_specific) own.push_back(make_specific_record(m));
     if (has_trait(m.program, program_trait::kLayered)) {
       records.back().openpbr = static_cast<uint32_t>(openpbr.size());
       openpbr.push_back(make_openpbr_record(m.openpbr));
-      const WalkKind walk =
-          exit_material != kInheritMaterial ? walk_kind(m, *graphs) : WalkKind::kNone;
+      const SubsurfaceKind walk =
+          exit_material != kInheritMaterial ? subsurface_kind(m, *graphs) : SubsurfaceKind::kNone;
       openpbr.back().walks = static_cast<float>(walk);
-      if (walk != WalkKind::kNone) {
+      if (walk != SubsurfaceKind::kNone) {
         walks.resize(materials.size());
-        walks[records.size() - 1] = make_walk_medium(m, walk);
+        walks[records.size() - 1] = make_subsurface_medium(m, walk);
       }
     }
     for (const TextureUse& use : m.textures) uses.push_back(make_use_record(use));
     programs.push_back(static_cast<uint32_t>(m.program));
-    variants.push_back(least_variant(
+    variants.push_back(cheapest_variant(
         m.program, parts_of(m, *graphs, textures, exit_material != kInheritMaterial)));
     wants_tangents.push_back(wavecomb::wants_tangents(m, *graphs) ? 1 : 0);
     has_presence = has_presence || m.needs_presence();
     has_emission = has_emission || m.emits();
     has_absorbing_graphs = has_absorbing_graphs || absorbs_by_graph(m, *graphs);
   }
-  if (inside_material != kInheritMaterial) interiors = make_interiors(shaded, *graphs, true);
+  if (event_material != kInheritMaterial) nested_media = make_mesh_media(shaded, *graphs, true);
 }
 
 std::vector<Material> SceneMaterials::given() const {
   std::vector<Material> some = materials;
-  if (inside_material != kInheritMaterial) some.pop_back();
+  if (event_material != kInheritMaterial) some.pop_back();
   return some;
 }
 

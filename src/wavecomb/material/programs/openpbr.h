@@ -29,19 +29,20 @@ namespace wavecomb {
 template <typename F, uint32_t kParts>
 class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   using Viewed = ViewedBsdf<OpenPbrBsdf<F, kParts>, F>;
-  static constexpr bool kCoat = (kParts & kCoats) != 0, kFuzz = (kParts & kFuzzes) != 0,
-                        kBack = (kParts & kBacks) != 0, kTurned = (kParts & kBrushes) != 0;
+  static constexpr bool kCoat = (kParts & kCoatPart) != 0, kFuzz = (kParts & kFuzzPart) != 0,
+                        kBack = (kParts & kBackDiffusePart) != 0,
+                        kTurned = (kParts & kAnisotropyPart) != 0;
   using Base = OpenPbrBase<F, kParts>;
 
  public:
   static constexpr ProgramId kProgram = ProgramId::kOpenPbr;
   static constexpr bool kReadsIor = true;
-  static constexpr bool kEmits = (kParts & kGlows) != 0;
-  static constexpr bool kAbsorbs = (kParts & kPasses) != 0;
+  static constexpr bool kEmits = (kParts & kEmissionPart) != 0;
+  static constexpr bool kAbsorbs = (kParts & kTransmissionPart) != 0;
   // True for all variants, because light selection in the light tree depends on it.
   static constexpr bool kTransmits = true;
-  static constexpr bool kWalks = kBack;
-  static constexpr bool kTextured = (kParts & (kVaries | kBrushes)) != 0;
+  static constexpr bool kHasSubsurface = kBack;
+  static constexpr bool kTextured = (kParts & (kTexturePart | kAnisotropyPart)) != 0;
   using Params = OpenPbrParams<F>;
   /// All inputs or none, because one textured input suffices to align the frame with the texture.
   static constexpr uint32_t kInputs =
@@ -64,15 +65,15 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     // adjusted by anisotropy, or all of it if a random walk follows.
     const F sub = p.subsurface_weight;
     Color<F> under = p.subsurface_color;
-    back_ = seen_back_ = Color<F>(F(0.f));
+    back_ = returned_back_ = Color<F>(F(0.f));
     if constexpr (kBack) {
-      walks_ = p.walks > 0.f;
-      const F through =
-          select(walks_, F(1.f), F(F(0.5f * F(1.f + p.subsurface_anisotropy)) * p.thin_walled));
+      subsurface_ = p.subsurface > 0.f;
+      const F through = select(subsurface_, F(1.f),
+                               F(F(0.5f * F(1.f + p.subsurface_anisotropy)) * p.thin_walled));
       under = under * F(1.f - through);
-      seen_back_ = p.subsurface_color * F(sub * through);
-      const Mask<F> whole = p.walks == F(static_cast<float>(WalkKind::kWhole));
-      back_ = select<F>(whole, Color<F>(sub), seen_back_);
+      returned_back_ = p.subsurface_color * F(sub * through);
+      const Mask<F> lambertian = p.subsurface == F(static_cast<float>(SubsurfaceKind::kWhole));
+      back_ = select<F>(lambertian, Color<F>(sub), returned_back_);
     }
     diffuse_ = lerp(p.base_color, under, sub);
     if constexpr (kTurned) {
@@ -83,7 +84,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   }
 
   Color<F> albedo() const {
-    const Color<F> c = base_.metal_f0() * base_.metal + (diffuse_ + seen_back_) * base_.opaque +
+    const Color<F> c = base_.metal_f0() * base_.metal + (diffuse_ + returned_back_) * base_.opaque +
                        base_.tint * base_.glass +
                        base_.specular_color * F(F(1.f - base_.metal) * base_.glass_f0);
     return min(c, Color<F>(F(1.f)));
@@ -99,7 +100,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   /// Lanes whose light enters the surface and continues as a subsurface random walk.
   Mask<F> enters(const Vec3<F>& wo, const Vec3<F>& wi) const {
     if constexpr (!kBack) return Mask<F>(false);
-    return walks_ & (wo.z > 0.f) & (wi.z < 0.f);
+    return subsurface_ & (wo.z > 0.f) & (wi.z < 0.f);
   }
 
   /// Lanes whose light samples may lie on the other side of the surface.
@@ -250,11 +251,11 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     const F& z = view.o.z;
     const auto facet = base_.facet(view.base, z);
     const F p_up = facet.reflect_share();
-    const F p_way = select(refracted, F(1.f - p_up), p_up);
+    const F p_direction = select(refracted, F(1.f - p_up), p_up);
     const Color<F> base =
         select<F>(refracted, facet.transmit * base_.radiance_scale(view.base), facet.reflect) *
         below(view, wi);
-    F p_lobe = view.p_base * p_way;
+    F p_lobe = view.p_base * p_direction;
     Color<F> f = base;
     if constexpr (kCoat) {
       p_lobe = select(delta_coat, view.p_coat, p_lobe);
@@ -265,9 +266,9 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     s.pdf = select(delta, p, s.pdf);
     s.is_delta = delta;
     // A sample that carries no light is invalid, for example after almost complete absorption.
-    const Mask<F> nothing = delta & is_black(s.weight);
-    s.pdf = select(nothing, F(0.f), s.pdf);
-    s.is_delta = s.is_delta & not_(nothing);
+    const Mask<F> carries_no_light = delta & is_black(s.weight);
+    s.pdf = select(carries_no_light, F(0.f), s.pdf);
+    s.is_delta = s.is_delta & not_(carries_no_light);
   }
 
   bool has_coat() const {
@@ -313,7 +314,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   /// Darkening of the base by interreflection with the coat.
   Color<F> darkened(const View& v, const F& z) const {
     const Color<F> albedo = base_.metal_f0() * base_.metal +
-                            (diffuse_ + seen_back_) * base_.opaque + Color<F>(base_.glass);
+                            (diffuse_ + returned_back_) * base_.opaque + Color<F>(base_.glass);
     const F spread = fma(F(1.f - base_.opaque), base_.roughness, base_.opaque);
     return coat_.darkened(z, albedo, spread, v.base.inside);
   }
@@ -326,10 +327,12 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
       return select(on, max(estimate, floor), F(0.f));
     };
     const Mask<F> opaque = base_.opaque > 0.f;
-    const Color<F> seen = v.glossy * through;
-    const F diffuse = share(opaque & not_(is_black(diffuse_)), importance(seen * diffuse_));
+    const Color<F> base_seen_through_layers = v.glossy * through;
+    const F diffuse =
+        share(opaque & not_(is_black(diffuse_)), importance(base_seen_through_layers * diffuse_));
     F back(0.f), fuzz(0.f), coated(0.f);
-    if constexpr (kBack) back = share(opaque & not_(is_black(back_)), importance(seen * back_));
+    if constexpr (kBack)
+      back = share(opaque & not_(is_black(back_)), importance(base_seen_through_layers * back_));
     if constexpr (kFuzz)
       fuzz = share(v.fuzz_on > 0.f, F(v.fuzz_on * v.fuzz.albedo * importance(fuzz_color_)));
     if constexpr (kCoat) coated = share(v.coat_on > 0.f, coat);
@@ -391,8 +394,8 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   OpenPbrCoat<F> coat_;
   F fuzz_, fuzz_roughness_, turn_cos_, turn_sin_;
   Color<F> fuzz_color_, diffuse_, back_;
-  Color<F> seen_back_;  ///< colour of the light that returns after it entered through `back_`
-  Mask<F> walks_{false};
+  Color<F> returned_back_;  ///< colour of the light that returns after it entered through `back_`
+  Mask<F> subsurface_{false};
 };
 
 }  // namespace wavecomb

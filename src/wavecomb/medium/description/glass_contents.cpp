@@ -24,7 +24,7 @@ using Point = Vec3<float>;
 /// inside the glass that stands on it.
 constexpr float kMargin = 1e-3f;
 /// Number of bounds and triangle tests after which the search gives up, about half a second.
-constexpr size_t kMostTests = size_t{1} << 28;
+constexpr size_t kMaxTests = size_t{1} << 28;
 
 bool overlap(const Bounds& a, const Bounds& b) {
   return a.lo.x < b.hi.x && b.lo.x < a.hi.x && a.lo.y < b.hi.y && b.lo.y < a.hi.y &&
@@ -92,15 +92,15 @@ class Clipped {
   /// Keeps the part of the polygon where `distance` is not negative.
   template <typename Distance>
   void cut(const Distance& distance) {
-    std::array<Point, 9> kept;
+    std::array<Point, 9> clipped;
     size_t n = 0;
     for (size_t i = 0; i < count_; ++i) {
       const Point &a = points_[i], &b = points_[(i + 1) % count_];
       const float da = distance(a), db = distance(b);
-      if (da >= 0) kept[n++] = a;
-      if ((da >= 0) != (db >= 0)) kept[n++] = a + (b - a) * (da / (da - db));
+      if (da >= 0) clipped[n++] = a;
+      if ((da >= 0) != (db >= 0)) clipped[n++] = a + (b - a) * (da / (da - db));
     }
-    points_ = kept;
+    points_ = clipped;
     count_ = n;
   }
 
@@ -127,7 +127,7 @@ class GlassTree {
   /// returns whether it did. Adds the number of tests to `tests`.
   template <typename Visit>
   bool any(const Bounds& bounds, size_t& tests, const Visit& visit) const {
-    return !all_.empty() && any_below(0, bounds, tests, visit);
+    return !all_.empty() && visit_node(0, bounds, tests, visit);
   }
 
  private:
@@ -162,13 +162,13 @@ class GlassTree {
   static Point centre(const Glass& g) { return (g.bounds.lo + g.bounds.hi) * 0.5f; }
 
   template <typename Visit>
-  bool any_below(size_t number, const Bounds& bounds, size_t& tests, const Visit& visit) const {
+  bool visit_node(size_t number, const Bounds& bounds, size_t& tests, const Visit& visit) const {
     const Node& node = nodes_[number];
     ++tests;
     if (!overlap(node.bounds, bounds)) return false;
     if (node.second != 0)
-      return any_below(number + 1, bounds, tests, visit) ||
-             any_below(node.second, bounds, tests, visit);
+      return visit_node(number + 1, bounds, tests, visit) ||
+             visit_node(node.second, bounds, tests, visit);
     for (size_t i = node.first; i < node.last; ++i, ++tests)
       if (overlap(all_[i].bounds, bounds) && visit(all_[i])) return true;
     return false;
@@ -187,9 +187,9 @@ class Search {
         steps_(objects.steps),
         glasses_(glasses) {
     std::vector<Glass> all;
-    each_placed([&](uint32_t mesh, const Instance& instance) {
+    for_each_instance([&](uint32_t mesh, const Instance& instance) {
       if (!uses_glass(mesh, instance)) return false;
-      const Bounds bounds = placed_bounds(mesh, instance);
+      const Bounds bounds = instance_bounds(mesh, instance);
       if (!bounds.empty())
         all.push_back({bounds, mesh, &instance, WideMap(instance.to_world).inverse()});
       return false;
@@ -198,7 +198,7 @@ class Search {
   }
 
   bool finds_objects() {
-    return each_placed([&](uint32_t mesh, const Instance& i) { return is_inside(mesh, i); });
+    return for_each_instance([&](uint32_t mesh, const Instance& i) { return is_inside(mesh, i); });
   }
   bool finds_lights(std::span<const Light> lights) {
     return std::ranges::any_of(lights, [&](const Light& light) {
@@ -217,7 +217,7 @@ class Search {
   /// Calls `visit` for all meshes of all instances until it returns true, and returns whether it
   /// did.
   template <typename Visit>
-  bool each_placed(const Visit& visit) {
+  bool for_each_instance(const Visit& visit) {
     for (const uint32_t mesh : groups_[0].meshes)
       if (visit(mesh, world_)) return true;
     for (const Instance& instance : instances_)
@@ -230,17 +230,17 @@ class Search {
     if (is_new) at->second.bounds = mesh_bounds(meshes_[mesh]);
     return at->second;
   }
-  Bounds placed_bounds(uint32_t mesh, const Instance& instance) {
+  Bounds instance_bounds(uint32_t mesh, const Instance& instance) {
     Bounds bounds;
-    add_placed(bounds, shape(mesh).bounds, instance, steps_);
+    add_instance_bounds(bounds, shape(mesh).bounds, instance, steps_);
     return bounds;
   }
   bool uses_glass(uint32_t mesh, const Instance& instance) {
     const Mesh& m = meshes_[mesh];
     if (m.is_curved()) return false;
     const auto is_glass = [&](uint32_t material) {
-      const uint32_t worn = material == kInheritMaterial ? instance.material : material;
-      return worn < glasses_.size() && glasses_[worn];
+      const uint32_t bound_material = material == kInheritMaterial ? instance.material : material;
+      return bound_material < glasses_.size() && glasses_[bound_material];
     };
     if (m.face_materials.empty()) return is_glass(m.material);
     tests_ += m.face_materials.size();
@@ -270,7 +270,7 @@ class Search {
   /// Returns whether part of a mesh instance is inside other glass.
   bool is_inside(uint32_t mesh, const Instance& instance) {
     const auto is_other = [&](const Glass& g) { return g.mesh != mesh || g.instance != &instance; };
-    const Bounds bounds = grown(placed_bounds(mesh, instance));
+    const Bounds bounds = grown(instance_bounds(mesh, instance));
     if (bounds.empty() || !glass_->any(bounds, tests_, is_other)) return false;
     if (uses_glass(mesh, instance) && is_hollow_glass(mesh)) return false;
     const Mesh& m = meshes_[mesh];
@@ -278,18 +278,18 @@ class Search {
     const auto in_glass = [&](const Point& p) { return is_in_glass(p, mesh, &instance); };
     if (m.is_curved()) {
       for (size_t i = 0; i < m.vertex_count(); ++i)
-        if (in_glass(at(i)) || tests_ > kMostTests) return true;
+        if (in_glass(at(i)) || tests_ > kMaxTests) return true;
       return false;
     }
     for (size_t t = 0; t + 2 < m.indices.size(); t += 3) {
       const std::array<Point, 3> triangle{at(m.indices[t]), at(m.indices[t + 1]),
                                           at(m.indices[t + 2])};
-      Bounds its;
-      for (const Point& p : triangle) its.add(p);
-      const bool found = glass_->any(grown(its), tests_, [&](const Glass& g) {
+      Bounds object_bounds;
+      for (const Point& p : triangle) object_bounds.add(p);
+      const bool found = glass_->any(grown(object_bounds), tests_, [&](const Glass& g) {
         return is_other(g) && Clipped(triangle, shrunk(g.bounds)).any(g.bounds, in_glass);
       });
-      if (found || tests_ > kMostTests) return true;
+      if (found || tests_ > kMaxTests) return true;
     }
     return false;
   }

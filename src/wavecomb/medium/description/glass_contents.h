@@ -29,7 +29,7 @@ Glasses glasses_of(std::span<const Material> materials,
 
 /// Returns whether a closed mesh of glass contains an object or a part of one. If so, light travels
 /// through the glass on segments that do not end at its surface, so paths have to track a medium
-/// stack if the glass absorbs (asks_for_interiors).
+/// stack if the glass absorbs (needs_medium_stack).
 ///
 /// The test uses the first time step of mesh shapes and instance transforms at mid-shutter. It
 /// tests vertices of curves, and a few points on the part of each triangle that lies within the

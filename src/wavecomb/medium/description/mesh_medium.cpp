@@ -15,7 +15,7 @@ namespace {
 
 /// Lower limit of transmission colours, which keeps their logarithm finite.
 constexpr float kDarkestTransmission = 1e-6f;
-constexpr float kMostInteriorCosine = 0.99f;
+constexpr float kMaxMediumCosine = 0.99f;
 
 struct Coefficients {
   float absorption, scattering;
@@ -34,7 +34,7 @@ Coefficients raw_coefficients(float color, float scatter, float depth) {
   return {extinction - scattering, scattering};
 }
 
-void set_medium(const OpenPbr& o, InteriorMedium<float>& out) {
+void set_medium(const OpenPbr& o, MeshMedium<float>& out) {
   if (!(o.transmission_depth > 0)) return;
   const Vec3<float>&c = o.transmission_color, &s = o.transmission_scatter;
   Coefficients k[3] = {raw_coefficients(c.x, s.x, o.transmission_depth),
@@ -45,7 +45,7 @@ void set_medium(const OpenPbr& o, InteriorMedium<float>& out) {
   out.absorption = {k[0].absorption - least, k[1].absorption - least, k[2].absorption - least};
   out.scattering = {k[0].scattering, k[1].scattering, k[2].scattering};
   out.anisotropy =
-      std::clamp(o.transmission_scatter_anisotropy, -kMostInteriorCosine, kMostInteriorCosine);
+      std::clamp(o.transmission_scatter_anisotropy, -kMaxMediumCosine, kMaxMediumCosine);
 }
 
 bool is_any(const Vec3<float>& v) {
@@ -86,26 +86,26 @@ bool absorbs_by_graph(const Material& m, const GraphSet& graphs) {
   return may_transmit(m, graphs) && drives_extinction(m, graphs);
 }
 
-bool absorbs_inside(const Material& m, const GraphSet& graphs) {
+bool is_absorbing_solid(const Material& m, const GraphSet& graphs) {
   if (!may_transmit(m, graphs) || drives_extinction(m, graphs)) return false;
-  InteriorMedium<float> medium{};
+  MeshMedium<float> medium{};
   set_medium(m.openpbr, medium);
   return is_any(medium.absorption);
 }
 
-bool asks_for_interiors(const Material& m, const GraphSet& graphs, bool absorbing) {
+bool needs_medium_stack(const Material& m, const GraphSet& graphs, bool absorbing) {
   if (!is_solid(m)) return false;
-  InteriorMedium<float> medium{};
+  MeshMedium<float> medium{};
   set_medium(m.openpbr, medium);
   if (m.openpbr.transmission_weight > 0 && is_any(medium.scattering)) return true;
-  if (absorbing && absorbs_inside(m, graphs)) return true;
+  if (absorbing && is_absorbing_solid(m, graphs)) return true;
   return m.openpbr.nested_priority != 0 || (is_clear(m) && is_any(medium.absorption));
 }
 
 uint32_t add_inside_material(std::vector<Material>& materials, const GraphSet& graphs,
                              bool absorbing) {
   if (std::ranges::none_of(
-          materials, [&](const Material& m) { return asks_for_interiors(m, graphs, absorbing); }))
+          materials, [&](const Material& m) { return needs_medium_stack(m, graphs, absorbing); }))
     return kInheritMaterial;
   Material inside;
   inside.name = "inside of meshes";
@@ -114,19 +114,19 @@ uint32_t add_inside_material(std::vector<Material>& materials, const GraphSet& g
   return static_cast<uint32_t>(materials.size() - 1);
 }
 
-std::vector<InteriorMedium<float>> make_interiors(std::span<const Material> materials,
-                                                  const GraphSet& graphs, bool absorbing) {
+std::vector<MeshMedium<float>> make_mesh_media(std::span<const Material> materials,
+                                               const GraphSet& graphs, bool absorbing) {
   if (std::ranges::none_of(
-          materials, [&](const Material& m) { return asks_for_interiors(m, graphs, absorbing); }))
+          materials, [&](const Material& m) { return needs_medium_stack(m, graphs, absorbing); }))
     return {};
-  std::vector<InteriorMedium<float>> all(materials.size());
+  std::vector<MeshMedium<float>> all(materials.size());
   for (size_t i = 0; i < all.size(); ++i) {
     const Material& m = materials[i];
-    InteriorMedium<float>& out = all[i];
+    MeshMedium<float>& out = all[i];
     out = {};
     out.ior = 1;
     if (!is_glass(m, graphs)) continue;
-    const InteriorKind kind = is_clear(m) ? InteriorKind::kClear : InteriorKind::kRefracts;
+    const BoundaryKind kind = is_clear(m) ? BoundaryKind::kClear : BoundaryKind::kRefracts;
     out.kind = static_cast<uint32_t>(kind);
     out.ior = m.ior;
     if (!is_solid(m)) continue;

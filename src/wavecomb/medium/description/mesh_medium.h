@@ -15,7 +15,7 @@ struct Material;
 struct GraphSet;
 
 /// Role of a surface as the boundary of a medium.
-enum class InteriorKind : uint32_t {
+enum class BoundaryKind : uint32_t {
   kNone,      ///< bounds no medium
   kRefracts,  ///< refractive boundary of glass or a liquid
   kClear,  ///< boundary of fog: index of refraction 1, no scattering or absorption at the surface
@@ -23,33 +23,33 @@ enum class InteriorKind : uint32_t {
 
 /// Packed medium behind a surface, one record for each material.
 template <typename F>
-struct InteriorMedium {
+struct MeshMedium {
   Color<F> absorption, scattering;  ///< coefficients, per unit of length
   F anisotropy;                     ///< mean cosine of the scattering angle
   F ior;
   /// In overlaps the medium of highest priority counts; among equal ones, the last entered.
   F priority;
-  UInt<F> kind;  ///< InteriorKind
+  UInt<F> kind;  ///< BoundaryKind
   Vec3<F> pad, pad_too;
   WAVECOMB_FIELDS(absorption, scattering, anisotropy, ior, priority, kind, pad, pad_too)
 };
-static_assert(sizeof(InteriorMedium<float>) == 64);
+static_assert(sizeof(MeshMedium<float>) == 64);
 
 /// Device view of the media of all materials.
-struct InteriorView {
+struct MeshMediaView {
   /// Media by material. Null if no material needs a medium stack; absorption is then applied at the
   /// hit where a path leaves the solid (path/steps/interact.h).
-  const InteriorMedium<float>* media = nullptr;
+  const MeshMedium<float>* media = nullptr;
   uint32_t event_material = 0;  ///< material that shades collisions in media with clear boundaries
 
   bool is_bound(uint32_t material) const {
-    return media && media[material].kind != static_cast<uint32_t>(InteriorKind::kNone);
+    return media && media[material].kind != static_cast<uint32_t>(BoundaryKind::kNone);
   }
 };
 
 /// Returns whether a material is a solid that transmits light, possibly by a value graph, and
 /// absorbs part of it inside with constant coefficients.
-bool absorbs_inside(const Material& material, const GraphSet& graphs);
+bool is_absorbing_solid(const Material& material, const GraphSet& graphs);
 /// Returns whether a material is a solid that transmits light and whose absorption comes from a
 /// value graph. The graph is evaluated where a path leaves the glass, so the coefficients of a
 /// segment depend on its direction.
@@ -59,13 +59,13 @@ bool absorbs_by_graph(const Material& material, const GraphSet& graphs);
 /// alone is enough. Set it for scenes with volumes, in which a path scattered by a volume inside
 /// the solid has covered part of its length before the collision, and for scenes with objects
 /// inside absorbing glass (medium/description/glass_contents.h).
-bool asks_for_interiors(const Material& material, const GraphSet& graphs, bool absorbing);
+bool needs_medium_stack(const Material& material, const GraphSet& graphs, bool absorbing);
 /// Appends the material that shades collisions inside meshes, if a material needs a medium stack.
 /// Returns its index, or kInheritMaterial.
 uint32_t add_inside_material(std::vector<Material>& materials, const GraphSet& graphs,
                              bool absorbing);
 /// Makes the media of all materials; empty if no material needs a medium stack.
-std::vector<InteriorMedium<float>> make_interiors(std::span<const Material> materials,
-                                                  const GraphSet& graphs, bool absorbing);
+std::vector<MeshMedium<float>> make_mesh_media(std::span<const Material> materials,
+                                               const GraphSet& graphs, bool absorbing);
 
 }  // namespace wavecomb

@@ -34,33 +34,36 @@ template <typename F>
 
 /// Returns the volume events that stopped the flights of a packet.
 template <typename F>
-VolumeSeen<F> volume_seen(const Wave& wave, const WaveContext& context, const UInt<F>& slot,
-                          const Flight<F>& flight) {
+VolumeHit<F> volume_hit(const Wave& wave, const WaveContext& context, const UInt<F>& slot,
+                        const Flight<F>& flight) {
   using U = UInt<F>;
   const SceneView& scene = context.scene;
-  VolumeSeen<F> seen{flight.material - scene.volumes.first_material, U(0u), flight.material,
-                     Mask<F>(false)};
-  if (!context.knows_inside()) return seen;
-  seen.in_mesh = flight.stopped & Mask<F>(flight.material == U(scene.interiors.event_material));
+  VolumeHit<F> volume_event{flight.material - scene.volumes.first_material, U(0u), flight.material,
+                            Mask<F>(false)};
+  if (!context.has_medium_stack()) return volume_event;
+  volume_event.in_mesh =
+      flight.stopped & Mask<F>(flight.material == U(scene.nested_media.event_material));
   const auto of_path = [&](auto member) {
-    return gather_field<F>(wave.pool.inside, member, slot, seen.in_mesh);
+    return gather_field<F>(wave.pool.medium_stacks, member, slot, volume_event.in_mesh);
   };
-  seen.place = of_path(&InsideRow<float>::place);
-  seen.material = select(Mask<U>(seen.in_mesh), of_path(&InsideRow<float>::medium), seen.material);
-  return seen;
+  volume_event.object = of_path(&MediumStackRow<float>::object);
+  volume_event.material = select(Mask<U>(volume_event.in_mesh),
+                                 of_path(&MediumStackRow<float>::medium), volume_event.material);
+  return volume_event;
 }
 
 /// Records for AOVs how paths passed through volumes and media. `throughput` is the throughput
 /// after the flight.
 template <typename F>
-void note_way(Wave& wave, uint32_t depth, const UInt<F>& slot, const Flight<F>& flight,
-              const Color<F>& throughput, const Mask<F>& active) {
+void record_segment(Wave& wave, uint32_t depth, const UInt<F>& slot, const Flight<F>& flight,
+                    const Color<F>& throughput, const Mask<F>& active) {
   if (depth == 0 && wave.aovs.wants_transmittance())
-    wave.aovs.pass<F>(slot, select<F>(flight.stopped | flight.walked, Color<F>(F(0.f)), throughput),
-                      active);
-  const Mask<F> walked = active & flight.walked;
-  if (wave.aovs.expressions() && any(walked))
-    wave.aovs.expressions().template walk<F>(slot, walked);
+    wave.aovs.pass<F>(
+        slot, select<F>(flight.stopped | flight.has_scattered, Color<F>(F(0.f)), throughput),
+        active);
+  const Mask<F> has_scattered = active & flight.has_scattered;
+  if (wave.aovs.expressions() && any(has_scattered))
+    wave.aovs.expressions().template walk<F>(slot, has_scattered);
 }
 
 /// Packet of rays of a wave, from index `i` of the queue on, and what they hit.
@@ -97,8 +100,8 @@ struct RayPacket {
 template <typename F, typename Media>
 WAVECOMB_INLINE Flight<F> fly_packet(Wave& wave, const ShadeSettings& settings, uint32_t depth,
                                      const Media& media, RayPacket<F>& p) {
-  if constexpr (Media::kShines)
-    if (media.shines()) {
+  if constexpr (Media::kHasEmission)
+    if (media.has_emission()) {
       const float* const times = wave.times.floats(0);
       const F when = times ? load<F>(times + p.i) : F(0.f);
       const Color<F> c =
@@ -108,20 +111,20 @@ WAVECOMB_INLINE Flight<F> fly_packet(Wave& wave, const ShadeSettings& settings, 
                    clamp_limit(settings, depth));
       const Mask<F> bright = p.active & not_(is_black(c));
       add_radiance<F>(wave.pool.radiance, p.slot, c, bright);
-      if (wave.aovs.wants_lights()) wave.aovs.add_glow<F>(p.slot, c, bright);
+      if (wave.aovs.wants_lights()) wave.aovs.add_volume_emission<F>(p.slot, c, bright);
     }
   Flight<F> flight;
   if constexpr (Media::kStreams)
     flight = media.template flight<F>(wave, p.i, p.path.throughput);
   else
-    flight = media.template fly<F>({settings.sampler, p.path.key, depth, p.o, p.d, p.t},
-                                   p.path.throughput, p.active);
+    flight = media.template sample_flight<F>({settings.sampler, p.path.key, depth, p.o, p.d, p.t},
+                                             p.path.throughput, p.active);
   flight.stopped = p.active & flight.stopped;
   p.t = select(flight.stopped, flight.t, p.t);
   p.path.throughput = p.path.throughput * flight.weight;
   store_row<PathRow, F>(wave.pool.paths, p.slot, p.path, p.active);
   const Mask<F> through = not_(flight.stopped);
-  note_way<F>(wave, depth, p.slot, flight, p.path.throughput, p.active);
+  record_segment<F>(wave, depth, p.slot, flight, p.path.throughput, p.active);
   p.missed = p.missed & through;
   p.shape = p.shape & through;
   p.surface = p.surface & through;
@@ -155,7 +158,7 @@ WAVECOMB_INLINE void add_ended(Wave& wave, const WaveContext& context,
   const SceneView& scene = context.scene;
   const uint32_t* const geom = wave.hits.geom + p.i;
   Color<F> c(F(0.f));
-  const bool is_lit = any(p.missed) && settings.sees_sky(depth);
+  const bool is_lit = any(p.missed) && settings.adds_environment(depth);
   if (is_lit)
     c = select<F>(p.missed, environment_emission<F>(scene, settings, depth, p.state, p.missed), c);
   if (any(p.shape)) {
@@ -220,8 +223,8 @@ WAVECOMB_INLINE UInt<F> surface_material(const Wave& wave, const SceneView& scen
   using U = UInt<F>;
   const U material = hit_material<F>(scene, ids.inherited, ids.mesh, ids.prim, p.surface);
   if constexpr (Media::kStreams)
-    if (media.has_walks())
-      return select(Mask<U>(media.template came_out<F>(wave, p.i)), U(media.exit_material()),
+    if (media.has_subsurface())
+      return select(Mask<U>(media.template left_body<F>(wave, p.i)), U(media.exit_material()),
                     material);
   return material;
 }
@@ -254,7 +257,7 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
   const SceneView& scene = context.scene;
   const bool cost_aware = settings.cost_aware && depth >= settings.roulette_depth;
   const bool is_first = !kFromLights && depth == 0;
-  const bool notes_hits = is_first && wave.aovs.wants_hits();
+  const bool records_hits = is_first && wave.aovs.wants_hits();
   queue.clear();
   size_t n = 0;
   for (size_t i = 0; i < wave.rays.size; i += kWidth<F>) {
@@ -271,8 +274,8 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     if (is_first && context.joins_light()) [[unlikely]]
       begin_ratios<F>(wave, context, p.slot, p.o, p.d, p.t, p.surface);
     if (is_first && scene.visibility) [[unlikely]]
-      p.surface = p.surface & not_(held_out<F>(scene, p.inst, load<U>(hits.geom + i), p.surface));
-    if (notes_hits) note_shapes<F>(wave, context, p);
+      p.surface = p.surface & not_(is_holdout<F>(scene, p.inst, load<U>(hits.geom + i), p.surface));
+    if (records_hits) note_shapes<F>(wave, context, p);
     const auto recorded = [&] {
       if constexpr (Media::kAny)
         return Mask<F>(p.surface | flight.stopped);
@@ -281,9 +284,9 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     };
     if (is_first && wave.aovs.wants_alpha()) wave.aovs.cover<F>(p.slot, p.shape | recorded());
     if constexpr (Media::kAny)
-      if (notes_hits)
+      if (records_hits)
         wave.aovs.hit_volume<F>(*context.camera, p.slot, p.end(), shutter_time<F>(wave, context, p),
-                                volume_seen<F>(wave, context, p.slot, flight), flight.stopped);
+                                volume_hit<F>(wave, context, p.slot, flight), flight.stopped);
     if (none(recorded())) continue;
 
     const HitIds<F> ids(scene, hits, p);
@@ -291,7 +294,7 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     if constexpr (Media::kAny)
       material = select(Mask<U>(flight.stopped), flight.material, material);
     const U program = gather<U>(scene.material_variant, material, Mask<U>(recorded()));
-    if (notes_hits) note_surfaces<F>(wave, context, p, ids, material);
+    if (records_hits) note_surfaces<F>(wave, context, p, ids, material);
     if (cost_aware) {
       const F q =
           cost_aware_survival<F>(scene, *context.roulette_costs, material, p.state, p.surface);

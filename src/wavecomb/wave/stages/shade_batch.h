@@ -15,7 +15,7 @@ WAVECOMB_INLINE VertexResult<F> shade_one(const Vertex<F, kFeatures>& v) {
   if constexpr (kIsScalar<F>)
     return shade_vertex<Bsdf, F>(v);
   else
-    return take_steps<Bsdf, F>(v);
+    return vertex_steps<Bsdf, F>(v);
 }
 
 /// Loads the state of the paths of a packet. `joins` is whether MIS weights include light paths.
@@ -30,13 +30,14 @@ WAVECOMB_INLINE PathState<F> load_state(const PathPool& pool, const WaveContext&
     state.link = gather_field<F>(pool.cold, &PathColdRow<float>::link, slot, active);
   if (V::has(kMeshLights) && context.scene.mesh_lights && pool.diffuse && depth > 0) [[unlikely]]
     state.diffuse = load_row<RadianceRow, F>(pool.diffuse, slot, active).sum;
-  if (context.weighs_pixels()) [[unlikely]]
+  if (context.uses_pixel_importance()) [[unlikely]]
     state.importance = gather_field<F>(pool.cold, &PathColdRow<float>::importance, slot, active);
   if (joins) [[unlikely]]
     unpack_ratio<F>(gather<F>(pool.ratio, slot, active), state);
-  if (V::has(kInside) && pool.inside) [[unlikely]] {
-    state.outer = gather_field<F>(pool.inside, &InsideRow<float>::outer, slot, active);
-    state.medium = gather_field<F>(pool.inside, &InsideRow<float>::medium, slot, active);
+  if (V::has(kNestedMedia) && pool.medium_stacks) [[unlikely]] {
+    state.outer = gather_field<F>(pool.medium_stacks, &MediumStackRow<float>::outer, slot, active);
+    state.medium =
+        gather_field<F>(pool.medium_stacks, &MediumStackRow<float>::medium, slot, active);
   }
   return state;
 }
@@ -50,35 +51,35 @@ WAVECOMB_INLINE UInt<F> add_emitted(Wave& wave, const VertexResult<F>& v, const 
   using V = Vertex<F, kFeatures>;
   const Mask<F> emits = active & not_(is_black(v.emitted));
   if (any(emits)) add_radiance<F>(wave.pool.radiance, slot, v.emitted, emits);
-  UInt<F> lit_by(0u);
-  if (V::has(kNotes) && aovs.wants_lights) {
+  UInt<F> light_id(0u);
+  if (V::has(kRecordsAovs) && aovs.wants_lights) {
     wave.aovs.template add_light<F>(slot, aovs.emitter, v.emitted, emits);
-    lit_by = wave.aovs.template group_of<F>(aovs.lit_by, v.has_shadow);
+    light_id = wave.aovs.template group_of<F>(aovs.light_id, v.has_shadow);
     if (aovs.wants_events)
       wave.aovs.expressions().template scatter<F>(depth, slot, key, aovs, v.has_shadow,
                                                   Mask<F>(v.alive | v.has_shadow));
   }
-  return lit_by;
+  return light_id;
 }
 
-/// Stores the shadow rays and the next path segments of a packet. `lit_by` is the light group of
+/// Stores the shadow rays and the next path segments of a packet. `light_id` is the light group of
 /// the light samples.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE void store_rays(const PathPool& pool, const VertexResult<F>& v,
                                 const SampleKey<F>& key, const UInt<F>& slot,
-                                const UInt<F>& lit_by) {
+                                const UInt<F>& light_id) {
   using V = Vertex<F, kFeatures>;
   if (any(v.has_shadow))
-    store_row<ShadowRow, F>(pool.shadows, slot,
-                            {v.shadow_o, v.shadow_d, v.shadow_tfar, v.direct, lit_by, v.shadow_set},
-                            v.has_shadow);
+    store_row<ShadowRow, F>(
+        pool.shadows, slot,
+        {v.shadow_o, v.shadow_d, v.shadow_tfar, v.direct, light_id, v.shadow_set}, v.has_shadow);
   if constexpr (V::has(kMeshLights)) {
-    if (pool.shades) [[unlikely]]
-      store_row<RadianceRow, F>(pool.shades, slot, {v.shade}, v.has_shadow);
+    if (pool.shadow_tints) [[unlikely]]
+      store_row<RadianceRow, F>(pool.shadow_tints, slot, {v.shadow_tint}, v.has_shadow);
     if (pool.diffuse) [[unlikely]]
       store_row<RadianceRow, F>(pool.diffuse, slot, {v.next.diffuse}, v.alive);
   }
-  constexpr bool kMayEnter = V::has(kBelow) && Bsdf::kWalks;
+  constexpr bool kMayEnter = V::has(kSubsurface) && Bsdf::kHasSubsurface;
   if (any(v.alive))
     store_row<PathRow, F>(pool.paths, slot, path_row<kMayEnter, F>(v.next, key), v.alive);
 }
@@ -94,8 +95,8 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
   const PathPool& pool = wave.pool;
   VertexAovs<F> aovs = wave.aovs.template wanted<F>(depth);
   using V = Vertex<F, kFeatures>;
-  const bool wants_aovs = V::has(kNotes) && wave.aovs.wants_vertex(depth);
-  const bool is_watched = wants_aovs || (V::has(kNotes) && wave.history);
+  const bool wants_aovs = V::has(kRecordsAovs) && wave.aovs.wants_vertex(depth);
+  const bool is_watched = wants_aovs || (V::has(kRecordsAovs) && wave.history);
   const bool joins = V::has(kJoined) && settings.joins_light;
   const bool links = V::has(kLinks) && context.links();
   for (size_t i = begin; i < end; i += kWidth<F>) {
@@ -114,7 +115,7 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
     const bool connects = joins && wave.light_vertices;
     if (connects) [[unlikely]]
       offer = offer_for<F>(wave.light_vertices, slot, depth, settings.max_depth, active);
-    VisibleOffer<F> visible;
+    MergePointOffer<F> visible;
     const bool merges = joins && wave.visible;
     const V vertex{context.scene,
                    settings,
@@ -131,16 +132,16 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
                    connects ? &offer : nullptr,
                    merges ? &visible : nullptr};
     const VertexResult<F> v = shade_one<Bsdf, F>(vertex);
-    if (merges && any(visible.seen)) [[unlikely]]
-      store_row<VisiblePoint, F>(wave.visible.rows, slot, visible.row, visible.seen);
+    if (merges && any(visible.stored)) [[unlikely]]
+      store_row<MergePoint, F>(wave.visible.rows, slot, visible.row, visible.stored);
     if (connects) [[unlikely]] {
       store_row<ConnectionRow, F>(wave.light_vertices.connections, slot, offer.row, active);
       if (aovs.wants_events)
         wave.light_aovs.offer<F>(slot, wave.aovs.expressions().template states<F>(slot, active),
-                                 offer.note, active);
+                                 offer.scattering, active);
     }
 
-    const U lit_by = add_emitted<F, kFeatures>(wave, v, path.key, slot, depth, aovs, active);
+    const U light_id = add_emitted<F, kFeatures>(wave, v, path.key, slot, depth, aovs, active);
     if (is_watched) {
       if (wants_aovs) wave.aovs.template vertex<F>(depth, slot, aovs, state, active);
       if (wave.history)
@@ -148,12 +149,13 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
                                         {.path = state, .t = t, .material = material, .result = v},
                                         pool.radiance, active);
     }
-    packet.note(queue, v.alive, v.next.dir, v.has_shadow, v.shadow_d);
-    store_rays<Bsdf, F, kFeatures>(pool, v, path.key, slot, lit_by);
+    packet.store(queue, v.alive, v.next.dir, v.has_shadow, v.shadow_d);
+    store_rays<Bsdf, F, kFeatures>(pool, v, path.key, slot, light_id);
     if (joins) [[unlikely]]
       scatter<F>(pool.ratio, pack_ratio<F>(v.next), slot, v.alive);
-    if (V::has(kInside) && pool.inside) [[unlikely]]
-      scatter_field<F>(pool.inside, &InsideRow<float>::crossed, slot, v.crossed, active);
+    if (V::has(kNestedMedia) && pool.medium_stacks) [[unlikely]]
+      scatter_field<F>(pool.medium_stacks, &MediumStackRow<float>::crossed, slot, v.crossed,
+                       active);
     if (links) scatter_field<F>(pool.cold, &PathColdRow<float>::link, slot, v.next.link, v.alive);
     ++wave.counts.packets;
     wave.counts.packet_lanes += kWidth<F>;
