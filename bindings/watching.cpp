@@ -58,7 +58,7 @@ nb::dict state_dict(const Snapshot& s) {
   d["pass.target"] = s.pass.target;
   d["pass.light_target"] = view(&s.pass.light_target, sizeof(uint32_t));
   d["pass.active"] = view(s.pass.active.data(), s.pass.active.size());
-  const auto& counts = s.pass.allotment.counts;
+  const auto& counts = s.pass.allocation.counts;
   d["pass.counts"] = view(counts.data(), counts.size() * sizeof(uint32_t));
   for (const Film::Block& block : s.film.blocks())
     d[("film." + block.name).c_str()] = view(block.bytes.data(), block.bytes.size());
@@ -188,9 +188,9 @@ std::function<std::vector<std::byte>(Film&, PassState&)> resumed_from(const nb::
     if (state.contains("pass.counts")) {
       const auto counts = nb::cast<Bytes>(state["pass.counts"]);
       if (counts.size() != 0) bytes_of(state, "pass.counts", film.pixel_count() * sizeof(uint32_t));
-      pass.allotment.counts.resize(counts.size() / sizeof(uint32_t));
+      pass.allocation.counts.resize(counts.size() / sizeof(uint32_t));
       if (counts.size() != 0)
-        std::memcpy(pass.allotment.counts.data(), counts.data(), counts.size());
+        std::memcpy(pass.allocation.counts.data(), counts.data(), counts.size());
     }
     if (!state.contains("learned.field")) return std::vector<std::byte>();
     const auto learned = nb::cast<Bytes>(state["learned.field"]);

@@ -130,7 +130,7 @@ RenderStatistics RenderRun::statistics() const {
   s.passes = status.passes;
   s.resumed_samples = status.resumed_samples;
   s.error = status.error;
-  s.allotment = loop_.allotment();
+  s.allotment = loop_.allocation();
   s.guiding = pilots_.training->statistics;
   if (const LightAiming* aiming = pilots_.aiming.get(); aiming && aiming->paths > 0)
     s.light_aiming = {aiming->aim.count, aiming->paths, aiming->seconds};

@@ -94,7 +94,7 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
                static_cast<uint32_t>(geometry_->volume_records.size()),
                geometry_->first_volume_material,
                std::ranges::any_of(geometry_->volume_records, &VolumeRecord::emits)};
-  v.walks = {materials_->walks.empty() ? nullptr : materials_->walks.data(),
+  v.subsurface = {materials_->walks.empty() ? nullptr : materials_->walks.data(),
              geometry_->exit_material};
   v.nested_media = {materials_->nested_media.empty() ? nullptr : materials_->nested_media.data(),
                     materials_->event_material};

@@ -124,7 +124,7 @@ SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const 
       openpbr.push_back(make_openpbr_record(m.openpbr));
       const SubsurfaceKind walk =
           exit_material != kInheritMaterial ? subsurface_kind(m, *graphs) : SubsurfaceKind::kNone;
-      openpbr.back().walks = static_cast<float>(walk);
+      openpbr.back().subsurface = static_cast<float>(walk);
       if (walk != SubsurfaceKind::kNone) {
         walks.resize(materials.size());
         walks[records.size() - 1] = make_subsurface_medium(m, walk);

@@ -58,7 +58,7 @@ void add_up(const PassRunner& runner, const WaveContext& context, const Scene& s
     workers.push_back(worker);
   }
   s.lanes = runner.integrator().lanes();
-  s.sharing = runner.sharing();
+  s.sharing = runner.work_distribution();
   for (size_t i = 0; i < kPhaseCount; ++i)
     s.phases_s.emplace_back(kPhaseNames[i], 1e-9 * static_cast<double>(clock.ns()[i]));
   s.samples = counts.samples;
