@@ -27,7 +27,7 @@ std::vector<MaterialStatistics> material_statistics(const std::vector<WorkerView
     material.name = scene.materials()[m].name;
     material.program = kProgramNames[static_cast<size_t>(scene.materials()[m].program)];
     for (const WorkerView& worker : workers)
-      if (worker.costs) material.records += worker.costs->seen()[m];
+      if (worker.costs) material.records += worker.costs->record_counts()[m];
     material.timed_records = costs.total_timed()[m];
     if (material.timed_records > 0)
       material.measured_ns = costs.total_ns()[m] / static_cast<double>(material.timed_records);
