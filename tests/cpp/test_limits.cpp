@@ -33,7 +33,8 @@ struct Limit {
 };
 
 TEST(Limits, scene_counts_end_where_words_do) {
-  // 32-bit words of a record times the last index stay below 2^31, those of rows below 2^32.
+  // The offset of the last record in 32-bit words stays below 2^31, that of the last row below
+  // 2^32.
   const Limit limits[] = {
       {&SceneCounts::meshes, 134217728, "134,217,729 meshes"},
       {&SceneCounts::materials, (1ull << 31) / (kInputCount * 16), "materials"},

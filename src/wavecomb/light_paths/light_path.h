@@ -134,8 +134,8 @@ inline PathState<F> light_path_state(const CameraSetup& camera, const LightPathR
 template <typename F>
 struct LightVertexResult {
   VertexResult<F> v;
-  F x, y;           ///< film position in pixels, if there is a shadow ray
-  Vec3<F> p;        ///< position of the vertex
+  F x, y;                ///< film position in pixels, if there is a shadow ray
+  Vec3<F> p;             ///< position of the vertex
   Mask<F> is_candidate;  ///< whether vertices of camera paths may connect to it
 };
 

@@ -95,7 +95,7 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
                geometry_->first_volume_material,
                std::ranges::any_of(geometry_->volume_records, &VolumeRecord::emits)};
   v.subsurface = {materials_->walks.empty() ? nullptr : materials_->walks.data(),
-             geometry_->exit_material};
+                  geometry_->exit_material};
   v.nested_media = {materials_->nested_media.empty() ? nullptr : materials_->nested_media.data(),
                     materials_->event_material};
   v.has_motion = geometry_->moves() || v.lights.motions;

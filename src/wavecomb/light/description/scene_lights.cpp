@@ -149,7 +149,7 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
                       .mesh_lights = light_instances,
                       .tree_time = TreeTime::kWhenChosen,
                       .filters = geometry.filters});
-  // So far entries count from the first triangle and the first mesh light; make them light ids.
+  // Entries are still relative to the first triangle and the first mesh light; make them light ids.
   for (std::vector<uint32_t>* table : {&emissive, &mesh_lights})
     for (uint32_t& entry : *table)
       if (entry != kNoLight) entry += set.first_triangle();

@@ -156,7 +156,7 @@ inline KindEmission<F> emit_cylinder(const EmissionQuery<F>& q) {
 
 namespace wavecomb {
 
-/// Kind of cylinder lights in WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h).
+/// Class of cylinder lights, an entry of WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h).
 struct CylinderKind : FiniteKind {
   static LightKindInfo describe();
   template <typename F>

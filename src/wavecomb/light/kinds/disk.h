@@ -41,7 +41,7 @@ inline KindEmission<F> emit_disk(const EmissionQuery<F>& q) {
 
 namespace wavecomb {
 
-/// Kind of disk lights in WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h).
+/// Class of disk lights, an entry of WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h).
 struct DiskKind : FlatKind {
   static LightKindInfo describe();
   template <typename F>

@@ -58,7 +58,7 @@ inline KindEmission<F> emit_distant(const EmissionQuery<F>& q) {
 
 namespace wavecomb {
 
-/// Kind of distant lights in WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h).
+/// Class of distant lights, an entry of WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h).
 struct DistantKind : InfiniteKind {
   static LightKindInfo describe();
   template <typename F>

@@ -205,7 +205,7 @@ inline F dome_emission_density(const LightHitQuery<F>& m) {
 
 namespace wavecomb {
 
-/// Kind of dome lights in WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h).
+/// Class of dome lights, an entry of WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h).
 struct DomeKind : InfiniteKind {
   static LightKindInfo describe();
   template <typename F>

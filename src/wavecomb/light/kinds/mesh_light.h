@@ -86,8 +86,8 @@ inline Color<F> mesh_light_radiance(const LightView& view, const UInt<F>& record
   return select<F>(uses_light, radiance, emission);
 }
 
-/// Kind of mesh lights in WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h). Records of mesh lights are
-/// never selected themselves; their triangles have separate rows.
+/// Class of mesh lights, an entry of WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h). Records of mesh
+/// lights are never selected themselves; their triangles have separate rows.
 struct TriangleKind : FlatKind {
   static LightKindInfo describe();
   template <typename F>

@@ -309,7 +309,7 @@ inline F rect_emission_density(const LightHitQuery<F>& m) {
 
 namespace wavecomb {
 
-/// Kind of rect lights in WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h).
+/// Class of rect lights, an entry of WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h).
 struct RectKind : FlatKind {
   static LightKindInfo describe();
   template <typename F>

@@ -93,7 +93,7 @@ inline F sphere_emission_density(const LightReader<F>& light) {
 
 namespace wavecomb {
 
-/// Kind of sphere lights in WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h).
+/// Class of sphere lights, an entry of WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h).
 struct SphereKind : FiniteKind {
   static LightKindInfo describe();
   template <typename F>

@@ -60,8 +60,10 @@ struct MediumSegment {
 /// Returns the distribution for a segment. The sample values `r` select the light and the point on
 /// it.
 template <typename F>
-inline EquiangularDistribution<F> equiangular_distribution(const LightView& lights, const MediumSegment<F>& segment,
-                           const Sample4<F>& r, const Mask<F>& active) {
+inline EquiangularDistribution<F> equiangular_distribution(const LightView& lights,
+                                                           const MediumSegment<F>& segment,
+                                                           const Sample4<F>& r,
+                                                           const Mask<F>& active) {
   const auto& [o, d, begin, end, extinction] = segment;
   EquiangularDistribution<F> range;
   const Mask<F> some = active & (begin < end) & (end < F(kFarAway));
@@ -93,8 +95,9 @@ struct OutcomeDensity {
   F exact, sampled;
 };
 template <typename F>
-inline OutcomeDensity<F> outcome_density(const EquiangularDistribution<F>& distribution, const F& extinction, const F& x,
-                                 const F& at, const Mask<F>& stopped) {
+inline OutcomeDensity<F> outcome_density(const EquiangularDistribution<F>& distribution,
+                                         const F& extinction, const F& x, const F& at,
+                                         const Mask<F>& stopped) {
   const F through = exp(F(-extinction * x));
   const F exact = select(stopped, F(through * extinction), through);
   const F other = select(stopped, distribution.density(at), F(1.f - distribution.before(at)));

@@ -29,7 +29,8 @@ struct SegmentRandom {
   SegmentRandom(SamplerKind sampler, const SampleKey<F>& key, uint32_t depth, VertexSet set)
       : r(sample_4d<F>(sampler, key, vertex_set(set, depth))),
         seed(float_bits<F>(r.x) ^ hash_u32<UInt<F>>(key.pixel_hash, key.sample)) {}
-  SegmentRandom(const MediumQuery<F>& p, VertexSet set) : SegmentRandom(p.sampler, p.key, p.depth, set) {}
+  SegmentRandom(const MediumQuery<F>& p, VertexSet set)
+      : SegmentRandom(p.sampler, p.key, p.depth, set) {}
   /// Returns a copy with independent random numbers.
   SegmentRandom branch(uint32_t number) const {
     SegmentRandom other = *this;
@@ -71,8 +72,8 @@ class FlightVisitor {
 
  public:
   /// `times` is RaySegments::times.
-  FlightVisitor(const VolumeRecord& v, uint32_t material, const Flights& flights, FlightResults results,
-                const float* times)
+  FlightVisitor(const VolumeRecord& v, uint32_t material, const Flights& flights,
+                FlightResults results, const float* times)
       : v_(v), seconds_(v, times), material_(material), flights_(flights), results_(results) {}
 
   void start(const U& random, const Mask<F>& lanes) {
@@ -112,8 +113,8 @@ class FlightVisitor {
     if (results_ == FlightResults::kStops || v_.is_grey) return;
     const F* const ratio[3] = {&ratio_.x, &ratio_.y, &ratio_.z};
     for (int k = 0; k < 3; ++k)
-      scatter<F>(flights_.ratio[k], F(gather<F>(flights_.ratio[k], random, lanes) * *ratio[k]), random,
-                 lanes);
+      scatter<F>(flights_.ratio[k], F(gather<F>(flights_.ratio[k], random, lanes) * *ratio[k]),
+                 random, lanes);
   }
 
  private:
@@ -133,8 +134,8 @@ namespace detail {
 
 /// Samples free flights through one volume.
 template <typename F>
-inline void sample_flights_in(const VolumeView& volumes, uint32_t i, const RaySegments& segments, const Flights& flights,
-                   FlightResults results, VolumeCounts& counts) {
+inline void sample_flights_in(const VolumeView& volumes, uint32_t i, const RaySegments& segments,
+                              const Flights& flights, FlightResults results, VolumeCounts& counts) {
   const VolumeRecord& v = volumes.volumes[i];
   FlightVisitor<F> visitor(v, volumes.first_material + i, flights, results, segments.times);
   each_collision<F>(extinction_cells(v), v.max_extinction, i, segments, counts, visitor);
@@ -147,8 +148,8 @@ inline bool are_grey(const VolumeView& volumes) {
   return std::all_of(volumes.volumes, volumes.volumes + volumes.count,
                      [](const VolumeRecord& v) { return v.is_grey; });
 }
-/// Returns whether flights have weights other than 1. `distance_lights` holds the lights that guide distances
-/// in homogeneous volumes, or is null.
+/// Returns whether flights have weights other than 1. `distance_lights` holds the lights that guide
+/// distances in homogeneous volumes, or is null.
 inline bool has_flight_weights(const VolumeView& volumes, const LightView* distance_lights) {
   return distance_lights || !are_grey(volumes);
 }
@@ -156,14 +157,16 @@ inline bool has_flight_weights(const VolumeView& volumes, const LightView* dista
 /// Samples only where flights stop, in all volumes. `scratch` receives the original lengths of the
 /// segments, which are `segments.most` and `flights.t`.
 template <typename F>
-inline void sample_stops(const VolumeView& volumes, const RaySegments& segments, const Flights& flights,
-                         float* scratch, const LightView* distance_lights, VolumeCounts& counts) {
+inline void sample_stops(const VolumeView& volumes, const RaySegments& segments,
+                         const Flights& flights, float* scratch, const LightView* distance_lights,
+                         VolumeCounts& counts) {
   std::copy_n(flights.t, segments.count, scratch);
   RaySegments original = segments;
   original.most = scratch;
   for (uint32_t i = 0; i < volumes.count; ++i)
     if (distance_lights && supports_equiangular(volumes.volumes[i]))
-      sample_homogeneous_flights<F>(volumes, i, original, flights, FlightResults::kStops, *distance_lights, counts);
+      sample_homogeneous_flights<F>(volumes, i, original, flights, FlightResults::kStops,
+                                    *distance_lights, counts);
     else
       detail::sample_flights_in<F>(volumes, i, segments, flights, FlightResults::kStops, counts);
 }
@@ -172,14 +175,16 @@ inline void sample_stops(const VolumeView& volumes, const RaySegments& segments,
 /// than the final stop, so they are repeated up to it with the same random numbers. A flight that
 /// its own volume stopped keeps its original length and repeats exactly.
 template <typename F>
-inline void compute_flight_ratios(const VolumeView& volumes, const RaySegments& segments, const Flights& flights,
-                          float* scratch, const LightView* distance_lights, VolumeCounts& counts) {
+inline void compute_flight_ratios(const VolumeView& volumes, const RaySegments& segments,
+                                  const Flights& flights, float* scratch,
+                                  const LightView* distance_lights, VolumeCounts& counts) {
   RaySegments original = segments, once_more = segments;
   original.most = scratch;
   once_more.most = scratch + segments.count;
   for (uint32_t i = 0; i < volumes.count; ++i) {
     if (distance_lights && supports_equiangular(volumes.volumes[i])) {
-      sample_homogeneous_flights<F>(volumes, i, original, flights, FlightResults::kRatios, *distance_lights, counts);
+      sample_homogeneous_flights<F>(volumes, i, original, flights, FlightResults::kRatios,
+                                    *distance_lights, counts);
       continue;
     }
     if (volumes.volumes[i].is_grey) continue;
@@ -192,11 +197,12 @@ inline void compute_flight_ratios(const VolumeView& volumes, const RaySegments& 
   }
 }
 
-/// Runs sample_stops() and compute_flight_ratios(). `segments.most` is `flights.t`, and `scratch` has room for
-/// two numbers per segment.
+/// Runs sample_stops() and compute_flight_ratios(). `segments.most` is `flights.t`, and `scratch`
+/// has room for two numbers per segment.
 template <typename F>
-inline void sample_flights(const VolumeView& volumes, const RaySegments& segments, const Flights& flights,
-                        float* scratch, const LightView* distance_lights, VolumeCounts& counts) {
+inline void sample_flights(const VolumeView& volumes, const RaySegments& segments,
+                           const Flights& flights, float* scratch, const LightView* distance_lights,
+                           VolumeCounts& counts) {
   if (distance_lights || (volumes.count > 1 && !are_grey(volumes))) {
     sample_stops<F>(volumes, segments, flights, scratch, distance_lights, counts);
     compute_flight_ratios<F>(volumes, segments, flights, scratch, distance_lights, counts);
@@ -209,8 +215,8 @@ inline void sample_flights(const VolumeView& volumes, const RaySegments& segment
 /// Samples one flight in each lane.
 template <typename F>
 inline Flight<F> sample_flights(const VolumeView& volumes, const MediumQuery<F>& p,
-                             const Color<F>& throughput, const Mask<F>& active,
-                             const LightView* distance_lights, VolumeCounts& counts) {
+                                const Color<F>& throughput, const Mask<F>& active,
+                                const LightView* distance_lights, VolumeCounts& counts) {
   using U = UInt<F>;
   constexpr size_t kLanes = kWidth<F>;
   const SegmentRandom<F> random(p, VertexSet::kFlight);
@@ -259,9 +265,11 @@ class TransmittanceVisitor {
   Mask<F> collide(const Mask<F>& lanes, const F& /*x*/, const Vec3<F>& p, const F& majorant,
                   CollisionSequence<F>& numbers) {
     const F density = density_at<F>(v_, p, seconds_(), lanes) / select(lanes, majorant, F(1.f));
-    const auto transmitted = [&](float extinction) { return max(F(1.f - density * extinction), F(0.f)); };
-    Color<F> now =
-        product_ * Color<F>(transmitted(v_.extinction[0]), transmitted(v_.extinction[1]), transmitted(v_.extinction[2]));
+    const auto transmitted = [&](float extinction) {
+      return max(F(1.f - density * extinction), F(0.f));
+    };
+    Color<F> now = product_ * Color<F>(transmitted(v_.extinction[0]), transmitted(v_.extinction[1]),
+                                       transmitted(v_.extinction[2]));
     const F q = min(F(max_component(now) * (1.f / kLittle)), F(1.f));
     const Mask<F> ends = lanes & not_(numbers.next(lanes) < q);
     now = now * F(F(1.f) / select(q > 0.f, q, F(1.f)));
@@ -304,8 +312,8 @@ template <typename F>
 inline Color<F> transmittance_through(const VolumeView& volumes, const SegmentRandom<F>& random,
                                       const RaySegment<F>& segment, const Mask<F>& active,
                                       VolumeCounts& counts) {
-  const PacketSegments<F> packet(segment.o, segment.d, segment.length, random.seed, random.r.z, segment.time,
-                             active);
+  const PacketSegments<F> packet(segment.o, segment.d, segment.length, random.seed, random.r.z,
+                                 segment.time, active);
   alignas(64) float product[3][kWidth<F>];
   for (auto& one : product) store(one, F(1.f));
   float* const columns[3] = {product[0], product[1], product[2]};

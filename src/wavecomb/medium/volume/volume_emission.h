@@ -10,12 +10,13 @@ namespace wavecomb {
 /// is sampled in proportion to the grid's largest value in each cell, and the estimate includes the
 /// transmittance of all volumes up to the point.
 template <typename F>
-inline Color<F> emission_of(const VolumeView& volumes, uint32_t index, const SegmentRandom<F>& random,
-                            const RaySegment<F>& segment, const Mask<F>& active,
-                            VolumeCounts& counts) {
+inline Color<F> emission_of(const VolumeView& volumes, uint32_t index,
+                            const SegmentRandom<F>& random, const RaySegment<F>& segment,
+                            const Mask<F>& active, VolumeCounts& counts) {
   const VolumeRecord& v = volumes.volumes[index];
   const auto each_cell = [&](const auto& visit) {
-    for (GridTraversal<F> traversal(emission_cells(v), segment.o, segment.d, segment.length, active);
+    for (GridTraversal<F> traversal(emission_cells(v), segment.o, segment.d, segment.length,
+                                    active);
          any(traversal.on());) {
       visit(traversal, F(traversal.most() * (traversal.leave() - traversal.x())));
       traversal.next_cell(traversal.on());

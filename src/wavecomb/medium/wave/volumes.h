@@ -28,26 +28,29 @@ class Volumes : public SubsurfaceScattering {
       : SubsurfaceScattering(context, counts, walks),
         volumes_(context.scene.volumes),
         distance_lights_(context.settings->equiangular && has_finite_lights(context.scene.lights) &&
-                       std::any_of(volumes_.volumes, volumes_.volumes + volumes_.count,
-                                   supports_equiangular)
-                   ? &context.scene.lights
-                   : nullptr),
+                                 std::any_of(volumes_.volumes, volumes_.volumes + volumes_.count,
+                                             supports_equiangular)
+                             ? &context.scene.lights
+                             : nullptr),
         nested_media_(context.scene, *context.accel, context.traversal_width, nested_media, counts,
-                   context.settings->equiangular && has_finite_lights(context.scene.lights)) {}
+                      context.settings->equiangular && has_finite_lights(context.scene.lights)) {}
 
   /// Samples the free flight of the reference integrator in scenes with nested dielectrics, for the
   /// path `path` with medium stack `stack`, whose ray with `keys` has hit `hit`. The passage leads
   /// to the hit. May change both the path and the hit.
   template <typename Hit>
   Flight<float> sample_nested_flight(const MediumQuery<float>& p, const PresenceKeys& keys,
-                           PathState<float>& path, Hit& hit, MediumStackRow<float>& stack) const;
+                                     PathState<float>& path, Hit& hit,
+                                     MediumStackRow<float>& stack) const;
   /// Returns the transmittance of media inside meshes along a shadow ray of the reference
   /// integrator.
-  Color<float> nested_transmittance(const PresenceKeys& keys, float time, const MediumStackRow<float>& stack,
-                           const Vec3<float>& o, const Vec3<float>& d, float t) const;
+  Color<float> nested_transmittance(const PresenceKeys& keys, float time,
+                                    const MediumStackRow<float>& stack, const Vec3<float>& o,
+                                    const Vec3<float>& d, float t) const;
 
   template <typename F>
-  Flight<F> sample_flight(const MediumQuery<F>& p, const Color<F>& throughput, const Mask<F>& active) const {
+  Flight<F> sample_flight(const MediumQuery<F>& p, const Color<F>& throughput,
+                          const Mask<F>& active) const {
     return sample_flights<F>(volumes_, p, throughput, active, distance_lights_, counts_.volumes);
   }
   template <typename F>
@@ -91,11 +94,13 @@ class Volumes : public SubsurfaceScattering {
     const RaySegments segments = segments_of(wave, q, flights.t);
     float* const scratch = wave.segments.floats(kScratch);
     if (!has_medium_stack)
-      return sample_flights<F>(volumes_, segments, flights, scratch, distance_lights_, counts_.volumes);
+      return sample_flights<F>(volumes_, segments, flights, scratch, distance_lights_,
+                               counts_.volumes);
     sample_stops<F>(volumes_, segments, flights, scratch, distance_lights_, counts_.volumes);
     sample_nested_flights<F>(wave, depth, sampler);
     if (has_flight_weights(volumes_, distance_lights_))
-      compute_flight_ratios<F>(volumes_, segments, flights, scratch, distance_lights_, counts_.volumes);
+      compute_flight_ratios<F>(volumes_, segments, flights, scratch, distance_lights_,
+                               counts_.volumes);
   }
   /// Returns the flights of the packet of rays at `i`, whose paths have this throughput.
   template <typename F>
@@ -126,7 +131,8 @@ class Volumes : public SubsurfaceScattering {
       store(most + i, select(traced, F(load<F>(q.tfar + i) * (1.f / kShadowRayFraction)), F(0.f)));
       for (float* one : product) store(one + i, F(1.f));
       const PathRow<F> path = path_at<F>(wave, q.slot, i, q.size);
-      store_random_numbers<F>(wave, i, SegmentRandom<F>(sampler, path.key, depth, VertexSet::kShadow));
+      store_random_numbers<F>(wave, i,
+                              SegmentRandom<F>(sampler, path.key, depth, VertexSet::kShadow));
     }
     const RaySegments segments = segments_of(wave, q, most);
     transmittance_through<F>(volumes_, segments, product, counts_.volumes);
@@ -135,13 +141,14 @@ class Volumes : public SubsurfaceScattering {
       for (size_t i = 0; i < q.size; ++i)
         if (q.occluded[i] != 0) most[i] = 0;
     nested_media_.attenuate<F>({{q.ox, q.oy, q.oz},
-                        {q.dx, q.dy, q.dz},
-                        q.slot,
-                        q.size,
-                        wave.times.floats(0),
-                        wave.pool.paths,
-                        wave.pool.medium_stacks},
-                       most, product, presence_keys(wave.pool, depth, true, context_.links()));
+                                {q.dx, q.dy, q.dz},
+                                q.slot,
+                                q.size,
+                                wave.times.floats(0),
+                                wave.pool.paths,
+                                wave.pool.medium_stacks},
+                               most, product,
+                               presence_keys(wave.pool, depth, true, context_.links()));
   }
   template <typename F>
   Color<F> shadow_transmittance(const Wave& wave, size_t i) const {
@@ -163,29 +170,30 @@ class Volumes : public SubsurfaceScattering {
     const Flights f = flights_of(wave);
     const SoaBlock& c = wave.segments;
     const MediumStack<float> around = depth == 0 ? around_camera(keys) : MediumStack<float>();
-    nested_media_.sample_flight<F>({{q.ox, q.oy, q.oz},
-                       {q.dx, q.dy, q.dz},
-                       q.slot,
-                       q.size,
-                       wave.times.floats(0),
-                       wave.pool.paths,
-                       wave.pool.medium_stacks},
-                      {h.t, h.u, h.v, h.prim, h.geom, h.inst},
-                      {volumes_.count > 0,
-                       f.t,
-                       f.material,
-                       {f.ratio[0], f.ratio[1], f.ratio[2]},
-                       {c.floats(kAbsorbed), c.floats(kAbsorbed + 1), c.floats(kAbsorbed + 2)},
-                       c.uints(kHero)},
-                      depth == 0 ? &around : nullptr, keys, [&](size_t, const PathRow<F>& path) {
-                        return begin_nested_flight<F>(sampler, path.key, depth, path.throughput);
-                      });
+    nested_media_.sample_flight<F>(
+        {{q.ox, q.oy, q.oz},
+         {q.dx, q.dy, q.dz},
+         q.slot,
+         q.size,
+         wave.times.floats(0),
+         wave.pool.paths,
+         wave.pool.medium_stacks},
+        {h.t, h.u, h.v, h.prim, h.geom, h.inst},
+        {volumes_.count > 0,
+         f.t,
+         f.material,
+         {f.ratio[0], f.ratio[1], f.ratio[2]},
+         {c.floats(kAbsorbed), c.floats(kAbsorbed + 1), c.floats(kAbsorbed + 2)},
+         c.uints(kHero)},
+        depth == 0 ? &around : nullptr, keys, [&](size_t, const PathRow<F>& path) {
+          return begin_nested_flight<F>(sampler, path.key, depth, path.throughput);
+        });
   }
   /// Returns the start of a ray through media. The random number of the first distance is
   /// stratified over the pixel's samples, unless volumes use that number.
   template <typename F>
-  NestedRayStart<F> begin_nested_flight(SamplerKind sampler, const SampleKey<F>& key, uint32_t depth,
-                                const Color<F>& throughput) const {
+  NestedRayStart<F> begin_nested_flight(SamplerKind sampler, const SampleKey<F>& key,
+                                        uint32_t depth, const Color<F>& throughput) const {
     const SegmentRandom<F> random(sampler, key, depth, VertexSet::kFlight);
     const UInt<F> seed = random.branch(0x1d3a7u).seed;
     const F first = volumes_.count == 0 ? random.r.z : walk_samples<F>(seed, UInt<F>(0u)).x;

@@ -29,7 +29,7 @@ struct PixelGrid {
 /// Table of undistorted positions, with the same number of nodes along both axes and bilinear
 /// interpolation between them.
 struct LensTable {
-  uint32_t across = 0;         ///< nodes along each edge of the image; 0 without distortion
+  uint32_t across = 0;         ///< table nodes along each edge of the image; 0 without distortion
   float per_x = 0, per_y = 0;  ///< cells per pixel
   /// (x, y) of each node, in pixels of the undistorted image, row by row.
   std::vector<float> nodes;
