@@ -112,7 +112,7 @@ bool is_present(const SceneView& scene, const PresenceQuery& at, const PresenceK
       opacity_at<float>(scene.materials, scene.meshes, scene.instances,
                         {.material = material,
                          .instance = at.instance,
-                         .place = {at.mesh, at.prim, at.u, at.v},
+                         .mesh_position = {at.mesh, at.prim, at.u, at.v},
                          .uv = hit_uv<float>(scene.meshes, at.mesh, at.prim, at.u, at.v, true)},
                         true);
   return is_present_sample(opacity, at, keys);

@@ -46,7 +46,7 @@ LightPathConflict light_path_conflict(const Scene& scene) {
     return {"rolling shutters", "a camera without one"};
   if (scene.view().visibility)
     return {"prims that some rays do not see, nor with holdouts", "a stage without them"};
-  if (scene.view().walks.media)
+  if (scene.view().subsurface.media)
     return {"light that walks below surfaces", "a stage without subsurface scattering"};
   if (scene.view().nested_media.media)
     return {

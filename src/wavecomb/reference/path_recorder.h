@@ -94,17 +94,17 @@ class PathRecorder {
   }
   /// Records the ray segment for AOVs. `throughput` is the throughput of the path after the flight.
   void record_segment(uint32_t depth, const Flight<F>& flight, const Color<F>& throughput) {
-    const bool straight = !flight.stopped && !flight.walked;
+    const bool straight = !flight.stopped && !flight.has_scattered;
     if (depth == 0 && aovs_.wants_transmittance())
       aovs_.pass<F>(kSlot, straight ? throughput : Color<F>(0.f), true);
-    if (aovs_.expressions() && flight.walked) aovs_.expressions().walk<F>(kSlot, true);
+    if (aovs_.expressions() && flight.has_scattered) aovs_.expressions().walk<F>(kSlot, true);
   }
   /// Returns the volume, or the mesh filled with a medium, whose event `material` has stopped the
   /// path.
   VolumeHit<F> volume_hit(uint32_t material) const {
     const SceneView& scene = context_.scene;
     if (context_.has_medium_stack() && material == scene.nested_media.event_material)
-      return {0, inside_.place, inside_.medium, true};
+      return {0, medium_stack_.object, medium_stack_.medium, true};
     return {material - scene.volumes.first_material, 0, material, false};
   }
 
@@ -116,7 +116,7 @@ class PathRecorder {
   PathAovs& aovs_;
   PathHistory& history_;
   RadianceRow<F> radiance_;
-  MediumStackRow<F> inside_{};    ///< medium stack of the path, if the scene has nested dielectrics
+  MediumStackRow<F> medium_stack_{};    ///< medium stack of the path, if the scene has nested dielectrics
   std::span<LightProbe> probes_;  ///< sampled lights of the path; empty if unused
   uint32_t probe_count_ = 0;
 };

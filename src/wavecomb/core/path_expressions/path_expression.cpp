@@ -146,8 +146,8 @@ std::vector<PathStateRow> minimal_rows(const std::vector<PathStateRow>& rows) {
     for (const PathStateRow& row : rows) {
       PathStateRow mapped{row.next, row.matched};
       for (uint32_t& to : mapped.next) to = classes[to];
-      const auto [at, is_new] = numbers.try_emplace(seen, static_cast<uint32_t>(numbers.size()));
-      if (is_new) least.push_back(std::move(seen));
+      const auto [at, is_new] = numbers.try_emplace(mapped, static_cast<uint32_t>(numbers.size()));
+      if (is_new) least.push_back(std::move(mapped));
       finer.push_back(at->second);
     }
     const bool is_done = numbers.size() == known && finer == classes;
