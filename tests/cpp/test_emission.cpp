@@ -29,7 +29,7 @@ LightView sending(const Lights& lights) {
 
 EmissionNumbers<float> draw(Random& random) {
   EmissionNumbers<float> r{};
-  for (float* x : {&r.pick, &r.u, &r.v, &r.s, &r.t, &r.aim}) *x = random();
+  for (float* x : {&r.light, &r.u, &r.v, &r.s, &r.t, &r.aim}) *x = random();
   return r;
 }
 
@@ -333,7 +333,7 @@ TEST(Emission, PacketsAreScalars) {
         return load<F>(values);
       };
       using N = EmissionNumbers<float>;
-      lanes = {column(&N::pick), column(&N::u), column(&N::v),
+      lanes = {column(&N::light), column(&N::u), column(&N::v),
                column(&N::s),    column(&N::t), column(&N::aim)};
       const auto packet = sample_emission<F>(view, lanes, Mask<F>(true));
       for (size_t i = 0; i < kWidth<F>; ++i) {

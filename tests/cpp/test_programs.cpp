@@ -332,7 +332,7 @@ void expect_packet_equals_scalar(ProgramId id) {
         {&P::film_thickness, &Q::film_thickness},
         {&P::film_ior, &Q::film_ior},
         {&P::thin_walled, &Q::thin_walled},
-        {&P::walks, &Q::walks}};
+        {&P::subsurface, &Q::subsurface}};
     for (const auto& [from, to] : numbers)
       p.*to = packet([from = from](const Inputs& i) { return i.params.*from; });
     p.base_color = vec([](const Inputs& i) { return i.params.base_color; });

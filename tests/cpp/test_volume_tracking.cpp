@@ -230,8 +230,8 @@ TEST(Equiangular, DrawsByItsDensity) {
              4000;
     EXPECT_NEAR(sum, 1, 1e-3);
     for (const float v : {0.f, 0.2f, 0.5f, 0.99f})
-      EXPECT_NEAR(distribution.before(distribution.draw(v)), v, 1e-4f);
-    EXPECT_NEAR(distribution.draw(0), 1, 1e-4f);
+      EXPECT_NEAR(distribution.before(distribution.sample_distance(v)), v, 1e-4f);
+    EXPECT_NEAR(distribution.sample_distance(0), 1, 1e-4f);
   }
   const auto none =
       equiangular_distribution<float>(scene->view().lights, {o, d, 2, 1, 0.5f}, {}, true);

@@ -150,7 +150,7 @@ class Integrator {
   /// Returns the record of the mesh light at a hit, or kNoLight.
   uint32_t mesh_light_of(const Hit& hit) const {
     return scene_.mesh_lights
-               ? scene_.mesh_lights[placed_geometry<F>(scene_, hit.inst, hit.geom, true)]
+               ? scene_.mesh_lights[instance_geometry<F>(scene_, hit.inst, hit.geom, true)]
                : kNoLight;
   }
 
