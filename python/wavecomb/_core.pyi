@@ -573,20 +573,20 @@ class SceneBuilder:
         *,
         motion: NDArray[np.float64] | None = None,
         # ---- camera_table(): tools/update_stub ----
-        # Of the lens, scene units; 0: all is sharp.
+        # Lens radius in scene units; 0 gives a pinhole camera.
         lens_radius: float = 0,
-        # Along -z, scene units; above 0 with a lens.
+        # Distance of the focal plane along -z, scene units; above 0 with a lens.
         focus_distance: float = 1,
-        # Along -z, scene units; of a latlong camera a distance.
+        # Near clipping distance along -z, scene units; radial for a latlong camera.
         near_clip: float = 0,
-        # Along -z, scene units; of a latlong camera a distance.
+        # Far clipping distance along -z, scene units; radial for a latlong camera.
         far_clip: float = 1e30,
-        # x0, x1, y0, y1 of what the picture shows: on the plane z = -1, across the axis of an
-        # orthographic camera, longitude and latitude in radians of a latlong one.
+        # Visible region (x0, x1, y0, y1): on the plane z = -1, in scene units for an orthographic
+        # camera, longitude and latitude in radians for a latlong one.
         window: tuple[float, float, float, float],
-        # latlong: all directions, longitude to the right, latitude up.
+        # latlong shows all directions, longitude to the right, latitude up.
         projection: Literal["perspective", "orthographic", "latlong"] = "perspective",
-        # What gives way where the shapes of window and picture differ: UsdRender's
+        # How the window is fitted to an image of another aspect ratio: UsdRender's
         # aspectRatioConformPolicy.
         conform: Literal[
             "expandAperture",
@@ -595,35 +595,35 @@ class SceneBuilder:
             "adjustApertureHeight",
             "adjustPixelAspectRatio",
         ] = "expandAperture",
-        # Width of a pixel / its height.
+        # Pixel width / pixel height.
         pixel_aspect: float = 1,
-        # Planes (a, b, c, d) in the camera's space; of what it sees itself, points with a x + b y +
-        # c z + d < 0 are cut off.
+        # Planes (a, b, c, d) in camera space; camera rays ignore points with a x + b y + c z + d <
+        # 0.
         clip_planes: Sequence[Sequence[float]] = [],
-        # What light is multiplied by in the picture.
+        # Factor of the image's radiance.
         exposure: float = 1,
-        # Corners of the aperture, 3 or more; 0: it is round.
+        # Number of corners of the aperture, 3 or more; 0 gives a disk.
         aperture_blades: float = 0,
-        # Of the aperture, degrees.
+        # Rotation of the aperture, degrees.
         aperture_rotation: float = 0,
-        # The aperture's height / its width: anamorphic lenses.
+        # Aperture height / aperture width, for anamorphic lenses.
         lens_squeeze: float = 1,
-        # Radial distortion, of r^2 on the plane at distance 1.
+        # Radial distortion, coefficient of r^2 on the plane at distance 1.
         lens_k1: float = 0,
-        # Radial distortion, of r^4.
+        # Radial distortion, coefficient of r^4.
         lens_k2: float = 0,
-        # Radial distortion, of r^6.
+        # Radial distortion, coefficient of r^6.
         lens_k3: float = 0,
         # Tangential distortion.
         lens_p1: float = 0,
         # Tangential distortion.
         lens_p2: float = 0,
-        # Distortion as a map: n x n nodes over the picture, two in each four numbers; shares of the
-        # undistorted picture's width and height.
+        # Distortion as a map of n x n nodes over the image, two in each four numbers: positions in
+        # fractions of the undistorted image's width and height.
         lens_map: Sequence[Sequence[float]] = [],
-        # The edge of the picture at which a rolling shutter begins.
+        # Image edge at which a rolling shutter begins.
         rolling_shutter: Literal["off", "top", "bottom", "left", "right"] = "off",
-        # Share of the shutter's time that a row is exposed.
+        # Fraction of the shutter interval for which a row is exposed.
         rolling_duration: float = 0,
         # ---- to here ----
     ) -> None:
