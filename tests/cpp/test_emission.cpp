@@ -334,7 +334,7 @@ TEST(Emission, PacketsAreScalars) {
       };
       using N = EmissionNumbers<float>;
       lanes = {column(&N::light), column(&N::u), column(&N::v),
-               column(&N::s),    column(&N::t), column(&N::aim)};
+               column(&N::s),     column(&N::t), column(&N::aim)};
       const auto packet = sample_emission<F>(view, lanes, Mask<F>(true));
       for (size_t i = 0; i < kWidth<F>; ++i) {
         const auto one = sample_emission<float>(view, r[i], true);

@@ -370,7 +370,8 @@ template <typename F>
         break;
       case GraphCode::kAttribute:
         op.one([](const F& a) { return a; });
-        read_attribute<F>(view.attributes, op.code.number, op.width, at.mesh_position, active, op.to);
+        read_attribute<F>(view.attributes, op.code.number, op.width, at.mesh_position, active,
+                          op.to);
         break;
       default:
         break;

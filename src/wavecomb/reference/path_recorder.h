@@ -116,7 +116,8 @@ class PathRecorder {
   PathAovs& aovs_;
   PathHistory& history_;
   RadianceRow<F> radiance_;
-  MediumStackRow<F> medium_stack_{};    ///< medium stack of the path, if the scene has nested dielectrics
+  MediumStackRow<F>
+      medium_stack_{};            ///< medium stack of the path, if the scene has nested dielectrics
   std::span<LightProbe> probes_;  ///< sampled lights of the path; empty if unused
   uint32_t probe_count_ = 0;
 };
