@@ -31,7 +31,7 @@ Index = tuple[int, int, int]
 _MAGIC, _FORMAT, _LIBRARY = 0x56444220, 224, (10, 0)
 _ZIP, _ACTIVE_MASK = 1, 2
 _LOG2 = {4096: 5, 128: 4}
-"""Base-2 logarithm of the entries along an edge of an inner node, by its edge length in voxels."""
+"""Maps the edge length of an inner node in voxels to log2 of its number of entries per edge."""
 _CHILD = {4096: 128, 128: BRICK}
 
 

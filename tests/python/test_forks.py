@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A forked process behaves as a fresh one for its caller."""
+"""A forked process renders like a newly started one."""
 
 from __future__ import annotations
 

@@ -289,7 +289,7 @@ def box_of_fog(as_mesh: bool, seed: int, **more: Any) -> Any:
 
 @pytest.mark.parametrize("equiangular", ["off", "on"])
 def test_fog_in_a_mesh_is_fog(equiangular: str) -> None:
-    """Equals a volume with the same coefficients, with and without equiangular sampling."""
+    """A mesh filled with fog renders like a volume with the same coefficients."""
     mesh = np.array([box_of_fog(True, seed, equiangular=equiangular) for seed in range(8)])
     volume = np.array([box_of_fog(False, seed) for seed in range(8, 16)])
     error = np.sqrt(mesh.var(axis=0, ddof=1) / 8 + volume.var(axis=0, ddof=1) / 8)

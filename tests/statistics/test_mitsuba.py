@@ -270,8 +270,9 @@ def test_rough_gold_gives_back_what_single_scattering_loses(
     """At alpha 0.2 in a white furnace Mitsuba's gold loses about 7 %, ours does not.
 
     By hand: GGX of alpha 0.2025 loses L = 0.0837 on average (integral of G2 / G1 over visible
-    normals). The series of further bounces returns F^2 (1 - L) / (1 - F L) of it, with a mean
-    reflectance F = 0.97, 0.81, 0.36: 0.92, 0.64, 0.12. A distant ball gains this amount.
+    normals). Further bounces return the fraction F^2 (1 - L) / (1 - F L) of this energy, which is
+    0.92, 0.64 and 0.12 for the mean reflectances F of red, green and blue, 0.97, 0.81 and 0.36. A
+    distant ball gains this amount.
     """
     from mitsuba_bridge import PeerSettings
 

@@ -395,7 +395,7 @@ class _Watch:
 
 
 class _SoFar:
-    """Adapter of a snapshot to the interface of results, for ``make_stats``."""
+    """Adapts a snapshot to the interface of results that ``make_stats`` expects."""
 
     cancelled = False
 

@@ -56,7 +56,7 @@ class _Entry:
 
     Attributes:
         wanted: Texels across that the image can resolve; None if unknown, which keeps all levels.
-        drop: Number of finest levels to leave out.
+        drop: Number of finest mip levels that are not loaded.
     """
 
     key: Key

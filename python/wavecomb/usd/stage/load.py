@@ -294,7 +294,7 @@ class _Load:
         return StrandDetail(ViewSize(view, c.options.size), c.options.strand_pixels, c.report)
 
     def _limit_textures(self, settings: ViewSettings) -> None:
-        """Chooses the mip levels that textures leave out."""
+        """Chooses how many of the finest mip levels of each texture are not loaded."""
         from wavecomb.usd.materials.texture_limit import plan_levels
 
         c = self._context
