@@ -157,11 +157,11 @@ TEST(LightTable, MessagesSayWhatToDo) {
             "light '/World/light': texture is texture 7, which was never added; add textures "
             "before lights");
   EXPECT_EQ(said([](Light& l) { l.to_world.t.x = kInf; }),
-            "light '/World/light': its transform is not finite; mend it");
+            "light '/World/light': its transform is not finite; give finite numbers");
   EXPECT_EQ(said([](Light& l) { l.to_world.row[1].z = kNan; }),
-            "light '/World/light': its transform is not finite; mend it");
+            "light '/World/light': its transform is not finite; give finite numbers");
   EXPECT_EQ(said([](Light& l) { l.kind = LightKind::kTriangle; }),
-            "light '/World/light': its kind has no place of its own");
+            "light '/World/light': lights of its kind have no transform");
   EXPECT_THROW(check_mesh_light(a_light(), kThere), Error);
 }
 

@@ -177,7 +177,7 @@ def test_motion_is_in_pixels_to_the_right_and_up(tmp_path: Path) -> None:
     np.testing.assert_allclose(motion[covered], np.broadcast_to((pixels, pixels / 4),
                                motion[covered].shape), rtol=1e-3)  # fmt: skip
     assert not motion[picture.aovs["alpha"] == 0].any()
-    with pytest.raises(Exception, match="none of latlong"):
+    with pytest.raises(Exception, match="does not support latlong"):
         _render(_stage(tmp_path), aovs=["motion"], projection="latlong")
 
 

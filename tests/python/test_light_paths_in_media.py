@@ -49,7 +49,7 @@ def stage(medium: str) -> Any:
 
 REFUSALS = {
     "volume": "transport light does not go with volumes",
-    "skin": "transport light does not go with light that walks below surfaces",
+    "skin": "transport light does not go with subsurface scattering",
     "cloudy": "transport light does not go with media inside of meshes",
 }
 

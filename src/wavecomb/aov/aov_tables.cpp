@@ -21,10 +21,12 @@ AovTables::AovTables(const Scene& scene, const Settings& settings) {
   }
   if (layout.set.has(Aov::kDeep) && scene.view().volumes.emits)
     throw Error(
-        "deep pictures know no volumes that glow: light without a surface has no depth there; give "
-        "no deep picture, or no emission");
+        "deep images do not support volumes with emission, whose light has no depth; render "
+        "without "
+        "a deep image, or without the emission");
   if (layout.set.has(Aov::kMotion) && scene.camera().projection == Projection::kLatlong)
-    throw Error("the AOV motion is none of latlong cameras; give others, or another projection");
+    throw Error(
+        "the AOV motion does not support latlong cameras; leave it out, or use another projection");
   check_id_layers(layout.set, scene.instances().size() + 1, scene.materials().size());
   // Ids of instances and materials do not need these tables, but ids of objects do.
   if (layout.set.has(AovKind::kCoverage)) crypto = CryptoTables(scene, layout.set);

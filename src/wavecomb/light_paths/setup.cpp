@@ -47,7 +47,7 @@ LightPathConflict light_path_conflict(const Scene& scene) {
   if (scene.view().visibility)
     return {"prims that some rays do not see, nor with holdouts", "a stage without them"};
   if (scene.view().subsurface.media)
-    return {"light that walks below surfaces", "a stage without subsurface scattering"};
+    return {"subsurface scattering", "a stage without subsurface scattering"};
   if (scene.view().nested_media.media)
     return {
         "media inside of meshes",

@@ -317,7 +317,7 @@ void check_value(const std::string& of, const LightParameter& p, const LightValu
 
 void check(const Light& light, const LightReferences& references) {
   const std::string of = quoted("light", light.name) + ": ";
-  if (!finite(light.to_world)) throw Error(of + "its transform is not finite; mend it");
+  if (!finite(light.to_world)) throw Error(of + "its transform is not finite; give finite numbers");
   if (light.moves() && (light.motion.size() < 2 || light.motion.size() > kMaxSteps))
     throw Error(of + "motion has " + std::to_string(light.motion.size()) +
                 " transforms; give from 2 to " + std::to_string(kMaxSteps) + ", or none");
@@ -361,7 +361,7 @@ LightKind light_kind(std::string_view name) {
 void check_light(const Light& light, const LightReferences& references) {
   const bool is_known = static_cast<size_t>(light.kind) < light_kinds().size();
   if (!is_known || !info_of(light.kind).has(light_trait::kHasTransform))
-    throw Error(quoted("light", light.name) + ": its kind has no place of its own");
+    throw Error(quoted("light", light.name) + ": lights of its kind have no transform");
   check(light, references);
 }
 

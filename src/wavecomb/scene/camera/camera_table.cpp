@@ -155,12 +155,13 @@ void CameraParameter::check(const Camera& camera) const {
   const CameraValue value = read(camera);
   if (const auto* number = std::get_if<float>(&value)) {
     const double v = *number;
-    if (std::isnan(v) || (std::isinf(v) && !may_be_infinite)) wrong("is not finite; mend it");
+    if (std::isnan(v) || (std::isinf(v) && !may_be_infinite))
+      wrong("is not finite; give finite numbers");
     if (v < least || (is_above && v <= least))
       wrong("is " + text(v) + "; it must be " +
             (is_above ? "above " + text(least) : text(least) + " or more"));
   } else if (const auto* four = std::get_if<FourNumbers>(&value)) {
-    if (!finite(*four)) wrong("is not finite; mend it");
+    if (!finite(*four)) wrong("is not finite; give finite numbers");
   } else if (const auto* planes = std::get_if<std::vector<FourNumbers>>(&value)) {
     for (const FourNumbers& plane : *planes)
       if (!finite(plane)) wrong("are not finite; give finite numbers");
