@@ -91,7 +91,7 @@ def test_downward_includes_pass(tmp_path):
         ("core/rng.h", '#include "../scene/scene.h"', "from the root"),
         ("core/rng.h", "#include <wavecomb/core/hash.h>", "write #include"),
         ("gpu/kernel.h", "#include <span>", "no known layer"),
-        ("geometry/tessellation/point.h", "#include <span>", "no known layer"),
+        ("geometry/point.h", "#include <span>", "no known layer"),
         ("core/rng.h", '#include "wavecomb/gpu/kernel.h"', "no known layer"),
     ],
 )

@@ -12,7 +12,8 @@ namespace wavecomb {
 struct Material;
 struct GraphSet;
 
-/// How light enters a surface with a subsurface random walk; the value of OpenPbrRecord::walks.
+/// How light enters a surface with a subsurface random walk; the value of
+/// OpenPbrRecord::subsurface.
 enum class SubsurfaceKind : uint8_t {
   kNone,   ///< no random walk
   kWhole,  ///< all light enters, and the medium gives it its colour

@@ -65,26 +65,28 @@ inline EquiangularDistribution<F> equiangular_distribution(const LightView& ligh
                                                            const Sample4<F>& r,
                                                            const Mask<F>& active) {
   const auto& [o, d, begin, end, extinction] = segment;
-  EquiangularDistribution<F> range;
+  EquiangularDistribution<F> distribution;
   const Mask<F> some = active & (begin < end) & (end < F(kFarAway));
-  if (none(some)) return range;
+  if (none(some)) return distribution;
   const F middle = select(some, F(0.5f * (begin + end)), F(0.f));
   const LightReceiver<F> receiver(fma(d, middle, o));
   const LightSample<F> l = sample_light<F>(lights, receiver, r.x, r.y, r.z, some);
   const Mask<F> usable = some & l.valid & (l.distance < kFarAway);
   const Vec3<F> to = fma(l.wi, select(usable, l.distance, F(0.f)), receiver.p) - o;
-  range.nearest = dot(to, d);
-  const Vec3<F> across = to - d * range.nearest;
+  distribution.nearest = dot(to, d);
+  const Vec3<F> across = to - d * distribution.nearest;
   const F length = end - begin;
-  range.height = max(F(sqrt(dot(across, across))), F(1e-4f * length));
-  range.from = atan2(F(begin - range.nearest), range.height);
-  range.span = max(F(atan2(F(end - range.nearest), range.height) - range.from), F(1e-6f));
+  distribution.height = max(F(sqrt(dot(across, across))), F(1e-4f * length));
+  distribution.from = atan2(F(begin - distribution.nearest), distribution.height);
+  distribution.span = max(
+      F(atan2(F(end - distribution.nearest), distribution.height) - distribution.from), F(1e-6f));
   // q grows with the angle that the segment subtends from the light, and with the transmittance of
   // the medium from `begin` to the closest point and on to the light.
-  const F before = clamp(F(range.nearest - begin), F(0.f), length);
-  const F q = F(kMaxEquiangular / kPi) * range.span * exp(F(-extinction * (before + range.height)));
-  range.share = select(usable & (q > kMinEquiangular), q, F(0.f));
-  return range;
+  const F before = clamp(F(distribution.nearest - begin), F(0.f), length);
+  const F q = F(kMaxEquiangular / kPi) * distribution.span *
+              exp(F(-extinction * (before + distribution.height)));
+  distribution.share = select(usable & (q > kMinEquiangular), q, F(0.f));
+  return distribution;
 }
 
 /// Probabilities of the outcome of a segment through a homogeneous medium that ends after length

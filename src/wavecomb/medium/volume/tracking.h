@@ -47,9 +47,9 @@ class SegmentSeconds {
  public:
   /// `times` is RaySegments::times.
   SegmentSeconds(const VolumeRecord& v, const float* times) : v_(v), times_(times) {}
-  void start(const UInt<F>& random, const Mask<F>& lanes) {
+  void start(const UInt<F>& segment, const Mask<F>& lanes) {
     if (v_.moves && times_)
-      seconds_ = select(lanes, seconds_at<F>(v_, gather<F>(times_, random, lanes)), seconds_);
+      seconds_ = select(lanes, seconds_at<F>(v_, gather<F>(times_, segment, lanes)), seconds_);
   }
   const F& operator()() const { return seconds_; }
 
@@ -76,14 +76,14 @@ class FlightVisitor {
                 FlightResults results, const float* times)
       : v_(v), seconds_(v, times), material_(material), flights_(flights), results_(results) {}
 
-  void start(const U& random, const Mask<F>& lanes) {
-    const U hero = gather<U>(flights_.hero, random, Mask<U>(lanes));
+  void start(const U& segment, const Mask<F>& lanes) {
+    const U hero = gather<U>(flights_.hero, segment, Mask<U>(lanes));
     const F own = select(hero == U(0u), F(v_.extinction[0]),
                          select(hero == U(1u), F(v_.extinction[1]), F(v_.extinction[2])));
     of_hero_ = select(lanes, own, of_hero_);
     ratio_ = select<F>(lanes, Color<F>(F(1.f)), ratio_);
     stopped_ = stopped_ & not_(lanes);
-    seconds_.start(random, lanes);
+    seconds_.start(segment, lanes);
   }
   Mask<F> collide(const Mask<F>& lanes, const F& x, const Vec3<F>& p, const F& majorant,
                   CollisionSequence<F>& numbers) {
@@ -103,18 +103,18 @@ class FlightVisitor {
     x_ = select(stops, x, x_);
     return stops;
   }
-  void finish(const U& random, const Mask<F>& lanes) {
+  void finish(const U& segment, const Mask<F>& lanes) {
     if (none(lanes)) return;
     if (results_ != FlightResults::kRatios) {
       const Mask<F> stops = lanes & stopped_;
-      scatter<F>(flights_.t, x_, random, stops);
-      scatter<U>(flights_.material, U(material_), random, Mask<U>(stops));
+      scatter<F>(flights_.t, x_, segment, stops);
+      scatter<U>(flights_.material, U(material_), segment, Mask<U>(stops));
     }
     if (results_ == FlightResults::kStops || v_.is_grey) return;
     const F* const ratio[3] = {&ratio_.x, &ratio_.y, &ratio_.z};
     for (int k = 0; k < 3; ++k)
-      scatter<F>(flights_.ratio[k], F(gather<F>(flights_.ratio[k], random, lanes) * *ratio[k]),
-                 random, lanes);
+      scatter<F>(flights_.ratio[k], F(gather<F>(flights_.ratio[k], segment, lanes) * *ratio[k]),
+                 segment, lanes);
   }
 
  private:
@@ -257,10 +257,10 @@ class TransmittanceVisitor {
   TransmittanceVisitor(const VolumeRecord& v, float* const (&product)[3], const float* times)
       : v_(v), seconds_(v, times), columns_(product) {}
 
-  void start(const U& random, const Mask<F>& lanes) {
-    const auto column = [&](int k) { return gather<F>(columns_[k], random, lanes); };
+  void start(const U& segment, const Mask<F>& lanes) {
+    const auto column = [&](int k) { return gather<F>(columns_[k], segment, lanes); };
     product_ = select<F>(lanes, Color<F>(column(0), column(1), column(2)), product_);
-    seconds_.start(random, lanes);
+    seconds_.start(segment, lanes);
   }
   Mask<F> collide(const Mask<F>& lanes, const F& /*x*/, const Vec3<F>& p, const F& majorant,
                   CollisionSequence<F>& numbers) {
@@ -276,9 +276,9 @@ class TransmittanceVisitor {
     product_ = select<F>(lanes, select<F>(ends, Color<F>(F(0.f)), now), product_);
     return ends;
   }
-  void finish(const U& random, const Mask<F>& lanes) {
+  void finish(const U& segment, const Mask<F>& lanes) {
     const F* const product[3] = {&product_.x, &product_.y, &product_.z};
-    for (int k = 0; k < 3; ++k) scatter<F>(columns_[k], *product[k], random, lanes);
+    for (int k = 0; k < 3; ++k) scatter<F>(columns_[k], *product[k], segment, lanes);
   }
 
  private:

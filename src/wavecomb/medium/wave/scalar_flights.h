@@ -41,12 +41,12 @@ Flight<float> Volumes::sample_nested_flight(const MediumQuery<float>& p, const P
        {&absorbed[0], &absorbed[1], &absorbed[2]},
        &hero},
       p.depth == 0 ? &around : nullptr, keys, [&](size_t, const PathRow<F>&) { return begin; });
-  const auto has_scattered = load_row<PathRow, F>(row, 0u, true);
-  path.o = has_scattered.o;
-  path.dir = has_scattered.d;
-  path.throughput = has_scattered.throughput;
-  path.pdf = has_scattered.pdf;
-  path.receiver = has_scattered.receiver;
+  const auto end = load_row<PathRow, F>(row, 0u, true);
+  path.o = end.o;
+  path.dir = end.d;
+  path.throughput = end.throughput;
+  path.pdf = end.pdf;
+  path.receiver = end.receiver;
   stack = load_row<MediumStackRow, F>(row_words, 0u, true);
   if (has_flight_weights(volumes_, distance_lights_))
     compute_flight_ratios<F>(volumes_, segments, flights, scratch, distance_lights_,
