@@ -236,7 +236,7 @@ test-clang: build/.setup-clang ## C++ tests and the Python module with clang and
 # includes them.
 arm64_tests := lanes rows math vec_frame warp sampler morton_hash camera_ray params programs variants surface texture curves \
   curve_clumps volumes subdivision accelerator motion wave renderer policies
-# Statistics of materials, which take minutes each under emulation.
+# Statistical tests of materials; each takes minutes under emulation.
 arm64_without := Programs.*Furnace*:Programs.DeltaLobes*:Programs.WeightIs*:Programs.Reciprocity*:Programs.MultipleScattering*
 ARM64_TESTS ?= $(subst $() ,;,$(strip $(arm64_tests)))
 test-arm64: build/.setup-arm64 ## C++ tests of NEON lanes, cross-compiled for ARM64, under qemu

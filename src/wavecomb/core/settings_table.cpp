@@ -150,7 +150,7 @@ std::vector<SettingInfo> image_settings() {
           "Formula for the reflectance of dielectrics.")),
       in_expectation(choice<&S::texture_filter>(
           "texture_filter", "Texture filter",
-          {{"auto", "Full filtering where the camera looks, one random texel after a bounce."},
+          {{"auto", "Full filtering at directly visible points, one random texel after a bounce."},
            {"whole", "Full filtering everywhere."}},
           "How textures are filtered.")),
       row<&S::cosine_sampling>("cosine_sampling", "Cosine sampling",
@@ -178,7 +178,7 @@ std::vector<SettingInfo> work_settings() {
   return {
       choice<&S::roulette>(
           "roulette", "Roulette",
-          {{"auto", "Efficient where bounces are guided, otherwise throughput."},
+          {{"auto", "`efficient` with path guiding, otherwise `throughput`."},
            {"off", "Paths end at the maximum depth only."},
            {"throughput", "Survival probability by the path's throughput."},
            {"cost-aware", "Survival by throughput over the square root of the shading cost."},
@@ -277,13 +277,14 @@ std::vector<SettingInfo> order_settings() {
           {{"wavefront", "Processes waves of paths stage by stage."},
            {"reference", "Traces one path at a time. Slow; for checking the wavefront."}},
           "How paths are traced."),
-      choice<&S::costs>("costs", "Costs",
-                        {{"auto", "Calibrated, then measured; roulette uses the model."},
-                         {"measured",
-                          "Calibrated, then measured, also for roulette: the image then varies "
-                          "within its noise if roulette is cost-aware."},
-                         {"model", "Fixed costs by program and texture reads; reproducible."}},
-                        "Source of the estimated costs of materials."),
+      choice<&S::costs>(
+          "costs", "Costs",
+          {{"auto", "Calibrated, then measured; roulette uses the model."},
+           {"measured",
+            "Calibrated, then measured, also for roulette: the image then varies "
+            "within its noise if roulette is cost-aware."},
+           {"model", "Fixed estimates from the program and its texture reads; reproducible."}},
+          "Source of the estimated costs of materials."),
       row<&S::policy>("policy", "Policy", "The order in which hits are shaded."),
       choice<&S::ray_order>("ray_order", "Ray order", ray_orders(),
                             "The order in which bounce rays are traced."),
@@ -295,7 +296,7 @@ std::vector<SettingInfo> order_settings() {
                             "Number of paths that a thread processes together.", "automatic"),
       choice<&S::materialize>("materialize", "Materialize",
                               {{"auto", "Off, since that is faster."},
-                               {"on", "Move records into their order before shading."},
+                               {"on", "Copy records into sorted order before shading."},
                                {"off", "Gather the inputs of shading through indices."}},
                               "Whether records are moved into their order."),
       choice<&S::traversal>("traversal", "Traversal",

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Table of camera parameters other than the transform: one row for each member of Camera. Range
-/// checks, the scene fingerprint, Python keywords and their stub, sandbox calls and the poses of
-/// the window are derived from it. To add a parameter, add a member, a row here, and its use.
+/// checks, the scene fingerprint, the Python keywords and their stub, and the camera poses that the
+/// window sets are derived from it. To add a parameter, add a member, a row here, and its use.
 #pragma once
 
 #include <array>
