@@ -143,7 +143,7 @@ def test_refuses_in_one_line(stage: Path, tmp_path: Path, arguments: list[str], 
 def test_the_summary_says_what_was_allotted(stage: Path, tmp_path: Path) -> None:
     out = tmp_path / "a.exr"
     command = ["render", str(stage), "-o", str(out), "--size", "32", "32", "--spp", "64"]
-    result = CliRunner().invoke(main, [*command, "--allocate", "efficiency"])
+    result = CliRunner().invoke(main, [*command, "--allocate", "efficiency", "--verbose"])
     assert result.exit_code == 0, result.output
     assert "samples by efficiency: 16 to" in result.output
     assert "expected efficiency" in result.output

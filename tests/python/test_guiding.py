@@ -250,7 +250,7 @@ def test_the_summary_says_what_was_learned(stage: Path, tmp_path: Path) -> None:
     result = CliRunner().invoke(
         main,
         ["render", str(stage), "-o", str(tmp_path / "a.exr"), "--size", str(SIZE), str(SIZE),
-         "--spp", str(SPP), "--guiding", "on"],
+         "--spp", str(SPP), "--guiding", "on", "--verbose"],
     )  # fmt: skip
     assert result.exit_code == 0, result.output
     assert "learned from" in result.output

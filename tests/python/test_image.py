@@ -248,7 +248,7 @@ def test_temporary_names_of_long_names(tmp_path: Path, stem: str) -> None:
 def test_check_writable_leaves_nothing(tmp_path: Path) -> None:
     check_writable(tmp_path / "a.exr")
     assert os.listdir(tmp_path) == []
-    with pytest.raises(OSError, match="does not exist"):
-        check_writable(tmp_path / "no" / "a.exr")
+    check_writable(tmp_path / "new" / "a.exr")
+    assert os.listdir(tmp_path / "new") == [], "missing folders are created"
     with pytest.raises(OSError, match="cannot be written"):
         check_writable("/proc/a.exr")

@@ -118,7 +118,7 @@ def test_a_command_keeps_it_and_another_starts_from_it(stage: Path, tmp_path: Pa
     done = run("render", stage, "-o", tmp_path / "a.exr", "--spp", SPP, *size, "--learn-to", kept)
     assert done.exit_code == 0, done.output
     words = ("--spp", 2, *size, "--learn-from", kept)
-    done = run("render", stage, "-o", tmp_path / "b.exr", *words)
+    done = run("render", stage, "-o", tmp_path / "b.exr", "--verbose", *words)
     assert done.exit_code == 0 and "before" in done.output, done.output
     folder = tmp_path / "job"
     done = run(

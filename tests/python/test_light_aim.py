@@ -85,7 +85,7 @@ def test_aimed_paths_find_a_small_ring(landscape: Path) -> None:
 
 def test_the_summary_says_where_they_go(landscape: Path, tmp_path: Path) -> None:
     out = str(tmp_path / "a.exr")
-    asked = ["--size", "24", "16", "--spp", "1", "--transport", "light", "-o", out]
+    asked = ["--size", "24", "16", "--spp", "1", "--transport", "light", "--verbose", "-o", out]
     result = CliRunner().invoke(main, ["render", str(landscape), *asked])
     assert result.exit_code == 0, result.output
     assert "light paths aim at" in result.output and "learned from" in result.output

@@ -367,6 +367,7 @@ PROGRAMS = {
     "bench/counters.py": "perf",
     "bench/machine.py": "git",
     "farm/clusters.py": "Slurm's commands",
+    "gui/needs.py": "ldd",
     "run/isolation/sandbox.py": "bwrap",
 }
 """Files that start programs other than Python."""

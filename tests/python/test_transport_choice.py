@@ -76,7 +76,7 @@ def test_auto_is_path_to_the_bit_in_a_matt_stage(tmp_path: Path) -> None:
 
 def test_the_summary_says_what_was_chosen(caustics: Path, tmp_path: Path) -> None:
     out = str(tmp_path / "a.exr")
-    asked = ["--size", "16", "16", "--spp", "1", "--transport", "auto", "-o", out]
+    asked = ["--size", "16", "16", "--spp", "1", "--transport", "auto", "-o", out, "--verbose"]
     result = CliRunner().invoke(main, ["render", str(caustics), *asked])
     assert result.exit_code == 0, result.output
     assert "transport path: too few samples to find out whether light paths pay" in result.output

@@ -8,6 +8,7 @@ import re
 import sys
 from collections.abc import Sequence
 
+from wavecomb import processes
 from wavecomb.errors import WavecombError
 from wavecomb.extras import check_installed
 
@@ -98,21 +99,22 @@ def start_qt(timeout: float = 60.0) -> tuple[str, str]:
     """
     import subprocess
 
+    pipe = subprocess.PIPE
+    child = processes.start("-c", _START, stdout=pipe, stderr=pipe, text=True)
     try:
-        done = subprocess.run(
-            [sys.executable, "-c", _START], capture_output=True, text=True, timeout=timeout,
-            check=False,
-        )  # fmt: skip
+        out, errors = child.communicate(timeout=timeout)
     except subprocess.TimeoutExpired:
+        child.kill()
+        child.communicate()
         return "", f"Qt does not start within {timeout:g} s"
-    for line in done.stdout.splitlines():
-        if line.startswith("platform: ") and done.returncode == 0:
+    for line in out.splitlines():
+        if line.startswith("platform: ") and child.returncode == 0:
             return line.removeprefix("platform: "), ""
     if libraries := missing_libraries():
         return "", libraries_message(libraries)
-    said = [line for line in done.stderr.splitlines() if line.strip()]
+    said = [line for line in errors.splitlines() if line.strip()]
     # Qt's messages begin with a category, such as "qt.qpa.xcb: ".
-    why = said[0].strip() if said else f"Qt ended with code {done.returncode}"
+    why = said[0].strip() if said else f"Qt ended with code {child.returncode}"
     return "", re.sub(r"^qt\.[\w.]+: ", "", why)
 
 

@@ -266,7 +266,7 @@ def test_costs_from_a_file(
     file = tmp_path / "costs.json"
     file.write_text("{}")
     panel.load_profile(str(file))
-    assert "no cost profile" in messages[0] and session.setup.profile is None
+    assert "is not a cost profile" in messages[0] and session.setup.profile is None
     from wavecomb.run.cost_profile import save_costs
 
     save_costs(file, {"materials": {"/World/Looks/White": 50.0}, "textures": {}})
