@@ -95,7 +95,10 @@ def test_each_row_is_set_kept_edited_and_told_apart(name: str) -> None:
         ({"pixel_aspect": 0}, "the camera's pixel_aspect is 0; it must be above 0"),
         ({"exposure": float("inf")}, "the camera's exposure is not finite; give finite numbers"),
         ({"far_clip": float("nan")}, "the camera's far_clip is not finite; give finite numbers"),
-        ({"window": (0, 1, 0, float("inf"))}, "the camera's window is not finite; give finite numbers"),
+        (
+            {"window": (0, 1, 0, float("inf"))},
+            "the camera's window is not finite; give finite numbers",
+        ),
         ({"near_clip": 3, "far_clip": 3}, "the camera's clipping range must end beyond its start"),
         ({"lens_radius": 1, "focus_distance": 0}, "the camera's lens needs a focus distance "
          "above 0"),
