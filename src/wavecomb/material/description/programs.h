@@ -23,7 +23,6 @@ struct ProgramParameter {
 /// Traits of programs, combined as bits. The scene, the accelerator and the pilots ask for traits,
 /// never for a program's name, so that a new program is complete with its row and its BSDF.
 namespace program_trait {
-inline constexpr uint32_t kNone = 0;
 inline constexpr uint32_t kEmits = 1;  ///< reads the emission input
 /// A roughness input near 0 makes its lobes sharp enough to focus light.
 inline constexpr uint32_t kGlossy = 2;
@@ -51,7 +50,7 @@ inline constexpr uint32_t kSubsurface = 128;  ///< may have subsurface random wa
 /// requires two spaces and one row on each line. Add new programs at the end, since fingerprints
 /// contain the ids.
 #define WAVECOMB_PROGRAMS(X, P)                                                       \
-  X(diffuse, Diffuse, kNone, 60)                                                      \
+  X(diffuse, Diffuse, 0, 60)                                                          \
   X(metal, Metal, kGlossy, 75)                                                        \
   X(dielectric, Dielectric, kGlossy | kGlass, 70)                                     \
   X(plastic, Plastic, kGlossy, 85)                                                    \
