@@ -191,7 +191,7 @@ struct PowerTable {
 struct LightTreeChild {
   float centre[3];  ///< centre of the bounding sphere
   float radius;
-  /// Emitted along the normals, summed over the lights, relative to all lights of the tree.
+  /// Intensity along the normals of the lights below, as a fraction of that of the whole tree.
   float intensity;
   /// Axis of the cone of normals, 16 bits for each component: 0 is -1, 65535 is 1.
   uint32_t axis_xy;

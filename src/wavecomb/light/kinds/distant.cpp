@@ -34,7 +34,7 @@ LightKindInfo DistantKind::describe() {
   LightKindInfo kind;
   kind.name = "distant";
   kind.prims = {"DistantLight"};
-  kind.traits = kHasTransform | kSized | kShaped | kInfinite;
+  kind.traits = kHasTransform | kSized | kShaped;
   kind.parameters = {"angle"};
   kind.make = &make;
   return kind;

@@ -74,7 +74,7 @@ LightKindInfo DomeKind::describe() {
   LightKindInfo kind;
   kind.name = "dome";
   kind.prims = {"DomeLight", "DomeLight_1"};
-  kind.traits = kHasTransform | kTextured | kInfinite | kBackground;
+  kind.traits = kHasTransform | kTextured | kBackground;
   kind.parameters = {"portals"};
   kind.make = &make;
   return kind;

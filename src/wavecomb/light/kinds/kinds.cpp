@@ -6,7 +6,12 @@
 namespace wavecomb {
 
 std::span<const LightKindInfo> light_kinds() {
-#define WAVECOMB_LIGHT_KIND(name) name##Kind::describe(),
+  const auto described = []<typename Kind>(Kind) {
+    LightKindInfo kind = Kind::describe();
+    if constexpr (Kind::kIsInfinite) kind.traits |= light_trait::kInfinite;
+    return kind;
+  };
+#define WAVECOMB_LIGHT_KIND(name) described(name##Kind{}),
   static const std::vector<LightKindInfo> kinds = {WAVECOMB_LIGHT_KINDS(WAVECOMB_LIGHT_KIND)};
 #undef WAVECOMB_LIGHT_KIND
   return kinds;
