@@ -34,8 +34,8 @@ Result render(WavefrontRenderer& renderer, nb::handle settings, const nb::object
 }
 
 void edit(WavefrontRenderer& renderer, const nb::object& camera, const nb::dict& materials,
-          const nb::dict& lights) {
-  const SceneEdit change = scene_edit(*renderer.scene(), camera, materials, lights);
+          const nb::dict& lights, const nb::dict& moves) {
+  const SceneEdit change = scene_edit(*renderer.scene(), camera, materials, lights, moves);
   const nb::gil_scoped_release release;
   renderer.edit(change);
 }
@@ -103,7 +103,7 @@ void bind_renderer(nb::module_& m) {
       .def_prop_ro("scene", &WavefrontRenderer::scene)
       .def_prop_ro("version", &WavefrontRenderer::version)
       .def("edit", &edit, nb::kw_only(), "camera"_a = nb::none(), "materials"_a = nb::dict(),
-           "lights"_a = nb::dict())
+           "lights"_a = nb::dict(), "moves"_a = nb::dict())
       .def("render", &render, "settings"_a, "progress"_a = nb::none(), "policy"_a = nb::none(),
            "costs"_a = nb::none(), "watcher"_a = nb::none(), "state"_a = nb::none(),
            "interval"_a = 0.1, "picture"_a = true, "learned"_a = nb::none())

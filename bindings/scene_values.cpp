@@ -306,7 +306,7 @@ nb::dict material_dict(const Scene& scene, uint32_t material) {
 }
 
 SceneEdit scene_edit(const Scene& scene, const nb::object& camera, const nb::dict& materials,
-                     const nb::dict& lights) {
+                     const nb::dict& lights, const nb::dict& moves) {
   SceneEdit edit;
   if (!camera.is_none()) edit.camera = edited_camera(scene, nb::cast<nb::dict>(camera));
   for_each_change("material", materials, [&](uint32_t id, const nb::dict& values) {
@@ -321,5 +321,10 @@ SceneEdit scene_edit(const Scene& scene, const nb::object& camera, const nb::dic
   for_each_change("light", lights, [&](uint32_t i, const nb::dict& values) {
     edit.lights[i] = edited_light(scene, i, values);
   });
+  for (const auto& [key, value] : moves) {
+    std::string path;
+    if (!nb::try_cast(key, path)) throw Error("moves must be a dict {prim path: 4 x 4 matrix}");
+    edit.moves[path] = matrix_of("the move of prim '" + path + "'", value);
+  }
   return edit;
 }

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Changes a material, a light and the camera, and renders again without loading the stage."""
+"""Changes a material, a light, an object and the camera; renders again without loading."""
 
 from __future__ import annotations
 
@@ -18,6 +18,10 @@ renderer.render(spp=16).save("blue.png")
 aside = np.array(renderer.scene.light(0)["transform"])
 aside[3, 0] += 120.0  # translation is in the last row, as in USD
 renderer.edit(lights={name: {"transform": aside, "color": (20.0, 16.0, 9.0)}})
+
+lifted = np.eye(4)
+lifted[3, 1] = 60.0
+renderer.edit(moves={"/World/Objects/TallBlock": lifted})
 
 closer = np.array(renderer.scene.camera["to_world"])
 closer[3, 2] += 150.0

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 INHERIT_MATERIAL: int
 """Material id that means the material of the instance."""
@@ -915,18 +915,22 @@ class Renderer:
         camera: dict[str, Any] | None = None,
         materials: dict[int, dict[str, Any]] = {},
         lights: dict[int, dict[str, Any]] = {},
+        moves: dict[str, ArrayLike] = {},
     ) -> None:
         """Changes the scene atomically. Parameters that are not given are unchanged.
 
         camera: arguments of set_camera, or a value of Scene.camera. materials: arguments of
         add_material by id, except program, name and textures. lights: arguments of add_light by
-        index, except kind, name, texture and group. Renders are then bit-identical to those of a
-        scene that was built with these values.
+        index, except kind, name, texture and group. moves: by prim path, transform (4, 4) in the
+        scene's space that all objects and lights at or below the prim have after their transform in
+        the first scene. Renders are then bit-identical to those of a scene that was built with
+        these values, where meshes of the world are instances once an object was moved.
 
         A camera edit takes microseconds, and edits of materials and light colours take little time.
         If a mesh starts or stops being partially present, the groups that contain it are rebuilt.
         In that case, and if the shape or position of a light changes, the top level with all meshes
-        outside of instances is rebuilt as well. Raises Error for an invalid value, and during a
+        outside of instances is rebuilt as well. The first move of an object builds a hierarchy of
+        these meshes; later moves rebuild the top level over the instances only. Raises Error for an invalid value, and during a
         render.
         """
     def render(

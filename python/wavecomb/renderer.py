@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scene that stays ready to render while materials, lights and the camera change."""
+"""A scene that stays ready to render while materials, lights, objects and the camera change."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import os
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from wavecomb.api import is_unread, load
 from wavecomb.arguments import check_arguments, check_source
@@ -29,8 +31,8 @@ Values = Mapping[str, Any]
 class Renderer:
     """A scene with its acceleration structures, which can be edited and rendered again.
 
-    An edit of the camera, a material or a light takes milliseconds, and the next render starts
-    without loading or building. Only one thread may use the object.
+    An edit of the camera, a material, a light or a transform takes milliseconds, and the next
+    render starts without loading. Only one thread may use the object.
 
     >>> renderer = wavecomb.Renderer("shot.usd", size=(640, 360))  # doctest: +SKIP
     >>> renderer.edit(materials={"/World/Looks/Car": {"roughness": 0.1}})  # doctest: +SKIP
@@ -100,10 +102,11 @@ class Renderer:
         camera: Values | None = None,
         materials: Mapping[Key, Values] | None = None,
         lights: Mapping[Key, Values] | None = None,
+        moves: Mapping[str, Any] | None = None,
     ) -> None:
         """Changes the scene; parameters that are not given keep their values.
 
-        Transforms are (4, 4) matrices from object to world space for row vectors, as in USD.
+        Transforms are (4, 4) matrices for row vectors, as in USD.
 
         Args:
             camera: Arguments of ``SceneBuilder.set_camera``: ``transform``, ``window``,
@@ -111,7 +114,10 @@ class Renderer:
             materials: Name or id of a material -> arguments of ``SceneBuilder.add_material``,
                 except program, name and textures.
             lights: Name or id of a light -> arguments of ``SceneBuilder.add_light``, except kind,
-                name, texture and group: ``transform``, ``color``, ``radius`` ...
+                name, texture and group: ``transform`` (object to world), ``color``, ``radius`` ...
+            moves: Path of a prim -> transform in world space that moves all objects and lights at
+                or below the prim from where they were loaded; the identity puts them back. An
+                instance moves as a whole, and volumes do not move.
 
         Raises:
             wavecomb.Error: A name, a parameter or a value is invalid; nothing is changed.
@@ -120,7 +126,17 @@ class Renderer:
             camera=None if camera is None else dict(camera),
             materials=_by_id("material", materials, self.materials),
             lights=_by_id("light", lights, self.lights),
+            moves={path: self._in_scene(move) for path, move in (moves or {}).items()},
         )
+
+    def _in_scene(self, move: Any) -> Any:
+        """Converts a transform in world space to the scene's space, whose origin may differ."""
+        origin = (0.0, 0.0, 0.0) if self._loaded is None else self._loaded.origin
+        if not any(origin) or np.shape(move) != (4, 4):
+            return move
+        there, back = np.eye(4), np.eye(4)
+        there[3, :3], back[3, :3] = origin, np.negative(origin)
+        return there @ np.asarray(move, np.float64) @ back
 
     def render(
         self,

@@ -11,6 +11,8 @@
 #include "wavecomb/render/inspection/picking.h"
 #include "wavecomb/render/renderer.h"
 #include "wavecomb/render/statistics/cost_profile.h"
+#include "wavecomb/scene/moves.h"
+#include "wavecomb/scene/names.h"
 
 namespace wavecomb {
 namespace {
@@ -44,8 +46,15 @@ Values values() {
   return v;
 }
 
-/// Instances that inherit materials, a mesh with face materials, and a world mesh.
-ScenePtr build(const Values& v) {
+/// Transforms that tests of moves use: of the floor, the mesh with face materials (mirrored), the
+/// first ball and the panel.
+struct Placing {
+  Affine floor, cut, ball, panel;
+};
+
+/// Instances that inherit materials, a mesh with face materials, and a world mesh. With `placing`,
+/// meshes of the world are instances after all others, and have these transforms.
+ScenePtr build(const Values& v, const Placing* placing = nullptr) {
   SceneBuilder b;
   const uint32_t sky = add_texture(b, 16, 8, 3, random_texels(16 * 8 * 3, 0.f, 1.5f, 4));
   const uint32_t mask = add_texture(b, 8, 8, 1, random_texels(64, -0.2f, 1.2f, 6));
@@ -55,10 +64,12 @@ ScenePtr build(const Values& v) {
     if (m == kLamp) material.textures[static_cast<size_t>(Input::kRoughness)] = use(mask, 0);
     b.add_material(material);
   }
-  b.add_to_group(0, b.add_mesh(make_mesh(ground(4, -1), kFloor, "/World/Floor")));
+  const uint32_t floor = b.add_mesh(make_mesh(ground(4, -1), kFloor, "/World/Floor"));
   MeshData cut = quad({-1, -1, 1.2f}, {2, 0, 0}, {0, 1, 0});
   cut.face_materials = {kLeaf, kGlossy};
-  b.add_to_group(0, b.add_mesh(make_mesh(cut, kInheritMaterial, "/World/Cut")));
+  const uint32_t card = b.add_mesh(make_mesh(cut, kInheritMaterial, "/World/Cut"));
+  for (const uint32_t mesh : {floor, card})
+    if (!placing) b.add_to_group(0, mesh);
   const uint32_t ball = b.add_group("ball", "/World/Ball");
   b.add_to_group(ball,
                  b.add_mesh(make_mesh(sphere(6, true), kInheritMaterial, "/World/Ball/Mesh")));
@@ -66,11 +77,21 @@ ScenePtr build(const Values& v) {
   b.add_to_group(pair, b.add_mesh(make_mesh(box({-1, -1, -1}, {1, 1, 1}), kLamp, "/World/Pair/A")));
   b.add_to_group(pair, b.add_mesh(make_mesh(sphere(4, false).transform(translate(0, 1.8f, 0)),
                                             kLeaf, "/World/Pair/B")));
-  b.add_instance(0, ball, translate(-1, -0.4f, 0) * scale(0.5f, 0.5f, 0.5f), kGlossy);
+  const Affine first = translate(-1, -0.4f, 0) * scale(0.5f, 0.5f, 0.5f);
+  b.add_instance(0, ball, placing ? placing->ball * first : first, kGlossy,
+                 b.add_placement_name("/World/First", 0));
   b.add_instance(0, ball, translate(0.1f, -0.5f, 0.3f) * scale(-0.4f, 0.4f, 0.4f), kLeaf);
   b.add_instance(0, pair, translate(1, -0.5f, -0.3f) * rotate(1, 30) * scale(0.4f, 0.3f, 0.4f));
+  if (placing) {
+    const uint32_t floors = b.add_group("floors"), cards = b.add_group("cards");
+    b.add_to_group(floors, floor);
+    b.add_to_group(cards, card);
+    b.add_instance(0, cards, placing->cut);
+    b.add_instance(0, floors, placing->floor);
+  }
   for (uint32_t i = 0; i < v.lights.size(); ++i) {
     Light light = v.lights[i];
+    if (placing && i == kPanel) light.to_world = placing->panel * light.to_world;
     light.name = "/World/Light" + std::to_string(i);
     if (i == kSky) light.texture = sky;
     b.add_light(light);
@@ -190,6 +211,67 @@ TEST(Edits, AnEditedSceneIsTheSceneBuiltAnew) {
     EXPECT_NE(edited.beauty, before.beauty) << change.what << ": or it would show nothing";
     before = edited;
   }
+}
+
+bool same_transform(const Affine& a, const Affine& b) {
+  const MatrixStep x(a), y(b);
+  return std::ranges::equal(x.to_world, y.to_world);
+}
+
+TEST(Edits, AMovedSceneIsTheSceneBuiltAnew) {
+  Values v = values();
+  v.materials[kLamp].emission = {2, 1, 0.5f};
+  v.materials[kGlossy].emission = {0.5f, 0.1f, 0.1f};
+  const Affine identity{};
+  const Affine down = translate(0, -0.2f, 0) * rotate(2, 5), up = translate(0.3f, 0.5f, 0.2f),
+               mirror = translate(0, 0.4f, -0.8f) * scale(-0.5f, 0.5f, 1), all = rotate(1, 20);
+  struct Step {
+    std::string what;
+    std::map<std::string, Affine> moves;
+    Placing placing;
+  };
+  const std::vector<Step> steps = {
+      {"floor", {{"/World/Floor", down}}, {down, identity, identity, identity}},
+      {"an instance too", {{"/World/First", up}}, {down, identity, up, identity}},
+      {"a light too", {{"/World/Light1", up}}, {down, identity, up, up}},
+      {"back", {{"/World/First", identity}}, {down, identity, identity, up}},
+  };
+  WavefrontRenderer renderer(build(v));
+  RenderedImage before = renderer.render(small());
+  for (const Step& step : steps) {
+    renderer.edit({.moves = step.moves});
+    const RenderedImage edited = renderer.render(small());
+    expect_same_image(edited, WavefrontRenderer(build(v, &step.placing)).render(small()),
+                      step.what);
+    EXPECT_NE(edited.beauty, before.beauty) << step.what;
+    before = edited;
+  }
+  // A mirrored mesh.
+  WavefrontRenderer other(build(v));
+  other.edit({.moves = {{"/World/Cut", mirror}, {"/World/Floor", identity}}});
+  const Placing cut{identity, mirror, identity, identity};
+  expect_same_image(other.render(small()), WavefrontRenderer(build(v, &cut)).render(small()),
+                    "cut");
+  EXPECT_EQ(ObjectNames(*other.scene()).asset(4), "/World/Cut");
+  const Moves nested{{"/World", all}, {"/World/Floor", down}};
+  EXPECT_TRUE(same_transform(move_of(nested, "/World/Floor"), all * down));
+  EXPECT_TRUE(same_transform(move_of(nested, "/World/Floors"), all));
+}
+
+TEST(Edits, MovesThatAreRefused) {
+  WavefrontRenderer renderer(build(values()));
+  const auto complaint = [&](const std::string& path, const Affine& m) -> std::string {
+    try {
+      renderer.edit({.moves = {{path, m}}});
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_NE(complaint("/World/Flor", {}).find("/World/Flor"), std::string::npos);
+  EXPECT_NE(complaint("/World/Floor", scale(1, 0, 1)).find("singular"), std::string::npos);
+  EXPECT_NE(complaint("[2]/A", {}).find("part of an instance"), std::string::npos);
+  EXPECT_EQ(renderer.version(), 0u);
 }
 
 TEST(Edits, ShareWhatDidNotChange) {

@@ -302,6 +302,7 @@ def test_a_renderer_is_edited_by_prim() -> None:
         {"materials": {"/World/Looks/Red": {"base_color": (0.1, 0.1, 0.9)}}},
         {"lights": {light: {"color": (1.0, 2.0, 8.0)}}},
         {"lights": {light: {"transform": moved}}},
+        {"moves": {"/World/Objects/TallBlock": translation(40.0, 20.0, 60.0)}},
         {"camera": {"lens_radius": 5.0, "focus_distance": 900.0}},
     ):
         before = renderer.render(spp=4)
@@ -314,8 +315,68 @@ def test_a_renderer_is_edited_by_prim() -> None:
     assert not wavecomb.compare(first, image).equal
     with pytest.raises(wavecomb.Error, match="no material /World/Looks/Rad; there are /World/"):
         renderer.edit(materials={"/World/Looks/Rad": {}})
+    with pytest.raises(wavecomb.Error, match="no object or light is at or below prim '/World/No'"):
+        renderer.edit(moves={"/World/No": np.eye(4)})
+    with pytest.raises(wavecomb.Error, match="4 x 4"):
+        renderer.edit(moves={"/World/Objects": [1.0, 2.0]})
     with pytest.raises(wavecomb.Error, match="smaples"):
         renderer.render(smaples=4)
+
+
+def translation(x: float, y: float, z: float) -> np.ndarray:
+    matrix = np.eye(4)
+    matrix[3, :3] = x, y, z
+    return matrix
+
+
+MOVED = """#usda 1.0
+( upAxis = "Y" )
+def Xform "Set" {
+    double3 xformOp:translate = (%s, 0, %s)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+    def Camera "Camera" {
+        float focalLength = 35
+        double3 xformOp:translate = (0, 1, 9)
+        uniform token[] xformOpOrder = ["xformOp:translate"]
+    }
+    def Plane "Floor" {
+        double width = 9
+        double length = 9
+        token axis = "Y"
+    }
+    def Sphere "Ball" {
+        double radius = 1
+        double3 xformOp:translate = (%s, 1, 0)
+        uniform token[] xformOpOrder = ["xformOp:translate"]
+    }
+    def Xform "Lamp" {
+        double3 xformOp:translate = (%s, 4, 1)
+        uniform token[] xformOpOrder = ["xformOp:translate"]
+        def SphereLight "Light" {
+            float inputs:intensity = 40
+        }
+    }
+}
+"""
+
+
+@REAL
+@pytest.mark.parametrize("at", [0.0, 5e8])
+def test_a_moved_prim_is_where_the_stage_would_put_it(tmp_path: Path, at: float) -> None:
+    here, there = tmp_path / "here.usda", tmp_path / "there.usda"
+    here.write_text(MOVED % (at, -at, 0, 0))
+    there.write_text(MOVED % (at, -at, 1.5, -2))
+    renderer = wavecomb.Renderer(here, size=(48, 36))
+    before = renderer.render(spp=64)
+    moves = {"/Set/Ball": translation(1.5, 0, 0), "/Set/Lamp": translation(-2, 0, 0)}
+    renderer.edit(moves=moves)
+    image, expected = renderer.render(spp=64), wavecomb.render(there, size=(48, 36), spp=64)
+    difference = np.abs(np.asarray(image) - np.asarray(expected))
+    assert difference.mean() < 1e-3 * np.asarray(expected).mean(), "rounding only"
+    assert np.abs(np.asarray(before) - np.asarray(expected)).mean() > 1e-2
+    renderer.edit(moves=dict.fromkeys(moves, np.eye(4)))
+    difference = np.abs(np.asarray(renderer.render(spp=64)) - np.asarray(before))
+    assert difference.mean() < 1e-3 * np.asarray(before).mean()
 
 
 @REAL

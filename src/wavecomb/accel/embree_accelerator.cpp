@@ -258,7 +258,8 @@ EmbreeAccelerator::EmbreeAccelerator(std::shared_ptr<const Scene> edited,
   std::shared_ptr<const EmbreeHierarchy> hierarchy = before.hierarchy;
   const bool may_differ = edited->material_part() != before.scene->material_part() ||
                           edited->light_part() != before.scene->light_part();
-  if (may_differ && !hierarchy->fits(*edited))
+  const bool is_moved = edited->geometry() != before.scene->geometry();
+  if (is_moved || (may_differ && !hierarchy->fits(*edited)))
     hierarchy = std::make_shared<const EmbreeHierarchy>(*edited, hierarchy->rule(), hierarchy.get(),
                                                         threads);
   impl_ = std::make_unique<Impl>(std::move(edited), std::move(hierarchy));

@@ -76,7 +76,8 @@ class EmbreeAccelerator {
                     HitRule rule = HitRule::kList);
   /// Creates an accelerator for a scene edited from that of `origin`. Shares the BVH, or the groups
   /// whose meshes are unchanged. Groups are rebuilt if the presence filtering or hair status of a
-  /// mesh changes; then, or if the shape or position of a light changes, the top level is rebuilt.
+  /// mesh changes; then, or if
+  /// an object moves or the shape or position of a light changes, the top level is rebuilt.
   EmbreeAccelerator(std::shared_ptr<const Scene> edited, const EmbreeAccelerator& origin,
                     uint32_t threads);
   ~EmbreeAccelerator();

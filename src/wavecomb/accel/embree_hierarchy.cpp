@@ -224,7 +224,9 @@ void EmbreeHierarchy::build(const EmbreeHierarchy* origin) {
   std::vector<size_t> built;
   for (size_t g = 1; g < groups.size(); ++g) {
     const auto& meshes = groups[g].meshes;
-    if (origin && std::all_of(meshes.begin(), meshes.end(), is_reused)) {
+    const bool is_known = origin && g < origin->geometry_->groups.size() &&
+                          origin->geometry_->groups[g].meshes == meshes;
+    if (is_known && std::all_of(meshes.begin(), meshes.end(), is_reused)) {
       group_scenes_[g] = origin->group_scenes_[g];
       rtcRetainScene(group_scenes_[g]);
       continue;

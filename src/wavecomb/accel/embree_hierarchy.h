@@ -22,7 +22,7 @@ struct EmbreeDevice;
 /// meshes need the presence filter; the filter reads the materials of the traced scene.
 class EmbreeHierarchy {
  public:
-  /// `origin`: hierarchy of a scene with the same geometry, whose device, geometries and groups are
+  /// `origin`: hierarchy of a scene with the same meshes, whose device, geometries and groups are
   /// shared if unchanged; may be null. `threads`: 0 uses all. Throws Error if Embree fails.
   EmbreeHierarchy(const Scene& scene, HitRule rule, const EmbreeHierarchy* origin,
                   uint32_t threads);

@@ -106,7 +106,9 @@ std::string ObjectNames::asset(uint32_t index) const {
   const Found found = find(index);
   const Mesh& mesh = scene_.meshes()[found.mesh];
   const std::string_view model = std::string_view(mesh.name).substr(0, mesh.asset_length);
-  if (found.instance == 0) return model.empty() ? second_level(mesh.name) : std::string(model);
+  const bool in_world =
+      found.instance == 0 || scene_.instances()[found.instance - 1].placement == kNoName;
+  if (in_world) return model.empty() ? second_level(mesh.name) : std::string(model);
   const Instance& instance = scene_.instances()[found.instance - 1];
   if (!model.empty())
     return path_through(placement_name(instance.placement), scene_.groups()[instance.group].root,

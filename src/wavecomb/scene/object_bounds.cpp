@@ -6,15 +6,11 @@
 #include "wavecomb/scene/names.h"
 
 namespace wavecomb {
-namespace {
 
-/// Returns whether an object is at or below a prim.
-bool is_in(std::string_view object, std::string_view prim) {
+bool is_in_prim(std::string_view object, std::string_view prim) {
   if (!object.starts_with(prim)) return false;
   return object.size() == prim.size() || object[prim.size()] == '/' || object[prim.size()] == '[';
 }
-
-}  // namespace
 
 Bounds mesh_bounds(const Mesh& mesh) {
   Bounds out;
@@ -51,10 +47,10 @@ Bounds object_bounds(const Scene& scene, std::string_view prim) {
   Bounds out;
   uint32_t object = 0;
   for (uint32_t mesh : scene.groups()[0].meshes)
-    if (is_in(names.object(object++), prim)) out.add(bounds_of(mesh));
+    if (is_in_prim(names.object(object++), prim)) out.add(bounds_of(mesh));
   for (const Instance& instance : scene.instances())
     for (uint32_t mesh : scene.groups()[instance.group].meshes)
-      if (is_in(names.object(object++), prim))
+      if (is_in_prim(names.object(object++), prim))
         add_instance_bounds(out, bounds_of(mesh), instance, scene.geometry()->steps);
   return out;
 }

@@ -9,6 +9,10 @@
 
 namespace wavecomb {
 
+/// Returns whether an object is at or below a prim: "/World/Forest[12]/Leaves" is below
+/// "/World/Forest".
+bool is_in_prim(std::string_view object, std::string_view prim);
+
 /// Returns the bounds of a mesh in its local space, over all motion steps and with the radii of
 /// curves and points.
 Bounds mesh_bounds(const Mesh& mesh);
@@ -18,9 +22,8 @@ void add_instance_bounds(Bounds& out, const Bounds& box, const Instance& instanc
                          std::span<const MatrixStep> steps);
 
 /// Returns the world bounds, over the whole shutter interval, of all meshes at or below a prim
-/// (named as by ObjectNames); "/World/Forest" includes the object "/World/Forest[12]/Leaves". The
-/// bounds are empty if there are no such meshes. Visits every object of the scene, so call it
-/// rarely.
+/// (named as by ObjectNames). The bounds are empty if there are no such meshes. Visits every object
+/// of the scene, so call it rarely.
 Bounds object_bounds(const Scene& scene, std::string_view prim);
 
 }  // namespace wavecomb

@@ -11,6 +11,8 @@
 #include "wavecomb/medium/description/mesh_medium.h"
 #include "wavecomb/medium/description/volume_motion.h"
 #include "wavecomb/scene/camera/camera_table.h"
+#include "wavecomb/scene/moves.h"
+#include "wavecomb/scene/object_bounds.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene_checks.h"
 #include "wavecomb/texture/tile_store.h"
@@ -123,25 +125,26 @@ void Scene::link() {
   view_.visibility = visibility_->data();
 }
 
-bool Scene::needs_in_glass(std::span<const Material> all_materials,
+bool Scene::needs_in_glass(const SceneGeometry& geometry, std::span<const Material> all_materials,
                            std::span<const Light> all_lights) const {
   if (!volumes().empty()) return true;
   const auto test = [&](const Material& m) { return is_absorbing_solid(m, *materials_->graphs); };
   const Glasses before = glasses_of(materials(), test), after = glasses_of(all_materials, test);
   // The material of collisions inside of meshes may follow those of `after`.
-  const bool same_glass = std::equal(after.begin(), after.end(), before.begin());
+  const bool same_glass =
+      &geometry == geometry_.get() && std::equal(after.begin(), after.end(), before.begin());
   const bool same_lights =
       std::ranges::equal(lights(), all_lights, [](const Light& a, const Light& b) {
         return a.kind == b.kind && same(a.to_world.t, b.to_world.t);
       });
   if (same_glass && same_lights) return materials_->in_glass;
-  const PlacedObjects objects{meshes(), groups(), instances(), geometry_->steps};
+  const PlacedObjects objects{geometry.meshes, geometry.groups, geometry.instances, geometry.steps};
   if (glass_holds_lights(after, objects, all_lights)) return true;
   if (same_glass && !materials_->in_glass) return false;
   return glass_holds_objects(after, objects);
 }
 
-std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threads) const {
+void Scene::check(const SceneEdit& edit) const {
   if (edit.camera) check_camera(*edit.camera);
   for (const auto& [id, material] : edit.materials) {
     if (id >= materials().size()) throw_unknown("material", id, materials().size());
@@ -158,20 +161,44 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
     if (light.group >= light_groups().size())
       throw_unknown("light group", light.group, light_groups().size());
   }
+}
+
+std::vector<Light> Scene::edited_lights(const SceneEdit& edit, const Moves& moves) const {
+  std::vector<Light> all = lights();
+  if (!edit.moves.empty()) {
+    const std::vector<Light>& placed = (unmoved_ ? *unmoved_ : *this).lights();
+    for (size_t i = 0; i < all.size(); ++i) {
+      const auto moves_light = [&](const auto& one) { return is_in_prim(all[i].name, one.first); };
+      if (std::ranges::none_of(edit.moves, moves_light)) continue;
+      const Affine m = move_of(moves, all[i].name);
+      all[i].to_world = m * placed[i].to_world;
+      for (size_t k = 0; k < all[i].motion.size(); ++k) all[i].motion[k] = m * placed[i].motion[k];
+    }
+  }
+  for (const auto& [i, light] : edit.lights) all[i] = light;
+  return all;
+}
+
+std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threads) const {
+  check(edit);
+  const bool is_moved = !edit.moves.empty();
+  Moves moves = moves_;
+  for (const auto& [path, m] : edit.moves) moves.insert_or_assign(path, m);
+  std::shared_ptr<const SceneGeometry> new_geometry = geometry_;
+  if (is_moved) new_geometry = moved_geometry(unmoved_ ? *unmoved_ : *this, moves);
 
   std::shared_ptr<const SceneMaterials> new_materials = materials_;
-  bool emission_changed = !edit.lights.empty();
+  bool emission_changed = !edit.lights.empty() || is_moved;
   std::vector<Light> all_lights;
-  if (!edit.materials.empty() || !edit.lights.empty()) {
-    all_lights = lights();
-    for (const auto& [i, light] : edit.lights) all_lights[i] = light;
+  if (!edit.materials.empty() || emission_changed) {
+    all_lights = edited_lights(edit, moves);
     const bool any_mesh_lights = !geometry_->mesh_lights.empty();
     std::vector<Material> all = materials_->given();
     for (const auto& [id, material] : edit.materials) {
       emission_changed = emission_changed || !same_emission(all[id], material, any_mesh_lights);
       all[id] = material;
     }
-    const bool in_glass = needs_in_glass(all, all_lights);
+    const bool in_glass = needs_in_glass(*new_geometry, all, all_lights);
     if (!edit.materials.empty() || in_glass != materials_->in_glass)
       new_materials = std::make_shared<const SceneMaterials>(std::move(all), materials_->graphs,
                                                              geometry_->textures,
@@ -186,14 +213,17 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
   std::shared_ptr<const SceneLights> new_lights = lights_;
   if (emission_changed)
     with_threads(threads, [&] {
-      new_lights = std::make_shared<const SceneLights>(std::move(all_lights), *geometry_,
+      new_lights = std::make_shared<const SceneLights>(std::move(all_lights), *new_geometry,
                                                        *new_materials, lights_.get());
     });
-  std::shared_ptr<Scene> scene(new Scene(geometry_, std::move(new_materials), std::move(new_lights),
-                                         std::move(new_tangents), links_,
+  std::shared_ptr<Scene> scene(new Scene(std::move(new_geometry), std::move(new_materials),
+                                         std::move(new_lights), std::move(new_tangents), links_,
                                          edit.camera.value_or(camera_)));
   scene->visibility_ = visibility_;
   scene->view_.visibility = view_.visibility;
+  scene->unmoved_ = is_moved && !unmoved_ ? shared_from_this() : unmoved_;
+  scene->moves_ = std::move(moves);
+  if (is_moved) scene->link();
   return scene;
 }
 

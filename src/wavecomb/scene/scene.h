@@ -63,6 +63,10 @@ struct SceneEdit {
   std::optional<Camera> camera{};
   std::map<uint32_t, Material> materials{};  ///< by id
   std::map<uint32_t, Light> lights{};        ///< by index into Scene::lights
+  /// By prim path (ObjectNames): transform in world space that everything at or below the prim has,
+  /// after its transform in the scene as it was built; the identity puts it back. Lights in
+  /// `lights` do not follow. Paths that are not listed keep their last move.
+  std::map<std::string, Affine> moves{};
 };
 
 class SceneBuilder;
@@ -70,7 +74,7 @@ struct PlacedObjects;
 
 /// Geometry, materials, textures, lights and camera, checked and complete. Immutable; any number of
 /// renderers and threads may read it.
-class Scene {
+class Scene : public std::enable_shared_from_this<Scene> {
  public:
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
@@ -120,13 +124,15 @@ class Scene {
   const std::vector<std::string>& warnings() const { return geometry_->warnings; }
 
   /// Returns a scene with other values that shares all unchanged data with this one, and equals a
-  /// scene built from scratch with these values. `threads`: 0 uses all.
+  /// scene built from scratch with these values, where meshes of the world are instances once an
+  /// object was moved. `threads`: 0 uses all.
   ///
   /// A camera edit takes microseconds. A material edit copies the materials. An edit of lights or
   /// of emission rebuilds the light set. If a new material needs tangents, they are computed. A
   /// material that begins or ceases to absorb, or a light that moves, costs a search of the
-  /// contents of absorbing glass. Throws Error naming the object for invalid values, as
-  /// SceneBuilder does, and for unknown ids.
+  /// contents of absorbing glass, as does a move. A move also copies the instances, and rebuilds
+  /// the light set if the scene has lights below the prim or emissive meshes. Throws Error naming
+  /// the object for invalid values, as SceneBuilder does, and for unknown ids.
   std::shared_ptr<const Scene> edited(const SceneEdit& edit, uint32_t threads = 0) const;
 
   /// Returns the parts of the scene, to be compared with those of scenes derived by edits.
@@ -142,8 +148,14 @@ class Scene {
         const Camera& camera);
   /// Computes the sets that each object belongs to, and the rays that see it.
   void link();
-  /// Returns SceneMaterials::in_glass of a scene with this geometry and other materials and lights.
-  bool needs_in_glass(std::span<const Material> materials, std::span<const Light> lights) const;
+  /// Returns SceneMaterials::in_glass of a scene with other geometry, materials and lights.
+  bool needs_in_glass(const SceneGeometry& geometry, std::span<const Material> materials,
+                      std::span<const Light> lights) const;
+  /// Throws Error for values of an edit that are invalid.
+  void check(const SceneEdit& edit) const;
+  /// Returns the lights of the scene after an edit that moves objects by `moves`.
+  std::vector<Light> edited_lights(const SceneEdit& edit,
+                                   const std::map<std::string, Affine>& moves) const;
   /// Returns a value for every light of the light set: of_input(light) for lights of the stage,
   /// of_run(triangles) for the triangle lights of meshes.
   template <typename T, typename OfInput, typename OfRun>
@@ -158,6 +170,8 @@ class Scene {
   std::shared_ptr<const std::vector<uint32_t>> visibility_;
   Camera camera_;
   SceneView view_;
+  std::shared_ptr<const Scene> unmoved_;  ///< before any object was moved; null if none was
+  std::map<std::string, Affine> moves_;   ///< since then
 };
 
 /// Collects the contents of a scene. Ids count from 0 in order of addition.

@@ -63,8 +63,9 @@ struct Instance {
   uint32_t group = 0;
   Affine to_world;
   uint32_t material = kInheritMaterial;
-  uint32_t placement = kNoName;  ///< index into Scene::placements
-  StepRange motion;              ///< range of SceneGeometry::steps
+  /// Index into Scene::placements; kNoName for meshes of the world that edits made an instance.
+  uint32_t placement = kNoName;
+  StepRange motion;  ///< range of SceneGeometry::steps
 };
 
 /// Maximum number of light groups of a stage, including kOtherLights.
@@ -72,7 +73,8 @@ inline constexpr uint32_t kMaxLightGroups = 64;
 /// Name of group 0, for lights without a group.
 inline constexpr const char* kOtherLights = "other";
 
-/// Everything that edits cannot change: shapes and transforms, textures, names.
+/// Everything that edits of materials, lights and the camera cannot change: shapes and transforms,
+/// textures, names. A scene with moved objects has a copy with other instances (scene/moves.h).
 struct SceneGeometry {
   std::vector<Mesh> meshes;
   /// Distinct face materials of each mesh; empty for meshes without face materials.
@@ -93,6 +95,7 @@ struct SceneGeometry {
   float radius = 1;  ///< radius of the bounding sphere
   std::vector<std::string> warnings;
 
+  std::vector<Bounds> mesh_boxes;  ///< mesh_bounds() of each mesh
   std::vector<MeshRecord> mesh_records;
   std::vector<InstanceRecord> instance_records;
   std::vector<uint32_t> geometry_mesh;
@@ -131,6 +134,10 @@ struct SceneGeometry {
     return false;
   }
 };
+
+/// Fills `geometry_mesh`, the instance records, `bounds` and `radius` for the groups and instances
+/// of `geometry`, whose record 0, of the world, keeps its material.
+void place_instances(SceneGeometry& geometry);
 
 /// Materials and their packed form.
 struct SceneMaterials {

@@ -110,24 +110,32 @@ void SceneBuilder::make_records(SceneGeometry& geometry, uint32_t grey) const {
   }
   make_attribute_records(geometry);
   for (const auto& texture : geometry.textures) geometry.texture_views.push_back(texture->view());
+  geometry.mesh_boxes.resize(meshes.size());
+  parallel_for(meshes.size(), [&](size_t m) { geometry.mesh_boxes[m] = mesh_bounds(meshes[m]); });
+  for (const Volume& volume : geometry.volumes)
+    geometry.volume_records.push_back(make_volume_record(volume));
+  geometry.instance_records.push_back(make_instance_record(Affine{}, grey));
+  place_instances(geometry);
+}
 
-  std::vector<uint32_t> first(geometry.groups.size());
-  std::vector<Bounds> bounds(geometry.groups.size());
+void place_instances(SceneGeometry& geometry) {
+  geometry.geometry_mesh.clear();
+  geometry.instance_motions.clear();
+  geometry.instance_records.resize(1);
+  std::vector<uint32_t> first;
+  std::vector<Bounds> boxes(geometry.groups.size());
   for (size_t g = 0; g < geometry.groups.size(); ++g) {
-    first[g] = static_cast<uint32_t>(geometry.geometry_mesh.size());
+    first.push_back(static_cast<uint32_t>(geometry.geometry_mesh.size()));
     const auto& in_group = geometry.groups[g].meshes;
     geometry.geometry_mesh.insert(geometry.geometry_mesh.end(), in_group.begin(), in_group.end());
+    for (const uint32_t mesh : in_group) boxes[g].add(geometry.mesh_boxes[mesh]);
   }
-  parallel_for(geometry.groups.size(), [&](size_t g) {
-    for (uint32_t mesh : geometry.groups[g].meshes) bounds[g].add(mesh_bounds(meshes[mesh]));
-  });
   geometry.instance_records.reserve(geometry.instances.size() + 1);
-  geometry.instance_records.push_back(make_instance_record(Affine{}, grey));
   if (!geometry.steps.empty()) {
     geometry.instance_motions.resize(1);
     for (const Instance& i : geometry.instances) geometry.instance_motions.push_back(i.motion);
   }
-  geometry.bounds = bounds[0];
+  geometry.bounds = boxes[0];
   auto emissive = static_cast<uint32_t>(geometry.groups[0].meshes.size());
   for (const Instance& i : geometry.instances) {
     InstanceRecord r = make_instance_record(i.to_world, i.material);
@@ -135,12 +143,10 @@ void SceneBuilder::make_records(SceneGeometry& geometry, uint32_t grey) const {
     r.emissive = emissive;
     emissive += static_cast<uint32_t>(geometry.groups[i.group].meshes.size());
     geometry.instance_records.push_back(r);
-    add_instance_bounds(geometry.bounds, bounds[i.group], i, geometry.steps);
+    add_instance_bounds(geometry.bounds, boxes[i.group], i, geometry.steps);
   }
-  for (const Volume& volume : geometry.volumes) {
-    geometry.volume_records.push_back(make_volume_record(volume));
+  for (const Volume& volume : geometry.volumes)
     for (const Vec3<float>& corner : volume_corners(volume)) geometry.bounds.add(corner);
-  }
   if (geometry.bounds.empty()) return;
   const Bounds& b = geometry.bounds;
   const Vec3<float> d = b.hi - (b.lo + b.hi) * 0.5f;

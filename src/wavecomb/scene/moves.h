@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Edits that move objects.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "wavecomb/scene/scene.h"
+
+namespace wavecomb {
+
+/// Transforms in world space by prim path, as in SceneEdit::moves.
+using Moves = std::map<std::string, Affine>;
+
+/// Returns the transform of an object: the product of the moves of the prims that it is at or
+/// below, the outermost prim last. Identity if there are none.
+Affine move_of(const Moves& moves, std::string_view object);
+
+/// Returns the geometry of a scene with its objects moved.
+///
+/// Moved meshes of the world become instances, and so do the others, together, so that the next
+/// move does not build their hierarchy again. Meshes keep their ids and arrays. Throws Error for a
+/// singular transform, a path without objects or lights, a part of an instance, and volumes.
+std::shared_ptr<const SceneGeometry> moved_geometry(const Scene& unmoved, const Moves& moves);
+
+}  // namespace wavecomb
