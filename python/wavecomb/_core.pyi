@@ -930,8 +930,8 @@ class Renderer:
         If a mesh starts or stops being partially present, the groups that contain it are rebuilt.
         In that case, and if the shape or position of a light changes, the top level with all meshes
         outside of instances is rebuilt as well. The first move of an object builds a hierarchy of
-        these meshes; later moves rebuild the top level over the instances only. Raises Error for an invalid value, and during a
-        render.
+        these meshes; later moves rebuild the top level over the instances only. Raises Error for an
+        invalid value, and during a render.
         """
     def render(
         self,

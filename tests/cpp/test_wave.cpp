@@ -92,9 +92,8 @@ ScenePtr under_point_lights() {
   return b.build();
 }
 
-// The sample of a light brings its probability along. A second descent of the tree by the light's
-// trail costs as much as the first. Bounces do not hit point lights, so no vertex needs a trail,
-// and wrong trails must not change a bit.
+// A light sample includes its selection probability, so the tree is not descended again by the
+// light's trail. Bounces do not hit point lights, so wrong trails must not change the image.
 TEST(Wave, LightSamplesDescendTheTreeOnce) {
   Settings s = small_settings();
   s.light_selection = LightSelection::kTree;
