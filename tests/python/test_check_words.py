@@ -48,6 +48,8 @@ def test_this_tree_is_clean_in_five_seconds() -> None:
         ("python/wavecomb/a.py", '"""Docs.\n\nMends a stage."""\n', ':3: "Mends": write fix'),
         ("python/wavecomb/a.py", "x = 1  # the dearest one\n", '"dearest": write expensive'),
         ("python/wavecomb/a.py", 'o(help="A lamp "\n  "or sun.")\n', '"lamp": write light'),
+        ("python/wavecomb/a.py", 'option("--a", "flag", "A lamp in use.")\n', '"lamp"'),
+        ("python/wavecomb/a.py", '_row(\n  None, "A lamp in use.", "text")\n', ':2: "lamp"'),
         ("src/wavecomb/core/s_table.cpp", 'row("a", "The lamp in use.")\n', '"lamp"'),
         ("Makefile", "# What is asked for.\n", '"What is asked for.": name the subject'),
         ("tests/python/test_a.py", "def f():\n    # Who dies.\n", ":2: "),
@@ -133,6 +135,32 @@ def test_a_sample_is_sixty_sentences_and_the_same_again() -> None:
     assert first.returncode == 0 and len(first.stdout.splitlines()) == 60
     assert first.stdout == run(ROOT, "--sample", "7").stdout
     assert first.stdout != run(ROOT, "--sample", "8").stdout
+
+
+def test_entries_of_sections_are_sentences_and_code_is_none(tmp_path: pathlib.Path) -> None:
+    doc = '''"""Do a thing.
+
+Args:
+    one: The first
+        of all numbers. It is even.
+    two: Another one of these.
+
+    tool --option FILE that writes code
+
+- The first item of a list.
+- The second item of a list.
+
+>>> code(that is not any prose)
+"""
+'''
+    root = tree(tmp_path, {"python/wavecomb/a.py": doc})
+    lines = run(root, "--sample", "1").stdout.splitlines()
+    assert {line.partition("wavecomb/")[2] for line in lines if "a.py" in line} == {
+        "a.py:4: one: The first of all numbers.",
+        "a.py:6: two: Another one of these.",
+        "a.py:10: The first item of a list.",
+        "a.py:11: The second item of a list.",
+    }
 
 
 def test_words_are_counted_by_page(tmp_path: pathlib.Path) -> None:

@@ -181,7 +181,8 @@ class SettingCommand(cloup.Command):
         self.params.append(
             click.Option(
                 ["--help-all"], is_flag=True, is_eager=True, expose_value=False,
-                callback=_show_all, hidden=True, help="Show all options and examples.",
+                callback=_show_all, hidden=True,
+                help="Show all options of the command and all examples.",
             )
         )  # fmt: skip
 

@@ -210,6 +210,6 @@ TILE = click.option(
     "--tile",
     "part",
     metavar="I/N",
-    help="Render tile I of N only, to NAME.tile-I-of-N.exr; `wavecomb farm assemble NAME.exr` "
-    "joins the tiles.",
+    help="Render only tile I of N, to NAME.tile-I-of-N.exr, for `wavecomb farm assemble "
+    "NAME.exr` to join.",
 )
