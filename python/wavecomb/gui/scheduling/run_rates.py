@@ -158,7 +158,8 @@ def compare_runs(run: Run, base: Run) -> Ratio:
     ends = [samples * k / n for k in range(n + 1)]
     mine = [time_of(run, b) - time_of(run, a) for a, b in pairwise(ends)]
     theirs = [time_of(base, b) - time_of(base, a) for a, b in pairwise(ends)]
-    # The estimator is sum(theirs) / sum(mine). Its variance is the one of theirs - value * mine.
+    # The estimator is sum(theirs) / sum(mine). The variance of the ratio is that of theirs - value
+    # * mine.
     rest = [b - value * a for a, b in zip(mine, theirs, strict=True)]
     error = math.sqrt(sum(r * r for r in rest) * n / (n - 1)) / sum(mine)
     half = t975(n - 1) * error / value

@@ -25,8 +25,8 @@ struct TrainingSamples {
 
 /// Cost model in units of one ray traced through a BVH.
 struct PathCosts {
-  double ray = 1;                         ///< of a bounce ray or a shadow ray
-  double lookup = 0;                      ///< of a guiding field lookup at a vertex
+  double ray = 1;                         ///< cost of a bounce ray or a shadow ray
+  double lookup = 0;                      ///< cost of a guiding field lookup at a vertex
   const CostSnapshot* shading = nullptr;  ///< costs of materials
 
   /// Returns the cost of a vertex with its light sample.
