@@ -239,8 +239,8 @@ class SceneBuilder:
         rotation (turns), transmission_weight, transmission_color, transmission_depth,
         subsurface_weight, subsurface_color, subsurface_radius (mean free paths; 0 means diffuse),
         subsurface_anisotropy, fuzz_weight, fuzz_color, fuzz_roughness, coat_color, coat_ior,
-        coat_darkening, film_weight, film_thickness (nanometres), film_ior, thin_walled. Its coat
-        uses clearcoat and clearcoat_roughness.
+        coat_darkening, film_weight, film_thickness (nanometres), film_ior, thin_walled. The coat of
+        openpbr uses clearcoat and clearcoat_roughness.
         """
     def add_mesh(
         self,
@@ -303,7 +303,7 @@ class SceneBuilder:
     ) -> None:
         """Replaces the arrays of a mesh, in the form of add_mesh.
 
-        Its name and groups are unchanged.
+        The name and groups of the mesh are unchanged.
         """
     def make_surfaces(
         self, descriptions: list[dict[str, Any]], threads: int = 0
@@ -820,7 +820,8 @@ class Result:
         """
     @property
     def variance(self) -> NDArray[np.float32] | None:
-        """(height, width, 3) variance of each pixel's mean. None in the same cases as ``error``."""
+        """(height, width, 3) variance of each pixel's mean. The array is None in the same cases as
+        ``error``."""
     @property
     def cancelled(self) -> bool: ...
     @property
@@ -834,7 +835,8 @@ class Result:
         """Plain ints, floats, strings, lists and dicts; docs/statistics.md has the keys."""
 
 class Snapshot:
-    """State of a paused render, valid only during Watcher.snapshot(). Later it raises Error."""
+    """State of a paused render, valid only during Watcher.snapshot(). After the call returns, any
+    use raises Error."""
 
     @property
     def finished(self) -> bool:
@@ -956,7 +958,7 @@ class Renderer:
     def stop(self) -> None:
         """Stops the current render within one wave; render() then returns the finished samples.
 
-        Without a render it does nothing.
+        Without a running render the call has no effect.
         """
     def twin(self) -> Renderer:
         """Returns another renderer of the scene with separate edits.

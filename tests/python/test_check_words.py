@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import pathlib
 import shutil
@@ -137,30 +138,30 @@ def test_a_sample_is_sixty_sentences_and_the_same_again() -> None:
     assert first.stdout != run(ROOT, "--sample", "8").stdout
 
 
-def test_entries_of_sections_are_sentences_and_code_is_none(tmp_path: pathlib.Path) -> None:
-    doc = '''"""Do a thing.
+def test_entries_of_sections_are_items_and_code_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "tools" / "words"))
+    docstring_blocks = importlib.import_module("prose").docstring_blocks
+    text = """Does a thing.
+
+    tool --option FILE    # code
 
 Args:
     one: The first
-        of all numbers. It is even.
-    two: Another one of these.
+        number. It is even.
+    two: Another one.
 
-    tool --option FILE that writes code
+- An item.
+- Another item.
 
-- The first item of a list.
-- The second item of a list.
-
->>> code(that is not any prose)
+>>> code()
 """
-'''
-    root = tree(tmp_path, {"python/wavecomb/a.py": doc})
-    lines = run(root, "--sample", "1").stdout.splitlines()
-    assert {line.partition("wavecomb/")[2] for line in lines if "a.py" in line} == {
-        "a.py:4: one: The first of all numbers.",
-        "a.py:6: two: Another one of these.",
-        "a.py:10: The first item of a list.",
-        "a.py:11: The second item of a list.",
-    }
+    assert list(docstring_blocks(text)) == [
+        (0, "Does a thing."),
+        (5, "one: The first number. It is even."),
+        (7, "two: Another one."),
+        (9, "An item."),
+        (10, "Another item."),
+    ]
 
 
 def test_words_are_counted_by_page(tmp_path: pathlib.Path) -> None:

@@ -103,8 +103,8 @@ def run_command(
 ) -> None:
     """Run SUITE, a name from `wavecomb bench list` or a TOML file.
 
-    Each run is a separate process, pinned to its cores. Results are written to DIR after each run.
-    After Ctrl-C, SIGTERM or a kill, --resume continues.
+    Each run of the suite is a separate process, pinned to its cores. Results are written to DIR
+    after each run. After Ctrl-C, SIGTERM or a kill, --resume continues.
     """
     from wavecomb.bench.results import ResultFolder
     from wavecomb.bench.runner import Options, Sitting

@@ -126,7 +126,8 @@ def status_command(job: str, maps: tuple[str, ...], as_json: bool) -> None:
 def task_command(job: str, image: int, tile: str, maps: tuple[str, ...]) -> None:
     """Render one tile of JOB in this process, unless it is finished.
 
-    For sites whose own queue starts the tasks. `wavecomb farm assemble JOB` joins the tiles.
+    This command is for sites whose own queue starts the tasks. `wavecomb farm assemble JOB` joins
+    the tiles.
     """
     from wavecomb.farm.api import render_task
 

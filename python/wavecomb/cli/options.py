@@ -76,8 +76,8 @@ def isolate_option(command: F) -> F:
         envvar="WAVECOMB_SANDBOX",
         expose_value=False,
         callback=_ask_sandbox,
-        help="Sandbox the child process with bubblewrap: no network, only outputs are writable; `on` "
-        "fails if that is impossible.  [default: auto, if possible]",
+        help="Sandbox the child process with bubblewrap: no network, only outputs are writable; "
+        "`on` fails if that is impossible.  [default: auto, if possible]",
     )(command)
     command = click.option(
         "--memory-limit",

@@ -44,7 +44,7 @@ def _is_history(event: Any) -> bool:
 class _Spin(QDoubleSpinBox):
     """Number field that emits changes while typing and uses a point as decimal mark.
 
-    It leaves undo and redo to the window and has no undo history.
+    The field leaves undo and redo to the window and has no undo history.
 
     Signals:
         typing(bool): The user began (True) or finished typing a value.

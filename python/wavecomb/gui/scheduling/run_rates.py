@@ -61,7 +61,8 @@ class Ratio:
     high: float
     """End of a 95 % interval that begins at ``low``; 0 and infinity if it is unknown."""
     repeats: int
-    """Number of pairs of runs. With 1, the interval is over one pair and does not cover drift."""
+    """Number of pairs of runs. With one pair of runs, the interval does not cover drift of the
+    machine."""
     short: bool = False
 
     @property
@@ -118,7 +119,7 @@ def rate(run: Run, counter: str) -> Rate:
 def rate_of(series: Series, counter: str) -> Rate:
     """Returns the rate over all finished runs of a series.
 
-    With several, its spread is over runs.
+    With several runs, the interval covers the spread between runs.
     """
     runs = _whole(series.runs)
     if len(runs) == 1:

@@ -51,7 +51,7 @@ struct TrainingPlan {
 /// Contract: workers may call ended() concurrently, each for different paths.
 class BounceReader final : public HistoryReader {
  public:
-  /// Most vertices of a path that become training samples.
+  /// Maximum number of vertices of a path that become training samples.
   static constexpr uint32_t kVertices = 6;
 
   /// `pixels` and `plan` must outlive the reader.
