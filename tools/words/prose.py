@@ -102,8 +102,8 @@ def helps(name: str, text: str) -> Iterator[Text]:
 
 
 def plain(markdown: str) -> str:
-    """A paragraph without links and tags."""
-    return " ".join(LINK.sub(r"\1", re.sub(r"<[^>]+>", "", markdown)).split())
+    """A paragraph without links, and without tags outside of code."""
+    return " ".join(LINK.sub(r"\1", re.sub(r"(`[^`]*`)|<[^>]+>", r"\1", markdown)).split())
 
 
 def prose_lines(text: str) -> Iterator[tuple[int, str]]:
