@@ -2,10 +2,10 @@
 /// A path tracer for tests that is simple enough to be obviously correct.
 ///
 /// It shares with production all functions without random decisions: ray intersection, shading
-/// points, f |cos| of BSDFs, emission of lights and surfaces along a ray, and light linking. It
-/// shares no sampling. Directions are uniform over the sphere (over the hemisphere for opaque
-/// programs), there is no light sampling and hence no MIS, no Russian roulette, and the random
-/// number generator is a separate one.
+/// points, f |cos| of BSDFs, emission of lights and surfaces along a ray, and light linking. The
+/// naive integrator shares no sampling with production. Directions are uniform over the sphere
+/// (over the hemisphere for opaque programs), there is no light sampling and hence no MIS, no
+/// Russian roulette, and the random number generator is a separate one.
 ///
 ///   L(x, wo) = Le + sum over delta lobes c L(x', wi)                    (each followed)
 ///                 + (2 or 4) pi / n sum over n uniform wi f |cos| L(x', wi)
@@ -30,7 +30,7 @@ namespace wavecomb {
 
 struct NaiveSettings {
   uint32_t width = 16, height = 16;
-  uint32_t samples = 16;    ///< per pixel, uniform over the pixel
+  uint32_t samples = 16;    ///< samples per pixel, uniform over the pixel
   uint32_t max_depth = 1;   ///< same as Settings::max_depth
   uint32_t directions = 1;  ///< uniform directions at the first vertex; one at later vertices
   /// Random numbers used to find delta lobes; 0 for scenes without delta lobes.

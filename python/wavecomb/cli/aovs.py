@@ -57,7 +57,7 @@ def file_options(command: F) -> F:
             "--split-aovs",
             "split",
             is_flag=True,
-            help="Write a file FILE.NAME.exr for each AOV; the beauty is in FILE.exr.",
+            help="Write each AOV to a separate file FILE.NAME.exr, and the beauty to FILE.exr.",
         ),
         click.option(
             "--exr-tile",
@@ -65,14 +65,15 @@ def file_options(command: F) -> F:
             type=click.IntRange(min=0),
             default=0,
             metavar="N",
-            help="Write the EXR in tiles of N x N pixels, a multiple of 16.  [default: scanlines]",
+            help="Write the EXR in tiles of N x N pixels, with N a multiple of 16.  [default: "
+            "scanlines]",
         ),
         click.option(
             "--compression",
             type=click.Choice(_COMPRESSIONS),
             default="zip",
             show_default=True,
-            help="Compression of the EXR.",
+            help="Compression of the EXR file.",
         ),
         click.option("--half", is_flag=True, help="Store colours and normals as 16-bit floats."),
     ):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rendering single tiles with ``wavecomb render --tile``, for sites with their own job queue.
 
-Also converts the options of ``render`` to a farm job.
+This module also converts the options of ``render`` to a farm job.
 """
 
 from __future__ import annotations
@@ -210,6 +210,6 @@ TILE = click.option(
     "--tile",
     "part",
     metavar="I/N",
-    help="Render tile I of N only, to NAME.tile-I-of-N.exr; `wavecomb farm assemble NAME.exr` "
-    "joins the tiles.",
+    help="Render only tile I of N, to NAME.tile-I-of-N.exr, for `wavecomb farm assemble "
+    "NAME.exr` to join.",
 )

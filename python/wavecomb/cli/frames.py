@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 frame_options = add_options(
     option(
         "--frames RANGE", "text",
-        "Frames to render, such as 1-48, 1-48x2 or 1,5,9. File names need a placeholder: "
+        "Frames to render, such as 1-48, 1-48x2 or 1,5,9; file names need a placeholder, as in "
         "shot.####.exr, shot.%04d.exr, shot.$F4.exr or shot.<frame>.exr.",
     ),
-    option("--skip-existing", "flag", "With --frames: skip frames whose files exist."),
+    option("--skip-existing", "flag", "With --frames, skip frames whose files already exist."),
 )  # fmt: skip
 """Options --frames and --skip-existing."""
 

@@ -62,7 +62,8 @@ class Plan:
     def aovs(self, layers: AovOptions, before: Sequence[str] | None) -> tuple[str, ...]:
         """Returns the AOVs to render.
 
-        They come from the options, else from the resumed render, else from the render product.
+        The AOVs come from the options, else from the resumed render, else from the render
+        product.
         """
         if layers.aovs:
             return layers.names

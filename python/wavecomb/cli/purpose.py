@@ -21,7 +21,7 @@ UNLIMITED_SPP = 1 << 20
 purpose_options = add_options(
     option(
         "--adaptive X", "positive",
-        "Sample pixels until their relative error is below X (0.02 is a good value).",
+        "Sample each pixel until its relative error is below X (0.02 is a good value).",
     ),
     option(
         "--noise X", "positive",
@@ -31,7 +31,10 @@ purpose_options = add_options(
         "--min-spp N", "count",
         "Samples per pixel before the first error estimate of adaptive renders.  [default: 16]",
     ),
-    option("--max-spp N", "count", "Most samples per pixel in adaptive renders.  [default: 1024]"),
+    option(
+        "--max-spp N", "count",
+        "Maximum number of samples per pixel in adaptive renders.  [default: 1024]",
+    ),
     option(
         "--time-limit S", "positive",
         "Stop after S seconds of rendering, or earlier at --spp if given.",
@@ -40,19 +43,20 @@ purpose_options = add_options(
         "--checkpoint FILE", "path",
         "Save the state of the render regularly, and on Ctrl-C and SIGTERM.",
     ),
-    option("--every S", "positive", "Seconds between checkpoints.  [default: 120]"),
+    option("--every S", "positive", "Interval between checkpoints in seconds.  [default: 120]"),
     option(
         "--resume FILE", "path",
         "Continue from a checkpoint, and save to it unless --checkpoint is given.",
     ),
-    option("--preview FILE.png", "path", "Write an image of the render in progress."),
-    option("--preview-every S", "positive", "Seconds between previews.  [default: 10]"),
+    option("--preview FILE.png", "path", "Regularly write an image of the render in progress."),
+    option("--preview-every S", "positive", "Interval between previews in seconds.  [default: 10]"),
     option(
         "--denoise", "flag", "Add a denoised layer, which PNGs then show (extra 'denoise')."
     ),
     option(
         "--progress", click.Choice(["bar", "json", "off"]),
-        "Progress display; json prints a line per second on standard output.  [default: bar]",
+        "How progress is shown; json prints one line per second on standard output.  [default: "
+        "bar]",
     ),
 )  # fmt: skip
 """--adaptive, --noise, --time-limit, --checkpoint, --resume, --preview, --denoise ..."""

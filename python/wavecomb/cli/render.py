@@ -25,26 +25,28 @@ from wavecomb.run.guiding_file import save_learned
 picture_options = add_options(
     option(
         "-o --output FILE.exr|.png", "path",
-        "Image with all layers, or only a PNG.  [default: the productName of render products]",
+        "Image file to write: an EXR with all layers, or only a PNG.  [default: the productName "
+        "of render products]",
     ),
     option(
         "--output-dir DIR", "path",
-        "Folder that relative productNames start from and must stay in.  "
+        "Folder for render products with relative productNames, which must stay inside it.  "
         "[default: the working folder]",
     ),
     aov_options,
-    option("--png FILE.png", "path", "Also write an image for display."),
+    option("--png FILE.png", "path", "Also write a PNG for display."),
     option(
-        "--deep FILE.exr", "path", "Also write colour and alpha by depth (docs/deep.md)."
+        "--deep FILE.exr", "path",
+        "Also write a deep EXR with colour and alpha by depth (docs/deep.md).",
     ),
     option(
-        "--stats FILE.json", "path", "Also write statistics (docs/statistics.md).",
+        "--stats FILE.json", "path", "Also write statistics of the render (docs/statistics.md).",
         name="stats_file",
     ),
     option(
         "--size WxH|N%", SizeType(),
-        "Image size in pixels, such as 640x360, or a part of the stage's.  "
-        "[default: of the render settings, else 600x600]",
+        "Image size in pixels, such as 640x360, or in percent of the stage's.  [default: of the "
+        "render settings, else 600x600]",
     ),
     option(
         "--region X0 Y0 X1 Y1", click.INT,
@@ -53,42 +55,47 @@ picture_options = add_options(
     ),
     option(
         "--spp N", click.INT,
-        "Samples per pixel; the most of them with --adaptive or --noise.  [default: 64]",
+        "Samples per pixel, or their maximum with --adaptive or --noise.  [default: 64]",
     ),
     purpose_options,
     setting_options(),
     option(
         "--costs auto|measured|model|FILE.json", "text",
-        "Source of scheduling costs. A file is read if it exists, and written at the end.  "
-        "[default: auto]",
+        "Source of material costs for scheduling; FILE.json is read if it exists, and written at "
+        "the end.  [default: auto]",
     ),
     option(
         "--learn-from FILE|before", "text",
-        "Use the guiding data of another render instead of training; before: each of --frames "
-        "uses the data of the previous frame.",
+        "Use the guiding data of another render instead of training; with `before` each of "
+        "--frames uses those of the previous frame.",
     ),
     option(
         "--learn-to FILE.learned", "path", "Save the guiding data of this render for --learn-from."
     ),
     option(
         "--film-memory MB", "positive",
-        "Memory for an image, in MB; a larger one is rendered in bands of rows.  "
+        "Memory limit of the image in MB; a larger image is rendered in bands of rows.  "
         "[default: half of the machine's memory]",
     ),
     option("--exposure EV", "number", "Exposure of the PNG, in stops.  [default: 0]", default=0.0),
     option(
         "--tone-map", click.Choice(["clamp", "neutral"]),
-        "Tone mapping of the PNG: clip, or roll off highlights.  [default: clamp]", default="clamp",
+        "Tone mapping of the PNG: clamp clips at 1, neutral rolls off highlights.  [default: "
+        "clamp]", default="clamp",
     ),
     option(
         "--ocio-view NAME", "text",
         "Show the PNG and previews through a view of $OCIO, such as AgX or an ACES view.",
     ),
     option(
-        "--ocio-display NAME", "text", "Display of --ocio-view.  [default: an sRGB screen]"
+        "--ocio-display NAME", "text",
+        "OpenColorIO display of --ocio-view.  [default: an sRGB screen]",
     ),
     option("--quiet", "flag", "Print only warnings and errors."),
-    option("--verbose", "flag", "Also print phases, materials and predictions at the end."),
+    option(
+        "--verbose", "flag",
+        "Also print times of phases, materials and predicted costs at the end.",
+    ),
 )  # fmt: skip
 """Image, duration and files: options of all commands that render images."""
 

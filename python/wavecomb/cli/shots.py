@@ -78,7 +78,7 @@ class Still:
 
 
 class FrameShot:
-    """One frame of a stage that stays open."""
+    """A frame of a stage that stays open between frames."""
 
     def __init__(self, frames: Frames, frame: float | None, **options: Any) -> None:
         """Creates the source. ``options`` are arguments of ``Frames.load``."""

@@ -67,7 +67,7 @@ struct RenderPlan {
   Region window;  ///< pixels of the film
   LightSplatFilter
       light_splat_filter;  ///< pixel filter of connections from light paths to the camera
-  SceneView view;          ///< with the light tree, if lights are selected by it
+  SceneView view;          ///< has the light tree if lights are selected by it
   /// Names of the lights that send no paths, if others do.
   std::vector<std::string> lights_without_paths;
 

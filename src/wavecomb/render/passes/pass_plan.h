@@ -34,7 +34,7 @@ struct SampleAllocation {
 struct PassState {
   uint32_t target = 0;            ///< samples of each active pixel after the pass, or their mean
   uint32_t light_target = 0;      ///< samples of each light path after the pass
-  std::vector<uint8_t> active{};  ///< by pixel, row by row: 1 if active; empty if all are
+  std::vector<uint8_t> active{};  ///< indexed by pixel, row by row: 1 if active; empty if all are
   SampleAllocation allocation{};
 
   bool is_active(size_t pixel) const { return active.empty() || active[pixel] != 0; }
@@ -46,7 +46,7 @@ struct PassRules {
   uint32_t min_spp = 0;  ///< adaptive: samples before the first error check
   bool adaptive = false;
   bool timed = false;        ///< the render has a time limit
-  uint32_t step = 16;        ///< not adaptive: samples that a pass adds
+  uint32_t step = 16;        ///< samples that a pass adds if not adaptive
   bool progressive = false;  ///< sample counts double from one sample on
   uint32_t pilot = 0;        ///< a pass ends at this sample count; 0 if pixels are sampled evenly
 };

@@ -29,7 +29,7 @@ struct MaterialStatistics {
   uint64_t records = 0;  ///< shading records
   uint64_t timed_records = 0;
   double measured_ns = 0;    ///< mean of the timed records; 0 if none was timed
-  double calibrated_ns = 0;  ///< before the first pass
+  double calibrated_ns = 0;  ///< cost before the first pass
   double predicted_ns = 0;   ///< cost that the next pass would be scheduled by
 };
 
@@ -67,7 +67,7 @@ struct RenderStatistics {
   uint32_t threads = 0, wave_size = 0, lanes = 0;
   uint32_t passes = 0;  ///< begun
   WorkDistribution sharing;
-  uint64_t resumed_samples = 0;  ///< from a checkpoint; not in `samples`
+  uint64_t resumed_samples = 0;  ///< samples from a checkpoint; not in `samples`
   double error = 0;              ///< mean relative error of the image; infinite if unknown
   SceneBytes scene_bytes;
   uint64_t accelerator_bytes = 0, wave_bytes = 0, film_bytes = 0, peak_rss_bytes = 0;
@@ -86,7 +86,7 @@ struct RenderStatistics {
   AimStatistics light_aiming;
   std::vector<std::string> lights_without_paths;  ///< names, if other lights send light paths
   std::optional<TransportChoice> transport;       ///< for Transport::kAuto
-  std::optional<StoreStatistics> texture_store;   ///< if texture memory has a limit
+  std::optional<StoreStatistics> texture_store;   ///< set if texture memory has a limit
 };
 
 /// Adds up the counters of the workers, by phase, depth, policy and material, into `statistics`.
