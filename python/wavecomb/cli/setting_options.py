@@ -140,6 +140,9 @@ class Percent:
         width, height = (max(1, round(edge * self.value / 100.0)) for edge in size)
         return width, height
 
+    def __str__(self) -> str:
+        return f"{self.value!r}%"
+
 
 ImageSize = tuple[int, int] | Percent
 

@@ -18,7 +18,7 @@ from wavecomb.cli.farm.tiles import check_options, job_of
 from wavecomb.cli.options import examples, isolation_options, stage_options
 from wavecomb.cli.render_options import RenderOptions, render_options
 from wavecomb.cli.sandbox import enter_to_read, enter_to_render
-from wavecomb.cli.setting_options import Real
+from wavecomb.cli.setting_options import Real, SizeType
 from wavecomb.errors import WavecombError
 
 _PLAN_S = 4 * 3600.0
@@ -124,7 +124,9 @@ def ask_plan(request: dict[str, Any]) -> dict[str, Any]:
     Raises:
         WavecombError: The child reported an error, or did not finish in time.
     """
-    words = processes.command("wavecomb", "farm", "plan", json.dumps(request), parent=0)
+    words = processes.command(
+        "wavecomb", "farm", "plan", json.dumps(request, default=str), parent=0
+    )
     process = processes.popen(
         words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
@@ -164,6 +166,8 @@ def plan_command(text: str) -> None:
         name: request.pop(name)
         for name in ("tiles", "tries", "hang_s", "strict", "maps", "isa", "workers")
     }
+    if isinstance(request["size"], str):
+        request["size"] = SizeType().convert(request["size"], None, None)
     options = RenderOptions.parse(request)
     enter_to_render(options, gpu=False)
     from wavecomb.cli.planning import prepare
