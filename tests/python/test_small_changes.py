@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What it takes to add a program, a light, a setting, an AOV: files, and whether they compile.
+"""Files to edit for a program, a light, a setting, an AOV or a transport, and that they compile.
 
 Each example edits a copy of the sources as the pages of docs/ describe it. Lists and tables made
 by hand anywhere else would make the number of files grow, or the edited tree not compile.
@@ -20,8 +20,8 @@ from parts import not_here
 ROOT = Path(__file__).resolve().parents[2]
 CORE = "src/wavecomb"
 
-Change = dict[str, tuple[str, str]]
-"""File -> text in it, and what replaces the text; "" for a new file."""
+Change = dict[str, tuple[str, ...]]
+"""File -> texts in it, each followed by its replacement; "" for a new file."""
 
 
 def header(name: str) -> str:
@@ -191,6 +191,47 @@ OF_TECHNIQUE = aov(
 )
 
 
+# A longest connection.
+OF_LIGHT_PATHS: Change = {
+    f"{CORE}/core/settings.h": (
+        "  float merge_radius = 0;\n",
+        "  float merge_radius = 0;\n  float longest_connection = 0;  ///< 0 means no limit\n",
+    ),
+    f"{CORE}/core/settings_table.cpp": (
+        '      number<&S::seed>("seed"',
+        '      number<&S::longest_connection>("longest_connection", "Longest", 0, 1e30,\n'
+        '                                     "Length of the longest connection.", "any"),\n'
+        '      number<&S::seed>("seed"',
+    ),
+    f"{CORE}/light_paths/context.h": (
+        "        connects(settings.connects()),\n",
+        "        connects(settings.connects()),\n"
+        "        longest2(settings.longest_connection > 0\n"
+        "                     ? settings.longest_connection * settings.longest_connection\n"
+        "                     : kInfinity),\n",
+        "  float share = 1;",
+        "  float longest2 = kInfinity;\n  float share = 1;",
+    ),
+    f"{CORE}/light_paths/coupling.h": (
+        "      if (context_.connects) [[unlikely]]\n        offer_connection(c, joint_, offer_);\n",
+        "      if (context_.connects) [[unlikely]] {\n"
+        "        offer_connection(c, joint_, offer_);\n"
+        "        const F d2 = length_squared(offer_.to - c.at.s.p);\n"
+        "        Color<F>& l = offer_.row.light;\n"
+        "        l = select<F>(d2 <= context_.longest2, l, Color<F>(F(0.f)));\n"
+        "      }\n",
+    ),
+}  # fmt: skip
+USES_TRANSPORT = """#include "wavecomb/light_paths/coupling.h"
+#include "wavecomb/material/programs/diffuse.h"
+#include "wavecomb/path/vertex.h"
+namespace wavecomb {
+template VertexResult<float> shade_vertex<DiffuseBsdf<float>, float, kEverything, CLASS>(
+    const Vertex<float>&, CLASS::Coupling<float>&);
+}
+"""
+
+
 @pytest.fixture(scope="module")
 def compiler() -> list[str]:
     """The command that checks a file as the library is compiled, without the folder of includes."""
@@ -211,16 +252,17 @@ def compiler() -> list[str]:
 
 def applied(tree: Path, change: Change) -> None:
     """Makes a copy of the core with a change."""
-    shutil.copytree(ROOT / "src", tree / "src")
-    for name, (before, after) in change.items():
+    shutil.copytree(ROOT / "src", tree / "src", dirs_exist_ok=True)
+    for name, texts in change.items():
         path = tree / name
-        if before:
-            text = path.read_text("utf-8")
-            assert text.count(before) == 1, name
-            after = text.replace(before, after)
-        else:
-            assert not path.exists()
-        path.write_text(after, "utf-8")
+        for before, after in zip(texts[::2], texts[1::2], strict=True):
+            if before:
+                text = path.read_text("utf-8")
+                assert text.count(before) == 1, name
+                after = text.replace(before, after)
+            else:
+                assert not path.exists()
+            path.write_text(after, "utf-8")
 
 
 def compiled(
@@ -292,4 +334,26 @@ def test_an_aov(tmp_path: Path, compiler: list[str], change: Change) -> None:
     assert len(change) <= 2
     applied(tmp_path, change)
     done = compiled(tmp_path, compiler, "path_aovs.cpp")
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.slow
+def test_a_parameter_of_light_paths(tmp_path: Path, compiler: list[str]) -> None:
+    assert len(OF_LIGHT_PATHS) <= 6
+    applied(tmp_path, OF_LIGHT_PATHS)
+    done = compiled(tmp_path, compiler, text=USES_TRANSPORT.replace("CLASS", "LightPaths"))
+    assert done.returncode == 0, done.stderr
+    done = compiled(tmp_path, compiler, "settings_table.cpp")
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.slow
+def test_a_transport(tmp_path: Path, compiler: list[str]) -> None:
+    """The example of docs/writing-a-transport.md: vertex steps take its class."""
+    file = f"{CORE}/vertex_counts/vertex_counts.h"
+    (tmp_path / file).parent.mkdir(parents=True)
+    applied(tmp_path, {file: ("", page("writing-a-transport")[0])})
+    text = USES_TRANSPORT.replace("CLASS", "VertexCounts")
+    text = text.replace("light_paths/coupling.h", "vertex_counts/vertex_counts.h")
+    done = compiled(tmp_path, compiler, text=text)
     assert done.returncode == 0, done.stderr

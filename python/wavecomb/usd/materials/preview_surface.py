@@ -51,13 +51,8 @@ INPUTS: dict[str, tuple[str, Any]] = {
 }
 """Input of UsdPreviewSurface -> parameter of a program and its default."""
 
-_UNIT = (
-    "roughness",
-    "metallic",
-    "clearcoat",
-    "clearcoat_roughness",
-    "opacity",
-    "opacity_threshold",
+_UNIT = frozenset(
+    "roughness metallic clearcoat clearcoat_roughness opacity opacity_threshold".split()
 )
 
 _WRAP_INPUTS = ("wrapS", "wrapT")
