@@ -52,7 +52,7 @@ INPUTS: dict[str, tuple[str, Any]] = {
 """Input of UsdPreviewSurface -> parameter of a program and its default."""
 
 _UNIT = frozenset(
-    "roughness metallic clearcoat clearcoat_roughness opacity opacity_threshold".split()
+    ("roughness", "metallic", "clearcoat", "clearcoat_roughness", "opacity", "opacity_threshold")
 )
 
 _WRAP_INPUTS = ("wrapS", "wrapT")
