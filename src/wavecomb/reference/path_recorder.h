@@ -22,7 +22,7 @@ class PathRecorder {
 
   PathRecorder(const WaveContext& context, ReferenceWorker& worker)
       : context_(context),
-        settings_(camera_shade_settings(context)),
+        settings_(*context.settings),
         counts_(worker.counts),
         rays_(context, worker.counts, worker.aovs),
         aovs_(worker.aovs),
