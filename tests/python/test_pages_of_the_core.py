@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[2]
 CORE = ROOT / "src" / "wavecomb"
 PAGES = (
     *("how-a-wave-works", "writing-a-material", "writing-a-light", "writing-an-aov"),
-    "writing-a-policy",
+    *("writing-a-policy", "writing-a-transport"),
 )
 MADE_UP = {
     *("Minnaert", "minnaert", "Ring", "RingKind", "kRoughness", "ExpensiveFirst", "kMinnaert"),

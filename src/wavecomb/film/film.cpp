@@ -38,7 +38,7 @@ void Film::update_splat_aovs() {
   if (splats_.empty()) return;
   aovs_.set_light_splat_scale(splats_.scale());
   for (size_t i = 0; i < pixels_.size(); ++i) {
-    double* sums = aovs_.sums(Aov::kByLightPaths, i);
+    double* sums = aovs_.sums(kSplatAov, i);
     if (!sums) return;
     const std::array<double, 3> mean = splats_.mean(i);
     for (size_t c = 0; c < 3; ++c) sums[c] = mean[c] * pixels_[i].samples;
