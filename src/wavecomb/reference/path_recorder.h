@@ -10,7 +10,7 @@
 #include "wavecomb/path/path_history.h"
 #include "wavecomb/path/steps/emit.h"
 #include "wavecomb/path/steps/escape.h"
-#include "wavecomb/reference/reference.h"
+#include "wavecomb/reference/reference_worker.h"
 #include "wavecomb/reference/single_rays.h"
 
 namespace wavecomb {
