@@ -18,8 +18,8 @@ class LightPathCoupling {
   LightPathCoupling(const LightPathContext& context, const LightPathBuffers& buffers)
       : context_(context), buffers_(buffers) {}
 
-  void load(const UInt<F>& slot, uint32_t depth, uint32_t max_depth, const Mask<F>& active,
-            PathState<F>& state) {
+  WAVECOMB_INLINE void load(const UInt<F>& slot, uint32_t depth, uint32_t max_depth,
+                            const Mask<F>& active, PathState<F>& state) {
     if (!context_.is_active()) [[likely]]
       return;
     const F word = gather<F>(buffers_.ratios, slot, active);
@@ -83,8 +83,8 @@ class LightPathCoupling {
         next.ratio = next_ratio(c, joint_, context_.merge_scale > 0.f, world, b, awaits_merge_);
   }
 
-  void store(const UInt<F>& slot, const PathState<F>& next, const Mask<F>& alive,
-             const PathAovs& aovs, const Mask<F>& active) const {
+  WAVECOMB_INLINE void store(const UInt<F>& slot, const PathState<F>& next, const Mask<F>& alive,
+                             const PathAovs& aovs, const Mask<F>& active) const {
     if (!context_.is_active()) [[likely]]
       return;
     scatter<F>(buffers_.ratios, select(awaits_merge_, F(-1.f), next.ratio), slot, alive);
