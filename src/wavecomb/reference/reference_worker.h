@@ -30,7 +30,7 @@ struct ReferenceWorker {
   LightVertices light_vertices;
   MergePointRows visible;
   LightPathAovs light_aovs;
-  SoaBlock walks;  ///< of subsurface random walks
+  SoaBlock walks;  ///< states of subsurface random walks
   NestedMediaBuffers nested_media;
 };
 

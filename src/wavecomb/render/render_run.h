@@ -26,10 +26,10 @@ namespace wavecomb {
 /// Data that the pilot renders for one image share. Both pointers are null in other renders.
 struct PilotShared {
   const Settings* image = nullptr;                  ///< image whose lights are calibrated
-  std::shared_ptr<const LightAiming>* aiming = {};  ///< from the first pilot render
+  std::shared_ptr<const LightAiming>* aiming = {};  ///< result of the first pilot render
 };
 
-/// One render by a plan.
+/// Execution of one render by a plan.
 ///
 /// Contract: all functions on one thread; run() once, finish() once and last. The arguments of the
 /// constructor outlive the run.

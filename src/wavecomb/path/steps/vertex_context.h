@@ -16,7 +16,7 @@ struct JointVertex;
 /// has computed once for the vertex.
 ///
 /// Contract: valid only within vertex_steps(). Steps read it and write VertexResult and the outputs
-/// of Vertex. They are inlined, so that no reference costs a memory access.
+/// of Vertex. The steps are inlined, so that no reference costs a memory access.
 template <typename Bsdf, typename F, uint32_t kFeatureSet>
 struct VertexContext {
   using Program = Bsdf;
@@ -29,12 +29,12 @@ struct VertexContext {
 
   const Vertex<F, kFeatures>& vertex;
   const Interaction& at;             ///< shading point or volume event
-  const Frame<F>& frame;             ///< of the BSDF's local directions
+  const Frame<F>& frame;             ///< frame of the BSDF's local directions
   const Vec3<F>& wo;                 ///< direction to the viewer, in `frame`
-  const View& view;                  ///< of the BSDF from `wo`
+  const View& view;                  ///< view of the BSDF from `wo`
   const GuidingLookup<F>& guide;     ///< lookup in the guiding field
   const JointVertex<F>& joint;       ///< ratio R of light paths; zero without light paths
-  const LightReceiver<F>& receiver;  ///< for light sampling, without a position
+  const LightReceiver<F>& receiver;  ///< receiver for light sampling, without a position
 };
 
 }  // namespace wavecomb

@@ -22,7 +22,7 @@ double error_threshold(const ErrorMap& map, const Settings& settings);
 
 /// Result of an error check.
 struct AdaptiveCheck {
-  std::vector<uint8_t> active;  ///< by pixel; all 0 if the render is done
+  std::vector<uint8_t> active;  ///< indexed by pixel; all 0 if the render is done
   uint64_t active_count = 0;
   /// Expected number of samples of the finished image, if errors fall with the square root of the
   /// sample count.
@@ -49,8 +49,8 @@ AdaptiveCheck check_adaptive(const ErrorMap& map, const Region& window,
 /// of one sample, the error V_c / n + V_l / m is least for a given cost where
 ///   m / n = sqrt(V_l |A| / (V_c P)).
 /// Both variances are estimated from half buffers over the active pixels. `share` is the limit
-/// because more samples of one kind would need other MIS weights. Only earlier passes decide, so
-/// the image stays unbiased.
+/// because more samples of one kind would need other MIS weights. Only earlier passes determine
+/// this ratio, so the image stays unbiased.
 uint32_t light_samples_after(const NoiseParts& noise, uint32_t done, uint32_t before,
                              uint32_t after, uint32_t share, double active_share);
 
