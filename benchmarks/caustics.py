@@ -12,8 +12,8 @@ Efficiency is 1 / (relMSE x seconds). relMSE is the mean of (image - reference 1
 reference 2) / (m^2 + 0.01 of its mean^2), with m the mean of the references: independent noise of
 the references adds nothing on average. Seconds are wall time including training and pilot renders
 but not loading. Results are given for the whole image and for the caustics: pixels where light
-paths contribute more than half of the references. Both are also given without the thousandth of the
-pixels with the largest values (``trimmed``).
+paths contribute more than half of the references. Both figures are also given without the
+thousandth of the pixels with the largest values (``trimmed``).
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ AOVS = (
     *("emission", "direct", "indirect", "light_groups", "guide_albedo", "guide_normal"),
     *("samples", "error", "variance"),
 )
-"""All AOVs but cost, which depends on the clock."""
+"""All AOVs except cost, which depends on the clock."""
 WAYS = {
     "plain": [],
     "aovs": [word for name in AOVS for word in ("--aov", name)],
@@ -54,7 +54,7 @@ def small_tasks(stage: Path, workers: int, count: int) -> dict[str, float]:
     """Overhead in milliseconds for each of ``count`` tiles of 8 x 8 pixels.
 
     Tiles are rendered once by one process, without a scheduler, and once by the farm, whose workers
-    have opened the stage before the clock starts. Both write the same files.
+    have opened the stage before the clock starts. Both renders write the same files.
     """
     from wavecomb import farm
     from wavecomb.farm import assembly, client

@@ -129,7 +129,7 @@ def cost_spread(stats: dict[str, Any]) -> float:
 
 
 def _ratios(times: dict[str, list[dict[str, float]]], of: Any) -> dict[str, Any]:
-    """Each configuration relative to arrival order at the same lanes."""
+    """Ratios of each configuration to arrival order with the same number of lanes."""
     return {
         case: ratio([of(t) for t in runs], [of(t) for t in times[f"{case.split('/')[0]}/none"]])
         for case, runs in times.items()

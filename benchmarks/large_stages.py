@@ -3,10 +3,10 @@
 
     .venv/bin/python benchmarks/large_stages.py --gb 12     # 12 GB of disk for each, one at a time
 
-There are two kinds of stages, as in production shots. `cache` is one .usdc with the points of a sea
-of a million points for each frame, rendered at one frame. `parts` has a hundred payloads with a
-mesh each, rendered with `--mask` of one. Each is compared with the same stage without the data that
-the frame does not need.
+The benchmark has two kinds of stages, as in production shots. `cache` is one .usdc with the points
+of a sea of a million points for each frame, rendered at one frame. `parts` has a hundred payloads
+with a mesh each, rendered with `--mask` of one. Each stage is compared with a copy without the data
+that the frame does not need.
 """
 
 from __future__ import annotations

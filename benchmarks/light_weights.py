@@ -4,8 +4,8 @@
     .venv/bin/python benchmarks/light_weights.py
     .venv/bin/python benchmarks/light_weights.py --quick       # check that it runs
 
-`studio` is lit by a key light, a fill light and a dim dome, as many stages are. Others are the
-stages of benchmarks/light_selection.py and of the isolation benchmark. For each seed there is a
+`studio` is lit by a key light, a fill light and a dim dome, as many stages are. Further stages are
+those of benchmarks/light_selection.py and of the isolation benchmark. For each seed there is a
 render with `light_weights` power and one with calibration. Mitsuba 3 selects lights uniformly. It
 renders `studio` from the same arrays with the samplers independent and `multijitter`, compared with
 a converged image of Mitsuba.

@@ -72,7 +72,7 @@ def turn(stage: Path, size: int, threads: int) -> dict[str, Any]:
             check=True,
             capture_output=True,
             text=True,
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # as the command line sets it
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # the value that the command line sets
         )
         end = time.monotonic()
     got = json.loads(run.stdout)

@@ -62,7 +62,8 @@ NOT_REACHED = {
         "the delegate's 1 - cos(0.265 degrees) is 179 steps of a float for 179.45: 0.25 % too dark",
     ),
 }
-"""Reasons why stages and images do not pass. Their means must still be within 0.5 %."""
+"""Reasons why stages and images do not pass. The means of these images must still be within 0.5
+%."""
 NAME = re.compile(r"(?P<stage>\w+)-embree\.(?P<frame>\d+)\.exr")
 
 PAGE = """<!doctype html>

@@ -23,10 +23,11 @@ Array = NDArray[np.float64]
 BLOCK = 16
 MEAN_LIMIT = 0.005
 SIGNIFICANCE = 0.01
-"""For all blocks of an image together, by Sidak."""
+"""Significance level for all blocks of an image together, by Sidak's correction."""
 ROUNDING = 1e-3
 """Blocks that differ by less than this fraction of their value, or of a hundredth of the image
-mean, agree. This covers half floats, 50 faces around a sphere, and similar negligible differences.
+mean, agree. This tolerance covers half floats, 50 faces around a sphere, and similar negligible
+differences.
 """
 
 

@@ -19,7 +19,7 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 
 class Run:
-    """One window with one stage."""
+    """Measurements of one window with one stage."""
 
     def __init__(self, application, stage, size, scratch):
         from PySide6.QtCore import QSettings

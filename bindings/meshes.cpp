@@ -26,7 +26,8 @@ namespace {
 /// Group index that means "no group".
 constexpr uint32_t kNoGroup = 0xffffffffu;
 
-/// Returns an owner that keeps arrays alive from C++. It acquires the GIL to release them.
+/// Returns an owner that keeps arrays alive from C++. The destructor acquires the GIL to release
+/// the arrays.
 std::shared_ptr<const void> own_arrays(nb::list arrays) {
   return {new nb::list(std::move(arrays)), [](const void* p) {
             const nb::gil_scoped_acquire gil;

@@ -30,8 +30,8 @@ foreach(program IN LISTS program_headers)
       "(src/wavecomb/material/description/programs.h) has no row for it")
   endif()
 endforeach()
-# Programs of media: rows of WAVECOMB_MEDIUM_PROGRAMS, "M(name, Class, ...)". They have no separate
-# compilation units.
+# Programs of media: rows of WAVECOMB_MEDIUM_PROGRAMS, "M(name, Class, ...)". These kernels have no
+# separate compilation units.
 wavecomb_read_rows(media material/description/programs.h " M\\([a-z_0-9]+, ")
 list(TRANSFORM media REPLACE "^.*\\(([a-z_0-9]+), $" "\\1")
 # Variants as "name:program": first the full programs, then rows of WAVECOMB_VARIANTS, "X(name,
@@ -167,7 +167,7 @@ function(wavecomb_add_core name flags)
     OpenSubdiv::osdCPU)
   get_target_property(widths ${flags} WAVECOMB_WIDTHS)
   set_target_properties(${name} PROPERTIES UNITY_BUILD ${WAVECOMB_BATCH} UNITY_BUILD_BATCH_SIZE 10
-    DEFINE_SYMBOL "")  # as precompiled headers that others own are compiled
+    DEFINE_SYMBOL "")  # as other precompiled headers are compiled
   set(cold_target ${name}_cold)
   add_library(${cold_target} OBJECT ${cold})
   target_include_directories(${cold_target} PRIVATE "${PROJECT_SOURCE_DIR}/src")

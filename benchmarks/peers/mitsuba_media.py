@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Convert recorded volumes to Mitsuba media, each in an invisible box.
 
-Mitsuba has no overlapping and no emissive media. Only tests cover colour grids.
+Mitsuba has no overlapping and no emissive media. Only the tests use colour grids.
 """
 
 from __future__ import annotations

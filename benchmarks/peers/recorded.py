@@ -53,7 +53,7 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Placed:
-    """One instance of a mesh: mesh index, transform (row vectors), inherited material."""
+    """Instance of a mesh: mesh index, transform (row vectors), inherited material."""
 
     mesh: int
     transform: Matrix

@@ -61,7 +61,7 @@ RENDERERS = {
 }
 _APART = ("mitsuba-llvm-volpath", "mitsuba-llvm-ptracer", "cycles-shadow-caustics")
 USUAL = tuple(name for name in RENDERERS if name not in _APART)
-"""All but those for volumes and caustics only."""
+"""All renderers except those for volumes and caustics only."""
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ The process loads a stage, renders one sample per pixel, and writes
 
     {"load_s", "version", "settings"}
 
-Then it answers each {"spp", "seed", "image": path or null} with
+Then the worker answers each request {"spp", "seed", "image": path or null} with
 
     {"spp", "seconds", "mean", "rays", "peak_mb"}
 

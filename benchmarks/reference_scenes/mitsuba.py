@@ -154,7 +154,7 @@ class _Translator:
     def _emitter(self, number: int) -> None:
         kind, props = self.scene.kind(number), self.scene.props(number)
         if kind == "area":
-            return  # a shape refers to it
+            return  # a shape refers to this light
         if missing := self.scene.missing_file(number):
             raise Inexpressible(f"{missing}, which lights the scene, is not among the assets")
         if kind == "constant":
@@ -362,7 +362,7 @@ class _Translator:
                 self.scene.colour(texture, "color0", 0.4),
                 self.scene.colour(texture, "color1", 0.2),
             )
-            # Mitsuba's v points down: it is 1 - t.
+            # Mitsuba's v points down, so v = 1 - t.
             u, v = float(scale[0, 0]), float(scale[1, 1])
             use = Image(file, "raw", (u, -v), (0.0, v))
         else:

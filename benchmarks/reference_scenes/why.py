@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reasons why images differ from their references, and scenes that are not compared.
 
-These complement the notes of the translators. Each sentence says how it was verified.
+These explanations complement the notes of the translators. Each explanation names how it was
+verified.
 """
 
 _LAMP = "Wavecomb's light reflects nothing; with a black light Mitsuba renders our image (as ours)"

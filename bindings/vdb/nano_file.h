@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Reader of .nvdb files: segments of grids in NanoVDB's memory layout, plain or compressed.
 ///
-/// NanoVDB follows offsets in a file without checks. Here its structures are used only as memory
-/// layouts, and each offset is checked before use.
+/// NanoVDB follows offsets in a file without checks. Only the memory layouts of NanoVDB's
+/// structures are used here, and each offset is checked before use.
 #pragma once
 
 #include <memory>

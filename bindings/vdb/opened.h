@@ -11,7 +11,7 @@
 
 namespace vdb {
 
-/// Opens a file and returns its size in bytes. Later reads past the end throw. Throws
+/// Opens a file and returns its size in bytes. Later reads past the end of the file throw. Throws
 /// std::system_error.
 inline uintmax_t open_to_read(std::ifstream& stream, const std::string& path) {
   std::error_code code;

@@ -239,8 +239,8 @@ class SceneBuilder:
         rotation (turns), transmission_weight, transmission_color, transmission_depth,
         subsurface_weight, subsurface_color, subsurface_radius (mean free paths; 0 means diffuse),
         subsurface_anisotropy, fuzz_weight, fuzz_color, fuzz_roughness, coat_color, coat_ior,
-        coat_darkening, film_weight, film_thickness (nanometres), film_ior, thin_walled. Its coat
-        uses clearcoat and clearcoat_roughness.
+        coat_darkening, film_weight, film_thickness (nanometres), film_ior, thin_walled. The coat of
+        openpbr uses clearcoat and clearcoat_roughness.
         """
     def add_mesh(
         self,
@@ -303,7 +303,7 @@ class SceneBuilder:
     ) -> None:
         """Replaces the arrays of a mesh, in the form of add_mesh.
 
-        Its name and groups are unchanged.
+        The name and groups of the mesh are unchanged.
         """
     def make_surfaces(
         self, descriptions: list[dict[str, Any]], threads: int = 0
@@ -575,19 +575,21 @@ class SceneBuilder:
         # ---- camera_table(): tools/update_stub ----
         # Lens radius in scene units; 0 gives a pinhole camera.
         lens_radius: float = 0,
-        # Distance of the focal plane along -z, scene units; above 0 with a lens.
+        # Distance of the focal plane along -z in scene units; must be above 0 if the lens radius
+        # is.
         focus_distance: float = 1,
-        # Near clipping distance along -z, scene units; radial for a latlong camera.
+        # Near clipping distance in scene units, along -z, or radial for a latlong camera.
         near_clip: float = 0,
-        # Far clipping distance along -z, scene units; radial for a latlong camera.
+        # Far clipping distance in scene units, along -z, or radial for a latlong camera.
         far_clip: float = 1e30,
-        # Visible region (x0, x1, y0, y1): on the plane z = -1, in scene units for an orthographic
-        # camera, longitude and latitude in radians for a latlong one.
+        # Visible region (x0, x1, y0, y1) of a camera: on the plane z = -1 for perspective, in scene
+        # units for orthographic, in radians of longitude and latitude for latlong.
         window: tuple[float, float, float, float],
-        # latlong shows all directions, longitude to the right, latitude up.
+        # Projection of the camera; latlong shows all directions, with longitude to the right and
+        # latitude up.
         projection: Literal["perspective", "orthographic", "latlong"] = "perspective",
-        # How the window is fitted to an image of another aspect ratio: UsdRender's
-        # aspectRatioConformPolicy.
+        # How the camera window is fitted to an image of another aspect ratio (UsdRender's
+        # aspectRatioConformPolicy).
         conform: Literal[
             "expandAperture",
             "cropAperture",
@@ -595,35 +597,35 @@ class SceneBuilder:
             "adjustApertureHeight",
             "adjustPixelAspectRatio",
         ] = "expandAperture",
-        # Pixel width / pixel height.
+        # Aspect ratio of a pixel, width / height.
         pixel_aspect: float = 1,
-        # Planes (a, b, c, d) in camera space; camera rays ignore points with a x + b y + c z + d <
-        # 0.
+        # Clipping planes (a, b, c, d) in camera space; camera rays ignore points with a x + b y + c
+        # z + d < 0.
         clip_planes: Sequence[Sequence[float]] = [],
-        # Factor of the image's radiance.
+        # Factor by which the camera scales the radiance of the image.
         exposure: float = 1,
-        # Number of corners of the aperture, 3 or more; 0 gives a disk.
+        # Number of corners of the lens aperture, 3 or more; 0 gives a circular aperture.
         aperture_blades: float = 0,
-        # Rotation of the aperture, degrees.
+        # Rotation of the lens aperture in degrees.
         aperture_rotation: float = 0,
-        # Aperture height / aperture width, for anamorphic lenses.
+        # Height / width of the lens aperture, for anamorphic lenses.
         lens_squeeze: float = 1,
-        # Radial distortion, coefficient of r^2 on the plane at distance 1.
+        # Coefficient of r^2 in the radial lens distortion, on the plane at distance 1.
         lens_k1: float = 0,
-        # Radial distortion, coefficient of r^4.
+        # Coefficient of r^4 in the radial lens distortion.
         lens_k2: float = 0,
-        # Radial distortion, coefficient of r^6.
+        # Coefficient of r^6 in the radial lens distortion.
         lens_k3: float = 0,
-        # Tangential distortion.
+        # First coefficient of the tangential lens distortion.
         lens_p1: float = 0,
-        # Tangential distortion.
+        # Second coefficient of the tangential lens distortion.
         lens_p2: float = 0,
-        # Distortion as a map of n x n nodes over the image, two in each four numbers: positions in
-        # fractions of the undistorted image's width and height.
+        # Lens distortion as a map of n x n nodes, two per row of four numbers; a node is a position
+        # in fractions of the undistorted image's width and height.
         lens_map: Sequence[Sequence[float]] = [],
-        # Image edge at which a rolling shutter begins.
+        # Image edge at which the exposure of a rolling shutter begins.
         rolling_shutter: Literal["off", "top", "bottom", "left", "right"] = "off",
-        # Fraction of the shutter interval for which a row is exposed.
+        # Fraction of the shutter interval for which a rolling shutter exposes each pixel row.
         rolling_duration: float = 0,
         # ---- to here ----
     ) -> None:
@@ -672,29 +674,32 @@ class Settings:
     seed: int
     """Seed of all random numbers. Default: 0."""
     sampler: Literal["sobol", "independent"]
-    """Pattern of the sample positions. Default: sobol."""
+    """Generator of sample positions: low-discrepancy points or independent random numbers. Default:
+    sobol."""
     filter: Literal["box", "gaussian", "blackman-harris"]
-    """Pixel filter: weights of samples around a pixel. Default: blackman-harris."""
+    """Pixel filter, which weights the samples around a pixel. Default: blackman-harris."""
     @property
     def filter_width(self) -> float:
-        """Full filter width in pixels; its own is 1 for the box, else 3. Default: its own."""
+        """Full width of the pixel filter in pixels; the default is 1 for box, 3 for other filters.
+        Default: depends on other settings."""
 
     @filter_width.setter
     def filter_width(self, value: float | None) -> None: ...
     clamp_indirect: float
-    """Maximum luminance of an indirect contribution. Reduces fireflies but darkens the image.
+    """Maximum luminance of an indirect contribution, which reduces fireflies but darkens the image.
     Default: off. 0: off."""
     fresnel: Literal["exact", "schlick"]
     """Formula for the reflectance of dielectrics. Default: exact."""
     texture_filter: Literal["auto", "whole"]
-    """How textures are filtered. Default: auto."""
+    """Where textures are fully filtered. Default: auto."""
     cosine_sampling: bool
-    """Samples every non-specular bounce by cosine, for comparisons. Default: False."""
+    """Samples non-specular bounces with a cosine-weighted density instead of the BSDF, for
+    comparisons. Default: False."""
     alpha: bool
-    """Makes domes and distant lights transparent to the camera, with an alpha channel. Default:
+    """Makes dome and distant lights transparent to the camera, and adds an alpha channel. Default:
     False."""
     error: bool
-    """Stores error and variance estimates of each pixel. Default: False."""
+    """Stores estimates of the error and variance of each pixel. Default: False."""
     overscan: int
     """Extra pixels to render beyond each edge of the image. Default: 0."""
     deep_samples: int
@@ -703,46 +708,46 @@ class Settings:
     """Merges samples of a deep image whose depths differ by at most this fraction of the depth.
     Default: 0.01."""
     crop: bool
-    """Limits the image, in memory and in files, to the region. Default: False."""
+    """Stores only the pixels of the render region, in memory and in files. Default: False."""
     roulette: Literal["auto", "off", "throughput", "cost-aware", "efficient"]
-    """Russian roulette: how paths are terminated early, without bias. Default: auto."""
+    """Russian roulette, which terminates paths early without bias. Default: auto."""
     transport: Literal["path", "light", "auto", "bdpt"]
-    """Where paths start. Default: path."""
+    """Whether paths start at the camera only or also at the lights. Default: path."""
     light_aim: Literal["off", "on"]
-    """Where light paths are aimed. Default: on."""
+    """How the starting points and directions of light paths are chosen. Default: on."""
     merge_radius: float
-    """Radius in pixels within which caustics seen in mirrors or through glass are blurred to find
-    them. Default: never. 0: never."""
+    """Radius in pixels within which light paths merge at points seen in mirrors or through glass,
+    which blurs these caustics. Default: never. 0: never."""
     firefly: Literal["keep", "reweight"]
-    """Treatment of samples much brighter than others. Default: keep."""
+    """Treatment of samples that are much brighter than their neighbours. Default: keep."""
     roulette_depth: int
-    """First vertex at which roulette may terminate a path. Default: 2."""
+    """First vertex of a path at which Russian roulette may terminate it. Default: 2."""
     light_selection: Literal["auto", "tree", "power"]
-    """How shading chooses the light to sample. Default: auto."""
+    """How a light to sample is chosen at a shading point. Default: auto."""
     light_weights: Literal["calibrated", "power"]
-    """How often each light is chosen. Default: calibrated."""
+    """Weight of each light in the choice of a light to sample. Default: calibrated."""
     equiangular: Literal["off", "on"]
     """How scattering distances in homogeneous volumes are sampled. Default: off."""
     guiding: Literal["auto", "on", "off"]
-    """Path guiding: bounces also follow the learned incident light. Default: off."""
+    """Path guiding, which also samples bounces by learned incident light. Default: off."""
     learn_memory: int
-    """Memory limit of learned data in MB. Default: 64."""
+    """Memory limit of the path guiding field in MB. Default: 64."""
     adaptive: float
     """Samples each pixel until its relative error is below this value. Default: off. 0: off."""
     noise: float
     """Renders until the image's mean relative error is below this value. Default: off. 0: off."""
     min_spp: int
-    """Samples per pixel before the first error estimate. Default: 16."""
+    """Samples per pixel before adaptive sampling first estimates the error. Default: 16."""
     spp: int
-    """Samples per pixel; the maximum with adaptive sampling. Default: 64."""
+    """Number of samples per pixel, or their maximum with adaptive sampling. Default: 64."""
     allocate: Literal["even", "error", "efficiency"]
     """How samples are distributed over pixels. Default: even."""
     time_limit: float
     """Stops rendering after this many seconds. Default: none. 0: none."""
     integrator: Literal["wavefront", "reference"]
-    """How paths are traced. Default: wavefront."""
+    """Integrator that traces the paths. Default: wavefront."""
     costs: Literal["auto", "measured", "model"]
-    """Source of the estimated costs of materials. Default: auto."""
+    """Source of the estimated shading costs of materials. Default: auto."""
     policy: str
     """The order in which hits are shaded. Default: code."""
     ray_order: Literal["slot", "morton", "morton-octant", "direction", "auto"]
@@ -750,20 +755,22 @@ class Settings:
     shadow_order: Literal["slot", "morton", "morton-octant", "direction", "auto"]
     """The order in which shadow rays are traced. Default: auto."""
     lanes: int
-    """Number of records that are shaded at once. Default: auto. 0: auto."""
+    """Number of SIMD lanes, that is, of hits that are shaded at once. Default: auto. 0: auto."""
     wave_size: int
-    """Number of paths that a thread processes together. Default: automatic. 0: automatic."""
+    """Number of paths in a wave, which a thread processes together. Default: automatic. 0:
+    automatic."""
     materialize: Literal["auto", "on", "off"]
-    """Whether records are moved into their order. Default: auto."""
+    """Whether the inputs of shading are copied into shading order. Default: auto."""
     traversal: Literal["packets", "single"]
-    """How rays are passed to Embree; the image is the same. Default: packets."""
+    """Whether Embree traces rays in packets or one by one, which does not change the image.
+    Default: packets."""
     threads: int
     """Number of render threads. Default: all. 0: all."""
     cost_weight: float
-    """Weight of a pass in the moving average of costs. Default: 0.3."""
+    """Weight of the latest pass in the moving average of shading costs. Default: 0.3."""
     progressive: bool
-    """Renders passes of 1, 1, 2, 4, ... samples, so that the whole image appears soon. Default:
-    False."""
+    """Renders passes of 1, 1, 2, 4, ... samples per pixel, so that the whole image appears soon.
+    Default: False."""
     # ---- to here ----
     region: tuple[int, int, int, int] | None  # x0, y0, x1, y1: the pixels rendered, end excluded
     # Names of aov_table(); "light_NAME" for one light group, "lpe:NAME=EXPRESSION".
@@ -813,7 +820,8 @@ class Result:
         """
     @property
     def variance(self) -> NDArray[np.float32] | None:
-        """(height, width, 3) variance of each pixel's mean. None in the same cases as ``error``."""
+        """(height, width, 3) variance of each pixel's mean. The array is None in the same cases as
+        ``error``."""
     @property
     def cancelled(self) -> bool: ...
     @property
@@ -827,7 +835,8 @@ class Result:
         """Plain ints, floats, strings, lists and dicts; docs/statistics.md has the keys."""
 
 class Snapshot:
-    """State of a paused render, valid only during Watcher.snapshot(). Later it raises Error."""
+    """State of a paused render, valid only during Watcher.snapshot(). After the call returns, any
+    use raises Error."""
 
     @property
     def finished(self) -> bool:
@@ -949,7 +958,7 @@ class Renderer:
     def stop(self) -> None:
         """Stops the current render within one wave; render() then returns the finished samples.
 
-        Without a render it does nothing.
+        Without a running render the call has no effect.
         """
     def twin(self) -> Renderer:
         """Returns another renderer of the scene with separate edits.

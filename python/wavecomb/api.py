@@ -47,7 +47,7 @@ def load(
 
     Args:
         path: .usd, .usda, .usdc or .usdz; or a ``Usd.Stage``, also one in memory or with unsaved
-            edits. Of that, only the session layer changes, if ``variants`` are given.
+            edits. Only the session layer of a given stage changes, if ``variants`` are given.
         options: Load options.
         progress: Called as progress(prims read, prims found so far) at intervals.
         isolate: Deprecated and without effect: a stage is read in the calling process.
@@ -131,7 +131,7 @@ def render(
             False to stop and keep the finished samples. In a notebook, None shows a bar and the
             current image; False shows nothing, and True shows a bar on a terminal as well.
         policy: Order of shading: the name of a policy, or an object of a ``SchedulingPolicy``
-            subclass. No policy changes the image.
+            subclass. Scheduling policies never change the image.
         costs: "auto", "measured", "model", or the ``Picture.costs`` of another render as initial
             values.
         aovs: Layers besides beauty: names of docs/aovs.md, "light_NAME" for a light group,
@@ -142,7 +142,7 @@ def render(
         resume: Checkpoint to continue, from a render with the same stage and settings. The image is
             bit-identical to that of an uninterrupted render.
         learn_from: With ``guiding``: a picture, or a file of its ``save_learned``, whose guiding
-            field this render uses. No training takes place then.
+            field this render uses. With a given guiding field no training takes place.
         isolate: Deprecated and without effect, as in ``load``.
         **options: Fields of ``wavecomb.Settings``: max_depth, integrator, threads, seed, adaptive,
             noise, min_spp, time_limit ...; for a path also those of ``LoadOptions``: camera, frame,

@@ -90,7 +90,7 @@ def _try(name: str, look: Callable[[], str]) -> Check:
     """
     try:
         return Check(name, OK, look(), True)
-    # Any exception is a result of the check.
+    # Any exception counts as a failed check.
     except Exception as error:
         return Check(name, BROKEN, _why(error), True, _rebuild())
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 _MOST_VOLUMES = 16
-"""Most volumes in the text output."""
+"""Maximum number of volumes in the text output."""
 
 
 def stage_info(loaded: LoadedStage, stage: str) -> dict[str, Any]:

@@ -156,39 +156,53 @@ class LoadOptions:
     """
 
     camera: str | None = _row(
-        None, "Camera prim to render from.", "text", "--camera", metavar="PATH",
+        None,
+        "Camera prim to render from, by path or unique name.",
+        "text", "--camera", metavar="PATH",
         unset="of the render settings, else the first",
     )  # fmt: skip
     frame: float | None = _row(
-        None, "Time code of the frame.", "number", "--frame", metavar="T", unset="the stage's start"
+        None,
+        "Time code of the frame to render.",
+        "number",
+        "--frame",
+        metavar="T",
+        unset="the stage's start",
     )
     purposes: tuple[str, ...] | None = _row(
-        None, "Purpose of geometry to render; may be repeated.", "choice", "--purpose", many=True,
+        None, "Purpose of geometry to render (repeatable).", "choice", "--purpose", many=True,
         choices=PURPOSES, unset="of the render settings, else default and render",
     )  # fmt: skip
     variants: Mapping[str, str] | None = _row(
-        None, "Variant to select; may be repeated. SET=NAME applies to the default prim.", "text",
+        None, "Variant to select (repeatable); SET=NAME alone applies to the default prim.", "text",
         "--variant", many=True, metavar="PRIM{SET}=NAME",
     )  # fmt: skip
     lights: str = _row(
-        "visible", "Whether the shapes of lights are visible; hidden lights still emit.",
+        "visible",
+        "Whether the shapes of lights are visible in the image; hidden lights still emit.",
         "choice", "--lights", choices=LIGHT_SHAPES, unset="visible",
     )  # fmt: skip
     shutter: tuple[float, float] | None = _row(
         None, "Opening and closing time of the shutter, in time codes from the frame.", "pair",
         "--shutter", metavar="OPEN CLOSE", unset="the camera's",
     )  # fmt: skip
-    motion_blur: bool | None = _row(None, "Disable motion blur.", "not", "--no-motion-blur")
+    motion_blur: bool | None = _row(None, "Render without motion blur.", "not", "--no-motion-blur")
     motion_steps: int | None = _row(
-        None, "Number of motion steps over the shutter.", "integer", "--motion-steps", metavar="N",
+        None,
+        "Number of motion steps over the shutter interval.",
+        "integer", "--motion-steps", metavar="N",
         least=2, most=64, unset="as needed, 2 to 8",
     )  # fmt: skip
     render_settings: str | None = _row(
-        None, "Render settings prim, by path or name.", "text", "--render-settings", metavar="PATH",
+        None,
+        "Render settings prim of the stage to use, by path or name.",
+        "text", "--render-settings", metavar="PATH",
         unset="the stage's, else the only ones under /Render",
     )  # fmt: skip
     product: str | None = _row(
-        None, "Render product, by path or name.", "text", "--product", metavar="PATH",
+        None,
+        "Render product of the stage to render, by path or name.",
+        "text", "--product", metavar="PATH",
         unset="all for render, else the first",
     )  # fmt: skip
     projection: str | None = _row(
@@ -204,61 +218,78 @@ class LoadOptions:
         "--depth-of-field", unset="unless the render settings disable it",
     )  # fmt: skip
     lens_settings: Mapping[str, str] | None = _row(
-        None, "Distortion, aperture or rolling shutter of the camera; may be repeated.", "text",
+        None,
+        "Camera setting for lens distortion, aperture or rolling shutter (repeatable).",
+        "text",
         "--lens-setting", many=True, metavar="NAME=VALUE", unset="the camera's",
     )  # fmt: skip
     st_map: str | None = _row(
-        None, "ST map of the lens distortion.", "file", "--st-map", metavar="FILE.exr"
+        None,
+        "ST map image that defines the lens distortion.",
+        "file",
+        "--st-map",
+        metavar="FILE.exr",
     )
     mask: tuple[str, ...] = _row(
-        (), "Prim or pattern to render, with its descendants and everything it needs; may be "
-        "repeated.", "text", "--mask", many=True, metavar="PATH", unset="all",
+        (),
+        "Prim or pattern to render, with descendants and everything that they need (repeatable).",
+        "text", "--mask", many=True, metavar="PATH", unset="all",
     )  # fmt: skip
     payloads: tuple[str, ...] = _row(
-        (), "Pattern of prims whose payloads are loaded, or none; may be repeated.", "text",
+        (), "Pattern of prims whose payloads are loaded, or `none` (repeatable).", "text",
         "--payloads", many=True, metavar="PATTERN", unset="all",
     )  # fmt: skip
     holdouts: tuple[str, ...] = _row(
-        (), "Prim that, with its descendants, cuts a hole into the image (black, alpha 0); may be "
-        "repeated.", "text", "--holdout", many=True, metavar="PATH", unset="as the stage says",
+        (), "Prim that, with its descendants, cuts a black hole of alpha 0 into the image "
+        "(repeatable).", "text", "--holdout", many=True, metavar="PATH", unset="as the stage says",
     )  # fmt: skip
     catchers: tuple[str, ...] = _row(
-        (), "Prim that, with its descendants, shows only the shadows on it, as alpha; may be "
-        "repeated.", "text", "--catcher", many=True, metavar="PATH", unset="as the stage says",
+        (), "Prim that, with its descendants, shows only the shadows it receives, as alpha "
+        "(repeatable).", "text", "--catcher", many=True, metavar="PATH", unset="as the stage says",
     )  # fmt: skip
     catch: str = _row(
         "through",
-        "Render of a stage with catchers for which it is loaded.",
+        "Pass of a render with shadow catchers for which the stage is loaded.",
         "choice",
         choices=CATCH,
     )
     session_layer: str | None = _row(
-        None, "Layer with opinions stronger than the stage's.", "file", "--session-layer",
+        None,
+        "Layer whose opinions are stronger than those of the stage.",
+        "file", "--session-layer",
         metavar="FILE",
     )  # fmt: skip
     texture_limit: float | None = _row(
-        None, "Memory limit of textures and grids; textures beyond it use a temporary file.",
+        None,
+        "Memory limit of textures and volume grids; textures beyond the limit move to a temporary "
+        "file.",
         "number",
         "--texture-limit", metavar="MB", least=0, above=True, unit="MB", unset="any",
     )  # fmt: skip
     working_space: str = _row(
-        "rec709", "Linear colour space of the render.", "choice", "--working-space",
+        "rec709",
+        "Linear colour space in which the image is rendered.",
+        "choice", "--working-space",
         choices=WORKING_SPACES, unset="rec709",
     )  # fmt: skip
     subdivision: str | int = _row(
         "auto",
-        "Subdivision surfaces: off (polygons), refined LEVEL times (0 to 10), or auto, by their "
-        "size in the image.",
+        "Refinement of subdivision surfaces: off for polygons, LEVEL times (0 to 10), or auto, "
+        "by their size in the image.",
         "text", "--subdivision", metavar="off|LEVEL|auto", unset="auto",
     )  # fmt: skip
     strand_pixels: float = _row(
-        0.0, "Width in pixels below which curves are thinned out and the rest widened; 0 disables "
-        "it.", "number", "--strand-pixels", metavar="X", least=0, unset="0",
+        0.0,
+        "Width in pixels below which some curves are dropped and the others widened; 0 keeps all "
+        "curves.",
+        "number", "--strand-pixels", metavar="X", least=0, unset="0",
     )  # fmt: skip
     size: tuple[int, int] = _row(
         (600, 600), "Width and height of the image in pixels.", "pair", least=1
     )
-    threads: int = _row(0, "Threads for reading; 0 means all.", "integer", least=0)
+    threads: int = _row(
+        0, "Number of threads for reading the stage; 0 means all.", "integer", least=0
+    )
 
     @classmethod
     def of(cls, options: LoadOptions | None, changes: Mapping[str, Any]) -> LoadOptions:

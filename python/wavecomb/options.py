@@ -116,7 +116,7 @@ def default_text(setting: Setting) -> str:
     ('all', '64')
     """
     if setting.default is None:
-        return "its own"
+        return "depends on other settings"
     if setting.zero and not setting.default:
         return setting.zero
     if isinstance(setting.default, float):

@@ -30,7 +30,7 @@ class Renderer:
     """A scene with its acceleration structures, which can be edited and rendered again.
 
     An edit of the camera, a material or a light takes milliseconds, and the next render starts
-    without loading or building. Only one thread may use the object.
+    without loading or building. Only one thread may use a ``Renderer``.
 
     >>> renderer = wavecomb.Renderer("shot.usd", size=(640, 360))  # doctest: +SKIP
     >>> renderer.edit(materials={"/World/Looks/Car": {"roughness": 0.1}})  # doctest: +SKIP

@@ -89,7 +89,7 @@ class LightCharts {
   struct Ray {
     D3 dir;
     double distance = 0;
-    double solid_angle = 0;  ///< per dx dy; 0 if not visible
+    double solid_angle = 0;  ///< solid angle per dx dy; 0 if not visible
   };
   Ray ray(const chi_square::Place& p) const {
     Ray r = any_ray(p);

@@ -18,7 +18,7 @@ struct Lights {
   std::vector<TextureView> views;
   std::vector<IesProfile> profiles;
   std::vector<MaterialRecord> records;
-  std::vector<TextureUseRecord> uses;  ///< of materials; only emission slots are set
+  std::vector<TextureUseRecord> uses;  ///< textures of materials; only emission slots are set
   LightSet set;
 
   Lights() = default;

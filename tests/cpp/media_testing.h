@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A test medium: homogeneous fog that fills all space. It uses all hooks that integrators offer to
-/// media.
+/// A test medium: homogeneous fog that fills all space. The medium uses all hooks that
+/// integrators offer to media.
 #pragma once
 
 #include "wavecomb/core/encoding/hash.h"
@@ -13,8 +13,8 @@
 
 namespace wavecomb::media_testing {
 
-/// Isotropic phase function. It replaces the program "principled", whose base colour becomes the
-/// albedo.
+/// Isotropic phase function. The phase function replaces the program "principled", whose base
+/// colour becomes the albedo.
 template <typename F>
 class FogPhase : public BsdfTraits {
  public:
@@ -71,7 +71,7 @@ struct Fog {
   template <typename F>
   using Programs = ProgramList<DiffuseBsdf<F>, EmissiveBsdf<F>, FogPhase<F>>;
 
-  Vec3<float> extinction;     ///< per unit of length; no channel is 0
+  Vec3<float> extinction;     ///< extinction per unit of length; no channel is 0
   uint32_t material;          ///< a material of program "principled"
   bool tracks_ratio = false;  ///< shadow ray transmittance by ratio tracking instead of exp
 

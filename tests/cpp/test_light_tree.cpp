@@ -126,8 +126,8 @@ TEST(LightTree, BothHalvesOfMisAgree) {
       mean[way] = sum / kSamples;
       error2[way] = (sum2 / kSamples - mean[way] * mean[way]) / kSamples;
     }
-    // Both are 0 where no light arrives. Compilers may evaluate arguments in any order, so
-    // positions differ between compilers.
+    // Both probabilities are 0 where no light arrives. Compilers may evaluate arguments in any
+    // order, so positions differ between compilers.
     EXPECT_LE(std::abs(mean[0] - mean[1]), 4.5 * std::sqrt(error2[0] + error2[1])) << k;
     for (int way = 0; way < 2; ++way) variance[way] += error2[way] / (mean[0] * mean[0] + 1e-12);
   }

@@ -68,7 +68,7 @@ TEST(Math, SinCos) {
     EXPECT_EQ(sincos_2pi(q).sin, static_cast<float>(std::round(sin_d(q))));
     EXPECT_EQ(sincos_2pi(q).cos, static_cast<float>(std::round(cos_d(q))));
   }
-  for (const float v : x) {  // on the unit circle
+  for (const float v : x) {  // results lie on the unit circle
     const auto [s, c] = sincos_2pi(v);
     ASSERT_NEAR(static_cast<double>(s) * s + static_cast<double>(c) * c, 1, 4e-7);
   }

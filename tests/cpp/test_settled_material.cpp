@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Material simplification: constant textures become constants, and features that textures and
-// graphs cannot reach are dropped. Neither changes the image.
+// graphs cannot reach are dropped. Neither simplification changes the image.
 #include "wavecomb/material/description/simplified_material.h"
 
 #include "range_testing.h"

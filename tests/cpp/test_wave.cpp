@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reproducibility: all schedules give bitwise the same image.
 #include <bit>
+#include <numeric>
 
 #include "curve_testing.h"
 #include "wave_testing.h"
@@ -71,6 +72,59 @@ TEST(Wave, LightsByTreeAreOnePicture) {
   s.width = s.height = 19;
   for (const ScenePtr& scene : {cornell(), mixed(), emissive_meshes()}) expect_one_image(scene, s);
 }
+/// A ball, a strand and a floor under 40 point lights.
+ScenePtr under_point_lights() {
+  SceneBuilder b;
+  const uint32_t grey = b.add_material(make_material(ProgramId::kDiffuse, {0.6f, 0.6f, 0.6f}));
+  const uint32_t gold = b.add_material(make_material(ProgramId::kMetal, {0.9f, 0.7f, 0.3f}, 0.4f));
+  b.add_to_group(0, b.add_mesh(make_mesh(curve_testing::ground(4, -1.2f), grey)));
+  b.add_to_group(0, b.add_mesh(make_mesh(sphere(8, true), gold)));
+  for (const Primitive primitive : curve_testing::curved_primitives())
+    b.add_to_group(0, b.add_mesh(curve_testing::make_curves(
+                          curve_testing::strands(primitive, 12, 4, 1.f, 0.05f, 3), grey)));
+  for (int i = 0; i < 40; ++i) {
+    const double x = -2 + 0.5 * (i % 8), z = -1 + 0.5 * (i / 8);
+    Light light = make_light(LightKind::kSphere, {1, 0.9f, 0.7f}, translate(x, 2, z));
+    light.radius = 0;
+    b.add_light(light);
+  }
+  b.set_camera(make_camera({0, 0.5, 5}, {0, 0, 0}, 0.9f));
+  return b.build();
+}
+
+// The sample of a light brings its probability along. A second descent of the tree by the light's
+// trail costs as much as the first. Bounces do not hit point lights, so no vertex needs a trail,
+// and wrong trails must not change a bit.
+TEST(Wave, LightSamplesDescendTheTreeOnce) {
+  Settings s = small_settings();
+  s.light_selection = LightSelection::kTree;
+  const ScenePtr scene = under_point_lights();
+  const std::vector<uint32_t> none(scene->view().lights.count, kNoLight);
+  for (const uint32_t lanes : lane_widths()) {
+    WaveRun expected(scene, {s, lanes, 1}), without_trails(scene, {s, lanes, 1});
+    ASSERT_TRUE(expected.context().scene.lights.by_tree);
+    without_trails.replace_trails(none);
+    expected.all(4096);
+    without_trails.all(4096);
+    const std::vector<float> beauty = expected.image().beauty;
+    EXPECT_GT(std::accumulate(beauty.begin(), beauty.end(), 0.0), 0);
+    expect_same_image(expected.image(), without_trails.image(), std::to_string(lanes) + " lanes");
+  }
+}
+
+// The test above can fail: with lights that bounces hit, trails count.
+TEST(Wave, LightsThatBouncesHitNeedTrails) {
+  Settings s = small_settings();
+  s.light_selection = LightSelection::kTree;
+  const ScenePtr scene = mixed();
+  const std::vector<uint32_t> none(scene->view().lights.count, kNoLight);
+  WaveRun expected(scene, {s, lane_widths().back(), 1}), wrong(scene, {s, lane_widths().back(), 1});
+  wrong.replace_trails(none);
+  expected.all(4096);
+  wrong.all(4096);
+  EXPECT_NE(expected.image().beauty, wrong.image().beauty);
+}
+
 TEST(Wave, PresenceIsOnePicture) {
   expect_one_image(presence(), small_settings());
 }

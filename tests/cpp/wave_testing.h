@@ -124,6 +124,11 @@ class WaveRun {
   const WaveContext& context() const { return context_; }
   /// Enables guiding. Contract: call before reserve; the field must outlive the run.
   void guide(const GuidingView& view) { context_.guide = &view; }
+  /// Replaces the trails of the light tree, which only the pdf of a light that was hit needs.
+  /// Contract: `trails` has an entry for each light and must outlive the run.
+  void replace_trails(const std::vector<uint32_t>& trails) {
+    context_.scene.lights.tree.trails = trails.data();
+  }
   Film& film() { return film_; }
   const Counts& reference_counts() const { return *reference_->worker(0).counts; }
 

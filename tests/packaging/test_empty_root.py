@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The wheel in a root file system with only Python, glibc and libstdc++.
 
-There is no compiler, shell, pip or network. The wheel installs from a folder of wheels and renders
-the same images as outside, with each of its libraries, also with another Python version. `make
-test-wheel` runs this; it needs `apt-get`.
+The root has no compiler, shell, pip or network. The wheel installs from a folder of wheels and
+renders the same images as outside, with each of its libraries, also with another Python version.
+`make test-wheel` runs this; it needs `apt-get`.
 """
 
 from __future__ import annotations

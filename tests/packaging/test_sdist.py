@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The source distribution of `make sdist` builds in a separate folder.
 
-It renders the same image as this build. `make test-sdist` runs this.
+The installed package renders the same image as this build. `make test-sdist` runs this.
 """
 
 from __future__ import annotations

@@ -214,7 +214,8 @@ def _job(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _golden(row: Mapping[str, Any]) -> str:
-    """Returns the file name of a golden image. Each stage has one for Wavecomb and one per peer."""
+    """Returns the file name of a golden image. Each stage has one golden image for Wavecomb and one
+    per peer."""
     peer = "" if row["renderer"] == "wavecomb" else f"-{row['renderer']}"
     return f"{row['stage']}{peer}-64x48-0a1b2c3d.npy"
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Broken stages and images. Each is determined by its kind, a seed and a number."""
+"""Broken stages and images. Each case is determined by its kind, a seed and a number."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Broken inputs other than stages and images.
 
-IES profiles, MaterialX, meshes, files that renders write, names of image files. Each is made from
-a valid file by the mutations of ``fuzz_cases``. ``fuzz_worker`` and the command decide by the
+IES profiles, MaterialX, meshes, files that renders write, names of image files. Each case is made
+from a valid file by the mutations of ``fuzz_cases``. ``fuzz_worker`` and the command decide by the
 file name how to read it.
 """
 

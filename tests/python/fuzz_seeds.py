@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Valid stages and images from which ``fuzz_cases`` makes broken ones.
 
-They are small and contain one of everything that the loader reads, so that most mutations have
-an effect.
+The seed stages are small and contain one of everything that the loader reads, so that most
+mutations have an effect.
 """
 
 from __future__ import annotations

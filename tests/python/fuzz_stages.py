@@ -39,7 +39,7 @@ from fuzz_inputs import BY_COMMAND, words_for
 from fuzz_seeds import stage_text
 
 GOOD = ("rendered", "warned", "refused", "contained")
-"""Acceptable outcomes. All others are faults."""
+"""Acceptable outcomes. All other outcomes are faults."""
 
 WORKER_BYTES = 3 << 30
 LIMIT_S = 10.0

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import pathlib
 import shutil
@@ -48,6 +49,8 @@ def test_this_tree_is_clean_in_five_seconds() -> None:
         ("python/wavecomb/a.py", '"""Docs.\n\nMends a stage."""\n', ':3: "Mends": write fix'),
         ("python/wavecomb/a.py", "x = 1  # the dearest one\n", '"dearest": write expensive'),
         ("python/wavecomb/a.py", 'o(help="A lamp "\n  "or sun.")\n', '"lamp": write light'),
+        ("python/wavecomb/a.py", 'option("--a", "flag", "A lamp in use.")\n', '"lamp"'),
+        ("python/wavecomb/a.py", '_row(\n  None, "A lamp in use.", "text")\n', ':2: "lamp"'),
         ("src/wavecomb/core/s_table.cpp", 'row("a", "The lamp in use.")\n', '"lamp"'),
         ("Makefile", "# What is asked for.\n", '"What is asked for.": name the subject'),
         ("tests/python/test_a.py", "def f():\n    # Who dies.\n", ":2: "),
@@ -133,6 +136,32 @@ def test_a_sample_is_sixty_sentences_and_the_same_again() -> None:
     assert first.returncode == 0 and len(first.stdout.splitlines()) == 60
     assert first.stdout == run(ROOT, "--sample", "7").stdout
     assert first.stdout != run(ROOT, "--sample", "8").stdout
+
+
+def test_entries_of_sections_are_items_and_code_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "tools" / "words"))
+    docstring_blocks = importlib.import_module("prose").docstring_blocks
+    text = """Does a thing.
+
+    tool --option FILE    # code
+
+Args:
+    one: The first
+        number. It is even.
+    two: Another one.
+
+- An item.
+- Another item.
+
+>>> code()
+"""
+    assert list(docstring_blocks(text)) == [
+        (0, "Does a thing."),
+        (5, "one: The first number. It is even."),
+        (7, "two: Another one."),
+        (9, "An item."),
+        (10, "Another item."),
+    ]
 
 
 def test_words_are_counted_by_page(tmp_path: pathlib.Path) -> None:

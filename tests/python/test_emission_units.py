@@ -147,7 +147,7 @@ def test_points_shine_as_far_spheres(
     """treatAsPoint lets a sphere light be replaced by one of radius 0.
 
     The illuminance at distance d is pi r^2 / d^2 times the luminance. With inputs:normalize, which
-    divides by 4 pi r^2, it is 1 / (4 d^2).
+    divides by 4 pi r^2, the irradiance is 1 / (4 d^2).
     """
     light = (
         f'def SphereLight "L" {{\n{EMITTED}float inputs:radius = {radius}\n'

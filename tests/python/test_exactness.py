@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One image, bit for bit, for every schedule."""
+"""Tests that every schedule renders the same image, bit for bit."""
 
 from __future__ import annotations
 
@@ -373,7 +373,10 @@ def test_every_choice(
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_what_a_stage_keeps_does_not_show(scene: str, scene_of: Any) -> None:
-    """A loaded stage reuses its BVH and light calibration. They equal those of a new render."""
+    """A loaded stage reuses its BVH and light calibration.
+
+    The reused data equals that of a new render.
+    """
     stage = scene_of(scene)
     alone = getattr(stage, "scene", stage)
     for threads in (1, 2, 5):

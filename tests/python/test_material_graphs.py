@@ -312,7 +312,8 @@ def test_networks_in_circles_end(tmp_path):
 
 @pytest.mark.parametrize("category", ["power", "screen", "contrast", "safepower", "overlay"])
 def test_networks_too_deep_are_cut(tmp_path, category):
-    """Networks that are too deep are cut at a node with a warning. Other inputs are kept."""
+    """Networks that are too deep are cut at a node with a warning. All other inputs keep their
+    values."""
     first = {"power": "in1", "safepower": "in1", "contrast": "in"}.get(category, "fg")
     nodes = "".join(
         node(
@@ -396,7 +397,8 @@ MOVED = """matrix4d xformOp:transform = ((0, 2, 0, 0), (-2, 0, 0, 0), (0, 0, 2, 
 
 
 def test_object_space_is_that_of_each_mesh(tmp_path):
-    """Points of a mesh outside of instances are in world space. Its graph transforms them back."""
+    """Points of a mesh outside of instances are in world space. The graph of the material
+    transforms the coordinates back."""
     nodes = node("P", "ND_position_vector3", "", "float3 outputs:out")
     nodes += node("N", "ND_normal_vector3", "", "float3 outputs:out")
     text = standard(

@@ -192,7 +192,7 @@ def test_an_added_row_is_in_the_stub(with_rows: None) -> None:
 
 def test_defaults_for_people() -> None:
     rows = settings()
-    assert default_text(rows["filter_width"]) == "its own"
+    assert default_text(rows["filter_width"]) == "depends on other settings"
     assert default_text(rows["cost_weight"]) == "0.3"
     assert default_text(replace(rows["threads"], default=3)) == "3"
     assert set(names("order")) | set(names("work")) | set(names("picture")) == set(rows)

@@ -4,8 +4,8 @@
 Each stage is rendered with many seeds for each setting. Tiles of the image are compared by Welch's
 t, at a level that is Sidak's correction of 1 % over all stages, settings, tiles and channels of the
 long run. Skewed noise from rare bright paths inflates t, so a significant difference is tested
-again with new seeds, twice as many. It counts only if it is found again with the same sign, as a
-bias would be.
+again with new seeds, twice as many. A difference counts only if it is found again with the same
+sign, as a bias would be.
 """
 
 from __future__ import annotations

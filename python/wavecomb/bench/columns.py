@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Columns of ``runs.csv``, which has one row for each run.
 
-A result folder also has ``runs.jsonl`` with one JSON object for each row, by ``run_id``. It holds
-all data that the row leaves out (docs/bench.md).
+A result folder also has ``runs.jsonl`` with one JSON object for each row, by ``run_id``. The JSON
+record holds all data that the row leaves out (docs/bench.md).
 
 An empty cell means "not measured" or "does not apply", never 0.
 """
@@ -57,7 +57,7 @@ COUNTER_COLUMNS = (
 
 with (Path(__file__).parent / "columns.csv").open(encoding="utf-8", newline="") as _file:
     COLUMNS = tuple(Column(**row) for row in csv.DictReader(_file))  # type: ignore[arg-type]
-"""All columns, in the order of the file. ``columns.csv`` describes them."""
+"""All columns of runs.csv, in the order of the file. ``columns.csv`` describes them."""
 
 NAMES = tuple(column.name for column in COLUMNS)
 _BY_NAME = {column.name: column for column in COLUMNS}

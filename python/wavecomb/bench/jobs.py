@@ -114,7 +114,10 @@ class Jobs:
         )
 
     def warm_up(self, config: Config) -> Job:
-        """Returns a job that fills the file cache. Its result is discarded."""
+        """Returns a job that fills the file cache.
+
+        The result of the warm-up render is discarded.
+        """
         settings = {**config.settings, "policy": "program", "spp": 1}
         return self._job(config, settings)
 

@@ -98,7 +98,7 @@ def machine_state() -> dict[str, Any]:
 def source_state() -> dict[str, Any]:
     """Returns the commit of the checkout and whether its files were changed.
 
-    Both are None outside a checkout.
+    Both values are None outside a checkout.
     """
     here = Path(__file__).resolve().parent
 
@@ -208,7 +208,7 @@ MAX_VARIATION = 0.10
 def spin_reference(spins: Sequence[float]) -> float:
     """Returns the spin time of the quiet machine.
 
-    This is the lower quartile, since noise only adds time.
+    The usual time is the lower quartile, since noise only adds time.
     """
     ordered = sorted(spins)
     return ordered[len(ordered) // 4] if ordered else 0.0

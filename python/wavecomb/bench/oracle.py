@@ -151,7 +151,7 @@ def best_orders(trace: Sequence[Recording]) -> dict[str, Any]:
 def _scales(trace: Sequence[Recording]) -> list[float]:
     """Returns factors that remove drift of the machine.
 
-    They come from traversal times, which do not depend on the order of materials.
+    The factors come from traversal times, which do not depend on the order of materials.
     """
     times = [float(recording["trace_ns_per_ray"]) for recording in trace]
     overall = sum(times) / len(times)

@@ -24,7 +24,8 @@ _KINDS: dict[str, tuple[str, dict[str, Any]]] = {
     "cycles": ("cycles", {"light_tree": True}),
 }
 _COMPILES = ("mitsuba-llvm",)
-"""Renderers that compile code for each sample count. They render twice, and the second is timed."""
+"""Renderers that compile code for each sample count. Such renderers render twice, and the second
+render is timed."""
 
 
 def check(renderers: set[str]) -> None:

@@ -29,7 +29,7 @@ FRAMED = {"ray_order": "slot", "shadow_order": "slot", "roulette": "throughput"}
 
 @dataclass(frozen=True)
 class Config:
-    """One configuration: all inputs of a run except repetition and seed.
+    """Configuration of a suite: all inputs of a run except repetition and seed.
 
     Attributes:
         name: Short name, unique in the suite and usable in file names.
@@ -60,7 +60,7 @@ class Config:
     def golden_key(self) -> str:
         """Returns a key for file names.
 
-        It is equal for configurations that converge to the same image.
+        The key is equal for configurations that converge to the same image.
         """
         width, height = self.settings["size"]
         names = ("size", *expectation())
@@ -72,7 +72,7 @@ class Config:
     def recording_key(self) -> str:
         """Returns a key, equal for configurations with the same shading costs.
 
-        It depends on all settings but policy and roulette.
+        The key depends on all settings but policy and roulette.
         """
         left_out = ("policy", "roulette")
         of = {key: value for key, value in self.settings.items() if key not in left_out}

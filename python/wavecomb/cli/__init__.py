@@ -59,6 +59,6 @@ def main() -> None:
     Exit codes: 0 done, 1 pictures differ (compare), 2 an error, 130 stopped by Ctrl-C.
     `wavecomb COMMAND --help` says more.
     """
-    # NumPy multiplies only 3 x 3 matrices here. Its thread pool would only compete with ours for
-    # cores.
+    # NumPy multiplies only 3 x 3 matrices here. The thread pool of the library would only compete
+    # with Wavecomb's for cores.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -59,22 +59,29 @@ def list_command() -> None:
 @bench_command.command("run")
 @click.argument("suite")
 @add_options(
-    option("-o --output DIR", "path", "Folder for results.", required=True),
-    option("--dry-run", "flag", "Print the runs and their estimated time, but run nothing."),
-    option("--resume", "flag", "Continue with the results in DIR."),
-    option("--repetitions N", "count", "Repetitions of each run.  [default: of the suite]"),
+    option("-o --output DIR", "path", "Folder to write the results to.", required=True),
+    option(
+        "--dry-run", "flag",
+        "Print the runs of the suite and their estimated time, but run nothing.",
+    ),
+    option("--resume", "flag", "Continue an interrupted suite with the results in DIR."),
+    option(
+        "--repetitions N", "count",
+        "Number of repetitions of each run.  [default: of the suite]",
+    ),
     option("--only GLOB", "text", "Run only configurations whose name matches."),
     option(
         "--stage NAME", "text", "Run only this stage; repeat for more.",
         name="only_these", multiple=True,
     ),
-    option("--threads N", "count", "Render threads.  [default: of the suite]"),
+    option("--threads N", "count", "Number of render threads.  [default: of the suite]"),
     option("--seed N", click.IntRange(min=0), "Seed of the random order of runs."),
     option("--time-limit MINUTES", "positive", "Start no run that would end after this time."),
-    option("--stages FOLDER", "path", "Folder with more stages."),
+    option("--stages FOLDER", "path", "Folder with additional stages for the suite."),
     option(
         "--progress", click.Choice(["text", "json"]),
-        "json: also print lines of JSON on standard output (docs/bench.md).",
+        "How progress is shown; json also prints lines of JSON on standard output "
+        "(docs/bench.md).",
         default="text", show_default=True,
     ),
     option("--quiet", "flag", "Print only warnings and errors."),
@@ -97,8 +104,8 @@ def run_command(
 ) -> None:
     """Run SUITE, a name from `wavecomb bench list` or a TOML file.
 
-    Each run is a separate process, pinned to its cores. Results are written to DIR after each run.
-    After Ctrl-C, SIGTERM or a kill, --resume continues.
+    Each run of the suite is a separate process, pinned to its cores. Results are written to DIR
+    after each run. After Ctrl-C, SIGTERM or a kill, --resume continues.
     """
     from wavecomb.bench.results import ResultFolder
     from wavecomb.bench.runner import Options, Sitting

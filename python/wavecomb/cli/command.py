@@ -16,7 +16,7 @@ from wavecomb.load_options import rows
 from wavecomb.options import settings
 
 WIDEST = 100
-"""Most columns of a help text."""
+"""Maximum width of a help text in columns."""
 
 MOST_EXAMPLES = 3
 """Examples in the short help."""
@@ -71,7 +71,7 @@ OTHERS = "This command"
 _FULL = "wavecomb.cli.command.full"
 _DEFAULT = re.compile(r"\s*\[default: .*$")
 _ENDS = (". ", "; ", ": ", ", ", " (")
-"""Where a help text may be cut, the best first."""
+"""Strings at which a help text may be cut, in order of preference."""
 
 
 def grouped(
@@ -181,7 +181,8 @@ class SettingCommand(cloup.Command):
         self.params.append(
             click.Option(
                 ["--help-all"], is_flag=True, is_eager=True, expose_value=False,
-                callback=_show_all, hidden=True, help="Show all options and examples.",
+                callback=_show_all, hidden=True,
+                help="Show all options of the command and all examples.",
             )
         )  # fmt: skip
 

@@ -43,29 +43,34 @@ _MAPS = ("absolute", "signed", "flip-ldr", "flip-hdr", "z")
         default=0.0,
     ),
     option(
-        "--variance-a FILE", "path", "Variance image of A, for a z-test.  [default: none]"
+        "--variance-a FILE", "path",
+        "Image with the variance of A's pixels, for a z-test of the difference.  [default: none]",
     ),
-    option("--variance-b FILE", "path", "Variance image of B."),
+    option("--variance-b FILE", "path", "Image with the variance of B's pixels, for the z-test."),
     option(
         "--significance", click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
         "Significance level of the z-test.", default=0.01, show_default=True,
     ),
-    option("--heatmap FILE.png", "path", "Write an image of the differences."),
+    option("--heatmap FILE.png", "path", "Write a false-colour image of the differences."),
     option(
-        "--map", click.Choice(_MAPS), "Kind of difference in --heatmap and --page.",
+        "--map", click.Choice(_MAPS), "Kind of difference that --heatmap and --page show.",
         name="kind", default="absolute", show_default=True,
     ),
     option(
-        "--page FILE.html", "path", "Write a page with a wipe of A and B, and their difference."
+        "--page FILE.html", "path",
+        "Write an HTML page with a wipe between A and B, and their difference.",
     ),
-    option("--wipe FILE.png", "path", "Write an image with A left and B right of a line."),
+    option(
+        "--wipe FILE.png", "path",
+        "Write an image that shows A left and B right of a vertical line.",
+    ),
     option(
         "--at X", click.FloatRange(0, 1),
         "Position of the wipe line, 0 to 1 of the image width.  [default: 0.5]", default=0.5,
     ),
     option(
         "--tone-map", click.Choice(["clamp", "neutral"]),
-        "Tone mapping of --page and --wipe.  [default: clamp]", default="clamp",
+        "Tone mapping of the images of --page and --wipe.  [default: clamp]", default="clamp",
     ),
     option("--json", "flag", "Print JSON on standard output.", name="as_json"),
     option(

@@ -28,7 +28,7 @@ from wavecomb.cli.options import (
 )
 @optional_stage
 @isolation_options
-@click.option("--machine", is_flag=True, help="Report what this machine supports, without STAGE.")
+@click.option("--machine", is_flag=True, help="Report what this machine supports; takes no STAGE.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
 def info_command(stage: str | None, machine: bool, as_json: bool, **options: Any) -> None:
     """Report what would be rendered of STAGE, and which parts are not supported."""

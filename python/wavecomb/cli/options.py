@@ -65,7 +65,7 @@ def isolate_option(command: F) -> F:
         metavar="DIR",
         expose_value=False,
         callback=_ask_reads,
-        help="Let the sandbox read only DIR (repeatable), named files and libraries.  "
+        help="Folder that the sandbox may read besides named files and libraries (repeatable).  "
         "[default: everything that you may read]",
     )(command)
     command = click.option(
@@ -75,8 +75,8 @@ def isolate_option(command: F) -> F:
         envvar="WAVECOMB_SANDBOX",
         expose_value=False,
         callback=_ask_sandbox,
-        help="Run the child in bubblewrap without network, with only the outputs writable; on: "
-        "fail if that is not possible.  [default: auto, if possible]",
+        help="Sandbox the child process with bubblewrap: no network, only outputs are writable; "
+        "`on` fails if that is impossible.  [default: auto, if possible]",
     )(command)
     command = click.option(
         "--memory-limit",
@@ -84,7 +84,8 @@ def isolate_option(command: F) -> F:
         metavar="MB",
         expose_value=False,
         callback=_limit_memory,
-        help="Memory limit of the child process, in MB.  [default: the memory of the machine]",
+        help="Memory limit of the child process that does the work, in MB.  "
+        "[default: the memory of the machine]",
     )(command)
     return click.option(
         "--isolate",
@@ -92,8 +93,8 @@ def isolate_option(command: F) -> F:
         default="auto",
         expose_value=False,
         callback=_isolate,
-        help="Work in a child process, which turns a crash into a one-line error.  "
-        "[default: auto, unless called from Python]",
+        help="Run the command in a child process, so that a crash ends in a one-line error.  "
+        "[default: auto, on unless called from Python]",
     )(command)
 
 

@@ -48,7 +48,8 @@ class Product:
     def aovs(self, before: Sequence[str] | None) -> tuple[str, ...]:
         """Returns the AOVs to render.
 
-        They come from the options, else from the resumed render, else from the render product.
+        The AOVs come from the options, else from the resumed render, else from the render
+        product.
         """
         if self.options.aovs:
             return aov_names.expand(self.options.aovs)

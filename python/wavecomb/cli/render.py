@@ -34,8 +34,8 @@ from wavecomb.cli.setting_options import option
 @isolation_options
 @option(
     "--tile I/N", "text",
-    "Render tile I of N only, to NAME.tile-I-of-N.exr; `wavecomb farm assemble NAME.exr` "
-    "joins the tiles.", name="part",
+    "Render only tile I of N, to NAME.tile-I-of-N.exr, for `wavecomb farm assemble NAME.exr` to "
+    "join.", name="part",
 )  # fmt: skip
 @render_options
 def render_command(part: str | None, **values: Any) -> None:

@@ -64,17 +64,18 @@ class FileOptions:
 
     half: bool = declared("--half", "flag", "Store colours and normals as 16-bit floats.")
     compression: str = declared(
-        "--compression", click.Choice(_COMPRESSIONS), "Compression of the EXR.", default="zip",
+        "--compression", click.Choice(_COMPRESSIONS), "Compression of the EXR file.", default="zip",
         show_default=True,
     )  # fmt: skip
     tile: int = declared(
         "--exr-tile N", click.IntRange(min=0),
-        "Write the EXR in tiles of N x N pixels, a multiple of 16.  [default: scanlines]",
+        "Write the EXR in tiles of N x N pixels, with N a multiple of 16.  [default: "
+        "scanlines]",
         default=0,
     )  # fmt: skip
     split: bool = declared(
         "--split-aovs", "flag",
-        "Write a file FILE.NAME.exr for each AOV; the beauty is in FILE.exr.",
+        "Write each AOV to a separate file FILE.NAME.exr, and the beauty to FILE.exr.",
     )  # fmt: skip
 
     @classmethod
@@ -103,46 +104,49 @@ class RenderOptions(FileOptions):
     output: str | None = declared(
         "-o --output FILE.exr|.png",
         "path",
-        "Image with all layers, or only a PNG.  [default: the productName of render products]",
+        "Image file to write: an EXR with all layers, or only a PNG.  [default: the productName "
+        "of render products]",
     )
     output_dir: str | None = declared(
         "--output-dir DIR",
         "path",
-        "Folder that relative productNames start from and must stay in.  "
+        "Folder for render products with relative productNames, which must stay inside it.  "
         "[default: the working folder]",
     )
     aovs: tuple[str, ...] = declared("--aov NAME", "text", "", cls=_AovOption, multiple=True)
-    png: str | None = declared("--png FILE.png", "path", "Also write an image for display.")
+    png: str | None = declared("--png FILE.png", "path", "Also write a PNG for display.")
     deep: str | None = declared(
-        "--deep FILE.exr", "path", "Also write colour and alpha by depth (docs/deep.md)."
+        "--deep FILE.exr",
+        "path",
+        "Also write a deep EXR with colour and alpha by depth (docs/deep.md).",
     )
     stats_file: str | None = declared(
-        "--stats FILE.json", "path", "Also write statistics (docs/statistics.md)."
+        "--stats FILE.json", "path", "Also write statistics of the render (docs/statistics.md)."
     )
     size: ImageSize | None = declared(
         "--size WxH|N%",
         SizeType(),
-        "Image size in pixels, such as 640x360, or a part of the stage's.  "
-        "[default: of the render settings, else 600x600]",
+        "Image size in pixels, such as 640x360, or in percent of the stage's.  [default: of the "
+        "render settings, else 600x600]",
     )
     spp: int | None = declared(
         "--spp N",
         click.INT,
-        "Samples per pixel; the most of them with --adaptive or --noise.  [default: 64]",
+        "Samples per pixel, or their maximum with --adaptive or --noise.  [default: 64]",
     )
     frames: str | None = declared(
         "--frames RANGE",
         "text",
-        "Frames to render, such as 1-48, 1-48x2 or 1,5,9. File names need a placeholder: "
+        "Frames to render, such as 1-48, 1-48x2 or 1,5,9; file names need a placeholder, as in "
         "shot.####.exr, shot.%04d.exr, shot.$F4.exr or shot.<frame>.exr.",
     )
     skip_existing: bool = declared(
-        "--skip-existing", "flag", "With --frames: skip frames whose files exist."
+        "--skip-existing", "flag", "With --frames, skip frames whose files already exist."
     )
     adaptive: float | None = declared(
         "--adaptive X",
         "positive",
-        "Sample pixels until their relative error is below X (0.02 is a good value).",
+        "Sample each pixel until its relative error is below X (0.02 is a good value).",
     )
     noise: float | None = declared(
         "--noise X",
@@ -155,7 +159,9 @@ class RenderOptions(FileOptions):
         "Samples per pixel before the first error estimate of adaptive renders.  [default: 16]",
     )
     max_spp: int | None = declared(
-        "--max-spp N", "count", "Most samples per pixel in adaptive renders.  [default: 1024]"
+        "--max-spp N",
+        "count",
+        "Maximum number of samples per pixel in adaptive renders.  [default: 1024]",
     )
     time_limit: float | None = declared(
         "--time-limit S",
@@ -167,17 +173,19 @@ class RenderOptions(FileOptions):
         "path",
         "Save the state of the render regularly, and on Ctrl-C and SIGTERM.",
     )
-    every: float = declared("--every S", "positive", "Seconds between checkpoints.  [default: 120]")
+    every: float = declared(
+        "--every S", "positive", "Interval between checkpoints in seconds.  [default: 120]"
+    )
     resume: str | None = declared(
         "--resume FILE",
         "path",
         "Continue from a checkpoint, and save to it unless --checkpoint is given.",
     )
     preview: str | None = declared(
-        "--preview FILE.png", "path", "Write an image of the render in progress."
+        "--preview FILE.png", "path", "Regularly write an image of the render in progress."
     )
     preview_every: float = declared(
-        "--preview-every S", "positive", "Seconds between previews.  [default: 10]"
+        "--preview-every S", "positive", "Interval between previews in seconds.  [default: 10]"
     )
     denoise: bool = declared(
         "--denoise", "flag", "Add a denoised layer, which PNGs then show (extra 'denoise')."
@@ -185,19 +193,20 @@ class RenderOptions(FileOptions):
     progress: str | None = declared(
         "--progress",
         click.Choice(["bar", "json", "off"]),
-        "Progress display; json prints a line per second on standard output.  [default: bar]",
+        "How progress is shown; json prints one line per second on standard output.  [default: "
+        "bar]",
     )
     costs: str | None = declared(
         "--costs auto|measured|model|FILE.json",
         "text",
-        "Source of scheduling costs. A file is read if it exists, and written at the end.  "
-        "[default: auto]",
+        "Source of material costs for scheduling; FILE.json is read if it exists, and written at "
+        "the end.  [default: auto]",
     )
     learn_from: str | None = declared(
         "--learn-from FILE|before",
         "text",
-        "Use the guiding data of another render instead of training; before: each of --frames "
-        "uses the data of the previous frame.",
+        "Use the guiding data of another render instead of training; with `before` each of "
+        "--frames uses those of the previous frame.",
     )
     learn_to: str | None = declared(
         "--learn-to FILE.learned", "path", "Save the guiding data of this render for --learn-from."
@@ -205,7 +214,7 @@ class RenderOptions(FileOptions):
     film_memory: float | None = declared(
         "--film-memory MB",
         "positive",
-        "Memory for an image, in MB; a larger one is rendered in bands of rows.  "
+        "Memory limit of the image in MB; a larger image is rendered in bands of rows.  "
         "[default: half of the machine's memory]",
     )
     exposure: float = declared(
@@ -214,7 +223,8 @@ class RenderOptions(FileOptions):
     tone_map: Any = declared(
         "--tone-map",
         click.Choice(["clamp", "neutral"]),
-        "Tone mapping of the PNG: clip, or roll off highlights.  [default: clamp]",
+        "Tone mapping of the PNG: clamp clips at 1, neutral rolls off highlights.  [default: "
+        "clamp]",
         default="clamp",
     )
     ocio_view: str | None = declared(
@@ -223,11 +233,13 @@ class RenderOptions(FileOptions):
         "Show the PNG and previews through a view of $OCIO, such as AgX or an ACES view.",
     )
     ocio_display: str | None = declared(
-        "--ocio-display NAME", "text", "Display of --ocio-view.  [default: an sRGB screen]"
+        "--ocio-display NAME",
+        "text",
+        "OpenColorIO display of --ocio-view.  [default: an sRGB screen]",
     )
     quiet: bool = declared("--quiet", "flag", "Print only warnings and errors.")
     verbose: bool = declared(
-        "--verbose", "flag", "Also print phases, materials and predictions at the end."
+        "--verbose", "flag", "Also print times of phases, materials and predicted costs at the end."
     )
     stage: str
     image: str | None

@@ -36,31 +36,49 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
 )
 @click.argument("name", required=False, shell_complete=_names)
 @add_options(
-    option("-o --output FILE", "path", "Stage to write: .usda, .usdc or .usd."),
-    option("--list", "flag", "List the scenes.", name="list_"),
+    option("-o --output FILE", "path", "Stage file to write: .usda, .usdc or .usd."),
+    option("--list", "flag", "List the built-in scenes.", name="list_"),
     option("--dragon FILE", "path", "OBJ, PLY or USD mesh that replaces the built-in dragon."),
-    option("--triangles N", "count", "Triangles of the built-in dragon, or of the stone field."),
-    option("--seed N", click.IntRange(min=0), "Random seed of layout and patterns."),
+    option(
+        "--triangles N", "count",
+        "Number of triangles of the built-in dragon, or of the stone field.",
+    ),
+    option("--seed N", click.IntRange(min=0), "Random seed of the scene's layout and patterns."),
     option("--texture-size N", click.IntRange(min=16), "Largest texture size, in texels."),
     option("--aspect X", "positive", "Aspect ratio of the camera, width / height."),
-    option("--material NAME", "text", "cornell-dragon: gold, copper, glass, jade."),
-    option("--materials N", "count", "spread, heavy: number of materials."),
-    option("--programs N", click.IntRange(1, 5), "spread: kinds of materials, 1 to 5."),
-    option("--lights N", "count", "lights: number of lights."),
-    option("--lamps", "flag", "mixed, dragon: light with a key, a fill and a dim dome."),
-    option("--strands N", "count", "fur, head: number of strands."),
-    option("--splats N", "count", "splats: number of Gaussian splats."),
-    option("--capture FILE", "path", "splats: use a PLY file of 3D Gaussian splats instead."),
-    option("--capture-linear", "flag", "Read colours of the capture as linear light, not as sRGB."),
-    option("--voxels N", click.IntRange(min=16), "smoke, clouds: voxels along the longest edge."),
-    option("--texture-mb X", Real(0), "spread, heavy: memory of all textures, in MB."),
+    option(
+        "--material NAME", "text",
+        "Material of scene cornell-dragon: gold, copper, glass or jade.",
+    ),
+    option("--materials N", "count", "Number of materials of scenes spread and heavy."),
+    option(
+        "--programs N", click.IntRange(1, 5),
+        "Number of kinds of materials in scene spread, 1 to 5.",
+    ),
+    option("--lights N", "count", "Number of lights in scene lights."),
+    option(
+        "--lamps", "flag",
+        "Light scenes mixed and dragon with a key light, a fill light and a dim dome.",
+    ),
+    option("--strands N", "count", "Number of hair strands in scenes fur and head."),
+    option("--splats N", "count", "Number of Gaussian splats in scene splats."),
+    option("--capture FILE", "path", "PLY file of 3D Gaussian splats to use in scene splats."),
+    option(
+        "--capture-linear", "flag",
+        "Read the colours of --capture as linear light, not as sRGB.",
+    ),
+    option(
+        "--voxels N", click.IntRange(min=16),
+        "Number of voxels along the longest edge in scenes smoke and clouds.",
+    ),
+    option("--texture-mb X", Real(0), "Memory of all textures of scenes spread and heavy, in MB."),
     option(
         "--shader-cost X", Real(1),
-        "spread: octaves of noise on the most expensive material; 1 means none.",
+        "Octaves of noise on the most expensive material of scene spread; 1 means none.",
     ),
     option(
         "--plain", "flag",
-        "Export UsdPreviewSurface with the metallic workflow only. Not for heavy.",
+        "Use only UsdPreviewSurface with the metallic workflow (any scene except heavy).",
     ),
 )  # fmt: skip
 def scene_command(name: str | None, output: str | None, list_: bool, **options: Any) -> None:

@@ -47,7 +47,8 @@ class SettingPlaceholder(click.Option):
 def setting_options(only: Iterable[str] | None = None) -> Callable[[F], F]:
     """Adds an option for each setting in ``only``, by default all without a hand-written option.
 
-    For a ``SettingCommand`` (cli/command.py). The value of an option that is not given is None.
+    The decorated command must be a ``SettingCommand`` (cli/command.py). The value of an option that
+    is not given is None.
     """
 
     def decorate(command: F) -> F:

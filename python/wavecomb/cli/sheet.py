@@ -25,24 +25,41 @@ from wavecomb.cli.setting_options import Real
 @click.argument("pictures", nargs=-1, required=True, type=click.Path())
 @click.option(
     "-o", "--output", required=True, type=click.Path(), metavar="FILE",
-    help="Contact sheet (.png), or page that plays the images (.html).",
+    help="File to write: a contact sheet (.png), or a page that plays the images (.html).",
 )  # fmt: skip
-@click.option("--layer", default="", metavar="NAME", help="Layer of EXR files.  [default: denoised "
-              "if present, else beauty]")  # fmt: skip
+@click.option(
+    "--layer",
+    default="",
+    metavar="NAME",
+    help="Layer to show of EXR files.  [default: denoised if present, else beauty]",
+)
 @click.option(
     "--width", type=click.IntRange(16, 8192), metavar="PX",
-    help="Largest width of each image, in pixels.  [default: 240; .html: 960]",
+    help="Largest width of each image in the sheet or page, in pixels.  [default: 240; .html: "
+    "960]",
 )  # fmt: skip
 @click.option("--columns", type=click.IntRange(1), metavar="N",
-              help="Columns of the contact sheet.  [default: a landscape layout]")  # fmt: skip
+              help="Number of image columns in the contact sheet.  [default: a landscape "
+                   "layout]")  # fmt: skip
 @click.option("--fps", type=Real(0, above=True), default=24.0, metavar="X",
-              help="Frames per second of the page.  [default: 24]")  # fmt: skip
-@click.option("--title", metavar="TEXT", help="Title of the page.  [default: the first name]")
-@click.option("--lossless", is_flag=True, help="Embed images of the page as PNG, not as JPEG.")
-@click.option("--exposure", type=Real(), default=0.0, metavar="EV", help="Exposure of HDR images.")
+              help="Frames per second at which the page plays.  [default: 24]")  # fmt: skip
+@click.option(
+    "--title",
+    metavar="TEXT",
+    help="Title of the page that plays the images.  [default: the first name]",
+)
+@click.option("--lossless", is_flag=True, help="Embed images in the page as PNG instead of JPEG.")
+@click.option(
+    "--exposure",
+    type=Real(),
+    default=0.0,
+    metavar="EV",
+    help="Exposure at which HDR images are shown, in stops.",
+)
 @click.option(
     "--tone-map", type=click.Choice(["clamp", "neutral"]), default="clamp",
-    help="Tone mapping of HDR images: clip at 1, or roll off highlights.  [default: clamp]",
+    help="Tone mapping of HDR images: clamp clips at 1, neutral rolls off highlights.  [default: "
+    "clamp]",
 )  # fmt: skip
 @isolate_option
 def sheet_command(pictures: tuple[str, ...], output: str, **options: Any) -> None:

@@ -30,11 +30,11 @@ DEFAULT_SIZE = (960, 540)
     type=SizeType(),
     default="960x540",
     metavar="WxH|N%",
-    help="Image size in pixels, or a part of the default.  [default: 960x540]",
+    help="Image size in pixels, or in percent of the default size.  [default: 960x540]",
 )
-@click.option("--spp", type=int, metavar="N", help="Samples per pixel.  [default: 64]")
+@click.option("--spp", type=int, metavar="N", help="Number of samples per pixel.  [default: 64]")
 @setting_options(("max_depth", "seed", "threads", "policy", "ray_order", "roulette"))
-@click.option("--denoise", is_flag=True, help="Denoise the image.")
+@click.option("--denoise", is_flag=True, help="Denoise the image when it is finished.")
 def view_command(stage: str | None, size: ImageSize, denoise: bool, **options: Any) -> None:
     """Open STAGE in a window to navigate, edit and compare.
 

@@ -120,7 +120,7 @@ def run(
         Files of the images.
 
     Raises:
-        WavecombError: Some tasks failed. All other tasks are done.
+        WavecombError: Some tasks failed. All other tasks are finished.
         KeyboardInterrupt: ``progress`` stopped the run. Finished tiles are kept.
     """
     from wavecomb.farm.client import run as run_job

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Joins tiles to the image that one process would have rendered, bit for bit.
 
-Also determines how much of a job is done.
+This module also determines how much of a job is done.
 """
 
 from __future__ import annotations
@@ -131,8 +131,8 @@ def _verify_borders(parts: Sequence[RenderedTile]) -> None:
     """Raises NarrowBorder if a tile took more passes than some border allows for.
 
     An adaptive tile decides about each of its pixels as the whole image would, as long as all
-    pixels that the decision depends on were rendered. That holds if no tile took more passes than
-    each border allows for.
+    pixels that the decision depends on were rendered. Tiles fit together if no tile took more
+    passes than each border allows for.
     """
     most = max(part.passes for part in parts)
     for part in parts:
@@ -304,7 +304,7 @@ class Outcome:
 
     @property
     def state(self) -> str:
-        """One of "done", "failed" and "unfinished"."""
+        """State of an image: "done", "failed" or "unfinished"."""
         if self.images_done == self.images:
             return "done"
         return "failed" if self.failed else "unfinished"

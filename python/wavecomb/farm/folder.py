@@ -2,7 +2,8 @@
 """Folder of a farm job.
 
 It holds ``job.json``, ``parts/IMAGE/TILE.exr`` for each rendered tile of an unfinished image, and
-``images/IMAGE.json`` for each finished image. These files are the only record of progress.
+``images/IMAGE.json`` for each finished image. The files of the job's folder are the only record of
+progress.
 """
 
 from __future__ import annotations

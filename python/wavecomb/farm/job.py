@@ -73,7 +73,7 @@ class StageFile:
 
 @dataclass(frozen=True, order=True)
 class Task:
-    """One tile of one image, by indices into the job."""
+    """A tile of an image, by indices into the job."""
 
     image: int
     tile: int
@@ -152,7 +152,7 @@ class Job:
     def tile_count(self, image: int) -> int:
         """Returns the number of tiles of an image.
 
-        There are never more columns or rows than pixels.
+        Tiles never have more columns or rows than the image has pixels.
         """
         x0, y0, x1, y1 = self.shot(image).region
         return min(self.tiles[0], x1 - x0) * min(self.tiles[1], y1 - y0)

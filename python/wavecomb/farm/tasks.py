@@ -70,7 +70,7 @@ progress = Progress()
 class FarmPlugin(WorkerPlugin):
     """Dask plugin that announces a worker's machine class.
 
-    It also restarts the worker if a render hangs.
+    The plugin also restarts the worker if a render hangs.
     """
 
     name = "wavecomb-farm"

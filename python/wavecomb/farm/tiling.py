@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Divides images into tiles of pixels (samples are never divided).
 
-Also rejects settings that a farm cannot render or cannot divide into tiles.
+This module also rejects settings that a farm cannot render or cannot divide into tiles.
 """
 
 from __future__ import annotations

@@ -86,7 +86,8 @@ def run(
     # Python handles signals only while its interpreter runs, so a timer wakes it regularly.
     beat = QTimer(window)
     beat.start(200)
-    # USD also reports problems during edits and when panels read the stage. Add them to the notes.
+    # USD also reports problems during edits and when panels read the stage. Add these messages to
+    # the notes.
     listening = DiagnosticListener()
     beat.timeout.connect(lambda: window.session.note_words(listening.take()))
     window.show()

@@ -31,7 +31,7 @@ def from_display(colour: QColor) -> Colour:
 def swatch(colour: Colour, size: int, wide: int = 1) -> QIcon:
     """Makes an icon filled with a colour, ``wide`` times as wide as high.
 
-    Its frame makes it visible on any background.
+    The frame makes the swatch visible on any background.
     """
     ratio = 2.0
     pixmap = QPixmap(round(size * wide * ratio), round(size * ratio))

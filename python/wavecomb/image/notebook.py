@@ -78,7 +78,7 @@ def mime_bundle(
 def page(picture: Rendered) -> str:
     """Returns HTML of the image, its summary and its layers, which untrusted notebooks keep.
 
-    It contains no scripts, and only inline styles.
+    The HTML contains no scripts, and only inline styles.
     """
     shown = codes(picture)
     line = html.escape(facts(picture))

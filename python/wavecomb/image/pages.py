@@ -16,7 +16,7 @@ from wavecomb.image.embedded import Kind, data_uri
 from wavecomb.image.thumbnails import DisplayOptions, fit_image
 
 MAX_FRAMES = 1000
-"""Most images of a page."""
+"""Maximum number of images of a page."""
 SPEEDS = (6, 12, 24, 25, 30, 60)
 """Selectable playback speeds in frames per second, besides the requested one."""
 _HERE = Path(__file__).parent
@@ -92,7 +92,7 @@ def sequence_page(
 
 @dataclass(frozen=True)
 class Pair:
-    """Two images of a page with descriptive lines.
+    """Pair of images on a page, with descriptive lines.
 
     Attributes:
         name: Common name; "" if the page title gives it.

@@ -101,7 +101,7 @@ def fit_image(codes: NDArray[np.uint8], width: int, height: int) -> NDArray[np.u
 Codes = NDArray[np.uint8]
 
 MAX_IMAGES = 2000
-"""Most images of a contact sheet."""
+"""Maximum number of images of a contact sheet."""
 _PAPER = 24
 _GAP = 12
 _TEXT = 13

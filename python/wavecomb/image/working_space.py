@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Colour spaces in which images can be rendered.
 
-These are linear Rec.709 (the default) and ACEScg, which has the AP1 primaries and the ACES white
-point.
+The working spaces are linear Rec.709 (the default) and ACEScg, which has the AP1 primaries and the
+ACES white point.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 """Checkpoints, from which a stopped render continues with an identical result.
 
 A file is an uncompressed NumPy archive (.npz) with ``header``, JSON as bytes, and the arrays of
-``Snapshot.state()``. It is written under a temporary name and renamed when it is on disk, so that a
-complete file always exists; the archive's checksums detect damage.
+``Snapshot.state()``. A checkpoint is written under a temporary name and renamed when it is on disk,
+so that a complete file always exists; the archive's checksums detect damage.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Guiding field of a render, saved as the starting point of later renders.
 
-A file holds the guiding field in the form of checkpoints. It fits scenes with the same number of
-materials. After changes of geometry or lighting it is less accurate, but never biases the image.
+A file holds the guiding field in the form of checkpoints. A saved guiding field fits scenes with
+the same number of materials. After changes of geometry or lighting a guiding field is less
+accurate, but never biases the image.
 """
 
 from __future__ import annotations

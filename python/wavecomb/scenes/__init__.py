@@ -81,7 +81,7 @@ SCENES: dict[str, SceneInfo] = {
     "splats": SceneInfo("a dragon of Gaussian splats: see --splats", 0.1, build_splats),
     "lights": SceneInfo("a street at night with 1000 lights: see --lights", 1.0, build_lights),
 }
-"""All scenes by name."""
+"""All built-in scenes by name."""
 
 
 def write_scene(name: str, path: Path, **options: Any) -> None:

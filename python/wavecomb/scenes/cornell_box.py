@@ -55,7 +55,7 @@ def _box(writer: StageWriter, aspect: float) -> None:
 def _block(writer: StageWriter, name: str) -> None:
     """Adds one of the two blocks: a top and four sides.
 
-    It stands on the floor, without a bottom.
+    The block stands on the floor, without a bottom.
     """
     height, foot = _BLOCKS[name]
     corners = [[x, height, z] for x, z in foot] + [[x, 0.0, z] for x, z in foot]

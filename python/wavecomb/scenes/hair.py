@@ -53,7 +53,7 @@ def head_radius(d: FloatArray) -> FloatArray:
 def is_scalp(d: FloatArray, chance: FloatArray) -> NDArray[np.bool_]:
     """Returns whether hair grows in unit directions (n, 3), as (n,).
 
-    It grows above a line from brow to neck, and sparser near the line.
+    Hair grows above a line from brow to neck, and sparser near the line.
     """
     line = -0.50 + 1.08 * ramp(d[:, 2], -0.5, 0.75)
     return chance < ramp(d[:, 1] - line, 0.0, 0.12)

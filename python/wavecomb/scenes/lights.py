@@ -28,7 +28,7 @@ from wavecomb.scenes.options import SceneOptions
 
 MAX_LIGHTS = 200_000
 _LENGTH, _HALF_WIDTH, _HEIGHT = 60.0, 5.0, 12.0
-_POWER = 3000.0  # of all lights together, in W
+_POWER = 3000.0  # power of all lights together, in W
 _SIGN_COLOURS = 16
 _KINDS = ("Window", "Lamp", "Bulb", "Sign", "Strip")
 

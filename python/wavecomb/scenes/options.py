@@ -39,8 +39,8 @@ class SceneOptions:
             most captures are trained.
         voxels: Voxels along the longest edge of the grids of ``smoke`` and ``clouds``, at least 16.
         plain: Whether materials are written as by third-party exporters: UsdPreviewSurface in the
-            metallic workflow, without a program. Not available for ``heavy``, for hair, and for
-            ``spread`` with a ``shader_cost`` above 1.
+            metallic workflow, without a program. Plain materials are not available for ``heavy``,
+            for hair, and for ``spread`` with a ``shader_cost`` above 1.
     """
 
     dragon: Path | str | None = None

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A dragon of Gaussian splats in front of a mirror, like a capture but made from a mesh.
 
-Splats are flat and lie on the mesh. Their colours come from one light, with a view-dependent sheen.
+Splats are flat and lie on the mesh. The colours of the splats come from one light, with a
+view-dependent sheen.
 """
 
 from __future__ import annotations

@@ -131,7 +131,7 @@ RTCGeometry make_curve_geometry(RTCDevice device, const CurveGeometry& user, Hit
   const size_t count = user.nodes ? user.nodes->count() : user.mesh->primitive_count();
   rtcSetGeometryUserPrimitiveCount(g, static_cast<unsigned>(count));
   rtcSetGeometryTimeStepCount(g, user.mesh->steps);
-  rtcSetGeometryUserData(g, const_cast<CurveGeometry*>(&user));  // callbacks only read it
+  rtcSetGeometryUserData(g, const_cast<CurveGeometry*>(&user));  // callbacks only read the data
   rtcSetGeometryBoundsFunction(g, curve_box, nullptr);
   const bool is_bare = rule == HitRule::kEmbree;
   rtcSetGeometryIntersectFunction(g, is_bare ? intersect_curves_bare : intersect_curves);

@@ -22,7 +22,7 @@ struct CurveGeometry {
   std::unique_ptr<const CurveBvhNodes> nodes;
 };
 
-/// Creates and commits a geometry for a mesh of curves or points. The caller releases it.
+/// Creates and commits a geometry for a mesh of curves or points. The caller releases the geometry.
 RTCGeometry make_curve_geometry(RTCDevice device, const CurveGeometry& user, HitRule rule);
 
 }  // namespace wavecomb

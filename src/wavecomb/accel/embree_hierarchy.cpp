@@ -16,8 +16,8 @@
 
 namespace wavecomb {
 
-/// Embree device. Its hierarchies may share geometries, so they are built one at a time; other
-/// hierarchies may be traced meanwhile.
+/// Embree device. Hierarchies of one device may share geometries, so they are built one at a time;
+/// other hierarchies may be traced meanwhile.
 struct EmbreeDevice {
   RTCDevice handle = rtcNewDevice(nullptr);
   std::atomic<int64_t> bytes{0};
@@ -185,7 +185,7 @@ void EmbreeHierarchy::attach_light(uint32_t id, const LightGeometry& shape) cons
   } else {
     RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_USER);
     rtcSetGeometryUserPrimitiveCount(g, 1);
-    rtcSetGeometryUserData(g, const_cast<LightGeometry*>(&shape));  // callbacks only read it
+    rtcSetGeometryUserData(g, const_cast<LightGeometry*>(&shape));  // callbacks only read the data
     rtcSetGeometryBoundsFunction(g, light_box, nullptr);
     rtcSetGeometryIntersectFunction(
         g, rule_ != HitRule::kEmbree ? intersect_lights : intersect_lights_bare);

@@ -53,8 +53,8 @@ class EmbreeHierarchy {
   std::shared_ptr<const SceneGeometry> geometry_;
   HitRule rule_;
   std::shared_ptr<EmbreeDevice> device_;
-  std::vector<uint8_t> filtered_;      ///< by mesh: see filtered_meshes()
-  std::vector<uint8_t> fibres_;        ///< by mesh: see fibre_meshes()
+  std::vector<uint8_t> filtered_;      ///< indexed by mesh: see filtered_meshes()
+  std::vector<uint8_t> fibres_;        ///< indexed by mesh: see fibre_meshes()
   std::vector<LightGeometry> shapes_;  ///< by light record
   RTCScene top_ = nullptr;
   std::vector<RTCScene> group_scenes_;

@@ -19,7 +19,7 @@ class Scene;
 /// Light group that has no layer.
 inline constexpr uint32_t kNoGroup = 0xffffffffu;
 
-/// AOV tables of a render. They are built once and read by all waves.
+/// AOV tables of a render. The tables are built once and read by all waves.
 struct AovTables {
   AovLayout layout;
   CryptoTables crypto;
@@ -28,8 +28,8 @@ struct AovTables {
   uint32_t group_of_rest = kNoGroup;  ///< index of the group of emission without a light
   /// Names of the film's light groups, followed by those of its expressions.
   std::vector<std::string> layer_names;
-  PathAutomaton automaton;             ///< of the light path expressions
-  BackwardAutomaton backward;          ///< for light paths, if the render has any
+  PathAutomaton automaton;             ///< automaton of the light path expressions
+  BackwardAutomaton backward;          ///< automaton for light paths, if the render has any
   std::vector<uint32_t> end_of_light;  ///< parameter of PathExpressions; empty if unused
   std::vector<float> multipliers;      ///< parameter of PathExpressions; empty if unused
   /// Whether the cost AOV holds modelled costs, which are reproducible, instead of measured time.

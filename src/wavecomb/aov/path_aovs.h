@@ -302,8 +302,8 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   /// First word of each AOV in a row of vertex_, or kNoWords.
   std::array<uint32_t, kAovCount> vertex_at_ = no_words();
   std::array<Block, 2> parts_;  ///< radiance before the light samples of vertices 0 and 1
-  /// Contributions of connections at first vertices. They are indirect light, although they are
-  /// added between the two copies in parts_.
+  /// Contributions of connections at first vertices. These contributions are indirect light,
+  /// although they are added between the two copies in parts_.
   Block early_connections_;
   Block groups_;  ///< radiance by light group; the groups of a slot are adjacent
   Block guides_, bounces_;

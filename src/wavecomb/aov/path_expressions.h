@@ -26,7 +26,7 @@ namespace wavecomb {
 /// State of a path for light path expressions.
 template <typename F>
 struct ExpressionRow {
-  UInt<F> states;  ///< of the three colours, ten bits each
+  UInt<F> states;  ///< states of the three colours, ten bits each
   // Current light sample: states before its scattering, event, path end, and diffuse fraction.
   UInt<F> light_states, light_event, light_end;
   Color<F> light_diffuse;

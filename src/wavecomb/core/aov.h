@@ -30,11 +30,11 @@ enum class AovKind : uint8_t {
 
 /// Point in a path's evaluation at which an AOV's value is known.
 enum class AovSource : uint8_t {
-  kHit,     ///< at the hit of the camera ray, before shading
+  kHit,     ///< known at the hit of the camera ray, before shading
   kVertex,  ///< after shading the first vertex
   kGuide,   ///< after the last vertex that provides denoiser features
   kLight,   ///< when light contributes to the path
-  kMis,     ///< as kLight, separated by sampling technique
+  kMis,     ///< when light contributes, separated by sampling technique
   kTime,    ///< measured with the clock
   kBounce,  ///< over all bounces of the path
 };

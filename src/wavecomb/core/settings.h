@@ -113,8 +113,8 @@ struct Settings {
   AovSet aovs;                                    ///< AOVs to store; they do not affect the beauty
   std::vector<std::string> light_groups;          ///< names for Aov::kLightGroups; empty means all
   std::vector<NamedExpression> expressions;       ///< for Aov::kExpressions
-  uint32_t deep_samples = DeepLimits{}.most;      ///< for Aov::kDeep: maximum per pixel
-  float deep_tolerance = DeepLimits{}.tolerance;  ///< for Aov::kDeep: see DeepLimits
+  uint32_t deep_samples = DeepLimits{}.most;      ///< maximum samples of a deep pixel
+  float deep_tolerance = DeepLimits{}.tolerance;  ///< depth tolerance of deep images
   /// Adaptive sampling: stop sampling a pixel when its error (ErrorMap::error) is at most this. 0
   /// means off.
   float adaptive = 0;

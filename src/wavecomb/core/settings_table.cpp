@@ -88,11 +88,15 @@ SettingInfo choice(const char* name, const char* label, std::vector<SettingChoic
 }
 
 std::vector<SettingChoice> ray_orders() {
-  return {{"slot", "Not sorted: in the order of the paths."},
-          {"morton", "Sorted by position of the origin (Morton code)."},
-          {"morton-octant", "Sorted by octant of the direction, then by position of the origin."},
-          {"direction", "Sorted by octant and major axes of the direction."},
-          {"auto", "The fastest of the four, learned for each depth."}};
+  return {
+      {"slot", "Rays are not sorted; they keep the order of their paths."},
+      {"morton", "Rays are sorted by the Morton code of their origin."},
+      {"morton-octant",
+       "Rays are sorted by the octant of their direction, then by the Morton code of their "
+       "origin."},
+      {"direction", "Rays are sorted by the octant and the major axes of their direction."},
+      {"auto",
+       "Rays use the fastest of the other four orders, which is measured for each path depth."}};
 }
 
 // Upper limits of path depth and of samples per pixel.
@@ -127,39 +131,46 @@ std::vector<SettingInfo> image_settings() {
       in_expectation(number<&S::max_depth>("max_depth", "Max depth", 0, kMaxDepth,
                                            "Maximum number of scattering events of a path.")),
       number<&S::seed>("seed", "Seed", 0, 0xffffffffu, "Seed of all random numbers."),
-      choice<&S::sampler>("sampler", "Sampler",
-                          {{"sobol", "Owen-scrambled Sobol points."},
-                           {"independent", "Independent random numbers."}},
-                          "Pattern of the sample positions."),
-      in_expectation(choice<&S::filter>("filter", "Filter",
-                                        {{"box", "Constant weight over its width."},
-                                         {"gaussian", "Gaussian with sigma of 1/6 of its width."},
-                                         {"blackman-harris", "Blackman-Harris window."}},
-                                        "Pixel filter: weights of samples around a pixel.")),
+      choice<&S::sampler>(
+          "sampler", "Sampler",
+          {{"sobol", "Sample positions are points of an Owen-scrambled Sobol sequence."},
+           {"independent", "Sample positions are independent random numbers."}},
+          "Generator of sample positions: low-discrepancy points or independent random numbers."),
+      in_expectation(choice<&S::filter>(
+          "filter", "Filter",
+          {{"box", "The box filter gives all samples within its width the same weight."},
+           {"gaussian", "The Gaussian filter has a standard deviation of 1/6 of its width."},
+           {"blackman-harris", "The filter is a Blackman-Harris window."}},
+          "Pixel filter, which weights the samples around a pixel.")),
       in_expectation(number_or_unset<&S::filter_width>(
           "filter_width", "Filter width", 0.01f, 32,
-          "Full filter width in pixels; its own is 1 for the box, else 3.",
+          "Full width of the pixel filter in pixels; the default is 1 for box, 3 for other "
+          "filters.",
           [](const S& s) -> SettingValue { return double{s.used_filter_width()}; })),
       in_expectation(number<&S::clamp_indirect>("clamp_indirect", "Clamp indirect", 0, 1e30f,
-                                                "Maximum luminance of an indirect contribution. "
-                                                "Reduces fireflies but darkens the image.",
+                                                "Maximum luminance of an indirect contribution, "
+                                                "which reduces fireflies but darkens the image.",
                                                 "off")),
       in_expectation(choice<&S::schlick_fresnel>(
           "fresnel", "Fresnel",
-          {{"exact", "Fresnel's equations."}, {"schlick", "Schlick's approximation."}},
+          {{"exact", "The reflectance of dielectrics follows Fresnel's equations."},
+           {"schlick", "The reflectance of dielectrics follows Schlick's approximation."}},
           "Formula for the reflectance of dielectrics.")),
-      in_expectation(choice<&S::texture_filter>(
-          "texture_filter", "Texture filter",
-          {{"auto", "Full filtering at directly visible points, one random texel after a bounce."},
-           {"whole", "Full filtering everywhere."}},
-          "How textures are filtered.")),
+      in_expectation(
+          choice<&S::texture_filter>("texture_filter", "Texture filter",
+                                     {{"auto",
+                                       "Textures are fully filtered at directly visible points and "
+                                       "read one random texel after a bounce."},
+                                      {"whole", "Textures are fully filtered at all hits."}},
+                                     "Where textures are fully filtered.")),
       row<&S::cosine_sampling>("cosine_sampling", "Cosine sampling",
-                               "Samples every non-specular bounce by cosine, for comparisons."),
+                               "Samples non-specular bounces with a cosine-weighted density "
+                               "instead of the BSDF, for comparisons."),
       in_expectation(row<&S::alpha>(
           "alpha", "Alpha",
-          "Makes domes and distant lights transparent to the camera, with an alpha channel.")),
-      same_bits(
-          row<&S::error>("error", "Errors", "Stores error and variance estimates of each pixel.")),
+          "Makes dome and distant lights transparent to the camera, and adds an alpha channel.")),
+      same_bits(row<&S::error>("error", "Errors",
+                               "Stores estimates of the error and variance of each pixel.")),
       in_expectation(number<&S::overscan>("overscan", "Overscan", 0, kMaxSize / 2,
                                           "Extra pixels to render beyond each edge of the image.")),
       number<&S::deep_samples>("deep_samples", "Deep samples", 1, kMaxDeepSamples,
@@ -167,8 +178,8 @@ std::vector<SettingInfo> image_settings() {
       number<&S::deep_tolerance>("deep_tolerance", "Deep tolerance", 0, 1,
                                  "Merges samples of a deep image whose depths differ by at most "
                                  "this fraction of the depth."),
-      in_expectation(row<&S::crop>("crop", "Crop",
-                                   "Limits the image, in memory and in files, to the region.")),
+      in_expectation(row<&S::crop>(
+          "crop", "Crop", "Stores only the pixels of the render region, in memory and in files.")),
   };
 }
 
@@ -178,67 +189,78 @@ std::vector<SettingInfo> work_settings() {
   return {
       choice<&S::roulette>(
           "roulette", "Roulette",
-          {{"auto", "`efficient` with path guiding, otherwise `throughput`."},
-           {"off", "Paths end at the maximum depth only."},
-           {"throughput", "Survival probability by the path's throughput."},
-           {"cost-aware", "Survival by throughput over the square root of the shading cost."},
+          {{"auto",
+            "Roulette runs in mode efficient with path guiding, and in mode throughput without "
+            "it."},
+           {"off", "Roulette is off, so it terminates no path before the maximum depth."},
+           {"throughput", "The survival probability of a path grows with its throughput."},
+           {"cost-aware",
+            "The survival probability of a path grows with its throughput / sqrt(shading cost)."},
            {"efficient",
-            "Survival by expected contribution and cost, learned before the first pass."}},
-          "Russian roulette: how paths are terminated early, without bias."),
+            "The survival probability of a path follows its expected contribution and cost, "
+            "learned before the first pass."}},
+          "Russian roulette, which terminates paths early without bias."),
       choice<&S::transport>("transport", "Transport",
                             {{"path", "Paths start at the camera only."},
                              {"light",
-                              "Paths also start at the lights, combined by multiple importance "
-                              "sampling: for caustics of small lights."},
+                              "Paths start at the camera and at the lights, combined by multiple "
+                              "importance sampling, for caustics of small lights."},
                              {"auto",
-                              "Also at the lights if a short pilot render predicts that it reduces "
-                              "noise."},
+                              "Paths also start at the lights if a short pilot render predicts "
+                              "that this reduces noise."},
                              {"bdpt",
-                              "At both, with connections between their vertices. No measured "
-                              "benefit over light so far."}},
-                            "Where paths start."),
-      choice<&S::light_aim>("light_aim", "Light path aiming",
-                            {{"off", "By the emission of the lights alone."},
-                             {"on", "Mostly where pilot paths contributed to the image."}},
-                            "Where light paths are aimed."),
+                              "Bidirectional path tracing connects vertices of camera and light "
+                              "paths, so far without a measured benefit over mode light."}},
+                            "Whether paths start at the camera only or also at the lights."),
+      choice<&S::light_aim>(
+          "light_aim", "Light path aiming",
+          {{"off", "Light paths start according to the emission of the lights alone."},
+           {"on", "Light paths mostly start where earlier pilot paths contributed to the image."}},
+          "How the starting points and directions of light paths are chosen."),
       in_expectation(
           number<&S::merge_radius>("merge_radius", "Merge radius", 0, 64,
-                                   "Radius in pixels within which caustics seen in mirrors or "
-                                   "through glass are blurred to find them.",
+                                   "Radius in pixels within which light paths merge at points seen "
+                                   "in mirrors or through glass, which blurs these caustics.",
                                    "never")),
       in_expectation(choice<&S::firefly>(
           "firefly", "Fireflies",
-          {{"keep", "Unchanged, without bias."},
+          {{"keep", "Very bright samples keep their weight, so the image has no bias."},
            {"reweight",
-            "Reduces the weight of rare bright samples, which darkens the image slightly. The "
-            "layer unbiased keeps them."}},
-          "Treatment of samples much brighter than others.")),
-      number<&S::roulette_depth>("roulette_depth", "From depth", 0, kMaxDepth,
-                                 "First vertex at which roulette may terminate a path."),
+            "Rare bright samples get less weight, which darkens the image slightly; the layer "
+            "named unbiased keeps their full weight."}},
+          "Treatment of samples that are much brighter than their neighbours.")),
+      number<&S::roulette_depth>(
+          "roulette_depth", "From depth", 0, kMaxDepth,
+          "First vertex of a path at which Russian roulette may terminate it."),
       choice<&S::light_selection>(
           "light_selection", "Lights",
-          {{"auto", "Light tree if there are several lights, otherwise power."},
-           {"tree", "Probability by expected contribution at the shaded point, with a light tree."},
-           {"power", "Probability by power, independent of position."}},
-          "How shading chooses the light to sample."),
-      choice<&S::light_weights>(
-          "light_weights", "Light weights",
-          {{"calibrated", "By contribution to the image, measured with a pilot render."},
-           {"power", "Probability by power, independent of position."}},
-          "How often each light is chosen."),
+          {{"auto",
+            "Lights are chosen with a light tree if many have similar power, otherwise by power."},
+           {"tree",
+            "A light tree chooses lights by their expected contribution at the shading point."},
+           {"power", "Lights are chosen in proportion to their power, independent of position."}},
+          "How a light to sample is chosen at a shading point."),
+      choice<&S::light_weights>("light_weights", "Light weights",
+                                {{"calibrated",
+                                  "The weight of a light is its contribution to the image, "
+                                  "measured with a pilot render."},
+                                 {"power", "The weight of a light is its power."}},
+                                "Weight of each light in the choice of a light to sample."),
       choice<&S::equiangular>(
           "equiangular", "Equiangular",
-          {{"off", "By density only."},
-           {"on", "Also by distance to lights, in homogeneous volumes (equiangular sampling)."}},
+          {{"off", "Scattering distances are sampled by the density of the medium only."},
+           {"on",
+            "Scattering distances in homogeneous volumes are also sampled by distance to lights "
+            "(equiangular sampling)."}},
           "How scattering distances in homogeneous volumes are sampled."),
       choice<&S::guiding>(
           "guiding", "Guiding",
-          {{"auto", "Use guiding if a short pilot render predicts that it reduces noise."},
-           {"on", "Use the guiding field wherever it has data."},
-           {"off", "Sample by material only."}},
-          "Path guiding: bounces also follow the learned incident light."),
+          {{"auto", "Path guiding is used if a short pilot render predicts that it reduces noise."},
+           {"on", "Path guiding is used wherever the guiding field has training data."},
+           {"off", "Bounce directions are sampled by material only, without path guiding."}},
+          "Path guiding, which also samples bounces by learned incident light."),
       number<&S::learn_memory_mb>("learn_memory", "Learning (MB)", 1, 1u << 16,
-                                  "Memory limit of learned data in MB."),
+                                  "Memory limit of the path guiding field in MB."),
   };
 }
 
@@ -253,15 +275,17 @@ std::vector<SettingInfo> sample_settings() {
                         "Renders until the image's mean relative error is below this value.",
                         "off"),
       number<&S::min_spp>("min_spp", "Min samples", 1, kMaxSamples,
-                          "Samples per pixel before the first error estimate."),
-      same_bits(number<&S::spp>("spp", "Samples", 1, kMaxSamples,
-                                "Samples per pixel; the maximum with adaptive sampling.")),
+                          "Samples per pixel before adaptive sampling first estimates the error."),
+      same_bits(
+          number<&S::spp>("spp", "Samples", 1, kMaxSamples,
+                          "Number of samples per pixel, or their maximum with adaptive sampling.")),
       choice<&S::allocate>(
           "allocate", "Sample allocation",
-          {{"even", "The same number of samples for all pixels."},
+          {{"even", "All pixels get the same number of samples."},
            {"error",
-            "More samples for pixels of larger relative error (standard deviation / brightness)."},
-           {"efficiency", "More samples where they reduce the error most for their cost."}},
+            "Pixels of larger relative error (standard deviation / brightness) get more samples."},
+           {"efficiency",
+            "Pixels whose error falls most for the cost of a sample get more samples."}},
           "How samples are distributed over pixels."),
       number<&S::time_limit>("time_limit", "Time limit", 0, 1e9f,
                              "Stops rendering after this many seconds.", "none"),
@@ -274,40 +298,50 @@ std::vector<SettingInfo> order_settings() {
   std::vector<SettingInfo> settings = {
       choice<&S::integrator>(
           "integrator", "Integrator",
-          {{"wavefront", "Processes waves of paths stage by stage."},
-           {"reference", "Traces one path at a time. Slow; for checking the wavefront."}},
-          "How paths are traced."),
-      choice<&S::costs>(
-          "costs", "Costs",
-          {{"auto", "Calibrated, then measured; roulette uses the model."},
-           {"measured",
-            "Calibrated, then measured, also for roulette: the image then varies "
-            "within its noise if roulette is cost-aware."},
-           {"model", "Fixed estimates from the program and its texture reads; reproducible."}},
-          "Source of the estimated costs of materials."),
+          {{"wavefront", "The wavefront integrator advances waves of thousands of paths together."},
+           {"reference",
+            "The reference integrator traces one path at a time; it is slow and serves to check "
+            "the wavefront."}},
+          "Integrator that traces the paths."),
+      choice<&S::costs>("costs", "Costs",
+                        {{"auto",
+                          "Shading costs are calibrated, then measured, but roulette uses the "
+                          "reproducible cost model."},
+                         {"measured",
+                          "Shading costs are calibrated, then measured, also for cost-aware "
+                          "roulette, which makes the image vary within its noise."},
+                         {"model",
+                          "Shading costs are fixed, reproducible estimates from the material's "
+                          "program and texture reads."}},
+                        "Source of the estimated shading costs of materials."),
       row<&S::policy>("policy", "Policy", "The order in which hits are shaded."),
       choice<&S::ray_order>("ray_order", "Ray order", ray_orders(),
                             "The order in which bounce rays are traced."),
       choice<&S::shadow_order>("shadow_order", "Shadow order", ray_orders(),
                                "The order in which shadow rays are traced."),
-      with_steps(row<&S::lanes>("lanes", "Lanes", "Number of records that are shaded at once."),
+      with_steps(row<&S::lanes>("lanes", "Lanes",
+                                "Number of SIMD lanes, that is, of hits that are shaded at once."),
                  {1, 4, 8, 16}, "auto"),
       number<&S::wave_size>("wave_size", "Wave size", 64, 1 << 20,
-                            "Number of paths that a thread processes together.", "automatic"),
-      choice<&S::materialize>("materialize", "Materialize",
-                              {{"auto", "Off, since that is faster."},
-                               {"on", "Copy records into sorted order before shading."},
-                               {"off", "Gather the inputs of shading through indices."}},
-                              "Whether records are moved into their order."),
-      choice<&S::traversal>("traversal", "Traversal",
-                            {{"packets", "In packets."}, {"single", "One by one."}},
-                            "How rays are passed to Embree; the image is the same."),
+                            "Number of paths in a wave, which a thread processes together.",
+                            "automatic"),
+      choice<&S::materialize>(
+          "materialize", "Materialize",
+          {{"auto", "Inputs of shading are read through indices, which is faster than copying."},
+           {"on", "Inputs of shading are copied into shading order first."},
+           {"off", "Inputs of shading are read through indices, without copies."}},
+          "Whether the inputs of shading are copied into shading order."),
+      choice<&S::traversal>(
+          "traversal", "Traversal",
+          {{"packets", "Embree traces rays in packets."},
+           {"single", "Embree traces rays one by one."}},
+          "Whether Embree traces rays in packets or one by one, which does not change the image."),
       number<&S::threads>("threads", "Threads", 0, 1024, "Number of render threads.", "all"),
       number<&S::cost_weight>("cost_weight", "Cost weight", 0, 1,
-                              "Weight of a pass in the moving average of costs."),
+                              "Weight of the latest pass in the moving average of shading costs."),
       row<&S::progressive>("progressive", "Progressive",
-                           "Renders passes of 1, 1, 2, 4, ... samples, so that the whole image "
-                           "appears soon."),
+                           "Renders passes of 1, 1, 2, 4, ... samples per pixel, so that the whole "
+                           "image appears soon."),
   };
   for (SettingInfo& setting : settings) {
     setting.changes_image =

@@ -46,7 +46,7 @@ struct SettingInfo {
   double least = 0, most = -1;         ///< range of numbers; no limits if least > most
   const char* zero = "";               ///< meaning of 0, if it has a special one
   std::vector<double> steps;           ///< allowed values besides 0; empty means all
-  std::vector<SettingChoice> choices;  ///< in the order of the enum
+  std::vector<SettingChoice> choices;  ///< choices in the order of the enum
 
   bool may_be_none = false;  ///< None is allowed; the default then depends on other settings
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Two- and three-component vectors that do not depend on Dr.Jit, for public headers.
+/// Vectors of two and three components that do not depend on Dr.Jit, for public headers.
 #pragma once
 
 #include <type_traits>

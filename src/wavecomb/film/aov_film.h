@@ -68,8 +68,8 @@ class AovFilm {
   /// Counts a sample that hit something, for AOVs that are means over hits.
   void count_hit(size_t pixel) { ++hits_[pixel]; }
   /// Returns whether a sample at squared distance `centre2` (pixels^2) from the pixel centre is
-  /// closer than all earlier samples, and records the distance. If so, the caller must put() its
-  /// values.
+  /// closer than all earlier samples, and records the distance. If this returns true, the caller
+  /// must put() the values of the sample.
   bool is_nearest(size_t pixel, float centre2) {
     if (!(centre2 < centre2_[pixel])) return false;
     centre2_[pixel] = centre2;

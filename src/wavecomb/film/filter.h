@@ -24,8 +24,8 @@ class FilterTable {
 
   /// Half the filter's full width in pixels.
   float radius() const { return radius_; }
-  /// Returns the density per pixel of the sampled offsets at `x` pixels from the pixel centre. It
-  /// is the weight of light that arrives there.
+  /// Returns the density per pixel of the sampled offsets at `x` pixels from the pixel centre. This
+  /// value is the weight of light that arrives at that offset.
   float density(float x) const {
     const float at = (x + radius_) * density_scale_;
     return at >= 0 && at < float{kBins} ? density_[static_cast<size_t>(at)] : 0.f;

@@ -89,8 +89,8 @@ inline ShadeSettings light_shade_settings(const Settings& settings) {
   return s;
 }
 
-/// Returns the shutter time of the light path of a pixel and sample. With connections it is the
-/// time of the camera path.
+/// Returns the shutter time of the light path of a pixel and sample. With connections, the time is
+/// that of the camera path.
 template <typename F>
 inline F light_path_time(const Settings& settings, const SampleKey<F>& key, const UInt<F>& pixel,
                          const UInt<F>& sample) {

@@ -34,7 +34,7 @@ namespace wavecomb {
 /// State of a light path for light path expressions.
 template <typename F>
 struct LightPathStateRow {
-  UInt<F> states;  ///< of the three colours, in the layout of ExpressionRow
+  UInt<F> states;  ///< states of the three colours, in the layout of ExpressionRow
   // Vertex that was shaded last: the states before it, and its scattering towards the camera.
   UInt<F> splat_states, splat_event;
   Color<F> splat_diffuse;
@@ -55,9 +55,9 @@ struct ConnectionStateRow {
 
 /// Contribution of a vertex of a light path to the film.
 struct LightSplat {
-  uint32_t slot;   ///< of the path
-  uint32_t depth;  ///< of the vertex
-  uint32_t light;  ///< that the path left
+  uint32_t slot;   ///< slot of the path
+  uint32_t depth;  ///< depth of the vertex
+  uint32_t light;  ///< light that the path left
   float x, y;      ///< position on the film, pixels
   Color<float> c;
 };

@@ -6,8 +6,8 @@
 /// vertex with a non-delta lobe. A light path cannot connect to the camera through a mirror.
 /// Instead, a light path with a vertex within r of the point is treated as if it ended there, where
 /// r is given in pixels as seen at the point. These are the visible points of progressive photon
-/// mapping (T. Hachisuka et al., "Progressive Photon Mapping", 2008). Their light is splatted to
-/// the pixels of the points in integer sums, whose order does not matter.
+/// mapping (T. Hachisuka et al., "Progressive Photon Mapping", 2008). The light of merge points is
+/// splatted to their pixels in integer sums, whose order does not matter.
 ///
 /// A pass has one sample for each pixel, which stores at most one point. The light paths of the
 /// pass are traced after all camera paths.

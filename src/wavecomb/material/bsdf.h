@@ -48,8 +48,8 @@ struct BsdfTraits {
   static constexpr bool kOnSurface = true;       ///< shades hits; otherwise has an `interact`
   static constexpr bool kOnGaussianSplats = false;  ///< provides the emission of Gaussian splats
   /// Scatters like a whole fibre around an axis: x of the local frame lies along the fibre
-  /// (geometry/hit/fibre_frame.h), and there are no two sides. It is not reciprocal, so light paths
-  /// exclude it.
+  /// (geometry/hit/fibre_frame.h), and there are no two sides. Such a BSDF is not reciprocal, so
+  /// light paths exclude it.
   static constexpr bool kOnFibre = false;
 
   /// Values that depend on wo only, as input of the functions below: wo itself by default.

@@ -221,7 +221,7 @@ class PathTracer : PathRecorder {
     return true;
   }
 
-  /// Returns the ray segment of a path to `hit`. It refers to the path and the hit.
+  /// Returns the ray segment of a path to `hit`. The query refers to the path and the hit.
   MediumQuery<F> passage_of(const SampleKey<F>& key, uint32_t depth, const PathState<F>& path,
                             const SingleHit& hit) const {
     return {settings_.sampler, key, depth, path.o, path.dir, hit.t, rays_.time()};

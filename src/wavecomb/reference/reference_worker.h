@@ -22,7 +22,7 @@ struct ReferenceWorker {
   PathAovs aovs;
   PathHistory history;
   JointTransport::Buffers joint;
-  SoaBlock walks;  ///< of subsurface random walks
+  SoaBlock walks;  ///< states of subsurface random walks
   NestedMediaBuffers nested_media;
 };
 

@@ -16,7 +16,7 @@ inline constexpr uint32_t kOnlySlot = 0;
 struct SingleHit {
   float t, u, v;
   uint32_t prim, geom, inst;
-  uint32_t event_material;  ///< if inst is kNoSurface
+  uint32_t event_material;  ///< valid if inst is kNoSurface
 };
 
 /// Traces the rays of one path after the other.

@@ -29,7 +29,7 @@ struct PilotShared {
   std::shared_ptr<const JointPilot::Result>* joint = {};
 };
 
-/// One render by a plan.
+/// Execution of one render by a plan.
 ///
 /// Contract: all functions on one thread; run() once, finish() once and last. The arguments of the
 /// constructor outlive the run.

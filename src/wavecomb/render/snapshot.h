@@ -20,7 +20,7 @@ namespace wavecomb {
 struct Snapshot {
   Film& film;
   const PassState& pass;
-  const GuidingTraining& training;  ///< from before the first pass; may be empty
+  const GuidingTraining& training;  ///< training before the first pass; may be empty
   RenderStatus status;
   bool finished;  ///< done, cancelled or out of time: no more samples follow
   const std::vector<std::string>& light_groups;  ///< light groups that the film keeps

@@ -5,7 +5,7 @@
 
 namespace wavecomb {
 
-/// Wave parameters of a render. They do not change the image.
+/// Wave parameters of a render. The parameters do not change the image.
 struct WaveSetup {
   uint32_t lanes;
   uint32_t threads;

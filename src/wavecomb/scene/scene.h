@@ -24,7 +24,7 @@ namespace wavecomb {
 struct SceneView {
   const MeshRecord* meshes = nullptr;
   const InstanceRecord* instances = nullptr;
-  const TangentRecord* tangents = nullptr;  ///< by mesh; null if no mesh has tangents
+  const TangentRecord* tangents = nullptr;  ///< indexed by mesh; null if no mesh has tangents
   const uint32_t* geometry_mesh = nullptr;  ///< mesh id, at (instance.geometry + geometry id)
   /// Index of the first triangle light of a mesh instance, at (instance.emissive + geometry id).
   const uint32_t* emissive_lights = nullptr;
@@ -85,8 +85,8 @@ class Scene {
   const std::vector<Instance>& instances() const { return geometry_->instances; }
   const std::vector<Material>& materials() const { return materials_->materials; }
   const std::vector<TexturePtr>& textures() const { return geometry_->textures; }
-  /// Returns the tile store of the first texture that has one, or null. It limits the memory of
-  /// textures.
+  /// Returns the tile store of the first texture that has one, or null. The store limits the memory
+  /// of textures.
   const TileStore* texture_store() const;
   const std::vector<Light>& lights() const { return lights_->lights; }
   const std::vector<Volume>& volumes() const { return geometry_->volumes; }
@@ -186,7 +186,7 @@ class SceneBuilder {
   /// Adds a value graph for Material::graph and its parts. Outputs are numbered as in
   /// graph/parameters/parameters.h; texture ids in it must exist.
   uint32_t add_graph(const Graph& graph);
-  /// Adds a material. Its texture and graph ids must exist.
+  /// Adds a material. The texture and graph ids of the material must exist.
   uint32_t add_material(Material material);
   /// Returns the id of the attribute of that name, for MeshAttribute and for graphs.
   uint32_t attribute(const std::string& name);

@@ -142,7 +142,7 @@ struct SceneMaterials {
   /// All materials but the one of collisions inside of meshes.
   std::vector<Material> given() const;
 
-  std::vector<Material> materials;  ///< as the caller described them
+  std::vector<Material> materials;  ///< materials as the caller described them
   std::vector<Material> shaded;  ///< after simplification by simplified() (simplified_material.h)
   std::shared_ptr<const GraphSet> graphs;
   std::vector<MaterialRecord> records;

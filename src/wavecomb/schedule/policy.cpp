@@ -13,32 +13,37 @@ struct Entry {
 };
 
 constexpr Entry kPolicies[] = {
-    {{"none", "Keeps arrival order; nothing is sorted."}, &make_none_policy},
-    {{"program", "Sorts by program, the kind of material, which suffices to fill lanes."},
+    {{"none", "Hits are shaded in the order of their arrival, unsorted."}, &make_none_policy},
+    {{"program",
+      "Sorts hits by shading program, that is, kind of material, which suffices to fill SIMD "
+      "lanes."},
      &make_program_policy},
     {{"code",
-      "Sorts by program, then by material if textures or a graph drive its inputs, so that lanes "
-      "run and read the same."},
+      "Sorts hits by program, then by material if textures or a graph drive its inputs, so that "
+      "lanes run the same code and read the same data."},
      &make_code_policy},
-    {{"material", "Sorts by program, then by estimated cost of the material, then by material."},
+    {{"material",
+      "Sorts hits by program, then by the estimated cost of the material, then by material."},
      &make_material_policy},
-    {{"texture", "Sorts by program, then by the size of the material's largest texture."},
+    {{"texture", "Sorts hits by program, then by the size of the material's largest texture."},
      &make_texture_policy},
     {{"texture-locality",
-      "Sorts by program, material and texture coordinates (tile, mip level, uv), as MoonRay's "
+      "Sorts hits by program, material and texture coordinates (tile, mip level, uv), as MoonRay's "
       "shade queues do."},
      &make_texture_locality_policy},
     {{"cost-benefit",
-      "Sorts by program, then by the material's throughput over cost, highest first, then by "
-      "position in the scene."},
+      "Sorts hits by program, then by the material's throughput / cost in descending order, then "
+      "by position in the scene."},
      &make_cost_benefit_policy},
-    {{"random-runs", "Placebo: the runs of 'material' in a random order."},
+    {{"random-runs",
+      "Shades the runs of equal keys of policy material in random order, as a placebo for "
+      "comparisons."},
      &make_random_runs_policy},
 };
 
 constexpr PolicyInfo kAdaptive{"adaptive",
-                               "Chooses among none, code, material, texture and "
-                               "texture-locality for each queue, by measured times."};
+                               "Chooses one of none, code, material, texture and texture-locality "
+                               "for each queue, by measured times."};
 
 }  // namespace
 

@@ -75,7 +75,7 @@ bool TileFile::read(std::byte* to, size_t bytes, uint64_t offset) const {
 
 void TileFile::discard(uint64_t offset, uint64_t bytes) {
 #if defined(FALLOC_FL_PUNCH_HOLE)
-  // Only frees disk space. If unsupported, the next texture stored here reuses the space.
+  // This call only frees disk space. If unsupported, the next texture stored here reuses the space.
   [[maybe_unused]] const int done =
       ::fallocate(file_, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, static_cast<off_t>(offset),
                   static_cast<off_t>(bytes));

@@ -79,8 +79,8 @@ class TileStore {
 
   uint64_t limit_bytes() const { return limit_bytes_; }
   StoreStatistics statistics() const;
-  /// Throws Error if a tile could not be read back or there was no memory for it. Such tiles read
-  /// as black.
+  /// Throws Error if a tile could not be read back or there was no memory for it. Tiles that cannot
+  /// be read are black.
   void check() const;
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Wave: the paths of a batch of pixels and samples. One worker traces them to their end, using
-/// only its own buffers.
+/// Wave: the paths of a batch of pixels and samples. One worker traces the paths of a wave to their
+/// end, using only its own buffers.
 #pragma once
 
 #include <memory>
@@ -44,7 +44,7 @@ struct WaveContext {
   std::span<const SchedulingPolicy* const> policies;
   std::span<const MaterialTraits> traits;
   const CostSnapshot* costs;           ///< for scheduling policies
-  const CostSnapshot* roulette_costs;  ///< for cost-aware roulette
+  const CostSnapshot* roulette_costs;  ///< costs for cost-aware roulette
   OrderGrid grid;                      ///< for ray orders and hit positions
   Film* film;                          ///< each wave writes only its own pixels
   uint32_t traversal_width;

@@ -37,7 +37,7 @@ BASELINES = {
     "renderer": "wavecomb",
     "case": "off",
 }
-"""Level of each factor that all other levels are compared with. For numbers it is the smallest."""
+"""Level of each factor that all other levels are compared with. Of numbers it is the smallest."""
 
 POLICIES = (
     *("none", "program", "material", "texture", "texture-locality", "cost-benefit"),
@@ -133,8 +133,8 @@ def cells(
 ) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
     """Yields groups of runs that agree in every setting except ``vary`` and ``ignore``.
 
-    A case of a suite may change settings that have no column. Such groups are separated by the name
-    of the configuration.
+    A case of a suite may change settings that have no column. The name of the configuration
+    separates such groups.
     """
     varied = {vary} if isinstance(vary, str) else set(vary)
     keys = [name for name in SETTINGS if name not in varied and name not in ignore]

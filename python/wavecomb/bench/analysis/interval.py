@@ -72,7 +72,7 @@ def bootstrap(rounds: Array, statistic: Statistic, *, positive: bool = False) ->
         positive: Whether the statistics are ratios or times.
 
     Returns:
-        m estimates. There is no interval for a statistic that some resample leaves undefined.
+        m estimates. A statistic that is undefined for some resample has no interval.
     """
     n = len(rounds)
 
@@ -152,7 +152,7 @@ def to_column(rounds: Array, denominator: int) -> list[Estimate]:
 def paired_p(a: Array, b: Array) -> float:
     """Returns the two-sided p-value of a paired t-test of the logarithms, round by round.
 
-    It is 1 if there are fewer than two pairs or all pairs are equal.
+    The p-value is 1 if there are fewer than two pairs or all pairs are equal.
     """
     stats = needed("scipy.stats", "the analysis")
     with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():

@@ -159,8 +159,8 @@ def fixed(value: float, digits: int) -> str:
 def clipped(low: float, high: float, values: Sequence[float]) -> tuple[float, float]:
     """Returns limits of a logarithmic axis that cut off very long whiskers.
 
-    Intervals of two or three disturbed runs can span decades. They then extend beyond the axes, and
-    the points remain distinguishable.
+    Intervals of two or three disturbed runs can span decades. Longer intervals then extend beyond
+    the axes, and the points remain distinguishable.
 
     >>> clipped(1e-9, 1e6, [0.5, 2.0])
     (0.125, 8.0)

@@ -32,7 +32,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Text(Part):
-    """A paragraph, or a heading with ``mark="heading"``. Other marks are CSS classes."""
+    """A paragraph, or a heading with ``mark="heading"``. All other marks are CSS classes."""
 
     kind = "text"
     text: str

@@ -23,7 +23,8 @@ JOB = click.argument("job", type=click.Path(), metavar="JOB")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
 MAP = click.option(
     "--map", "maps", multiple=True, metavar="FROM=TO",
-    help="Use folder TO on this machine for FROM in the job, its stage or its images.",
+    help="Read folder TO on this machine wherever the job, its stage or its images name folder "
+    "FROM.",
 )  # fmt: skip
 
 
@@ -58,7 +59,8 @@ def opened(job: str, maps: tuple[str, ...] = ()) -> Folder:
 @JOB
 @ON
 @click.option("--threads", type=click.IntRange(min=0), default=0, metavar="N",
-              help="Threads per local worker.  [default: of the job, else equal]")  # fmt: skip
+              help="Number of render threads of each local worker.  [default: of the job, else "
+                   "equal]")  # fmt: skip
 @MAP
 @DASHBOARD
 @click.option("--quiet", is_flag=True, help="Print only warnings and errors.")
@@ -113,13 +115,19 @@ def status_command(job: str, maps: tuple[str, ...], as_json: bool) -> None:
 )
 @JOB
 @click.option("--image", type=click.IntRange(1), default=1, metavar="I",
-              help="Number of the image in the job, from 1.  [default: 1]")  # fmt: skip
-@click.option("--tile", default="1/1", metavar="I/N", help="Render tile I of N.  [default: 1/1]")
+              help="Number of the image in the job, counted from 1.  [default: 1]")  # fmt: skip
+@click.option(
+    "--tile",
+    default="1/1",
+    metavar="I/N",
+    help="Render tile I of the N tiles of an image.  [default: 1/1]",
+)
 @MAP
 def task_command(job: str, image: int, tile: str, maps: tuple[str, ...]) -> None:
     """Render one tile of JOB in this process, unless it is finished.
 
-    For sites whose own queue starts the tasks. `wavecomb farm assemble JOB` joins the tiles.
+    This command is for sites whose own queue starts the tasks. `wavecomb farm assemble JOB` joins
+    the tiles.
     """
     from wavecomb.farm.api import render_task
 
@@ -181,7 +189,7 @@ def opened_maps(maps: tuple[str, ...]) -> None:
 )
 @JOB
 @click.option("--openjd", type=click.Path(), required=True, metavar="FILE.json",
-              help="Write a template of Open Job Description.")  # fmt: skip
+              help="Write a job template in the format Open Job Description.")  # fmt: skip
 def export_command(job: str, **options: Any) -> None:
     """Write JOB for schedulers that run Open Job Description, with one task for each tile."""
     from wavecomb.farm.openjd import write_template

@@ -24,13 +24,14 @@ _SHOW_S = 0.5
 
 ON = click.option(
     "--on", default="local", metavar="local[:N]|dask:ADDRESS|slurm[:N]|none",
-    help="Where to render: N workers on this machine, the workers of a Dask cluster, N workers "
-    "that Slurm starts, or nowhere: only write the job.  [default: local: one worker on all cores]",
+    help="Where to render: on N workers of this machine, the workers of a Dask cluster, N "
+    "workers that Slurm starts, or none, to only write the job.  [default: local, one "
+    "worker on all cores]",
 )  # fmt: skip
 DASHBOARD = click.option(
     "--dashboard", type=click.IntRange(0, 65535), is_flag=False, flag_value=0, default=None,
     metavar="[PORT]",
-    help="Serve Dask's dashboard to this machine, and print its address.",
+    help="Serve Dask's dashboard to browsers on this machine, and print its address.",
 )  # fmt: skip
 
 

@@ -40,13 +40,15 @@ _PLAN_S = 4 * 3600.0
     "--tiles",
     default="auto",
     metavar="auto|NxM",
-    help="Columns and rows of tiles in each image.  [default: auto: whole images if there "
-    "are two for each worker]",
+    help="Number of tile columns and rows in each image.  [default: auto, no tiles if there are "
+    "two images per worker]",
 )
-@click.option("--job", metavar="DIR", help="The job's folder.  [default: NAME.farm beside -o]")
+@click.option(
+    "--job", metavar="DIR", help="Folder to write the job to.  [default: NAME.farm beside -o]"
+)
 @click.option(
     "--tries", type=click.IntRange(1, 100), default=3, metavar="N",
-    help="Number of attempts for a task that fails.  [default: 3]",
+    help="Maximum number of attempts to run a task that fails.  [default: 3]",
 )  # fmt: skip
 @click.option(
     "--hang", "hang_s", type=Real(1), default=1800.0, metavar="S",
@@ -59,13 +61,13 @@ _PLAN_S = 4 * 3600.0
 )
 @click.option(
     "--map", "maps", multiple=True, metavar="FROM=TO",
-    help="Workers without folder FROM look for the stage, its files and the images at TO.",
+    help="Workers that lack folder FROM use folder TO for the stage, its files and the images.",
 )  # fmt: skip
 @click.option(
     "--isa",
     metavar="NAME",
-    help="Instruction set for all workers (x86-64-v3 ...), so that older and newer machines "
-    "render the same bits.",
+    help="CPU instruction set for all workers, such as x86-64-v3, so that older and newer "
+    "machines render the same bits.",
 )
 @DASHBOARD
 @click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")

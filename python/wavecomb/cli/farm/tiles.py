@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rendering single tiles with ``wavecomb render --tile``, for sites with their own job queue.
 
-Also converts the options of ``render`` to a farm job.
+This module also converts the options of ``render`` to a farm job.
 """
 
 from __future__ import annotations

@@ -56,7 +56,9 @@ class Ask:
 
 
 class Jobs(QObject):
-    """Four workers for images, numbers, FLIP and the map. Each computes only the newest request.
+    """Four workers for images, numbers, FLIP and the map.
+
+    Each kind of job computes only the newest request.
 
     Signals:
         images(A, B): Displayed images, QImage or None.

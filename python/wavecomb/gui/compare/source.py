@@ -29,7 +29,7 @@ SHORT = {
 
 
 class SideSource(QObject):
-    """One side of a comparison. All methods are for the UI thread; none blocks.
+    """Source of one side of a comparison. All methods are for the UI thread; none blocks.
 
     Signals:
         changed(): ``side`` or ``kind`` changed.

@@ -186,7 +186,7 @@ class CompareWindow(QWidget):
             self.sources[which].open(Path(paths[0]))
 
     def compare(self, a: Side | Path | None, b: Side | Path | None) -> None:
-        """Shows two images, and raises the window. None keeps the current image."""
+        """Shows two images, and raises the window. The value None keeps the current image."""
         for source, side in ((self.a, a), (self.b, b)):
             if isinstance(side, Side):
                 source.set_side(side)

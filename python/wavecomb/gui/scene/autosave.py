@@ -27,8 +27,8 @@ DELAY_MS = 2000
 class Autosave(QObject):
     """Automatic writer of the edits of the open stage to a file, until they are saved or undone.
 
-    Each stage has one file. The window with the stage holds a lock beside the file. A second window
-    with the same stage writes no copy.
+    Each stage has one autosave file. The window with the stage holds a lock beside the file. A
+    second window with the same stage writes no copy.
 
     Signals:
         found(): There are edits of an earlier window that ended without saving them.

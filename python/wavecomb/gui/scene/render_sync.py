@@ -70,7 +70,7 @@ class RenderSync:
     def material_ids(self, path: str) -> list[int]:
         """Returns the indices of a prim's materials in the scene.
 
-        There are several if primvars of meshes provide different values.
+        A prim has several materials if primvars of meshes provide different values.
         """
         stage = self.session.stage
         paths = stage.material_paths if stage is not None else ()

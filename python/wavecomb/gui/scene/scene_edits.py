@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class SceneEdits(QObject, RenderSync):
-    """Edits of the session's open stage. Each is an undo step of ``history``.
+    """Edits of the session's open stage. Each edit is an undo step of ``history``.
 
     Edits of visibility and variants load the stage again. Edits of materials and lights change the
     existing scene immediately.

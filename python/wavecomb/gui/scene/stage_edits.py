@@ -98,7 +98,7 @@ class StageEdits:
     Attributes:
         stage: The stage, whose session layer holds the edits.
         time: Time code at which attributes are read.
-        values: Edited values that no attribute can hold, by prim and parameter. They affect the
+        values: Edited values that no attribute can hold, by prim and parameter. These affect the
             image but cannot be saved.
     """
 
@@ -140,7 +140,7 @@ class StageEdits:
     def edited(self) -> list[Key]:
         """Returns the keys of all edits, in the order of the stage.
 
-        Those that cannot be saved come last.
+        Edits that cannot be saved come last.
         """
         found: list[Key] = []
 

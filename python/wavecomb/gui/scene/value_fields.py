@@ -44,7 +44,7 @@ def _is_history(event: Any) -> bool:
 class _Spin(QDoubleSpinBox):
     """Number field that emits changes while typing and uses a point as decimal mark.
 
-    It leaves undo and redo to the window and has no undo history.
+    The field leaves undo and redo to the window and has no undo history.
 
     Signals:
         typing(bool): The user began (True) or finished typing a value.
@@ -160,7 +160,7 @@ class NumberField(Field):
         self.row.addWidget(self.spin)
         self.finish()
         self._place(self.spin.value())
-        # By its range alone the field would be wider.
+        # The range alone would make the field wider.
         widest = max(f"{bounds.soft_high:.{bounds.decimals}f}", "-0.000", key=len)
         text = self.spin.fontMetrics().horizontalAdvance(widest)
         self.spin.setFixedWidth(max(text + theme.em(2.2), theme.em(5)))

@@ -64,8 +64,9 @@ def show(
 ) -> Words:
     """Returns the opinions that ``UsdGeom.Imageable.MakeVisible`` would author.
 
-    They show this prim and nothing else. An invisible ancestor becomes visible. Siblings along the
-    path to the prim become invisible, so that everything else below the ancestor stays hidden.
+    The opinions show the given prim and nothing else. An invisible ancestor becomes visible.
+    Siblings along the path to the prim become invisible, so that everything else below the ancestor
+    stays hidden.
     """
     chain = [prim]
     while chain[-1].GetParent() and not chain[-1].GetParent().IsPseudoRoot():

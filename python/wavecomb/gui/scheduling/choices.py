@@ -124,7 +124,7 @@ def scheduling_of(setup: Setup) -> dict[str, Any]:
 def promise(setup: Setup) -> str:
     """Returns a text that says how the settings of order affect the image.
 
-    They do not, except with a time limit or with cost-aware roulette.
+    Such settings do not change the image, except with a time limit or with cost-aware roulette.
     """
     if setup.time_limit:
         return (
@@ -151,7 +151,10 @@ def defaults(names: tuple[str, ...]) -> dict[str, Any]:
 
 
 def presets() -> dict[str, tuple[str, dict[str, Any]]]:
-    """Returns presets as (description, settings) by name. All but the first set only the order."""
+    """Returns presets as (description, settings) by name.
+
+    All presets but the first set only the order of work.
+    """
     order = defaults((*ORDER_FIELDS, "own_policy", "profile"))
     return {
         "Default": ("Default settings.", order),

@@ -42,7 +42,10 @@ _PROFILE_FILTER = "Cost profile (*.json);;All files (*)"
 
 
 class SchedulingPanel(QScrollArea):
-    """Panel of the session's scheduling settings. Its only state are loaded policies."""
+    """Panel of the session's scheduling settings.
+
+    The only state of the panel are loaded policies.
+    """
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -19,10 +19,11 @@ WORK = names("work", without=("spp",))
 """Settings that change the amount of work, and thus the noise."""
 
 FIELDS = (*names("order", without=("progressive",)), *WORK)
-"""Settings that distinguish series. All but those of ``WORK`` leave the image unchanged."""
+"""Settings that distinguish series. All fields but those of ``WORK`` leave the image unchanged."""
 
 MAX_LOOKS = 240
-"""Largest number of looks in a run. More are thinned out, so that memory use is bounded."""
+"""Largest number of looks in a run. Further looks are thinned out, so that memory use is
+bounded."""
 MAX_SERIES = 100
 SHORTEST_S = 0.25
 """Shortest abandoned run that is kept, in seconds. Shorter ones, as while orbiting, have no

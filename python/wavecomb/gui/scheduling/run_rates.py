@@ -61,7 +61,8 @@ class Ratio:
     high: float
     """End of a 95 % interval that begins at ``low``; 0 and infinity if it is unknown."""
     repeats: int
-    """Number of pairs of runs. With 1, the interval is over one pair and does not cover drift."""
+    """Number of pairs of runs. With one pair of runs, the interval does not cover drift of the
+    machine."""
     short: bool = False
 
     @property
@@ -118,7 +119,7 @@ def rate(run: Run, counter: str) -> Rate:
 def rate_of(series: Series, counter: str) -> Rate:
     """Returns the rate over all finished runs of a series.
 
-    With several, its spread is over runs.
+    With several runs, the interval covers the spread between runs.
     """
     runs = _whole(series.runs)
     if len(runs) == 1:
@@ -158,7 +159,8 @@ def compare_runs(run: Run, base: Run) -> Ratio:
     ends = [samples * k / n for k in range(n + 1)]
     mine = [time_of(run, b) - time_of(run, a) for a, b in pairwise(ends)]
     theirs = [time_of(base, b) - time_of(base, a) for a, b in pairwise(ends)]
-    # The estimator is sum(theirs) / sum(mine). Its variance is the one of theirs - value * mine.
+    # The estimator is sum(theirs) / sum(mine). The variance of the ratio is that of theirs - value
+    # * mine.
     rest = [b - value * a for a, b in zip(mine, theirs, strict=True)]
     error = math.sqrt(sum(r * r for r in rest) * n / (n - 1)) / sum(mine)
     half = t975(n - 1) * error / value

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Render thread of a live render: takes the newest task, stops the previous one, returns frames.
 
-Independent of Qt. If the full image would take long, a task first renders a reduced image. Then it
-renders the full image pass by pass.
+Independent of Qt. If the full image would take long, a task first renders a reduced image. Then the
+engine renders the full image pass by pass.
 """
 
 from __future__ import annotations

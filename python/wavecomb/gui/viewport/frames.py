@@ -23,7 +23,7 @@ _FIELDS = ("albedo", "normal", "depth", "samples", "error", "variance")
 
 @dataclass(frozen=True)
 class Frame:
-    """An image of a live render. Its arrays must not be modified.
+    """An image of a live render. The arrays of a frame must not be modified.
 
     Attributes:
         beauty: (height, width, 3), linear Rec.709. Pixels without samples hold values of the

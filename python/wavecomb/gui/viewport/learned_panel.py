@@ -20,7 +20,7 @@ from wavecomb.image.directions import density_map, map_point
 _LATER_MS = 40
 _HEIGHT = 128
 MOST_LIGHTS = 12
-"""Largest number of lights with separate bars. All further lights share one."""
+"""Largest number of lights with separate bars. All further lights share one bar."""
 
 
 def field_text(setup: Setup, learned: dict[str, Any] | None) -> str:

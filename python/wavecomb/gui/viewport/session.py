@@ -344,7 +344,7 @@ class Session(Live):
     def twin(self, setup: Setup) -> Live:
         """Starts another live render of the same scene and camera, with separate settings.
 
-        It follows all edits. ``drop_twin`` ends it.
+        The twin follows all edits. ``drop_twin`` ends it.
         """
         live = Live(setup, self)
         self.twins.append(live)

@@ -128,7 +128,7 @@ class Viewport(PictureView):
     def pivot(self) -> Vector:
         """Returns the point that the camera orbits.
 
-        It is the last point under the cursor, or the centre of the scene.
+        The orbit centre is the last point under the cursor, or the centre of the scene.
         """
         if self._pivot is None:
             bounds = self.bounds()

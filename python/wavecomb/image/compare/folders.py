@@ -100,7 +100,8 @@ def as_plain(pair: PairResult, tolerance: float | None) -> dict[str, Any]:
 
 
 MAX_PAIRS = 60
-"""Most pairs whose images are in a page, those with the largest differences; its table has all."""
+"""Maximum number of pairs with images in a page, those that differ most; the table lists all
+pairs."""
 _HEAD = ("picture", "", "differ", "RMSE", "relMSE", "largest", "at")
 
 

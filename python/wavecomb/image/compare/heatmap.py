@@ -40,8 +40,8 @@ class Scale:
         colours: (count, 3) colours of the scale.
         ticks: Position along the bar, from 0 to 1, and label.
         position: (height, width) position of every pixel along the bar; NaN means black.
-        finite: (height, width) mask; False (a value of A or B is not finite) means cyan. None if
-            all are finite.
+        finite: (height, width) mask; False (a value of A or B is not finite) means cyan. The mask
+        is None if all values are finite.
     """
 
     title: str

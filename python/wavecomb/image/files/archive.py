@@ -23,7 +23,7 @@ from wavecomb.image.files.output_file import check_regular, replacing
 from wavecomb.version import version
 
 MAX_HEADER = 1 << 24
-"""Most bytes of an archive's header."""
+"""Maximum number of bytes of an archive's header."""
 
 MAX_ENTRIES = 4096
 

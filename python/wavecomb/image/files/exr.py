@@ -57,8 +57,8 @@ def channel_names(layer: str, channels: int) -> list[str]:
 def is_exact(layer: str) -> bool:
     """Returns whether lossy compression would invalidate a layer.
 
-    It would change ids. Positions far from 0 exceed its range, since dwaa treats every channel
-    named Y as luminance.
+    Lossy compression would change ids. Positions far from 0 exceed its range, since dwaa treats
+    every channel named Y as luminance.
     """
     return is_crypto(layer) or aovs.content(layer) in ("exact", "id")
 

@@ -53,7 +53,7 @@ def command(
     Args:
         words: Command to run, with absolute paths.
         private: The only writable folder, which also holds temporary files.
-        inputs: Paths that the command line names. They remain readable even if a hidden folder
+        inputs: Paths that the command line names. These remain readable even if a hidden folder
             (/tmp, /run) or ``reads`` would hide them.
         reads: Folders of ``--sandbox-read``. If any are given, only these, the inputs and libraries
             can be read; otherwise everything that the user may read.

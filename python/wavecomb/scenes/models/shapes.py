@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Basic shapes of furniture: rounded boxes, bodies of revolution, tubes and pillows.
 
-All are closed meshes in metres. Texture coordinates are also in metres, with v along the grain.
+All shapes are closed meshes in metres. Texture coordinates are also in metres, with v along the
+grain.
 """
 
 from __future__ import annotations

@@ -6,8 +6,8 @@ University of Utah, 1975; numbers as published by F. Crow, "The Origins of the T
 7(1), 1987, with the bottom that was added later.
 
 The published list has 306 points, but most follow from symmetry: rim, body, lid and bottom are
-profiles turned in four patches; handle and spout are half sections mirrored in y = 0. This file
-holds only the generating numbers.
+profiles turned in four patches; handle and spout are half sections mirrored in y = 0. The file
+holds only the numbers that generate the patches.
 """
 
 from __future__ import annotations

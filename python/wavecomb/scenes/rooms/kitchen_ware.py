@@ -133,7 +133,7 @@ def faucet(columns: int) -> list[Part]:
 def pendant(columns: int, cord: float) -> list[Part]:
     """Makes an enamel lampshade that hangs from y = 0 on a cord.
 
-    Its light belongs 0.11 m below the end of the cord.
+    The light of the pendant belongs 0.11 m below the end of the cord.
     """
     shade = [
         (0, -0.005),

@@ -128,7 +128,7 @@ def _is_camera(prim: Usd.Prim) -> bool:
 
 
 MAX_CAMERAS = 1000
-"""Most cameras that are listed, since instancing can multiply them."""
+"""Maximum number of cameras that are listed, since instancing can multiply them."""
 
 
 def all_cameras(stage: Usd.Stage) -> list[Usd.Prim]:

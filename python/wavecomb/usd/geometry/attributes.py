@@ -15,7 +15,7 @@ from wavecomb.usd.geometry.mesh_arrays import MeshArrays
 from wavecomb.usd.geometry.primvar import Primvar, PrimvarError, fitting, spread
 
 MAX_WIDTH = 4
-"""Most components of an attribute."""
+"""Maximum number of components of an attribute."""
 
 Attributes = dict[str, tuple[str, NDArray[np.float32]]]
 """Name -> (rate, values (k, c)), in the form that ``SceneBuilder.add_mesh`` takes."""

@@ -32,12 +32,12 @@ PARTS = 8
 """Quads along each knot span."""
 
 MAX_QUADS = 1 << 24
-"""Most quads of a patch; spans of larger patches get fewer quads."""
+"""Maximum number of quads of a patch; spans of larger patches get fewer quads."""
 
 
 @dataclass(frozen=True)
 class _Axis:
-    """One parametric direction of a patch, sampled at rows of points.
+    """Parametric direction of a patch, sampled at rows of points.
 
     Attributes:
         spline: Its basis.

@@ -20,7 +20,7 @@ from wavecomb.usd.stage.time_codes import frame_number
 Matrices = NDArray[np.float64]
 
 MAX_STEPS = 64
-"""Most motion steps that the user may request."""
+"""Maximum number of motion steps that the user may request."""
 
 _CHOICES = (2, 3, 4, 5, 8)
 """Numbers of motion steps that are tried in turn if none is requested."""

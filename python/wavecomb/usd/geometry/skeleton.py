@@ -153,7 +153,8 @@ class Skin:
 
 
 MAX_SKINNED_INSTANCES = 100_000
-"""Most instances that are read separately, since nested instancing can multiply them."""
+"""Maximum number of instances that are read separately, since nested instancing can multiply
+them."""
 
 
 class SkinError(ValueError):

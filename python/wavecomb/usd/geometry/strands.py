@@ -269,7 +269,7 @@ class Strands:
         end = base + step * self.segments
         out[end] = points[step][last]
         if lead:
-            # The same point with the same bits.
+            # Both strands get the same point with the same bits.
             out[end] = points[0][first]
             out[base - 1] = points[step - 1][last]
             out[end + 1] = points[1][first]

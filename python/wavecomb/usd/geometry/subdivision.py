@@ -39,7 +39,7 @@ AUTO_LEVEL = 8
 MAX_LEVEL = 10
 
 AUTO_TRIANGLES = 16_000_000
-"""Most triangles that all subdivided meshes together may have at automatic levels."""
+"""Maximum number of triangles that all subdivided meshes together may have at automatic levels."""
 
 BYTES_PER_TRIANGLE = 210
 """Peak memory per refined triangle during refinement (measured); the scene keeps less."""

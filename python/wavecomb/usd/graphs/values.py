@@ -41,7 +41,7 @@ class GraphTooLarge(Exception):
 
 @dataclass(eq=False, slots=True)
 class Node:
-    """One operation; ``Expressions`` creates equal nodes only once."""
+    """Operation of a graph; ``Expressions`` creates equal nodes only once."""
 
     code: str
     width: int

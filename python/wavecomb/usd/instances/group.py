@@ -22,7 +22,7 @@ Matrices = NDArray[np.float64]
 T = TypeVar("T")
 
 MAX_STEPS = 64
-"""Most motion steps of an animated transform inside another animated one."""
+"""Maximum number of motion steps of an animated transform inside another animated one."""
 
 _MANY_BOXES = 1024
 """Number of boxes above which they are merged."""
@@ -218,7 +218,7 @@ MIN_IRRADIANCE = 0.02
 """Irradiance from which an object counts as lit: a hundredth of that from the default dome."""
 
 MAX_SAMPLED_EMITTERS = 2048
-"""Most objects and most emitters that are considered."""
+"""Maximum number of objects and most emitters that are considered."""
 
 
 def emitter_of(shape: MeshArrays, material: int, faces: NDArray[np.uint32] | None) -> Emitter:
@@ -274,7 +274,7 @@ def _emitter_powers(
 
 
 _MAX_PLACED = 1 << 20
-"""Most transforms of a group that are considered."""
+"""Maximum number of transforms of a group that are considered."""
 
 
 def placements(world: Group) -> dict[int, Matrices]:

@@ -30,7 +30,7 @@ from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.traversal import InstancePrim, inherit
 
 MAX_COLOURS = 256
-"""Most materials that a varying colour is quantised to."""
+"""Maximum number of materials that a varying colour is quantised to."""
 
 
 def quantise(colours: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
@@ -119,7 +119,7 @@ class InstanceMaterials:
 
 
 MAX_VARIATIONS = 256
-"""Most variations of a prototype; primvars of further instances are ignored."""
+"""Maximum number of variations of a prototype; primvars of further instances are ignored."""
 
 _ARRAYS = {
     1: (Sdf.ValueTypeNames.FloatArray, Vt.FloatArray),

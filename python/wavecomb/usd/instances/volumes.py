@@ -16,7 +16,7 @@ from wavecomb.usd.volumes.info import GridFacts, VolumeFacts
 from wavecomb.usd.volumes.volume import VolumeReader
 
 MAX_VOLUMES = 4096
-"""Most volumes in a scene, since instancing can multiply them."""
+"""Maximum number of volumes in a scene, since instancing can multiply them."""
 
 
 class VolumeInstancer:

@@ -23,7 +23,7 @@ from wavecomb.usd.stage.diagnostics import capture_diagnostics, first_message
 from wavecomb.usd.stage.report import LoadReport
 
 MAX_SURVEYED = 4096
-"""Most cameras and lights that are listed, since instancing can multiply them."""
+"""Maximum number of cameras and lights that are listed, since instancing can multiply them."""
 
 
 @dataclass(frozen=True)

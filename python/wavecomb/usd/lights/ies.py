@@ -123,7 +123,7 @@ def _expand_c(vertical: Floats, horizontal: Floats, candela: Floats) -> IesProfi
 
     def mirrored(about: float) -> None:
         nonlocal horizontal, candela
-        # All planes except the plane of symmetry itself.
+        # This mirrors all planes except the plane of symmetry itself.
         inner = slice(-2, None, -1)
         horizontal = np.append(horizontal, 2 * about - horizontal[inner])
         candela = np.append(candela, candela[inner], axis=0)

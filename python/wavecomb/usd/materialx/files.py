@@ -20,13 +20,13 @@ MAX_DEPTH = 64
 """Deepest nesting of elements, since MaterialX parses them recursively."""
 
 MAX_INCLUDES = 256
-"""Most files that a document may include directly or indirectly."""
+"""Maximum number of files that a document may include directly or indirectly."""
 
 MAX_CHAIN = 32
 """Longest chain of includes, since each file copies the content of the files below it."""
 
 MAX_BYTES = 1 << 26
-"""Most bytes of a document with all its includes."""
+"""Maximum number of bytes of a document with all its includes."""
 
 _INCLUDE = "http://www.w3.org/2001/XInclude include"
 

@@ -25,7 +25,7 @@ from wavecomb.usd.materialx.prims import Prims
 from wavecomb.usd.stage.report import LoadReport
 
 MAX_ROUNDS = 16
-"""Most passes over a stage, since a translated file may refer to further files."""
+"""Maximum number of passes over a stage, since a translated file may refer to further files."""
 
 
 @dataclass
@@ -46,7 +46,8 @@ class _Translation:
 
 
 _translations: dict[str, _Translation] = {}
-"""Translations by file. They are never released, since layers of open stages refer to them."""
+"""Translations by file. Translated layers are never released, since layers of open stages refer to
+them."""
 
 _lock = threading.Lock()
 

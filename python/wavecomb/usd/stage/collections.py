@@ -12,7 +12,8 @@ Rules = dict[str, str]
 """Rule for each path: exclude, explicit (only that path) or expand (the path and all below it)."""
 
 MAX_PRIMS = 1 << 20
-"""Most prims at which an expression is evaluated; nested instancing may create billions."""
+"""Maximum number of prims at which an expression is evaluated; nested instancing may create
+billions."""
 
 _RULES = {
     Usd.Tokens.exclude: "exclude",

@@ -22,7 +22,7 @@ BINDING_PURPOSES = ("full", "preview")
 
 @dataclass
 class LoadContext:
-    """One load of a stage at one frame.
+    """State of one load of a stage at one frame.
 
     Attributes:
         stage: The stage.

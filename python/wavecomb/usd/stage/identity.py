@@ -15,7 +15,7 @@ from wavecomb.usd.stage.report import LoadReport
 OTHER = "other"
 """Name of the group of lights without an authored group."""
 MAX_LIGHT_GROUPS = 63
-"""Most further light groups that the core supports."""
+"""Maximum number of further light groups that the core supports."""
 PRIMVAR = "wavecomb:lightGroup"
 _LIGHT_GROUPS = (
     "wavecomb:lightGroup",

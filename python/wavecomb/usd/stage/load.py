@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from wavecomb import _core
 
 MAX_LIGHTS = 4096
-"""Most lights in a scene, since instancing can multiply them."""
+"""Maximum number of lights in a scene, since instancing can multiply them."""
 
 
 def load_stage(
@@ -169,7 +169,7 @@ def _opened(source: str | Path | Usd.Stage, options: LoadOptions) -> Usd.Stage:
 
 
 class _Load:
-    """One load of a stage into a scene builder.
+    """State of one load of a stage into a scene builder.
 
     Attributes:
         textures: Textures of the scene.

@@ -94,7 +94,7 @@ class LoadedStage:
         from wavecomb import _core
 
         kept = None
-        # Other threads may be using it.
+        # Other threads may be using the result.
         with contextlib.suppress(IndexError):
             kept = self._kept.pop()
         # The scene may have been edited.

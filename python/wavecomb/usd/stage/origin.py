@@ -27,7 +27,7 @@ CELL = 2.0**12
 """Origins are multiples of this, so that most frames of a moving camera share an origin."""
 
 MANY = 4096
-"""Most prims that determine the centre of a stage without a camera."""
+"""Maximum number of prims that determine the centre of a stage without a camera."""
 
 DEEP = 256
 """Deepest prims that are considered, since USD computes their transforms recursively."""

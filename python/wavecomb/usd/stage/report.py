@@ -13,7 +13,7 @@ LEVELS = ("warning", "not supported", "note")
 """Kinds of messages, in the order of a log."""
 
 MAX_KEPT = 500
-"""Most locations that are stored per message."""
+"""Maximum number of locations that are stored per message."""
 
 
 @dataclass

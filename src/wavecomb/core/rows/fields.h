@@ -119,7 +119,7 @@ template <template <typename> class Row>
 inline constexpr size_t kRowWords = std::bit_ceil(kFieldWords<Row>);
 
 /// Returns the word index of a member in a row or record: word_of(&Row<float>::slot). Compilers
-/// reduce it to a constant.
+/// reduce the function to a constant.
 template <typename Record, typename Member>
 WAVECOMB_INLINE uint32_t word_of(Member Record::* member) {
   static_assert(std::is_trivially_copyable_v<Record>);

@@ -12,8 +12,8 @@ namespace wavecomb {
 /// The two halves are separate estimates of the same value. They alternate in blocks of kHalfBlock
 /// samples, since such a block of the Sobol sequence is a (t,m,s)-net and the next block fills its
 /// gaps, so that both halves stay well distributed. The variance is Welford's (Technometrics 4(3),
-/// 1962, p. 419). It treats samples as independent, which Sobol samples are not, so it is only an
-/// output and never controls sampling.
+/// 1962, p. 419). This variance treats samples as independent, which Sobol samples are not, so it
+/// is only an output and never controls sampling.
 struct ErrorSums {
   /// Block length, a power of two. Pixels need twice as many samples for an error estimate.
   static constexpr uint32_t kHalfBlock = 8;

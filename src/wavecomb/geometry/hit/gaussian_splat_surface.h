@@ -51,7 +51,7 @@ inline Vec3<F> gaussian_splat_offset(const GaussianSplatMap<F>& map, const Insta
 namespace wavecomb {
 
 /// Returns the factor by which a Gaussian splat multiplies its material's emission for rays along
-/// `dir`: 0.5 plus the sum of its harmonics, clamped to at least 0. It is 1 for other hits.
+/// `dir`: 0.5 plus the sum of its harmonics, clamped to at least 0. The factor is 1 for other hits.
 template <typename F>
 [[gnu::noinline, gnu::cold]] Color<F> gaussian_splat_radiance(const SceneView& scene,
                                                               const MeshHit<F>& hit,

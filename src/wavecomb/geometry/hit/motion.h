@@ -15,8 +15,8 @@
 
 namespace wavecomb {
 
-/// Returns the time of a path in [0, 1), which all its rays share. It depends on the sample key
-/// only.
+/// Returns the time of a path in [0, 1), which all its rays share. The time depends on the sample
+/// key only.
 template <typename F>
 inline F path_time(SamplerKind sampler, const SampleKey<F>& key) {
   return sample_4d<F>(sampler, key, kTimeSet).x;

@@ -103,7 +103,7 @@ WAVECOMB_INLINE void set_triangle_uv(const SceneView& scene, const MeshHit<F>& h
   s.uv_per_length = sqrt(F(abs(det) / at.safe_area2));
   const Mask<F> mirrored = det < 0.f;
   s.handedness = select(mirrored, F(-maps.side), maps.side);
-  // dp/du = (d2.v e1 - d1.v e2) / det. Only its direction is used.
+  // dp/du = (d2.v e1 - d1.v e2) / det. Only the direction of this vector is used.
   const Vec3<F> across = at.e1 * d2.y - at.e2 * d1.y;
   Vec3<F> tangent = select<F>(mirrored, -across, across);
   // A copy, so that the vertices can stay in registers.

@@ -64,7 +64,7 @@ static_assert(sizeof(MatrixStep) == 64);
 /// Device view of a scene's motion.
 struct MotionView {
   const MeshMotion* meshes = nullptr;
-  const StepRange* instances = nullptr;  ///< by instance; null where none moves
+  const StepRange* instances = nullptr;  ///< indexed by instance; null where none moves
   const MatrixStep* steps = nullptr;
 };
 

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Mesh tangents along u that vary smoothly over triangles, as normals do.
 ///
-/// They follow MikkTSpace, for which normal maps are baked (M. Mikkelsen, "Simulation of Wrinkled
-/// Surfaces Revisited", 2008). Corners of a vertex with the same texture coordinates, normal and
-/// texture orientation share one tangent. It is the mean of the tangents of their triangles, each
-/// projected to the plane of the normal and weighted by the triangle's angle at the corner.
-/// Tangents are therefore split at texture seams, where the texture is mirrored, and at hard edges.
+/// Tangents follow MikkTSpace, for which normal maps are baked (M. Mikkelsen, "Simulation of
+/// Wrinkled Surfaces Revisited", 2008). Corners of a vertex with the same texture coordinates,
+/// normal and texture orientation share one tangent. It is the mean of the tangents of their
+/// triangles, each projected to the plane of the normal and weighted by the triangle's angle at the
+/// corner. Tangents are therefore split at texture seams, where the texture is mirrored, and at
+/// hard edges.
 #pragma once
 
 #include <cstdint>
@@ -49,7 +50,7 @@ struct SceneTangents {
 
   /// By mesh, null for none; empty if no mesh has tangents.
   std::vector<std::shared_ptr<const MeshTangents>> of_mesh;
-  std::vector<TangentRecord> records;  ///< by mesh; empty if no mesh has tangents
+  std::vector<TangentRecord> records;  ///< indexed by mesh; empty if no mesh has tangents
   uint64_t bytes() const;
 };
 

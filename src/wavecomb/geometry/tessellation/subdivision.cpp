@@ -20,7 +20,7 @@ namespace {
 namespace Far = OpenSubdiv::Far;
 namespace Sdc = OpenSubdiv::Sdc;
 
-/// First message of OpenSubdiv on this thread. Its callbacks are global to the process.
+/// First message of OpenSubdiv on this thread. OpenSubdiv's callbacks are global to the process.
 thread_local std::string last_message;
 
 void catch_messages() {

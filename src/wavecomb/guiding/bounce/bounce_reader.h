@@ -25,8 +25,8 @@ struct TrainingSamples {
 
 /// Cost model in units of one ray traced through a BVH.
 struct PathCosts {
-  double ray = 1;                         ///< of a bounce ray or a shadow ray
-  double lookup = 0;                      ///< of a guiding field lookup at a vertex
+  double ray = 1;                         ///< cost of a bounce ray or a shadow ray
+  double lookup = 0;                      ///< cost of a guiding field lookup at a vertex
   const CostSnapshot* shading = nullptr;  ///< costs of materials
 
   /// Returns the cost of a vertex with its light sample.
@@ -51,7 +51,7 @@ struct TrainingPlan {
 /// Contract: workers may call ended() concurrently, each for different paths.
 class BounceReader final : public HistoryReader {
  public:
-  /// Most vertices of a path that become training samples.
+  /// Maximum number of vertices of a path that become training samples.
   static constexpr uint32_t kVertices = 6;
 
   /// `pixels` and `plan` must outlive the reader.

@@ -179,8 +179,8 @@ class GuidingFieldBuilder {
     return part.region;
   }
 
-  /// Processes the octree node of `depth` whose Morton codes share the prefix of `code`. Its
-  /// records are [begin, end).
+  /// Processes the octree node of `depth` whose Morton codes share the prefix of `code`. The
+  /// records of the cell are [begin, end).
   void divide(uint32_t depth, uint32_t code, size_t begin, size_t end) {
     read(depth, begin, end);
     if (end - begin <= cell_records_ || depth == kGuidingBits) {
@@ -261,7 +261,7 @@ class GuidingFieldBuilder {
   GuidingFieldArrays& parts_;  ///< parts of field_
   bool first_, guides_;
   std::vector<TrainingRecord> records_;  ///< sorted by Morton code
-  std::vector<ShareRatios> ratios_;      ///< of records_; empty in the first round
+  std::vector<ShareRatios> ratios_;      ///< ratios of records_; empty in the first round
   std::vector<uint32_t> codes_;
   size_t cell_records_ = kCellRecords;
   std::array<std::vector<const TrainingRecord*>, kGuidingAxes> by_axis_;  ///< scratch of read()

@@ -54,7 +54,8 @@ struct GuidingFieldStatistics {
 /// A guiding field and the arrays that kernels read. Immutable except for compute_survival.
 class GuidingField {
  public:
-  /// Creates an empty field. It guides nothing but defines the grid for bounce_position_key.
+  /// Creates an empty field. Such a field guides nothing but defines the grid for
+  /// bounce_position_key.
   explicit GuidingField(const GuidingGrid& grid) : grid_(grid) {}
   /// Builds a field from training records. `materials` is the number of materials. `first` means:
   /// the records hold no densities of a field yet, so each region is guided half of the time. With

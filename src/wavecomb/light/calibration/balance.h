@@ -41,8 +41,8 @@ class LightBalance {
   void add(size_t cell, size_t part, double value, double weight);
 
   /// Returns the selection probabilities of least variance. The fraction kFloor is distributed half
-  /// evenly and half by `power` (> 0, sum 1). Returns `power` if no part contributed. All are above
-  /// 0, and the sum is 1.
+  /// evenly and half by `power` (> 0, sum 1). Returns `power` if no part contributed. All
+  /// probabilities are above 0, and their sum is 1.
   std::vector<double> shares(std::span<const double> power) const;
 
   static constexpr double kFloor = 0.1;

@@ -17,7 +17,7 @@ constexpr uint32_t kNumbers = 1u << 24;
 struct Candidate {
   double power;
   std::string name;
-  uint32_t record;  ///< or kNoLight for a mesh
+  uint32_t record;  ///< light record, or kNoLight for a mesh
   uint32_t mesh;    ///< index into LightParts::of_mesh; kNoLight for a record
 };
 

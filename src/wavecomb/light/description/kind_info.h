@@ -36,8 +36,8 @@ struct LightBuild {
 /// and `intersect`.
 enum class LightShape : uint8_t { kNone, kParallelogram, kCustom };
 
-/// Description of a kind of light for the scene and the accelerator. Its kernels are in the header
-/// of the kind.
+/// Description of a kind of light for the scene and the accelerator. The kernels of a kind are in
+/// its header.
 struct LightKindInfo {
   const char* name = "";
   std::vector<const char*> prims;  ///< types of USD prims that are rendered as this kind

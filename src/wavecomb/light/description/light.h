@@ -33,10 +33,10 @@ inline constexpr uint32_t kNoSet = 0xffffffffu;
 struct Shaping {
   float focus = 0;  ///< exponent of the cosine to the axis; 0 or less: no focus
   Vec3<float> focus_tint{0, 0, 0};
-  float cone_angle = 180;      ///< degrees from the axis; 180 or more: no cone
-  float cone_softness = 0;     ///< fraction of the cone over which emission falls to 0
-  uint32_t ies = kNoIes;       ///< profile id of SceneBuilder::add_ies
-  float ies_angle_scale = 0;   ///< as defined by UsdLux; 0: no scaling
+  float cone_angle = 180;     ///< degrees from the axis; 180 or more: no cone
+  float cone_softness = 0;    ///< fraction of the cone over which emission falls to 0
+  uint32_t ies = kNoIes;      ///< profile id of SceneBuilder::add_ies
+  float ies_angle_scale = 0;  ///< scale of vertical angles as defined by UsdLux; 0 means no scaling
   bool ies_normalize = false;  ///< divide by IesProfile::mean
 
   bool is_plain() const { return !(focus > 0) && !(cone_angle < 180) && ies == kNoIes; }
@@ -120,7 +120,7 @@ struct Light {
   /// For a rect (u to the right, v up as seen from the front) or a dome (latlong).
   uint32_t texture = kNoTexture;
   uint32_t group = 0;  ///< light group id of SceneBuilder::light_group
-  Shaping shaping;     ///< for area lights and point lights
+  Shaping shaping;     ///< used by area lights and point lights
   /// Factors of the light's contribution to the diffuse and the specular response of materials
   /// (UsdLux; not physically based).
   float diffuse = 1, specular = 1;

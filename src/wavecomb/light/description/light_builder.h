@@ -37,8 +37,8 @@ struct EmissiveTriangle {
   float opacity = 1;
   bool opacity_varies = false;
   /// The expected luminance of the emission is luminance(radiance) * mean_scale. For a texture,
-  /// pass the mean of the texture (times scale, plus bias) in `radiance` and leave this at 1. It
-  /// affects only light selection probabilities.
+  /// pass the mean of the texture (times scale, plus bias) in `radiance` and leave this at 1. This
+  /// factor affects only light selection probabilities.
   float mean_scale = 1;
 };
 
@@ -63,7 +63,7 @@ struct LightSet {
   std::vector<ShapingRecord> shapings;
   std::vector<FilterRecord> filters;
   std::vector<ShadowRecord> shadows;
-  std::vector<LightMotion> motions;  ///< by record; empty where no light moves
+  std::vector<LightMotion> motions;  ///< indexed by record; empty where no light moves
   std::vector<LightStep> motion_steps;
   std::vector<IesRecord> ies;
   std::vector<float> ies_numbers;

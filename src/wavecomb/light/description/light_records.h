@@ -268,7 +268,7 @@ struct LightView {
   const IesRecord* ies = nullptr;
   const float* ies_numbers = nullptr;
   const FilterRecord* filters = nullptr;  ///< null if no light has a filter
-  const LightMotion* motions = nullptr;   ///< by record; null if no light moves
+  const LightMotion* motions = nullptr;   ///< indexed by record; null if no light moves
   const LightStep* motion_steps = nullptr;
   const ShadowRecord* shadows = nullptr;  ///< null if all shadows are plain
   /// Record of the mesh light of each triangle, or kNoLight. Null if there are no mesh lights.

@@ -115,47 +115,50 @@ std::vector<LightParameter> shape_rows() {
   using enum LightGroup;
   using namespace light_trait;
   return {
-      all(kEmission, positive(row<&L::color>("color", "colour", "color",
-                                             "Emitted radiance, W / (m^2 sr): colour * intensity * "
-                                             "2^exposure * colour temperature."),
-                              1)),
-      in(kShape,
-         positive(row<&L::width>("width", "width", "width", "Size along x, in local units."), 10)),
-      in(kShape,
-         positive(row<&L::height>("height", "height", "height", "Size along y, in local units."),
-                  10)),
-      in(kShape,
-         positive(row<&L::radius>("radius", "radius", "radius",
-                                  "Radius in local units; a sphere of radius 0 is a point light."),
-                  10)),
-      in(kShape,
-         positive(row<&L::length>("length", "length", "length", "Size along x, in local units."),
-                  10)),
-      in(kShape,
-         positive(row<&L::angle>("angle", "angle", "angle",
-                                 "Apparent diameter in degrees; 0 gives a single direction."),
-                  10)),
+      all(kEmission,
+          positive(row<&L::color>("color", "colour", "color",
+                                  "Emitted radiance of the light in W / (m^2 sr): colour * "
+                                  "intensity * 2^exposure * colour temperature."),
+                   1)),
+      in(kShape, positive(row<&L::width>("width", "width", "width",
+                                         "Size of the light along x, in local units."),
+                          10)),
+      in(kShape, positive(row<&L::height>("height", "height", "height",
+                                          "Size of the light along y, in local units."),
+                          10)),
+      in(kShape, positive(row<&L::radius>("radius", "radius", "radius",
+                                          "Radius of the light in local units; a sphere light of "
+                                          "radius 0 is a point light."),
+                          10)),
+      in(kShape, positive(row<&L::length>("length", "length", "length",
+                                          "Size of the light along x, in local units."),
+                          10)),
+      in(kShape, positive(row<&L::angle>("angle", "angle", "angle",
+                                         "Apparent diameter of a distant light in degrees; 0 makes "
+                                         "all its light parallel."),
+                          10)),
       with(kSized, kEmission,
            row<&L::normalize>("normalize", "normalize", "normalize",
-                              "Divides radiance by the world-space area; for a distant light, by "
-                              "UsdLux's sizeFactor.")),
+                              "Divides the light's radiance by its world-space area, or for a "
+                              "distant light by UsdLux's sizeFactor.")),
       with(kTextured, kEmission,
            id(row<&L::texture>("texture", "texture", "texture:file",
-                               "Texture that multiplies the colour: on a rect with u to the right "
-                               "and v up as seen from the front, on a dome as latlong."),
+                               "Texture that multiplies the light's colour: on a rect with u to "
+                               "the right and v up as seen from the front, on a dome as latlong."),
               LightRefers::kTexture)),
       with(kHasTransform, kEmission,
-           id(row<&L::group>("group", "group", "", "Name of its light group, for AOVs."),
+           id(row<&L::group>("group", "group", "",
+                             "Name of the light group of this light, for AOVs of light groups."),
               LightRefers::kGroup)),
       all(kResponse,
-          positive(
-              row<&L::diffuse>("diffuse", "diffuse", "diffuse",
-                               "Factor of its contribution to the diffuse response of materials."),
-              2)),
+          positive(row<&L::diffuse>(
+                       "diffuse", "diffuse", "diffuse",
+                       "Factor of the light's contribution to the diffuse response of materials."),
+                   2)),
       all(kResponse,
           positive(row<&L::specular>(
                        "specular", "specular", "specular",
-                       "Factor of its contribution to the specular response of materials."),
+                       "Factor of the light's contribution to the specular response of materials."),
                    2)),
   };
 }
@@ -168,33 +171,37 @@ std::vector<LightParameter> shaping_rows() {
   constexpr auto kS = &Light::shaping;
   return {
       with(kShaped, kShaping,
-           with_slider_max(row<kS, &S::focus>(
-                               "focus", "focus", "shaping:focus",
-                               "Exponent of the cosine to the axis, -z; 0 or less for no focus."),
+           with_slider_max(row<kS, &S::focus>("focus", "focus", "shaping:focus",
+                                              "Exponent of the cosine between emitted direction "
+                                              "and light axis (-z); 0 or less means no focus."),
                            50)),
       with(kShaped, kShaping,
            row<kS, &S::focus_tint>("focus_tint", "focus tint", "shaping:focusTint",
-                                   "Tint of the emission off the axis if there is a focus.")),
+                                   "Tint of the light that is emitted away from the light axis, if "
+                                   "the focus is above 0.")),
       with(kShaped, kShaping,
            with_slider_max(
-               row<kS, &S::cone_angle>(
-                   "cone_angle", "cone angle", "shaping:cone:angle",
-                   "Angle from the axis in degrees at which light ends; 180 or more for no cone."),
+               row<kS, &S::cone_angle>("cone_angle", "cone angle", "shaping:cone:angle",
+                                       "Angle from the light axis in degrees beyond which nothing "
+                                       "is emitted; 180 or more means no cone."),
                180)),
       with(kShaped, kShaping,
-           row<kS, &S::cone_softness>("cone_softness", "cone softness", "shaping:cone:softness",
-                                      "Fraction of the cone over which light falls to 0.")),
+           row<kS, &S::cone_softness>(
+               "cone_softness", "cone softness", "shaping:cone:softness",
+               "Fraction of the light's cone over which emission falls to 0.")),
       with(kShaped, kShaping,
-           id(row<kS, &S::ies>("ies", "IES profile", "shaping:ies:file",
-                               "Profile of add_ies that multiplies its radiance."),
+           id(row<kS, &S::ies>(
+                  "ies", "IES profile", "shaping:ies:file",
+                  "IES profile, added with add_ies, that multiplies the light's radiance."),
               LightRefers::kProfile)),
       with(kShaped, kShaping,
-           row<kS, &S::ies_angle_scale>(
-               "ies_angle_scale", "IES angle scale", "shaping:ies:angleScale",
-               "Scale of the profile's vertical angles as defined by UsdLux; 0 for no scaling.")),
+           row<kS, &S::ies_angle_scale>("ies_angle_scale", "IES angle scale",
+                                        "shaping:ies:angleScale",
+                                        "Scale of the IES profile's vertical angles as defined by "
+                                        "UsdLux; 0 means no scaling.")),
       with(kShaped, kShaping,
            row<kS, &S::ies_normalize>("ies_normalize", "IES normalize", "shaping:ies:normalize",
-                                      "Divides the profile by its mean over directions.")),
+                                      "Divides the IES profile by its mean over all directions.")),
   };
 }
 
@@ -206,27 +213,30 @@ std::vector<LightParameter> shadow_rows() {
   constexpr auto kH = &L::shadow;
   return {
       all(kResponse,
-          id(row<&L::light_link>("light_link", "light link", "",
-                                 "Geometry set that it illuminates; all geometry if not given."),
+          id(row<&L::light_link>(
+                 "light_link", "light link", "",
+                 "Geometry set that the light illuminates; all geometry if none is given."),
              LightRefers::kSet)),
-      all(kResponse, id(row<&L::shadow_link>(
-                            "shadow_link", "shadow link", "",
-                            "Geometry set that casts shadows from it; all geometry if not given."),
-                        LightRefers::kSet)),
-      all(kResponse, positive(row<kH, &H::color>("shadow_color", "shadow colour", "shadow:color",
-                                                 "Fraction of its light that arrives in shadow."),
-                              1)),
+      all(kResponse,
+          id(row<&L::shadow_link>(
+                 "shadow_link", "shadow link", "",
+                 "Geometry set that casts shadows from the light; all geometry if none is given."),
+             LightRefers::kSet)),
+      all(kResponse,
+          positive(row<kH, &H::color>(
+                       "shadow_color", "shadow colour", "shadow:color",
+                       "Fraction of the light's radiance that still arrives in its shadows."),
+                   1)),
       all(kResponse, with_slider_max(row<kH, &H::distance>(
                                          "shadow_distance", "shadow distance", "shadow:distance",
-                                         "Maximum world-space distance of an occluder from the "
-                                         "shaded surface; less than 0 for no limit."),
+                                         "Maximum world-space distance from an occluder to the "
+                                         "surface it shadows; less than 0 means no limit."),
                                      10)),
       all(kResponse,
-          with_slider_max(
-              row<kH, &H::falloff>("shadow_falloff", "shadow falloff", "shadow:falloff",
-                                   "Length before the shadow distance over which shadows fade; "
-                                   "0 or less for no fade."),
-              10)),
+          with_slider_max(row<kH, &H::falloff>("shadow_falloff", "shadow falloff", "shadow:falloff",
+                                               "World-space length before the shadow distance over "
+                                               "which shadows fade; 0 or less means no fade."),
+                          10)),
       all(kResponse,
           positive(row<kH, &H::gamma>("shadow_falloff_gamma", "shadow falloff gamma",
                                       "shadow:falloffGamma",
@@ -242,24 +252,25 @@ std::vector<LightParameter> other_rows() {
   using namespace light_trait;
   return {
       with(kFiltered, kEmission,
-           id(row<&L::filter>("filter", "filter", "",
-                              "Filter of add_light_filter that modifies its emission."),
+           id(row<&L::filter>(
+                  "filter", "filter", "",
+                  "Light filter, added with add_light_filter, that modifies the light's emission."),
               LightRefers::kFilter)),
       with(kVisibleShape, kShape,
            row<&L::visible>("visible", "visible", "",
-                            "Whether camera and bounce rays can hit its shape.")),
+                            "Whether camera and bounce rays can hit the light's shape.")),
       with(kHasTransform, kShape,
            row<&L::motion>("motion", "motion", "",
-                           "Transforms at equally spaced shutter times, (k, 4, 4), two or more. "
-                           "Its size is that of the transform at mid-shutter.")),
+                           "Transforms of a moving light at k >= 2 equally spaced shutter times, "
+                           "(k, 4, 4); the one at mid-shutter defines its size.")),
       in(kShape,
          row<&L::portals>("portals", "portals", "",
-                          "Maps of the unit square in the xy plane to openings towards which the "
-                          "dome is sampled, (k, 4, 4). Their -z sides receive the light.")),
+                          "Transforms (k, 4, 4) of the unit square in the xy plane to k openings "
+                          "towards which a dome is sampled; it lights their -z sides.")),
       in(kEmission,
          choice(
              row<&L::sync>("material_sync", "material sync", "",
-                           "Relation between its light and the emission of the mesh's material."),
+                           "How a mesh light combines with the emission of the mesh's material."),
              {"materialGlowTintsLight", "independent", "noMaterialResponse"})),
   };
 }

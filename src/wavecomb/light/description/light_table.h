@@ -38,7 +38,7 @@ inline constexpr uint32_t kVisibleShape = 8;  ///< rays can hit its shape
 inline constexpr uint32_t kTextured = 16;     ///< supports a texture
 inline constexpr uint32_t kInfinite = 32;     ///< surrounds the scene at infinite distance
 inline constexpr uint32_t kFiltered = 64;     ///< supports light filters
-/// Its radiance is the background of light path expressions.
+/// The radiance of such lights is the background of light path expressions.
 inline constexpr uint32_t kBackground = 128;
 }  // namespace light_trait
 
@@ -58,7 +58,7 @@ struct LightParameter {
   std::vector<const char*> choices;
   /// Lights with this trait have the parameter, in addition to the kinds that name it.
   uint32_t trait = 0;
-  bool is_common = false;    ///< all lights have it
+  bool is_common = false;    ///< all lights have the parameter
   bool is_specific = false;  ///< specific to one kind of light
   uint32_t kinds = 0;        ///< bit k: lights of LightKind k have it
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lights that move while the shutter is open. They move as rigid bodies from their pose at
-/// mid-shutter, which their records describe.
+/// Lights that move while the shutter is open. Moving lights are rigid bodies; their records
+/// describe the pose at mid-shutter.
 ///
 /// At a given time, the record is rotated by R about its pivot `origin`, which moves to `position`:
 ///   x = R (x_rest - origin) + place

@@ -10,8 +10,8 @@ namespace wavecomb {
 namespace record_builder {
 namespace {
 
-/// Stores the inverse of `to_world`: its rows and its translation. All are 0 if `to_world` is
-/// singular.
+/// Stores the inverse of `to_world`: its rows and its translation. All entries are 0 if `to_world`
+/// is singular.
 void store_inverse(FilterRecord& r, const Affine& to_world) {
   const Double3 axes[3] = {to_double(to_world.axis(0)), to_double(to_world.axis(1)),
                            to_double(to_world.axis(2))};

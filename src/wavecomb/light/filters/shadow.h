@@ -4,7 +4,7 @@
 /// A shadow whose nearest occluder is at distance t has the strength s(t) = ((D - t) / f)^gamma
 /// from D - f to D, 1 before and 0 beyond. Shadow rays end at
 ///   L = D - f u^(1 / gamma),   u uniform in [0, 1),
-/// so that P(L > t) = s(t). Their result is that shadow in the mean.
+/// so that P(L > t) = s(t). In the mean, these random shadow rays give that shadow.
 ///
 /// Emission that a bounce hits cannot reproduce this, so only light samples find such lights.
 #pragma once

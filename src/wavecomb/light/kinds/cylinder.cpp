@@ -32,7 +32,7 @@ void bound(LightCluster& cluster, const LightRecord& light, double power) {
   include(cluster, {end.x, end.y, end.z});
   widen(cluster, {light.radius, light.radius, light.radius});
   bound_round(cluster);
-  cluster.intensity = power / (kPiD * kPiD);  // as seen from the side
+  cluster.intensity = power / (kPiD * kPiD);  // intensity as seen from the side
 }
 
 LightShape shape(const LightRecord& /*light*/) {

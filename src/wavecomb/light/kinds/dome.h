@@ -97,7 +97,7 @@ inline KindSample<F> sample_dome_light(const LightView& view, const LightReader<
 template <typename F>
 struct ImageDirection {
   F sin_theta;
-  F s, down;  ///< from the left and from the top
+  F s, down;  ///< image coordinates from the left and from the top
   explicit ImageDirection(const Vec3<F>& w)
       : sin_theta(sqrt(fma(w.x, w.x, F(w.z * w.z)))),
         s(fnma(atan2(w.x, w.z), F(kInv2Pi), F(0.5f))),

@@ -50,7 +50,7 @@ template <typename F>
 struct MeshLightRay {
   Vec3<F> dir;
   UInt<F> link;      ///< link class of the surface that the ray left
-  Mask<F> is_delta;  ///< of delta bounces and camera rays, which no light sample matches
+  Mask<F> is_delta;  ///< delta bounces and camera rays, which no light sample matches
   bool from_camera;
   Color<F> diffuse;  ///< diffuse fraction of the bounce, by colour
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Triangles of emissive meshes, sampled uniformly by area. They emit on both sides.
+/// Triangles of emissive meshes, sampled uniformly by area. Triangle lights emit on both sides.
 #pragma once
 
 #include "wavecomb/core/rows/fields.h"

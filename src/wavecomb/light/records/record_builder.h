@@ -11,7 +11,7 @@ namespace wavecomb::record_builder {
 
 inline constexpr double kPiD = 3.14159265358979323846;
 
-/// Smaller areas are indistinguishable from 0 in float. Such lights are dark.
+/// Smaller areas are indistinguishable from 0 in float. Lights of such areas are dark.
 inline constexpr double kMinArea = 1e-36;
 /// Largest radiance. Products of larger values overflow.
 inline constexpr double kMaxRadiance = 1e30;

@@ -35,7 +35,7 @@ template <typename F>
 struct EscapedRay {
   Vec3<F> from, dir;
   F bsdf_pdf{0.f};          ///< density of the bounce, per sr
-  Mask<F> is_delta{false};  ///< of delta bounces and camera rays, which no light sample matches
+  Mask<F> is_delta{false};  ///< delta bounce or camera ray, which no light sample matches
   bool from_camera = false;
   UInt<F> link{0u};          ///< link class of the surface that the ray left
   F ratio{0.f};              ///< PathState::ratio; adds light paths to the MIS weight

@@ -22,7 +22,7 @@ namespace wavecomb {
 template <typename F>
 struct LightSample {
   Vec3<F> wi;
-  F distance;  ///< to the point on the light; kFarAway for infinite lights
+  F distance;  ///< distance to the point on the light; kFarAway for infinite lights
   Color<F> weight;
   F pdf;
   Mask<F> is_delta;

@@ -11,8 +11,8 @@
 namespace wavecomb {
 namespace {
 
-/// Fraction of light paths that start unaimed. They reach surfaces that no training path has hit
-/// and keep the weights of aimed paths bounded.
+/// Fraction of light paths that start unaimed. Unaimed paths reach surfaces that no training path
+/// has hit and keep the weights of aimed paths bounded.
 constexpr float kEvenShare = 0.25f;
 /// Minimum number of training samples per sphere, and number of candidate split cells per axis.
 constexpr uint32_t kMinSamples = 4, kSplits = 16;

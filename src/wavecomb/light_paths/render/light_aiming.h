@@ -2,9 +2,9 @@
 /// Learns where to aim light paths, before the first pass.
 ///
 /// Light paths are traced in rounds. The first round aims at the points that the camera sees, the
-/// others at the results of the round before. These paths do not contribute to the image. The
-/// result does not depend on seed, region, samples, threads, waves or lanes, so that crops, resumed
-/// renders and merged renders aim alike.
+/// others at the results of the round before. The paths of this pilot do not contribute to the
+/// image. The result does not depend on seed, region, samples, threads, waves or lanes, so that
+/// crops, resumed renders and merged renders aim alike.
 #pragma once
 
 #include <cstdint>

@@ -13,7 +13,8 @@
 /// costs. The gain in efficiency of a ratio with squared error e_s and cost c_s is
 ///   (e_camera + e_left) c / (e_s c_s).
 /// The choice does not depend on seed, region, threads, waves or lanes, so that crops, resumed
-/// renders and merged renders use the same transport. Its samples do not contribute to the image.
+/// renders and merged renders use the same transport. Samples of the pilot do not contribute to the
+/// image.
 #pragma once
 
 #include <array>

@@ -30,7 +30,7 @@ struct AzimuthFrame {
 
 /// EON for a roughness in [0, 1]; both directions above the surface. Roughness 0 is Lambertian.
 /// With a white colour the directional albedo is 1: the fit E of single scattering is used both in
-/// the multiple-scattering lobe and in its normalisation. Its error is below 0.1 %.
+/// the multiple-scattering lobe and in its normalisation. The error of this fit is below 0.1 %.
 template <typename F>
 struct EonDiffuse {
   F roughness, a, average;  ///< A of Fujii's model, and its mean albedo

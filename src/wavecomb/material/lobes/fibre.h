@@ -146,8 +146,8 @@ struct Fibre {
 
   /// Values that depend on wo only.
   struct View {
-    F sin_o, cos_o, y, z;                                 ///< of theta_o; y and z of the unit
-                                                          ///< azimuthal direction of wo
+    F sin_o, cos_o, y, z;  ///< sine and cosine of theta_o; y and z of the unit
+                           ///< azimuthal direction of wo
     std::array<F, kLobes> sin_tilted, cos_tilted, share;  ///< share: sampling probability of each
                                                           ///< lobe
     std::array<Color<F>, kLobes> passed;                  ///< A_p including the tint

@@ -8,9 +8,9 @@
 
 namespace wavecomb {
 
-/// f |cos theta_i| = albedo D(wi), where D integrates to 1 and is the density of `sample`. So the
-/// directional albedo is exactly `albedo`, and sample weights are constant. The lobe depends on the
-/// view direction and is not reciprocal.
+/// f |cos theta_i| = albedo D(wi), where D integrates to 1 and is the density of `sample`. With
+/// this normalisation the directional albedo is exactly `albedo`, and sample weights are constant.
+/// The lobe depends on the view direction and is not reciprocal.
 template <typename F>
 struct FuzzLobe {
   F albedo, inv_a, inv_b;

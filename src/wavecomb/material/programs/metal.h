@@ -10,9 +10,9 @@
 
 namespace wavecomb {
 
-/// Metal BSDF. Its reflectance is base_color at normal incidence with a tint at 82 degrees; with
-/// kConductorIndex set, it is that of the measured complex index. A black tint, the default, means
-/// white, which is Schlick's formula.
+/// Metal BSDF. The reflectance of a metal is base_color at normal incidence with a tint at 82
+/// degrees; with kConductorIndex set, it is that of the measured complex index. A black tint, the
+/// default, means white, which is Schlick's formula.
 template <typename F>
 class MetalBsdf : public BsdfTraits {
  public:

@@ -85,8 +85,8 @@ class PlasticBsdf : public BsdfTraits {
     return interface_.albedo(coat_.f0_exact, F(0.f), z, lost);
   }
 
-  /// Probability of sampling the coat, in proportion to its contribution. It is clamped to [0.05,
-  /// 0.95] unless the base is black.
+  /// Probability of sampling the coat, in proportion to its contribution. The probability of the
+  /// coat is clamped to [0.05, 0.95] unless the base is black.
   F coat_probability(const F& coat) const {
     const F diffuse = luminance(base_) * F(1.f - coat);
     const F share = coat / max(F(coat + diffuse), F(1e-20f));

@@ -24,7 +24,7 @@ enum class SubsurfaceKind : uint8_t {
 /// Homogeneous medium for the subsurface random walk of a material.
 template <typename F>
 struct SubsurfaceMedium {
-  Color<F> extinction;     ///< per unit of length; 0 if the material has no random walk
+  Color<F> extinction;     ///< extinction per unit of length; 0 if the material has no random walk
   Color<F> albedo;         ///< single-scattering albedo
   F anisotropy;            ///< mean cosine of the scattering angle
   Color<F> color;          ///< diffuse albedo of a flat half-space, at least 0.05
@@ -56,7 +56,7 @@ double diffusion_length(double albedo, double anisotropy);
 /// Device view of all media for subsurface random walks.
 struct SubsurfaceView {
   const SubsurfaceMedium<float>* media =
-      nullptr;                 ///< by material; null if there are no random walks
+      nullptr;                 ///< indexed by material; null if there are no random walks
   uint32_t exit_material = 0;  ///< white diffuse material that shades exit points of random walks
 };
 

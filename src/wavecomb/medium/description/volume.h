@@ -37,7 +37,7 @@ struct GridBricks {
   std::string name;                  ///< used in messages
   std::span<const int32_t> origins;  ///< x, y, z of the first voxel of each brick, multiples of 8
   /// Voxels as 32-bit floats, or as 16-bit floats in `halves`: x slowest, z fastest, components
-  /// interleaved. The other span is empty.
+  /// interleaved. The span of the other type is empty.
   std::span<const float> floats;
   std::span<const uint16_t> halves;
   uint32_t components = 1;
@@ -123,9 +123,9 @@ struct TransformedGrid {
 
 /// Maps for looking up a moving field, from the space of cells or of the world.
 struct FieldDrift {
-  float to_velocity[12];  ///< to bricks of the velocity grid
-  float to_bricks[12];    ///< to bricks of the field
-  float per_second[12];   ///< from velocities to bricks of the field, without translation
+  float to_velocity[12];  ///< transform to bricks of the velocity grid
+  float to_bricks[12];    ///< transform to bricks of the field
+  float per_second[12];   ///< transform from velocities to bricks of the field, without translation
 };
 
 /// Packed volume. All lanes of a packet look up the same volume at a time, so records are read
@@ -144,7 +144,7 @@ struct VolumeRecord {
 
   TransformedGrid density_cells, emission_cells;  ///< without a table
   GridView velocity;
-  FieldDrift density_drift, emission_drift;  ///< from the spaces of these cells
+  FieldDrift density_drift, emission_drift;  ///< transforms from the spaces of these cells
   FieldDrift color_drift;                    ///< from world space
   float seconds_open, seconds_span;
 };

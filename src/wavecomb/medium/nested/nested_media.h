@@ -170,7 +170,7 @@ class NestedMedia {
   template <typename F>
   struct SegmentEnd {
     MediumStackRow<F> stack;
-    UInt<F> material;    ///< of the event, or Flights::kNoEvent
+    UInt<F> material;    ///< material of the event, or Flights::kNoEvent
     Mask<F> terminated;  ///< lanes whose path ends here
   };
   /// Stores hit, event and path of the rays in the lanes `done`.

@@ -19,7 +19,7 @@ inline Mask<F> NestedMedia::is_visible(const Rays<F>& r, const UInt<F>& object,
   const LinkView& links = scene_.lights.links;
   const Mask<F> linked = visible & Mask<F>(r.shadow_set != U(0u));
   if (!links.members || none(linked)) return visible;
-  // Same test as casts_shadow() (accel/presence.h).
+  // This is the test of casts_shadow() (accel/presence.h).
   const U set = select(Mask<U>(linked), r.shadow_set, U(1u)) - 1u;
   const U link = gather<U>(links.classes, object, Mask<U>(linked));
   const U word = gather<U>(links.members, (link - 1u) * links.words + (set >> 5), Mask<U>(linked));

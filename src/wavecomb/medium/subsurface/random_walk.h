@@ -37,7 +37,7 @@
 namespace wavecomb {
 
 /// Number of collisions after which a walk continues only with probability 1/2 per collision. This
-/// guarantees termination and keeps the mean.
+/// roulette guarantees termination and keeps the mean.
 inline constexpr uint32_t kLongWalk = 512;
 /// Fraction of the initial light below which a walk is subject to roulette.
 inline constexpr float kFaintWalk = 0.25f;

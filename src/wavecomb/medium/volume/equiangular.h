@@ -54,7 +54,7 @@ template <typename F>
 struct MediumSegment {
   Vec3<F> o, d;
   F begin, end;
-  F extinction;  ///< of the least attenuated channel, per unit of length
+  F extinction;  ///< extinction of the least attenuated channel, per unit of length
 };
 
 /// Returns the distribution for a segment. The sample values `r` select the light and the point on
@@ -91,7 +91,7 @@ inline EquiangularDistribution<F> equiangular_distribution(const LightView& ligh
 
 /// Probabilities of the outcome of a segment through a homogeneous medium that ends after length
 /// `x` in it, at distance `at`: the true one, and the one it was sampled with if this channel is
-/// the hero. They are densities where the segment was `stopped`.
+/// the hero. Both are densities where the segment was `stopped`.
 template <typename F>
 struct OutcomeDensity {
   F exact, sampled;

@@ -13,7 +13,7 @@ struct Flights {
   static constexpr uint32_t kNoHero = 4;  ///< volumes no longer apply to the flight
 
   float* t;
-  uint32_t* material;  ///< of the volume that stopped the flight
+  uint32_t* material;  ///< material of the volume that stopped the flight
   /// Probability of the outcome by channel, divided by that of the hero channel.
   float* ratio[3];
   const uint32_t* hero;  ///< the channel that samples the distance

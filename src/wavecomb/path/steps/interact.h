@@ -40,8 +40,8 @@ template <typename Bsdf, typename F>
 struct MaterialLookup {
   Bsdf bsdf;
   Color<F> throughput;  ///< throughput on arrival at the surface
-  Color<F> emission;    ///< if the program emits
-  Vec3<F> normal;       ///< in tangent space, if the program reads textures
+  Color<F> emission;    ///< used if the program emits
+  Vec3<F> normal;       ///< normal in tangent space, if the program reads textures
 };
 
 /// Shading point on a surface. Later steps use only `bsdf`, `throughput` and the member functions,
@@ -76,7 +76,7 @@ struct SurfaceInteraction : SurfaceHitPoint<Bsdf, F>, MaterialLookup<Bsdf, F> {
   /// Returns the origin of a ray that leaves along `dir`, without the terminator offset.
   Vec3<F> clear_origin(const Vec3<F>& dir) const;
   /// Returns whether a direction is on the same side of the geometric normal as of the shading
-  /// normal. Other directions would leak light.
+  /// normal. Directions on the other side would leak light.
   Mask<F> is_consistent(const Vec3<F>& world, const Vec3<F>& local) const;
 
  private:

@@ -41,7 +41,7 @@ namespace detail {
 /// Light sample that a vertex may use.
 template <typename F>
 struct LightCandidate {
-  Vec3<F> origin;  ///< of the shadow ray
+  Vec3<F> origin;  ///< origin of the shadow ray
   Vec3<F> wi;
   F distance;
   Color<F> c;     ///< contribution if the light is visible, divided by the density
@@ -49,7 +49,7 @@ struct LightCandidate {
   Mask<F> valid;  ///< whether the contribution may be non-zero; otherwise c is undefined
   UInt<F> light;
   UInt<F> shadow_set;      ///< for linked lights
-  ShadowExtent<F> extent;  ///< for lights with shadow attributes
+  ShadowExtent<F> extent;  ///< used for lights with shadow attributes
 };
 
 /// Returns the light sample for the sample values `r` in the lanes `active_lights`. `receiver` is

@@ -42,8 +42,8 @@ inline F cost_aware_survival(const SceneView& scene, const CostSnapshot& costs,
   return select(active & not_(emits), clamp(F(t / sqrt(relative)), F(0.05f), F(1.f)), F(1.f));
 }
 
-/// Returns the random number to compare with cost_aware_survival(). It is independent of the
-/// sampler.
+/// Returns the random number to compare with cost_aware_survival(). This random number is
+/// independent of the sampler.
 template <typename F>
 inline F cost_aware_number(const SampleKey<F>& key, uint32_t depth) {
   using U = UInt<F>;

@@ -13,7 +13,7 @@ namespace wavecomb {
 /// has computed once for the vertex.
 ///
 /// Contract: valid only within vertex_steps(). Steps read it and write VertexResult and the outputs
-/// of Vertex. They are inlined, so that no reference costs a memory access.
+/// of Vertex. The steps are inlined, so that no reference costs a memory access.
 template <typename Bsdf, typename F, uint32_t kFeatureSet, typename Coupling>
 struct VertexContext {
   using Program = Bsdf;
@@ -26,11 +26,11 @@ struct VertexContext {
 
   const Vertex<F, kFeatures>& vertex;
   const Interaction& at;             ///< shading point or volume event
-  const Frame<F>& frame;             ///< of the BSDF's local directions
+  const Frame<F>& frame;             ///< frame of the BSDF's local directions
   const Vec3<F>& wo;                 ///< direction to the viewer, in `frame`
-  const View& view;                  ///< of the BSDF from `wo`
+  const View& view;                  ///< view of the BSDF from `wo`
   const GuidingLookup<F>& guide;     ///< lookup in the guiding field
-  const LightReceiver<F>& receiver;  ///< for light sampling, without a position
+  const LightReceiver<F>& receiver;  ///< receiver for light sampling, without a position
   Coupling& joint;                   ///< coupling to the joint transport (joint_transport.h)
 };
 

@@ -22,7 +22,7 @@ double error_threshold(const ErrorMap& map, const Settings& settings);
 
 /// Result of an error check.
 struct AdaptiveCheck {
-  std::vector<uint8_t> active;  ///< by pixel; all 0 if the render is done
+  std::vector<uint8_t> active;  ///< indexed by pixel; all 0 if the render is done
   uint64_t active_count = 0;
   /// Expected number of samples of the finished image, if errors fall with the square root of the
   /// sample count.

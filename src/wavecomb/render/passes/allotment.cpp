@@ -18,8 +18,8 @@ constexpr double kDarkShare = 0.25;
 
 /// Measurements of the pilot.
 struct Pilot {
-  std::vector<double> error;  ///< by pixel: deviation over brightness; negative if unknown
-  std::vector<double> cost;   ///< by pixel: mean cost of a sample; empty if not measured
+  std::vector<double> error;  ///< indexed by pixel: deviation over brightness; negative if unknown
+  std::vector<double> cost;   ///< indexed by pixel: mean cost of a sample; empty if not measured
 };
 
 double light_of(const Film& film, size_t pixel) {
@@ -88,7 +88,7 @@ std::vector<double> means_around(const std::vector<double>& values, uint32_t wid
   return out;
 }
 
-/// Divides the weights by their mean and clamps them. All become 1 if they are all 0.
+/// Divides the weights by their mean and clamps them. All weights become 1 if they are all 0.
 void limit_weights(std::vector<double>& weights) {
   double mean = 0;
   for (const double w : weights) mean += w;

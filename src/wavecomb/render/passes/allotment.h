@@ -24,8 +24,8 @@ namespace wavecomb {
 
 /// Pixels to each side in the window of these means.
 inline constexpr uint32_t kAllocationWindow = 2;
-/// Limits of a pixel's weight, relative to the mean weight. They keep a pixel that was dark by
-/// chance from getting too few samples, and a firefly from taking all of them.
+/// Limits of a pixel's weight, relative to the mean weight. These limits keep a pixel that was dark
+/// by chance from getting too few samples, and a firefly from taking all of them.
 inline constexpr double kMinWeight = 0.125, kMaxWeight = 8;
 
 /// Returns the samples per pixel of the pilot. 0 means that all pixels get the same number, because

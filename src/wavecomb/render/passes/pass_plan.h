@@ -34,7 +34,7 @@ struct SampleAllocation {
 struct PassState {
   uint32_t target = 0;            ///< samples of each active pixel after the pass, or their mean
   uint32_t light_target = 0;      ///< samples of each light path after the pass
-  std::vector<uint8_t> active{};  ///< by pixel, row by row: 1 if active; empty if all are
+  std::vector<uint8_t> active{};  ///< indexed by pixel, row by row: 1 if active; empty if all are
   SampleAllocation allocation{};
 
   bool is_active(size_t pixel) const { return active.empty() || active[pixel] != 0; }

@@ -36,9 +36,9 @@ double trace_training_paths(WaveContext context, const WaveSetup& waves,
 /// Result of a pilot render: two images of some pixels with different seeds. Both use the sampler
 /// of the render, so that their noise is that of well-distributed samples.
 struct PilotRender {
-  uint32_t samples = 0;             ///< per pixel, in each image
-  std::vector<double> differences;  ///< of the two means of each pixel
-  double cost = 0;                  ///< of both images, in rays traced through a BVH
+  uint32_t samples = 0;             ///< samples per pixel, in each image
+  std::vector<double> differences;  ///< difference of the two means of each pixel
+  double cost = 0;                  ///< cost of both images, in rays traced through a BVH
 
   double cost_of_sample() const {
     return cost / (2.0 * samples * static_cast<double>(differences.size()));
@@ -48,7 +48,7 @@ struct PilotRender {
 /// Work of a pilot render of some pixels.
 struct PilotRenderPlan {
   std::span<const uint32_t> pixels;
-  uint32_t samples;          ///< per pixel, in each of two images
+  uint32_t samples;          ///< samples per pixel, in each of two images
   const GuidingView* guide;  ///< guiding field to use, or null for none
   const GuidingGrid& grid;   ///< of the guiding field
 };

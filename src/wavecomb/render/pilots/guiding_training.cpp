@@ -291,8 +291,8 @@ class Trainer {
   }
 
   const Clock::time_point start_ = Clock::now();
-  const Settings pilot_settings_;  ///< of the whole image
-  Settings settings_;              ///< of the training paths
+  const Settings pilot_settings_;  ///< settings of the whole image
+  Settings settings_;              ///< settings of the training paths
   const WaveSetup waves_;
   const Scene& scene_;
   uint64_t budget_;

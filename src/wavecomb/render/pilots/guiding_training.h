@@ -24,7 +24,7 @@ struct WaveContext;
 
 /// Statistics of the training.
 struct GuidingStatistics {
-  GuidingFieldStatistics facts;  ///< of the last field that was built
+  GuidingFieldStatistics facts;  ///< statistics of the last field that was built
   uint64_t paths = 0;            ///< training paths; 0 if nothing was learned
   uint32_t rounds = 0;
   uint64_t field_bytes = 0;

@@ -20,8 +20,8 @@ class RenderCosts {
  public:
   RenderCosts(const Scene& scene, std::span<const MaterialTraits> traits, const Settings& settings);
 
-  CostSnapshot order;     ///< for the order of shading
-  CostSnapshot roulette;  ///< for cost-aware roulette
+  CostSnapshot order;     ///< costs for the order of shading
+  CostSnapshot roulette;  ///< costs for cost-aware roulette
   bool measures() const { return measures_; }
 
   /// Sets the costs before the first pass: from a profile, and by measuring synthetic hits if the

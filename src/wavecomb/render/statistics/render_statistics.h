@@ -67,7 +67,7 @@ struct RenderStatistics {
   uint32_t threads = 0, wave_size = 0, lanes = 0;
   uint32_t passes = 0;  ///< begun
   WorkDistribution sharing;
-  uint64_t resumed_samples = 0;  ///< from a checkpoint; not in `samples`
+  uint64_t resumed_samples = 0;  ///< samples from a checkpoint; not in `samples`
   double error = 0;              ///< mean relative error of the image; infinite if unknown
   SceneBytes scene_bytes;
   uint64_t accelerator_bytes = 0, wave_bytes = 0, film_bytes = 0, peak_rss_bytes = 0;

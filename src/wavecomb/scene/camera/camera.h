@@ -29,7 +29,7 @@ enum class Conform : uint32_t {
 /// Image edge at which a rolling shutter begins.
 enum class RollingShutter : uint32_t { kOff, kTop, kBottom, kLeft, kRight };
 
-/// A thin-lens camera. It looks along -z in camera space, with +x to the right and +y up, as
+/// A thin-lens camera. A camera looks along -z in camera space, with +x to the right and +y up, as
 /// UsdGeomCamera does. Lengths are in scene units.
 struct Camera {
   Affine to_world;

@@ -88,49 +88,55 @@ std::vector<CameraParameter> make_camera_parameters() {
   return {
       counted(number_from<&C::lens_radius>(
           "lens_radius", 0, "Lens radius in scene units; 0 gives a pinhole camera.")),
-      counted(distance<&C::focus_distance>(
-          "focus_distance",
-          "Distance of the focal plane along -z, scene units; above 0 with a lens.")),
+      counted(distance<&C::focus_distance>("focus_distance",
+                                           "Distance of the focal plane along -z in scene units; "
+                                           "must be above 0 if the lens radius is.")),
       counted(number_from<&C::near_clip>(
           "near_clip", 0,
-          "Near clipping distance along -z, scene units; radial for a latlong camera.")),
+          "Near clipping distance in scene units, along -z, or radial for a latlong camera.")),
       counted(distance<&C::far_clip>(
-          "far_clip", "Far clipping distance along -z, scene units; radial for a latlong camera.")),
+          "far_clip",
+          "Far clipping distance in scene units, along -z, or radial for a latlong camera.")),
       counted(needed(row<&C::window>(
           "window",
-          "Visible region (x0, x1, y0, y1): on the plane z = -1, in scene units for an "
-          "orthographic camera, longitude and latitude in radians for a latlong one."))),
+          "Visible region (x0, x1, y0, y1) of a camera: on the plane z = -1 for perspective, in "
+          "scene units for orthographic, in radians of longitude and latitude for latlong."))),
       choice<&C::projection>("projection", {"perspective", "orthographic", "latlong"},
-                             "latlong shows all directions, longitude to the right, latitude up."),
+                             "Projection of the camera; latlong shows all directions, with "
+                             "longitude to the right and latitude up."),
       choice<&C::conform>("conform",
                           {"expandAperture", "cropAperture", "adjustApertureWidth",
                            "adjustApertureHeight", "adjustPixelAspectRatio"},
-                          "How the window is fitted to an image of another aspect ratio: "
-                          "UsdRender's aspectRatioConformPolicy."),
-      number_above<&C::pixel_aspect>("pixel_aspect", 0, "Pixel width / pixel height."),
+                          "How the camera window is fitted to an image of another aspect ratio "
+                          "(UsdRender's aspectRatioConformPolicy)."),
+      number_above<&C::pixel_aspect>("pixel_aspect", 0, "Aspect ratio of a pixel, width / height."),
       row<&C::clip_planes>("clip_planes",
-                           "Planes (a, b, c, d) in camera space; camera rays ignore points with a "
-                           "x + b y + c z + d < 0."),
-      number_from<&C::exposure>("exposure", 0, "Factor of the image's radiance."),
+                           "Clipping planes (a, b, c, d) in camera space; camera rays ignore "
+                           "points with a x + b y + c z + d < 0."),
+      number_from<&C::exposure>("exposure", 0,
+                                "Factor by which the camera scales the radiance of the image."),
       number_from<&C::aperture_blades>(
-          "aperture_blades", 0, "Number of corners of the aperture, 3 or more; 0 gives a disk."),
-      row<&C::aperture_rotation>("aperture_rotation", "Rotation of the aperture, degrees."),
+          "aperture_blades", 0,
+          "Number of corners of the lens aperture, 3 or more; 0 gives a circular aperture."),
+      row<&C::aperture_rotation>("aperture_rotation", "Rotation of the lens aperture in degrees."),
       number_above<&C::lens_squeeze>("lens_squeeze", 0,
-                                     "Aperture height / aperture width, for anamorphic lenses."),
-      row<&C::lens_k1>("lens_k1",
-                       "Radial distortion, coefficient of r^2 on the plane at distance 1."),
-      row<&C::lens_k2>("lens_k2", "Radial distortion, coefficient of r^4."),
-      row<&C::lens_k3>("lens_k3", "Radial distortion, coefficient of r^6."),
-      row<&C::lens_p1>("lens_p1", "Tangential distortion."),
-      row<&C::lens_p2>("lens_p2", "Tangential distortion."),
+                                     "Height / width of the lens aperture, for anamorphic lenses."),
+      row<&C::lens_k1>(
+          "lens_k1",
+          "Coefficient of r^2 in the radial lens distortion, on the plane at distance 1."),
+      row<&C::lens_k2>("lens_k2", "Coefficient of r^4 in the radial lens distortion."),
+      row<&C::lens_k3>("lens_k3", "Coefficient of r^6 in the radial lens distortion."),
+      row<&C::lens_p1>("lens_p1", "First coefficient of the tangential lens distortion."),
+      row<&C::lens_p2>("lens_p2", "Second coefficient of the tangential lens distortion."),
       row<&C::lens_map>(
           "lens_map",
-          "Distortion as a map of n x n nodes over the image, two in each four numbers: positions "
-          "in fractions of the undistorted image's width and height."),
+          "Lens distortion as a map of n x n nodes, two per row of four numbers; a node is a "
+          "position in fractions of the undistorted image's width and height."),
       choice<&C::rolling_shutter>("rolling_shutter", {"off", "top", "bottom", "left", "right"},
-                                  "Image edge at which a rolling shutter begins."),
+                                  "Image edge at which the exposure of a rolling shutter begins."),
       number_from<&C::rolling_duration>(
-          "rolling_duration", 0, "Fraction of the shutter interval for which a row is exposed."),
+          "rolling_duration", 0,
+          "Fraction of the shutter interval for which a rolling shutter exposes each pixel row."),
   };
 }
 

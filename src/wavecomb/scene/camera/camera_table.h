@@ -32,7 +32,7 @@ struct CameraParameter {
   bool is_above = false;                                    ///< the bound is exclusive
   bool may_be_infinite = false;
   std::vector<const char*> choices;
-  bool is_needed = false;  ///< set_camera requires it
+  bool is_needed = false;  ///< set_camera requires the parameter
   /// The fingerprint includes the value even if it is the default, as it did before the table had
   /// optional rows.
   bool counts_always = false;

@@ -227,7 +227,7 @@ def _hextiled_image(n: NodeCall) -> Value:
     m, grid = n.make, _Grid(n)
     copies = grid.copies()
     texels = _texels(n, grid, copies, is_raw=False)
-    # This is the fallback of a missing file.
+    # This value is the fallback of a missing file.
     if is_constant(texels[0]):
         return texels[0]
     luma, contrast = n.value("lumacoeffs", LUMA, 3), n.value("falloffcontrast", 0.5, 1)

@@ -27,7 +27,7 @@ MAX_DEPTH = 100
 """Longest chain of connected nodes."""
 
 MAX_NODES = 10_000
-"""Most nodes in the networks of a material.
+"""Maximum number of nodes in the networks of a material.
 
 The limit is a tenth of this in instanced node graphs, whose paths are long.
 """
