@@ -118,7 +118,7 @@ class LightCharts {
                                              ///< perpendicular to u
     double area = 0;                         ///< flat: area per dx dy
     double size = 0;                         ///< cones: 1 - cos; cylinder: maximum angle across
-    double distance = 0;                     ///< to the centre; cylinder: perpendicular to its axis
+    double distance = 0;                     ///< to the centre, or to the axis of a cylinder
     double radius = 0, begin = 0, axis = 0;  ///< cylinder: extent along its axis
   };
 

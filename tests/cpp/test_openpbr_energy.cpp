@@ -56,7 +56,7 @@ Rgb measured(const Bsdf& bsdf, const Vec& wo, uint32_t samples) {
 
 /// Tolerances for tables and sampling noise.
 struct Bounds {
-  double loss = 0.008, gain = 0.003;  ///< relative to the prediction
+  double loss = 0.008, gain = 0.003;  ///< limits relative to the prediction
   double most = 1.002;                ///< absolute limit
   std::vector<double> azimuths = {0.3};
   uint32_t samples = is_long() ? 32768 : 8192;

@@ -93,7 +93,7 @@ TEST(Sobol, LaineKarrasIsAnOwenScramble) {
     for (uint32_t b = 0; b < 32; ++b) {
       const uint32_t changed = y ^ detail::laine_karras(x ^ 1u << b, seed);
       ASSERT_EQ(changed & ((1u << b) - 1u), 0u);  // lower bits are unaffected
-      ASSERT_TRUE(changed >> b & 1u);             // permutes each node of the tree
+      ASSERT_TRUE(changed >> b & 1u);             // scrambling permutes each tree node
     }
   }
 }

@@ -30,7 +30,7 @@ namespace wavecomb {
 
 struct NaiveSettings {
   uint32_t width = 16, height = 16;
-  uint32_t samples = 16;    ///< per pixel, uniform over the pixel
+  uint32_t samples = 16;    ///< samples per pixel, uniform over the pixel
   uint32_t max_depth = 1;   ///< same as Settings::max_depth
   uint32_t directions = 1;  ///< uniform directions at the first vertex; one at later vertices
   /// Random numbers used to find delta lobes; 0 for scenes without delta lobes.

@@ -287,7 +287,7 @@ def test_rough_gold_gives_back_what_single_scattering_loses(
 
 @pytest.mark.parametrize("roughness", [0.1, 0.2, 0.4])
 def test_frosted_glass(check: Check, recorded: Any, tmp_path: Path, roughness: float) -> None:
-    """Our masking is height-correlated, Mitsuba's separable: invisible here."""
+    """Height-correlated masking and Mitsuba's separable masking show no difference."""
     dome = light("Dome", texture=write_sky(tmp_path))
     glass = material("Glass", "dielectric", diffuseColor=(1, 1, 1), roughness=roughness, ior=1.5)
     ball = sphere("Ball", "Glass", (0, 1.01, 0), rings=8)

@@ -22,7 +22,7 @@ struct EmbreeDevice {
   RTCDevice handle = rtcNewDevice(nullptr);
   std::atomic<int64_t> bytes{0};
   std::mutex building;
-  TaskOrder order;  ///< for ThreadSanitizer: Embree's tasks call the memory monitor
+  TaskOrder order;  ///< for ThreadSanitizer, since Embree's tasks call the memory monitor
 
   EmbreeDevice() {
     if (!handle) throw Error("the ray tracer could not start; is this CPU older than SSE2?");

@@ -64,7 +64,7 @@ struct RenderPlan {
   AovTables aovs;
   Region window;  ///< pixels of the film
   JointPlan joint;
-  SceneView view;  ///< with the light tree, if lights are selected by it
+  SceneView view;  ///< has the light tree if lights are selected by it
 
   /// Creates an empty film with all layers that the settings ask for.
   Film make_film() const;

@@ -25,9 +25,9 @@ struct WavefrontRenderer::Impl {
   std::shared_ptr<const EmbreeAccelerator> accel;
   uint64_t version = 0;
   std::shared_ptr<const Learned> learned;  ///< by the last render that was not stopped before
-  Watch* watch = nullptr;                  ///< of the running render
-  RenderStatistics statistics;             ///< of the last render
-  CostProfile profile;                     ///< after the last render
+  Watch* watch = nullptr;                  ///< watch of the running render
+  RenderStatistics statistics;             ///< statistics of the last render
+  CostProfile profile;                     ///< costs after the last render
   mutable std::mutex mutex;
 
   uint32_t threads = 0;

@@ -143,7 +143,7 @@ struct SceneMaterials {
   std::vector<Material> given() const;
 
   std::vector<Material> materials;  ///< materials as the caller described them
-  std::vector<Material> shaded;  ///< after simplification by simplified() (simplified_material.h)
+  std::vector<Material> shaded;     ///< materials after simplified() (simplified_material.h)
   std::shared_ptr<const GraphSet> graphs;
   std::vector<MaterialRecord> records;
   std::vector<TextureUseRecord> uses;
@@ -151,7 +151,7 @@ struct SceneMaterials {
   std::vector<uint32_t> variants;  ///< least expensive variant of the program of each material
   /// By material: whether smooth tangents affect its shading (tangents.h).
   std::vector<uint8_t> wants_tangents;
-  std::vector<OpenPbrRecord> openpbr;  ///< for materials of the program openpbr
+  std::vector<OpenPbrRecord> openpbr;  ///< records of materials of the program openpbr
   /// By material; empty if no program has specific parameters.
   std::vector<ProgramParameterRecord> own;
   /// By material; empty if there are no subsurface random walks.

@@ -11,7 +11,7 @@ namespace wavecomb {
 struct CostSnapshot {
   std::vector<float> material_ns;  ///< by material
   std::vector<float> texture_ns;   ///< by texture: mean over the records that read it
-  float mean_ns = 1;               ///< over the measured records; initially over the materials
+  float mean_ns = 1;               ///< mean over measured records; initially over materials
 
   float material(uint32_t id) const { return material_ns[id]; }
   /// Returns the cost of a texture, or 0 if there is none.

@@ -15,7 +15,7 @@ namespace wavecomb {
 
 /// Properties of a material that scheduling may use.
 struct MaterialTraits {
-  static constexpr uint32_t kNone = 0xffffffffu;  ///< no texture, no graph
+  static constexpr uint32_t kNone = 0xffffffffu;  ///< id of no texture or no graph
   uint32_t program = 0;                           ///< shading program
   uint32_t texture = kNone;                       ///< largest texture
   uint64_t texture_bytes = 0;                     ///< memory of that texture, 0 without one

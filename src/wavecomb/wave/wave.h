@@ -45,7 +45,7 @@ struct WaveContext {
   std::span<const MaterialTraits> traits;
   const CostSnapshot* costs;           ///< for scheduling policies
   const CostSnapshot* roulette_costs;  ///< costs for cost-aware roulette
-  OrderGrid grid;                      ///< for ray orders and hit positions
+  OrderGrid grid;                      ///< grid for ray orders and hit positions
   Film* film;                          ///< each wave writes only its own pixels
   uint32_t traversal_width;
   bool wants_position;                 ///< whether some policy reads position keys

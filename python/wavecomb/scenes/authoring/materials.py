@@ -137,8 +137,8 @@ def plain(info: MaterialInfo) -> MaterialInfo:
 
     Matt surfaces get the specular reflection that UsdPreviewSurface gives all dielectrics. Metals
     lose the tint of their edges. Glass becomes specular reflection with straight transmission,
-    because UsdPreviewSurface has no refraction. Its only tint is opacity, so coloured glass is
-    partly covered by its colour.
+    because UsdPreviewSurface has no refraction. The only tint of such glass is its opacity, so
+    coloured glass is partly covered by its colour.
     """
     inputs = {key: value for key, value in info.inputs.items() if key not in _SPECULAR_WORKFLOW}
     if info.program == "dielectric":

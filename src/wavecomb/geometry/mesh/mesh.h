@@ -84,7 +84,7 @@ struct Mesh {
   std::span<const GaussianSplatRow> splats;  ///< 1 per splat
   std::span<const float> harmonics;  ///< 3 (harmonics_degree + 1)^2 floats per splat: its colour
   uint32_t harmonics_degree = 0;     ///< 0 to 3
-  std::vector<MeshAttribute> attributes;  ///< for the first step, as for uvs
+  std::vector<MeshAttribute> attributes;  ///< values at the first step, as for uvs
   /// Number of shapes at equally spaced shutter times; 1 if the mesh does not deform.
   uint32_t steps = 1;
   std::shared_ptr<const void> owner;

@@ -41,7 +41,7 @@ void LightBalance::add(size_t cell, size_t part, double value, double weight) {
 std::vector<double> LightBalance::gains(std::span<const double> p) const {
   struct Term {
     double a, r, inverse;
-    int64_t bounces_less_lights;  ///< estimate of N - M from this sample
+    int64_t bounces_less_lights;  ///< N - M (balance.h) estimated from the sample
   };
   const auto term = [&](const Sample& s) {
     const double share = std::max(p[s.part], kMinShare), a{s.a}, r{s.r};

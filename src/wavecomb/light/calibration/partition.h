@@ -53,7 +53,7 @@ struct CalibratedLights {
   std::vector<double> shares;  ///< by part, after rounding; empty if the tables of the view remain
   std::vector<float> selection_pdf;  ///< by light; empty for selection by tree
   std::vector<uint32_t> power_bins;
-  PowerTable power_table;  ///< with a null pointer to the bins
+  PowerTable power_table;  ///< table with a null pointer to the bins
   std::vector<uint32_t> infinite_ends;
   std::vector<float> infinite_pdf;
   uint32_t tree_numbers = 0;

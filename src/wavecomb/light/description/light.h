@@ -93,7 +93,7 @@ struct IesProfile {
 enum class MaterialSync : uint32_t {
   kGlowTintsLight,  ///< the light is the material's emission times the light's colour
   kIndependent,     ///< the light is the light's colour alone
-  kNoResponse,      ///< as kGlowTintsLight, and cameras and mirrors see the tinted emission
+  kNoResponse,      ///< like kGlowTintsLight, but cameras and mirrors see the tinted emission
 };
 
 /// A light as the stage describes it, in its local space. As in UsdLux, rects and disks lie in the

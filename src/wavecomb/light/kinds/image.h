@@ -76,7 +76,7 @@ inline F image_pdf(const Distribution2D& d, const UInt<F>& row_count, const UInt
 template <typename F>
 struct ImagePoint {
   F x, y;
-  F pdf;  ///< over the unit square
+  F pdf;  ///< density over the unit square
 };
 
 /// Samples an image point: first the row by the marginal distribution, then the column, both by

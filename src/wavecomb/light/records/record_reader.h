@@ -58,7 +58,7 @@ struct KindSample {
   Vec3<F> wi;  ///< unit direction to the light
   F distance;
   Color<F> radiance;  ///< for delta lights, the irradiance at normal incidence
-  F pdf;              ///< over solid angle; 1 for delta lights; 0 without a sample
+  F pdf;              ///< density over solid angle; 1 for delta lights; 0 without a sample
   Mask<F> is_delta;
 };
 

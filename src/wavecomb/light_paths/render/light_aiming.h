@@ -19,7 +19,7 @@ namespace wavecomb {
 
 /// Result of the pilot that learns where to aim, with statistics.
 struct LightAiming {
-  LightAim aim;        ///< without spheres: paths are not aimed
+  LightAim aim;        ///< paths are not aimed if it has no spheres
   uint64_t paths = 0;  ///< training paths
   double seconds = 0;
 };

@@ -95,7 +95,7 @@ class VolumeMotion;
 /// at time t are those that the fields have at p - v(p) t.
 struct Volume {
   std::string name;
-  VolumeField density;  ///< one component; if not given, 1 everywhere in the box
+  VolumeField density;  ///< field of one component; 1 everywhere if not given
   VolumeField color;    ///< if not given, 1
   VolumeField glow;     ///< emission field; if not given, the density
   /// Three signed components in the volume's local space per second; if not given, the volume does

@@ -21,7 +21,7 @@ inline constexpr size_t kRayKinds = 3;
 
 /// Options of RayRecording::replay().
 struct Replay {
-  bool alone = true;     ///< by Embree alone, or else by EmbreeAccelerator
+  bool alone = true;     ///< trace by Embree alone, else by EmbreeAccelerator
   uint32_t threads = 0;  ///< 0 means all hardware threads
   /// By kind of ray: rays per packet, and whether Embree is told that they are coherent. Without a
   /// value, coherence is as recorded.

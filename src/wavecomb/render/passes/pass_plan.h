@@ -46,7 +46,7 @@ struct PassRules {
   uint32_t min_spp = 0;  ///< adaptive: samples before the first error check
   bool adaptive = false;
   bool timed = false;        ///< the render has a time limit
-  uint32_t step = 16;        ///< not adaptive: samples that a pass adds
+  uint32_t step = 16;        ///< samples that a pass adds if not adaptive
   bool progressive = false;  ///< sample counts double from one sample on
   uint32_t pilot = 0;        ///< a pass ends at this sample count; 0 if pixels are sampled evenly
 };

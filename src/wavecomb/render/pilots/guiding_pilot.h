@@ -50,7 +50,7 @@ struct PilotRenderPlan {
   std::span<const uint32_t> pixels;
   uint32_t samples;          ///< samples per pixel, in each of two images
   const GuidingView* guide;  ///< guiding field to use, or null for none
-  const GuidingGrid& grid;   ///< of the guiding field
+  const GuidingGrid& grid;   ///< grid of the guiding field
 };
 
 /// Renders the pixels twice, with `settings` except for the seed.

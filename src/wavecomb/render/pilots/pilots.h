@@ -42,7 +42,7 @@ struct PilotResults {
   /// Never null; without a field before and unless it is trained.
   std::shared_ptr<const GuidingTraining> training = std::make_shared<const GuidingTraining>();
   LightView light_view;      ///< lights with calibrated weights, and aimed if they send paths
-  GuidingView guiding_view;  ///< of the field of `training`, if it has one
+  GuidingView guiding_view;  ///< view of the guiding field of `training`, if any
 
   /// Makes the waves of `context` use these results. Contract: this object outlives the use of the
   /// context and does not change meanwhile.

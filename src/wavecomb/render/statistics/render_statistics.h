@@ -29,7 +29,7 @@ struct MaterialStatistics {
   uint64_t records = 0;  ///< shading records
   uint64_t timed_records = 0;
   double measured_ns = 0;    ///< mean of the timed records; 0 if none was timed
-  double calibrated_ns = 0;  ///< before the first pass
+  double calibrated_ns = 0;  ///< cost before the first pass
   double predicted_ns = 0;   ///< cost that the next pass would be scheduled by
 };
 
@@ -86,7 +86,7 @@ struct RenderStatistics {
   AimStatistics light_aiming;
   std::vector<std::string> lights_without_paths;  ///< names, if other lights send light paths
   std::optional<TransportChoice> transport;       ///< for Transport::kAuto
-  std::optional<StoreStatistics> texture_store;   ///< if texture memory has a limit
+  std::optional<StoreStatistics> texture_store;   ///< set if texture memory has a limit
 };
 
 /// Adds up the counters of the workers, by phase, depth, policy and material, into `statistics`.
