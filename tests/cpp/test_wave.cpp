@@ -92,7 +92,7 @@ ScenePtr under_point_lights() {
   return b.build();
 }
 
-// The sample of a light brings its probability along. A second descent of the tree by the light's
+// A light sample includes its selection probability. A second descent of the tree by the light's
 // trail costs as much as the first. Bounces do not hit point lights, so no vertex needs a trail,
 // and wrong trails must not change a bit.
 TEST(Wave, LightSamplesDescendTheTreeOnce) {
