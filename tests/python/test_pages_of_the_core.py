@@ -17,7 +17,7 @@ PAGES = (
 )
 MADE_UP = {
     *("Minnaert", "minnaert", "Ring", "RingKind", "kRoughness", "ExpensiveFirst", "kMinnaert"),
-    *("VertexCounts", "vertex_counts.h", "expensive_first.cpp"),
+    *("VertexCounts", "expensive_first.cpp"),
     *("ring.h", "ring.cpp", "minnaert.h", "NAME.h"),
 }
 """Names of the examples."""
