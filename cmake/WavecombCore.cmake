@@ -55,8 +55,8 @@ if(WAVECOMB_SANITIZE)
   set_source_files_properties(${refiner} PROPERTIES COMPILE_OPTIONS -O0 SKIP_PRECOMPILE_HEADERS ON)
 endif()
 # Sources whose speed no render notices (descriptions, checks, tables, the plan of a render) are
-# compiled with -O1, which takes a compiler two thirds of the time. Excepted are loops over
-# vertices, texels, pixels and training samples.
+# compiled with -O1, which takes a compiler two thirds of the time. Sources with loops over
+# vertices, texels, pixels or training samples are excepted.
 set(cold ${core_sources})
 list(FILTER cold INCLUDE REGEX
   "/src/wavecomb/(core|scene|render|(light|material|medium)/description|light/(tree|calibration)|geometry/mesh|graph/parameters|light_paths/render)/([a-z_]+/)?[a-z_]+\\.cpp$")

@@ -256,7 +256,7 @@ TEST(Guide, FewBouncesLeanOnWhatIsAround) {
   const GuidingField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
   const auto guiding = look_up_guiding<float>(field.view(), {0.1f, 0.1f, 0.1f}, 0, 0, true);
   EXPECT_TRUE(guiding.guided);
-  // Positions outside of the bounds, and NaN.
+  // Positions outside of the bounds, and NaN positions.
   for (const float x : {-5.f, 9.f, kNan, kInf})
     look_up_guiding<float>(field.view(), {x, x, x}, 3, 0, true);
   const GuidingField empty(kUnitGrid, {}, 1, true, true, size_t{64} << 20);

@@ -164,6 +164,14 @@ Args:
     ]
 
 
+def test_tags_in_code_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "tools" / "words"))
+    plain = importlib.import_module("prose").plain
+    assert plain("Tiles of `a.<UDIM>.png` <b>or</b> [more](b.md).") == (
+        "Tiles of `a.<UDIM>.png` or more."
+    )
+
+
 def test_words_are_counted_by_page(tmp_path: pathlib.Path) -> None:
     root = tree(tmp_path, {"docs/a.md": "one two\n", "docs/decisions/b.md": "three\n"})
     lines = run(root, "--count").stdout.splitlines()

@@ -45,23 +45,26 @@ def nodes_of(text: str) -> list[ast.AST]:
 
 
 def comments(text: str, whole: re.Pattern[str], trailing: re.Pattern[str]) -> Iterator[Text]:
-    """Blocks of consecutive comment lines, and comments behind code."""
+    """Blocks of consecutive comment lines, and comments behind code with their continuation."""
     block: list[str] = []
-    start = 0
+    start, behind_at = 0, -1
     for number, line in enumerate([*text.splitlines(), ""], start=1):
         match = whole.match(line)
         said = match[1].strip() if match else ""
         is_prose = bool(said) and not NO_PROSE.search(said)
-        if block and (not is_prose or said.startswith("- ")):
+        continues = behind_at in (-1, len(line) - len(line.lstrip()))
+        if block and (not is_prose or not continues or said.startswith("- ")):
             yield Text(start, "comment", " ".join(block))
             block = []
         if is_prose:
-            start = start if block else number
+            start, behind_at = (start, behind_at) if block else (number, -1)
             block.append(said.removeprefix("- "))
             continue
         behind = None if match else trailing.match(line)
         if behind and behind[1].count('"') % 2 == 0 and not NO_PROSE.search(behind[2]):
-            yield Text(number, "comment", behind[2].strip())
+            rest = line[behind.end(1) :]
+            start, behind_at = number, len(line) - len(rest.lstrip())
+            block = [behind[2].strip()]
 
 
 def joined(literals: str) -> str:
@@ -102,8 +105,8 @@ def helps(name: str, text: str) -> Iterator[Text]:
 
 
 def plain(markdown: str) -> str:
-    """A paragraph without links and tags."""
-    return " ".join(LINK.sub(r"\1", re.sub(r"<[^>]+>", "", markdown)).split())
+    """A paragraph without links, and without tags outside of code."""
+    return " ".join(LINK.sub(r"\1", re.sub(r"(`[^`]*`)|<[^>]+>", r"\1", markdown)).split())
 
 
 def prose_lines(text: str) -> Iterator[tuple[int, str]]:

@@ -24,7 +24,7 @@ from wavecomb.cli.setting_options import option, options_of
 )
 @click.argument("pictures", nargs=-1, required=True, type=click.Path(), metavar="A B ...")
 @option("-o --output FILE.exr", "path", "Merged image.", required=True)
-@option("--png FILE", "path", "Also write an image for display.")
+@option("--png FILE", "path", "Also write a PNG for display.")
 @options_of(FileOptions)
 @isolate_option
 def merge_command(pictures: tuple[str, ...], output: str, png: str | None, **options: Any) -> None:

@@ -58,7 +58,7 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
     option("--lights N", "count", "Number of lights in scene lights."),
     option(
         "--lamps", "flag",
-        "Light scenes mixed and dragon with a key light, a fill light and a dim dome.",
+        "Illuminate scenes mixed and dragon with a key light, a fill light and a dim dome.",
     ),
     option("--strands N", "count", "Number of hair strands in scenes fur and head."),
     option("--splats N", "count", "Number of Gaussian splats in scene splats."),

@@ -215,7 +215,7 @@ class MeshReader:
 
         Args:
             prim: A UsdGeomMesh for which ``deforms`` holds.
-            mesh: Its arrays at the frame.
+            mesh: Arrays of the mesh at the frame.
             matrix: Transform from the mesh to its group.
             track: Animated transform; replaces ``matrix`` if there is one.
 

@@ -106,7 +106,7 @@ WAVECOMB_INLINE void set_triangle_uv(const SceneView& scene, const MeshHit<F>& h
   // dp/du = (d2.v e1 - d1.v e2) / det. Only the direction of this vector is used.
   const Vec3<F> across = at.e1 * d2.y - at.e2 * d1.y;
   Vec3<F> tangent = select<F>(mirrored, -across, across);
-  // A copy, so that the vertices can stay in registers.
+  // Working on a copy lets the vertices stay in registers.
   if (scene.tangents)
     tangent = smooth_tangent<F>(scene, hit, {at.i[0], at.i[1], at.i[2]}, tangent, active);
   s.dpdu = maps.vector(tangent);

@@ -7,7 +7,7 @@
 ///   finite lights     g = a_0 + sum a_k [d hits sphere k] / (W_k p(d)),
 /// where R is the radius of the sphere around the scene, W_k the solid angle of sphere k as seen
 /// from the point on the light (4 pi inside the sphere), and p the light's own density of
-/// directions. Both ends of a path can compute g, so it is part of all MIS weights.
+/// directions. Both ends of a path can compute the factor g, so g is part of all MIS weights.
 #pragma once
 
 #include "wavecomb/core/frame.h"
