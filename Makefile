@@ -259,10 +259,11 @@ bench: build ## Run micro-benchmarks; JSON goes to out/micro
 
 # ---- style -------------------------------------------------------------------------------------
 
-lint: build/.setup-test ## Check layout, layers, English and types; changes nothing
+lint: build/.setup-test ## Check layout, layers, sizes, English and types; changes nothing
 	$(VENV)/ruff check --quiet .
 	$(VENV)/ruff format --check --quiet . || { echo "lint: run make format"; exit 1; }
 	$(VENV)/python tools/check_layers
+	$(VENV)/python tools/check_sizes
 	$(VENV)/python tools/check_words
 	@printf '%s\n' $(CPP_FILES) | xargs -r -P $(JOBS) -n 24 $(VENV)/clang-format --dry-run --Werror \
 	  || { echo "lint: run make format"; exit 1; }

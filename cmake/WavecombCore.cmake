@@ -59,7 +59,7 @@ endif()
 # vertices, texels, pixels or training samples are excepted.
 set(cold ${core_sources})
 list(FILTER cold INCLUDE REGEX
-  "/src/wavecomb/(core|scene|render|(light|material|medium)/description|light/(tree|calibration)|geometry/mesh|graph/parameters)/([a-z_]+/)?[a-z_]+\\.cpp$")
+  "/src/wavecomb/(core|scene|render|(light|material|medium)/description|light/(tree|calibration)|geometry/mesh|graph/parameters|light_paths/render)/([a-z_]+/)?[a-z_]+\\.cpp$")
 foreach(name IN ITEMS geometry/mesh/attributes geometry/mesh/tangents light/calibration/partition
     light/description/image_distribution light/description/motion light/description/triangle_means light/tree/light_cluster
     light/tree/light_tree medium/description/subsurface medium/description/volume_grid medium/description/volume_motion

@@ -16,6 +16,7 @@ from wavecomb.load_options import LoadOptions, split
 from wavecomb.run import aovs as aov_names
 from wavecomb.run import catchers, live_view
 from wavecomb.run.callbacks import CheckpointSink, Sink, Watcher
+from wavecomb.run.checkpoint import check_fits, load_checkpoint, make_header
 from wavecomb.run.guiding_file import check_trains_field, learned_of
 from wavecomb.run.settings import DEFAULT_SIZE, check_memory, check_options, prepare
 
@@ -161,8 +162,6 @@ def render(
     Raises:
         wavecomb.Error: The stage cannot be rendered, or an argument is invalid.
     """
-    from wavecomb.run.stats import make_stats
-
     warn_deprecated(isolate=isolate)
     check_source(source, also=("scene", "instanced_triangles"))
     check_arguments(size, spp, aovs, options)
@@ -186,28 +185,45 @@ def render(
     learned = learned_of(learn_from)
     if learned is not None:
         check_trains_field(chosen, "learn_from")
-    again = loaded if loaded is source else None
     told, asked = (progress, False) if callable(progress) else (None, progress)
     space = "rec709" if loaded is None else loaded.working_space
     with live_view.watching(asked, space) as shown:
-        watcher, state = _keeping(scene, chosen, names, stage, checkpoint, every, resume, shown)
+        watcher, state = _keeping(
+            checkpoint, every, resume, shown,
+            lambda: make_header(scene, chosen, stage=stage, source={}, aovs=names),
+        )  # fmt: skip
         result, is_built = _render(
-            scene, again, chosen, told, own, profile, watcher, state, learned
-        )
-    stats = make_stats(result, stage=stage, loaded=loaded, is_built=is_built)
-    picture = picture_of(result, stats, scene=scene, aovs=names)
+            scene, loaded if loaded is source else None, chosen, progress=told, policy=own,
+            costs=profile, watcher=watcher, state=state, learned=learned,
+        )  # fmt: skip
+    picture = picture_from(result, names, scene, loaded=loaded, stage=stage, is_built=is_built)
     if not has_catchers or picture.cancelled:
         return picture
 
     def render_catchers(how: Mapping[str, str]) -> Result:
         size = chosen.width, chosen.height
         options = LoadOptions.of(None, {**loading, "size": size, "threads": chosen.threads, **how})
-        scene = load(source, options).scene
-        return _render(
-            scene, None, catchers.catcher_settings(chosen), None, own, None, None, None, learned
-        )[0]
+        settings = catchers.catcher_settings(chosen)
+        return _render(load(source, options).scene, None, settings, policy=own, learned=learned)[0]
 
     return catchers.with_catcher_shadows(picture, render_catchers)
+
+
+def picture_from(
+    result: Result, aovs: Sequence[str], scene: Scene, *, loaded: LoadedStage | None, **more: Any
+) -> Picture:
+    """Returns the image of a render with its statistics.
+
+    Args:
+        result: Result of the core.
+        aovs: Expanded AOVs.
+        scene: The scene.
+        loaded: The loaded stage; None for a scene of ``SceneBuilder``.
+        more: Further arguments of ``make_stats``.
+    """
+    from wavecomb.run.stats import make_stats
+
+    return picture_of(result, make_stats(result, loaded=loaded, **more), scene=scene, aovs=aovs)
 
 
 def is_unread(source: Any) -> TypeGuard[str | os.PathLike[str] | Usd.Stage]:
@@ -240,29 +256,24 @@ def _asked_for(
 
 
 def _keeping(
-    scene: Scene,
-    settings: Settings,
-    aovs: Sequence[str],
-    stage: str | None,
     checkpoint: str | os.PathLike[str] | None,
     every: float,
     resume: str | os.PathLike[str] | None,
     shown: ProgressDisplays | None,
+    header: Callable[[], dict[str, Any]],
 ) -> tuple[Watcher | None, dict[str, Any] | None]:
     """Returns a watcher for checkpoints and progress, and the state from which to continue."""
     sinks: list[Sink] = [] if shown is None else list(shown.sinks)
     reporter = None if shown is None else shown.reporter
     if checkpoint is None and resume is None:
         return (None if shown is None else Watcher(sinks, reporter=reporter)), None
-    from wavecomb.run.checkpoint import check_fits, load_checkpoint, make_header
-
-    header = make_header(scene, settings, stage=stage, source={}, aovs=aovs)
+    own = header()
     before = load_checkpoint(resume) if resume is not None else None
     if before is not None:
-        check_fits(before, header)
+        check_fits(before, own)
     seconds = before.seconds if before is not None else 0.0
     if checkpoint is not None:
-        sinks.append(CheckpointSink(checkpoint, every, header, seconds))
+        sinks.append(CheckpointSink(checkpoint, every, own, seconds))
     watcher = Watcher(sinks, reporter=reporter, warn=_warn)
     return watcher, before.state if before is not None else None
 
@@ -295,25 +306,15 @@ def _resolve(
 
 
 def _render(
-    scene: Scene,
-    again: LoadedStage | None,
-    settings: Settings,
-    progress: Progress | None,
-    policy: SchedulingPolicy | None,
-    costs: dict[str, dict[str, float]] | None,
-    watcher: Watcher | None,
-    state: dict[str, Any] | None,
-    learned: bytes | None,
+    scene: Scene, again: LoadedStage | None, settings: Settings, **named: Any
 ) -> tuple[Result, bool]:
     """Renders a scene; also returns whether acceleration structures were built.
 
-    ``again`` is a loaded stage that keeps its renderer.
+    ``again`` is a loaded stage that keeps its renderer; ``named`` are arguments of the core.
     """
     from wavecomb import _core
 
     if again is None:
-        named: dict[str, Any] = {"watcher": watcher, "state": state, "learned": learned}
-        return _core.render(scene, settings, progress, policy, costs, **named), True
+        return _core.render(scene, settings, **named), True
     with again.renderer(settings.threads) as (renderer, is_new):
-        result = renderer.render(settings, progress, policy, costs, watcher, state, learned=learned)
-        return result, is_new
+        return renderer.render(settings, **named), is_new

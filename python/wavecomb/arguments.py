@@ -13,12 +13,32 @@ from typing import Any
 from wavecomb.errors import ArgumentError
 from wavecomb.load_options import LoadOptions
 
-_SYNONYMS = {
-    "width": "size", "height": "size", "resolution": "size", "samples": "spp",
-    "samples_per_pixel": "spp", "sample_count": "spp", "bounces": "max_depth", "depth": "max_depth",
-    "layers": "aovs", "aov": "aovs", "passes": "aovs", "cam": "camera", "time": "frame",
-}  # fmt: skip
-"""Names of other renderers, each with the keyword of Wavecomb."""
+_OTHER_NAMES = {
+    "spp": "samples sample_count samples_per_pixel pixel_samples",
+    "size": "resolution res width height",
+    "output": "out outfile output_file output_image destination image",
+    "max_depth": "bounces max_bounces depth ray_depth",
+    "region": "crop_window",
+    "aov": "layers aovs passes",
+    "frames": "frame_range range start_frame",
+    "frame": "time",
+    "time_limit": "timeout max_time",
+    "denoise": "denoiser",
+    "threads": "jobs cores",
+    "camera": "cam",
+    "noise": "variance noise_threshold error_threshold",
+    "checkpoint": "snapshot",
+    "resume": "continue",
+    "stats": "statistics",
+    "quiet": "silent",
+}
+"""Option -> names of other renderers and tools for it."""
+
+SYNONYMS = {word: name for name, words in _OTHER_NAMES.items() for word in words.split()}
+"""Name of another renderer -> option of Wavecomb, with underscores in place of hyphens."""
+
+_KEYWORDS = {"aov": "aovs"}
+"""Options whose keyword has another name."""
 
 _EXAMPLES = {
     "size": "size=(640, 360)", "spp": "spp=64", "aovs": 'aovs=["depth", "normal"]',
@@ -99,8 +119,13 @@ def _wrong(name: str, value: Any, what: str, example: str = "") -> ArgumentError
 
 
 def _unknown(name: str, known: set[str]) -> ArgumentError:
-    near = get_close_matches(name, [*known, *_EXAMPLES, *_SYNONYMS], n=1, cutoff=0.7)
-    wanted = _SYNONYMS.get(name) or next((_SYNONYMS.get(one, one) for one in near), None)
+    meant = {one: one for one in (*known, *_EXAMPLES)}
+    for word, option in SYNONYMS.items():
+        keyword = _KEYWORDS.get(option, option)
+        if keyword in meant:
+            meant.setdefault(word, keyword)
+    near = [name] if name in meant else get_close_matches(name, meant, n=1, cutoff=0.7)
+    wanted = next((meant[one] for one in near), None)
     if wanted is None:
         return ArgumentError(f"{name}: is no keyword of render(); docs/command-line.md lists them")
     return ArgumentError(f"{name}: is no keyword; did you mean {_EXAMPLES.get(wanted, wanted)}?")

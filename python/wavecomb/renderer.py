@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wavecomb.api import is_unread, load
+from wavecomb.api import is_unread, load, picture_from
 from wavecomb.arguments import check_arguments, check_source
 from wavecomb.errors import ArgumentError, WavecombError
-from wavecomb.image.rendered import Picture, picture_of
+from wavecomb.image.rendered import Picture
 from wavecomb.run.settings import DEFAULT_SIZE, prepare
 
 if TYPE_CHECKING:
@@ -160,16 +160,13 @@ class Renderer:
         Raises:
             wavecomb.Error: An argument is invalid.
         """
-        from wavecomb.run.stats import make_stats
-
         check_arguments(size, spp, aovs, settings)
         own, costs, names, chosen = prepare(
             size or self._size, spp, None, None, aovs, dict(settings)
         )
         result = self._core.render(chosen, None, own, costs)
-        stats = make_stats(result, loaded=self._loaded, is_built=self._is_built)
-        self._is_built = False
-        return picture_of(result, stats, scene=self.scene, aovs=names)
+        is_built, self._is_built = self._is_built, False
+        return picture_from(result, names, self.scene, loaded=self._loaded, is_built=is_built)
 
     def __repr__(self) -> str:
         return f"<wavecomb.Renderer of {self._loaded or self.scene}>"

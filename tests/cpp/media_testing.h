@@ -3,8 +3,8 @@
 /// integrators offer to media.
 #pragma once
 
+#include "wavecomb/core/encoding/hash.h"
 #include "wavecomb/core/frame.h"
-#include "wavecomb/core/hash.h"
 #include "wavecomb/core/math.h"
 #include "wavecomb/core/warp.h"
 #include "wavecomb/material/bsdf.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/light_paths/render/light_path_plan.h"
 #include "wavecomb/render/passes/adaptive.h"
 
 #include <gtest/gtest.h>

@@ -8,9 +8,9 @@
 #include "parts.h"
 #include "wavecomb/core/frame.h"
 #include "wavecomb/film/film.h"
-#include "wavecomb/film/light_splat_filter.h"
-#include "wavecomb/light_paths/camera_connection.h"
+#include "wavecomb/film/splats/light_splat_filter.h"
 #include "wavecomb/light_paths/setup.h"
+#include "wavecomb/path/camera/camera_connection.h"
 #include "wavecomb/path/camera/camera_ray.h"
 
 namespace wavecomb {

@@ -5,7 +5,7 @@
 #include "bsdf_testing.h"
 #include "lane_testing.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/guiding/field.h"
+#include "wavecomb/guiding/field/field.h"
 #include "wavecomb/guiding/mixing_fractions.h"
 #include "wavecomb/guiding/region_directions.h"
 #include "wavecomb/guiding/roulette.h"

@@ -5,7 +5,7 @@
 
 #include "lane_testing.h"
 #include "scene_testing.h"
-#include "wavecomb/core/octahedral.h"
+#include "wavecomb/core/encoding/octahedral.h"
 #include "wavecomb/geometry/hit/surface.h"
 #include "wavecomb/scene/parallel.h"
 

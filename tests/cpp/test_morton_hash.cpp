@@ -2,8 +2,8 @@
 #include <algorithm>
 
 #include "lane_testing.h"
-#include "wavecomb/core/hash.h"
-#include "wavecomb/core/morton.h"
+#include "wavecomb/core/encoding/hash.h"
+#include "wavecomb/core/encoding/morton.h"
 
 namespace wavecomb {
 namespace {

@@ -4,7 +4,7 @@
 #include <mutex>
 
 #include "wave_testing.h"
-#include "wavecomb/core/fixed_point.h"
+#include "wavecomb/core/encoding/fixed_point.h"
 
 namespace wavecomb {
 namespace {

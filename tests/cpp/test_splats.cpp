@@ -5,7 +5,7 @@
 
 #include "scene_testing.h"
 #include "wavecomb/accel/embree_accelerator.h"
-#include "wavecomb/core/fixed_point.h"
+#include "wavecomb/core/encoding/fixed_point.h"
 #include "wavecomb/core/sampler.h"
 #include "wavecomb/core/warp.h"
 #include "wavecomb/film/film.h"

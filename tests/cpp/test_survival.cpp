@@ -3,7 +3,7 @@
 /// estimates, and the moments that paths without roulette predict for paths with it.
 #include "chi_square.h"
 #include "wave_testing.h"
-#include "wavecomb/guiding/field.h"
+#include "wavecomb/guiding/field/field.h"
 #include "wavecomb/guiding/path_moments.h"
 
 namespace wavecomb {

@@ -6,8 +6,8 @@
 #include <tuple>
 
 #include "lane_testing.h"
+#include "wavecomb/core/encoding/hash.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/core/hash.h"
 #include "wavecomb/texture/lookup.inl"
 #include "wavecomb/texture/pyramid.h"
 

@@ -3,7 +3,7 @@
 #include <cstring>
 
 #include "lane_testing.h"
-#include "wavecomb/core/hash.h"
+#include "wavecomb/core/encoding/hash.h"
 #include "wavecomb/texture/half.h"
 #include "wavecomb/texture/lookup.h"
 #include "wavecomb/texture/texture.h"

@@ -6,8 +6,8 @@
 #include <random>
 
 #include "scene_testing.h"
+#include "wavecomb/light_paths/render/transport_choice.h"
 #include "wavecomb/light_paths/setup.h"
-#include "wavecomb/render/pilots/transport_choice.h"
 #include "wavecomb/render/renderer.h"
 #include "wavecomb/render/snapshot.h"
 #include "wavecomb/render/statistics/render_statistics.h"

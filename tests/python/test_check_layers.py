@@ -48,14 +48,15 @@ def test_downward_includes_pass(tmp_path):
         "geometry/curve/checks.h": '#include "wavecomb/scene/scene.h"\n',
         "scene/builder.cpp": '#include "wavecomb/geometry/curve/checks.h"\n',
         "light_paths/join.h": '#include "wavecomb/path/vertex.h"\n',
-        "path/vertex.h": '#include "wavecomb/light_paths/join.h"\n',
+        "path/vertex.h": '#include "wavecomb/path/features.h"\n',
+        "wave/joint_transport.h": '#include "wavecomb/light_paths/join.h"\n',
         "light_paths/stages/connect.h": '#include "wavecomb/wave/wave.h"\n',
         "render/renderer.cpp": '#include <oneapi/tbb.h>\n#include "wavecomb/wave/wave.h"\n',
         "wavecomb.h": '#include "wavecomb/render/renderer.h"\n',
     }
     result = run(tree(tmp_path, files))
     assert result.returncode == 0, result.stderr
-    assert "19 files, 0 violations" in result.stdout
+    assert "20 files, 0 violations" in result.stdout
 
 
 @pytest.mark.parametrize(
@@ -93,6 +94,9 @@ def test_downward_includes_pass(tmp_path):
         ("gpu/kernel.h", "#include <span>", "no known layer"),
         ("geometry/point.h", "#include <span>", "no known layer"),
         ("core/rng.h", '#include "wavecomb/gpu/kernel.h"', "no known layer"),
+        ("path/vertex.h", '#include "wavecomb/light_paths/join.h"', "above it"),
+        ("wave/wave.h", '#include "wavecomb/light_paths/join.h"', "only the files that register"),
+        ("render/renderer.h", '#include "wavecomb/light_paths/setup.h"', "that register"),
     ],
 )
 def test_a_bad_include_is_refused(tmp_path, name, line, message):

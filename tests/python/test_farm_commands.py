@@ -216,6 +216,14 @@ def test_what_the_command_refuses(stage: Path, tmp_path: Path) -> None:
     assert not any(f"\n  {command} " in said for command in (*gone, "plan"))
 
 
+def test_a_size_in_percent(stage: Path, tmp_path: Path) -> None:
+    words = ("-o", tmp_path / "a.exr", "--size", "12.5%", "--on", "none", "--job", tmp_path / "job")
+    done = run("farm", "submit", stage, *words)
+    assert done.returncode == 0, done.stderr
+    settings = farm.Folder(tmp_path / "job").job.shots[0].settings
+    assert (settings["width"], settings["height"]) == (75, 75)
+
+
 PLANTED = 'from pathlib import Path\nPath(__file__).with_name("RAN").touch()\nraise SystemExit\n'
 
 

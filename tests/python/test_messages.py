@@ -16,7 +16,7 @@ from parts import only_where
 
 pytest.importorskip("wavecomb._core")
 import wavecomb
-from wavecomb.cli.group import SYNONYMS
+from wavecomb.arguments import SYNONYMS
 from wavecomb.errors import WavecombError
 from wavecomb.image.files import output_file
 from wavecomb.image.files.exr import write_exr
@@ -144,9 +144,22 @@ def test_synonyms_stand_for_options_that_there_are() -> None:
     from wavecomb.cli.group import options_of
     from wavecomb.cli.render import render_command
 
-    options = set(options_of(click.Context(render_command)))
-    assert set(SYNONYMS.values()) <= options
-    assert not options & SYNONYMS.keys()
+    options = {name.lstrip("-") for name in options_of(click.Context(render_command))}
+    words = {word.replace("_", "-"): one.replace("_", "-") for word, one in SYNONYMS.items()}
+    assert set(words.values()) <= options
+    assert not options & words.keys()
+
+
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [("samples", "spp=64"), ("resolution", "size=(640, 360)"), ("layers", "aovs="),
+     ("aov", "aovs="), ("ray_depth", "max_depth=8"), ("cores", "threads"), ("smaples", "spp=64")],
+)  # fmt: skip
+def test_a_misspelt_keyword_has_a_suggestion(given: str, wanted: str) -> None:
+    """The synonyms are those of the command line."""
+    with pytest.raises(wavecomb.Error, match="is no keyword; did you mean") as caught:
+        wavecomb.render("gone.usda", **{given: 3})
+    assert wanted in str(caught.value)
 
 
 # ---- the stage -----------------------------------------------------------------------------------

@@ -13,11 +13,12 @@ ROOT = Path(__file__).resolve().parents[2]
 CORE = ROOT / "src" / "wavecomb"
 PAGES = (
     *("how-a-wave-works", "writing-a-material", "writing-a-light", "writing-an-aov"),
-    "writing-a-policy",
+    *("writing-a-policy", "writing-a-transport"),
 )
 MADE_UP = {
     *("Minnaert", "minnaert", "Ring", "RingKind", "kRoughness", "ExpensiveFirst", "kMinnaert"),
-    *("expensive_first.cpp", "ring.h", "ring.cpp", "minnaert.h", "NAME.h"),
+    *("VertexCounts", "expensive_first.cpp"),
+    *("ring.h", "ring.cpp", "minnaert.h", "NAME.h"),
 }
 """Names of the examples."""
 

@@ -87,6 +87,7 @@ def list_command() -> None:
     option("--quiet", "flag", "Print only warnings and errors."),
 )  # fmt: skip
 def run_command(
+    *,
     suite: str,
     output: str,
     dry_run: bool,

@@ -80,6 +80,7 @@ _MAPS = ("absolute", "signed", "flip-ldr", "flip-hdr", "z")
 )  # fmt: skip
 @isolate_option
 def compare_command(
+    *,
     a: str,
     b: str,
     metrics: tuple[str, ...],
@@ -158,7 +159,12 @@ def compare_command(
         if heatmap is not None:
             _write_map(heatmap, a, b, kind, exposure, test)
         if page is not None or wipe is not None:
-            _write_looks(a, b, result, page, wipe, at, kind, look)
+            from wavecomb.cli.compare_many import write_pair_page, write_wipe
+
+            if page is not None:
+                write_pair_page(page, a, b, result, kind, look)
+            if wipe is not None:
+                write_wipe(wipe, a, b, at, look)
     except ValueError as error:
         raise WavecombError(str(error)) from error
     passed = result.equal or (tolerance is not None and result.within(tolerance))
@@ -184,17 +190,6 @@ def _refuse(options: dict[str, Any]) -> None:
     for name, value in options.items():
         if value:
             raise WavecombError(f"{name} is only for two images; --page FILE.html compares folders")
-
-
-def _write_looks(
-    a: str, b: str, found: Any, page: str | None, wipe: str | None, at: float, kind: str, look: Any
-) -> None:
-    from wavecomb.cli.compare_many import write_pair_page, write_wipe
-
-    if page is not None:
-        write_pair_page(page, a, b, found, kind, look)
-    if wipe is not None:
-        write_wipe(wipe, a, b, at, look)
 
 
 def _measure(a: str, b: str, metrics: tuple[str, ...], exposure: float) -> dict[str, float]:

@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 import click
 
 from wavecomb import terminal
+from wavecomb.arguments import SYNONYMS
 from wavecomb.errors import WavecombError
 from wavecomb.run.error_messages import describe
 from wavecomb.run.isolation import supervisor
@@ -157,50 +158,6 @@ def _fail(message: str, more: str | None = None) -> NoReturn:
     sys.exit(ERROR)
 
 
-SYNONYMS = {
-    "--samples": "--spp",
-    "--sample-count": "--spp",
-    "--samples-per-pixel": "--spp",
-    "--pixel-samples": "--spp",
-    "--resolution": "--size",
-    "--res": "--size",
-    "--width": "--size",
-    "--height": "--size",
-    "--out": "--output",
-    "--outfile": "--output",
-    "--output-file": "--output",
-    "--output-image": "--output",
-    "--destination": "--output",
-    "--image": "--output",
-    "--bounces": "--max-depth",
-    "--max-bounces": "--max-depth",
-    "--depth": "--max-depth",
-    "--ray-depth": "--max-depth",
-    "--crop-window": "--region",
-    "--layers": "--aov",
-    "--aovs": "--aov",
-    "--passes": "--aov",
-    "--frame-range": "--frames",
-    "--range": "--frames",
-    "--start-frame": "--frames",
-    "--time": "--frame",
-    "--timeout": "--time-limit",
-    "--max-time": "--time-limit",
-    "--denoiser": "--denoise",
-    "--jobs": "--threads",
-    "--cores": "--threads",
-    "--cam": "--camera",
-    "--variance": "--noise",
-    "--noise-threshold": "--noise",
-    "--error-threshold": "--noise",
-    "--snapshot": "--checkpoint",
-    "--continue": "--resume",
-    "--statistics": "--stats",
-    "--silent": "--quiet",
-}
-"""Option names of other renderers and tools, each with Wavecomb's equivalent."""
-
-
 def message_of(error: click.ClickException) -> str:
     """Returns the message of a command-line error, with suggestions for a misspelt option."""
     if not isinstance(error, click.NoSuchOption) or error.ctx is None:
@@ -226,7 +183,10 @@ def suggestions(name: str, options: list[str]) -> list[str]:
     ['--output']
     """
     words = {option: option for option in options if option.startswith("--")}
-    words |= {word: one for word, one in SYNONYMS.items() if one in words and word not in words}
+    for word, one in SYNONYMS.items():
+        other, option = (f"--{text.replace('_', '-')}" for text in (word, one))
+        if option in words:
+            words.setdefault(other, option)
     if name in words:
         return [words[name]]
     found = get_close_matches(name, words, n=6, cutoff=0.6)

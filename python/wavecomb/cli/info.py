@@ -40,12 +40,15 @@ def info_command(stage: str | None, machine: bool, as_json: bool, **options: Any
     if stage is None:
         raise click.UsageError("Missing argument 'STAGE'.")
     from wavecomb.info import print_info, stage_info
+    from wavecomb.load_options import given
     from wavecomb.run.isolation.outputs import Outputs
     from wavecomb.run.isolation.supervisor import enter
 
-    source = StageOptions.take(options)
+    loading = given(StageOptions.take(options).values)
     enter(Outputs())
-    loaded = source.load(stage)
+    from wavecomb.api import load
+
+    loaded = load(stage, **loading)
     info = stage_info(loaded, stage)
     if as_json:
         click.echo(json.dumps(info, indent=2))

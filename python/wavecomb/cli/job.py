@@ -7,113 +7,165 @@ import contextlib
 import signal
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from wavecomb.cli.aovs import AovOptions
-from wavecomb.cli.options import StageOptions, stage_warnings, warn
-from wavecomb.cli.purpose import PurposeOptions
+import numpy as np
+
+from wavecomb.api import load
+from wavecomb.cli.options import stage_warnings, warn
 from wavecomb.cli.reporting import Done
-from wavecomb.cli.shots import Shot
+from wavecomb.image.files.band_writer import BandFiles
+from wavecomb.image.rendered import Picture, picture_of, window_of
 from wavecomb.run import aovs as aov_names
-from wavecomb.run.frame_names import fill
-from wavecomb.run.guiding_file import Learning
+from wavecomb.run import catchers
+from wavecomb.run.bands import band_rows, render_bands, sum_stats, without_samples
+from wavecomb.run.callbacks import CheckpointSink, PreviewSink, Sink, Watcher
+from wavecomb.run.checkpoint import Checkpoint, build_note, check_fits, make_header
+from wavecomb.run.progress import Interrupt
+from wavecomb.run.settings import check_memory, image_size
+from wavecomb.run.stats import make_stats, rendered_pixels, write_stats
 
 if TYPE_CHECKING:
+    from wavecomb.cli.render_options import RenderOptions
     from wavecomb.cli.reporting import Reporter
-    from wavecomb.image.rendered import Picture
-    from wavecomb.run.checkpoint import Checkpoint
+    from wavecomb.run.guiding_file import Learning
+    from wavecomb.run.sequence import Frames
     from wavecomb.usd import LoadedStage
 
 
-@dataclass(frozen=True)
-class Names:
-    """File names of one image. In a sequence, they hold placeholders for the frame.
+class Still:
+    """A stage at one frame, as the source of one image."""
 
-    ``output`` is the EXR; None if only a PNG is written.
-    """
+    def __init__(self, job: Job, kept: Any = None) -> None:
+        """Creates the source. Holds ``kept`` until the stage is loaded."""
+        self._renderer: Any = None
+        self._kept = kept
+        self._job = job
+        self._loaded: LoadedStage | None = None
 
-    output: str | None
-    png: str | None
-    stats: str | None
-    deep: str | None = None
+    def load(
+        self, progress: Callable[[int, int], None] | None = None, **changes: Any
+    ) -> LoadedStage:
+        """Loads the stage. ``changes`` are fields of ``LoadOptions`` that override the options."""
+        settings = self._job.settings
+        own = {"size": (settings.width, settings.height), "threads": settings.threads}
+        options = {**self._job.loading, **own, **changes}
+        self._loaded = load(self._job.options.stage, progress=progress, **options)
+        self._kept = None
+        self._renderer = None
+        return self._loaded
 
-    @property
-    def image(self) -> str:
-        """The EXR, or the PNG if that is the only image."""
-        image = self.output or self.png
-        assert image is not None
-        return image
+    def render(self, *arguments: Any, **named: Any) -> Any:
+        """Renders the scene, and frees the renderer's data afterwards.
 
-    def at(self, frame: float) -> Names:
-        """Returns the file names for a frame."""
-        names = (self.output, self.png, self.stats, self.deep)
-        return Names(*(None if name is None else fill(name, frame) for name in names))
+        Takes the arguments of ``_core.render`` after the scene.
+        """
+        from wavecomb import _core
 
-    def all(self) -> list[str]:
-        """Returns all file names that are not None, in the order in which files are written."""
-        names = (self.output, self.png, self.deep, self.stats)
-        return [name for name in names if name is not None]
+        assert self._loaded is not None
+        return _core.render(self._loaded.scene, *arguments, **named)
+
+    def render_part(self, settings: Any, *arguments: Any, **named: Any) -> Any:
+        """Renders a band of the image, and keeps the renderer for the next one."""
+        from wavecomb import _core
+
+        assert self._loaded is not None
+        if self._renderer is None:
+            self._renderer = _core.Renderer(self._loaded.scene, settings.threads)
+        return self._renderer.render(settings, *arguments, **named)
+
+    def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
+        """Returns ``make_stats`` for a result, after ``resumed_s`` seconds of an earlier render."""
+        stage = self._job.options.stage
+        return make_stats(result, stage=stage, loaded=self._loaded, resumed_s=resumed_s)
+
+
+class FrameShot:
+    """One frame of a stage that stays open, with the methods of ``Still``."""
+
+    def __init__(self, frames: Frames, frame: float | None, **options: Any) -> None:
+        """Creates the source. ``options`` are arguments of ``Frames.load``."""
+        self._frames = frames
+        self._frame = frame
+        self._options = options
+        self.render = self.render_part = frames.render
+
+    def load(
+        self, progress: Callable[[int, int], None] | None = None, **changes: Any
+    ) -> LoadedStage:
+        """Loads what changed since the previous frame."""
+        return self._frames.load(self._frame, progress=progress, **self._options, **changes)
+
+    def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
+        """Returns the statistics of the image."""
+        return self._frames.stats(result, resumed_s=resumed_s)
+
+
+Shot = Still | FrameShot
 
 
 @dataclass(frozen=True)
 class Job:
-    """Settings and objects that all images of one command share."""
+    """One image, or a sequence of frames, whose options have passed all checks.
 
-    stage: str
+    Attributes:
+        options: Options with the file names of the image.
+        frames: Frames of a sequence; None for a single image.
+        settings: Settings of the render.
+        aovs: AOVs of the image.
+        loading: Arguments of ``wavecomb.load``.
+        profile: Initial scheduling costs, or None.
+        learning: Initial guiding data, which all jobs of a command share.
+        reporter: Progress display.
+    """
+
+    options: RenderOptions
+    frames: tuple[float, ...] | None
     settings: Any
     aovs: tuple[str, ...]
+    loading: dict[str, Any]
     profile: dict[str, dict[str, float]] | None
-    layers: AovOptions
+    learning: Learning
     reporter: Reporter
-    exposure: float
-    tone_map: Any
-    film_memory: float | None = None
-    learning: Learning = field(default_factory=Learning)
+
+    def at(self, frame: float) -> Job:
+        """Returns the job of one frame of a sequence."""
+        source = self.options.source
+        source = replace(source, values={**source.values, "frame": frame})
+        return replace(self, options=replace(self.options.at(frame), source=source))
 
     def run(
-        self,
-        shot: Shot,
-        source: StageOptions,
-        purpose: PurposeOptions,
-        names: Names,
-        resumed: Checkpoint | None = None,
-        *,
-        keeps_stopped: bool = True,
+        self, shot: Shot, resumed: Checkpoint | None = None, *, keeps_stopped: bool = True
     ) -> Done:
-        """Loads the stage and renders it. An image in bands is also written to ``names``.
+        """Loads the stage and renders one image. An image in bands is also written.
 
-        ``keeps_stopped`` says whether an image in bands is still written if the render is stopped
-        after its first sample.
+        Args:
+            shot: Source of the image.
+            resumed: Checkpoint to continue, or None.
+            keeps_stopped: Whether an image in bands is still written if the render is stopped after
+                its first sample.
         """
-        from wavecomb.image.rendered import picture_of
-        from wavecomb.run.bands import band_rows
-        from wavecomb.run.callbacks import Watcher
-        from wavecomb.run.progress import Interrupt
-        from wavecomb.run.settings import check_memory
-
-        with self.reporter.loading(self.stage) as progress:
+        options = self.options
+        with self.reporter.loading(options.stage) as progress:
             loaded = shot.load(progress)
         warn(stage_warnings(loaded))
         groups = len(loaded.scene.light_groups) if "light_groups" in self.aovs else 1
-        whole = purpose.whole or ("" if names.deep is None else "--deep")
         rows = band_rows(
-            self.settings, self.aovs, self.film_memory, whole=whole, tile=self.layers.tile,
+            self.settings, self.aovs, options.film_memory, whole=options.whole, tile=options.tile,
             light_groups=groups,
         )  # fmt: skip
         settings, aovs = self.settings, self.aovs
         if loaded.catchers:
-            from wavecomb.run import catchers
-
-            own = {"--checkpoint": purpose.checkpoint_file, "--deep": names.deep}
+            own = {"--checkpoint": options.checkpoint, "--deep": options.deep}
             catchers.check(settings, {**own, "--film-memory": rows})
             settings = catchers.with_alpha(settings)
             aovs = aov_names.with_others(aovs, [catchers.LAYER])
         if rows is not None:
-            return self._run_bands(shot, loaded, rows, names, keeps_stopped)
+            return self._run_bands(shot, loaded, rows, keeps_stopped)
         if "light_groups" in aovs:
             check_memory(settings, aovs, groups)
-        sinks, state, seconds = self._sinks(loaded, source, purpose, resumed)
+        sinks, state, seconds = self._sinks(loaded, resumed)
         with Interrupt() as interrupt, self.reporter.rendering() as bar:
             watcher = Watcher(
                 sinks,
@@ -137,8 +189,6 @@ class Job:
         self, picture: Picture, shot: Shot, settings: Any, is_stopped: Callable[[], bool]
     ) -> Picture:
         """Adds the shadows on catchers to an image; leaves them out if the render was stopped."""
-        from wavecomb.run import catchers
-        from wavecomb.run.callbacks import Watcher
 
         def render(how: Mapping[str, str]) -> Any:
             shot.load(None, **how)
@@ -151,33 +201,24 @@ class Job:
         with_shadows = catchers.with_catcher_shadows(picture, render)
         return replace(picture, cancelled=True) if is_stopped() else with_shadows
 
-    def _run_bands(
-        self, shot: Shot, loaded: LoadedStage, rows: int, names: Names, keeps_stopped: bool
-    ) -> Done:
+    def _run_bands(self, shot: Shot, loaded: LoadedStage, rows: int, keeps_stopped: bool) -> Done:
         """Renders an image in bands and writes each one.
 
         If stopped, fills the rest with empty bands.
         """
-        from wavecomb.image.files.band_writer import BandFiles
-        from wavecomb.image.rendered import picture_of, window_of
-        from wavecomb.run.bands import render_bands, sum_stats, without_samples
-        from wavecomb.run.callbacks import Watcher
-        from wavecomb.run.progress import Interrupt
-        from wavecomb.run.settings import image_size
-        from wavecomb.run.stats import write_stats
-
+        options = self.options
         settings, height = self.settings.to_dict(), image_size(self.settings)[1]
         parts: list[dict[str, Any]] = []
         costs: Any = None
         broken = 0
         files = BandFiles(
-            names.output,
-            names.png,
+            options.output,
+            options.png,
             height=height,
             window=window_of(settings),
-            file_options=self.layers.file_options(),
-            exposure=self.exposure,
-            tone_map=self.tone_map,
+            file_options=options.file_options(),
+            exposure=options.exposure,
+            tone_map=options.tone_map,
         )
         with Interrupt() as interrupt, self.reporter.rendering() as bar:
 
@@ -222,88 +263,70 @@ class Job:
         stats = sum_stats(parts, settings)
         stopped = (interrupt.signal or signal.SIGINT) if stats["cancelled"] else None
         written = [] if stopped is not None and not keeps_stopped else files.written
-        if names.stats is not None and written:
-            write_stats(names.stats, stats)
-            written.append(names.stats)
+        if options.stats_file is not None and written:
+            write_stats(options.stats_file, stats)
+            written.append(options.stats_file)
         return Done(stats, costs, loaded.report, stopped, files=tuple(written))
 
     def _sinks(
-        self,
-        loaded: LoadedStage,
-        source: StageOptions,
-        purpose: PurposeOptions,
-        resumed: Checkpoint | None,
-    ) -> tuple[list[Any], dict[str, Any] | None, float]:
+        self, loaded: LoadedStage, resumed: Checkpoint | None
+    ) -> tuple[list[Sink], dict[str, Any] | None, float]:
         """Prepares checkpoints and previews.
 
         Returns:
             The sinks that save them, the state to resume or None, and its render time in seconds.
         """
-        from wavecomb.run.callbacks import CheckpointSink, PreviewSink, Sink
-
+        options = self.options
         sinks: list[Sink] = []
         state, seconds = None, 0.0
-        if purpose.checkpoint_file is not None:
-            from wavecomb.run.checkpoint import build_note, check_fits, make_header
-
+        if options.checkpoint is not None:
+            source = dict(options.source.values)
             header = make_header(
-                loaded.scene,
-                self.settings,
-                stage=self.stage,
-                source=source.as_dict(),
-                aovs=self.aovs,
+                loaded.scene, self.settings, stage=options.stage, source=source, aovs=self.aovs
             )
             if resumed is not None:
                 check_fits(resumed, header)
                 warn([note] if (note := build_note(resumed, header)) else [])
                 state, seconds = resumed.state, resumed.seconds
-            sinks.append(CheckpointSink(purpose.checkpoint_file, purpose.every, header, seconds))
-        if purpose.preview is not None:
+            sinks.append(CheckpointSink(options.checkpoint, options.every, header, seconds))
+        if options.preview is not None:
             sinks.append(
                 PreviewSink(
-                    purpose.preview,
-                    purpose.preview_every,
-                    exposure=self.exposure,
-                    tone_map=self.tone_map,
+                    options.preview,
+                    options.preview_every,
+                    exposure=options.exposure,
+                    tone_map=options.tone_map,
                     working_space=loaded.working_space,
                 )
             )
         return sinks, state, seconds
 
-    def write(self, done: Done, names: Names, *, denoise: bool) -> tuple[Done, list[str]]:
+    def write(self, done: Done) -> tuple[Done, list[str]]:
         """Writes the files of an image unless written; returns the image and the file names."""
         if done.picture is None:
             return done, list(done.files)
-        from wavecomb.run.stats import write_stats
-
-        picture = done.picture
+        options, picture = self.options, done.picture
         _warn_of_broken(_broken_pixels(picture))
-        if denoise:
+        if options.denoise:
             with self.reporter.working("denoising"):
                 picture = picture.with_denoised(threads=self.settings.threads)
         start = time.perf_counter()
+        written: list[str] = []
         with self.reporter.working("writing"):
-            written = self._save(picture, names)
+            if options.output is not None:
+                written += map(str, picture.save(options.output, **options.file_options()))
+            if options.png is not None:
+                picture.save(options.png, exposure=options.exposure, tone_map=options.tone_map)
+                written.append(options.png)
+            if options.deep is not None:
+                picture.save_deep(options.deep, half=options.half)
+                written.append(options.deep)
         seconds = {**picture.stats["seconds"], "write": time.perf_counter() - start}
         stats = {**picture.stats, "seconds": seconds}
-        if names.stats is not None:
-            write_stats(names.stats, stats)
-            written.append(names.stats)
+        if options.stats_file is not None:
+            write_stats(options.stats_file, stats)
+            written.append(options.stats_file)
         return replace(done, stats=stats, picture=picture), written
-
-    def _save(self, picture: Picture, names: Names) -> list[str]:
-        """Writes the image files; returns their names."""
-        written: list[str] = []
-        if names.output is not None:
-            files = picture.save(names.output, **self.layers.file_options())
-            written += map(str, files)
-        if names.png is not None:
-            picture.save(names.png, exposure=self.exposure, tone_map=self.tone_map)
-            written.append(names.png)
-        if names.deep is not None:
-            picture.save_deep(names.deep, half=self.layers.half)
-            written.append(names.deep)
-        return written
 
 
 class _NotKept(Exception):
@@ -311,8 +334,6 @@ class _NotKept(Exception):
 
 
 def _broken_pixels(picture: Picture) -> int:
-    import numpy as np
-
     return int((~np.isfinite(picture.beauty).all(axis=2)).sum())
 
 
@@ -324,22 +345,11 @@ def _any_samples(parts: list[dict[str, Any]]) -> bool:
     return any(part["counts"]["samples"] for part in parts)
 
 
-def purpose_at(purpose: PurposeOptions, frame: float) -> PurposeOptions:
-    """Returns the options with the frame filled into the names of checkpoint and preview."""
-    return replace(
-        purpose,
-        checkpoint=None if purpose.checkpoint is None else fill(purpose.checkpoint, frame),
-        preview=None if purpose.preview is None else fill(purpose.preview, frame),
-    )
-
-
 def how_far(done: Done) -> str:
     """Returns a phrase for the progress of a render.
 
     This is a percentage, or the samples per pixel if the number of samples is not fixed.
     """
-    from wavecomb.run.stats import rendered_pixels
-
     settings = done.stats["settings"]
     mean = done.samples / rendered_pixels(settings)
     if any(settings.get(name) for name in ("adaptive", "noise", "time_limit")):

@@ -8,10 +8,10 @@ from typing import Any
 
 import click
 
-from wavecomb.cli.aovs import AovOptions, file_options
 from wavecomb.cli.options import examples, isolate_option
+from wavecomb.cli.render_options import FileOptions
 from wavecomb.cli.sandbox import enter_to_read
-from wavecomb.cli.setting_options import option
+from wavecomb.cli.setting_options import option, options_of
 
 
 @click.command(
@@ -25,7 +25,7 @@ from wavecomb.cli.setting_options import option
 @click.argument("pictures", nargs=-1, required=True, type=click.Path(), metavar="A B ...")
 @option("-o --output FILE.exr", "path", "Merged image.", required=True)
 @option("--png FILE", "path", "Also write a PNG for display.")
-@file_options
+@options_of(FileOptions)
 @isolate_option
 def merge_command(pictures: tuple[str, ...], output: str, png: str | None, **options: Any) -> None:
     """Merge images of one stage that were rendered with different seeds.
@@ -41,7 +41,7 @@ def merge_command(pictures: tuple[str, ...], output: str, png: str | None, **opt
     from wavecomb.image.merge import merge
     from wavecomb.image.working_space import to_rec709
 
-    layers = AovOptions.take(options)
+    layers = FileOptions.take(options)
     enter_to_read((output, png), split=output if layers.split else None)
     seen = {os.path.realpath(name) for name in pictures}
     for name, flag, ending in ((output, "-o", ".exr"), (png, "--png", ".png")):

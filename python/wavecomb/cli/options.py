@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from wavecomb.cli.setting_options import Real, row_option
-from wavecomb.load_options import Row, given, rows
+from wavecomb.load_options import Row, rows
 
 if TYPE_CHECKING:
     from wavecomb.usd import LoadedStage
-    from wavecomb.usd.render_settings.values import ProductSettings
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -157,16 +156,6 @@ class StageOptions:
     def __getitem__(self, key: str) -> Any:
         return self.values[key]
 
-    @property
-    def frame(self) -> float | None:
-        """Value of --frame, or None."""
-        frame: float | None = self.values["frame"]
-        return frame
-
-    def changed(self, **values: Any) -> StageOptions:
-        """Returns a copy with some values replaced."""
-        return StageOptions({**self.values, **values})
-
     def as_dict(self) -> dict[str, Any]:
         """Returns the values as a dictionary for a checkpoint file; ``completed`` reads it back."""
         return dict(self.values)
@@ -185,52 +174,6 @@ class StageOptions:
             elif row.kind == "not":
                 values[key] = bool(values[key])
         return StageOptions(values)
-
-    def load(
-        self,
-        stage: str,
-        threads: int = 0,
-        size: tuple[int, int] | None = None,
-        progress: Callable[[int, int], None] | None = None,
-        **changes: Any,
-    ) -> LoadedStage:
-        """Loads a stage for a render with these options.
-
-        Args:
-            stage: File of the stage.
-            threads: Number of threads; 0 uses all cores.
-            size: Width and height of the image in pixels; None takes them from the stage.
-            progress: Called with the amounts done and total.
-            changes: Fields of ``LoadOptions`` that override the options.
-        """
-        from wavecomb.api import load
-
-        options = {**self.for_load(size), **changes}
-        # --isolate decided for the whole command, so ``load`` must not start another child process.
-        return load(stage, frame=self.frame, threads=threads, progress=progress, **options)
-
-    def for_load(self, size: tuple[int, int] | None) -> dict[str, Any]:
-        """Returns the arguments of ``wavecomb.load``, except the frame. Raises WavecombError."""
-        options = given(self.values)
-        options.pop("frame", None)
-        return options if size is None else {**options, "size": size}
-
-    def peek(self, stage: str) -> tuple[list[ProductSettings], Any]:
-        """Reads the stage's render settings.
-
-        Returns:
-            One choice for each render product, and an object to hold until the stage is loaded, so
-            that USD reads its layers only once.
-        """
-        from wavecomb.api import import_usd
-
-        import_usd()
-        from wavecomb.usd import peek_products
-
-        values = self.values
-        return peek_products(
-            stage, values["render_settings"], values["product"], values["session_layer"]
-        )
 
 
 def _check_kept(row: Row, value: Any) -> None:

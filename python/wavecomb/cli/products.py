@@ -1,79 +1,64 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Render products of ``wavecomb render``, from the stage's render settings and the options."""
+"""Images of ``wavecomb render`` and their files, by options and render products."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from wavecomb.cli.aovs import AovOptions
-from wavecomb.cli.job import Names
-from wavecomb.cli.options import StageOptions
-from wavecomb.cli.purpose import PurposeOptions
-from wavecomb.cli.shots import FrameShot
-from wavecomb.cli.size import Percent
+from wavecomb.cli.render_options import RenderOptions
+from wavecomb.cli.setting_options import Percent
 from wavecomb.errors import WavecombError
+from wavecomb.image import cryptomatte
+from wavecomb.image.files import exr
+from wavecomb.image.files.output_file import check_writable
+from wavecomb.image.files.render_output import split_names
+from wavecomb.options import settings as known_settings
 from wavecomb.run import aovs as aov_names
+from wavecomb.run.bands import band_rows
 from wavecomb.run.expressions import layer_of
+from wavecomb.run.frame_names import has_place, parse_frames
+from wavecomb.run.guiding_file import ENDING
+from wavecomb.run.settings import DEFAULT_SIZE, make_settings
 
 if TYPE_CHECKING:
-    from wavecomb.run.sequence import Frames
     from wavecomb.usd.render_settings.values import ProductSettings
 
 
 @dataclass(frozen=True)
-class Plan:
-    """One render product, with the choices of the stage and its output files."""
+class Product:
+    """An image to render.
+
+    Attributes:
+        choice: Choices of the stage.
+        options: Options of the command, with the image's file names and render product.
+        frames: Frames of a sequence; None for a single image.
+        folder: Folder that the image must stay in if the stage chose its name; None if the user
+            did.
+    """
 
     choice: ProductSettings
-    names: Names
+    options: RenderOptions
+    frames: tuple[float, ...] | None
     folder: str | None = None
-    """Folder that the image must stay in if the stage chose its name; None if the user did."""
 
-    def check_place(self, names: Names) -> None:
-        """Raises WavecombError if the image would leave ``folder``, also through symbolic links.
-
-        Args:
-            names: File names of the plan, at a frame.
-        """
-        if self.folder is None:
-            return
-        within = os.path.realpath(self.folder)
-        target = os.path.realpath(names.image)
-        if os.path.commonpath([within, target]) != within or within == target:
-            name = self.choice.output or names.image
-            raise WavecombError(
-                f"{self.choice.product}: productName {name} leaves the folder {within}: give "
-                "-o FILE.exr, or --output-dir with the folder for images"
-            )
-
-    def check_split(self, aovs: Sequence[str], frames: Sequence[float] | None) -> None:
-        """Does ``check_place`` for the files of --split-aovs, one for each layer and frame."""
-        from wavecomb.image.files.render_output import split_names
-
-        if self.names.output is None:
-            return
-        for names in [self.names] if frames is None else map(self.names.at, frames):
-            for file in split_names(names.image, [layer_of(name) for name in aovs]).values():
-                self.check_place(replace(names, output=str(file)))
-
-    def aovs(self, layers: AovOptions, before: Sequence[str] | None) -> tuple[str, ...]:
+    def aovs(self, before: Sequence[str] | None) -> tuple[str, ...]:
         """Returns the AOVs to render.
 
         The AOVs come from the options, else from the resumed render, else from the render
         product.
         """
-        if layers.aovs:
-            return layers.names
+        if self.options.aovs:
+            return aov_names.expand(self.options.aovs)
         if before is not None:
             return tuple(before)
-        return layers.names if self.choice.aovs is None else aov_names.expand(self.choice.aovs)
+        own = self.choice.aovs
+        return aov_names.DEFAULT if own is None else aov_names.expand(own)
 
-    def settings(
-        self, chosen: Mapping[str, Any], aovs: Sequence[str], resumed: bool, fits: Any = None
-    ) -> Any:
+    def settings(self, chosen: Mapping[str, Any], aovs: Sequence[str], resumed: bool) -> Any:
         """Builds checked render settings.
 
         Args:
@@ -81,10 +66,7 @@ class Plan:
                 --size.
             aovs: AOVs to keep.
             resumed: Whether a render is resumed, which fixes size and region.
-            fits: As in ``make_settings``.
         """
-        from wavecomb.run.settings import DEFAULT_SIZE, make_settings
-
         chosen = dict(chosen)
         width, height = self.choice.resolution or DEFAULT_SIZE
         size = chosen.pop("width", width), chosen.pop("height", height)
@@ -93,6 +75,11 @@ class Plan:
         if "region" not in chosen and not resumed and (region := self.choice.region(*size)):
             chosen["region"] = region
             chosen["crop"] = True  # the data window of the files is the one that the stage defines
+
+        options = self.options
+        fits = partial(
+            band_rows, megabytes=options.film_memory, whole=options.whole, tile=options.tile
+        )
         try:
             return make_settings(size, chosen.pop("spp"), aovs=aovs, fits=fits, **chosen)
         except WavecombError as error:
@@ -101,79 +88,191 @@ class Plan:
             prim = self.choice.product or self.choice.settings
             raise WavecombError(f"{prim}: {error}; --size overrides it") from None
 
-    def source(self, source: StageOptions) -> StageOptions:
-        """Returns the options that load the stage for this product."""
-        return source.changed(product=self.choice.product or source["product"])
+    def check_layers(self, aovs: Sequence[str]) -> None:
+        """Raises WavecombError if the EXR files cannot have these layers and options.
 
-    def shot(self, frames: Frames, frame: float | None, settings: Any) -> FrameShot:
-        """Returns this product at a frame of an open stage."""
-        size = settings.width, settings.height
-        return FrameShot(frames, frame, product=self.choice.product, size=size)
+        Light groups are known only after the stage is loaded, so the file names of ``light_groups``
+        are not checked here.
+        """
+        options, output = self.options, self.options.output
+        if output is None:
+            for option, given in (
+                ("--aov", options.aovs),
+                ("--half", options.half),
+                ("--split-aovs", options.split),
+                ("--exr-tile", options.tile),
+            ):
+                if given:
+                    raise WavecombError(
+                        f"{option}: is for EXR files, and {options.png} is the only image: give "
+                        "-o FILE.exr"
+                    )
+            return
+        layers = [cryptomatte.LEVELS.get(name, name) for name in aovs]
+        layers = [f"{name}00" if name in cryptomatte.LEVELS.values() else name for name in layers]
+        exr.check_options(
+            output, () if options.split else layers, options.compression, options.tile
+        )
+        if not options.split:
+            return
+        known = [layer_of(name) for name in aovs]
+        for file in split_names(output, [n for n in known if n != "light_groups"]).values():
+            check_writable(file)
+        for here in [options] if self.frames is None else map(options.at, self.frames):
+            for file in split_names(str(here.output), known).values():
+                self.check_place(str(file))
+
+    def check_place(self, image: str) -> None:
+        """Raises WavecombError if a file would leave ``folder``, also through symbolic links."""
+        if self.folder is None:
+            return
+        within, target = os.path.realpath(self.folder), os.path.realpath(image)
+        if os.path.commonpath([within, target]) != within or within == target:
+            name = self.choice.output or image
+            raise WavecombError(
+                f"{self.choice.product}: productName {name} leaves the folder {within}: give "
+                "-o FILE.exr, or --output-dir with the folder for images"
+            )
 
 
-def plan_products(
-    choices: Sequence[ProductSettings],
-    output: str | None,
-    beside: Names,
-    purpose: PurposeOptions,
-    folder: str | None = None,
-    *,
-    png_alone: bool = False,
-) -> list[Plan]:
-    """Plans the images to render: the first render product with ``-o``, else all.
-
-    Args:
-        choices: Choices of the stage, one for each render product.
-        output: File of -o, or None.
-        beside: Other output files, from the options.
-        purpose: Options of ``purpose_options``.
-        folder: Folder for images that the stage names, which they must not leave; None means the
-            working folder.
-        png_alone: Whether -o names a PNG, the only image.
+def plan_products(choices: Sequence[ProductSettings], options: RenderOptions) -> list[Product]:
+    """Returns the images that the stage names: one for each render product, with checked files.
 
     Raises:
         WavecombError: An image has no file name, or an option applies to one image only.
     """
-    if output is not None or png_alone:
-        if folder is not None:
-            raise WavecombError("--output-dir is for pictures that the stage names; -o names one")
-        return [Plan(choices[0], replace(beside, output=output))]
-    plans = []
-    for choice in choices:
-        if choice.output is None:
-            if beside.png is not None and len(choices) == 1:
-                plans.append(Plan(choice, beside))
-                continue
-            prim = choice.product
-            where = f"{prim} has no productName" if prim else "the stage has no render product"
-            raise WavecombError(f"-o is missing, and {where}: give -o FILE.exr or -o FILE.png")
-        if not choice.output.lower().endswith(".exr"):
+    products = [_product(choice, options, len(choices) == 1) for choice in choices]
+    if len(products) > 1:
+        _check_several(products, options)
+    if options.frames is None and any(has_place(str(one.options.image)) for one in products):
+        frame = (
+            choices[0].first_frame
+            if options.source.values["frame"] is None
+            else options.source.values["frame"]
+        )
+        products = [replace(one, options=one.options.at(frame)) for one in products]
+    return [replace(one, frames=checked_frames(one.options, one)) for one in products]
+
+
+def _product(choice: ProductSettings, options: RenderOptions, is_single: bool) -> Product:
+    """Returns the image of a render product; raises WavecombError if it has no file name."""
+    if choice.output is None:
+        if options.png is not None and is_single:
+            return Product(choice, replace(options, image=options.png), None)
+        prim = choice.product
+        where = f"{prim} has no productName" if prim else "the stage has no render product"
+        raise WavecombError(f"-o is missing, and {where}: give -o FILE.exr or -o FILE.png")
+    if not choice.output.lower().endswith(".exr"):
+        raise WavecombError(
+            f"{choice.product}: productName {choice.output} must end in .exr; give -o FILE.exr"
+        )
+    if "\0" in choice.output:
+        raise WavecombError(f"{choice.product}: productName is no file name; give -o FILE.exr")
+    folder = options.output_dir
+    name = choice.output if folder is None else os.path.join(folder, choice.output)
+    return Product(choice, replace(options, output=name, image=name), None, folder or os.curdir)
+
+
+def _check_several(products: Sequence[Product], options: RenderOptions) -> None:
+    """Raises WavecombError for options of one image, and for names that products share."""
+    single = {
+        "--png": options.png, "--deep": options.deep, "--stats": options.stats_file,
+        "--resume": options.resume, "--checkpoint": options.checkpoint,
+        "--preview": options.preview,
+    }  # fmt: skip
+    for option, given in single.items():
+        if given is not None:
             raise WavecombError(
-                f"{choice.product}: productName {choice.output} must end in .exr; give -o FILE.exr"
+                f"{option} {given}: is of one picture and the stage has {len(products)} render "
+                "products; choose one by --product"
             )
-        if "\0" in choice.output:
-            raise WavecombError(f"{choice.product}: productName is no file name; give -o FILE.exr")
-        name = choice.output if folder is None else os.path.join(folder, choice.output)
-        plans.append(Plan(choice, replace(beside, output=name), folder or os.curdir))
-    if len(plans) > 1:
-        single = {
-            "--png": beside.png, "--deep": beside.deep, "--stats": beside.stats,
-            "--checkpoint": purpose.checkpoint, "--resume": purpose.resume,
-            "--preview": purpose.preview,
-        }  # fmt: skip
-        for option, given in single.items():
-            if given is not None:
-                raise WavecombError(
-                    f"{option} {given}: is of one picture and the stage has {len(plans)} render "
-                    "products; choose one by --product"
-                )
-        seen: set[str] = set()
-        for plan in plans:
-            target = os.path.realpath(plan.names.image)
-            if target in seen:
-                raise WavecombError(
-                    f"productName {plan.choice.output} is used by several render products; "
-                    "choose one by --product"
-                )
-            seen.add(target)
-    return plans
+    seen: set[str] = set()
+    for one in products:
+        target = os.path.realpath(str(one.options.image))
+        if target in seen:
+            raise WavecombError(
+                f"productName {one.choice.output} is used by several render products; "
+                "choose one by --product"
+            )
+        seen.add(target)
+
+
+def checked_frames(
+    options: RenderOptions, product: Product | None = None
+) -> tuple[float, ...] | None:
+    """Returns the frames of a sequence, or None for a single image, after checking all its files.
+
+    Args:
+        options: Options with the file names.
+        product: The render product that names the image; None if the user does.
+
+    Raises:
+        WavecombError: Options contradict each other, or a file cannot be written.
+    """
+    frames = _frames(options)
+    for here in [options] if frames is None else map(options.at, frames):
+        if product is not None:
+            product.check_place(str(here.image))
+        _check_outputs(here)
+    return frames
+
+
+def _frames(options: RenderOptions) -> tuple[float, ...] | None:
+    if options.frames is None:
+        if options.skip_existing:
+            raise WavecombError("--skip-existing applies to sequences: also give --frames")
+        return None
+    if options.source.values["frame"] is not None:
+        raise WavecombError("--frame is one frame and --frames are several; give one of them")
+    if options.resume is not None:
+        raise WavecombError(
+            "--resume continues one image: give its --frame, and then all other --frames "
+            "with --skip-existing"
+        )
+    frames = parse_frames(options.frames)
+    for option, name in (
+        ("-o", options.output),
+        ("--png", options.png),
+        ("--deep", options.deep),
+        ("--stats", options.stats_file),
+        ("--checkpoint", options.checkpoint),
+    ):
+        if len(frames) > 1 and name is not None and not has_place(name):
+            stem, ending = os.path.splitext(name)
+            raise WavecombError(
+                f"{option} {name}: would be written {len(frames)} times; "
+                f"say where the frame goes: {stem}.####{ending}"
+            )
+    return frames
+
+
+def _check_outputs(options: RenderOptions) -> None:
+    """Raises WavecombError if an output file cannot be written or is named twice."""
+    outputs = [
+        (options.output, "-o", ".exr"),
+        (options.png, "--png", ".png"),
+        (options.deep, "--deep", ".exr"),
+        (options.stats_file, "--stats", None),
+        (options.costs, "--costs", None),
+        (options.learn_to, "--learn-to", ENDING),
+        (options.preview, "--preview", ".png"),
+        (options.checkpoint, "--checkpoint", None),
+    ]
+    for name, option, ending in outputs:
+        if name is not None and ending is not None and not name.lower().endswith(ending):
+            endings = ".exr or .png" if option == "-o" else ending
+            raise WavecombError(f"{option} {name}: the name must end in {endings}")
+    if options.costs is not None and not options.costs.lower().endswith(".json"):
+        sources = known_settings()["costs"].choices
+        raise WavecombError(
+            f"--costs {options.costs}: must be one of {', '.join(sources)}, "
+            "or a file whose name ends in .json"
+        )
+    seen = {os.path.realpath(options.stage): "the stage"}
+    for name, option, _ in outputs:
+        if name is None:
+            continue
+        other = seen.setdefault(os.path.realpath(name), option)
+        if other != option:
+            raise WavecombError(f"{option} {name}: is the same file as {other}")
+        check_writable(name)

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
+from wavecomb.cli.render_options import WRITTEN, RenderOptions
 from wavecomb.run.frame_names import fill, has_place, parse_frames
 
 MOST_NAMES = 100_000
@@ -14,32 +15,23 @@ instead."""
 
 
 def enter_to_render(
-    names: Iterable[str | None],
-    output: str | None,
-    folder: str | None,
-    frames: str | None,
-    frame: float | None = None,
-    *,
-    split: bool,
-    gpu: bool,
+    options: RenderOptions, further: Sequence[str] = (), *, gpu: bool | None = None
 ) -> None:
     """Restarts ``wavecomb render`` in the sandbox.
 
     Args:
-        names: Files to write, with placeholders for the frame.
-        output: The image among them; None if the stage names it.
-        folder: Folder of images that the stage names; None means the working folder.
-        frames: Text of ``--frames``.
-        frame: Frame of a single image; None if the stage decides.
-        split: Whether each layer gets a separate file.
-        gpu: Whether denoising may use GPU devices.
+        options: Options of the command.
+        further: More files to write, with placeholders for the frame.
+        gpu: Whether denoising may use GPU devices; None means by the options.
     """
     from wavecomb.run.isolation.outputs import Outputs
     from wavecomb.run.isolation.supervisor import enter
 
-    given = [name for name in names if name is not None]
+    names = (getattr(options, field) for field in WRITTEN)
+    given = [name for name in (*names, *further) if name is not None]
+    frame, output = options.source.values["frame"], options.image
     single = () if frame is None else (frame,)
-    numbers = single if frames is None else parse_frames(frames)
+    numbers = single if options.frames is None else parse_frames(options.frames)
     trees: list[tuple[str, str]] = []
     is_open = not numbers and any(map(has_place, given))
     if is_open or len(numbers) * len(given) > MOST_NAMES:
@@ -50,17 +42,22 @@ def enter_to_render(
         filled = [*given, *(fill(name, frame) for name in given for frame in numbers)]
     else:
         filled = given
-    parts = []
-    if output is not None and split:
-        for name in (output, *(fill(output, frame) for frame in numbers)):
-            where, base = os.path.split(os.path.realpath(name))
-            stem, ending = os.path.splitext(base)
-            parts.append((where, f"{stem}.", ending))
+    layers = [output, *(fill(output, frame) for frame in numbers)] if output else []
+    parts = dict.fromkeys(map(_layers_of, layers)) if options.split else ()
     if output is None:
-        trees.append((os.path.abspath(folder or os.curdir), ".exr"))
-    outputs = Outputs(tuple(filled), tuple(dict.fromkeys(parts)), tuple(trees))
+        trees.append((os.path.abspath(options.output_dir or os.curdir), ".exr"))
     _make_folders(given)
-    enter(outputs, gpu=gpu)
+    enter(
+        Outputs(tuple(filled), tuple(parts), tuple(trees)),
+        gpu=options.denoise if gpu is None else gpu,
+    )
+
+
+def _layers_of(image: str) -> tuple[str, str, str]:
+    """Returns folder, start and end of the names of the files for each layer."""
+    where, base = os.path.split(os.path.realpath(image))
+    stem, ending = os.path.splitext(base)
+    return where, f"{stem}.", ending
 
 
 def _make_folders(names: Iterable[str]) -> None:
@@ -85,9 +82,5 @@ def enter_to_read(outputs: Iterable[str | None], *, split: str | None = None) ->
     from wavecomb.run.isolation.outputs import Outputs
     from wavecomb.run.isolation.supervisor import enter
 
-    parts: tuple[tuple[str, str, str], ...] = ()
-    if split is not None:
-        where, base = os.path.split(os.path.realpath(split))
-        stem, ending = os.path.splitext(base)
-        parts = ((where, f"{stem}.", ending),)
+    parts = () if split is None else (_layers_of(split),)
     enter(Outputs(tuple(name for name in outputs if name is not None), parts))

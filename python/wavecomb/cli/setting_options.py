@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options of commands: one for each render setting, and a short way to declare others."""
+"""Options of commands: one for each render setting, and short ways to declare others."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, fields
 from typing import Any, TypeVar
 
 import click
@@ -19,6 +21,7 @@ ASKED_FOR_ELSEWHERE = (
 )
 """Settings that have a hand-written option with more features, such as --size or --costs FILE."""
 
+_EDGES = re.compile(r"(-?\d+)[xX](-?\d+)")
 _METAVARS = {"integer": "N", "number": "X", "text": "TEXT"}
 
 
@@ -123,6 +126,56 @@ class Real(click.ParamType):
         return number
 
 
+@dataclass(frozen=True)
+class Percent:
+    """Size relative to another one."""
+
+    value: float
+
+    def of(self, size: tuple[int, int]) -> tuple[int, int]:
+        """Returns the size in pixels; each edge is at least one.
+
+        >>> Percent(50.0).of((1920, 1081))
+        (960, 540)
+        """
+        width, height = (max(1, round(edge * self.value / 100.0)) for edge in size)
+        return width, height
+
+    def __str__(self) -> str:
+        return f"{self.value!r}%"
+
+
+ImageSize = tuple[int, int] | Percent
+
+
+class SizeType(click.ParamType):
+    """Type of --size. ``SettingCommand`` joins two words to one before."""
+
+    name = "size"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> ImageSize:
+        """Converts a word to a size."""
+        if not isinstance(value, str):
+            return value
+        if found := _EDGES.fullmatch(value):
+            return int(found[1]), int(found[2])
+        if value.endswith("%"):
+            try:
+                percent = float(value[:-1])
+            except ValueError:
+                percent = math.nan
+            if 0.0 < percent <= 10000.0:
+                return Percent(percent)
+        self.fail(
+            f"{value!r} is no size: give width and height, such as 640x360, or a percentage, such "
+            "as 50%",
+            param,
+            ctx,
+        )
+
+
 def _first_integer(least: float, above: bool) -> int | None:
     """Returns the smallest valid integer, None without a limit."""
     bound = _bound(least)
@@ -215,6 +268,20 @@ def option(usage: str, kind: str | click.ParamType, text: str, **more: Any) -> C
     if kind == "flag":  # with is_flag=False an option would not take "-1" as its value
         more["is_flag"] = True
     return click.option(*names, type=given, metavar=metavar, help=text, **more)
+
+
+def declared(usage: str, kind: str | click.ParamType, text: str, **more: Any) -> Any:
+    """Returns a field of a dataclass of options; the arguments are those of ``option``.
+
+    The field's name is that of the command's argument.
+    """
+    return field(metadata={"option": (usage, kind, text, more)})
+
+
+def options_of(values: type) -> Callable[[F], F]:
+    """Returns a decorator that adds the options of a dataclass, in the order of its fields."""
+    rows = ((one.name, one.metadata.get("option")) for one in fields(values))
+    return add_options(*(option(*row[:3], name=name, **row[3]) for name, row in rows if row))
 
 
 def add_options(*options: Callable[[F], F]) -> Callable[[F], F]:

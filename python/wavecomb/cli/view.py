@@ -9,8 +9,8 @@ import click
 
 from wavecomb.cli.command import SettingCommand
 from wavecomb.cli.options import StageOptions, examples, optional_stage
-from wavecomb.cli.setting_options import setting_options
-from wavecomb.cli.size import ImageSize, Percent, SizeType
+from wavecomb.cli.setting_options import ImageSize, Percent, SizeType, setting_options
+from wavecomb.load_options import given
 
 DEFAULT_SIZE = (960, 540)
 
@@ -52,7 +52,7 @@ def view_command(stage: str | None, size: ImageSize, denoise: bool, **options: A
     from wavecomb.gui.setup import Setup
 
     source = StageOptions.take(options)
-    loading = source.for_load(None)
+    loading = given(source.values)
     if source["texture_limit"] is not None or source["working_space"] not in (None, "rec709"):
         name = "--working-space" if source["texture_limit"] is None else "--texture-limit"
         raise WavecombError(f"{name} is not for the window: leave it out, or use wavecomb render")
@@ -65,7 +65,7 @@ def view_command(stage: str | None, size: ImageSize, denoise: bool, **options: A
         stage,
         setup,
         camera=loading.get("camera"),
-        time=source.frame,
+        time=loading.get("frame"),
         variants=loading.get("variants"),
         purposes=loading.get("purposes"),
     )

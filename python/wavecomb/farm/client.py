@@ -13,15 +13,12 @@ from typing import Any
 
 from wavecomb.errors import WavecombError
 from wavecomb.farm.assembly import Outcome, is_finished, machine_of
-from wavecomb.farm.clusters import Cluster, ClusterSpec, connected
+from wavecomb.farm.clusters import Cluster, ClusterSpec, Workers, connected
 from wavecomb.farm.folder import Folder
 from wavecomb.farm.job import Task, hashed
-from wavecomb.farm.machine_class import PREFIX
 from wavecomb.farm.tile_file import has_tile
 
 _TURN_S = 0.2
-_QUERY_S = 1.0
-"""Time between queries of the list of workers, in seconds."""
 _BATCH_S = 0.5
 """Time that a batch of small tiles should take, in seconds."""
 _MIN_BATCHES = 4
@@ -69,8 +66,7 @@ class Run:
         self._attempts = 0
         self._seconds = 0.0
         self._warned: set[str] = set()
-        self._workers: dict[str, Any] = {}
-        self._next_query = 0.0
+        self._workers = Workers(cluster)
         self._progressed = False
         self._alone_since: float | None = None
         self._next_retry = 0.0
@@ -120,38 +116,20 @@ class Run:
             if until is not None and time.monotonic() > until:
                 raise WavecombError(f"{self._cluster.what}: no workers came in {limit:.0f} s")
             self._cluster.check(False)
-            self._query_workers(0.0)
+            self._workers.query(0.0)
             time.sleep(_TURN_S)
         return True
 
-    def _query_workers(self, every: float = _QUERY_S) -> None:
-        """Queries the scheduler for its workers, at most every ``every`` seconds."""
-        if time.monotonic() < self._next_query:
-            return
-        self._next_query = time.monotonic() + every
-        info = self._cluster.client.scheduler_info(n_workers=-1)
-        self._workers = {} if info is None else dict(info.get("workers", {}))
-
-    def _classes(self) -> dict[str, int]:
-        """Returns the number of workers of each machine class."""
-        found: dict[str, int] = {}
-        for facts in self._workers.values():
-            for name, amount in facts["resources"].items():
-                if name.startswith(PREFIX) and amount > 0:
-                    found[name] = found.get(name, 0) + 1
-        return found
-
     def _capacity(self) -> int:
         """Returns the number of workers that may work on the job."""
-        found = self._classes()
-        return found.get(self._machine, 0) if self._machine else sum(found.values())
+        return self._workers.count(self._machine)
 
     def _choose_machine(self, images: list[int]) -> str:
         """Chooses the machine class of this run: most finished tiles first, then most workers."""
         # lets workers that start together all register
         time.sleep(_TURN_S if self._cluster.wait_s else 0.0)
-        self._query_workers(0.0)
-        found = self._classes()
+        self._workers.query(0.0)
+        found = self._workers.classes()
         parts = dict.fromkeys(found, 0)
         if len(found) > 1:
             for image in images:
@@ -177,7 +155,7 @@ class Run:
                 self._out.stopped = True
                 client.cancel(list(self._flying), reason="wavecomb farm was stopped")
                 return
-            self._query_workers()
+            self._workers.query()
             while len(self._flying) < self._capacity() and self._submit():
                 pass
             try:
@@ -344,7 +322,7 @@ class Run:
     def _leave_out(self, worker: str, why: str) -> None:
         """Withdraws queued tasks from a worker whose disk is full."""
         self._full = why
-        self._next_query = 0.0
+        self._workers.expire()
         client = self._cluster.client
         held = set(client.processing(workers=[worker]).get(worker, ()))
         for future in [one for one in self._flying if one.key in held]:

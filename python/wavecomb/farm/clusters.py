@@ -25,12 +25,15 @@ from typing import Any
 from wavecomb import processes
 from wavecomb.errors import WavecombError
 from wavecomb.extras import needed
+from wavecomb.farm.machine_class import PREFIX
 from wavecomb.farm.worker import write_certificates
 from wavecomb.machine import usable_cores
 
 MAX_WORKERS = 1024
 DASK_WAIT_S = 60.0
 """Time to wait for the first worker of an existing Dask cluster, in seconds."""
+_QUERY_S = 1.0
+"""Time between queries of the list of workers, in seconds."""
 _SLURM_WORKERS = 4
 _CONNECT_S = 10.0
 _ANSWER_S = 60.0
@@ -136,6 +139,41 @@ class Cluster:
 
     def close(self) -> None:
         """Ends the workers that this process started."""
+
+
+class Workers:
+    """The workers of a cluster, by machine class."""
+
+    def __init__(self, cluster: Cluster) -> None:
+        self._client = cluster.client
+        self._facts: dict[str, Any] = {}
+        self._next_query = 0.0
+
+    def query(self, every: float = _QUERY_S) -> None:
+        """Queries the scheduler for its workers, at most every ``every`` seconds."""
+        if time.monotonic() < self._next_query:
+            return
+        self._next_query = time.monotonic() + every
+        info = self._client.scheduler_info(n_workers=-1)
+        self._facts = {} if info is None else dict(info.get("workers", {}))
+
+    def expire(self) -> None:
+        """Makes the next call of ``query`` ask the scheduler."""
+        self._next_query = 0.0
+
+    def classes(self) -> dict[str, int]:
+        """Returns the number of workers of each machine class."""
+        found: dict[str, int] = {}
+        for facts in self._facts.values():
+            for name, amount in facts["resources"].items():
+                if name.startswith(PREFIX) and amount > 0:
+                    found[name] = found.get(name, 0) + 1
+        return found
+
+    def count(self, machine: str) -> int:
+        """Returns the number of workers of a class, or of all workers for ""."""
+        found = self.classes()
+        return found.get(machine, 0) if machine else sum(found.values())
 
 
 class _LocalWorkers(Cluster):

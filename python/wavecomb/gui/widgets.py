@@ -46,6 +46,7 @@ def real(
     high: float,
     step: float,
     value: float,
+    *,
     changed: Callable[[float], object],
     decimals: int = 2,
 ) -> QDoubleSpinBox:

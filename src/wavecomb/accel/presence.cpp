@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "wavecomb/core/hash.h"
+#include "wavecomb/core/encoding/hash.h"
 #include "wavecomb/geometry/gaussian_splat/gaussian_splat.h"
 #include "wavecomb/geometry/hit/hit_material.h"
 #include "wavecomb/geometry/hit/uv.h"

@@ -14,7 +14,7 @@
 #include <array>
 #include <cstring>
 
-#include "wavecomb/core/hash.h"
+#include "wavecomb/core/encoding/hash.h"
 #include "wavecomb/core/path_expressions/path_expression.h"
 #include "wavecomb/core/rows/fields.h"
 #include "wavecomb/core/rows/soa.h"

@@ -4,7 +4,7 @@
 
 #include "wavecomb/geometry/hit/surface.h"
 #include "wavecomb/light/sampling/moving.h"
-#include "wavecomb/light_paths/camera_connection.h"
+#include "wavecomb/path/camera/camera_connection.h"
 
 namespace wavecomb {
 

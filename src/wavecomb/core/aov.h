@@ -104,6 +104,9 @@ enum class Aov : uint32_t {
 #undef WAVECOMB_AOV
 };
 
+/// AOV of what other pixels' paths contribute to a pixel, the light splats of the film.
+inline constexpr Aov kSplatAov = Aov::kByLightPaths;
+
 /// Row of the AOV table.
 struct AovRow {
   Aov aov;

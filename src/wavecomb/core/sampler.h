@@ -7,7 +7,7 @@
 /// numbers are from Joe and Kuo, 2008.
 #pragma once
 
-#include "wavecomb/core/hash.h"
+#include "wavecomb/core/encoding/hash.h"
 #include "wavecomb/core/rows/fields.h"
 #include "wavecomb/core/settings.h"
 

@@ -2,8 +2,8 @@
 /// Conversion and checks of the values of a setting.
 #include <algorithm>
 
+#include "wavecomb/core/encoding/number_text.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/core/number_text.h"
 #include "wavecomb/core/settings_table.h"
 
 namespace wavecomb {

@@ -25,7 +25,8 @@ constexpr float default_filter_width(FilterKind kind) {
 enum class IntegratorKind : uint8_t { kWavefront, kReference };
 /// Where paths start. kPath: at the camera. kLight: also one light path per camera path, combined
 /// by multiple importance sampling (docs/light-paths.md). kAuto: kLight if a pilot render predicts
-/// a gain (render/pilots/transport_choice.h). kBdpt: as kLight, and vertices of both are connected.
+/// a gain (light_paths/render/transport_choice.h). kBdpt: as kLight, and vertices of both are
+/// connected.
 enum class Transport : uint8_t { kPath, kLight, kAuto, kBdpt };
 /// Treatment of samples that are too bright and too rare to be reliable: keep them, or reduce their
 /// weight (film/cascades.h).
@@ -103,7 +104,7 @@ struct Settings {
   IntegratorKind integrator = IntegratorKind::kWavefront;
   Transport transport = Transport::kPath;
   /// Aim light paths where earlier ones, traced before the first pass, contributed to the image
-  /// (render/pilots/light_aiming.h).
+  /// (light_paths/render/light_aiming.h).
   bool light_aim = true;
   /// Merge radius in pixels, within which light paths end at points that the camera sees by
   /// specular reflection or refraction (light_paths/merge_grid.h). 0 means no merging.

@@ -11,9 +11,9 @@
 #include "wavecomb/core/aov.h"
 #include "wavecomb/film/cryptomatte.h"
 #include "wavecomb/film/deep_film.h"
-#include "wavecomb/film/light_splat_layout.h"
-#include "wavecomb/film/light_splats.h"
 #include "wavecomb/film/median.h"
+#include "wavecomb/film/splats/light_splat_layout.h"
+#include "wavecomb/film/splats/light_splats.h"
 
 namespace wavecomb {
 

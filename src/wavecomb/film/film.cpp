@@ -34,11 +34,11 @@ std::vector<float> Film::means(const std::vector<float>& excess) const {
   return out;
 }
 
-void Film::update_light_path_aovs() {
+void Film::update_splat_aovs() {
   if (splats_.empty()) return;
   aovs_.set_light_splat_scale(splats_.scale());
   for (size_t i = 0; i < pixels_.size(); ++i) {
-    double* sums = aovs_.sums(Aov::kByLightPaths, i);
+    double* sums = aovs_.sums(kSplatAov, i);
     if (!sums) return;
     const std::array<double, 3> mean = splats_.mean(i);
     for (size_t c = 0; c < 3; ++c) sums[c] = mean[c] * pixels_[i].samples;
@@ -87,7 +87,7 @@ std::vector<Film::Block> Film::blocks() {
   add("errors", errors_);
   splats_.for_each_block(add);
   cascades_.for_each_block(add);
-  add("visible_points", visible_);
+  add("visible_points", joint_rows_);
   return out;
 }
 
@@ -98,12 +98,12 @@ Film::Layers Film::finish(const std::vector<std::string>& multi_layer_names) && 
   layers.variance = variance();
   std::vector<float> kept;
   if (has_cascades()) kept = unbiased();
-  update_light_path_aovs();
+  update_splat_aovs();
   release(errors_);
   release(pixels_);
   splats_ = {};
   cascades_ = {};
-  release(visible_);
+  release(joint_rows_);
   layers.deep = aovs_.take_deep(layers.samples);
   layers.albedo = aovs_.take(Aov::kAlbedo, layers.samples).values;
   layers.normal = aovs_.take(Aov::kNormal, layers.samples).values;

@@ -12,8 +12,8 @@
 #include "wavecomb/core/settings.h"
 #include "wavecomb/film/aov_film.h"
 #include "wavecomb/film/cascades.h"
-#include "wavecomb/film/error_sums.h"
-#include "wavecomb/film/light_splats.h"
+#include "wavecomb/film/error/error_sums.h"
+#include "wavecomb/film/splats/light_splats.h"
 
 namespace wavecomb {
 
@@ -51,13 +51,13 @@ class Film {
     splats_ = LightSplatLayer(pixels_.size(), unit, paths, scale, has_error());
     aovs_.allocate_light_splats(unit);
   }
-  /// Allocates a row of kMergePointWords floats per pixel for the merge points
-  /// (light_paths/merge_grid.h).
-  static constexpr size_t kMergePointWords = 16;
-  void allocate_merge_points() { visible_.assign(pixels_.size() * kMergePointWords, 0.f); }
-  std::span<const float> merge_points() const { return visible_; }
-  void set_merge_point(size_t i, const float* row) {
-    std::copy_n(row, kMergePointWords, visible_.data() + i * kMergePointWords);
+  /// Allocates a row of `words` floats per pixel, which a joint transport keeps between the camera
+  /// paths and its own paths of a pass.
+  void allocate_joint_rows(size_t words) { joint_rows_.assign(pixels_.size() * words, 0.f); }
+  std::span<const float> joint_rows() const { return joint_rows_; }
+  /// Sets the row of pixel `i`.
+  void set_joint_row(size_t i, std::span<const float> row) {
+    std::copy(row.begin(), row.end(), joint_rows_.data() + i * row.size());
   }
   /// Adds all light splats of `list` and clears it.
   void take(LightSplatList& list) {
@@ -76,7 +76,7 @@ class Film {
   bool has_cascades() const { return !cascades_.empty(); }
   Cascades& cascades() { return cascades_; }
   /// Updates the AOVs of light path contributions from the current light splats.
-  void update_light_path_aovs();
+  void update_splat_aovs();
   LightSplatLayer& splats() { return splats_; }
   const LightSplatLayer& splats() const { return splats_; }
   /// Row-major index of an image pixel within the window.
@@ -89,7 +89,7 @@ class Film {
   /// Memory use in bytes.
   size_t bytes() const {
     return pixels_.size() * sizeof(Pixel) + aovs_.bytes() + errors_.size() * sizeof(ErrorSums) +
-           splats_.bytes() + cascades_.bytes() + visible_.size() * sizeof(float);
+           splats_.bytes() + cascades_.bytes() + joint_rows_.size() * sizeof(float);
   }
 
   /// Returns pixel means as interleaved rgb, with fireflies reduced if cascades are stored. Pixels
@@ -140,7 +140,7 @@ class Film {
   std::vector<ErrorSums> errors_;
   LightSplatLayer splats_;  ///< empty without light splats
   Cascades cascades_;       ///< empty without firefly reduction
-  std::vector<float> visible_;
+  std::vector<float> joint_rows_;
 };
 
 }  // namespace wavecomb

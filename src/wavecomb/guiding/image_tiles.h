@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "wavecomb/core/settings.h"
-#include "wavecomb/guiding/field_view.h"
+#include "wavecomb/guiding/field/field_view.h"
 
 namespace wavecomb {
 

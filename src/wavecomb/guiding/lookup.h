@@ -11,7 +11,7 @@
 
 #include "wavecomb/core/lanes/lanes.h"
 #include "wavecomb/guiding/directions.h"
-#include "wavecomb/guiding/field_view.h"
+#include "wavecomb/guiding/field/field_view.h"
 
 namespace wavecomb {
 

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "wavecomb/guiding/field_view.h"
+#include "wavecomb/guiding/field/field_view.h"
 #include "wavecomb/guiding/parallax_sphere.h"
 #include "wavecomb/guiding/training_sample.h"
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-#include "wavecomb/guiding/field_view.h"
+#include "wavecomb/guiding/field/field_view.h"
 
 namespace wavecomb {
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Ratio R that camera paths carry when light paths share their MIS weights (docs/light-paths.md).
+/// Ratio R of camera paths (PathState::ratio) when light paths share their MIS weights
+/// (docs/light-paths.md).
 ///
 /// Three techniques sample a path x_0 (lens) x_1 .. x_n x_L (light): the bounces of a camera path,
 /// the light sample at x_n, and a light path that is connected to the camera at x_1. Let w_i be the
@@ -28,9 +29,13 @@
 /// pi r^2 in place of 1 / (G |g w_k|). A delta bounce at x_k sets R to 0.
 #pragma once
 
+#include "wavecomb/light/emission/emission.h"
 #include "wavecomb/light_paths/connection.h"
-#include "wavecomb/path/steps/interact.h"
-#include "wavecomb/path/steps/note_events.h"
+#include "wavecomb/light_paths/context.h"
+#include "wavecomb/light_paths/light_vertices.h"
+#include "wavecomb/light_paths/merge_point.h"
+#include "wavecomb/light_paths/scattering.h"
+#include "wavecomb/path/steps/light_connection.h"
 #include "wavecomb/path/steps/vertex_context.h"
 
 namespace wavecomb {
@@ -55,6 +60,7 @@ struct JointVertex {
   F connection_ratio;  ///< E of the connection between the previous vertex and this one
   Mask<F> merges;      ///< lanes where light paths may be merged (merge_point.h)
   F radius2;           ///< squared merge radius
+  bool connects;       ///< LightPathContext::connects
 
   /// Returns R including this vertex for a direction `world` to the light (`local` in the frame),
   /// as if light samples or bounces had density 1 there: R p<- |g l| / |g w|. Lanes outside
@@ -72,15 +78,18 @@ struct JointVertex {
         r *= select(bounces, back, F(1.f));
       }
     }
-    return v.settings.connects ? fma(connection_ratio, cosine_ratio, r) : r;
+    return connects ? fma(connection_ratio, cosine_ratio, r) : r;
   }
 };
 
-/// Computes the state of R at the vertex, before its bounce.
+/// Computes the state of R at the vertex, before its bounce. `awaits_merge` holds the lanes whose
+/// bounces so far were all deltas.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
-WAVECOMB_INLINE JointVertex<F> joint_vertex(const Vertex<F, kFeatures>& v, const Interaction& at,
-                                            const Frame<F>& frame) {
-  if constexpr (Bsdf::kOnFibre) return {F(0.f), F(0.f), F(0.f), Mask<F>(false), F(0.f)};
+WAVECOMB_INLINE JointVertex<F> joint_vertex(const LightPathContext& context,
+                                            const Vertex<F, kFeatures>& v, const Interaction& at,
+                                            const Frame<F>& frame, const Mask<F>& awaits_merge) {
+  const F zero(0.f);
+  if constexpr (Bsdf::kOnFibre) return {zero, zero, zero, Mask<F>(false), zero, context.connects};
   const Vec3<F>& dir = v.path.dir;
   const F view_cosine = dot(at.s.ng, dir);
   const Frame<F> unadjusted = at.unadjusted_frame(v);
@@ -88,7 +97,7 @@ WAVECOMB_INLINE JointVertex<F> joint_vertex(const Vertex<F, kFeatures>& v, const
   reached = reached & Mask<F>(frame.n.x == unadjusted.n.x) & Mask<F>(frame.n.y == unadjusted.n.y) &
             Mask<F>(frame.n.z == unadjusted.n.z);
   F connection_ratio(0.f);
-  if (v.settings.connects && v.depth > 0) {
+  if (context.connects && v.depth > 0) {
     Mask<F> can_connect = reached & (v.path.pdf > 0.f);
     if (Bsdf::kAbsorbs) can_connect = can_connect & (view_cosine < 0.f);
     connection_ratio =
@@ -97,46 +106,62 @@ WAVECOMB_INLINE JointVertex<F> joint_vertex(const Vertex<F, kFeatures>& v, const
   // For a viewer inside an absorbing material, light paths do not know the length of the absorbing
   // segment.
   if (Bsdf::kAbsorbs && v.depth == 0) reached = reached & (view_cosine < 0.f);
-  JointVertex<F> joint{select(reached, v.path.ratio, F(0.f)),
+  JointVertex<F> joint{select(reached, v.path.ratio, zero),
                        F(1.f / select(view_cosine != 0.f, abs(view_cosine), F(1.f))),
-                       min(connection_ratio, F(kMaxRatio)), Mask<F>(false), F(0.f)};
-  if (v.settings.merge_scale > 0.f) [[unlikely]] {
-    const F radius = v.path.cone_width * v.settings.merge_scale;
+                       min(connection_ratio, F(kMaxRatio)),
+                       Mask<F>(false),
+                       zero,
+                       context.connects};
+  if (context.merge_scale > 0.f) [[unlikely]] {
+    const F radius = v.path.cone_width * context.merge_scale;
     joint.radius2 = radius * radius;
-    joint.merges = reached & v.path.awaits_merge & (joint.radius2 > 0.f);
+    joint.merges = reached & awaits_merge & (joint.radius2 > 0.f);
     if constexpr (Bsdf::kHasNonDelta)
       joint.merges = joint.merges & at.bsdf.has_non_delta();
     else
       joint.merges = Mask<F>(false);
-    joint.ratio = select(joint.merges,
-                         F(joint.radius2 * F(abs(view_cosine) * (kPi * v.settings.light_paths))),
-                         joint.ratio);
+    joint.ratio =
+        select(joint.merges, F(joint.radius2 * F(abs(view_cosine) * (kPi * (1.f / context.share)))),
+               joint.ratio);
   }
   return joint;
 }
 
-/// Stores the vertex as a point where light paths may be merged.
-template <typename F, uint32_t kFeatures, typename Interaction>
-WAVECOMB_INLINE void store_merge_point(const Vertex<F, kFeatures>& v, const Interaction& at,
-                                       const JointVertex<F>& joint) {
-  v.visible->stored = v.active & joint.merges;
-  v.visible->row = {at.s.p,
-                    sqrt(joint.radius2),
-                    -v.path.dir,
-                    pack_normal<F>(at.s.ng),
-                    clean<F>(at.throughput, 0.f),
-                    UInt<F>(v.depth)};
+/// Returns the MIS weight of the light sample `to_light` against bounces with density `p_bounce`
+/// and light paths. `wi` is its direction in the frame of the vertex. If R includes this vertex
+/// with p_light in place of p_bounce,
+///   w = 1 / (1 + p_bounce / p_light + R D / p_light);
+/// for a point light the last term has p_light d^2 in place of p_light.
+template <typename Context, typename F>
+WAVECOMB_INLINE F joint_light_weight(const Context& c, const JointVertex<F>& joint,
+                                     const LightConnection<F>& to_light, const Vec3<F>& wi,
+                                     const F& p_bounce) {
+  const LightView& lights = c.vertex.scene.lights;
+  const LightSample<F>& l = to_light.light;
+  const F pdf = select(l.pdf > 0.f, l.pdf, F(1.f));
+  const F by_bounce = select(l.is_delta, F(0.f), F(p_bounce / pdf));
+  if (!lights.emits_paths()) return 1.f / F(1.f + by_bounce);
+  const F density =
+      emission_density<F>(lights, l.light, to_light.origin, l.wi, l.distance, l.valid);
+  const Mask<F> point = l.is_delta & (l.distance < kFarAway);
+  const F nee = select(point, F(pdf * F(l.distance * l.distance)), pdf);
+  const F by_path =
+      F(joint.template towards<typename Context::Program>(c.vertex, c.at, c.wo, l.wi, wi, l.valid) *
+        density) /
+      nee;
+  return 1.f / F(F(1.f + by_bounce) + min(by_path, F(kMaxRatio)));
 }
 
 /// Computes the connection that the vertex offers to a vertex of a light path. With w the direction
 /// to that vertex, the offer has the factors on the camera's side of the contribution
 ///   T f(w, l) |cos| |g w| / |g l| T_light f_light  v / d^2
 /// and of its weight v (light_vertex.h). Uses no random numbers.
-template <typename Bsdf, typename F, uint32_t kFeatures>
-WAVECOMB_INLINE void offer_connection(const VertexContext<Bsdf, F, kFeatures>& context) {
-  const Vertex<F, kFeatures>& v = context.vertex;
+template <typename Context, typename F>
+WAVECOMB_INLINE void offer_connection(const Context& context, const JointVertex<F>& joint,
+                                      ConnectionOffer<F>& offer) {
+  using Bsdf = typename Context::Program;
+  const auto& v = context.vertex;
   const auto& at = context.at;
-  ConnectionOffer<F>& offer = *v.offer;
   const Mask<F> wanted = offer.wanted & v.active & at.bsdf.has_non_delta();
   if (!Bsdf::kHasNonDelta || none(wanted)) return;
   const Connection<F> c = connect_to_point<F>(at, offer.to);
@@ -146,20 +171,21 @@ WAVECOMB_INLINE void offer_connection(const VertexContext<Bsdf, F, kFeatures>& c
   const Mask<F> usable = wanted & c.valid & at.is_consistent(w, wi);
   const Color<F> light = at.throughput * e.f_cos * offer.vertices;
   offer.row = {c.o, e.pdf, select<F>(usable, clean<F>(light, 0.f), Color<F>(F(0.f))),
-               context.joint.template towards<Bsdf>(v, at, context.wo, w, wi, usable)};
+               joint.template towards<Bsdf>(v, at, context.wo, w, wi, usable)};
   if (v.wants_events()) [[unlikely]]
     offer.scattering =
         classify_event<std::remove_cvref_t<decltype(at.bsdf)>, F>(at.bsdf, context.wo, wi);
 }
 
-/// Sets R after the bounce `b` along `world`, and whether the path awaits a merge.
-template <typename Bsdf, typename F, uint32_t kFeatures>
-WAVECOMB_INLINE void next_ratio(const VertexContext<Bsdf, F, kFeatures>& c, const Vec3<F>& world,
-                                const BsdfSample<F>& b, PathState<F>& next) {
-  const Vertex<F, kFeatures>& v = c.vertex;
+/// Returns R after the bounce `b` along `world`. `awaits_merge` holds the lanes whose bounces
+/// before it were all deltas, and receives those whose bounces including it were.
+template <typename Context, typename F>
+WAVECOMB_INLINE F next_ratio(const Context& c, const JointVertex<F>& joint, bool merges,
+                             const Vec3<F>& world, const BsdfSample<F>& b, Mask<F>& awaits_merge) {
+  using Bsdf = typename Context::Program;
+  const auto& v = c.vertex;
   const auto& at = c.at;
   const Vec3<F>& wo = c.wo;
-  const JointVertex<F>& joint = c.joint;
   const Mask<F> by_pdf = not_(b.is_delta) & (b.pdf > 0.f);
   const F by_density = joint.template towards<Bsdf>(v, at, wo, world, b.wi, by_pdf) /
                        select(b.pdf > 0.f, b.pdf, F(1.f));
@@ -172,13 +198,12 @@ WAVECOMB_INLINE void next_ratio(const VertexContext<Bsdf, F, kFeatures>& c, cons
     r = select(b.is_delta, v.depth == 0 ? F(0.f) : by_angle, r);
   }
   r = min(max(r, F(0.f)), F(kMaxRatio));
-  if (v.settings.merge_scale > 0.f) [[unlikely]] {
-    const Mask<F> waits_for_merge =
-        v.depth == 0 ? b.is_delta : Mask<F>(b.is_delta & v.path.awaits_merge);
-    next.awaits_merge = waits_for_merge & not_(joint.merges);
-    r = select(next.awaits_merge | (b.is_delta & joint.merges), F(0.f), r);
+  if (merges) [[unlikely]] {
+    const Mask<F> waits_for_merge = v.depth == 0 ? b.is_delta : Mask<F>(b.is_delta & awaits_merge);
+    awaits_merge = waits_for_merge & not_(joint.merges);
+    r = select(awaits_merge | (b.is_delta & joint.merges), F(0.f), r);
   }
-  next.ratio = r;
+  return r;
 }
 
 }  // namespace wavecomb

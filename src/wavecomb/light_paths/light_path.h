@@ -5,9 +5,12 @@
 #pragma once
 
 #include "wavecomb/core/sampler.h"
-#include "wavecomb/film/light_splat_filter.h"
+#include "wavecomb/film/splats/light_splat_filter.h"
 #include "wavecomb/geometry/hit/motion.h"
 #include "wavecomb/light/emission/emission.h"
+#include "wavecomb/light_paths/context.h"
+#include "wavecomb/light_paths/light_path_row.h"
+#include "wavecomb/light_paths/light_vertices.h"
 #include "wavecomb/light_paths/merge_grid.h"
 #include "wavecomb/path/camera/camera_ray.h"
 #include "wavecomb/path/path_state.h"
@@ -26,13 +29,9 @@ struct LightPath {
 
   /// Returns the state of the path on its first ray.
   PathState<F> start() const {
-    return {.dir = emission.d,
-            .throughput = flux,
-            .eta_scale = eta_scale,
-            .o = emission.o,
-            .mis_sum = weight,
-            .light = emission.light};
+    return {.dir = emission.d, .throughput = flux, .eta_scale = eta_scale, .o = emission.o};
   }
+  LightPathState<F> light_state() const { return {weight, F(0.f), emission.light}; }
 };
 
 /// Returns the number of the light path of a pixel (x | y << 16) of the whole image.
@@ -77,29 +76,16 @@ inline LightPath<F> begin_light_path(const LightView& lights, const Settings& se
 
 /// Parameters of the render that vertices of light paths need.
 struct LightPathSetup {
+  const LightPathContext& paths;
   const CameraSetup& camera;
-  const LightSplatFilter& filter;
-  float share;           ///< 1 / N, where N is the number of light paths in the image per sample
-  float camera_squares;  ///< WaveContext::camera_squares
   const Merger* merger;  ///< null without merging
 };
 
-/// Returns the setup of a WaveContext.
-template <typename Context>
-inline LightPathSetup light_path_setup(const Context& context, const Merger* merger = nullptr) {
-  return {*context.camera, *context.light_splat_filter, context.light_path_share(),
-          context.camera_squares, context.aim_samples ? nullptr : merger};
-}
-
-/// Returns the settings for shading camera paths in a render that may have light paths.
-template <typename Context>
-inline ShadeSettings camera_shade_settings(const Context& context) {
-  ShadeSettings s(*context.settings);
-  s.joins_light = context.joins_light() && !context.has_media();
-  if (context.merges()) {
-    s.merge_scale = context.settings->merge_radius / kConeShare;
-    s.light_paths = 1.f / context.light_path_share();
-  }
+/// Returns the settings for shading light paths, which filter textures at every vertex, since each
+/// vertex is connected to the camera.
+inline ShadeSettings light_shade_settings(const Settings& settings) {
+  ShadeSettings s(settings);
+  s.filters_all_lookups = true;
   return s;
 }
 
@@ -124,19 +110,17 @@ inline PathState<F> light_path_state(const CameraSetup& camera, const LightPathR
           .throughput = row.throughput,
           .eta_scale = row.eta_scale,
           .cone_width = width,
-          .o = row.o,
-          .mis_sum = row.mis_sum,
-          .bounce_pdf = row.bounce_pdf,
-          .light = row.light};
+          .o = row.o};
 }
 
 /// Result of shading a vertex of a light path. `v.direct` is the contribution to the pixels.
 template <typename F>
 struct LightVertexResult {
   VertexResult<F> v;
-  F x, y;                ///< film position in pixels, if there is a shadow ray
-  Vec3<F> p;             ///< position of the vertex
-  Mask<F> is_candidate;  ///< whether vertices of camera paths may connect to it
+  LightPathState<F> next;  ///< beside v.next
+  F x, y;                  ///< film position in pixels, if there is a shadow ray
+  Vec3<F> p;               ///< position of the vertex
+  Mask<F> is_candidate;    ///< whether vertices of camera paths may connect to it
 };
 
 /// Vertices of camera paths to connect vertices of light paths to, instead of the camera.

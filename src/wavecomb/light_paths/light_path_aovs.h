@@ -25,8 +25,8 @@
 #include "wavecomb/core/path_expressions/backward_automaton.h"
 #include "wavecomb/core/rows/fields.h"
 #include "wavecomb/film/film.h"
-#include "wavecomb/film/light_splat_filter.h"
-#include "wavecomb/film/light_splat_layout.h"
+#include "wavecomb/film/splats/light_splat_filter.h"
+#include "wavecomb/film/splats/light_splat_layout.h"
 #include "wavecomb/path/path_state.h"
 
 namespace wavecomb {

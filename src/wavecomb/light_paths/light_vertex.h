@@ -12,7 +12,7 @@
 ///   T f(w, l) |cos l|  |g w| / |g l|  G  v,   v = 1 / (1 + S (p-> + p_light) |g w| / |g l| G / N).
 /// S is 1 / D at the light, and each vertex multiplies it:
 ///   S <- S p-> |g w| / (|g l| p<-);   the first one with p-> + p_light in place of p->.
-/// S is the density of the camera's techniques (light_paths/join.h) relative to this one.
+/// S is the density of the camera's techniques (join.h) relative to this one.
 ///
 /// With connections between vertices, S also sums over the connections closer to the light, and
 /// both formulas have (S p-> + F) in place of S p->, with
@@ -34,11 +34,13 @@
 #include <array>
 
 #include "wavecomb/light/emission/emission.h"
-#include "wavecomb/light_paths/camera_connection.h"
 #include "wavecomb/light_paths/connection.h"
+#include "wavecomb/light_paths/join.h"
 #include "wavecomb/light_paths/light_path.h"
-#include "wavecomb/path/steps/note_events.h"
-#include "wavecomb/path/vertex.h"
+#include "wavecomb/light_paths/scattering.h"
+#include "wavecomb/path/camera/camera_connection.h"
+#include "wavecomb/path/steps/interact.h"
+#include "wavecomb/path/steps/survive.h"
 
 namespace wavecomb {
 
@@ -53,6 +55,7 @@ inline constexpr float kMinNormalCosine = 0.7f;
 template <typename Bsdf, typename F, typename Interaction>
 struct LightPathPoint {
   const Interaction& at;
+  const LightPathState<F>& from;  ///< state of the path on arrival
   Frame<F> frame;
   Vec3<F> l;  ///< local direction to the light, computed as a connection (light_paths/connection.h)
   F inverse_cos;          ///< 1 / |g l|
@@ -68,27 +71,30 @@ struct LightPathPoint {
   F camera_density(const F& bounce) const {
     return select(by_light_only, F(0.f), bounce) + sampled;
   }
-  /// Returns S (p-> + p_light) + F, where `s` is S before this vertex.
-  F relative_density(const F& s, const F& bounce) const {
-    return s * camera_density(bounce) + connection_density;
+  /// Returns S (p-> + p_light) + F.
+  F relative_density(const F& bounce) const {
+    return from.mis_sum * camera_density(bounce) + connection_density;
   }
 };
 
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
 WAVECOMB_INLINE LightPathPoint<Bsdf, F, Interaction> light_path_point(const Vertex<F, kFeatures>& v,
                                                                       const Interaction& at,
+                                                                      const LightPathState<F>& from,
+                                                                      bool connects,
                                                                       const Mask<F>& is_first) {
   const Vec3<F> back = -v.path.dir;
   const F cosine = abs(dot(at.s.ng, back));
   // Direction to the origin of the flux, as a bounce of a camera path would reach it.
   Connection<F> c = connect_to_point<F>(at, v.path.o);
   const Mask<F> from_infinite =
-      is_first & Mask<F>(v.path.light < UInt<F>(v.scene.lights.infinite_count));
+      is_first & Mask<F>(from.light < UInt<F>(v.scene.lights.infinite_count));
   c.o = select<F>(from_infinite, at.origin(back), c.o);
   c.d = select<F>(from_infinite, back, c.d);
   const F distance = select(from_infinite, v.t, sqrt(c.distance2));
   LightPathPoint<Bsdf, F, Interaction> path_point{
       at,
+      from,
       at.unadjusted_frame(v),
       {},
       F(1.f / select(cosine > 0.f, cosine, F(1.f))),
@@ -106,15 +112,15 @@ WAVECOMB_INLINE LightPathPoint<Bsdf, F, Interaction> light_path_point(const Vert
       receiver.normal =
           pack_normal<F>(select<F>(path_point.l.z < 0.f, -path_point.frame.n, path_point.frame.n));
     const CameraPathDensity<F> reach =
-        camera_path_density<F>(v.scene.lights, v.path.light, receiver, c.d, distance, first);
+        camera_path_density<F>(v.scene.lights, from.light, receiver, c.d, distance, first);
     // Vertices that have only delta lobes do not sample lights.
     path_point.sampled = select(first & at.bsdf.has_non_delta(), reach.density, F(0.f));
     path_point.by_light_only = first & reach.is_delta;
   }
-  if (v.settings.connects) {
-    const Mask<F> can_connect_back = path_point.active & (v.path.bounce_pdf > 0.f);
+  if (connects) {
+    const Mask<F> can_connect_back = path_point.active & (from.bounce_pdf > 0.f);
     const F connection_density =
-        F(distance * distance) / select(can_connect_back, v.path.bounce_pdf, F(1.f));
+        F(distance * distance) / select(can_connect_back, from.bounce_pdf, F(1.f));
     path_point.connection_density =
         select(can_connect_back, min(connection_density, F(kMaxRatio)), F(0.f));
   }
@@ -152,7 +158,7 @@ WAVECOMB_INLINE void set_visibility_ray(const PathPoint& path_point, const Viewe
                                         VertexResult<F>& out) {
   out.direct = clean<F>(light, 0.f);
   out.has_shadow = viewer.is_visible & (max_component(out.direct) > 0.f);
-  out.shadow_o = path_point.at.light_path_origin(viewer.w);
+  out.shadow_o = path_point.at.clear_origin(viewer.w);
   const Vec3<F> ray = to - out.shadow_o;
   const F length2 = length_squared(ray);
   const F size = sqrt(select(length2 > 0.f, length2, F(1.f)));
@@ -175,10 +181,10 @@ WAVECOMB_INLINE void record_scattering(const Vertex<F, kFeatures>& v, const Path
 template <typename F>
 WAVECOMB_INLINE Color<F> splat_value(const LightPathSetup& setup, const Color<F>& light,
                                      const F& relative_density) {
-  if (setup.camera_squares <= 0.f) [[likely]]
+  if (setup.paths.camera_squares <= 0.f) [[likely]]
     return light;
   const F y = luminance<F>(light);
-  const F y2 = y * F(y * F(1.f / setup.camera_squares));
+  const F y2 = y * F(y * F(1.f / setup.paths.camera_squares));
   return Color<F>(F(y2 * F(F(1.f + relative_density) / max(relative_density, F(kMinRatio)))));
 }
 
@@ -196,14 +202,14 @@ WAVECOMB_INLINE void connect_vertex_to_camera(const Vertex<F, kFeatures>& v,
   const CameraConnection<F> c =
       connect_to_camera<F>(setup.camera, at.s.p, r.y, r.z, v.hit.time, wanted);
   const Viewer<F> viewer = viewer_at<Bsdf, F>(
-      v, path_point, c.to, Mask<F>(wanted & c.valid & setup.filter.reaches(c.x, c.y)));
+      v, path_point, c.to, Mask<F>(wanted & c.valid & setup.paths.filter->reaches(c.x, c.y)));
   if (none(viewer.is_visible)) return;
   const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(viewer.local), path_point.l);
   const F camera_factor = path_point.cosine_ratio(viewer.w) * c.density;
   const F relative_density =
-      path_point.relative_density(v.path.mis_sum, e.pdf) * F(camera_factor * setup.share);
+      path_point.relative_density(e.pdf) * F(camera_factor * setup.paths.share);
   const F brightness =
-      camera_factor * (setup.share * setup.camera.exposure) / F(1.f + relative_density);
+      camera_factor * (setup.paths.share * setup.camera.exposure) / F(1.f + relative_density);
   const Color<F> light = path_point.flux * e.f_cos * brightness;
   set_visibility_ray<F>(path_point, viewer, c.to, splat_value<F>(setup, light, relative_density),
                         out.v);
@@ -253,9 +259,9 @@ WAVECOMB_INLINE void merge(const Vertex<F, kFeatures>& v, const LightPathSetup& 
     const F area = F(point.radius * point.radius) * kPi;
     const F camera_factor = path_point.inverse_cos / select(is_visible, area, F(1.f));
     const F relative_density =
-        path_point.relative_density(v.path.mis_sum, e.pdf) * F(camera_factor * setup.share);
+        path_point.relative_density(e.pdf) * F(camera_factor * setup.paths.share);
     const F brightness =
-        camera_factor * (setup.share * setup.camera.exposure) / F(1.f + relative_density);
+        camera_factor * (setup.paths.share * setup.camera.exposure) / F(1.f + relative_density);
     const Color<F> light = path_point.flux * e.f_cos * point.light * brightness;
     const Color<F> value =
         select<F>(is_visible, clean<F>(splat_value<F>(setup, light, relative_density), 0.f),
@@ -285,8 +291,7 @@ WAVECOMB_INLINE void connect(const Vertex<F, kFeatures>& v, const PathPoint& pat
   const F cosine_ratio = path_point.cosine_ratio(viewer.w) * inverse_distance2;
   const F before = min(F(target.ratio * F(back * inverse_distance2)), F(kMaxRatio));
   const F relative_density =
-      min(F(path_point.relative_density(v.path.mis_sum, e.pdf) * F(cosine_ratio * target.pdf)),
-          F(kMaxRatio));
+      min(F(path_point.relative_density(e.pdf) * F(cosine_ratio * target.pdf)), F(kMaxRatio));
   const F brightness = cosine_ratio / F(F(1.f + before) + relative_density);
   set_visibility_ray<F>(path_point, viewer, target.from,
                         Color<F>(path_point.flux * e.f_cos * target.light * brightness), out);
@@ -295,8 +300,12 @@ WAVECOMB_INLINE void connect(const Vertex<F, kFeatures>& v, const PathPoint& pat
 
 /// Samples the bounce and the next ray.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename PathPoint>
-WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const PathPoint& path_point,
-                                  const Sample4<F>& r, VertexResult<F>& out) {
+WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
+                                  const PathPoint& path_point, const Sample4<F>& r,
+                                  LightVertexResult<F>& result) {
+  VertexResult<F>& out = result.v;
+  const LightPathState<F>& from = path_point.from;
+  const bool connects = setup.paths.connects;
   const auto& at = path_point.at;
   const BsdfSample<F> b = at.bsdf.sample(at.bsdf.view(path_point.l), r.x, r.y, r.z);
   const Vec3<F> d = normalize(path_point.frame.to_world(b.wi));
@@ -304,8 +313,8 @@ WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const PathPoint
   const F over_pdf = cosine_ratio / select(b.pdf > 0.f, b.pdf, F(1.f));
   const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(b.wi), path_point.l);
   Color<F> weight = e.f_cos * over_pdf;
-  F s = v.path.mis_sum * F(path_point.camera_density(e.pdf) * over_pdf);
-  if (v.settings.connects) s = fma(path_point.connection_density, over_pdf, s);
+  F s = from.mis_sum * F(path_point.camera_density(e.pdf) * over_pdf);
+  if (connects) s = fma(path_point.connection_density, over_pdf, s);
   Mask<F> continues = v.active;
   if (any(b.is_delta)) {
     const F eta2 = b.eta * b.eta;
@@ -313,7 +322,7 @@ WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const PathPoint
     const F angles = cosine_ratio * F(abs(path_point.l.z) / select(z > 0.f, z, F(1.f)));
     weight = select<F>(b.is_delta, b.weight * F(angles * eta2), weight);
     const F by_angle = select(path_point.by_light_only, F(0.f), F(angles / eta2));
-    s = select(b.is_delta, F(v.path.mis_sum * by_angle), s);
+    s = select(b.is_delta, F(from.mis_sum * by_angle), s);
     continues = not_(b.is_delta & is_asymmetric<Bsdf, F>(at.bsdf, path_point.l, b.wi));
   }
   if (v.wants_events()) [[unlikely]] {
@@ -323,17 +332,15 @@ WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const PathPoint
   }
   out.next.dir = d;
   out.next.throughput = path_point.flux * weight;
-  out.next.mis_sum = min(s, F(kMaxRatio));
-  out.next.bounce_pdf = F(0.f);
-  if (v.settings.connects) {
+  result.next = {min(s, F(kMaxRatio)), F(0.f), from.light};
+  if (connects) {
     Mask<F> can_connect = not_(b.is_delta);
     if (Bsdf::kAbsorbs) can_connect = can_connect & (dot(at.s.ng, d) > 0.f);
-    out.next.bounce_pdf = select(can_connect, b.pdf, F(0.f));
+    result.next.bounce_pdf = select(can_connect, b.pdf, F(0.f));
   }
   out.next.eta_scale = v.path.eta_scale;
-  out.next.light = v.path.light;
   out.next.cone_width = out.next.cone_spread = F(0.f);
-  out.next.o = at.light_path_origin(d);
+  out.next.o = at.clear_origin(d);
   const F largest = max_component(out.next.throughput);
   out.alive = path_point.active & continues & (b.pdf > 0.f) & at.is_consistent(d, b.wi) &
               not_(at.is_adjusted(v, path_point.frame, -d)) & (largest > 0.f) & is_finite(largest);
@@ -343,12 +350,14 @@ WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const PathPoint
 
 /// Runs the steps of a vertex of the active lanes' light paths, with shading program `Bsdf`.
 /// `v.hit.time` is the shutter time of the path, and `v.path.cone_width` is the width of a camera
-/// ray's cone at the hit. If `v.aovs` wants events, classifies the scattering towards the viewer
+/// ray's cone at the hit; `from` is the rest of its state. If `v.aovs` wants events, classifies the
+/// scattering towards the viewer
 /// (`light_scattering`) and of the bounce (`bounce`). With a null `target`, the vertex is connected
 /// to the camera and the path continues; otherwise it is connected to the camera path's vertices in
 /// `target`, and `v.depth` has no meaning.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE LightVertexResult<F> light_path_steps(const Vertex<F, kFeatures>& v,
+                                                      const LightPathState<F>& from,
                                                       const LightPathSetup& setup,
                                                       const ConnectionTarget<F>* target) {
   LightVertexResult<F> out;
@@ -359,8 +368,8 @@ WAVECOMB_INLINE LightVertexResult<F> light_path_steps(const Vertex<F, kFeatures>
   out.is_candidate = Mask<F>(false);
   if constexpr (Bsdf::kOnFibre) return out;
   const auto at = interact<Bsdf, F>(v);
-  const auto path_point =
-      detail::light_path_point<Bsdf, F>(v, at, target ? target->is_first : Mask<F>(v.depth == 0));
+  const auto path_point = detail::light_path_point<Bsdf, F>(
+      v, at, from, setup.paths.connects, target ? target->is_first : Mask<F>(v.depth == 0));
   if (target) [[unlikely]] {
     detail::connect<Bsdf, F>(v, path_point, target->row, out.v);
     return out;
@@ -373,16 +382,17 @@ WAVECOMB_INLINE LightVertexResult<F> light_path_steps(const Vertex<F, kFeatures>
   if (v.depth + 1 >= v.settings.max_depth) return out;
   const Sample4<F> r_bsdf =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kBsdf, v.depth));
-  detail::scatter_flux<Bsdf, F>(v, path_point, r_bsdf, out.v);
+  detail::scatter_flux<Bsdf, F>(v, setup, path_point, r_bsdf, out);
   survive<F>(v, GuidingLookup<F>{}, max_component(path_point.flux), r_light.w, out.v);
   return out;
 }
 
 /// Runs light_path_steps() without inlining, for the reference integrator.
 template <typename Bsdf, typename F, uint32_t kFeatures>
-LightVertexResult<F> shade_light_vertex(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
+LightVertexResult<F> shade_light_vertex(const Vertex<F, kFeatures>& v,
+                                        const LightPathState<F>& from, const LightPathSetup& setup,
                                         const ConnectionTarget<F>* target) {
-  return light_path_steps<Bsdf, F>(v, setup, target);
+  return light_path_steps<Bsdf, F>(v, from, setup, target);
 }
 
 }  // namespace wavecomb

@@ -6,10 +6,13 @@
 /// it. The connections depend only on pixel and sample, not on the wave.
 #pragma once
 
-#include "wavecomb/core/hash.h"
+#include <cstring>
+
+#include "wavecomb/core/encoding/hash.h"
 #include "wavecomb/core/rows/fields.h"
 #include "wavecomb/core/sampler.h"
-#include "wavecomb/path/path_pool.h"
+#include "wavecomb/light_paths/light_path_row.h"
+#include "wavecomb/path/path_state.h"
 #include "wavecomb/path/shading_record.h"
 
 namespace wavecomb {
@@ -94,6 +97,31 @@ inline Mask<F> store_light_vertex(const LightVertices& to, uint32_t depth,
   store_row<LightPathRow, F>(to.paths, record.slot, path, replaces);
   store_row<ShadingRecord, F>(to.records, record.slot, record, replaces);
   return replaces;
+}
+
+/// Connection that a vertex of a camera path offers to a vertex of a light path.
+template <typename F>
+struct ConnectionOffer {
+  Vec3<F> to;      ///< position of the light path's vertex
+  F vertices;      ///< LightVertexRow::vertices
+  Mask<F> wanted;  ///< whether such a vertex exists and the path would not exceed the maximum depth
+  ConnectionRow<F> row;  ///< output; black where `wanted` is false
+  /// Output, if light path expressions are active; undefined where `wanted` is false.
+  ScatteringEvent<F> scattering{};
+};
+
+/// Returns the offer of camera paths in `slot`, at `depth`, to the light path vertices chosen for
+/// these slots. Its contribution is still black.
+template <typename F>
+inline ConnectionOffer<F> offer_for(const LightVertices& from, const UInt<F>& slot, uint32_t depth,
+                                    uint32_t max_depth, const Mask<F>& active) {
+  const auto chosen = load_row<LightVertexRow, F>(from.chosen, slot, active);
+  const Vec3<F> none(F(0.f));
+  return {chosen.p,
+          F(Int<F>(chosen.vertices)),
+          Mask<F>(active & Mask<F>(chosen.vertices != UInt<F>(0u)) &
+                  Mask<F>(chosen.depth + (depth + 2) <= UInt<F>(max_depth))),
+          {none, F(0.f), none, F(0.f)}};
 }
 
 }  // namespace wavecomb

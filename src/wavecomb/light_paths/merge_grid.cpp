@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "wavecomb/core/hash.h"
+#include "wavecomb/core/encoding/hash.h"
 #include "wavecomb/scene/parallel.h"
 
 namespace wavecomb {

@@ -12,8 +12,6 @@
 
 namespace wavecomb {
 
-static_assert(kMergePointWords == Film::kMergePointWords);
-
 /// Hash grid of merge points. Each point is stored in the cells that the sphere of its radius
 /// overlaps. The cell size depends on the radius.
 ///

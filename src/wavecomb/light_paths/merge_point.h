@@ -14,6 +14,7 @@
 #pragma once
 
 #include <cstring>
+#include <span>
 
 #include "wavecomb/core/rows/fields.h"
 #include "wavecomb/core/rows/soa.h"
@@ -57,7 +58,9 @@ class MergePointRows {
   size_t bytes() const { return block_.bytes(); }
   /// Clears the points of slots below `slots`.
   void clear(size_t slots) const { std::memset(rows, 0, slots * kMergePointWords * sizeof(float)); }
-  const float* row(size_t slot) const { return rows + slot * kMergePointWords; }
+  std::span<const float> row(size_t slot) const {
+    return {rows + slot * kMergePointWords, kMergePointWords};
+  }
 
   float* rows = nullptr;
 

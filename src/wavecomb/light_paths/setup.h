@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "wavecomb/core/fixed_point.h"
+#include "wavecomb/core/encoding/fixed_point.h"
 #include "wavecomb/core/settings.h"
-#include "wavecomb/film/light_splat_filter.h"
+#include "wavecomb/film/splats/light_splat_filter.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb {

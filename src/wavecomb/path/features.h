@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Features that vertex kernels are compiled with (kernel_matrix.h): all of them, or, for plain
-/// kernels, only those that simple scenes need.
+/// kernels, only those that simple scenes need. A joint transport is not among them, since it is a
+/// type (joint_transport.h).
 #pragma once
 
 #include <cstdint>
@@ -14,12 +15,11 @@ enum Feature : uint32_t {
   kMeshLights = 8,     ///< mesh lights, and lights that only light sampling finds
   kRecordsAovs = 16,   ///< AOVs of vertices, path histories
   kExperiments = 32,   ///< cosine sampling, Schlick's approximation
-  kJoined = 64,        ///< MIS between camera paths and light paths
-  kSubsurface = 128,   ///< subsurface scattering
-  kNestedMedia = 256,  ///< nested dielectrics
+  kSubsurface = 64,    ///< subsurface scattering
+  kNestedMedia = 128,  ///< nested dielectrics
 };
 inline constexpr uint32_t kPlain = kRecordsAovs;
 inline constexpr uint32_t kEverything = kMotion | kCurves | kLinks | kMeshLights | kRecordsAovs |
-                                        kExperiments | kJoined | kSubsurface | kNestedMedia;
+                                        kExperiments | kSubsurface | kNestedMedia;
 
 }  // namespace wavecomb

@@ -20,9 +20,9 @@ struct WaveTask {
   uint32_t pixel_count;
   uint32_t first_sample;
   uint32_t samples;
-  /// Whether to trace light paths. A pixel then only numbers a light path, which may contribute to
-  /// any pixel.
-  bool from_lights = false;
+  /// Whether to trace paths of the joint transport (joint_transport.h) instead of camera paths. A
+  /// pixel then only numbers a path, which may contribute to any pixel.
+  bool joint = false;
   uint32_t path_count() const { return pixel_count * samples; }
 };
 
@@ -41,7 +41,8 @@ struct WorkerView {
 ///
 /// Contract: one thread calls begin_pass() and end_pass() while no wave runs. Workers call run()
 /// concurrently, each from one thread at a time. run() writes only the film pixels of its task, and
-/// adds the samples of a pixel in sample order. Light paths may contribute to any pixel.
+/// adds the samples of a pixel in sample order. Paths of a joint transport may
+/// contribute to any pixel.
 class Integrator {
  public:
   virtual ~Integrator() = default;

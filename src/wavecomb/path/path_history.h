@@ -113,7 +113,7 @@ class PathHistory {
 ///
 /// Contract: all workers call it concurrently, once for each wave (the reference integrator once
 /// for each path). The arguments are valid only during the call. Sums must be integers to be equal
-/// for every schedule (core/fixed_point.h).
+/// for every schedule (core/encoding/fixed_point.h).
 class HistoryReader {
  public:
   virtual ~HistoryReader() = default;

@@ -58,20 +58,6 @@ struct PathRow {
   }
 };
 
-/// Light path between two vertices, in the same slots as camera paths.
-template <typename F>
-struct LightPathRow {
-  Vec3<F> o, d;         ///< the ray to trace
-  Color<F> throughput;  ///< flux
-  F mis_sum;            ///< PathState::mis_sum
-  F eta_scale;
-  F unused;
-  F bounce_pdf;  ///< PathState::bounce_pdf
-  SampleKey<F> key;
-  UInt<F> light;  ///< light that the path left
-  WAVECOMB_FIELDS(o, d, throughput, mis_sum, eta_scale, unused, bounce_pdf, key, light)
-};
-
 /// Path state that only some scenes need.
 template <typename F>
 struct PathColdRow {
@@ -130,11 +116,6 @@ inline constexpr size_t kRadianceWords = kRowWords<RadianceRow>;
 
 static_assert(kRowWords<PathRow> == 16 && kRowWords<ShadowRow> == 16, "a cache line each");
 static_assert(kIsHead<RayHead, PathRow> && kIsHead<RayHead, ShadowRow>);
-// Stages that trace rays and draw random numbers treat both kinds of paths alike.
-static_assert(kFieldWords<LightPathRow> == kFieldWords<PathRow>);
-static_assert(offsetof(LightPathRow<float>, throughput) == offsetof(PathRow<float>, throughput) &&
-              offsetof(LightPathRow<float>, eta_scale) == offsetof(PathRow<float>, eta_scale) &&
-              offsetof(LightPathRow<float>, key) == offsetof(PathRow<float>, key));
 
 /// Path state of one wave. A slot holds one (pixel, sample) for the lifetime of its path. Its state
 /// is a row of one cache line, and its shadow ray is a second row, so that shading touches only the
@@ -144,14 +125,11 @@ static_assert(offsetof(LightPathRow<float>, throughput) == offsetof(PathRow<floa
 class PathPool {
  public:
   PathPool() = default;
-  /// Allocates `capacity` slots. The flags add optional rows: `cold` PathColdRow, `joined`
-  /// PathState::ratio, `nested` MediumStackRow, `shaded` VertexResult::shadow_tint, `split`
-  /// PathState::diffuse.
-  PathPool(size_t capacity, bool cold, bool joined = false, bool nested = false,
-           bool shaded = false, bool split = false)
+  /// Allocates `capacity` slots. The flags add optional rows: `cold` PathColdRow, `nested`
+  /// MediumStackRow, `shaded` VertexResult::shadow_tint, `split` PathState::diffuse.
+  PathPool(size_t capacity, bool cold, bool nested = false, bool shaded = false, bool split = false)
       : rows_(1, capacity * (kRowWords<PathRow> + kRowWords<ShadowRow> + kRadianceWords)),
         cold_(cold ? SoaBlock(1, capacity * kRowWords<PathColdRow>) : SoaBlock()),
-        ratios_(joined ? SoaBlock(1, capacity) : SoaBlock()),
         medium_stacks_(nested ? SoaBlock(1, capacity * kRowWords<MediumStackRow>) : SoaBlock()),
         shadow_tints_(shaded ? SoaBlock(1, capacity * kRadianceWords) : SoaBlock()),
         diffuse_(split ? SoaBlock(1, capacity * kRadianceWords) : SoaBlock()) {
@@ -159,29 +137,27 @@ class PathPool {
     shadows = paths + capacity * kRowWords<PathRow>;
     radiance = shadows + capacity * kRowWords<ShadowRow>;
     this->cold = cold ? cold_.floats(0) : nullptr;
-    ratio = joined ? ratios_.floats(0) : nullptr;
     medium_stacks = nested ? medium_stacks_.floats(0) : nullptr;
     shadow_tints = shaded ? shadow_tints_.floats(0) : nullptr;
     diffuse = split ? diffuse_.floats(0) : nullptr;
   }
 
-  float* paths = nullptr;          ///< PathRow or LightPathRow
+  float* paths = nullptr;          ///< PathRow, or the row of a joint transport of the same size
   float* shadows = nullptr;        ///< ShadowRow
   float* radiance = nullptr;       ///< RadianceRow
   float* cold = nullptr;           ///< PathColdRow, or null
-  float* ratio = nullptr;          ///< pack_ratio() of the paths; null without light paths
   float* medium_stacks = nullptr;  ///< MediumStackRow; null without nested dielectrics
   float* shadow_tints =
       nullptr;  ///< RadianceRow of VertexResult::shadow_tint; null if shadows are black
   /// RadianceRow of PathState::diffuse; null if no light has multipliers
   float* diffuse = nullptr;
   size_t bytes() const {
-    return rows_.bytes() + cold_.bytes() + ratios_.bytes() + medium_stacks_.bytes() +
-           shadow_tints_.bytes() + diffuse_.bytes();
+    return rows_.bytes() + cold_.bytes() + medium_stacks_.bytes() + shadow_tints_.bytes() +
+           diffuse_.bytes();
   }
 
  private:
-  SoaBlock rows_, cold_, ratios_, medium_stacks_, shadow_tints_, diffuse_;
+  SoaBlock rows_, cold_, medium_stacks_, shadow_tints_, diffuse_;
 };
 
 /// Adds `c` to the active lanes' rows of `radiance`. The rows must be distinct.

@@ -9,10 +9,8 @@
 #include "wavecomb/core/vec.h"
 #include "wavecomb/geometry/hit/hit_material.h"
 #include "wavecomb/geometry/hit/surface.h"
-#include "wavecomb/guiding/field_view.h"
+#include "wavecomb/guiding/field/field_view.h"
 #include "wavecomb/light/sampling/light_sample.h"
-#include "wavecomb/light_paths/light_vertices.h"
-#include "wavecomb/light_paths/merge_point.h"
 #include "wavecomb/path/features.h"
 #include "wavecomb/path/path_pool.h"
 
@@ -30,12 +28,7 @@ struct ShadeSettings {
   bool schlick_fresnel;
   bool cosine_sampling;
   bool filters_all_lookups;
-  bool shows_environment;    ///< whether camera rays show domes and distant lights
-  bool connects;             ///< whether vertices of camera paths and light paths are connected
-  bool joins_light = false;  ///< whether MIS weights of camera paths include light paths
-  /// Merge radius divided by the width of the path's ray cone. 0 disables merging.
-  float merge_scale = 0;
-  float light_paths = 0;  ///< light paths in the image per sample, if merged
+  bool shows_environment;  ///< whether camera rays show domes and distant lights
 
   explicit ShadeSettings(const Settings& s)
       : sampler(s.sampler),
@@ -48,20 +41,11 @@ struct ShadeSettings {
         schlick_fresnel(s.schlick_fresnel),
         cosine_sampling(s.cosine_sampling),
         filters_all_lookups(s.texture_filter == TextureFilter::kWhole),
-        shows_environment(!s.alpha),
-        connects(s.connects()) {}
+        shows_environment(!s.alpha) {}
 
   /// Returns whether a path that leaves the scene after `depth` vertices adds the environment's
   /// light.
   bool adds_environment(uint32_t depth) const { return shows_environment || depth > 0; }
-
-  /// Returns the settings for light paths, which filter textures at every vertex, since each vertex
-  /// is connected to the camera.
-  ShadeSettings of_light_paths() const {
-    ShadeSettings s = *this;
-    s.filters_all_lookups = true;
-    return s;
-  }
 };
 
 /// State of a path at a vertex. `dir` is the direction of the ray that arrived, and the ray cone is
@@ -77,17 +61,11 @@ struct PathState {
   UInt<F> receiver{0u};  ///< LightReceiver::normal of the previous vertex
   UInt<F> link{0u};      ///< link class of the surface that the ray left, if lights are linked
   F importance{0.f};     ///< one over the brightness of the image at the pixel; 0 if unknown
-  /// The ratio R of light_paths/join.h, the density of light paths relative to this path; 0 if no
-  /// light path can produce it.
+  /// Density with which a joint transport samples this path, relative to its own density and up to
+  /// the density of the light's emission (joint_transport.h); 0 without.
   F ratio{0.f};
-  /// Whether all bounces so far were deltas and the path waits for a vertex to merge at.
-  Mask<F> awaits_merge{false};
   Mask<F> enters_body{false};  ///< whether the bounce enters a subsurface body
   BodyEntry<F> entry{};        ///< that body
-  // Only for light paths (light_paths/light_vertex.h):
-  F mis_sum{0.f};     ///< the sum S of the MIS weight
-  F bounce_pdf{0.f};  ///< density of the previous bounce; 0 if its vertex cannot be connected
-  UInt<F> light{0u};  ///< light that the path left
   // Only for scenes with nested dielectrics (MediumStackRow):
   F outer{1.f};        ///< index of refraction on the other side of the surface
   UInt<F> medium{0u};  ///< material whose medium scatters here
@@ -131,29 +109,6 @@ WAVECOMB_INLINE PathRow<F> path_row(const PathState<F>& next, const SampleKey<F>
                  .receiver = next.receiver};
   if constexpr (kMayEnter) row.set_entry(next.enters_body, next.entry);
   return row;
-}
-/// Returns the row of a light path whose next ray is that of `next`.
-template <typename F>
-WAVECOMB_INLINE LightPathRow<F> light_path_row(const PathState<F>& next, const SampleKey<F>& key) {
-  return {.o = next.o,
-          .d = next.dir,
-          .throughput = next.throughput,
-          .mis_sum = next.mis_sum,
-          .eta_scale = next.eta_scale,
-          .unused = F(0.f),
-          .bounce_pdf = next.bounce_pdf,
-          .key = key,
-          .light = next.light};
-}
-/// Returns the word of PathPool::ratio: PathState::ratio, or -1 if the path awaits a merge.
-template <typename F>
-WAVECOMB_INLINE F pack_ratio(const PathState<F>& state) {
-  return select(state.awaits_merge, F(-1.f), state.ratio);
-}
-template <typename F>
-WAVECOMB_INLINE void unpack_ratio(const F& word, PathState<F>& state) {
-  state.awaits_merge = word < 0.f;
-  state.ratio = max(word, F(0.f));
 }
 
 /// Output of shading one vertex. Values of lanes outside the masks are undefined.
@@ -230,31 +185,6 @@ inline Guides<F> guides_of(const VertexAovs<F>& v, const PathState<F>& path) {
           v.normal};
 }
 
-/// Connection that a vertex of a camera path offers to a vertex of a light path.
-template <typename F>
-struct ConnectionOffer {
-  Vec3<F> to;      ///< position of the light path's vertex
-  F vertices;      ///< LightVertexRow::vertices
-  Mask<F> wanted;  ///< whether such a vertex exists and the path would not exceed the maximum depth
-  ConnectionRow<F> row;  ///< output; black where `wanted` is false
-  /// Output, if light path expressions are active; undefined where `wanted` is false.
-  ScatteringEvent<F> scattering{};
-};
-
-/// Returns the offer of camera paths in `slot`, at `depth`, to the light path vertices chosen for
-/// these slots. Its contribution is still black.
-template <typename F>
-inline ConnectionOffer<F> offer_for(const LightVertices& from, const UInt<F>& slot, uint32_t depth,
-                                    uint32_t max_depth, const Mask<F>& active) {
-  const auto chosen = load_row<LightVertexRow, F>(from.chosen, slot, active);
-  const Vec3<F> none(F(0.f));
-  return {chosen.p,
-          F(Int<F>(chosen.vertices)),
-          Mask<F>(active & Mask<F>(chosen.vertices != UInt<F>(0u)) &
-                  Mask<F>(chosen.depth + (depth + 2) <= UInt<F>(max_depth))),
-          {none, F(0.f), none, F(0.f)}};
-}
-
 /// Input of all steps of a vertex. `depth` is 0 at the first vertex, and `t` is the length of the
 /// ray that arrived. `hit` and `geom` (the geometry within the instance's group) describe a
 /// surface; at a vertex in a volume `hit.inst` is kNoSurface. `kFeatures` is the set of features
@@ -272,14 +202,11 @@ struct Vertex {
   const PathState<F>& path;
   VertexAovs<F>* aovs;  ///< null if no AOV needs the vertex
   const Mask<F>& active;
-  const GuidingView* guide = nullptr;     ///< guiding field that guides bounces or is in training
-  ConnectionOffer<F>* offer = nullptr;    ///< null without connections
-  MergePointOffer<F>* visible = nullptr;  ///< null without merging
+  const GuidingView* guide = nullptr;  ///< guiding field that guides bounces or is in training
 
   static constexpr bool has(Feature feature) { return (kFeatures & feature) != 0; }
   /// Returns the AOV values to write, or null.
   VertexAovs<F>* recorded_aovs() const { return has(kRecordsAovs) ? aovs : nullptr; }
-  bool joins_light() const { return has(kJoined) && settings.joins_light; }
   bool wants_lights() const { return recorded_aovs() && aovs->wants_lights; }
   bool wants_events() const { return recorded_aovs() && aovs->wants_events; }
   bool wants_bounces() const { return recorded_aovs() && aovs->wants_bounces; }

@@ -5,7 +5,7 @@
 
 #include "wavecomb/core/sampler.h"
 #include "wavecomb/guiding/bounce/guided_bounce.h"
-#include "wavecomb/light_paths/join.h"
+#include "wavecomb/path/joint_transport.h"
 #include "wavecomb/path/path_pool.h"
 #include "wavecomb/path/steps/emit.h"
 #include "wavecomb/path/steps/interact.h"
@@ -30,9 +30,10 @@ inline UInt<F> crossed_at(const Vertex<F, kFeatures>& v, const Frame<F>& frame, 
          bit(out.has_shadow & crosses(out.shadow_d), kShadowCrosses);
 }
 
-/// Runs the steps of a vertex for the active lanes' paths, all with shading program `Bsdf`.
-template <typename Bsdf, typename F, uint32_t kFeatures>
-WAVECOMB_INLINE VertexResult<F> vertex_steps(const Vertex<F, kFeatures>& v) {
+/// Runs the steps of a vertex for the active lanes' paths, all with shading program `Bsdf`. `joint`
+/// couples them to a joint transport (joint_transport.h).
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Coupling>
+WAVECOMB_INLINE VertexResult<F> vertex_steps(const Vertex<F, kFeatures>& v, Coupling& joint) {
   using U = UInt<F>;
   using V = Vertex<F, kFeatures>;
   VertexResult<F> out;
@@ -53,7 +54,7 @@ WAVECOMB_INLINE VertexResult<F> vertex_steps(const Vertex<F, kFeatures>& v) {
   if (v.wants_bounces()) v.aovs->survival = F(-1.f);
 
   const auto at = interact<Bsdf, F>(v);
-  if constexpr (Bsdf::kEmits) out.emitted = emit<Bsdf, F>(v, at);
+  if constexpr (Bsdf::kEmits) out.emitted = emit<Bsdf, F>(v, at, joint);
   const Frame<F> frame = at.frame(v);
   const Vec3<F> wo = frame.to_local(-v.path.dir);
   at.record_aovs(v, frame);
@@ -63,28 +64,21 @@ WAVECOMB_INLINE VertexResult<F> vertex_steps(const Vertex<F, kFeatures>& v) {
 
   const auto view = at.bsdf.view(wo);
   const GuidingLookup<F> guiding = guiding_lookup<Bsdf, F>(v, at, frame, wo);
-  JointVertex<F> joint{};
-  if constexpr (V::has(kJoined) && Bsdf::kOnSurface)
-    if (v.joins_light()) [[unlikely]] {
-      joint = joint_vertex<Bsdf, F>(v, at, frame);
-      if (v.visible) store_merge_point<F>(v, at, joint);
-    }
+  joint.template begin<Bsdf>(v, at, frame);
 
   const Sample4<F> r_light =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kLight, v.depth));
   const LightReceiver<F> receiver = light_receiver<Bsdf, F>(v, frame, wo);
-  const VertexContext<Bsdf, F, kFeatures> context{.vertex = v,
-                                                  .at = at,
-                                                  .frame = frame,
-                                                  .wo = wo,
-                                                  .view = view,
-                                                  .guide = guiding,
-                                                  .joint = joint,
-                                                  .receiver = receiver};
+  const VertexContext<Bsdf, F, kFeatures, Coupling> context{.vertex = v,
+                                                            .at = at,
+                                                            .frame = frame,
+                                                            .wo = wo,
+                                                            .view = view,
+                                                            .guide = guiding,
+                                                            .receiver = receiver,
+                                                            .joint = joint};
   sample_light(context, r_light, out);
-  if constexpr (V::has(kJoined) && Bsdf::kOnSurface)
-    if (v.offer) [[unlikely]]
-      offer_connection(context);
+  joint.offer(context);
   const Sample4<F> r_bsdf =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kBsdf, v.depth));
   scatter(context, r_bsdf, out);
@@ -98,9 +92,10 @@ WAVECOMB_INLINE VertexResult<F> vertex_steps(const Vertex<F, kFeatures>& v) {
 }
 
 /// Runs vertex_steps() without inlining, for the reference integrator.
-template <typename Bsdf, typename F, uint32_t kFeatures>
-VertexResult<F> shade_vertex(const Vertex<F, kFeatures>& v) {
-  return vertex_steps<Bsdf, F>(v);
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Joint>
+VertexResult<F> shade_vertex(const Vertex<F, kFeatures>& v,
+                             typename Joint::template Coupling<F>& joint) {
+  return vertex_steps<Bsdf, F>(v, joint);
 }
 
 }  // namespace wavecomb

@@ -10,7 +10,7 @@
 #include "wavecomb/path/path_history.h"
 #include "wavecomb/path/steps/emit.h"
 #include "wavecomb/path/steps/escape.h"
-#include "wavecomb/reference/reference.h"
+#include "wavecomb/reference/reference_worker.h"
 #include "wavecomb/reference/single_rays.h"
 
 namespace wavecomb {
@@ -22,7 +22,7 @@ class PathRecorder {
 
   PathRecorder(const WaveContext& context, ReferenceWorker& worker)
       : context_(context),
-        settings_(camera_shade_settings(context)),
+        settings_(*context.settings),
         counts_(worker.counts),
         rays_(context, worker.counts, worker.aovs),
         aovs_(worker.aovs),

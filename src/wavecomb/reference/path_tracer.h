@@ -6,8 +6,6 @@
 
 #include "wavecomb/geometry/hit/hit_material.h"
 #include "wavecomb/guiding/lookup.h"
-#include "wavecomb/light_paths/camera_connection.h"
-#include "wavecomb/light_paths/light_path.h"
 #include "wavecomb/path/media.h"
 #include "wavecomb/path/path_history.h"
 #include "wavecomb/path/shading_record.h"
@@ -20,18 +18,34 @@
 
 namespace wavecomb {
 
+/// Part that a joint transport (path/joint_transport.h) has in the camera paths of the reference
+/// integrator; here, of none.
+struct NoJointTracer {
+  NoJointTracer(const WaveContext& /*context*/, ReferenceWorker& /*worker*/) {}
+  /// Begins a camera path. The paths of the joint transport that it needs may be traced here.
+  void begin(uint32_t /*pixel*/, uint32_t /*sample*/) {}
+  /// Uses the vertex of the path at `depth`, after its shadow ray. `rays` are those of the path.
+  /// Returns a contribution to its radiance.
+  Color<float> use_vertex(uint32_t /*depth*/, SingleRays& /*rays*/) { return Color<float>(0.f); }
+  /// Ends a path that was added to pixel `index` of the film.
+  void end(size_t /*index*/) {}
+  void end_task(const WaveTask& /*task*/) {}
+};
+
 /// Traces camera paths one at a time and depth first. `Media` samples the volumes, media and
-/// subsurface random walks between mesh surfaces (path/media.h).
-template <typename Media>
+/// subsurface random walks between mesh surfaces (path/media.h). `Joint` has the members of
+/// NoJointTracer.
+template <typename Media, typename Joint = NoJointTracer>
 class PathTracer : PathRecorder {
  public:
   PathTracer(const WaveContext& context, ReferenceWorker& worker, const Media& media)
       : PathRecorder(context, worker),
         media_(media),
         clock_(worker.clock),
-        light_aovs_(worker.light_aovs),
-        vertices_(worker.light_vertices),
-        visible_(worker.visible) {}
+        buffers_(worker.joint),
+        joint_(context, worker) {}
+
+  Joint& joint() { return joint_; }
 
   /// Traces the path of `task`, which has one pixel and one sample, and returns its radiance times
   /// the camera's exposure. Slot 0 of the worker's AOVs then holds the AOVs of the path.
@@ -39,7 +53,6 @@ class PathTracer : PathRecorder {
     aovs_.clear(1);
     history_.clear(1);
     radiance_ = {};
-    if (visible_) visible_.clear(1);
     const uint32_t last = trace_path(*task.pixels, task.first_sample);
     aovs_.end_path(last, radiance(), 1);
     if (history_) context_.histories->ended(history_, radiance(), task);
@@ -109,9 +122,9 @@ class PathTracer : PathRecorder {
       }
       VertexAovs<F> aovs = aovs_.wanted<F>(depth);
       aovs.wants_lights |= !probes_.empty();
-      if (context_.joins_light() && depth == 0 && on_surface)
-        path.ratio =
-            first_ratio<F>(*context_.camera, context_.light_path_share(), p, path.dir, time, true);
+      if (context_.joint.is_active() && depth == 0 && on_surface)
+        buffers_.template begin_ratios<F>(context_.joint, *context_.camera, kSlot,
+                                          {p, path.dir, time}, true);
       if (context_.has_medium_stack()) {
         path.outer = medium_stack_.outer;
         path.medium = medium_stack_.medium;
@@ -122,8 +135,7 @@ class PathTracer : PathRecorder {
       }
       note_vertex(key, depth, {.path = path, .t = hit.t, .material = material, .result = v}, aovs);
       const bool is_free = v.has_shadow && trace_shadow(key, depth, v, aovs);
-      if constexpr (!Media::kAny)
-        if (vertices_ && max_component(offer_.row.light) > 0.f) connect(depth);
+      radiance_.sum += joint_.use_vertex(depth, rays_);
       if (!probes_.empty() && aovs.light_weight >= 0.f)
         record_choice(v, aovs, is_free ? luminance(v.direct) : 0.f);
       if (!v.alive) return depth + 1;
@@ -173,10 +185,6 @@ class PathTracer : PathRecorder {
                    const VertexAovs<F>& aovs) {
     const VertexResult<F>& v = at.result;
     add(aovs.emitter, v.emitted);
-    if constexpr (!Media::kAny)
-      if (vertices_ && aovs.wants_events)
-        light_aovs_.offer<F>(kSlot, aovs_.expressions().states<F>(kSlot, true), offer_.scattering,
-                             true);
     if (aovs.wants_events && (v.alive || v.has_shadow))
       aovs_.expressions().scatter<F>(depth, kSlot, key, aovs, v.has_shadow, true);
     aovs_.vertex<F>(depth, kSlot, aovs, at.path, true);
@@ -253,64 +261,26 @@ class PathTracer : PathRecorder {
   }
 
   VertexResult<F> shade(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit,
-                        uint32_t mesh, uint32_t material, const PathState<F>& path,
-                        VertexAovs<F>& aovs) {
+                        uint32_t mesh, uint32_t material, PathState<F>& path, VertexAovs<F>& aovs) {
     const SceneView& scene = context_.scene;
     counts_.add_records(depth, 1);
     if (aovs_.models_cost()) aovs_.add_cost(kSlot, context_.roulette_costs->material(material));
     const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, rays_.time()};
-    const bool joins = settings_.joins_light, connects = joins && vertices_;
-    if (connects) offer_ = offer_for<F>(vertices_, kSlot, depth, settings_.max_depth, true);
-    MergePointOffer<F> visible;
+    JointTransport::Coupling<F> joint(context_.joint, buffers_);
+    joint.load(kSlot, depth, settings_.max_depth, true, path);
     constexpr auto& kernels = kShadeVertex<F, typename Media::template Programs<F>>;
     const VertexResult<F> v = kernels[scene.material_program[material]](
         {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, path, &aovs, true,
-         context_.guide, connects ? &offer_ : nullptr, joins && visible_ ? &visible : nullptr});
-    if (visible.stored) store_row<MergePoint, F>(visible_.rows, kSlot, visible.row, true);
+         context_.guide},
+        joint);
+    joint.store(kSlot, v.next, v.alive, aovs_, true);
     return v;
   }
 
-  /// Connects the vertex at `depth` of the camera path to the chosen vertex of the light path.
-  void connect(uint32_t depth) {
-    clock_.enter(Phase::kShade);
-    const SceneView& scene = context_.scene;
-    const auto at = load_row<LightVertexRow, F>(vertices_.chosen, kSlot, true);
-    const auto from = load_row<LightPathRow, F>(vertices_.paths, kSlot, true);
-    const auto hit = load_row<ShadingRecord, F>(vertices_.records, kSlot, true);
-    counts_.add_records(depth, 1);
-    if (aovs_.models_cost()) aovs_.add_cost(kSlot, context_.roulette_costs->material(at.material));
-    const ConnectionTarget<F> target{offer_.row, at.depth == 0};
-    const MeshHit<F> mesh_hit{hit.inst, hit.mesh, hit.prim, hit.u, hit.v, rays_.time()};
-    const PathState<F> state =
-        light_path_state<F>(*context_.camera, from, hit.t, rays_.time(), true);
-    const LightPathSetup setup = light_path_setup(context_);
-    VertexAovs<F> aovs;
-    aovs.wants_events = light_aovs_.wants_events();
-    const VertexResult<F> v = kShadeLightVertex<F>[scene.material_program[at.material]](
-                                  {scene, light_settings_, from.key, depth, mesh_hit, hit.geom,
-                                   hit.t, at.material, state, &aovs, true},
-                                  setup, & target)
-                                  .v;
-    if (aovs.wants_events) light_aovs_.record_connection<F>(kSlot, aovs.light_scattering, true);
-    if (!v.has_shadow) return;
-    clock_.enter(Phase::kShadow);
-    const uint32_t no_set = 0;
-    const bool links = scene.lights.links.members != nullptr;
-    if (rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, links ? &no_set : nullptr))
-      return;
-    radiance_.sum += v.direct;
-    aovs_.add_connection<F>(depth, kSlot, from.light, v.direct, true);
-    if (light_aovs_.wants_events())
-      light_aovs_.connect<F>(aovs_.expressions(), kSlot, v.direct, true);
-  }
-
   [[maybe_unused]] const Media& media_;
-  const ShadeSettings light_settings_ = settings_.of_light_paths();
   PhaseClock& clock_;
-  LightPathAovs& light_aovs_;
-  LightVertices& vertices_;        ///< vertices of the light path; empty without connections
-  const MergePointRows& visible_;  ///< point where light paths may be merged
-  ConnectionOffer<F> offer_;       ///< connection that the current vertex offers
+  JointTransport::Buffers& buffers_;
+  Joint joint_;
 };
 
 }  // namespace wavecomb

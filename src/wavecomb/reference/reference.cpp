@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/reference/reference.h"
 
-#include "wavecomb/light_paths/reference/light_tracer.h"
+#include "wavecomb/light_paths/reference/joint_tracer.h"
 #include "wavecomb/medium/wave/volumes.h"
 #include "wavecomb/reference/trace_task.h"
 #include "wavecomb/wave/kernels/shared_kernels.h"
@@ -22,13 +22,13 @@ WorkerView ReferenceIntegrator::worker(size_t i) const {
 }
 
 void ReferenceIntegrator::run(size_t i, const WaveTask& task) {
-  if (task.from_lights) return trace_light_task(context_, *workers_[i], task);
   ReferenceWorker& worker = *workers_[i];
+  if (task.joint) return trace_light_task(context_, worker, task);
   if (context_.has_media())
     trace_task(context_, worker, task,
                Volumes(context_, worker.counts, worker.walks, worker.nested_media));
   else
-    trace_task(context_, *workers_[i], task, NoMedia());
+    trace_task<LightJointTracer>(context_, worker, task, NoMedia());
 }
 
 void run_light_probes(const WaveContext& context, std::span<const uint32_t> pixels, size_t first,

@@ -2,20 +2,16 @@
 /// Tracing of a task by the reference integrator: pixel by pixel, and sample by sample.
 #pragma once
 
-#include <optional>
-
-#include "wavecomb/light_paths/reference/light_tracer.h"
 #include "wavecomb/reference/path_tracer.h"
 
 namespace wavecomb {
 
-/// Traces the paths of a task into the film, the samples of a pixel in sample order.
-template <typename Media>
+/// Traces the camera paths of a task into the film, the samples of a pixel in sample order. `Joint`
+/// has the members of NoJointTracer.
+template <typename Joint = NoJointTracer, typename Media>
 void trace_task(const WaveContext& context, ReferenceWorker& worker, const WaveTask& task,
                 const Media& media) {
-  PathTracer tracer(context, worker, media);
-  std::optional<LightTracer> from_light;
-  if (context.connects()) from_light.emplace(context, worker);
+  PathTracer<Media, Joint> tracer(context, worker, media);
   Film& film = *context.film;
   worker.clock.start(Phase::kGenerate);
   for (uint32_t p = 0; p < task.pixel_count; ++p) {
@@ -28,7 +24,7 @@ void trace_task(const WaveContext& context, ReferenceWorker& worker, const WaveT
     Film::Pixel sum = film.pixel(x, y);
     for (uint32_t s = 0; s < task.samples; ++s) {
       worker.clock.enter(Phase::kGenerate);
-      if (from_light) from_light->trace(pixel, task.first_sample + s, true);
+      tracer.joint().begin(pixel, task.first_sample + s);
       const auto start = worker.aovs.start_time();
       const Color<float> radiance =
           tracer.exposed_path({task.pixels + p, 1, task.first_sample + s, 1});
@@ -42,11 +38,11 @@ void trace_task(const WaveContext& context, ReferenceWorker& worker, const WaveT
       ++sum.samples;
       if (film.has_cascades()) film.cascades().add(film.index(x, y), &radiance.x);
       worker.aovs.resolve(film.aovs(), film.index(x, y), 0, 1, tracer.radiance());
-      if (worker.visible) film.set_merge_point(film.index(x, y), worker.visible.row(0));
+      tracer.joint().end(film.index(x, y));
     }
     film.pixel(x, y) = sum;
   }
-  if (from_light) end_light_task(context, worker, task);
+  tracer.joint().end_task(task);
   worker.clock.stop();
 }
 

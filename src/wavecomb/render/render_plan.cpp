@@ -72,19 +72,17 @@ OrderGrid order_grid(const Bounds& bounds) {
 }
 
 uint32_t samples_of_pass(const Settings& settings, uint64_t pixels, uint32_t wave_size) {
-  // Light vertices are merged with the points seen by one sample of each pixel.
-  if (settings.merges()) return 1;
   const auto fill = static_cast<uint32_t>((wave_size + pixels - 1) / pixels);
-  return std::min({settings.spp, wave_size, std::max(kPassSamples, fill)});
+  return JointPlan::pass_samples(settings,
+                                 std::min({settings.spp, wave_size, std::max(kPassSamples, fill)}));
 }
 
 RenderPlan::RenderPlan(const Scene& scene, const EmbreeAccelerator& accelerator,
-                       const Settings& settings, LightPathShare light_share,
+                       const Settings& settings, JointShare joint_share,
                        const SchedulingPolicy* policy)
     : scene(scene),
       accelerator(accelerator),
       settings(settings),
-      light_share(light_share),
       waves(wave_setup(settings)),
       kernels(lane_kernels(waves.lanes)),
       pass_samples(samples_of_pass(settings, settings.rendered().pixels(), waves.wave_size)),
@@ -93,7 +91,7 @@ RenderPlan::RenderPlan(const Scene& scene, const EmbreeAccelerator& accelerator,
       camera(scene.camera(), settings.width, settings.height, filter, settings.overscan),
       aovs(scene, settings),
       window(settings.film()),
-      light_splat_filter(make_light_splat_filter(camera, filter, settings.rendered())),
+      joint(scene, settings, joint_share, camera, filter),
       view(view_for(scene, settings, waves.threads)) {
   if (policy) {
     policies.push_back(policy);
@@ -101,25 +99,18 @@ RenderPlan::RenderPlan(const Scene& scene, const EmbreeAccelerator& accelerator,
     owned_policies_ = make_policies(settings.policy);
     for (const auto& owned : owned_policies_) policies.push_back(owned.get());
   }
-  if (settings.joins_light()) {
-    check_light_paths(scene, settings);
-    lights_without_paths = wavecomb::lights_without_paths(scene);
-  }
 }
 
 Film RenderPlan::make_film() const {
   Film film(window, aovs.layout, settings.needs_error());
-  if (settings.joins_light())
-    film.allocate_light_splats(light_splat_unit(scene), size_t{settings.width} * settings.height,
-                               double{light_share.paths()});
-  if (settings.merges()) film.allocate_merge_points();
+  joint.allocate(film);
   if (settings.firefly == Firefly::kReweight)
     film.allocate_cascades(scene_brightness(scene) * kDarkestShare);
   return film;
 }
 
 WaveContext RenderPlan::make_context(Film& film, RenderCosts& costs, RayRecorder* recorder,
-                                     const MergeGrid* visible) const {
+                                     const JointPasses& passes) const {
   const bool wants_position = std::any_of(policies.begin(), policies.end(), [](const auto* one) {
     return (one->columns() & kPositionColumn) != 0;
   });
@@ -140,9 +131,7 @@ WaveContext RenderPlan::make_context(Film& film, RenderCosts& costs, RayRecorder
       .measures_costs = costs.measures(),
       .recorder = recorder,
       .aovs = &aovs,
-      .light_splat_filter = settings.joins_light() ? &light_splat_filter : nullptr,
-      .light_paths = light_share.paths(),
-      .visible = visible,
+      .joint = joint.context(passes.grid()),
   };
 }
 

@@ -12,9 +12,8 @@
 #include "wavecomb/core/settings.h"
 #include "wavecomb/film/film.h"
 #include "wavecomb/film/filter.h"
-#include "wavecomb/film/light_splat_filter.h"
-#include "wavecomb/light_paths/setup.h"
 #include "wavecomb/path/camera/camera_ray.h"
+#include "wavecomb/render/joint_transport.h"
 #include "wavecomb/render/lane_kernels.h"
 #include "wavecomb/render/statistics/render_costs.h"
 #include "wavecomb/render/wave_setup.h"
@@ -47,14 +46,13 @@ struct RenderPlan {
   /// `policy` replaces the policy of the settings, unless it is null. Throws Error if the scene or
   /// this build does not support what the settings ask for.
   RenderPlan(const Scene& scene, const EmbreeAccelerator& accelerator, const Settings& settings,
-             LightPathShare light_share, const SchedulingPolicy* policy);
+             JointShare joint_share, const SchedulingPolicy* policy);
   RenderPlan(const RenderPlan&) = delete;
   RenderPlan& operator=(const RenderPlan&) = delete;
 
   const Scene& scene;
   const EmbreeAccelerator& accelerator;
   const Settings& settings;
-  LightPathShare light_share;  ///< number of light paths, if there are any
   WaveSetup waves;
   LaneKernels kernels;
   uint32_t pass_samples;  ///< samples_of_pass()
@@ -65,19 +63,15 @@ struct RenderPlan {
   CameraSetup camera;
   AovTables aovs;
   Region window;  ///< pixels of the film
-  LightSplatFilter
-      light_splat_filter;  ///< pixel filter of connections from light paths to the camera
-  SceneView view;          ///< has the light tree if lights are selected by it
-  /// Names of the lights that send no paths, if others do.
-  std::vector<std::string> lights_without_paths;
+  JointPlan joint;
+  SceneView view;  ///< has the light tree if lights are selected by it
 
   /// Creates an empty film with all layers that the settings ask for.
   Film make_film() const;
-  /// Creates the data that the waves of the render read. `film` is from make_film(), `costs` are
-  /// those of this render, and `visible` holds the points with which light paths are merged, or is
-  /// null.
+  /// Creates the data that the waves of the render read. `film` is from make_film(), and `costs`
+  /// and `passes` are those of this render.
   WaveContext make_context(Film& film, RenderCosts& costs, RayRecorder* recorder,
-                           const MergeGrid* visible) const;
+                           const JointPasses& passes) const;
 
  private:
   std::vector<std::unique_ptr<SchedulingPolicy>> owned_policies_;

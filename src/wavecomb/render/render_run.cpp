@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "wavecomb/core/task_order.h"
-#include "wavecomb/film/error_map.h"
+#include "wavecomb/film/error/error_map.h"
 #include "wavecomb/render/inspection/picking.h"
 #include "wavecomb/render/snapshot.h"
 #include "wavecomb/render/statistics/process_memory.h"
@@ -40,14 +40,12 @@ RenderRun::RenderRun(std::shared_ptr<const Scene> scene, const RenderPlan& plan,
       build_s_(build_s),
       costs_(*scene_, plan.traits, plan.settings),
       film_(plan.make_film()),
-      context_(plan.make_context(film_, costs_, options.recorder,
-                                 plan.settings.merges() ? &visible_ : nullptr)),
+      joint_(plan.joint, plan.settings),
+      context_(plan.make_context(film_, costs_, options.recorder, joint_)),
       integrator_(make_integrator(plan.settings.integrator, context_, plan.waves.lanes,
                                   plan.waves.threads, plan.waves.wave_size)),
       runner_(*integrator_, plan.waves.threads, plan.waves.wave_size),
-      loop_(plan, resume(), film_, runner_, costs_, watch, [this] {
-        if (plan_.settings.merges()) visible_.build(film_.merge_points());
-      }) {}
+      loop_(plan, resume(), film_, runner_, costs_, watch, joint_) {}
 
 PassState RenderRun::resume() {
   PassState pass;
@@ -68,15 +66,15 @@ void RenderRun::work(PilotCache& cache, const PilotShared& shared,
           .profile = options_.profile,
           .light_settings = shared.image ? *shared.image : plan_.settings,
           .learned = learned_before_,
-          .aiming = shared.aiming ? *shared.aiming : nullptr,
+          .joint = shared.joint ? *shared.joint : nullptr,
           .stopped = stopped,
           .halted = [this] { return watch_.halted(); },
       },
       cache);
   pilots_.apply(context_);
-  if (shared.aiming) *shared.aiming = pilots_.aiming;
+  if (shared.joint) *shared.joint = pilots_.joint;
   // Set only now, since the pilots measure light.
-  if (options_.wants_camera_squares) context_.camera_squares = scene_brightness(*scene_);
+  if (options_.wants_camera_squares) plan_.joint.measure_squares(context_.joint);
   if (!stopped()) learned(pilots_);
   loop_.run();
 }
@@ -108,7 +106,7 @@ void RenderRun::run(PilotCache& cache, const PilotShared& shared,
 
 void RenderRun::take_snapshot(bool is_finished) {
   check_textures();
-  film_.update_light_path_aovs();
+  film_.update_splat_aovs();
   if (!options_.snapshot) return;
   options_.snapshot({film_, loop_.pass(), *pilots_.training, loop_.status(), is_finished,
                      plan_.aovs.layer_names, [this] { return statistics(); }});
@@ -132,9 +130,7 @@ RenderStatistics RenderRun::statistics() const {
   s.error = status.error;
   s.allotment = loop_.allocation();
   s.guiding = pilots_.training->statistics;
-  if (const LightAiming* aiming = pilots_.aiming.get(); aiming && aiming->paths > 0)
-    s.light_aiming = {aiming->aim.count, aiming->paths, aiming->seconds};
-  s.lights_without_paths = plan_.lights_without_paths;
+  plan_.joint.report(pilots_.joint.get(), s);
   add_up(runner_, context_, *scene_, costs_, s);
   s.scene_bytes = scene_->bytes();
   s.accelerator_bytes = plan_.accelerator.bytes();

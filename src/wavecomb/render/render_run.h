@@ -10,7 +10,6 @@
 
 #include "wavecomb/core/clock.h"
 #include "wavecomb/film/film.h"
-#include "wavecomb/light_paths/merge_grid.h"
 #include "wavecomb/render/passes/pass_loop.h"
 #include "wavecomb/render/passes/pass_runner.h"
 #include "wavecomb/render/pilots/pilots.h"
@@ -25,8 +24,9 @@ namespace wavecomb {
 
 /// Data that the pilot renders for one image share. Both pointers are null in other renders.
 struct PilotShared {
-  const Settings* image = nullptr;                  ///< image whose lights are calibrated
-  std::shared_ptr<const LightAiming>* aiming = {};  ///< result of the first pilot render
+  const Settings* image = nullptr;  ///< image whose lights are calibrated
+  /// Result of the joint transport's pilot, from the first pilot render.
+  std::shared_ptr<const JointPilot::Result>* joint = {};
 };
 
 /// Execution of one render by a plan.
@@ -68,7 +68,7 @@ class RenderRun {
   RenderCosts costs_;
   Film film_;
   std::vector<std::byte> learned_before_;  ///< packed_training() of an earlier render
-  MergeGrid visible_;
+  JointPasses joint_;
   WaveContext context_;
   Clock::time_point start_ = Clock::now();
   std::unique_ptr<Integrator> integrator_;

@@ -7,11 +7,10 @@
 
 #include "wavecomb/core/clock.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/light_paths/setup.h"
 #include "wavecomb/render/inspection/learned_lookup.h"
 #include "wavecomb/render/inspection/picking.h"
+#include "wavecomb/render/joint_transport.h"
 #include "wavecomb/render/pilots/training_cache.h"
-#include "wavecomb/render/pilots/transport_choice.h"
 #include "wavecomb/render/render_plan.h"
 #include "wavecomb/render/render_run.h"
 #include "wavecomb/render/snapshot.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/render/snapshot.h"
 
-#include "wavecomb/film/error_map.h"
+#include "wavecomb/film/error/error_map.h"
 #include "wavecomb/film/film.h"
 
 namespace wavecomb {

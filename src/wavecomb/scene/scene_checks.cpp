@@ -3,8 +3,8 @@
 
 #include <span>
 
+#include "wavecomb/core/encoding/number_text.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/core/number_text.h"
 #include "wavecomb/geometry/mesh/motion.h"
 #include "wavecomb/material/description/material_table.h"
 

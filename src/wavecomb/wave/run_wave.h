@@ -2,9 +2,6 @@
 /// Loop over the stages of a wave.
 #pragma once
 
-#include "wavecomb/light_paths/stages/connect.h"
-#include "wavecomb/light_paths/stages/generate_light.h"
-#include "wavecomb/light_paths/stages/light_splat.h"
 #include "wavecomb/wave/stages/collect.h"
 #include "wavecomb/wave/stages/generate.h"
 #include "wavecomb/wave/stages/order.h"
@@ -15,8 +12,19 @@
 
 namespace wavecomb {
 
+/// Stages that waves of camera paths run for a joint transport (path/joint_transport.h); here, for
+/// none.
+struct NoJointStages {
+  /// Begins a wave. The paths of the joint transport that camera paths need may be traced here.
+  static void begin(Wave& /*wave*/, const WaveContext& /*context*/, const WaveTask& /*task*/) {}
+  /// Uses the vertices at `depth`, after their shadow rays.
+  static void use_vertices(Wave& /*wave*/, const WaveContext& /*context*/, uint32_t /*depth*/) {}
+  /// Ends a wave, after its radiance was added to the film.
+  static void end(const Wave& /*wave*/, const WaveContext& /*context*/, const WaveTask& /*task*/) {}
+};
+
 /// Wave stages of camera paths, through the volumes and media of `Media`.
-template <typename F, typename Media>
+template <typename F, typename Media, typename JointStages>
 struct CameraPaths {
   const Media& media;
   const float* tfar = nullptr;  ///< far-plane distances of the camera rays
@@ -30,7 +38,7 @@ struct CameraPaths {
   /// differ at edges (canonical-hits.md).
   static bool are_coherent(const WaveContext& context) { return context.camera->is_pinhole(); }
   static ShadeSettings settings(const WaveContext& context) {
-    return camera_shade_settings(context);
+    return ShadeSettings(*context.settings);
   }
   void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                uint32_t depth) const {
@@ -44,9 +52,8 @@ struct CameraPaths {
   void shadow(Wave& wave, const WaveContext& context, uint32_t depth) const {
     wavecomb::shadow<F>(wave, context, depth, media);
   }
-  static void connect(Wave& wave, const WaveContext& context, uint32_t depth) {
-    if constexpr (!Media::kAny)
-      if (wave.light_vertices) wavecomb::connect<F>(wave, context, depth);
+  static void use_vertices(Wave& wave, const WaveContext& context, uint32_t depth) {
+    JointStages::use_vertices(wave, context, depth);
   }
   static void end_depth(Wave& wave, const WaveTask& task, uint32_t depth) {
     wave.aovs.end_depth(depth, wave.pool.radiance, task.path_count());
@@ -55,43 +62,9 @@ struct CameraPaths {
                       uint32_t depth) {
     wave.aovs.end_path(depth, wave.pool.radiance, task.path_count());
     if (wave.history) context.histories->ended(wave.history, wave.pool.radiance, task);
-    if (!context.discards) wavecomb::resolve(wave, context, task);
-  }
-};
-
-/// Wave stages of light paths.
-template <typename F>
-struct LightPaths {
-  static constexpr const float* tfar = nullptr;
-  const WaveTask* task = nullptr;
-
-  void generate(Wave& wave, const WaveContext& context, const WaveTask& next_task) {
-    task = &next_task;
-    generate_light<F>(wave, context, next_task);
-    fetch_rays<F>(wave);
-  }
-  static bool are_coherent(const WaveContext& /*context*/) { return false; }
-  static ShadeSettings settings(const WaveContext& context) {
-    return ShadeSettings(*context.settings).of_light_paths();
-  }
-  void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
-               uint32_t depth) const {
-    if (context.aim_samples && depth == 0) [[unlikely]]
-      record_first_hits(wave, context, *task);
-    wavecomb::collect<F, NoMedia, true>(wave, context, settings, depth, NoMedia());
-  }
-  static const auto& kernels(const WaveContext& /*context*/, const ShadeSettings& /*settings*/) {
-    return kShadeLightBatch;
-  }
-  void shadow(Wave& wave, const WaveContext& context, uint32_t depth) const {
-    splat<F>(wave, context, *task, depth);
-  }
-  static void connect(Wave& /*wave*/, const WaveContext& /*context*/, uint32_t /*depth*/) {}
-  static void end_depth(Wave& /*wave*/, const WaveTask& /*task*/, uint32_t /*depth*/) {}
-  static void resolve(Wave& wave, const WaveContext& context, const WaveTask& next_task,
-                      uint32_t /*depth*/) {
-    if (context.merges()) context.film->take(wave.splats);
-    count_light_paths(context, next_task);
+    if (context.discards) return;
+    wavecomb::resolve(wave, context, task);
+    JointStages::end(wave, context, task);
   }
 };
 
@@ -146,27 +119,19 @@ void run_stages(Wave& wave, const WaveContext& context, const WaveTask& task, Pa
       paths.shadow(wave, context, depth);
       learn_order(wave.shadow_chooser, depth, shadow_order, start);
     }
-    paths.connect(wave, context, depth);
+    paths.use_vertices(wave, context, depth);
   }
   clock.enter(Phase::kResolve);
   paths.resolve(wave, context, task, depth);
   clock.stop();
 }
 
-/// Traces the light paths whose vertices the camera paths of the task connect to.
-template <typename F>
-void run_connected_light(Wave& wave, const WaveContext& context, const WaveTask& task) {
-  wave.light_vertices.clear(task.path_count());
-  wave.light_use = Wave::LightUse::kStore;
-  run_stages<F>(wave, context, task, LightPaths<F>());
-  wave.light_use = Wave::LightUse::kToCamera;
-}
-
 /// Runs a wave of camera paths in lanes of type F.
-template <typename F, typename Media>
+template <typename F, typename JointStages = NoJointStages, typename Media>
 void run_wave_through(Wave& wave, const WaveContext& context, const WaveTask& task,
                       const Media& media) {
-  run_stages<F>(wave, context, task, CameraPaths<F, Media>{media});
+  JointStages::begin(wave, context, task);
+  run_stages<F>(wave, context, task, CameraPaths<F, Media, JointStages>{media});
 }
 
 }  // namespace wavecomb

@@ -12,10 +12,6 @@
 #include "wavecomb/aov/path_aovs.h"
 #include "wavecomb/core/settings.h"
 #include "wavecomb/film/film.h"
-#include "wavecomb/film/light_splat_filter.h"
-#include "wavecomb/light_paths/light_path_aovs.h"
-#include "wavecomb/light_paths/light_vertices.h"
-#include "wavecomb/light_paths/merge_grid.h"
 #include "wavecomb/medium/nested/buffers.h"
 #include "wavecomb/path/camera/camera_ray.h"
 #include "wavecomb/path/integrator.h"
@@ -33,11 +29,10 @@
 #include "wavecomb/schedule/ray_queue.h"
 #include "wavecomb/schedule/shading_queue.h"
 #include "wavecomb/wave/cost_calibration.h"
+#include "wavecomb/wave/joint_transport.h"
 #include "wavecomb/wave/ray_recorder.h"
 
 namespace wavecomb {
-
-class AimSamples;
 
 /// Data that all waves of a render read.
 struct WaveContext {
@@ -60,30 +55,7 @@ struct WaveContext {
   HistoryReader* histories = nullptr;  ///< receives vertices of finished paths; null if unused
   const GuidingView* guide = nullptr;  ///< guides bounces, or is in training; null without guiding
   bool discards = false;  ///< if true, paths serve `histories` only, and the film gets none
-  const LightSplatFilter* light_splat_filter =
-      nullptr;  ///< filter of light paths; null without light paths
-  AimSamples* aim_samples =
-      nullptr;            ///< receives the contributions of light paths instead of the film
-  float light_paths = 1;  ///< light paths per camera path, averaged over the image
-  /// Not 0 in some pilot renders: light splats then carry, instead of light, the variance that this
-  /// light would add to a sample of a pixel if camera paths had to find it, divided by this
-  /// brightness (light_vertex.h). 0 means that splats carry light.
-  float camera_squares = 0;
-
-  /// Points of camera paths to merge light paths with; null without merging.
-  const MergeGrid* visible = nullptr;
-
-  /// Returns whether light paths are merged with points of camera paths.
-  bool merges() const { return visible != nullptr; }
-  /// Returns whether the render has light paths.
-  bool joins_light() const { return light_splat_filter != nullptr; }
-  /// Returns whether vertices of camera paths connect to vertices of light paths.
-  bool connects() const { return joins_light() && settings->connects(); }
-  /// Returns one over the number of light paths in the whole image for each sample of a pixel.
-  float light_path_share() const {
-    return 1.f / (static_cast<float>(settings->width) * static_cast<float>(settings->height) *
-                  light_paths);
-  }
+  JointTransport::Context joint{};  ///< transport that is combined with camera paths, if any
 
   /// Returns whether the scene has volumes, nested dielectrics or subsurface scattering.
   bool has_media() const {
@@ -111,8 +83,8 @@ struct WaveContext {
 struct Wave {
   Wave(uint32_t capacity, const WaveContext& context)
       : pool(capacity, context.moves() || context.links() || context.uses_pixel_importance(),
-             context.joins_light(), context.has_medium_stack(),
-             context.scene.lights.shadows != nullptr, context.scene.lights.has_multipliers),
+             context.has_medium_stack(), context.scene.lights.shadows != nullptr,
+             context.scene.lights.has_multipliers),
         aovs(capacity, context.film->aovs().layout(), context.aovs),
         history(capacity, context.stored_vertices()),
         rays(capacity),
@@ -129,18 +101,12 @@ struct Wave {
         ray_indices(context.orders_rays() ? capacity + SoaBlock::kPad : 0),
         scratch(context.traits.size()),
         costs(context.traits.size()),
-        splats(context.joins_light() ? kLightSplats : 0),
         policy_chooser(context.policies.size()),
         ray_chooser(kRayOrders),
         shadow_chooser(kRayOrders),
-        light_vertices(context.connects() ? capacity : 0),
-        visible(context.merges() ? capacity : 0),
-        light_aovs(context.joins_light() ? LightPathAovs(capacity, context.film->aovs().layout(),
-                                                         context.aovs, context.connects())
-                                         : LightPathAovs()) {}
+        joint(capacity, context.joint, context.film->aovs().layout(), context.aovs) {}
   static constexpr size_t kSegmentColumns = 14, kWalkColumns = 36;
-  static constexpr size_t kLightSplats = 4096;  ///< size of the buffer of light splats
-  static constexpr size_t kRayOrders = 4;       ///< slot, morton, morton-octant and direction
+  static constexpr size_t kRayOrders = 4;  ///< slot, morton, morton-octant and direction
 
   PathPool pool;
   PathAovs aovs;
@@ -158,30 +124,23 @@ struct Wave {
   std::vector<uint32_t> ray_indices;  ///< padded by one packet
   std::vector<float> scratch;         ///< one value for each material, for policies
   CostTracker costs;
-  LightSplatList splats;
   Chooser policy_chooser, ray_chooser, shadow_chooser;
   CoherenceCounts coherence;
   /// Number of shading queues so far, of which some are measured for coherence.
   uint32_t queues = 0;
   PhaseClock clock;
   Counts counts;
-  LightVertices light_vertices;
-  MergePointRows visible;
-  LightPathAovs light_aovs;  ///< AOVs of light paths
-  /// Purpose of shading the vertices of light paths: connect them to the camera; connect them to
-  /// the camera and store them; or connect them to the camera path in the same slot.
-  enum class LightUse : uint8_t { kToCamera, kStore, kConnect } light_use = LightUse::kToCamera;
+  JointTransport::Buffers joint;
 
   size_t bytes() const {
     return pool.bytes() + aovs.bytes() + history.bytes() + rays.bytes() + hits.bytes() +
            shading.bytes() + shadows.bytes() + columns.bytes() + times.bytes() + walks.bytes() +
-           segments.bytes() + nested_media.bytes() + splats.bytes() + light_vertices.bytes() +
-           visible.bytes() + light_aovs.bytes();
+           segments.bytes() + nested_media.bytes() + joint.bytes();
   }
 };
 
 /// Runs a wave with kernels of `W` lanes: generate -> (trace -> policy -> shade -> shadow)* ->
-/// resolve. task.from_lights selects light paths.
+/// resolve. task.joint selects the joint transport.
 template <size_t W>
 void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task);
 

@@ -3,6 +3,7 @@
 #include <bit>
 #include <cstring>
 
+#include "wavecomb/light_paths/stages/run_light_paths.h"
 #include "wavecomb/wave/kernels/shared_kernels.h"
 #include "wavecomb/wave/run_wave.h"
 
@@ -12,9 +13,8 @@ WAVECOMB_SHARED_KERNELS(extern, Lanes<WAVECOMB_LANES>);
 
 template <size_t W>
 void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
-  if (task.from_lights) return run_stages<Lanes<W>>(wave, context, task, LightPaths<Lanes<W>>());
-  if (wave.light_vertices) run_connected_light<Lanes<W>>(wave, context, task);
-  run_wave_through<Lanes<W>>(wave, context, task, NoMedia());
+  if (task.joint) return run_light_paths<Lanes<W>>(wave, context, task);
+  run_wave_through<Lanes<W>, LightPathJointStages<Lanes<W>>>(wave, context, task, NoMedia());
 }
 
 /// Shades `records` synthetic hits of one material to measure its cost before the first pass. Has
@@ -23,7 +23,7 @@ template <size_t W>
 double time_material(Wave& wave, const WaveContext& context, const CalibrationHits& hits) {
   using F = Lanes<W>;
   using Q = ShadingQueue;
-  const ShadeSettings settings = camera_shade_settings(context);
+  const ShadeSettings settings(*context.settings);
   ShadingQueue& queue = wave.shading;
   queue.clear();
   queue.size = hits.count;

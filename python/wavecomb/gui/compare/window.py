@@ -146,7 +146,7 @@ class CompareWindow(QWidget):
         self._exposure = real(
             "compareExposure", "Exposure of both",
             "Exposure of both pictures in stops; PSNR and FLIP are computed with it",
-            -20.0, 20.0, 0.5, 0.0, lambda value: self.refresh(),
+            -20.0, 20.0, 0.5, 0.0, changed=lambda value: self.refresh(),
         )  # fmt: skip
         self._exposure.setSuffix(" stops")
         self._tone = self._combo("tone", "Tone mapping of both", "Tone mapping of both pictures")

@@ -82,7 +82,7 @@ class DisplayBar(QToolBar):
             "display.exposure",
             "Exposure",
             "Stops: each doubles the light.  [ and ] change it, \\ resets it",
-            -EXPOSURE, EXPOSURE, 0.25, 0.0, self.set_exposure,
+            -EXPOSURE, EXPOSURE, 0.25, 0.0, changed=self.set_exposure,
         )  # fmt: skip
         self.exposure.setSuffix(" EV")
         self.slider = named(
@@ -137,7 +137,7 @@ class DisplayBar(QToolBar):
         def changed(value: float) -> None:
             self._range_changed()
 
-        return real(name, title, title, -1e9, 1e9, 0.1, 0.0, changed, decimals=4)
+        return real(name, title, title, -1e9, 1e9, 0.1, 0.0, changed=changed, decimals=4)
 
     def _lay_out(self) -> None:
         self._to = QLabel(" to ")

@@ -57,12 +57,7 @@ from wavecomb.usd.geometry.skeleton import (
     skinned_points,
     step_times,
 )
-from wavecomb.usd.geometry.triangulate import (
-    MeshError,
-    Topology,
-    smooth_normals,
-    triangulate,
-)
+from wavecomb.usd.geometry.triangulate import MeshError, Topology, smooth_normals, triangulate
 from wavecomb.usd.materials.network import word
 from wavecomb.usd.stage.report import LoadReport
 

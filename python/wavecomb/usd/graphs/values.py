@@ -7,13 +7,14 @@ swizzles, extractions and combinations need no operation.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from wavecomb import _core
+from wavecomb.usd.graphs.simplification import simplified
 
 CODES = {name: number for number, name in enumerate(_core.GRAPH_CODES)}
 INPUTS = {name: number for number, name in enumerate(_core.GRAPH_INPUTS)}
@@ -55,6 +56,11 @@ class Node:
         return str(_core.GRAPH_INPUTS[self.number]) if self.code == "input" else ""
 
     @property
+    def reads(self) -> list[Node]:
+        """Nodes of the operands, in their order."""
+        return [node for value in self.operands for node in _nodes(value)]
+
+    @property
     def results(self) -> int:
         """Number of registers that it writes."""
         return 1 if self.code == "dot" else self.width
@@ -86,13 +92,15 @@ def fit(value: Value, width: int) -> Value:
     return (*value, 0.0)[: min(width, 3)] + ((1.0,) if width == 4 else ())
 
 
+def _nodes(parts: Iterable[Part]) -> list[Node]:
+    return [part[0] for part in parts if not isinstance(part, float)]
+
+
 def nodes_of(parts: Sequence[Part]) -> list[Node]:
     """Returns all nodes that the parts depend on, in evaluation order."""
     order: list[Node] = []
     done: set[Node] = set()
-    stack: list[tuple[Node, bool]] = [
-        (part[0], False) for part in reversed(parts) if not isinstance(part, float)
-    ]
+    stack = [(node, False) for node in reversed(_nodes(parts))]
     while stack:
         node, ready = stack.pop()
         if node in done:
@@ -102,8 +110,7 @@ def nodes_of(parts: Sequence[Part]) -> list[Node]:
             order.append(node)
             continue
         stack.append((node, True))
-        for value in reversed(node.operands):
-            stack += [(p[0], False) for p in reversed(value) if not isinstance(p, float)]
+        stack += [(one, False) for one in reversed(node.reads)]
     return order
 
 
@@ -172,16 +179,11 @@ class _Assembler:
     def graph(self) -> Graph:
         last: dict[Node, int] = {}
         for at, node in enumerate(self._order):
-            for value in node.operands:
-                last |= {part[0]: at for part in value if not isinstance(part, float)}
-        for part in self._outputs.values():
-            if not isinstance(part, float):
-                last[part[0]] = len(self._order)
+            last |= dict.fromkeys(node.reads, at)
+        last |= dict.fromkeys(_nodes(self._outputs.values()), len(self._order))
         for at, node in enumerate(self._order):
             self._write(node)
-            for read in {
-                p[0] for value in node.operands for p in value if not isinstance(p, float)
-            }:
+            for read in set(node.reads):
                 if last[read] == at:
                     self._release(self._place[read], read.results)
         outputs = tuple(
@@ -204,9 +206,7 @@ class _Assembler:
             if copied:
                 copies.append((place, len(value)))
         to = self._place[node] = self._take(node.results)
-        number = node.number
-        if node.image is not None:
-            number = self._image(node.image)
+        number = node.number if node.image is None else self._image(node.image)
         if node.attribute:
             known = self._attributes
             known[node.attribute] = max(known.get(node.attribute, 0), node.width)
@@ -349,7 +349,7 @@ class Expressions:
         known: dict[int, Part] = {}
         for i in range(width):
             parts = tuple(value[i] for value in operands)
-            simple = _simplified(code, parts)
+            simple = simplified(code, parts)
             if simple is not None:
                 known[i] = simple
             elif all(isinstance(part, float) for part in parts):
@@ -387,27 +387,3 @@ class Expressions:
         if node is None:
             node = self._nodes[key] = Node(code, width, operands, number, image, attribute)
         return node
-
-
-def _simplified(code: str, parts: tuple[Part, ...]) -> Part | None:
-    """Simplifies an operation algebraically; returns None if the operation is needed."""
-    a = parts[0]
-    b = parts[1] if len(parts) > 1 else None
-    if code == "add":
-        return b if a == 0.0 else a if b == 0.0 else None
-    if code == "subtract":
-        return a if b == 0.0 else None
-    if code == "multiply":
-        if a == 0.0 or b == 0.0:
-            return 0.0
-        return b if a == 1.0 else a if b == 1.0 else None
-    if code in ("divide", "power"):
-        return a if b == 1.0 else None
-    if code == "mix":
-        c = parts[2]
-        return a if c == 0.0 or a == b else b if c == 1.0 else None
-    if code == "select":
-        if isinstance(a, float):
-            return b if a != 0.0 else parts[2]
-        return b if b == parts[2] else None
-    return None

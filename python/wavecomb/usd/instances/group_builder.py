@@ -79,14 +79,11 @@ class GroupBuilder:
         self.has_other_emission = False
         self.context = context
         self.builder, self.report = context.builder, context.report
-        self.traversal = traversal
-        self.materials = materials
-        self.light_groups = light_groups
-        self.surfaces = surfaces
+        self.traversal, self.materials = traversal, materials
+        self.light_groups, self.surfaces = light_groups, surfaces
         self.gprims = GprimReader(context, surfaces, traversal.skeletons, cache)
         self.memory_check = MemoryCheck(context.stage, context.time)
-        self.progress = progress
-        self.detail = detail
+        self.progress, self.detail = progress, detail
         self.found, self.drawn = 0, 0
         self.assigner = Assigner(context, materials)
         self.mesh_lights = MeshLights(context, traversal.lights, materials)
@@ -212,11 +209,8 @@ class GroupBuilder:
                 group.has_lights_or_volumes = True
             else:
                 self.has_other_emission = True
-        options: dict[str, Any] = {
-            "material": material,
-            "name": name,
-            "asset_length": self.instancer.asset_length(draw.prim, path, name, draw.parent),
-        }
+        asset_length = self.instancer.asset_length(draw.prim, path, name, draw.parent)
+        options: dict[str, Any] = dict(material=material, name=name, asset_length=asset_length)
         if faces is not None:
             options["face_materials"] = faces
         if assigned.reads:
@@ -262,11 +256,9 @@ class GroupBuilder:
         self._draw(child, draw, scope)
         if child.empty:
             return
-        inherit = np.array([INHERIT_MATERIAL], np.uint32)
+        inherit, matrices = np.array([INHERIT_MATERIAL], np.uint32), np.array(matrix)[None]
         motion = None if steps is None else steps[None]
-        self.instancer.add(
-            group, child, np.array(matrix)[None], inherit, [draw.prim], motion=motion
-        )
+        self.instancer.add(group, child, matrices, inherit, [draw.prim], motion=motion)
 
     def _materials(
         self, draw: DrawItem, mesh: MeshArrays | CurveArrays, scope: Scope
@@ -293,12 +285,10 @@ class GroupBuilder:
         known = self._groups.get(key)
         if known is not None:
             return known
-        if key in self._building:
-            self.report.warn("prototype contains itself: left out", name)
-            return None
-        if len(self._building) == MAX_NESTING:
-            what = f"instances in instances, more than {MAX_NESTING} deep: left out"
-            self.report.warn(what, name)
+        if key in self._building or len(self._building) == MAX_NESTING:
+            deep = f"instances in instances, more than {MAX_NESTING} deep"
+            what = "prototype contains itself" if key in self._building else deep
+            self.report.warn(f"{what}: left out", name)
             return None
         self._building.add(key)
         try:

@@ -51,13 +51,8 @@ INPUTS: dict[str, tuple[str, Any]] = {
 }
 """Input of UsdPreviewSurface -> parameter of a program and its default."""
 
-_UNIT = (
-    "roughness",
-    "metallic",
-    "clearcoat",
-    "clearcoat_roughness",
-    "opacity",
-    "opacity_threshold",
+_UNIT = frozenset(
+    ("roughness", "metallic", "clearcoat", "clearcoat_roughness", "opacity", "opacity_threshold")
 )
 
 _WRAP_INPUTS = ("wrapS", "wrapT")
@@ -166,13 +161,8 @@ class PreviewReader:
         if value is None or tuple(value) == INPUTS["normal"][1]:
             return
         texel = np.array(value, np.float32).reshape(1, 1, 3)
-        self.textured["normal"] = {
-            "texture": self.textures.add_pixels(f"normal {tuple(value)}", texel),
-            "channel": "rgb",
-            "scale": _ONES,
-            "bias": _ZEROS,
-            "uv": (0.0,) * 6,
-        }
+        texture = self.textures.add_pixels(f"normal {tuple(value)}", texel)
+        self.textured["normal"] = _texture_use(texture, (0.0,) * 6)
 
     def _displacement(self, surface: UsdShade.Shader) -> float | dict[str, Any] | None:
         """Reads the material's displacement as a length or a texture use; None if there is none."""
@@ -275,15 +265,8 @@ class PreviewReader:
         if not any((*matrix[:2], *matrix[3:5])):
             # All lookups read one texel, into which the border colour must not be blended.
             wraps = ["clamp", "clamp"]
-        self.textured[parameter] = {
-            "texture": self.textures.add(
-                path, image, space, *wraps, is_colour=wide, missing=missing
-            ),
-            "channel": channel,
-            "scale": scale,
-            "bias": bias,
-            "uv": matrix,
-        }
+        texture = self.textures.add(path, image, space, *wraps, is_colour=wide, missing=missing)
+        self.textured[parameter] = _texture_use(texture, matrix, channel, scale, bias)
         return None
 
     def _wrap(self, shader: UsdShade.Shader, name: str, of_file: str) -> str:
@@ -336,13 +319,8 @@ class PreviewReader:
                 return tuple(value[:3]) if channel == "rgb" else (value["rgba".index(channel)],) * 3
             return constant(parameter, value["rgba".index(channel[0])], default)
         if parameter == "base_color":
-            self.textured[parameter] = {
-                "texture": self.textures.missing(),
-                "channel": "rgb",
-                "scale": _ONES,
-                "bias": _ZEROS,
-                "uv": self._coordinates(shader, parameter),
-            }
+            texture, uv = self.textures.missing(), self._coordinates(shader, parameter)
+            self.textured[parameter] = _texture_use(texture, uv)
             return None
         return default
 
@@ -390,6 +368,16 @@ class PreviewReader:
         tx, ty = pair(self._value(node, "translation"), (0.0, 0.0))
         c, s = math.cos(angle), math.sin(angle)
         return (c * sx, -s * sy, tx, s * sx, c * sy, ty)
+
+
+def _texture_use(
+    texture: int,
+    uv: tuple[float, ...],
+    channel: str = "rgb",
+    scale: tuple[float, ...] = _ONES,
+    bias: tuple[float, ...] = _ZEROS,
+) -> dict[str, Any]:
+    return {"texture": texture, "channel": channel, "scale": scale, "bias": bias, "uv": uv}
 
 
 def _four(value: Any, default: tuple[float, ...]) -> tuple[float, ...]:

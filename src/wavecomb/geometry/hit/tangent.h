@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "wavecomb/core/octahedral.h"
+#include "wavecomb/core/encoding/octahedral.h"
 #include "wavecomb/geometry/hit/surface_reader.h"
 #include "wavecomb/geometry/mesh/tangents.h"
 

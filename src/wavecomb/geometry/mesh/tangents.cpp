@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "wavecomb/core/octahedral.h"
+#include "wavecomb/core/encoding/octahedral.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene_parts.h"
 

@@ -20,8 +20,8 @@ namespace wavecomb {
 struct SceneGeometry;
 struct SceneMaterials;
 
-/// Tangents of one mesh in its local space, encoded by core/octahedral.h. Tangents that cancel out
-/// and those of triangles without area in the texture are kNoDirection.
+/// Tangents of one mesh in its local space, encoded by core/encoding/octahedral.h. Tangents that
+/// cancel out and those of triangles without area in the texture are kNoDirection.
 struct MeshTangents {
   std::vector<uint32_t> codes;  ///< one per vertex or corner, step after step
   bool at_corners = false;      ///< set if some vertex has more than one tangent

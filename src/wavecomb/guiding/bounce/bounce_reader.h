@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "wavecomb/aov/path_aovs.h"
-#include "wavecomb/guiding/field.h"
+#include "wavecomb/guiding/field/field.h"
 #include "wavecomb/guiding/image_tiles.h"
 #include "wavecomb/path/path_history.h"
 #include "wavecomb/schedule/cost_snapshot.h"

@@ -59,9 +59,9 @@ WAVECOMB_INLINE F mixed_pdf(const Vertex<F, kFeatures>& v, const GuidingLookup<F
 /// Turns `b`, a bounce sampled from the BSDF, into a sample of the mixture. r.w selects the
 /// technique. The ray cone always uses the roughness of the sampled BSDF lobe. Writes the training
 /// data of the bounce to `out`.
-template <typename Bsdf, typename F, uint32_t kFeatures>
-WAVECOMB_INLINE void guided_bounce(const VertexContext<Bsdf, F, kFeatures>& c, const Sample4<F>& r,
-                                   BsdfSample<F>& b, VertexResult<F>& out) {
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Coupling>
+WAVECOMB_INLINE void guided_bounce(const VertexContext<Bsdf, F, kFeatures, Coupling>& c,
+                                   const Sample4<F>& r, BsdfSample<F>& b, VertexResult<F>& out) {
   if constexpr (kGuided<Bsdf>) {
     const Vertex<F, kFeatures>& v = c.vertex;
     const GuidingLookup<F>& guiding = c.guide;

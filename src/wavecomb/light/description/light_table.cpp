@@ -6,8 +6,8 @@
 #include <string>
 #include <type_traits>
 
+#include "wavecomb/core/encoding/number_text.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/core/number_text.h"
 #include "wavecomb/geometry/mesh/motion.h"
 #include "wavecomb/light/description/kind_info.h"
 #include "wavecomb/scene/scene_checks.h"

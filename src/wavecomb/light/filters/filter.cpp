@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "wavecomb/light/kinds/record_builder.h"
+#include "wavecomb/light/records/record_builder.h"
 
 namespace wavecomb {
 namespace record_builder {

@@ -13,7 +13,7 @@
 #pragma once
 
 #include "wavecomb/core/rows/fields.h"
-#include "wavecomb/light/kinds/record_reader.h"
+#include "wavecomb/light/records/record_reader.h"
 #include "wavecomb/texture/lookup.h"
 
 namespace wavecomb::detail {

@@ -9,7 +9,7 @@
 /// Emission that a bounce hits cannot reproduce this, so only light samples find such lights.
 #pragma once
 
-#include "wavecomb/light/kinds/record_reader.h"
+#include "wavecomb/light/records/record_reader.h"
 
 namespace wavecomb {
 

@@ -2,7 +2,7 @@
 /// Cylinder lights, which are open at both ends and emit outwards.
 #pragma once
 
-#include "wavecomb/light/kinds/record_reader.h"
+#include "wavecomb/light/records/record_reader.h"
 
 namespace wavecomb::detail {
 

@@ -2,7 +2,7 @@
 /// Disk lights, or ellipses under a non-uniform scale, sampled uniformly by area.
 #pragma once
 
-#include "wavecomb/light/kinds/record_reader.h"
+#include "wavecomb/light/records/record_reader.h"
 
 namespace wavecomb::detail {
 

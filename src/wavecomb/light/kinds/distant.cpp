@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/light/kinds/distant.h"
 
-#include "wavecomb/light/kinds/record_builder.h"
+#include "wavecomb/light/records/record_builder.h"
 
 namespace wavecomb {
 namespace {

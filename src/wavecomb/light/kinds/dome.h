@@ -13,7 +13,7 @@
 
 #include "wavecomb/light/kinds/image.h"
 #include "wavecomb/light/kinds/portal.h"
-#include "wavecomb/light/kinds/record_reader.h"
+#include "wavecomb/light/records/record_reader.h"
 #include "wavecomb/texture/lookup.h"
 
 namespace wavecomb::detail {

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "wavecomb/light/kinds/record_reader.h"
+#include "wavecomb/light/records/record_reader.h"
 
 namespace wavecomb::detail {
 

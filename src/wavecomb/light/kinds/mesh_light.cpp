@@ -3,7 +3,7 @@
 
 #include <bit>
 
-#include "wavecomb/light/kinds/record_builder.h"
+#include "wavecomb/light/records/record_builder.h"
 
 namespace wavecomb {
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "wavecomb/core/frame.h"
-#include "wavecomb/light/kinds/record_reader.h"
+#include "wavecomb/light/records/record_reader.h"
 
 namespace wavecomb::detail {
 

@@ -5,7 +5,7 @@
 #include "wavecomb/core/rows/fields.h"
 #include "wavecomb/core/rows/rows.h"
 #include "wavecomb/geometry/hit/uv.h"
-#include "wavecomb/light/kinds/record_reader.h"
+#include "wavecomb/light/records/record_reader.h"
 #include "wavecomb/material/inputs/presence.h"
 
 namespace wavecomb::detail {

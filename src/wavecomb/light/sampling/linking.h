@@ -2,7 +2,7 @@
 /// Light linking: the surfaces that a light illuminates, and the objects that cast its shadows.
 #pragma once
 
-#include "wavecomb/light/kinds/record_reader.h"
+#include "wavecomb/light/records/record_reader.h"
 
 namespace wavecomb {
 

@@ -6,7 +6,7 @@
 
 #include "wavecomb/core/rows/rows.h"
 #include "wavecomb/geometry/mesh/motion.h"
-#include "wavecomb/light/kinds/record_reader.h"
+#include "wavecomb/light/records/record_reader.h"
 
 namespace wavecomb {
 

@@ -14,7 +14,7 @@
 /// the root, which the light's trail stores. Both MIS techniques run the same steps.
 #pragma once
 
-#include "wavecomb/core/hash.h"
+#include "wavecomb/core/encoding/hash.h"
 #include "wavecomb/core/math.h"
 #include "wavecomb/core/rows/rows.h"
 #include "wavecomb/core/vec.h"

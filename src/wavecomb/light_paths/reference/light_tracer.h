@@ -3,11 +3,11 @@
 #pragma once
 
 #include "wavecomb/light_paths/light_path.h"
+#include "wavecomb/light_paths/stages/light_kernels.h"
 #include "wavecomb/light_paths/stages/light_splat.h"
 #include "wavecomb/path/steps/survive.h"
 #include "wavecomb/reference/reference_worker.h"
 #include "wavecomb/reference/single_rays.h"
-#include "wavecomb/wave/kernels/program_dispatch.h"
 
 namespace wavecomb {
 
@@ -18,20 +18,19 @@ class LightTracer {
  public:
   LightTracer(const WaveContext& context, ReferenceWorker& worker)
       : context_(context),
-        settings_(ShadeSettings(*context.settings).of_light_paths()),
-        merger_{context.visible, &worker.splats, context.film},
-        setup_(light_path_setup(context, context.merges() ? &merger_ : nullptr)),
+        settings_(light_shade_settings(*context.settings)),
+        buffers_(worker.joint),
+        merger_{context.joint.grid, &buffers_.splats, context.film},
+        setup_{context.joint, *context.camera,
+               context.joint.merges() && !context.joint.aim_samples ? &merger_ : nullptr},
         clock_(worker.clock),
         counts_(worker.counts),
-        rays_(context, worker.counts, worker.aovs),
-        splats_(worker.splats),
-        vertices_(worker.light_vertices),
-        light_aovs_(worker.light_aovs) {}
+        rays_(context, worker.counts, worker.aovs) {}
 
   /// Traces one light path. With `keeps`, stores one of its vertices for the camera path of the
   /// same pixel and sample.
   void trace(uint32_t pixel, uint32_t sample, bool keeps = false) {
-    if (keeps) vertices_.clear(1);
+    if (keeps) buffers_.vertices.clear(1);
     const SceneView& scene = context_.scene;
     const LightPath<F> start =
         begin_light_path<F>(scene.lights, *context_.settings, pixel, sample, true);
@@ -40,16 +39,17 @@ class LightTracer {
     rays_.begin(start.key, context_.moves()
                                ? light_path_time<F>(*context_.settings, start.key, pixel, sample)
                                : 0.f);
-    if (light_aovs_.wants_events()) light_aovs_.begin<F>(kOnlySlot, e.light, true);
+    if (buffers_.aovs.wants_events()) buffers_.aovs.begin<F>(kOnlySlot, e.light, true);
     PathState<F> path = start.start();
+    LightPathState<F> light = start.light_state();
     for (uint32_t depth = 0;; ++depth) {
       clock_.enter(Phase::kTrace);
       const SingleHit hit = rays_.intersect(path.o, path.dir, kInfinity, depth);
       clock_.enter(Phase::kShade);
       if (hit.inst == kNoHit || hit.inst == kLightShape) return;
-      if (context_.aim_samples && depth == 0)
-        context_.aim_samples->begin(light_path_number(*context_.settings, pixel),
-                                    fma(path.dir, hit.t, path.o));
+      if (context_.joint.aim_samples && depth == 0)
+        context_.joint.aim_samples->begin(light_path_number(*context_.settings, pixel),
+                                          fma(path.dir, hit.t, path.o));
       const uint32_t mesh = rays_.mesh_of(hit), material = rays_.material_of(hit, mesh);
       if (settings_.cost_aware && depth >= settings_.roulette_depth) {
         const F q = cost_aware_survival<F>(scene, *context_.roulette_costs, material, path, true);
@@ -57,78 +57,86 @@ class LightTracer {
         path.throughput *= 1.f / q;
       }
       VertexAovs<F> aovs;
-      aovs.wants_events = light_aovs_.wants_events();
-      const LightVertexResult<F> out = shade(start.key, depth, hit, mesh, material, path, aovs);
+      aovs.wants_events = buffers_.aovs.wants_events();
+      const LightVertexResult<F> out =
+          shade({depth, light_path_row<F>(path, light, start.key)}, hit, mesh, material, aovs);
       const VertexResult<F>& v = out.v;
-      if (aovs.wants_events) light_aovs_.shade<F>(depth, kOnlySlot, start.key, aovs, true);
-      if (keeps) store_vertex(start.key, depth, hit, mesh, material, path, out);
+      if (aovs.wants_events) buffers_.aovs.shade<F>(depth, kOnlySlot, start.key, aovs, true);
+      if (keeps)
+        store_vertex({depth, light_path_row<F>(path, light, start.key)}, hit, mesh, material, out);
       if (v.has_shadow) {
         clock_.enter(Phase::kShadow);
         if (!rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, nullptr))
-          add_contribution(pixel, sample, depth, path.light, out);
+          add_contribution(pixel, sample, depth, light.light, out);
       }
       if (!v.alive) return;
       path = v.next;
+      light = out.next;
     }
   }
 
  private:
   void add_contribution(uint32_t pixel, uint32_t sample, uint32_t depth, uint32_t light,
                         const LightVertexResult<F>& out) {
-    if (context_.aim_samples) {
-      context_.aim_samples->add(light_path_number(*context_.settings, pixel), depth, out.v.direct);
+    if (context_.joint.aim_samples) {
+      context_.joint.aim_samples->add(light_path_number(*context_.settings, pixel), depth,
+                                      out.v.direct);
       return;
     }
-    add_light_splat(context_, splats_, sample, out.x, out.y, out.v.direct);
-    if (light_aovs_)
-      light_aovs_.add_to_film(*context_.film, *context_.light_splat_filter,
-                              {.slot = kOnlySlot,
-                               .depth = depth,
-                               .light = light,
-                               .x = out.x,
-                               .y = out.y,
-                               .c = out.v.direct});
+    add_light_splat(context_, buffers_.splats, sample, out.x, out.y, out.v.direct);
+    if (buffers_.aovs)
+      buffers_.aovs.add_to_film(*context_.film, *context_.joint.filter,
+                                {.slot = kOnlySlot,
+                                 .depth = depth,
+                                 .light = light,
+                                 .x = out.x,
+                                 .y = out.y,
+                                 .c = out.v.direct});
   }
 
-  void store_vertex(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit, uint32_t mesh,
-                    uint32_t material, const PathState<F>& path, const LightVertexResult<F>& out) {
+  /// Light path that arrives at its vertex number `depth`.
+  struct Arrival {
+    uint32_t depth;
+    LightPathRow<F> path;
+  };
+
+  void store_vertex(const Arrival& at, const SingleHit& hit, uint32_t mesh, uint32_t material,
+                    const LightVertexResult<F>& out) {
     const ShadingRecord<F> record{hit.t,    hit.u, hit.v,    hit.prim,
                                   hit.inst, mesh,  hit.geom, kOnlySlot};
-    if (store_light_vertex<F>(vertices_, depth, light_path_row<F>(path, key), record, material,
-                              out.p, out.is_candidate) &&
-        light_aovs_.wants_events())
-      light_aovs_.mark_stored<F>(kOnlySlot, true);
+    if (store_light_vertex<F>(buffers_.vertices, at.depth, at.path, record, material, out.p,
+                              out.is_candidate) &&
+        buffers_.aovs.wants_events())
+      buffers_.aovs.mark_stored<F>(kOnlySlot, true);
   }
 
-  LightVertexResult<F> shade(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit,
-                             uint32_t mesh, uint32_t material, const PathState<F>& path,
-                             VertexAovs<F>& aovs) {
+  LightVertexResult<F> shade(const Arrival& at, const SingleHit& hit, uint32_t mesh,
+                             uint32_t material, VertexAovs<F>& aovs) {
     const SceneView& scene = context_.scene;
-    counts_.add_records(depth, 1);
+    counts_.add_records(at.depth, 1);
     const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, rays_.time()};
-    const PathState<F> state = light_path_state<F>(*context_.camera, light_path_row<F>(path, key),
-                                                   hit.t, rays_.time(), true);
+    const PathState<F> state =
+        light_path_state<F>(*context_.camera, at.path, hit.t, rays_.time(), true);
     return kShadeLightVertex<F>[scene.material_program[material]](
-        {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, state, &aovs, true},
-        setup_, nullptr);
+        {scene, settings_, at.path.key, at.depth, mesh_hit, hit.geom, hit.t, material, state, &aovs,
+         true},
+        at.path.light_state(), setup_, nullptr);
   }
 
   const WaveContext& context_;
   const ShadeSettings settings_;
+  LightPathBuffers& buffers_;
   const Merger merger_;
   const LightPathSetup setup_;
   PhaseClock& clock_;
   Counts& counts_;
   SingleRays rays_;
-  LightSplatList& splats_;
-  LightVertices& vertices_;
-  LightPathAovs& light_aovs_;
 };
 
 /// Adds the contributions of a task's light paths to the film.
 inline void end_light_task(const WaveContext& context, ReferenceWorker& worker,
                            const WaveTask& task) {
-  if (!context.aim_samples) context.film->take(worker.splats);
+  if (!context.joint.aim_samples) context.film->take(worker.joint.splats);
   count_light_paths(context, task);
 }
 

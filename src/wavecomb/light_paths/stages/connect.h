@@ -3,6 +3,8 @@
 /// same slots, and adds the contributions of unblocked connections to those camera paths.
 #pragma once
 
+#include "wavecomb/light_paths/light_path.h"
+#include "wavecomb/light_paths/stages/light_kernels.h"
 #include "wavecomb/wave/stages/order.h"
 #include "wavecomb/wave/stages/shade.h"
 #include "wavecomb/wave/stages/trace.h"
@@ -15,7 +17,7 @@ template <typename F>
 void collect_connections(Wave& wave, const WaveContext& context, uint32_t depth) {
   using U = UInt<F>;
   using Q = ShadingQueue;
-  const LightVertices& vertices = wave.light_vertices;
+  const LightVertices& vertices = wave.joint.vertices;
   ShadingQueue& queue = wave.shading;
   const size_t shaded = queue.size;
   queue.clear();
@@ -50,10 +52,9 @@ void connect(Wave& wave, const WaveContext& context, uint32_t depth) {
   wave.clock.enter(Phase::kShade);
   collect_connections<F>(wave, context, depth);
   if (wave.shading.size == 0) return;
-  wave.light_use = Wave::LightUse::kConnect;
-  const ShadeSettings settings = ShadeSettings(*context.settings).of_light_paths();
-  shade<F>(wave, context, settings, depth, kShadeLightBatch);
-  wave.light_use = Wave::LightUse::kToCamera;
+  wave.joint.use = LightVertexUse::kConnect;
+  shade<F>(wave, context, light_shade_settings(*context.settings), depth, kShadeLightBatch);
+  wave.joint.use = LightVertexUse::kToCamera;
   compact_shadows<F>(wave);
   const ShadowQueue& q = wave.shadows;
   if (q.size == 0) return;
@@ -67,10 +68,10 @@ void connect(Wave& wave, const WaveContext& context, uint32_t depth) {
     add_radiance<F>(wave.pool.radiance, slot, c, active);
     if (wave.aovs.wants_connections()) [[unlikely]] {
       const auto light =
-          gather_field<F>(wave.light_vertices.paths, &LightPathRow<float>::light, slot, active);
+          gather_field<F>(wave.joint.vertices.paths, &LightPathRow<float>::light, slot, active);
       wave.aovs.add_connection<F>(depth, slot, light, c, active);
-      if (wave.light_aovs.wants_events())
-        wave.light_aovs.connect<F>(wave.aovs.expressions(), slot, c, active);
+      if (wave.joint.aovs.wants_events())
+        wave.joint.aovs.connect<F>(wave.aovs.expressions(), slot, c, active);
     }
   }
 }

@@ -31,10 +31,11 @@ void generate_light(Wave& wave, const WaveContext& context, const WaveTask& task
       scatter_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot,
                        light_path_time<F>(settings, path.key, pixel, sample), active);
     const Emission<F>& e = path.emission;
-    store_row<LightPathRow, F>(wave.pool.paths, slot, light_path_row<F>(path.start(), path.key),
+    store_row<LightPathRow, F>(wave.pool.paths, slot,
+                               light_path_row<F>(path.start(), path.light_state(), path.key),
                                e.valid);
-    if (wave.light_aovs.wants_events()) [[unlikely]]
-      wave.light_aovs.begin<F>(slot, e.light, e.valid);
+    if (wave.joint.aovs.wants_events()) [[unlikely]]
+      wave.joint.aovs.begin<F>(slot, e.light, e.valid);
     const Mask<U> on(e.valid);
     compress_store<U>(rays.direction + started, direction_key<F>(e.d), on);
     started += compress_store<U>(rays.slot + started, slot, on);

@@ -3,7 +3,7 @@
 /// film.
 #pragma once
 
-#include "wavecomb/light/emission/aim_samples.h"
+#include "wavecomb/light_paths/aiming/aim_samples.h"
 #include "wavecomb/light_paths/light_path.h"
 #include "wavecomb/wave/stages/trace.h"
 
@@ -14,7 +14,7 @@ namespace wavecomb {
 inline void add_light_splat(const WaveContext& context, LightSplatList& list, uint32_t sample,
                             float x, float y, const Color<float>& c) {
   Film& film = *context.film;
-  context.light_splat_filter->spread(film, x, y, [&](size_t pixel, float weight) {
+  context.joint.filter->spread(film, x, y, [&](size_t pixel, float weight) {
     const LightSplatList::LightSplat splat{static_cast<uint32_t>(pixel), c.x * weight, c.y * weight,
                                            c.z * weight, LightSplatLayer::is_in_half(sample)};
     film.collect(list, splat);
@@ -32,14 +32,14 @@ inline void record_first_hits(const Wave& wave, const WaveContext& context, cons
   for (size_t i = 0; i < rays.size; ++i) {
     if (wave.hits.inst[i] == kNoHit) continue;
     const Vec3<float> o{rays.ox[i], rays.oy[i], rays.oz[i]}, d{rays.dx[i], rays.dy[i], rays.dz[i]};
-    context.aim_samples->begin(light_path_in(context, task, rays.slot[i]),
-                               fma(d, wave.hits.t[i], o));
+    context.joint.aim_samples->begin(light_path_in(context, task, rays.slot[i]),
+                                     fma(d, wave.hits.t[i], o));
   }
 }
 
 /// Reports the finished light paths of a task to the film.
 inline void count_light_paths(const WaveContext& context, const WaveTask& task) {
-  if (context.aim_samples) return;
+  if (context.joint.aim_samples) return;
   for (uint32_t p = 0; p < task.pixel_count; ++p)
     context.film->splats().done(light_path_number(*context.settings, task.pixels[p]),
                                 task.first_sample, task.samples);
@@ -53,25 +53,26 @@ void splat(Wave& wave, const WaveContext& context, const WaveTask& task, uint32_
   occlude<F>(wave, context, depth, false);
   for (size_t i = 0; i < q.size; ++i) {
     if (q.occluded[i] != 0) continue;
-    if (context.aim_samples) [[unlikely]] {
-      context.aim_samples->add(light_path_in(context, task, q.slot[i]), depth,
-                               {q.r[i], q.g[i], q.b[i]});
+    if (context.joint.aim_samples) [[unlikely]] {
+      context.joint.aim_samples->add(light_path_in(context, task, q.slot[i]), depth,
+                                     {q.r[i], q.g[i], q.b[i]});
       continue;
     }
     const auto row = load_row<ShadowRow, float>(wave.pool.shadows, q.slot[i], true);
     const float x = bits_float<float>(row.group), y = bits_float<float>(row.set);
     const Color<float> c{q.r[i], q.g[i], q.b[i]};
-    add_light_splat(context, wave.splats, task.first_sample + q.slot[i] % task.samples, x, y, c);
-    if (wave.light_aovs) [[unlikely]] {
+    add_light_splat(context, wave.joint.splats, task.first_sample + q.slot[i] % task.samples, x, y,
+                    c);
+    if (wave.joint.aovs) [[unlikely]] {
       const auto light =
           gather_field<float>(wave.pool.paths, &LightPathRow<float>::light, q.slot[i], true);
-      wave.light_aovs.add_to_film(
-          *context.film, *context.light_splat_filter,
+      wave.joint.aovs.add_to_film(
+          *context.film, *context.joint.filter,
           {.slot = q.slot[i], .depth = depth, .light = light, .x = x, .y = y, .c = c});
     }
   }
-  if (context.aim_samples) return;
-  context.film->take(wave.splats);
+  if (context.joint.aim_samples) return;
+  context.film->take(wave.joint.splats);
 }
 
 }  // namespace wavecomb

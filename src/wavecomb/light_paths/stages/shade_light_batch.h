@@ -10,15 +10,16 @@ namespace wavecomb {
 /// Runs the steps of a light path vertex, inlined as in shade_one().
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE LightVertexResult<F> shade_one_of_light(const Vertex<F, kFeatures>& v,
+                                                        const LightPathState<F>& from,
                                                         const LightPathSetup& setup,
                                                         const ConnectionTarget<F>* target) {
   if constexpr (kIsScalar<F>)
-    return shade_light_vertex<Bsdf, F>(v, setup, target);
+    return shade_light_vertex<Bsdf, F>(v, from, setup, target);
   else
-    return light_path_steps<Bsdf, F>(v, setup, target);
+    return light_path_steps<Bsdf, F>(v, from, setup, target);
 }
 
-/// Shades records [begin, end) of the shading order for the purpose in Wave::light_use, as
+/// Shades records [begin, end) of the shading order for the purpose in LightPathBuffers::use, as
 /// shade_batch() does for camera paths. The words `group` and `set` of the ShadowRow hold the film
 /// position (x, y) of the contribution.
 template <typename Bsdf, typename F, uint32_t kFeatures>
@@ -28,12 +29,14 @@ void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettin
   using U = UInt<F>;
   const PathPool& pool = wave.pool;
   const CameraSetup& camera = *context.camera;
-  const LightVertices& vertices = wave.light_vertices;
-  const bool connects = wave.light_use == Wave::LightUse::kConnect;
-  const Merger merger{context.visible, &wave.splats, context.film};
-  const LightPathSetup setup = light_path_setup(context, context.merges() ? &merger : nullptr);
+  LightPathBuffers& light = wave.joint;
+  const LightVertices& vertices = light.vertices;
+  const bool connects = light.use == LightVertexUse::kConnect;
+  const Merger merger{context.joint.grid, &light.splats, context.film};
+  const bool merges = context.joint.merges() && !context.joint.aim_samples;
+  const LightPathSetup setup{context.joint, camera, merges ? &merger : nullptr};
   VertexAovs<F> aovs;
-  aovs.wants_events = wave.light_aovs.wants_events();
+  aovs.wants_events = light.aovs.wants_events();
   for (size_t i = begin; i < end; i += kWidth<F>) {
     const RecordPacket<F> packet(queue, i, end);
     const Mask<F>& active = packet.active;
@@ -53,20 +56,20 @@ void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettin
         context.scene, settings, path.key,        depth, hit,
         r.geom,        r.t,      packet.material, state, aovs.wants_events ? &aovs : nullptr,
         active};
-    const LightVertexResult<F> out =
-        shade_one_of_light<Bsdf, F>(vertex, setup, connects ? &target : nullptr);
+    const LightVertexResult<F> out = shade_one_of_light<Bsdf, F>(vertex, path.light_state(), setup,
+                                                                 connects ? &target : nullptr);
     const VertexResult<F>& v = out.v;
     if (aovs.wants_events) [[unlikely]] {
       if (connects)
-        wave.light_aovs.record_connection<F>(r.slot, aovs.light_scattering, active);
+        light.aovs.record_connection<F>(r.slot, aovs.light_scattering, active);
       else
-        wave.light_aovs.shade<F>(depth, r.slot, path.key, aovs, active);
+        light.aovs.shade<F>(depth, r.slot, path.key, aovs, active);
     }
-    if (wave.light_use == Wave::LightUse::kStore) {
+    if (light.use == LightVertexUse::kStore) {
       const Mask<F> stored =
           store_light_vertex<F>(vertices, depth, path, r, packet.material, out.p, out.is_candidate);
       if (aovs.wants_events && any(stored)) [[unlikely]]
-        wave.light_aovs.mark_stored<F>(r.slot, stored);
+        light.aovs.mark_stored<F>(r.slot, stored);
     }
     packet.store(queue, v.alive, v.next.dir, v.has_shadow, v.shadow_d);
     if (any(v.has_shadow))
@@ -76,7 +79,8 @@ void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettin
            connects ? U(0u) : float_bits<F>(out.y)},
           v.has_shadow);
     if (any(v.alive))
-      store_row<LightPathRow, F>(pool.paths, r.slot, light_path_row<F>(v.next, path.key), v.alive);
+      store_row<LightPathRow, F>(pool.paths, r.slot, light_path_row<F>(v.next, out.next, path.key),
+                                 v.alive);
     ++wave.counts.packets;
     wave.counts.packet_lanes += kWidth<F>;
   }

@@ -52,8 +52,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
                        input_bit(Input::kClearcoat) | input_bit(Input::kClearcoatRoughness) |
                        input_bit(Input::kNormal) | kNeedsTangent;
 
-  /// The Fresnel terms are always exact.
-  OpenPbrBsdf(const Params& p, bool /*schlick*/)
+  OpenPbrBsdf(const Params& p, bool /*schlick: the terms are always exact*/)
       : base_(p), eon_(p.diffuse_roughness), energy_(p.energy) {
     if constexpr (kFuzz) {
       fuzz_ = p.fuzz_weight;

@@ -3,7 +3,7 @@
 /// one.
 #pragma once
 
-#include "wavecomb/core/hash.h"
+#include "wavecomb/core/encoding/hash.h"
 #include "wavecomb/core/math.h"
 #include "wavecomb/medium/volume/grid_traversal.h"
 #include "wavecomb/path/media.h"

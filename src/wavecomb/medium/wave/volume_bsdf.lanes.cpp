@@ -11,12 +11,12 @@ using VolumeLanes = Lanes<WAVECOMB_LANES>;
 
 WAVECOMB_SHARED_KERNELS(extern, VolumeLanes);
 
-template void shade_batch<VolumeBsdf<VolumeLanes>, VolumeLanes, kEverything>(
+template void shade_batch<VolumeBsdf<VolumeLanes>, VolumeLanes, kEverything, JointTransport>(
     Wave&, const WaveContext&, const ShadeSettings&, uint32_t, size_t, size_t);
 #if WAVECOMB_LANES == 1
 // The reference integrator uses this scalar instantiation.
-template VertexResult<float> shade_vertex<VolumeBsdf<float>, float, kEverything>(
-    const Vertex<float>&);
+template VertexResult<float> shade_vertex<VolumeBsdf<float>, float, kEverything, JointTransport>(
+    const Vertex<float>&, JointTransport::Coupling<float>&);
 #endif
 
 }  // namespace wavecomb

@@ -41,9 +41,9 @@ template <typename F>
 }
 
 /// Returns the emission of textures and graphs at their finest level in `lanes`, as light samples
-/// and light paths use it, and `filtered` in other lanes. Filtered emission has a different mean
-/// wherever emission is cut off, by an edge of the mesh or by the weights of multiple importance
-/// sampling.
+/// and emission sampling use it, and `filtered` in other lanes. Filtered emission has a different
+/// mean wherever emission is cut off, by an edge of the mesh or by the weights of multiple
+/// importance sampling.
 template <typename F>
 [[gnu::noinline, gnu::cold]] Color<F> finest_emission(const SceneView& scene, const MeshHit<F>& hit,
                                                       const Surface<F>& s, const Vec3<F>& dir,
@@ -78,9 +78,9 @@ inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& sett
 }
 
 /// Returns the contribution of the emissive surface at a vertex. Records the emitter for AOVs.
-template <typename Bsdf, typename F, uint32_t kFeatures>
-WAVECOMB_INLINE Color<F> emit(const Vertex<F, kFeatures>& v,
-                              const SurfaceInteraction<Bsdf, F>& at) {
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Coupling>
+WAVECOMB_INLINE Color<F> emit(const Vertex<F, kFeatures>& v, const SurfaceInteraction<Bsdf, F>& at,
+                              const Coupling& joint) {
   using U = UInt<F>;
   const SceneView& scene = v.scene;
   Color<F> emission = at.emission;
@@ -100,29 +100,23 @@ WAVECOMB_INLINE Color<F> emit(const Vertex<F, kFeatures>& v,
         mesh_light_emission<F>(scene, v.hit.inst, v.geom, emission, v.path, v.depth == 0, v.active);
   const Mask<F> emits = v.active & not_(is_black(emission));
   if (none(emits)) return Color<F>(F(0.f));
-  F light_pdf(0.f), others(0.f);
+  F light_pdf(0.f);
+  U light(kNoLight);
   if (scene.has_emissive_meshes) {
     const U object = instance_geometry<F>(scene, v.hit.inst, v.geom, emits);
     const U base = gather<U>(scene.emissive_lights, object, Mask<U>(emits));
-    if (v.wants_lights())
-      v.aovs->emitter = select(Mask<U>(base == U(kNoLight)), base, U(base + v.hit.prim));
+    light = select(Mask<U>(base != U(kNoLight)), U(base + v.hit.prim), base);
+    if (v.wants_lights()) v.aovs->emitter = light;
     const Mask<F> sampled = emits & Mask<F>(base != U(kNoLight)) & (v.path.pdf > 0.f);
     if (any(sampled))
       light_pdf = select(sampled,
-                         triangle_light_pdf<F>(scene.lights, base + v.hit.prim,
-                                               v.path.vertex_before(), v.path.dir, v.t, sampled),
+                         triangle_light_pdf<F>(scene.lights, light, v.path.vertex_before(),
+                                               v.path.dir, v.t, sampled),
                          F(0.f));
-    if constexpr ((kFeatures & kJoined) != 0)
-      if (v.joins_light() && v.depth > 0) [[unlikely]] {
-        const Mask<F> known = emits & Mask<F>(base != U(kNoLight));
-        others = v.path.ratio * emission_density<F>(scene.lights, base + v.hit.prim, v.path.o,
-                                                    v.path.dir, v.t, known);
-      }
   }
   F w = bounce_weight<F>(v.path.pdf, light_pdf);
-  if constexpr ((kFeatures & kJoined) != 0)
-    if (v.joins_light() && scene.has_emissive_meshes && v.depth > 0) [[unlikely]]
-      w = joint_bounce_weight<F>(v.path.pdf, light_pdf, not_(Mask<F>(v.path.pdf > 0.f)), others);
+  if (scene.has_emissive_meshes)
+    w = joint.emission_weight(v, light, emits & Mask<F>(light != U(kNoLight)), light_pdf, w);
   const Color<F> e = clean<F>(at.throughput * emission * w, clamp_limit(v.settings, v.depth));
   return select<F>(emits, e, Color<F>(F(0.f)));
 }

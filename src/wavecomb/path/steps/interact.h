@@ -57,12 +57,11 @@ struct SurfaceInteraction : SurfaceHitPoint<Bsdf, F>, MaterialLookup<Bsdf, F> {
   /// Returns the frame of the BSDF's local directions, in which z is the shading normal.
   template <uint32_t kFeatures>
   Frame<F> frame(const Vertex<F, kFeatures>& v) const;
-  /// Returns the shading frame for light subpaths, whose viewing direction is unknown: uses the
-  /// normal without the view-dependent adjustment.
+  /// Returns the shading frame for an unknown viewing direction: uses the normal without the
+  /// view-dependent adjustment.
   template <uint32_t kFeatures>
   Frame<F> unadjusted_frame(const Vertex<F, kFeatures>& v) const;
-  /// Returns the lanes whose shading normal is adjusted to the viewing direction `dir`. Only camera
-  /// paths find light there.
+  /// Returns the lanes whose shading normal is adjusted to the viewing direction `dir`.
   template <uint32_t kFeatures>
   Mask<F> is_adjusted(const Vertex<F, kFeatures>& v, const Frame<F>& unadjusted,
                       const Vec3<F>& dir) const;
@@ -74,8 +73,8 @@ struct SurfaceInteraction : SurfaceHitPoint<Bsdf, F>, MaterialLookup<Bsdf, F> {
   UInt<F> link_class(const Vertex<F, kFeatures>& v) const;
   /// Returns the origin of a ray that leaves along `dir`.
   Vec3<F> origin(const Vec3<F>& dir) const;
-  /// Returns the origin of a light path's ray that leaves along `dir` (light_paths/connection.h).
-  Vec3<F> light_path_origin(const Vec3<F>& dir) const;
+  /// Returns the origin of a ray that leaves along `dir`, without the terminator offset.
+  Vec3<F> clear_origin(const Vec3<F>& dir) const;
   /// Returns whether a direction is on the same side of the geometric normal as of the shading
   /// normal. Directions on the other side would leak light.
   Mask<F> is_consistent(const Vec3<F>& world, const Vec3<F>& local) const;
@@ -259,8 +258,8 @@ WAVECOMB_INLINE Vec3<F> SurfaceInteraction<Bsdf, F>::origin(const Vec3<F>& dir) 
 }
 
 template <typename Bsdf, typename F>
-WAVECOMB_INLINE Vec3<F> SurfaceInteraction<Bsdf, F>::light_path_origin(const Vec3<F>& dir) const {
-  return clear_origin<F>(s, dir);
+WAVECOMB_INLINE Vec3<F> SurfaceInteraction<Bsdf, F>::clear_origin(const Vec3<F>& dir) const {
+  return wavecomb::clear_origin<F>(s, dir);
 }
 
 template <typename Bsdf, typename F>

@@ -15,8 +15,6 @@
 
 namespace wavecomb {
 
-namespace detail {
-
 /// Classifies the scattering between `wo` and `wi`. The light's contribution to the diffuse and the
 /// other lobes is scaled by `diffuse` and `specular`.
 template <typename Bsdf, typename F>
@@ -39,16 +37,6 @@ inline ScatteringEvent<F> classify_scattering(const Bsdf& bsdf, const Vec3<F>& w
                         U(static_cast<uint32_t>(PathEvent::kTransmission)),
                         U(static_cast<uint32_t>(PathEvent::kReflection)));
   return {side, {share(all.x, part.x), share(all.y, part.y), share(all.z, part.z)}, Mask<F>(false)};
-}
-
-}  // namespace detail
-
-/// Classifies the scattering from `l` to `w` at a vertex of a light path, or of a connection at a
-/// vertex of a camera path. All lobes count fully, since such lights have no multipliers.
-template <typename Bsdf, typename F>
-[[gnu::noinline, gnu::cold]] ScatteringEvent<F> classify_event(const Bsdf bsdf, const Vec3<F> w,
-                                                               const Vec3<F> l) {
-  return detail::classify_scattering<Bsdf, F>(bsdf, w, l, F(1.f), F(1.f));
 }
 
 namespace detail {
@@ -94,10 +82,10 @@ template <typename Bsdf, typename F>
 }  // namespace detail
 
 /// Records in the AOVs of the vertex how its light sample and its bounce in `out` scatter.
-template <typename Bsdf, typename F, uint32_t kFeatures>
-WAVECOMB_INLINE void classify_events(const VertexContext<Bsdf, F, kFeatures>& c,
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Coupling>
+WAVECOMB_INLINE void classify_events(const VertexContext<Bsdf, F, kFeatures, Coupling>& c,
                                      const VertexResult<F>& out) {
-  using Scattering = typename VertexContext<Bsdf, F, kFeatures>::Scattering;
+  using Scattering = typename VertexContext<Bsdf, F, kFeatures, Coupling>::Scattering;
   detail::note_directions<Scattering, F>(c.vertex.scene.lights,
                                          {.bsdf = c.at.bsdf,
                                           .frame = c.frame,

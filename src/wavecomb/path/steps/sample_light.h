@@ -12,10 +12,9 @@
 #include "wavecomb/guiding/bounce/guided_bounce.h"
 #include "wavecomb/light/filters/shadow.h"
 #include "wavecomb/light/sampling/light_sample.h"
-#include "wavecomb/light_paths/connection.h"
-#include "wavecomb/light_paths/join.h"
 #include "wavecomb/path/steps/bounce_sampling.h"
 #include "wavecomb/path/steps/interact.h"
+#include "wavecomb/path/steps/light_connection.h"
 #include "wavecomb/path/steps/vertex_context.h"
 
 namespace wavecomb {
@@ -37,29 +36,6 @@ WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F, kFeatures>& v,
   return receiver;
 }
 
-/// Returns the MIS weight of the light sample of `to_light` against bounces with density `p_bounce`
-/// and light paths (join.h). `wi` is its direction in the frame of the vertex. If R includes this
-/// vertex with p_light in place of p_bounce,
-///   w = 1 / (1 + p_bounce / p_light + R D / p_light);
-/// for a point light the last term has p_light d^2 in place of p_light.
-template <typename Bsdf, typename F, uint32_t kFeatures>
-WAVECOMB_INLINE F joint_light_weight(const VertexContext<Bsdf, F, kFeatures>& c,
-                                     const LightConnection<F>& to_light, const Vec3<F>& wi,
-                                     const F& p_bounce) {
-  const LightView& lights = c.vertex.scene.lights;
-  const LightSample<F>& l = to_light.light;
-  const F pdf = select(l.pdf > 0.f, l.pdf, F(1.f));
-  const F by_bounce = select(l.is_delta, F(0.f), F(p_bounce / pdf));
-  if (!lights.emits_paths()) return 1.f / F(1.f + by_bounce);
-  const F density =
-      emission_density<F>(lights, l.light, to_light.origin, l.wi, l.distance, l.valid);
-  const Mask<F> point = l.is_delta & (l.distance < kFarAway);
-  const F nee = select(point, F(pdf * F(l.distance * l.distance)), pdf);
-  const F by_path =
-      F(c.joint.template towards<Bsdf>(c.vertex, c.at, c.wo, l.wi, wi, l.valid) * density) / nee;
-  return 1.f / F(F(1.f + by_bounce) + min(by_path, F(kMaxRatio)));
-}
-
 namespace detail {
 
 /// Light sample that a vertex may use.
@@ -78,11 +54,10 @@ struct LightCandidate {
 
 /// Returns the light sample for the sample values `r` in the lanes `active_lights`. `receiver` is
 /// that of the context with its position, and `link` the link class of the surface.
-template <typename Bsdf, typename F, uint32_t kFeatures>
-WAVECOMB_INLINE LightCandidate<F> light_candidate(const VertexContext<Bsdf, F, kFeatures>& c,
-                                                  const LightReceiver<F>& receiver,
-                                                  const Sample4<F>& r, const UInt<F>& link,
-                                                  const Mask<F>& active_lights) {
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Coupling>
+WAVECOMB_INLINE LightCandidate<F> light_candidate(
+    const VertexContext<Bsdf, F, kFeatures, Coupling>& c, const LightReceiver<F>& receiver,
+    const Sample4<F>& r, const UInt<F>& link, const Mask<F>& active_lights) {
   using U = UInt<F>;
   const Vertex<F, kFeatures>& v = c.vertex;
   const auto& at = c.at;
@@ -98,9 +73,7 @@ WAVECOMB_INLINE LightCandidate<F> light_candidate(const VertexContext<Bsdf, F, k
   const U& light = l.light;
   U set(0u);
   const bool has_effects = v.has(kMeshLights) && lights.has_effects;
-  if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface)
-    if (v.joins_light()) [[unlikely]]
-      w = joint_light_weight(c, to_light, wi, p_bounce);
+  w = c.joint.light_weight(c, to_light, wi, p_bounce, w);
   ShadowExtent<F> extent{F(kFarAway), Color<F>(F(0.f))};
   if (has_effects) [[unlikely]] {
     const LightEffect<F> effect(lights, light, active_lights);
@@ -182,9 +155,9 @@ WAVECOMB_INLINE LightCandidate<F> resample(const LightCandidate<F>& first, const
 }  // namespace detail
 
 /// Samples a point on a light, and sets up its shadow ray. `out.next.link` must be set.
-template <typename Bsdf, typename F, uint32_t kFeatures>
-WAVECOMB_INLINE void sample_light(const VertexContext<Bsdf, F, kFeatures>& c, const Sample4<F>& r,
-                                  VertexResult<F>& out) {
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Coupling>
+WAVECOMB_INLINE void sample_light(const VertexContext<Bsdf, F, kFeatures, Coupling>& c,
+                                  const Sample4<F>& r, VertexResult<F>& out) {
   const Vertex<F, kFeatures>& v = c.vertex;
   const auto& at = c.at;
   const LightView& lights = v.scene.lights;

@@ -9,7 +9,6 @@
 
 #include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/guiding/bounce/guided_bounce.h"
-#include "wavecomb/light_paths/join.h"
 #include "wavecomb/path/steps/bounce_sampling.h"
 #include "wavecomb/path/steps/interact.h"
 
@@ -28,9 +27,9 @@ WAVECOMB_INLINE Color<F> diffuse_share(const Bsdf& bsdf, const View& view, const
 }
 
 /// Samples the bounce with the sample values `r`, and sets up the next path segment.
-template <typename Bsdf, typename F, uint32_t kFeatures>
-WAVECOMB_INLINE void scatter(const VertexContext<Bsdf, F, kFeatures>& c, const Sample4<F>& r,
-                             VertexResult<F>& out) {
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Coupling>
+WAVECOMB_INLINE void scatter(const VertexContext<Bsdf, F, kFeatures, Coupling>& c,
+                             const Sample4<F>& r, VertexResult<F>& out) {
   const Vertex<F, kFeatures>& v = c.vertex;
   const auto& at = c.at;
   const PathState<F>& path = v.path;
@@ -54,9 +53,7 @@ WAVECOMB_INLINE void scatter(const VertexContext<Bsdf, F, kFeatures>& c, const S
   // A rough bounce widens the ray cone: the half width of the lobe is about alpha = roughness^2.
   out.next.cone_spread = max(path.cone_spread, F(b.roughness * b.roughness * 0.25f));
   out.next.o = at.origin(d);
-  if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface)
-    if (v.joins_light()) [[unlikely]]
-      next_ratio(c, d, b, out.next);
+  c.joint.bounce(c, d, b, out.next);
   const F largest = max_component(out.next.throughput);
   out.alive =
       v.active & (b.pdf > 0.f) & at.is_consistent(d, b.wi) & (largest > 0.f) & is_finite(largest);

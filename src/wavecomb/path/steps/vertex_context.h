@@ -9,15 +9,12 @@
 
 namespace wavecomb {
 
-template <typename F>
-struct JointVertex;
-
 /// Context of the steps after `interact`: references to values that vertex_steps() (path/vertex.h)
 /// has computed once for the vertex.
 ///
 /// Contract: valid only within vertex_steps(). Steps read it and write VertexResult and the outputs
 /// of Vertex. The steps are inlined, so that no reference costs a memory access.
-template <typename Bsdf, typename F, uint32_t kFeatureSet>
+template <typename Bsdf, typename F, uint32_t kFeatureSet, typename Coupling>
 struct VertexContext {
   using Program = Bsdf;
   using Float = F;
@@ -33,8 +30,8 @@ struct VertexContext {
   const Vec3<F>& wo;                 ///< direction to the viewer, in `frame`
   const View& view;                  ///< view of the BSDF from `wo`
   const GuidingLookup<F>& guide;     ///< lookup in the guiding field
-  const JointVertex<F>& joint;       ///< ratio R of light paths; zero without light paths
   const LightReceiver<F>& receiver;  ///< receiver for light sampling, without a position
+  Coupling& joint;                   ///< coupling to the joint transport (joint_transport.h)
 };
 
 }  // namespace wavecomb

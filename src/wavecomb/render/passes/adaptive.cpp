@@ -66,13 +66,4 @@ AdaptiveCheck check_adaptive(const ErrorMap& map, const Region& window,
   return check;
 }
 
-uint32_t light_samples_after(const NoiseParts& noise, uint32_t done, uint32_t before,
-                             uint32_t after, uint32_t share, double active_share) {
-  if (done < 2) return std::max(done, share);  // the half buffers need two samples
-  const double own = noise.own * before, splats = noise.splats * done;
-  if (!(own > 0)) return splats > 0 ? std::max(done, share) : done;
-  const double wanted = std::ceil(after * std::sqrt(splats * active_share / own));
-  return std::max(done, wanted < share ? static_cast<uint32_t>(wanted) : share);
-}
-
 }  // namespace wavecomb

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "wavecomb/core/settings.h"
-#include "wavecomb/film/error_map.h"
+#include "wavecomb/film/error/error_map.h"
 #include "wavecomb/render/passes/pass_plan.h"
 
 namespace wavecomb {
@@ -36,22 +36,5 @@ struct AdaptiveCheck {
 AdaptiveCheck check_adaptive(const ErrorMap& map, const Region& window,
                              std::span<const uint32_t> samples, const Settings& settings,
                              const PassRules& rules);
-
-/// Returns the number of samples of each light path at the end of a pass.
-///
-/// `done` is the number of samples of light paths so far. `before` and `after` are the samples of
-/// pixels at the start and the end of the pass. `share` is the largest number of samples of light
-/// paths, from the ratio of the two kinds of paths that the render uses. `active_share` is |A| / P
-/// below.
-///
-/// A pass traces |A| (after - before) paths from the |A| active pixels, and P paths for each sample
-/// of the P light paths. With n samples of pixels, m of light paths and the variances V_c and V_l
-/// of one sample, the error V_c / n + V_l / m is least for a given cost where
-///   m / n = sqrt(V_l |A| / (V_c P)).
-/// Both variances are estimated from half buffers over the active pixels. `share` is the limit
-/// because more samples of one kind would need other MIS weights. Only earlier passes determine
-/// this ratio, so the image stays unbiased.
-uint32_t light_samples_after(const NoiseParts& noise, uint32_t done, uint32_t before,
-                             uint32_t after, uint32_t share, double active_share);
 
 }  // namespace wavecomb

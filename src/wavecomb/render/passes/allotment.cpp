@@ -6,7 +6,7 @@
 #include <bit>
 #include <cmath>
 
-#include "wavecomb/core/hash.h"
+#include "wavecomb/core/encoding/hash.h"
 
 namespace wavecomb {
 namespace {

@@ -25,18 +25,16 @@ PassRules pass_rules(const RenderPlan& plan) {
 }  // namespace
 
 PassLoop::PassLoop(const RenderPlan& plan, PassState pass, Film& film, PassRunner& runner,
-                   RenderCosts& costs, Watch& watch, std::function<void()> before_lights)
+                   RenderCosts& costs, Watch& watch, JointPasses& joint)
     : settings_(plan.settings),
       rules_(pass_rules(plan)),
       pass_(std::move(pass)),
-      light_share_(plan.light_share),
       film_(film),
       runner_(runner),
       costs_(costs),
       watch_(watch),
-      before_lights_(std::move(before_lights)),
+      joint_(joint),
       order_(morton_pixel_order(plan.settings.rendered())) {
-  const Settings& settings = plan.settings;
   if (!pass_.allocation.counts.empty()) {
     const auto& counts = pass_.allocation.counts;
     const auto [least, most] = std::minmax_element(counts.begin(), counts.end());
@@ -44,14 +42,6 @@ PassLoop::PassLoop(const RenderPlan& plan, PassState pass, Film& film, PassRunne
       throw Error("the counts of samples to resume from are not of such a render");
     allocation_ = {rules_.pilot, *least, *most, 0};
   }
-  // A render of a region also needs the light paths of the whole image.
-  if (settings.joins_light())
-    light_order_ = morton_pixel_order({0, 0, settings.width, settings.height});
-  // Light paths that camera paths connect to are traced in the same wave as these.
-  if (settings.connects())
-    std::erase_if(light_order_, [region = settings.rendered()](uint32_t pixel) {
-      return region.contains(pixel & 0xffffu, pixel >> 16);
-    });
   pass_.allocation.pilot = rules_.pilot;
   pass_.allocation.spp = rules_.spp;
   const std::vector<uint32_t> samples = film.samples();
@@ -71,15 +61,15 @@ PassLoop::PassLoop(const RenderPlan& plan, PassState pass, Film& film, PassRunne
   // comes first.
   if (rules_.timed && !all_started) pass_.target = std::min(pass_.target, 1u);
   if (!rules_.adaptive || pass_.light_target == 0)
-    pass_.light_target = light_share_.samples(pass_.target);
+    pass_.light_target = joint_.samples(pass_.target);
 }
 
 void PassLoop::run() {
   for (;;) {
     const std::vector<uint32_t> samples = film_.samples();
     const PassPlan plan = plan_pass(order_, film_.window(), samples, pass_);
-    const PassPlan from_lights = light_plan();
-    if (plan.batches.empty() && from_lights.batches.empty()) {
+    const PassPlan joint_plan = joint_.plan(film_, pass_.light_target);
+    if (plan.batches.empty() && joint_plan.batches.empty()) {
       if (!begin_pass(samples)) return;
       continue;
     }
@@ -87,11 +77,11 @@ void PassLoop::run() {
     const double begin = seconds();
     const auto halted = [this] { return watch_.halted() || is_past_deadline(); };
     runner_.run(plan, halted);
-    if (!from_lights.batches.empty()) {
-      if (before_lights_) before_lights_();
-      runner_.run(from_lights, halted, true);
+    if (!joint_plan.batches.empty()) {
+      joint_.begin(film_);
+      runner_.run(joint_plan, halted, true);
     }
-    film_.update_light_path_aovs();
+    film_.update_splat_aovs();
     samples_per_s_ =
         static_cast<double>(runner_.samples_done() - before) / std::max(1e-9, seconds() - begin);
     for (uint32_t i = 0; i < runner_.threads(); ++i)
@@ -100,14 +90,6 @@ void PassLoop::run() {
     if (watch_.stopped() || is_past_deadline()) return;
     watch_.rest();
   }
-}
-
-PassPlan PassLoop::light_plan() const {
-  if (light_order_.empty()) return {};
-  PassState pass;
-  pass.target = pass_.light_target;
-  return plan_pass(light_order_, {0, 0, settings_.width, settings_.height},
-                   film_.splats().samples(), pass);
 }
 
 bool PassLoop::begin_pass(std::span<const uint32_t> samples) {
@@ -129,11 +111,9 @@ bool PassLoop::begin_pass(std::span<const uint32_t> samples) {
   const TimeLeft left{settings_.time_limit - seconds(), samples_per_s_};
   // Pixels that become active again late catch up with the others.
   pass_.target = done >= rules_.spp ? rules_.spp : next_target(done, rules_, left, active);
-  pass_.light_target = light_share_.samples(pass_.target);
-  if (rules_.adaptive && done > 0 && !light_order_.empty())
-    pass_.light_target = light_samples_after(
-        measure_noise_parts(film_, pass_.active), light_done, done, pass_.target,
-        pass_.light_target, static_cast<double>(active) / static_cast<double>(light_order_.size()));
+  pass_.light_target = rules_.adaptive && done > 0
+                           ? joint_.adaptive_samples(film_, pass_, done, light_done, active)
+                           : joint_.samples(pass_.target);
   may_be_cut_ = may_be_cut_ || done > 0;
   ++passes_;
   return true;

@@ -10,7 +10,7 @@
 
 #include "wavecomb/core/clock.h"
 #include "wavecomb/film/film.h"
-#include "wavecomb/light_paths/setup.h"
+#include "wavecomb/render/joint_transport.h"
 #include "wavecomb/render/passes/allotment.h"
 #include "wavecomb/render/passes/pass_plan.h"
 #include "wavecomb/render/passes/pass_runner.h"
@@ -27,10 +27,10 @@ namespace wavecomb {
 /// samples depend on film, settings and pass only, unless there is a time limit.
 class PassLoop {
  public:
-  /// `pass` is the state that belongs to the film, if both come from a checkpoint. Each pass calls
-  /// `before_lights` between its camera paths and its light paths; it may be null.
+  /// `pass` is the state that belongs to the film, if both come from a checkpoint. Each pass traces
+  /// the paths of `joint` after its camera paths.
   PassLoop(const RenderPlan& plan, PassState pass, Film& film, PassRunner& runner,
-           RenderCosts& costs, Watch& watch, std::function<void()> before_lights = nullptr);
+           RenderCosts& costs, Watch& watch, JointPasses& joint);
 
   void run();
   RenderStatus status() const;
@@ -39,8 +39,6 @@ class PassLoop {
   const AllocationStatistics& allocation() const { return allocation_; }
 
  private:
-  /// Plans the remaining light paths of the pass; empty if the render has none.
-  PassPlan light_plan() const;
   /// Sets up the next pass. Returns false if the image is finished.
   bool begin_pass(std::span<const uint32_t> samples);
   bool is_past_deadline() const;
@@ -49,14 +47,12 @@ class PassLoop {
   const Settings& settings_;
   PassRules rules_;
   PassState pass_;
-  LightPathShare light_share_;
   Film& film_;
   PassRunner& runner_;
   RenderCosts& costs_;
   Watch& watch_;
-  std::function<void()> before_lights_;
+  JointPasses& joint_;
   std::vector<uint32_t> order_;
-  std::vector<uint32_t> light_order_;  ///< Morton order of light path numbers
   AllocationStatistics allocation_;
   Clock::time_point start_ = Clock::now();
   uint64_t resumed_samples_ = 0;

@@ -31,7 +31,7 @@ std::vector<WaveGroup> wave_groups(const PassPlan& plan, uint32_t wave_size, uin
 PassRunner::PassRunner(Integrator& integrator, uint32_t threads, uint32_t wave_size)
     : integrator_(integrator), wave_size_(wave_size), workers_(threads) {}
 
-void PassRunner::run(const PassPlan& plan, const std::function<bool()>& halted, bool from_lights) {
+void PassRunner::run(const PassPlan& plan, const std::function<bool()>& halted, bool joint) {
   const std::vector<WaveGroup> groups = wave_groups(plan, wave_size_, threads());
   std::vector<float> group_s(groups.size());
   const auto run_groups = [&](const tbb::blocked_range<size_t>& range) {
@@ -40,7 +40,7 @@ void PassRunner::run(const PassPlan& plan, const std::function<bool()>& halted, 
       const Clock::time_point start = Clock::now();
       for (uint32_t done = 0; done < group.samples && !halted(); done += group.wave_samples)
         run_wave({group.pixels, group.pixel_count, group.first_sample + done,
-                  std::min(group.wave_samples, group.samples - done), from_lights});
+                  std::min(group.wave_samples, group.samples - done), joint});
       group_s[g] = static_cast<float>(seconds_since(start));
     }
   };
@@ -64,7 +64,7 @@ void PassRunner::run_wave(const WaveTask& task) {
   const uint64_t before = rays();
   integrator_.run(worker, task);
   rays_ += rays() - before;
-  if (task.from_lights) return;
+  if (task.joint) return;
   if (samples_.fetch_add(task.path_count()) == 0) first_samples_s_ = seconds_since(start_);
 }
 

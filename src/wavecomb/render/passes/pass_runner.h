@@ -33,9 +33,9 @@ class PassRunner {
   PassRunner(Integrator& integrator, uint32_t threads, uint32_t wave_size);
 
   /// Runs a plan until it is done or `halted` returns true. All workers call `halted` before each
-  /// wave. Every pixel then has whole waves of samples, without gaps. `from_lights` means that the
-  /// plan consists of light paths (WaveTask::from_lights), which do not count as samples.
-  void run(const PassPlan& plan, const std::function<bool()>& halted, bool from_lights = false);
+  /// wave. Every pixel then has whole waves of samples, without gaps. `joint` means that the
+  /// plan consists of light paths (WaveTask::joint), which do not count as samples.
+  void run(const PassPlan& plan, const std::function<bool()>& halted, bool joint = false);
 
   const Integrator& integrator() const { return integrator_; }
   uint32_t threads() const { return static_cast<uint32_t>(workers_.size()); }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/render/passes/pixel_order.h"
 
-#include "wavecomb/core/morton.h"
+#include "wavecomb/core/encoding/morton.h"
 
 namespace wavecomb {
 

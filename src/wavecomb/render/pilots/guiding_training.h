@@ -13,7 +13,7 @@
 #include <optional>
 
 #include "wavecomb/core/settings.h"
-#include "wavecomb/guiding/field.h"
+#include "wavecomb/guiding/field/field.h"
 #include "wavecomb/guiding/image_tiles.h"
 #include "wavecomb/render/wave_setup.h"
 #include "wavecomb/scene/scene.h"

@@ -30,15 +30,9 @@ PilotResults run_pilots(const PilotInput& input, PilotCache& cache) {
   found.lights = cache.lights.get(input.scene, plan.accelerator, plan.view, input.light_settings,
                                   input.stopped);
   found.lights->tables.apply(view);
-  if (context.joins_light()) send_paths(*input.scene, view);
+  JointPilot::prepare(*input.scene, context);
   input.costs.start(context, plan.kernels, input.profile, input.halted);
-  if (plan.settings.joins_light() && plan.settings.light_aim) {
-    found.aiming = input.aiming;
-    if (!found.aiming)
-      found.aiming = std::make_shared<const LightAiming>(
-          learn_to_aim(context, *input.scene, plan.waves, input.stopped));
-    if (found.aiming->aim.count > 0) view.aim = &found.aiming->aim;
-  }
+  found.joint = JointPilot::run(*input.scene, plan.waves, input.joint, input.stopped, context);
   found.light_view = view;
   found.training = training_for(input, context, cache);
   if (found.training->field) found.guiding_view = view_of(*found.training);

@@ -4,12 +4,12 @@
 /// They run in this order, and each uses the results of those before:
 /// 1. light calibration: the contribution of each light to the image (light_calibration.h);
 /// 2. costs of materials (render_costs.h);
-/// 3. aiming: directions for light paths (light_aiming.h);
+/// 3. aiming: directions for light paths (light_paths/render/light_aiming.h);
 /// 4. training: where light comes from (guiding_training.h).
 /// Each returns its result with the seconds that it took and its statistics. Except for costs,
 /// which change no image, they depend only on counted samples of the whole image. Whether and how
 /// many light paths the render uses was decided before, by a pilot that compares whole renders
-/// (transport_choice.h).
+/// (light_paths/render/transport_choice.h).
 #pragma once
 
 #include <cstddef>
@@ -17,8 +17,9 @@
 #include <memory>
 #include <span>
 
-#include "wavecomb/guiding/field_view.h"
-#include "wavecomb/render/pilots/light_aiming.h"
+#include "wavecomb/guiding/field/field_view.h"
+#include "wavecomb/render/joint_transport.h"
+#include "wavecomb/render/pilots/guiding_training.h"
 #include "wavecomb/render/pilots/light_calibration.h"
 #include "wavecomb/render/pilots/training_cache.h"
 #include "wavecomb/render/render_plan.h"
@@ -36,7 +37,8 @@ struct PilotCache {
 /// Results of the pilots of one render.
 struct PilotResults {
   std::shared_ptr<const LightCalibration> lights;  ///< null if not calibrated yet
-  std::shared_ptr<const LightAiming> aiming;       ///< null if light paths are not aimed
+  /// Of the joint transport; may be null.
+  std::shared_ptr<const JointPilot::Result> joint;
   /// Never null; without a field before and unless it is trained.
   std::shared_ptr<const GuidingTraining> training = std::make_shared<const GuidingTraining>();
   LightView light_view;      ///< lights with calibrated weights, and aimed if they send paths
@@ -60,9 +62,8 @@ struct PilotInput {
   const Settings& light_settings;
   /// Packed training of an earlier render (packed_training()), which replaces training; or empty.
   std::span<const std::byte> learned;
-  /// Result of an earlier pilot render of the same image, which replaces learning to aim; may be
-  /// null.
-  std::shared_ptr<const LightAiming> aiming;
+  /// Result of the joint transport in an earlier pilot render of the same image; may be null.
+  std::shared_ptr<const JointPilot::Result> joint;
   std::function<bool()> stopped;  ///< whether to give up
   std::function<bool()> halted;   ///< whether to pause soon
 };

@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
+#include "wavecomb/light_paths/render/transport_choice.h"
 #include "wavecomb/path/statistics.h"
 #include "wavecomb/render/passes/allotment.h"
 #include "wavecomb/render/pilots/guiding_training.h"
-#include "wavecomb/render/pilots/transport_choice.h"
 #include "wavecomb/render/statistics/work_distribution.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/texture/tile_store.h"

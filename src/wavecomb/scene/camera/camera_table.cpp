@@ -7,8 +7,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "wavecomb/core/encoding/number_text.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/core/number_text.h"
 #include "wavecomb/geometry/mesh/motion.h"
 #include "wavecomb/scene/scene_checks.h"
 

@@ -15,28 +15,18 @@
 namespace wavecomb {
 
 // Defined in wave/stages/shade_batch.h and vertex.h.
-template <typename Bsdf, typename F, uint32_t kFeatures>
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Joint>
 void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                  uint32_t depth, size_t begin, size_t end);
-template <typename Bsdf, typename F, uint32_t kFeatures>
-VertexResult<F> shade_vertex(const Vertex<F, kFeatures>& v);
-// Defined in light_paths/stages/shade_light_batch.h and light_vertex.h.
-struct LightPathSetup;
-template <typename F>
-struct LightVertexResult;
-template <typename F>
-struct ConnectionTarget;
-template <typename Bsdf, typename F, uint32_t kFeatures>
-void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
-                       uint32_t depth, size_t begin, size_t end);
-template <typename Bsdf, typename F, uint32_t kFeatures>
-LightVertexResult<F> shade_light_vertex(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
-                                        const ConnectionTarget<F>* target);
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Joint>
+VertexResult<F> shade_vertex(const Vertex<F, kFeatures>& v,
+                             typename Joint::template Coupling<F>& joint);
 
 namespace detail {
 template <typename F>
 using BatchKernels =
-    std::array<decltype(&shade_batch<DiffuseBsdf<F>, F, kEverything>), kVariantCount>;
+    std::array<decltype(&shade_batch<DiffuseBsdf<F>, F, kEverything, JointTransport>),
+               kVariantCount>;
 
 /// Uses the kernel of a program for all its variants.
 template <typename Kernels>
@@ -52,7 +42,7 @@ inline constexpr bool kIsOfSurface =
 template <size_t kVariant, typename F>
 constexpr typename BatchKernels<F>::value_type plain_batch_kernel() {
   if constexpr (kIsOfSurface<kVariant>)
-    return &shade_batch<VariantBsdf<kVariant, F>, F, kPlain>;
+    return &shade_batch<VariantBsdf<kVariant, F>, F, kPlain, NoJointTransport>;
   else
     return nullptr;
 }
@@ -60,20 +50,15 @@ template <typename Bsdf, typename F>
 constexpr typename BatchKernels<F>::value_type general_batch_kernel() {
   constexpr size_t kProgram = id_of<Bsdf, F>();
   if constexpr (kProgram < kSurfaceProgramCount && !has_program_kernels(kProgram, kWidth<F>))
-    return &shade_batch<Program<static_cast<ProgramId>(kProgram), float>, float, kEverything>;
+    return &shade_batch<Program<static_cast<ProgramId>(kProgram), float>, float, kEverything,
+                        JointTransport>;
   else
-    return &shade_batch<Bsdf, F, kEverything>;
+    return &shade_batch<Bsdf, F, kEverything, JointTransport>;
 }
 template <typename F, typename... Bsdf>
 constexpr auto batch_kernels(ProgramList<Bsdf...>) {
   BatchKernels<F> kernels{};
   ((kernels[id_of<Bsdf, F>()] = general_batch_kernel<Bsdf, F>()), ...);
-  return for_variants(kernels);
-}
-template <typename F, typename... Bsdf>
-constexpr auto light_batch_kernels(ProgramList<Bsdf...>) {
-  BatchKernels<F> kernels{};
-  ((kernels[id_of<Bsdf, F>()] = &shade_light_batch<Bsdf, F, kEverything>), ...);
   return for_variants(kernels);
 }
 template <typename F, size_t... kVariant>
@@ -82,15 +67,9 @@ constexpr auto plain_batch_kernels(std::index_sequence<kVariant...>) {
 }
 template <typename F, typename... Bsdf>
 constexpr auto vertex_kernels(ProgramList<Bsdf...>) {
-  std::array<decltype(&shade_vertex<DiffuseBsdf<F>, F, kEverything>), kProgramCount> kernels{};
-  ((kernels[id_of<Bsdf, F>()] = &shade_vertex<Bsdf, F, kEverything>), ...);
-  return kernels;
-}
-template <typename F, typename... Bsdf>
-constexpr auto light_vertex_kernels(ProgramList<Bsdf...>) {
-  std::array<decltype(&shade_light_vertex<DiffuseBsdf<F>, F, kEverything>), kProgramCount>
+  std::array<decltype(&shade_vertex<DiffuseBsdf<F>, F, kEverything, JointTransport>), kProgramCount>
       kernels{};
-  ((kernels[id_of<Bsdf, F>()] = &shade_light_vertex<Bsdf, F, kEverything>), ...);
+  ((kernels[id_of<Bsdf, F>()] = &shade_vertex<Bsdf, F, kEverything, JointTransport>), ...);
   return kernels;
 }
 }  // namespace detail
@@ -101,11 +80,6 @@ template <typename F, typename List>
 inline constexpr auto kShadeBatch = detail::batch_kernels<F>(List{});
 template <typename F, typename List>
 inline constexpr auto kShadeVertex = detail::vertex_kernels<F>(List{});
-/// Kernels for light paths, for waves of any lane width.
-inline constexpr auto kShadeLightBatch =
-    detail::light_batch_kernels<LightLanes>(Programs<LightLanes>{});
-template <typename F>
-inline constexpr auto kShadeLightVertex = detail::light_vertex_kernels<F>(Programs<F>{});
 /// Plain kernels by variant. Only available if kHasPlain.
 template <typename F>
 inline constexpr auto kShadePlain =

@@ -6,7 +6,6 @@
 #include "wavecomb/aov/screen_motion.h"
 #include "wavecomb/core/rows/rows.h"
 #include "wavecomb/geometry/hit/hit_material.h"
-#include "wavecomb/light_paths/camera_connection.h"
 #include "wavecomb/path/media.h"
 #include "wavecomb/path/shading_record.h"
 #include "wavecomb/path/steps/emit.h"
@@ -16,21 +15,6 @@
 #include "wavecomb/wave/wave.h"
 
 namespace wavecomb {
-
-/// Initialises PathState::ratio of camera paths that have hit something.
-template <typename F>
-[[gnu::noinline, gnu::cold]] void begin_ratios(Wave& wave, const WaveContext& context,
-                                               const UInt<F>& slot, const Vec3<F>& o,
-                                               const Vec3<F>& d, const F& t,
-                                               const Mask<F>& active) {
-  F time(0.f);
-  if (context.camera->moves())
-    time = gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot, active);
-  scatter<F>(
-      wave.pool.ratio,
-      first_ratio<F>(*context.camera, context.light_path_share(), fma(d, t, o), d, time, active),
-      slot, active);
-}
 
 /// Returns the volume events that stopped the flights of a packet.
 template <typename F>
@@ -139,8 +123,8 @@ WAVECOMB_INLINE void load_arrival(const Wave& wave, const WaveContext& context, 
   p.state = path_state<F>(p.path, p.t);
   if (context.links() && depth > 0)
     p.state.link = gather_field<F>(pool.cold, &PathColdRow<float>::link, p.slot, wanted);
-  if (context.joins_light() && depth > 0)
-    unpack_ratio<F>(gather<F>(pool.ratio, p.slot, wanted), p.state);
+  if (context.joint.is_active() && depth > 0)
+    p.state.ratio = wave.joint.template ratio<F>(p.slot, wanted);
   if (pool.diffuse && depth > 0) [[unlikely]]
     p.state.diffuse = load_row<RadianceRow, F>(pool.diffuse, p.slot, wanted).sum;
   if (context.scene.lights.motions) [[unlikely]]
@@ -246,8 +230,8 @@ WAVECOMB_INLINE void note_surfaces(Wave& wave, const WaveContext& context, const
 }
 
 /// Reads the ray queue and the hit buffer, and fills the shading queue in the order of the rays.
-/// Light paths (`kFromLights`) contribute nothing where they end.
-template <typename F, typename Media, bool kFromLights = false>
+/// Paths of a joint transport (`kOfJoint`) contribute nothing where they end.
+template <typename F, typename Media, bool kOfJoint = false>
 void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settings, uint32_t depth,
              [[maybe_unused]] const Media& media) {
   using U = UInt<F>;
@@ -256,23 +240,25 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
   ShadingQueue& queue = wave.shading;
   const SceneView& scene = context.scene;
   const bool cost_aware = settings.cost_aware && depth >= settings.roulette_depth;
-  const bool is_first = !kFromLights && depth == 0;
+  const bool is_first = !kOfJoint && depth == 0;
   const bool records_hits = is_first && wave.aovs.wants_hits();
   queue.clear();
   size_t n = 0;
   for (size_t i = 0; i < wave.rays.size; i += kWidth<F>) {
     RayPacket<F> p(wave.rays, hits, i);
     Mask<F> wanted = Media::kAny || cost_aware ? p.active : Mask<F>(p.missed | p.shape);
-    if (kFromLights && !cost_aware) wanted = Mask<F>(false);
+    if (kOfJoint && !cost_aware) wanted = Mask<F>(false);
     [[maybe_unused]] Flight<F> flight;
     if (any(wanted)) {
       p.path = load_row<PathRow, F>(wave.pool.paths, p.slot, wanted);
       if constexpr (Media::kAny) flight = fly_packet<F>(wave, settings, depth, media, p);
       load_arrival<F>(wave, context, depth, wanted, p);
     }
-    if (!kFromLights) add_ended<F>(wave, context, settings, depth, p);
-    if (is_first && context.joins_light()) [[unlikely]]
-      begin_ratios<F>(wave, context, p.slot, p.o, p.d, p.t, p.surface);
+    if (!kOfJoint) add_ended<F>(wave, context, settings, depth, p);
+    if (is_first && context.joint.is_active()) [[unlikely]]
+      wave.joint.template begin_ratios<F>(context.joint, *context.camera, p.slot,
+                                          {p.end(), p.d, shutter_time<F>(wave, context, p)},
+                                          p.surface);
     if (is_first && scene.visibility) [[unlikely]]
       p.surface = p.surface & not_(is_holdout<F>(scene, p.inst, load<U>(hits.geom + i), p.surface));
     if (records_hits) note_shapes<F>(wave, context, p);
@@ -298,7 +284,7 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     if (cost_aware) {
       const F q =
           cost_aware_survival<F>(scene, *context.roulette_costs, material, p.state, p.surface);
-      if (!kFromLights) wave.aovs.survive<F>(depth, p.slot, q, p.surface);
+      if (!kOfJoint) wave.aovs.survive<F>(depth, p.slot, q, p.surface);
       p.surface = p.surface & (cost_aware_number<F>(p.path.key, depth) < q);
       p.path.throughput *= F(1.f) / q;
       if (none(recorded())) continue;

@@ -21,7 +21,6 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
   float* tfar = wave.shadows.tfar;  // unused until the first shading
   wave.aovs.clear(n);
   wave.history.clear(n);
-  if (wave.visible) wave.visible.clear(n);
   for (uint32_t i = 0; i < n; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(n - i);
     const U slot = lane_index<F>() + i;

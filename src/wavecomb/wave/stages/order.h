@@ -2,8 +2,8 @@
 /// Wave stage 3b: orders the shading queue by the scheduling policy.
 #pragma once
 
+#include "wavecomb/core/encoding/morton.h"
 #include "wavecomb/core/math.h"
-#include "wavecomb/core/morton.h"
 #include "wavecomb/core/rows/fields.h"
 #include "wavecomb/geometry/hit/uv.h"
 #include "wavecomb/material/description/variants.h"

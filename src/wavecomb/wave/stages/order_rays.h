@@ -3,7 +3,7 @@
 /// is the same under every shading policy.
 #pragma once
 
-#include "wavecomb/core/morton.h"
+#include "wavecomb/core/encoding/morton.h"
 #include "wavecomb/wave/wave.h"
 
 namespace wavecomb {

@@ -54,7 +54,6 @@ inline void resolve(const Wave& wave, const WaveContext& context, const WaveTask
     detail::add_rows(radiance, slot, end, sum);
     pixel = {sum[0], sum[1], sum[2], pixel.samples + task.samples};
     wave.aovs.resolve(film.aovs(), film.index(x, y), slot, end, radiance);
-    if (wave.visible) film.set_merge_point(film.index(x, y), wave.visible.row(end - 1));
     slot = end;
   }
 }

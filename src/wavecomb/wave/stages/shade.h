@@ -63,7 +63,7 @@ inline void spread_batch(Wave& wave, const WaveContext& context, size_t begin, s
 /// Returns whether plain kernels have all features that the scene and the settings use.
 inline bool is_plain(const WaveContext& context, const ShadeSettings& settings) {
   const SceneView& scene = context.scene;
-  return !context.joins_light() && !scene.has_motion && !scene.has_curves && !context.links() &&
+  return !context.joint.is_active() && !scene.has_motion && !scene.has_curves && !context.links() &&
          !scene.mesh_lights && !scene.lights.has_effects && !settings.cosine_sampling &&
          !settings.schlick_fresnel;
 }

@@ -10,19 +10,20 @@ namespace wavecomb {
 
 /// Runs the steps of a vertex. Packet kernels inline them; scalar kernels call the function of the
 /// reference integrator.
-template <typename Bsdf, typename F, uint32_t kFeatures>
-WAVECOMB_INLINE VertexResult<F> shade_one(const Vertex<F, kFeatures>& v) {
+template <typename Bsdf, typename Joint, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE VertexResult<F> shade_one(const Vertex<F, kFeatures>& v,
+                                          typename Joint::template Coupling<F>& joint) {
   if constexpr (kIsScalar<F>)
-    return shade_vertex<Bsdf, F>(v);
+    return shade_vertex<Bsdf, F, kFeatures, Joint>(v, joint);
   else
-    return vertex_steps<Bsdf, F>(v);
+    return vertex_steps<Bsdf, F>(v, joint);
 }
 
-/// Loads the state of the paths of a packet. `joins` is whether MIS weights include light paths.
+/// Loads the state of the paths of a packet.
 template <typename F, uint32_t kFeatures>
 WAVECOMB_INLINE PathState<F> load_state(const PathPool& pool, const WaveContext& context,
                                         const PathRow<F>& path, const ShadingRecord<F>& record,
-                                        uint32_t depth, bool joins, const Mask<F>& active) {
+                                        uint32_t depth, const Mask<F>& active) {
   using V = Vertex<F, kFeatures>;
   const UInt<F> slot = record.slot;
   PathState<F> state = path_state<F>(path, record.t);
@@ -32,8 +33,6 @@ WAVECOMB_INLINE PathState<F> load_state(const PathPool& pool, const WaveContext&
     state.diffuse = load_row<RadianceRow, F>(pool.diffuse, slot, active).sum;
   if (context.uses_pixel_importance()) [[unlikely]]
     state.importance = gather_field<F>(pool.cold, &PathColdRow<float>::importance, slot, active);
-  if (joins) [[unlikely]]
-    unpack_ratio<F>(gather<F>(pool.ratio, slot, active), state);
   if (V::has(kNestedMedia) && pool.medium_stacks) [[unlikely]] {
     state.outer = gather_field<F>(pool.medium_stacks, &MediumStackRow<float>::outer, slot, active);
     state.medium =
@@ -86,8 +85,8 @@ WAVECOMB_INLINE void store_rays(const PathPool& pool, const VertexResult<F>& v,
 
 /// Shades records [begin, end) of the shading order, all of variant `Bsdf`, one packet at a time.
 /// The next ray of a path overwrites its last ray in the pool, and outcomes are stored in arrival
-/// order.
-template <typename Bsdf, typename F, uint32_t kFeatures>
+/// order. `Joint` is the transport that may be combined with camera paths (path/joint_transport.h).
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Joint>
 void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                  uint32_t depth, size_t begin, size_t end) {
   using U = UInt<F>;
@@ -97,7 +96,6 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
   using V = Vertex<F, kFeatures>;
   const bool wants_aovs = V::has(kRecordsAovs) && wave.aovs.wants_vertex(depth);
   const bool is_watched = wants_aovs || (V::has(kRecordsAovs) && wave.history);
-  const bool joins = V::has(kJoined) && settings.joins_light;
   const bool links = V::has(kLinks) && context.links();
   for (size_t i = begin; i < end; i += kWidth<F>) {
     const RecordPacket<F> packet(queue, i, end);
@@ -109,14 +107,9 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
       hit.time = gather_field<F>(pool.cold, &PathColdRow<float>::time, slot, active);
     const auto path = load_row<PathRow, F>(pool.paths, slot, active);
     const F t = r.t;
-    const PathState<F> state =
-        load_state<F, kFeatures>(pool, context, path, r, depth, joins, active);
-    ConnectionOffer<F> offer;
-    const bool connects = joins && wave.light_vertices;
-    if (connects) [[unlikely]]
-      offer = offer_for<F>(wave.light_vertices, slot, depth, settings.max_depth, active);
-    MergePointOffer<F> visible;
-    const bool merges = joins && wave.visible;
+    PathState<F> state = load_state<F, kFeatures>(pool, context, path, r, depth, active);
+    typename Joint::template Coupling<F> joint(context.joint, wave.joint);
+    joint.load(slot, depth, settings.max_depth, active, state);
     const V vertex{context.scene,
                    settings,
                    path.key,
@@ -128,18 +121,9 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
                    state,
                    wants_aovs ? &aovs : nullptr,
                    active,
-                   context.guide,
-                   connects ? &offer : nullptr,
-                   merges ? &visible : nullptr};
-    const VertexResult<F> v = shade_one<Bsdf, F>(vertex);
-    if (merges && any(visible.stored)) [[unlikely]]
-      store_row<MergePoint, F>(wave.visible.rows, slot, visible.row, visible.stored);
-    if (connects) [[unlikely]] {
-      store_row<ConnectionRow, F>(wave.light_vertices.connections, slot, offer.row, active);
-      if (aovs.wants_events)
-        wave.light_aovs.offer<F>(slot, wave.aovs.expressions().template states<F>(slot, active),
-                                 offer.scattering, active);
-    }
+                   context.guide};
+    const VertexResult<F> v = shade_one<Bsdf, Joint>(vertex, joint);
+    joint.store(slot, v.next, v.alive, wave.aovs, active);
 
     const U light_id = add_emitted<F, kFeatures>(wave, v, path.key, slot, depth, aovs, active);
     if (is_watched) {
@@ -151,8 +135,6 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
     }
     packet.store(queue, v.alive, v.next.dir, v.has_shadow, v.shadow_d);
     store_rays<Bsdf, F, kFeatures>(pool, v, path.key, slot, light_id);
-    if (joins) [[unlikely]]
-      scatter<F>(pool.ratio, pack_ratio<F>(v.next), slot, v.alive);
     if (V::has(kNestedMedia) && pool.medium_stacks) [[unlikely]]
       scatter_field<F>(pool.medium_stacks, &MediumStackRow<float>::crossed, slot, v.crossed,
                        active);

@@ -23,10 +23,8 @@ from wavecomb.usd.materials.surface import Surface
 from wavecomb.usd.materialx.nodes.network import Networks
 
 if TYPE_CHECKING:
-    from wavecomb.usd.graphs.surface_parameters import Drivers
     from wavecomb.usd.materials.texture import TextureTable
     from wavecomb.usd.stage.report import LoadReport
-
 
 WHITE, PALE, BLACK = (1.0, 1.0, 1.0), (0.8, 0.8, 0.8), (0.0, 0.0, 0.0)
 

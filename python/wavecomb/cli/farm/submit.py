@@ -13,14 +13,12 @@ import click
 
 from wavecomb import processes
 from wavecomb.cli.command import SettingCommand
-from wavecomb.cli.farm_run import DASHBOARD, ON, run_job
-from wavecomb.cli.farm_tiles import check_options, job_of
-from wavecomb.cli.frames import frame_options
+from wavecomb.cli.farm.run import DASHBOARD, ON, run_job
+from wavecomb.cli.farm.tiles import check_options, job_of
 from wavecomb.cli.options import examples, isolation_options, stage_options
-from wavecomb.cli.planning import Asked, prepare
-from wavecomb.cli.render import picture_options
+from wavecomb.cli.render_options import RenderOptions, render_options
 from wavecomb.cli.sandbox import enter_to_read, enter_to_render
-from wavecomb.cli.setting_options import Real
+from wavecomb.cli.setting_options import Real, SizeType
 from wavecomb.errors import WavecombError
 
 _PLAN_S = 4 * 3600.0
@@ -37,7 +35,6 @@ _PLAN_S = 4 * 3600.0
     ),
 )
 @stage_options
-@frame_options
 @ON
 @click.option(
     "--tiles",
@@ -74,7 +71,7 @@ _PLAN_S = 4 * 3600.0
 )
 @DASHBOARD
 @click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
-@picture_options
+@render_options
 def submit_command(
     on: str, job: str | None, dashboard: int | None, as_json: bool, **options: Any
 ) -> None:
@@ -129,7 +126,9 @@ def ask_plan(request: dict[str, Any]) -> dict[str, Any]:
     Raises:
         WavecombError: The child reported an error, or did not finish in time.
     """
-    words = processes.command("wavecomb", "farm", "plan", json.dumps(request), parent=0)
+    words = processes.command(
+        "wavecomb", "farm", "plan", json.dumps(request, default=str), parent=0
+    )
     process = processes.popen(
         words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
@@ -169,16 +168,16 @@ def plan_command(text: str) -> None:
         name: request.pop(name)
         for name in ("tiles", "tries", "hang_s", "strict", "maps", "isa", "workers")
     }
-    asked = Asked.take(request)
-    enter_to_render(
-        asked.written(), asked.image, asked.output_dir, asked.frames, asked.source.frame,
-        split=asked.layers.split, gpu=False,
-    )  # fmt: skip
-    prepared = prepare(asked)
-    asked = prepared.asked
-    learned = prepared.learning.given
+    if isinstance(request["size"], str):
+        request["size"] = SizeType().convert(request["size"], None, None)
+    options = RenderOptions.parse(request)
+    enter_to_render(options, gpu=False)
+    from wavecomb.cli.planning import prepare
+
+    prepared = prepare(options)
+    learned = prepared.jobs[0].learning.given
     job = job_of(
-        prepared, asked, tries=own["tries"], hang_s=own["hang_s"], strict=own["strict"],
+        prepared, tries=own["tries"], hang_s=own["hang_s"], strict=own["strict"],
         maps=parse_maps(own["maps"]), isa=own["isa"],
     )  # fmt: skip
     job = complete(job, tiles=parse_tiles(own["tiles"]), workers=own["workers"], learned=learned)

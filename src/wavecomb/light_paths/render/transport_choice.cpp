@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/render/pilots/transport_choice.h"
+#include "wavecomb/light_paths/render/transport_choice.h"
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/light/kinds/record_builder.h"
+#include "wavecomb/light/records/record_builder.h"
 
 #include <cmath>
 

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Training samples from light paths, for aiming later light paths (light/emission/aim_targets.h).
+/// Training samples from light paths, for aiming later light paths
+/// (light_paths/aiming/aim_targets.h).
 #pragma once
 
 #include <vector>
 
 #include "wavecomb/core/vec.h"
-#include "wavecomb/light/emission/aim_targets.h"
+#include "wavecomb/light_paths/aiming/aim_targets.h"
 
 namespace wavecomb {
 

@@ -9,18 +9,20 @@ from __future__ import annotations
 import glob
 import os
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from wavecomb.cli.options import warn
-from wavecomb.cli.planning import Asked, Prepared
-from wavecomb.cli.size import is_png
+from wavecomb.cli.render_options import RenderOptions
+from wavecomb.cli.sandbox import enter_to_render
 from wavecomb.errors import WavecombError
 from wavecomb.run.guiding_file import BEFORE
 
 if TYPE_CHECKING:
+    from wavecomb.cli.planning import Prepared
     from wavecomb.farm.job import Job
 
 _TILE = "tile-{}-of-{}"
@@ -44,17 +46,17 @@ def tile_names(output: str) -> list[str]:
     return sorted(name for name in found if end.fullmatch(name))
 
 
-def check_options(options: dict[str, Any], what: str = "a farm") -> None:
+def check_options(options: Mapping[str, Any], what: str = "a farm") -> None:
     """Raises WavecombError for options of ``render`` that do not apply to a farm.
 
     Args:
-        options: Arguments of the command.
+        options: Values of the options.
         what: Name of the feature that lacks them, for the message.
     """
     learn_from = options["learn_from"] if options["learn_from"] == BEFORE else None
     for option, given, instead in (
-        ("--checkpoint", options["checkpoint"], "finished tiles are kept"),
         ("--resume", options["resume"], "`wavecomb farm resume` continues a job"),
+        ("--checkpoint", options["checkpoint"], "finished tiles are kept"),
         ("--preview", options["preview"], "`wavecomb farm status` shows how far a job is"),
         ("--learn-from", learn_from, "frames are rendered in any order; give a file"),
         ("--learn-to", options["learn_to"],
@@ -67,20 +69,20 @@ def check_options(options: dict[str, Any], what: str = "a farm") -> None:
             raise WavecombError(f"{option}: is not for {what}: {instead}")
 
 
-def check_tile(text: str, options: dict[str, Any]) -> tuple[int, int]:
+def _check_tile(text: str, options: RenderOptions) -> tuple[int, int]:
     """Parses --tile to (index, count). Raises WavecombError if other options contradict it."""
     from wavecomb.farm.tiling import parse_tile
 
     if text.isdecimal():
         raise WavecombError(f"--tile {text}: must be I/N; tiles inside the file are --exr-tile")
     found = parse_tile(text)
-    check_options(options, "--tile")
-    if options["output"] is None or is_png(options["output"]):
+    check_options(vars(options), "--tile")
+    if options.output is None:
         raise WavecombError("--tile: needs -o FILE.exr, because the tile is written beside it")
     return found
 
 
-def job_of(prepared: Prepared, asked: Asked, **more: Any) -> Job:
+def job_of(prepared: Prepared, **more: Any) -> Job:
     """Builds a farm job from a command's options, still without tiles and files.
 
     Raises:
@@ -89,39 +91,42 @@ def job_of(prepared: Prepared, asked: Asked, **more: Any) -> Job:
     from wavecomb.farm.job import Job
     from wavecomb.farm.planning import shot_of
 
-    if asked.costs_file is not None:
+    options = prepared.options
+    if options.costs is not None:
         raise WavecombError(
             "--costs: is not for a farm: all workers would write the file; give --costs model"
         )
     shots, images = [], []
-    for index, (plan, numbers, job) in enumerate(prepared.jobs):
-        source = plan.source(prepared.source)
-        names = plan.names
-        if names.output is None:
-            raise WavecombError(f"{names.image}: a farm writes EXR files; give -o FILE.exr")
+    for index, job in enumerate(prepared.jobs):
+        here = job.options
+        if here.output is None:
+            raise WavecombError(f"{here.image}: a farm writes EXR files; give -o FILE.exr")
+        loading = {name: value for name, value in job.loading.items() if name != "frame"}
         shots.append(
             shot_of(
-                job.settings.to_dict(), job.aovs, source.for_load(None), names.output, names.png,
-                names.stats,
+                job.settings.to_dict(), job.aovs, loading, here.output, here.png, here.stats_file
             )
-        )  # fmt: skip
-        for frame in (source.frame,) if numbers is None else numbers:
-            here = names if numbers is None else names.at(frame or 0.0)
-            if not (asked.skip_existing and all(map(os.path.exists, here.all()))):
+        )
+        for frame in (here.source.values["frame"],) if job.frames is None else job.frames:
+            filled = here if job.frames is None else here.at(frame or 0.0)
+            if not (options.skip_existing and filled.exist()):
                 images.append((index, frame))
     return Job(
-        stage=asked.stage, folder=os.getcwd(), shots=tuple(shots), images=tuple(images),
-        file=asked.layers.file_options(), exposure=asked.exposure, tone_map=asked.tone_map,
-        denoise=asked.purpose.denoise, costs=prepared.jobs[0][2].profile, **more,
+        stage=options.stage, folder=os.getcwd(), shots=tuple(shots), images=tuple(images),
+        file=options.file_options(), exposure=options.exposure, tone_map=options.tone_map,
+        denoise=options.denoise, costs=prepared.jobs[0].profile, **more,
     )  # fmt: skip
 
 
-def render_tile(prepared: Prepared, asked: Asked, tile: tuple[int, int]) -> list[str]:
-    """Renders tile I of N of each frame to a file beside the image, and returns the file names.
+def render_tile(options: RenderOptions, tile: str) -> None:
+    """Renders tile I/N of each frame to a file beside the image.
 
     Raises:
         WavecombError: A farm cannot render this stage.
     """
+    index, count = _check_tile(tile, options)
+    enter_to_render(options, [tile_name(str(options.output), index, count)])
+    from wavecomb.cli.planning import prepare
     from wavecomb.farm.job import Task
     from wavecomb.farm.machine_class import machine_class
     from wavecomb.farm.planning import complete
@@ -129,13 +134,15 @@ def render_tile(prepared: Prepared, asked: Asked, tile: tuple[int, int]) -> list
     from wavecomb.farm.tiling import layout
     from wavecomb.image.files.output_file import replacing
 
-    index, count = tile
-    learned = prepared.learning.given
-    job = job_of(prepared, asked)
+    prepared = prepare(options)
+    learned = prepared.jobs[0].learning.given
+    job = job_of(prepared)
     if len(job.shots) > 1:
         raise WavecombError("--tile: the stage has several render products; give --product")
     if not job.images:
-        return []
+        if not options.quiet:
+            click.echo("all images exist")
+        return
     job = complete(job, tiles=layout(count, job.shots[0].region), learned=learned)
     renderer, written = Renderer(job, learned=learned), []
     for image in range(len(job.images)):
@@ -145,7 +152,8 @@ def render_tile(prepared: Prepared, asked: Asked, tile: tuple[int, int]) -> list
         )
         written.append(name)
     warn(list(renderer.warnings))
-    return written
+    if not options.quiet:
+        click.echo(f"wrote {', '.join(written)}")
 
 
 def assemble_tiles(output: str) -> list[str]:
@@ -204,12 +212,3 @@ def assemble_tiles(output: str) -> list[str]:
     for name in wanted:
         os.unlink(name)
     return written
-
-
-TILE = click.option(
-    "--tile",
-    "part",
-    metavar="I/N",
-    help="Render only tile I of N, to NAME.tile-I-of-N.exr, for `wavecomb farm assemble "
-    "NAME.exr` to join.",
-)

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/guiding/field_arrays.h"
+#include "wavecomb/guiding/field/field_arrays.h"
 
 #include <algorithm>
 #include <cmath>
 #include <span>
 
 #include "wavecomb/core/error.h"
-#include "wavecomb/guiding/field_view.h"
+#include "wavecomb/guiding/field/field_view.h"
 
 namespace wavecomb {
 namespace {

@@ -23,8 +23,8 @@
 #include <vector>
 
 #include "wavecomb/core/vec3.h"
-#include "wavecomb/guiding/field_arrays.h"
-#include "wavecomb/guiding/field_view.h"
+#include "wavecomb/guiding/field/field_arrays.h"
+#include "wavecomb/guiding/field/field_view.h"
 #include "wavecomb/guiding/roulette.h"
 #include "wavecomb/guiding/training_sample.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/film/error_map.h"
+#include "wavecomb/film/error/error_map.h"
 
 #include <algorithm>
 #include <array>

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/guiding/field.h"
+#include "wavecomb/guiding/field/field.h"
 
 #include <algorithm>
 #include <cmath>
 #include <memory>
 #include <numeric>
 
-#include "wavecomb/core/morton.h"
+#include "wavecomb/core/encoding/morton.h"
 #include "wavecomb/guiding/lookup.inl"
 #include "wavecomb/guiding/mixing_fractions.h"
 #include "wavecomb/guiding/region_directions.h"

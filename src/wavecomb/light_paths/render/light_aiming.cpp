@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/render/pilots/light_aiming.h"
+#include "wavecomb/light_paths/render/light_aiming.h"
 
 #include <algorithm>
 #include <memory>
 
 #include "wavecomb/core/clock.h"
 #include "wavecomb/film/filter.h"
-#include "wavecomb/light/emission/aim_samples.h"
+#include "wavecomb/light_paths/aiming/aim_samples.h"
 #include "wavecomb/light_paths/setup.h"
 #include "wavecomb/render/inspection/picking.h"
 #include "wavecomb/render/lane_kernels.h"
@@ -65,7 +65,7 @@ LightAiming learn_to_aim(const WaveContext& render, const Scene& scene, const Wa
       make_light_splat_filter(*render.camera, filter, settings.rendered());
   WaveContext context = render;
   context.settings = &settings;
-  context.light_splat_filter = &light_splat_filter;
+  context.joint.filter = &light_splat_filter;
   context.recorder = nullptr;
   const uint64_t numbers = uint64_t{settings.width} * settings.height;
   const uint64_t count = std::clamp(numbers / kAimShare, kMinAimPaths, kMaxAimPaths);
@@ -75,7 +75,7 @@ LightAiming learn_to_aim(const WaveContext& render, const Scene& scene, const Wa
   out.aim = aim_at_visible(scene, *context.accel, settings, context.scene.lights.radius);
   for (uint32_t round = 0; round < kAimRounds; ++round) {
     AimSamples aim_samples(count);
-    context.aim_samples = &aim_samples;
+    context.joint.aim_samples = &aim_samples;
     context.scene.lights.aim = out.aim.count > 0 ? &out.aim : nullptr;
     runner.run(first_paths(settings, count, round), stopped, true);
     if (stopped()) return {};
@@ -84,6 +84,21 @@ LightAiming learn_to_aim(const WaveContext& render, const Scene& scene, const Wa
   }
   out.seconds = seconds_since(start);
   return out;
+}
+
+void LightPathPilot::prepare(const Scene& scene, WaveContext& context) {
+  if (context.joint.is_active()) send_paths(scene, context.scene.lights);
+}
+
+std::shared_ptr<const LightAiming> LightPathPilot::run(
+    const Scene& scene, const WaveSetup& waves, const std::shared_ptr<const LightAiming>& earlier,
+    const std::function<bool()>& stopped, WaveContext& context) {
+  if (!context.joint.is_active() || !context.settings->light_aim) return nullptr;
+  auto aiming =
+      earlier ? earlier
+              : std::make_shared<const LightAiming>(learn_to_aim(context, scene, waves, stopped));
+  if (aiming->aim.count > 0) context.scene.lights.aim = &aiming->aim;
+  return aiming;
 }
 
 }  // namespace wavecomb

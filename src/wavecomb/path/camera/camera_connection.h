@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Connections of light paths to the camera: the film position of a point, and the density with
-/// which camera paths find it.
+/// Connections of points to the camera: the film position of a point, and the density with which
+/// camera paths find it.
 ///
 /// With M the linear part of the camera-to-world transform, a point at depth s is p = o + s M d',
 /// where d' = (x, y, -1) and o is a point on the lens (for an orthographic camera, on its plane). A
@@ -8,7 +8,7 @@
 /// Directions from o thus have the density |M d'|^3 / (|det M| A) over solid angle, and a surface
 /// at p, viewed at an angle with cosine cos, has the density G cos over its area, with
 ///   G = |M d'| / (|det M| A s^2);   orthographic:   |M d'| / (|det M| A).
-/// Camera paths and light paths sample the lens uniformly, so its density cancels. For a latlong
+/// Camera rays and connections sample the lens uniformly, so its density cancels. For a latlong
 /// camera d' is a unit vector, and a pixel covers the solid angle cos(latitude) A, so
 ///   G = |M d'| / (|det M| A s^2 cos(latitude)).
 #pragma once
@@ -74,13 +74,6 @@ inline F inverse_camera_density(const CameraSetup& camera, const F& time, const 
   }
   const F inverse = 1.f / camera_density<F>(camera, space.det, stretch, s, spread);
   return select(is_finite(inverse) & (s > 0.f) & (stretch > 0.f), inverse, F(0.f));
-}
-
-/// Returns PathState::ratio at p, the hit of a camera ray along d: N / G. `share` is 1 / N.
-template <typename F>
-inline F first_ratio(const CameraSetup& camera, float share, const Vec3<F>& p, const Vec3<F>& d,
-                     const F& time, const Mask<F>& active) {
-  return inverse_camera_density<F>(camera, time, p, d, active) * (1.f / share);
 }
 
 /// Connection of a point to the lens of the camera.

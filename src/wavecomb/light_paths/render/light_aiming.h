@@ -9,9 +9,10 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 
 #include "wavecomb/light/description/aim.h"
-#include "wavecomb/render/pilots/guiding_training.h"
+#include "wavecomb/render/wave_setup.h"
 #include "wavecomb/wave/wave.h"
 
 namespace wavecomb {
@@ -27,5 +28,18 @@ struct LightAiming {
 /// `stopped` returns true; the result is then invalid.
 LightAiming learn_to_aim(const WaveContext& context, const Scene& scene, const WaveSetup& waves,
                          const std::function<bool()>& stopped);
+
+/// Pilot of light paths, which run_pilots() calls (render/joint_transport.h).
+struct LightPathPilot {
+  using Result = LightAiming;
+  /// Makes the lights of `context` emit light paths, if the render has any.
+  static void prepare(const Scene& scene, WaveContext& context);
+  /// Learns to aim, unless `earlier` is the result of an earlier pilot, and aims the lights of
+  /// `context`, which must not outlive the result. Returns null if light paths are not aimed.
+  static std::shared_ptr<const LightAiming> run(const Scene& scene, const WaveSetup& waves,
+                                                const std::shared_ptr<const LightAiming>& earlier,
+                                                const std::function<bool()>& stopped,
+                                                WaveContext& context);
+};
 
 }  // namespace wavecomb

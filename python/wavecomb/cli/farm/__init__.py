@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from wavecomb.cli.farm_run import DASHBOARD, ON, how_far, run_job
-from wavecomb.cli.farm_submit import ask_plan, plan_command, submit_command
-from wavecomb.cli.farm_tiles import assemble_tiles
+from wavecomb.cli.farm.run import DASHBOARD, ON, how_far, run_job
+from wavecomb.cli.farm.submit import ask_plan, plan_command, submit_command
+from wavecomb.cli.farm.tiles import assemble_tiles
 from wavecomb.cli.options import examples
 from wavecomb.errors import WavecombError
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/light/emission/aim_targets.h"
+#include "wavecomb/light_paths/aiming/aim_targets.h"
 
 #include <algorithm>
 #include <array>

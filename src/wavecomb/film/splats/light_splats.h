@@ -14,7 +14,7 @@
 #include <span>
 #include <vector>
 
-#include "wavecomb/core/fixed_point.h"
+#include "wavecomb/core/encoding/fixed_point.h"
 
 namespace wavecomb {
 

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Data of light paths that one worker needs.
+#pragma once
+
+#include "wavecomb/aov/aov_tables.h"
+#include "wavecomb/core/rows/soa.h"
+#include "wavecomb/film/film.h"
+#include "wavecomb/light_paths/context.h"
+#include "wavecomb/light_paths/light_path_aovs.h"
+#include "wavecomb/light_paths/light_vertices.h"
+#include "wavecomb/light_paths/merge_point.h"
+#include "wavecomb/path/camera/camera_connection.h"
+#include "wavecomb/path/joint_transport.h"
+
+namespace wavecomb {
+
+/// Purpose of shading the vertices of light paths.
+enum class LightVertexUse : uint8_t {
+  kToCamera,  ///< connect them to the camera
+  kStore,     ///< connect them to the camera and store them
+  kConnect,   ///< connect the stored ones to the camera paths in the same slots
+};
+
+/// Light paths of a worker, and their couplings to its camera paths: the Buffers of a joint
+/// transport (path/joint_transport.h). Everything is empty in renders without light paths.
+///
+/// Contract: owned by one wave, or one reference integrator. Slots must be below `capacity`.
+struct LightPathBuffers {
+  LightPathBuffers(size_t capacity, const LightPathContext& context, const AovLayout& layout,
+                   const AovTables* tables)
+      : splats(context.is_active() ? kSplats : 0),
+        vertices(context.connects ? capacity : 0),
+        merge_points(context.merges() ? capacity : 0),
+        aovs(context.is_active() ? LightPathAovs(capacity, layout, tables, context.connects)
+                                 : LightPathAovs()),
+        ratio_block_(context.is_active() ? SoaBlock(1, capacity) : SoaBlock()) {
+    if (context.is_active()) ratios = ratio_block_.floats(0);
+  }
+  static constexpr size_t kSplats = 4096;  ///< size of the buffer of light splats
+
+  LightSplatList splats;
+  LightVertices vertices;       ///< of light paths, and their connections
+  MergePointRows merge_points;  ///< of camera paths
+  LightPathAovs aovs;
+  LightVertexUse use = LightVertexUse::kToCamera;
+  /// By slot of a camera path: its ratio R (PathState::ratio), or -1 if it awaits a merge.
+  float* ratios = nullptr;
+
+  /// Starts the ratio R of the camera paths in `slot` at their first hits: N / G (join.h).
+  template <typename F>
+  [[gnu::noinline, gnu::cold]] void begin_ratios(const LightPathContext& context,
+                                                 const CameraSetup& camera, const UInt<F>& slot,
+                                                 const FirstHit<F>& hit,
+                                                 const Mask<F>& active) const {
+    const F ratio =
+        inverse_camera_density<F>(camera, hit.time, hit.p, hit.dir, active) * (1.f / context.share);
+    scatter<F>(ratios, ratio, slot, active);
+  }
+  /// Returns the ratio R of camera paths.
+  template <typename F>
+  F ratio(const UInt<F>& slot, const Mask<F>& active) const {
+    return max(gather<F>(ratios, slot, active), F(0.f));
+  }
+  size_t bytes() const {
+    return splats.bytes() + vertices.bytes() + merge_points.bytes() + aovs.bytes() +
+           ratio_block_.bytes();
+  }
+
+ private:
+  SoaBlock ratio_block_;
+};
+
+}  // namespace wavecomb

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Data of light paths that all waves of a render read.
+#pragma once
+
+#include "wavecomb/core/settings.h"
+#include "wavecomb/film/splats/light_splat_filter.h"
+#include "wavecomb/path/camera/camera_ray.h"
+
+namespace wavecomb {
+
+class AimSamples;
+class MergeGrid;
+
+/// Light paths of a render: the Context of a joint transport (path/joint_transport.h). The default
+/// is a render without light paths.
+struct LightPathContext {
+  LightPathContext() = default;
+  /// `paths_per_sample` is the number of light paths per camera path, averaged over the image.
+  /// `grid` holds the points to merge light paths with, or is null.
+  LightPathContext(const Settings& settings, const LightSplatFilter& filter, float paths_per_sample,
+                   const MergeGrid* grid)
+      : filter(&filter),
+        grid(grid),
+        connects(settings.connects()),
+        share(1.f / (static_cast<float>(settings.width) * static_cast<float>(settings.height) *
+                     paths_per_sample)),
+        merge_scale(grid ? settings.merge_radius / kConeShare : 0.f) {}
+
+  const LightSplatFilter* filter = nullptr;  ///< of connections to the camera; null: no light paths
+  const MergeGrid* grid = nullptr;           ///< points to merge with; null without merging
+  /// Receives the contributions of light paths instead of the film, unless null.
+  AimSamples* aim_samples = nullptr;
+  bool connects = false;  ///< whether vertices of camera paths connect to vertices of light paths
+  float share = 1;        ///< 1 / N, where N is the number of light paths in the image per sample
+  float merge_scale = 0;  ///< merge radius divided by the width of the path's ray cone
+  /// Not 0 in some pilot renders: light splats then carry, instead of light, the variance that this
+  /// light would add to a sample of a pixel if camera paths had to find it, divided by this
+  /// brightness (light_vertex.h). 0 means that splats carry light.
+  float camera_squares = 0;
+
+  /// Returns whether the render has light paths.
+  bool is_active() const { return filter != nullptr; }
+  /// Returns whether light paths are merged with points of camera paths.
+  bool merges() const { return grid != nullptr; }
+};
+
+}  // namespace wavecomb

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+/// State that light paths carry from vertex to vertex.
+#pragma once
+
+#include <cstddef>
+
+#include "wavecomb/core/rows/fields.h"
+#include "wavecomb/path/path_pool.h"
+#include "wavecomb/path/path_state.h"
+
+namespace wavecomb {
+
+/// State of a light path at a vertex, in addition to its PathState.
+template <typename F>
+struct LightPathState {
+  F mis_sum{0.f};     ///< the sum S of the MIS weight (light_vertex.h)
+  F bounce_pdf{0.f};  ///< density of the previous bounce; 0 if its vertex cannot be connected
+  UInt<F> light{0u};  ///< light that the path left
+};
+
+/// Light path between two vertices, in the same slots as camera paths.
+template <typename F>
+struct LightPathRow {
+  Vec3<F> o, d;         ///< the ray to trace
+  Color<F> throughput;  ///< flux
+  F mis_sum;            ///< LightPathState::mis_sum
+  F eta_scale;
+  F unused;
+  F bounce_pdf;  ///< LightPathState::bounce_pdf
+  SampleKey<F> key;
+  UInt<F> light;  ///< LightPathState::light
+  WAVECOMB_FIELDS(o, d, throughput, mis_sum, eta_scale, unused, bounce_pdf, key, light)
+
+  LightPathState<F> light_state() const { return {mis_sum, bounce_pdf, light}; }
+};
+
+// Stages that trace rays and draw random numbers treat both kinds of paths alike.
+static_assert(kFieldWords<LightPathRow> == kFieldWords<PathRow>);
+static_assert(offsetof(LightPathRow<float>, throughput) == offsetof(PathRow<float>, throughput) &&
+              offsetof(LightPathRow<float>, eta_scale) == offsetof(PathRow<float>, eta_scale) &&
+              offsetof(LightPathRow<float>, key) == offsetof(PathRow<float>, key));
+
+/// Returns the row of a light path whose next ray is that of `next`.
+template <typename F>
+WAVECOMB_INLINE LightPathRow<F> light_path_row(const PathState<F>& next,
+                                               const LightPathState<F>& light,
+                                               const SampleKey<F>& key) {
+  return {.o = next.o,
+          .d = next.dir,
+          .throughput = next.throughput,
+          .mis_sum = light.mis_sum,
+          .eta_scale = next.eta_scale,
+          .unused = F(0.f),
+          .bounce_pdf = light.bounce_pdf,
+          .key = key,
+          .light = light.light};
+}
+
+}  // namespace wavecomb

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Light paths of a render: the part of its plan and of its passes (render/joint_transport.h).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "wavecomb/core/settings.h"
+#include "wavecomb/film/error/error_map.h"
+#include "wavecomb/film/film.h"
+#include "wavecomb/film/splats/light_splat_filter.h"
+#include "wavecomb/light_paths/context.h"
+#include "wavecomb/light_paths/merge_grid.h"
+#include "wavecomb/light_paths/setup.h"
+#include "wavecomb/render/passes/pass_plan.h"
+#include "wavecomb/scene/scene.h"
+
+namespace wavecomb {
+
+struct LightAiming;
+struct RenderStatistics;
+
+/// Light paths of a render plan. Empty if the settings ask for none.
+///
+/// Contract: scene and settings outlive the plan, and the plan outlives the contexts made from it.
+class LightPathPlan {
+ public:
+  /// `filter` is the pixel filter of the camera. Throws Error if the scene does not support light
+  /// paths that the settings ask for.
+  LightPathPlan(const Scene& scene, const Settings& settings, LightPathShare share,
+                const CameraSetup& camera, const FilterTable& filter);
+
+  /// Returns the samples per pixel of a pass that would have `samples` without light paths.
+  static uint32_t pass_samples(const Settings& settings, uint32_t samples);
+  /// Adds the layers of light paths to an empty film.
+  void allocate(Film& film) const;
+  /// Creates the data that the waves of the render read. `grid` is from LightPathPasses.
+  LightPathContext context(const MergeGrid* grid) const;
+  LightPathShare share() const { return share_; }
+  /// Makes light splats carry LightPathContext::camera_squares from now on.
+  void measure_squares(LightPathContext& context) const;
+  /// Adds the statistics of light paths. `aiming` is null if they are not aimed.
+  void report(const LightAiming* aiming, RenderStatistics& statistics) const;
+
+ private:
+  const Scene& scene_;
+  const Settings& settings_;
+  LightPathShare share_;
+  LightSplatFilter filter_;
+  std::vector<std::string> lights_without_paths_;  ///< if other lights emit light paths
+};
+
+/// Returns the number of samples of each light path at the end of a pass.
+///
+/// `done` is the number of samples of light paths so far. `before` and `after` are the samples of
+/// pixels at the start and the end of the pass. `share` is the largest number of samples of light
+/// paths, from the ratio of the two kinds of paths that the render uses. `active_share` is |A| / P
+/// below.
+///
+/// A pass traces |A| (after - before) paths from the |A| active pixels, and P paths for each sample
+/// of the P light paths. With n samples of pixels, m of light paths and the variances V_c and V_l
+/// of one sample, the error V_c / n + V_l / m is least for a given cost where
+///   m / n = sqrt(V_l |A| / (V_c P)).
+/// Both variances are estimated from half buffers over the active pixels. `share` is the limit
+/// because more samples of one kind would need other MIS weights. Only earlier passes decide, so
+/// the image stays unbiased.
+uint32_t light_samples_after(const NoiseParts& noise, uint32_t done, uint32_t before,
+                             uint32_t after, uint32_t share, double active_share);
+
+/// Light paths of the passes of a render. A pass traces them after its camera paths.
+///
+/// Contract: one thread at a time.
+class LightPathPasses {
+ public:
+  explicit LightPathPasses(const LightPathPlan& plan, const Settings& settings);
+
+  /// Returns the points to merge light paths with, for LightPathPlan::context(), or null.
+  const MergeGrid* grid() const { return grid_.get(); }
+  /// Returns the samples of each light path when pixels have `samples`.
+  uint32_t samples(uint32_t samples) const { return share_.samples(samples); }
+  /// Returns the samples of each light path after a pass of an adaptive render. `done` and
+  /// `light_done` are the samples of pixels and of light paths before it, `pass` has its active
+  /// pixels, `active` of them, and their target.
+  uint32_t adaptive_samples(const Film& film, const PassState& pass, uint32_t done,
+                            uint32_t light_done, uint64_t active) const;
+  /// Plans the light paths that a pass still has to trace, up to `target` samples of each. Empty if
+  /// the render has none.
+  PassPlan plan(const Film& film, uint32_t target) const;
+  /// Prepares the light paths of a pass, whose camera paths are finished.
+  void begin(const Film& film);
+
+ private:
+  const Settings& settings_;
+  LightPathShare share_;
+  std::vector<uint32_t> order_;  ///< Morton order of light path numbers
+  std::unique_ptr<MergeGrid> grid_;
+};
+
+}  // namespace wavecomb
