@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reduced images without noise, shown during movements and before the first samples."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.errors import WavecombError
+from wavecomb.gui.viewport.frames import Array, Frame
+
+SCALES = (1, 2, 3, 4, 6, 8, 12)
+
+
+def reduced_scale(pixels: int, rate: float, overhead: float, limit: float) -> int:
+    """Returns the smallest reduction that renders one sample per pixel within a time limit.
+
+    Args:
+        pixels: Pixels of the full image.
+        rate: Samples per second; 0 if unknown.
+        overhead: Constant time of a render, in seconds.
+        limit: Time limit in seconds.
+
+    >>> reduced_scale(1_000_000, 2_000_000.0, 0.01, 0.06)
+    4
+    """
+    if rate <= 0.0:
+        rate = 300_000.0
+    for scale in SCALES:
+        if overhead + pixels / scale**2 / rate <= limit:
+            return scale
+    return SCALES[-1]
+
+
+def smooth(frame: Frame, back: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Returns the beauty of a reduced image without noise.
+
+    It is denoised or, without Open Image Denoise, shaded by the first hits.
+
+    Args:
+        frame: A frame with guide layers.
+        back: Unit vector opposite to the view direction.
+    """
+    from wavecomb.image.denoise import denoise
+
+    albedo, normal = frame.layers["guide_albedo"], frame.layers["guide_normal"]
+    try:
+        return denoise(frame.beauty, albedo, normal, threads=frame.setup.threads, fast=True)
+    except WavecombError:
+        return by_first_hit(frame.beauty, albedo, normal, back)
+
+
+def by_first_hit(beauty: Array, albedo: Array, normal: Array, back: Array) -> NDArray[np.float32]:
+    """Returns an image of the first hits, lit by a headlight of the beauty's mean brightness."""
+    lit = np.clip(albedo, 0.0, 1.0) * (0.3 + 0.7 * np.abs(normal @ back))[:, :, None]
+    hit = np.linalg.norm(normal, axis=2) > 0.5
+    if not hit.any():
+        return beauty
+    wanted, have = np.clip(beauty[hit], 0.0, 4.0).mean(), lit[hit].mean()
+    lit *= wanted / max(have, 1e-6)
+    return np.where(hit[:, :, None], lit, beauty).astype(np.float32)
+
+
+def enlarged(image: Array, width: int, height: int) -> Array:
+    """Enlarges an image to (height, width, ...), with bilinear interpolation."""
+    out = np.asarray(image, np.float32)
+    for axis, size in ((0, height), (1, width)):
+        count = out.shape[axis]
+        at = np.clip((np.arange(size) + 0.5) * count / size - 0.5, 0.0, count - 1)
+        low = at.astype(int)
+        weight = (at - low).astype(np.float32).reshape(-1, *(1,) * (out.ndim - axis - 1))
+        high = np.minimum(low + 1, count - 1)
+        out = out.take(low, axis) * (1.0 - weight) + out.take(high, axis) * weight
+    return out
+
+
+def filled(frame: Frame, preview: Frame | None) -> Frame:
+    """Returns a frame whose pixels without samples hold the reduced image.
+
+    Its denoised image is also the reduced one until each pixel has a sample.
+    """
+    if preview is None or frame.is_complete:
+        return frame
+    whole = enlarged(preview.beauty, frame.width, frame.height)
+    holes = frame.layers["samples"][:, :, None] == 0
+    beauty = np.where(holes, whole, frame.beauty)
+    return replace(frame, beauty=beauty, denoised=whole if frame.setup.denoise else None)

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Denoising of a live render: only complete frames, no late results, no noise in previews."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wavecomb.gui.setup import Setup
+from wavecomb.gui.viewport.frames import Frame
+from wavecomb.gui.viewport.live import LATE
+from wavecomb.gui.viewport.previews import by_first_hit, enlarged, filled
+
+
+class SlowDenoiser:
+    """A denoiser whose first result comes late, and whose pixels state the samples of its input."""
+
+    def __init__(self):
+        self.inputs = []
+        self.hold = threading.Event()
+
+    def __call__(self, frame):
+        self.inputs.append(frame)
+        if len(self.inputs) == 1:
+            self.hold.wait(20.0)
+        time.sleep(0.05)
+        return frame, np.full(frame.beauty.shape, frame.samples_done, np.float32)
+
+
+def test_a_slow_denoiser_never_shows_incomplete_or_late_images(
+    new_session, qtbot, cornell, monkeypatch, final
+):
+    denoiser = SlowDenoiser()
+    monkeypatch.setattr("wavecomb.gui.viewport.live.denoised_frame", denoiser)
+    session = new_session(width=160, height=160, spp=64, denoise=True)
+    shown = []
+    session.frame.connect(shown.append)
+    session.open(cornell)
+    qtbot.waitUntil(lambda: bool(denoiser.inputs), timeout=20000)
+    first = denoiser.inputs[0]
+    qtbot.waitUntil(lambda: session.last_frame.samples_done > LATE * first.samples_done)
+    denoiser.hold.set()
+    last = final(session)
+    total = last.samples_done
+    qtbot.waitUntil(
+        lambda: (
+            session.last_frame.denoised is not None and session.last_frame.denoised.min() == total
+        ),
+        timeout=20000,
+    )
+    assert all(frame.is_complete and frame.layers["samples"].min() > 0 for frame in denoiser.inputs)
+    by_denoiser = [f for f in shown if f.denoised is not None and np.ptp(f.denoised) == 0]
+    assert all(f.denoised.flat[0] != first.samples_done for f in by_denoiser), "late, so dropped"
+    ages = [f.denoised.flat[0] for f in by_denoiser]
+    assert ages == sorted(ages)
+    assert len(denoiser.inputs) < 12, "the denoiser does not take the time of the render"
+
+
+def test_incomplete_frames_hold_the_reduced_image():
+    setup = Setup(width=8, height=4, denoise=True)
+    small = Frame(np.full((2, 4, 3), 2.0, np.float32), {}, None, {}, 1, 2, False, setup)
+    samples = np.zeros((4, 8), np.uint32)
+    samples[0, 0] = 1
+    whole = Frame(
+        np.zeros((4, 8, 3), np.float32), {"samples": samples}, None, {}, 1, 1, False, setup
+    )
+    found = filled(whole, small)
+    assert not whole.is_complete
+    assert found.beauty[0, 0, 0] == 0.0 and found.beauty[1, 1, 0] == 2.0
+    assert np.array_equal(found.denoised, np.full((4, 8, 3), 2.0))
+    complete = replace(whole, layers={"samples": np.ones((4, 8), np.uint32)})
+    assert filled(complete, small) is complete
+    region = replace(whole, setup=setup.changed(region=(0, 0, 1, 1)))
+    assert region.is_complete
+
+
+def test_enlarging_keeps_ramps():
+    ramp = np.linspace(0.0, 1.0, 5, dtype=np.float32)[None, :, None].repeat(3, 0)
+    large = enlarged(ramp, 20, 12)
+    assert large.shape == (12, 20, 1)
+    assert (np.diff(large[0, :, 0]) >= 0.0).all() and np.ptp(large, axis=0).max() == 0.0
+
+
+def test_first_hits_have_no_noise_and_the_brightness_of_the_beauty():
+    random = np.random.default_rng(1)
+    beauty = random.exponential(0.5, (32, 32, 3)).astype(np.float32)
+    normal = np.zeros((32, 32, 3), np.float32)
+    normal[:16, :, 2] = 1.0
+    lit = by_first_hit(beauty, np.full_like(beauty, 0.5), normal, np.array([0.0, 0.0, 1.0]))
+    assert np.ptp(lit[:16]) == 0.0
+    assert lit[0, 0, 0] == pytest.approx(np.minimum(beauty[:16], 4.0).mean(), rel=1e-5)
+    assert np.array_equal(lit[16:], beauty[16:]), "the background stays"
