@@ -5,7 +5,7 @@
 For each stage, prints the seconds from reading it to the first image on the screen and to the first
 complete one, images per second and CPU seconds per image while the camera orbits, the scale of
 these images and their noise (mean difference to a median of 3 x 3 pixels, relative to the mean),
-the seconds from the last movement to an image at full size, milliseconds from stop to standstill
+the seconds and CPU seconds from the last movement to an image at full size, milliseconds from stop to standstill
 (median and maximum of ten), and the longest time during which the window did not respond. Works
 without a display.
 """
@@ -40,7 +40,9 @@ class Run:
 
         settings = QSettings(os.path.join(scratch, "window.ini"), QSettings.Format.IniFormat)
         self.application = application
-        self.window = MainWindow(Setup(width=options.size[0], height=options.size[1], spp=1 << 16), settings)
+        self.window = MainWindow(
+            Setup(width=options.size[0], height=options.size[1], spp=1 << 16), settings
+        )
         self.window.resize(1400, 860)
         self.window.show()
         self.session, self.viewport = self.window.session, self.window.viewport
@@ -89,18 +91,20 @@ class Run:
         cpu = (time.process_time() - cpu) / max(len(shown), 1)
         rate = len(shown) / (time.perf_counter() - start)
         noise = noise_of(self.viewport.frame_shown.beauty)
-        moved = time.perf_counter()
+        moved, back_cpu = time.perf_counter(), time.process_time()
         back = self.until(lambda: self.viewport.frame_shown.scale == 1) - moved
+        back_cpu = time.process_time() - back_cpu
         stops = [self.stop() for _ in range(10)]
         return {
             "load_s": opened[0] - begun,
             "first_picture_s": first - opened[0],
             "whole_picture_s": whole - opened[0],
             "moving_pictures_per_s": rate,
-            "moving_scale": max(shown, default=0),
+            "moving_scale": statistics.median(shown or [0]),
             "moving_cpu_s_per_picture": cpu,
             "moving_noise": noise,
             "full_size_after_s": back,
+            "full_size_after_cpu_s": back_cpu,
             "stop_ms": 1e3 * statistics.median(stops),
             "stop_most_ms": 1e3 * max(stops),
             "gap_ms": 1e3 * self.gap,
@@ -127,7 +131,12 @@ def main():
     parser.add_argument("stages", nargs="+")
     parser.add_argument("--size", nargs=2, type=int, default=(960, 540))
     parser.add_argument("--seconds", type=float, default=3.0, help="duration of the orbit")
+    parser.add_argument("--scale", type=int, help="fix the reduction during the orbit")
     options = parser.parse_args()
+    if options.scale:
+        from wavecomb.gui.viewport import previews
+
+        previews.reduced_scale = lambda *_: options.scale
     from wavecomb.gui import theme
     from wavecomb.gui.app import make_application
 

@@ -13,7 +13,7 @@ import pytest
 from wavecomb.gui.setup import Setup
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.gui.viewport.live import LATE
-from wavecomb.gui.viewport.previews import by_first_hit, enlarged, filled
+from wavecomb.gui.viewport.previews import Pace, by_first_hit, enlarged, filled
 
 
 class SlowDenoiser:
@@ -94,3 +94,17 @@ def test_first_hits_have_no_noise_and_the_brightness_of_the_beauty():
     assert np.ptp(lit[:16]) == 0.0
     assert lit[0, 0, 0] == pytest.approx(np.minimum(beauty[:16], 4.0).mean(), rel=1e-5)
     assert np.array_equal(lit[16:], beauty[16:]), "the background stays"
+
+
+def test_the_pace_of_previews_separates_constant_time_from_pixels():
+    pace, pixels = Pace(), 960 * 540
+    scales = []
+    for _ in range(30):
+        scale = pace.scale(pixels, 0.083)
+        scales.append(scale)
+        small = pixels // scale**2
+        pace.learn(small, 0.025 + small / 800_000)
+    assert set(scales[10:]) == {4}, scales  # 4: 66 ms; 3: 97 ms
+    for _ in range(30):
+        pace.learn(pixels // 16, 1.0)
+    assert pace.scale(pixels, 0.083) == 12, "the machine became slow"

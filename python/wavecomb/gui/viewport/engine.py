@@ -17,7 +17,7 @@ import numpy as np
 
 from wavecomb.gui.setup import Setup
 from wavecomb.gui.viewport.frames import Frame, layers_of_result
-from wavecomb.gui.viewport.previews import filled, reduced_scale, smooth
+from wavecomb.gui.viewport.previews import Pace, filled, smooth
 from wavecomb.gui.viewport.watching import LOOK_S, Stopper, Watch
 from wavecomb.run.error_messages import describe
 
@@ -110,9 +110,8 @@ class Engine:
         self._closing = False
         self._going = threading.Event()
         self._going.set()
-        self._rate = 0.0
+        self._pace = Pace()
         self._shown: Frame | None = None
-        self._overhead = 0.01
         self._thread = threading.Thread(target=self._run, name="wavecomb-render", daemon=True)
         self._thread.start()
 
@@ -199,7 +198,7 @@ class Engine:
 
     def _do(self, task: Task) -> None:
         if task.renderer is not None:
-            self._renderer, self._rate, self._shown = None, 0.0, None
+            self._renderer, self._pace, self._shown = None, Pace(), None
             self._loaded = task.loaded
             self._renderer = task.renderer()
             self.listener.on_ready(self._renderer)
@@ -225,7 +224,7 @@ class Engine:
             x0, y0, x1, y1 = task.setup.region
             pixels = max(1, (x1 - x0) * (y1 - y0))
         limit = MOVING_S if task.moving else QUICK_S
-        return reduced_scale(pixels, self._rate, self._overhead, limit)
+        return self._pace.scale(pixels, limit)
 
     def _preview(self, renderer: Renderer, task: Task, scale: int) -> Frame | None:
         settings = task.setup.settings(scale, preview=True)
@@ -238,17 +237,9 @@ class Engine:
         frame = Frame(result.beauty, layers, None, done, task.version, scale, False, task.setup)
         back = np.array(renderer.scene.camera["to_world"])[2, :3]
         frame = replace(frame, beauty=smooth(frame, back))
-        self._learn(time.perf_counter() - start, frame.samples_done)
+        self._pace.learn(frame.samples_done, time.perf_counter() - start)
         self.listener.on_frame(frame)
         return frame
-
-    def _learn(self, seconds: float, samples: int) -> None:
-        """Updates the sample rate from a short render.
-
-        Slower values count fully, faster ones by half.
-        """
-        rate = samples / max(seconds - self._overhead, 1e-4)
-        self._rate = rate if self._rate == 0.0 else min(rate, 0.5 * (rate + self._rate))
 
     def _whole(self, renderer: Renderer, task: Task, preview: Frame | None) -> None:
         watch = Watch(self, task, preview)

@@ -69,8 +69,8 @@ class Frame:
         """Whether every pixel that is rendered has a sample."""
         samples = self.layers["samples"]
         if self.setup.region is not None:
-            x0, y0, x1, y1 = (
-                scaled_region(self.setup.region, self.scale, self.setup.width, self.setup.height)
+            x0, y0, x1, y1 = scaled_region(
+                self.setup.region, self.scale, self.setup.width, self.setup.height
             )
             samples = samples[y0:y1, x0:x1]
         return bool(samples.all())

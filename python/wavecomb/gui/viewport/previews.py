@@ -34,6 +34,38 @@ def reduced_scale(pixels: int, rate: float, overhead: float, limit: float) -> in
     return SCALES[-1]
 
 
+class Pace:
+    """Model of the time of reduced images: constant time + pixels / rate, from recent images."""
+
+    def __init__(self) -> None:
+        self._sums = np.zeros(5)
+
+    def learn(self, pixels: int, seconds: float) -> None:
+        """Adds the time of an image; it counts 1.25 times as much as the one before."""
+        self._sums *= 0.8
+        self._sums += (1.0, pixels, seconds, pixels * pixels, pixels * seconds)
+
+    def scale(self, pixels: int, limit: float) -> int:
+        """Returns the smallest reduction of an image with this expected time in seconds."""
+        rate, constant = self._fit()
+        return reduced_scale(pixels, rate, constant, limit)
+
+    def _fit(self) -> tuple[float, float]:
+        """Returns pixels per second (0 if unknown) and constant seconds, by least squares.
+
+        An assumed empty image, of half the mean time and little weight, makes the solution unique.
+        It is optimistic, so that finer images are tried.
+        """
+        n, x, t, xx, xt = self._sums
+        if n == 0.0:
+            return 0.0, 0.03
+        mean_t, mean_x = t / n, x / n
+        n, t = n + 0.1, t + 0.1 * 0.5 * mean_t
+        slope = (n * xt - x * t) / (n * xx - x * x)
+        slope = float(np.clip(slope, 0.1 * mean_t / mean_x, mean_t / mean_x))
+        return 1.0 / slope, max(0.0, mean_t - slope * mean_x)
+
+
 def smooth(frame: Frame, back: NDArray[np.float64]) -> NDArray[np.float32]:
     """Returns the beauty of a reduced image without noise.
 
