@@ -18,7 +18,8 @@ Window = Any
 MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
     (
         "&File",
-        ("open", "recent", "reload", "-", "save", "save_as", "-", "save_edits", "-", "quit"),
+        ("open", "recent", "reload", "-", "save", "save_as", "-", "save_picture", "-",
+         "quit"),
     ),
     ("&Edit", ("undo", "redo")),
     (
@@ -70,14 +71,14 @@ def entries(window: Window) -> list[Entry]:
             "reload", "Re&load", window.reload, ["Ctrl+R"],
             "Reload the stage from disk and drop edits",
         ),
-        Entry("save", "&Save", window.save, ["Ctrl+S"], "Write the picture to the same file"),
         Entry(
-            "save_as", "Save &as\u2026", window.save_as, ["Ctrl+Shift+S"],
-            "Write all layers (EXR) or the displayed picture (PNG)",
+            "save", "&Save edits", scene.save, ["Ctrl+S"],
+            "Write the edits as a small USD layer over the stage, which is chosen the first time",
         ),
+        Entry("save_as", "Save edits &as layer\u2026", scene.ask_save, [], "Write another layer"),
         Entry(
-            "save_edits", "Save &edits as layer\u2026", scene.ask_save, [],
-            "Write the edits as a small USD layer over the stage",
+            "save_picture", "Save &picture\u2026", window.save_as, ["Ctrl+Shift+S"],
+            "Write all layers (EXR) or the displayed picture (PNG)",
         ),
         Entry("undo", "&Undo", scene.edits.undo, ["Ctrl+Z"], "Undo the last edit"),
         Entry(
@@ -103,8 +104,8 @@ def entries(window: Window) -> list[Entry]:
             "Render at the pixel size of the viewport",
         ),
         Entry(
-            "denoise", "&Denoise on, off", window.render_bar.denoise.toggle, ["Shift+D"],
-            "Denoise the picture with Open Image Denoise",
+            "denoise", "&Denoise on, off", window.docks["render"].widget().denoise.toggle,
+            ["Shift+D"], "Denoise the picture with Open Image Denoise",
         ),
         Entry(
             "farm", "Send to a &farm\u2026", window.send_to_farm, [],

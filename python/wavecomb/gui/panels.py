@@ -14,6 +14,7 @@ from wavecomb.gui.scene.scene_panel import ScenePanel
 from wavecomb.gui.scheduling.panel import SchedulingPanel
 from wavecomb.gui.scheduling.plots_panel import PlotsPanel
 from wavecomb.gui.viewport.learned_panel import LearnedPanel
+from wavecomb.gui.viewport.render_panel import RenderPanel
 from wavecomb.gui.viewport.session import Session
 
 _LEFT = Qt.DockWidgetArea.LeftDockWidgetArea
@@ -44,7 +45,8 @@ def make_panels(session: Session) -> list[Panel]:
     """Creates all panels."""
     return [
         Panel("scene", "Scene", ScenePanel(session), _LEFT),
-        Panel("scheduling", "Scheduling", SchedulingPanel(session), _RIGHT),
+        Panel("render", "Render", RenderPanel(session), _RIGHT),
+        Panel("scheduling", "Scheduling", SchedulingPanel(session), _RIGHT, hidden=True),
         Panel("learned", "Learned", LearnedPanel(session), _RIGHT),
         Panel("plots", "Plots", PlotsPanel(session), _BOTTOM, hidden=True),
         Panel("bench", "Bench", BenchPanel(session), _BOTTOM, hidden=True),

@@ -79,7 +79,7 @@ SETTLE_MS = 80
 """Delay between the last movement and the full image, in milliseconds."""
 BURST_S = 0.15
 """Edits at shorter intervals, in seconds, count as a drag with reduced images."""
-WAIT_S = 1.0
+WAIT_S = 3.0
 """Largest time that an image may take during a movement before the next edit stops it, in
 seconds."""
 DENOISE_AGAIN = 1.5

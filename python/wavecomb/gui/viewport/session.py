@@ -197,8 +197,6 @@ class Session(Live):
         self._tasks.end("load")
         self.opened.emit(loaded)
         self.camera_changed.emit(self.pose)
-        for line in loaded.scene.warnings:
-            self.warned.emit(line)
 
     def _take_failure(self, number: int, message: str) -> None:
         request = self._request_wanted
