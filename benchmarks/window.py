@@ -5,9 +5,9 @@
 For each stage, prints the seconds from reading it to the first image on the screen and to the first
 complete one, images per second and CPU seconds per image while the camera orbits, the scale of
 these images and their noise (mean difference to a median of 3 x 3 pixels, relative to the mean),
-the seconds and CPU seconds from the last movement to an image at full size, milliseconds from stop to standstill
-(median and maximum of ten), and the longest time during which the window did not respond. Works
-without a display.
+the seconds and CPU seconds from the last movement to an image at full size, milliseconds from stop
+to standstill (median and maximum of ten), and the longest time during which the window did not
+respond. Works without a display.
 """
 
 import argparse

@@ -22,17 +22,19 @@ from wavecomb.gui import theme
 from wavecomb.gui.actions import HistoryActions, UnsavedMark
 from wavecomb.gui.menus import CHECKED, make_menus
 from wavecomb.gui.messages import MessageBar, log_folder
-from wavecomb.gui.panels import make_panels
+from wavecomb.gui.panels import keep_half, make_panels
 from wavecomb.gui.scene.autosave import Autosave, make_question
 from wavecomb.gui.scene.notes_model import WARNING
 from wavecomb.gui.scene.scene_panel import ScenePanel
 from wavecomb.gui.shortcuts import ShortcutsDialog, make_about
 from wavecomb.gui.status import StatusLine
 from wavecomb.gui.viewport.display_bar import DisplayBar
+from wavecomb.gui.viewport.gizmo import Gizmo
 from wavecomb.gui.viewport.inspector import Inspector
 from wavecomb.gui.viewport.learned_panel import LearnedPanel
 from wavecomb.gui.viewport.render_bar import RenderBar
 from wavecomb.gui.viewport.session import Session, Setup
+from wavecomb.gui.viewport.timeline import Timeline
 from wavecomb.gui.viewport.view_history import ViewHistory
 from wavecomb.gui.viewport.viewport import Viewport
 from wavecomb.gui.widgets import TakesFiles, ask_file
@@ -58,6 +60,7 @@ class MainWindow(TakesFiles, QMainWindow):
         self.message = MessageBar()
         self.findings = MessageBar("findings")
         self.display = DisplayBar(self.session, self.viewport)
+        self.timeline = Timeline(self.session)
         self.render_bar = RenderBar(self.session, self)
         self.inspector = Inspector(self.session)
         self.status = StatusLine(self.session, self)
@@ -66,6 +69,7 @@ class MainWindow(TakesFiles, QMainWindow):
         self._bottom_sized = False
         self._dialog: QWidget | None = None
         self._lay_out()
+        self.viewport.gizmo = Gizmo(self.viewport, self.scene.edits)
         self.actions_by_name, self._recent = make_menus(self)
         for name in ("pause", "stop", "restart", "region", "clear_region"):
             self.render_bar.addAction(self.actions_by_name[name])
@@ -86,6 +90,7 @@ class MainWindow(TakesFiles, QMainWindow):
         over.addWidget(self.findings)
         over.addStretch(1)
         column.addWidget(self.viewport, 1)
+        column.addWidget(self.timeline)
         column.addWidget(self.display)
         self.setCentralWidget(centre)
         self.addToolBar(Qt.ToolBarArea.TopToolBarArea, self.render_bar)
@@ -108,25 +113,15 @@ class MainWindow(TakesFiles, QMainWindow):
         sides = [self.docks["scene"], self.docks["render"]]
         self.resizeDocks(sides, [theme.em(22), theme.em(20)], Qt.Orientation.Horizontal)
         self._sizing = QTimer(self, singleShot=True, interval=0)
-        self._sizing.timeout.connect(self._keep_half)
-
-    def _keep_half(self) -> None:
-        """Narrows the panels beside the image until it has half of the width."""
-        excess = self.width() // 2 - self.viewport.width()
-        sides = [
-            dock
-            for dock in self.docks.values()
-            if dock.isVisible() and not dock.isFloating() and not dock.visibleRegion().isEmpty()
-            and self.dockWidgetArea(dock) != Qt.DockWidgetArea.BottomDockWidgetArea
-        ]  # fmt: skip
-        if excess > 0 and sides:
-            share = self.width() // 2 // len(sides) - theme.em(0.5)
-            self.resizeDocks(sides, [share] * len(sides), Qt.Orientation.Horizontal)
+        self._sizing.timeout.connect(self._share_width)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Leaves half of the width to the image."""
         super().resizeEvent(event)
         self._sizing.start()
+
+    def _share_width(self) -> None:
+        keep_half(self, self.viewport, self.docks.values())
 
     def _room(self, wide: int, high: int) -> QSize:
         """Limits a size to the screen, minus some space for the window frame."""

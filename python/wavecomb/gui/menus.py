@@ -21,11 +21,11 @@ MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
         ("open", "recent", "reload", "-", "save", "save_as", "-", "save_picture", "-",
          "quit"),
     ),
-    ("&Edit", ("undo", "redo")),
+    ("&Edit", ("undo", "redo", "-", "move", "rotate", "scale", "-", "parent")),
     (
         "&Render",
         ("pause", "stop", "restart", "-", "region", "clear_region", "fit_size", "-", "denoise",
-         "-", "farm"),
+         "-", "play", "farm"),
     ),
     (
         "&Camera",
@@ -85,6 +85,17 @@ def entries(window: Window) -> list[Entry]:
             "redo", "&Redo", scene.edits.redo, ["Ctrl+Shift+Z", "Ctrl+Y"],
             "Redo the last undone edit",
         ),
+        *(
+            Entry(
+                name, f"&{name.capitalize()}", lambda name=name: viewport.gizmo.set_mode(name),
+                [key], f"{name.capitalize()} the selected light or object by handles", local=True,
+            )
+            for name, key in (("move", "W"), ("rotate", "E"), ("scale", "R"))
+        ),
+        Entry(
+            "parent", "Select &parent", scene.select_parent, ["P"],
+            "Select the prim that contains the selected one", local=True,
+        ),
         Entry("quit", "&Quit", window.close, ["Ctrl+Q"]),
         Entry(
             "pause", "&Pause", window.toggle_pause, ["Space"], "Pause or continue", local=True
@@ -106,6 +117,10 @@ def entries(window: Window) -> list[Entry]:
         Entry(
             "denoise", "&Denoise on, off", window.docks["render"].widget().denoise.toggle,
             ["Shift+D"], "Denoise the picture with Open Image Denoise",
+        ),
+        Entry(
+            "play", "Pla&y", window.timeline.toggle, ["Shift+Space"],
+            "Play or stop the frames of an animated stage", local=True,
         ),
         Entry(
             "farm", "Send to a &farm\u2026", window.send_to_farm, [],

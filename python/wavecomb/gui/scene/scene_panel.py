@@ -105,9 +105,7 @@ class ScenePanel(QWidget):
 
     def _action(self, name: str, call: Callable[[], None]) -> QAction:
         action = QAction(name, self)
-        action.setIconText(
-            name.partition(" ")[0]
-        )
+        action.setIconText(name.partition(" ")[0])
         action.setObjectName(name.rstrip("\u2026").lower().replace(" ", "-"))
         action.triggered.connect(lambda checked=False: call())
         return action
@@ -140,6 +138,11 @@ class ScenePanel(QWidget):
         self.state.setText(f"{len(lines)} edited" if lines else "")
         shown = lines[:30] + ([f"and {len(lines) - 30} more"] if len(lines) > 30 else [])
         self.state.setToolTip("\n".join(shown))
+
+    def select_parent(self) -> None:
+        """Selects the parent of the selected prim, unless it is the root."""
+        if parent := (self.session.selection or "").rpartition("/")[0]:
+            self.session.select(parent)
 
     def show_notes(self) -> None:
         """Shows the findings of the loader."""

@@ -114,7 +114,7 @@ def layers_of_snapshot(snapshot: Snapshot, names: tuple[str, ...]) -> dict[str, 
 
 
 def denoised_frame(frame: Frame) -> tuple[Frame, Any]:
-    """Denoises a frame with Open Image Denoise.
+    """Denoises a frame with Open Image Denoise, faster if it is not the last.
 
     Returns None as image if guide layers are missing.
     """
@@ -124,4 +124,5 @@ def denoised_frame(frame: Frame) -> tuple[Frame, Any]:
     normal = frame.layers.get("guide_normal")
     if albedo is None or normal is None:
         return frame, None
-    return frame, denoise(frame.beauty, albedo, normal, threads=frame.setup.threads)
+    threads, fast = frame.setup.threads, not frame.final
+    return frame, denoise(frame.beauty, albedo, normal, threads=threads, fast=fast)

@@ -146,12 +146,22 @@ class Live(QObject):
     # ---- methods for widgets
     # -------------------------------------------------------------------------
 
-    def begin(self, make: Callable[[], Renderer], loaded: LoadedStage | None, edit: Edit) -> None:
-        """Starts with a new scene. ``make`` creates its renderer on the render thread."""
+    def begin(
+        self,
+        make: Callable[[], Renderer],
+        loaded: LoadedStage | None,
+        edit: Edit,
+        *,
+        moving: bool = False,
+    ) -> None:
+        """Starts with a new scene. ``make`` creates its renderer on the render thread.
+
+        ``moving`` says whether a reduced image is enough.
+        """
         self._pending = Edit()
         self._moving = False
         self.renderer = None
-        self._submit(Task(self.setup, 0, edit, False, loaded, make))
+        self._submit(Task(self.setup, 0, edit, moving, loaded, make))
 
     def change(self, **values: Any) -> bool:
         """Changes fields of the setup and restarts. Emits ``failed`` if a value is invalid.
