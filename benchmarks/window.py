@@ -86,7 +86,9 @@ class Run:
         start, cpu = time.perf_counter(), time.process_time()
         while time.perf_counter() < start + self.seconds:
             self.viewport.orbit(0.01, 0.0, moving=True)
-            self.beat()
+            due = time.perf_counter() + 0.01  # as often as a mouse moves
+            while time.perf_counter() < due:
+                self.beat()
         shown = list(moving)
         cpu = (time.process_time() - cpu) / max(len(shown), 1)
         rate = len(shown) / (time.perf_counter() - start)

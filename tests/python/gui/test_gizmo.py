@@ -130,8 +130,8 @@ def test_edited_transforms_are_saved_and_read_again(moved, tmp_path):
 def test_the_outline_surrounds_the_selection(moved, qtbot):
     view, session = moved.viewport, moved.session
     session.select(BALL)
-    qtbot.waitUntil(lambda: view.outline.image is not None, timeout=10000)
-    image = view.outline.image
+    qtbot.waitUntil(lambda: view.marked.image is not None, timeout=10000)
+    image = view.marked.image
     drawn = [
         (x, y) for x in range(image.width()) for y in range(image.height())
         if image.pixelColor(x, y).alpha()
@@ -143,7 +143,7 @@ def test_the_outline_surrounds_the_selection(moved, qtbot):
     assert abs(x - centre[0]) < 3 and abs(y - centre[1]) < 3
     session.select("/World")
     session.select(None)
-    qtbot.waitUntil(lambda: view.outline.image is None, timeout=10000)
+    qtbot.waitUntil(lambda: view.marked.image is None, timeout=10000)
 
 
 def test_edges_are_outside_of_the_mask():

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from wavecomb._core import Renderer, Result
     from wavecomb.usd import LoadedStage
 
-MOVING_S = 1 / 12
+MOVING_S = 0.1
 """Target time of an image during movements, with denoising, in seconds."""
 QUICK_S = 0.15
 """Time of a full pass above which a reduced image comes first, in seconds."""
@@ -208,9 +208,9 @@ class Engine:
         if task.edit:
             _apply(renderer, task.edit)
             self._shown = None
-        scale = self._scale_for(task)
+        scale = self._scale_for(task, QUICK_S)
         if task.moving or (scale > 1 and not self._is_shown(task)):
-            self._shown = self._preview(renderer, task, scale)
+            self._shown = self._preview(renderer, task, self._scale_for(task, MOVING_S))
         if not task.moving and not self.superseded:
             self._whole(renderer, task, self._shown if scale > 1 else None)
 
@@ -218,12 +218,11 @@ class Engine:
         """Returns whether the last reduced image shows this scene with these settings."""
         return self._shown is not None and self._shown.setup == task.setup
 
-    def _scale_for(self, task: Task) -> int:
+    def _scale_for(self, task: Task, limit: float) -> int:
         pixels = task.setup.width * task.setup.height
         if task.setup.region is not None:
             x0, y0, x1, y1 = task.setup.region
             pixels = max(1, (x1 - x0) * (y1 - y0))
-        limit = MOVING_S if task.moving else QUICK_S
         return self._pace.scale(pixels, limit)
 
     def _preview(self, renderer: Renderer, task: Task, scale: int) -> Frame | None:
@@ -231,6 +230,8 @@ class Engine:
         start = time.perf_counter()
         result = renderer.render(settings, watcher=Stopper(self), interval=LOOK_S)
         if result.cancelled:
+            if (seconds := time.perf_counter() - start) > QUICK_S:
+                self._pace.learn(result.samples.size, seconds)
             return None
         done = {"samples_done": int(result.samples.sum()), "passes": 1, "preview": True}
         layers = layers_of_result(result)

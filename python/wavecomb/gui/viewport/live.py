@@ -75,7 +75,7 @@ class News:
         self._put("ready", renderer)
 
 
-SETTLE_MS = 80
+SETTLE_MS = 50
 """Delay between the last movement and the full image, in milliseconds."""
 BURST_S = 0.15
 """Edits at shorter intervals, in seconds, count as a drag with reduced images."""
@@ -130,6 +130,7 @@ class Live(QObject):
         self._pending = Edit()
         self._moving = False
         self._awaiting = False
+        self._is_reduced = False  # whether the task is only a reduced image
         self._submitted = 0.0
         self._denoised = self._denoising = 0  # samples of the images that were denoised last
         self._settle = QTimer(self)
@@ -159,7 +160,7 @@ class Live(QObject):
         ``moving`` says whether a reduced image is enough.
         """
         self._pending = Edit()
-        self._moving = False
+        self._moving = moving
         self.renderer = None
         self._submit(Task(self.setup, 0, edit, moving, loaded, make))
 
@@ -211,10 +212,12 @@ class Live(QObject):
         self._settle.stop()
         if self._moving:
             self._moving = False
-            self._flush()
+            if self._pending or not (self._awaiting and self._is_reduced):
+                self._flush()  # otherwise after the reduced image, which is being rendered
 
     def restart(self) -> None:
         """Restarts from the first sample."""
+        self._moving = False
         self._flush()
 
     def pause(self) -> None:
@@ -259,6 +262,7 @@ class Live(QObject):
         # During a movement, the previous image may still be on its way to the screen.
         last = self.last_frame.version if self.last_frame is not None else self.version
         self.oldest = last if task.moving else self.version
+        self._is_reduced = task.moving
         self._awaiting, self._submitted = True, time.perf_counter()
         if self.state == PAUSED:
             self._engine.resume()
@@ -313,7 +317,7 @@ class Live(QObject):
         if frame.final and self.state == RENDERING:
             self._set_state(FINISHED)
         self._denoise(frame)
-        if self._moving and self._pending:
+        if self._is_reduced and (self._pending or not self._moving):
             self._flush()
 
     def _show(self, frame: Frame) -> None:

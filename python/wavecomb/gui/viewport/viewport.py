@@ -51,7 +51,7 @@ class Viewport(PictureView):
     Attributes:
         look: Display settings.
         frame_shown: The frame on the screen, or None.
-        outline: Outline of the selection.
+        marked: Outline of the selection.
         gizmo: Handles that edit the selection, or None without a scene panel.
 
     Signals:
@@ -86,7 +86,7 @@ class Viewport(PictureView):
         self._region_mode = False
         self._region_from: QPointF | None = None
         self._message = EMPTY
-        self.outline = Outline(session, self)
+        self.marked = Outline(session, self)
         self.gizmo: Gizmo | None = None
         self._developer = Worker("develop", self)
         self._developer.done.connect(self._developed)
@@ -98,7 +98,7 @@ class Viewport(PictureView):
     def close_threads(self) -> None:
         """Ends the threads before the window is destroyed."""
         self._developer.close()
-        self.outline.close()
+        self.marked.close()
 
     def set_look(self, look: Look) -> None:
         """Sets layer, exposure and view."""
@@ -122,7 +122,7 @@ class Viewport(PictureView):
         self.frame_shown = frame
         size = QSize(frame.setup.width, frame.setup.height)
         self.set_picture(to_qimage(shown.pixels), size, shown.legend)
-        self.outline.follow(frame)
+        self.marked.follow(frame)
         self.shown.emit(frame, found.look)
 
     def _tell_failed(self, key: object, line: str) -> None:
@@ -371,7 +371,7 @@ class Viewport(PictureView):
             painter.setPen(QColor("#d8d8d8"))
             painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._message)
             return
-        self.outline.paint(painter)
+        self.marked.paint(painter)
         if self.gizmo is not None:
             self.gizmo.paint(painter)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from wavecomb._core import Snapshot
     from wavecomb.gui.viewport.engine import Engine, Task
 
-LOOK_S = 0.05
+LOOK_S = 0.03
 STATISTICS_S = 0.5
 
 
