@@ -13,6 +13,7 @@ import pytest
 from wavecomb.gui.setup import Setup
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.gui.viewport.live import LATE
+from wavecomb.gui.viewport.navigate import orbit
 from wavecomb.gui.viewport.previews import Pace, by_first_hit, enlarged, filled
 
 
@@ -58,6 +59,29 @@ def test_a_slow_denoiser_never_shows_incomplete_or_late_images(
     ages = [f.denoised.flat[0] for f in by_denoiser]
     assert ages == sorted(ages)
     assert len(denoiser.inputs) < 12, "the denoiser does not take the time of the render"
+
+
+@pytest.mark.slow
+def test_movements_show_no_noise(new_session, qtbot, cornell, final):
+    def roughness(image):
+        return np.abs(np.diff(np.clip(image, 0.0, 1.0), axis=1)).mean() / image.mean()
+
+    session = new_session(width=240, height=240, spp=1)
+    session.open(cornell)
+    raw = roughness(final(session).beauty)
+    shown = []
+    session.frame.connect(shown.append)
+
+    def has_moved():
+        session.set_camera(orbit(session.pose, np.zeros(3), 0.01, 0.0, "Y"), moving=True)
+        return len(shown) >= 6
+
+    qtbot.waitUntil(has_moved, timeout=20000)
+    previews = [frame for frame in shown if frame.status.get("preview")]
+    assert len(previews) >= 4, "the whole image starts only if the window does not respond"
+    assert max(roughness(frame.beauty) for frame in previews) < 0.3 * raw
+    final(session)
+    assert session.last_frame.scale == 1 and roughness(session.last_frame.beauty) > 0.8 * raw
 
 
 def test_incomplete_frames_hold_the_reduced_image():
