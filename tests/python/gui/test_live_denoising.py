@@ -14,7 +14,7 @@ from wavecomb.gui.setup import Setup
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.gui.viewport.live import LATE
 from wavecomb.gui.viewport.navigate import orbit
-from wavecomb.gui.viewport.previews import Pace, by_first_hit, enlarged, filled
+from wavecomb.gui.viewport.previews import Filler, Pace, by_first_hit, enlarged
 
 
 class SlowDenoiser:
@@ -84,20 +84,23 @@ def test_movements_show_no_noise(new_session, qtbot, cornell, final):
     assert session.last_frame.scale == 1 and roughness(session.last_frame.beauty) > 0.8 * raw
 
 
-def test_incomplete_frames_hold_the_reduced_image():
+def test_incomplete_frames_have_light_of_the_reduced_image_and_their_albedo():
     setup = Setup(width=8, height=4, denoise=True)
-    small = Frame(np.full((2, 4, 3), 2.0, np.float32), {}, None, {}, 1, 2, False, setup)
+    small = {"albedo": np.full((2, 4, 3), 0.45, np.float32)}
+    preview = Frame(np.full((2, 4, 3), 2.0, np.float32), small, None, {}, 1, 2, False, setup)
     samples = np.zeros((4, 8), np.uint32)
     samples[0, 0] = 1
-    whole = Frame(
-        np.zeros((4, 8, 3), np.float32), {"samples": samples}, None, {}, 1, 1, False, setup
-    )
-    found = filled(whole, small)
+    layers = {"samples": samples, "albedo": np.full((4, 8, 3), 0.2, np.float32)}
+    noisy = np.random.default_rng(1).exponential(1.0, (4, 8, 3)).astype(np.float32)
+    whole = Frame(noisy, layers, None, {}, 1, 1, False, setup)
+    found = Filler(preview).fill(whole)
     assert not whole.is_complete
-    assert found.beauty[0, 0, 0] == 0.0 and found.beauty[1, 1, 0] == 2.0
-    assert np.array_equal(found.denoised, np.full((4, 8, 3), 2.0))
+    assert found.beauty[0, 0] == pytest.approx(2.0 * (0.2 + 0.05) / (0.45 + 0.05))
+    assert found.beauty[1:] == pytest.approx(2.0) and np.array_equal(found.denoised, found.beauty)
+    plain = Filler(preview).fill(replace(whole, layers={"samples": samples}))
+    assert np.array_equal(plain.beauty[0, 0], noisy[0, 0]) and (plain.beauty[1:] == 2.0).all()
     complete = replace(whole, layers={"samples": np.ones((4, 8), np.uint32)})
-    assert filled(complete, small) is complete
+    assert Filler(preview).fill(complete) is complete and Filler(None).fill(whole) is whole
     region = replace(whole, setup=setup.changed(region=(0, 0, 1, 1)))
     assert region.is_complete
 

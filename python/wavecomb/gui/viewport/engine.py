@@ -17,7 +17,7 @@ import numpy as np
 
 from wavecomb.gui.setup import Setup
 from wavecomb.gui.viewport.frames import Frame, layers_of_result
-from wavecomb.gui.viewport.previews import Pace, filled, smooth
+from wavecomb.gui.viewport.previews import Filler, Pace, smooth
 from wavecomb.gui.viewport.watching import LOOK_S, Stopper, Watch
 from wavecomb.run.error_messages import describe
 
@@ -243,7 +243,8 @@ class Engine:
         return frame
 
     def _whole(self, renderer: Renderer, task: Task, preview: Frame | None) -> None:
-        watch = Watch(self, task, preview)
+        filler = Filler(preview)
+        watch = Watch(self, task, filler)
         setup = task.setup
         result = renderer.render(
             setup.settings(), policy=setup.own_policy, costs=setup.profile, watcher=watch,
@@ -255,7 +256,7 @@ class Engine:
         self.listener.on_statistics(statistics, task.version)
         if not result.samples.any():
             return
-        self.listener.on_frame(self._last_frame(renderer, task, preview, result, statistics))
+        self.listener.on_frame(self._last_frame(renderer, task, filler, result, statistics))
 
     def statistics_of(self, source: Any, held_s: float) -> dict[str, Any]:
         """Returns the statistics of a result or a snapshot, on the render thread."""
@@ -270,7 +271,7 @@ class Engine:
         self,
         renderer: Renderer,
         task: Task,
-        preview: Frame | None,
+        filler: Filler,
         result: Result,
         statistics: dict[str, Any],
     ) -> Frame:
@@ -293,7 +294,7 @@ class Engine:
             result.beauty, layers_of_result(result), None, status, task.version, 1, True,
             task.setup, picture,
         )  # fmt: skip
-        return filled(frame, preview)
+        return filler.fill(frame)
 
 
 def _apply(renderer: Renderer, edit: Edit) -> None:

@@ -26,8 +26,8 @@ class Frame:
     """An image of a live render. Its arrays must not be modified.
 
     Attributes:
-        beauty: (height, width, 3), linear Rec.709. A reduced image has no noise. Pixels without
-            samples hold the reduced image.
+        beauty: (height, width, 3), linear Rec.709. A reduced image has no noise, nor does one in
+            which not all pixels have samples yet.
         layers: Layers of ``setup.aovs`` by name: (height, width) or (height, width, channels).
         denoised: (height, width, 3), perhaps of an earlier frame of this version; None if missing.
         status: samples_done, samples_total, passes, seconds, error and so on, as in

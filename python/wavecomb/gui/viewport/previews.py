@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from wavecomb.errors import WavecombError
 from wavecomb.gui.viewport.frames import Array, Frame
 
+_DARK = np.float32(0.05)
+"""Added to albedos before a division."""
 SCALES = (1, 2, 3, 4, 6, 8, 12)
 
 
@@ -108,14 +110,39 @@ def enlarged(image: Array, width: int, height: int) -> Array:
     return out
 
 
-def filled(frame: Frame, preview: Frame | None) -> Frame:
-    """Returns a frame whose pixels without samples hold the reduced image.
+class Filler:
+    """Fills frames of the first pass, in which few pixels have samples, without noise.
 
-    Its denoised image is also the reduced one until each pixel has a sample.
+    Args:
+        preview: The reduced image; None leaves frames as they are.
     """
-    if preview is None or frame.is_complete:
-        return frame
-    whole = enlarged(preview.beauty, frame.width, frame.height)
-    holes = frame.layers["samples"][:, :, None] == 0
-    beauty = np.where(holes, whole, frame.beauty)
-    return replace(frame, beauty=beauty, denoised=whole if frame.setup.denoise else None)
+
+    def __init__(self, preview: Frame | None) -> None:
+        self._preview = preview
+        self._large: dict[str, Array] = {}
+
+    def fill(self, frame: Frame) -> Frame:
+        """Returns a frame whose pixels have the light of the reduced image.
+
+        Those with samples already have their albedo, so that textures and edges are sharp. A frame
+        in which all pixels have samples is returned unchanged.
+        """
+        preview = self._preview
+        if preview is None or frame.is_complete:
+            return frame
+        layers = (frame.layers, preview.layers)
+        names = [n for n in ("guide_albedo", "albedo") if all(n in one for one in layers)]
+        holes = frame.layers["samples"][:, :, None] == 0
+        if not names:
+            beauty = np.where(holes, self._enlarged("beauty", preview.beauty, frame), frame.beauty)
+        else:
+            low = preview.layers[names[0]] + _DARK
+            light = self._enlarged("light", preview.beauty / low, frame)
+            albedo = self._enlarged("albedo", low, frame)
+            beauty = light * np.where(holes, albedo, frame.layers[names[0]] + _DARK)
+        return replace(frame, beauty=beauty, denoised=beauty if frame.setup.denoise else None)
+
+    def _enlarged(self, name: str, image: Array, frame: Frame) -> Array:
+        if name not in self._large:
+            self._large[name] = enlarged(image, frame.width, frame.height)
+        return self._large[name]

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.gui.viewport.frames import Frame, layers_of_snapshot
-from wavecomb.gui.viewport.previews import filled
+from wavecomb.gui.viewport.previews import Filler
 
 if TYPE_CHECKING:
     from wavecomb._core import Snapshot
@@ -35,10 +35,10 @@ class Stopper:
 class Watch:
     """Watcher of a full render, which takes frames, pauses and stops."""
 
-    def __init__(self, engine: Engine, task: Task, preview: Frame | None) -> None:
+    def __init__(self, engine: Engine, task: Task, filler: Filler) -> None:
         self._engine = engine
         self._task = task
-        self._preview = preview
+        self._filler = filler
         self.held_s = 0.0
         """Total time in pauses, in seconds."""
         self._next = 0.0
@@ -83,7 +83,7 @@ class Watch:
         frame = Frame(
             snapshot.beauty(), layers, None, status, self._task.version, 1, False, self._task.setup
         )
-        self._engine.listener.on_frame(filled(frame, self._preview))
+        self._engine.listener.on_frame(self._filler.fill(frame))
         now = time.perf_counter()
         if now >= self._next_statistics or paused:
             self._next_statistics = now + STATISTICS_S
