@@ -11,6 +11,7 @@ respond. Works without a display.
 """
 
 import argparse
+import math
 import os
 import statistics
 import sys
@@ -85,8 +86,10 @@ class Run:
         moving.clear()
         start, cpu = time.perf_counter(), time.process_time()
         while time.perf_counter() < start + self.seconds:
-            self.viewport.orbit(0.01, 0.0, moving=True)
-            due = time.perf_counter() + 0.01  # as often as a mouse moves
+            # Back and forth, so that the camera stays in a room, and as often as a mouse moves.
+            step = 0.005 * math.cos(4.0 * (time.perf_counter() - start))
+            self.viewport.orbit(step, 0.0, moving=True)
+            due = time.perf_counter() + 0.01
             while time.perf_counter() < due:
                 self.beat()
         shown = list(moving)
