@@ -69,7 +69,7 @@ class MainWindow(TakesFiles, QMainWindow):
         self._bottom_sized = False
         self._dialog: QWidget | None = None
         self._lay_out()
-        self.viewport.gizmo = Gizmo(self.viewport, self.scene.edits)
+        self.viewport.gizmo = Gizmo(self.viewport, self.session, self.scene.edits)
         self.actions_by_name, self._recent = make_menus(self)
         for name in ("pause", "stop", "restart", "region", "clear_region"):
             self.render_bar.addAction(self.actions_by_name[name])

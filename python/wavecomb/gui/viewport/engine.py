@@ -244,7 +244,7 @@ class Engine:
 
     def _whole(self, renderer: Renderer, task: Task, preview: Frame | None) -> None:
         filler = Filler(preview)
-        watch = Watch(self, task, filler)
+        watch = Watch(self, task.setup, task.version, filler)
         setup = task.setup
         result = renderer.render(
             setup.settings(), policy=setup.own_policy, costs=setup.profile, watcher=watch,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, UsdGeom
-from PySide6.QtCore import QObject, QPointF, Qt, Signal
+from PySide6.QtCore import QObject, QPointF, QRectF, QSizeF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 
 from wavecomb.gui.scene.transforms import Placement, moves_alone
@@ -19,7 +19,8 @@ from wavecomb.usd.cameras.framing import corners
 
 if TYPE_CHECKING:
     from wavecomb.gui.scene.scene_edits import SceneEdits
-    from wavecomb.gui.viewport.viewport import Viewport
+    from wavecomb.gui.viewport.picture_view import PictureView
+    from wavecomb.gui.viewport.session import Session
 
 Array = NDArray[np.float64]
 MOVE, ROTATE, SCALE = "move", "rotate", "scale"
@@ -60,9 +61,9 @@ class Gizmo(QObject):
 
     mode_changed = Signal(str)
 
-    def __init__(self, viewport: Viewport, edits: SceneEdits) -> None:
-        super().__init__(viewport)
-        self._view, self._session, self._edits = viewport, viewport.session, edits
+    def __init__(self, view: PictureView, session: Session, edits: SceneEdits) -> None:
+        super().__init__(view)
+        self._view, self._session, self._edits = view, session, edits
         self.mode = ""
         self._anchor: Anchor | None = None
         self._handle = ""
@@ -243,7 +244,8 @@ class Gizmo(QObject):
                 if self.mode == MOVE:
                     painter.drawEllipse(points[-1], size, size)
                 else:
-                    painter.drawRect(points[-1].x() - size, points[-1].y() - size, 10.0, 10.0)
+                    corner = points[-1] - QPointF(size, size)
+                    painter.drawRect(QRectF(corner, QSizeF(2 * size, 2 * size)))
 
 
 def _distance(at: Array, line: Array) -> float:

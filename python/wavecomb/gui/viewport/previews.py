@@ -63,8 +63,8 @@ class Pace:
             return 0.0, 0.03
         mean_t, mean_x = t / n, x / n
         n, t = n + 0.1, t + 0.1 * 0.5 * mean_t
-        slope = (n * xt - x * t) / (n * xx - x * x)
-        slope = float(np.clip(slope, 0.1 * mean_t / mean_x, mean_t / mean_x))
+        fitted = (n * xt - x * t) / (n * xx - x * x)
+        slope = float(np.clip(fitted, 0.1 * mean_t / mean_x, mean_t / mean_x))
         return 1.0 / slope, max(0.0, mean_t - slope * mean_x)
 
 

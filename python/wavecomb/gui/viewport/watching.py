@@ -5,23 +5,40 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
+from wavecomb.gui.setup import Setup
 from wavecomb.gui.viewport.frames import Frame, layers_of_snapshot
 from wavecomb.gui.viewport.previews import Filler
 
 if TYPE_CHECKING:
     from wavecomb._core import Snapshot
-    from wavecomb.gui.viewport.engine import Engine, Task
 
 LOOK_S = 0.03
 STATISTICS_S = 0.5
 
 
+class Host(Protocol):
+    """Interface of the engine, as its watchers see it."""
+
+    listener: Any
+    superseded: bool
+
+    @property
+    def paused(self) -> bool:
+        """Whether the render is paused."""
+
+    def wait(self, seconds: float) -> None:
+        """Waits until the render is resumed, at most for some seconds."""
+
+    def statistics_of(self, source: Any, held_s: float) -> dict[str, Any]:
+        """Returns the statistics of a snapshot."""
+
+
 class Stopper:
     """Watcher that stops a render when it is superseded."""
 
-    def __init__(self, engine: Engine) -> None:
+    def __init__(self, engine: Host) -> None:
         self._engine = engine
 
     def progress(self, status: Mapping[str, Any]) -> str | None:
@@ -35,9 +52,9 @@ class Stopper:
 class Watch:
     """Watcher of a full render, which takes frames, pauses and stops."""
 
-    def __init__(self, engine: Engine, task: Task, filler: Filler) -> None:
+    def __init__(self, engine: Host, setup: Setup, version: int, filler: Filler) -> None:
         self._engine = engine
-        self._task = task
+        self._setup, self._version = setup, version
         self._filler = filler
         self.held_s = 0.0
         """Total time in pauses, in seconds."""
@@ -78,17 +95,15 @@ class Watch:
     def _send(self, snapshot: Snapshot) -> bool:
         """Sends a frame. Returns whether the frame states that the render is paused."""
         paused = self._engine.paused
-        layers = layers_of_snapshot(snapshot, self._task.setup.layers())
+        layers = layers_of_snapshot(snapshot, self._setup.layers())
         status = {**snapshot.status, "paused": paused}
-        frame = Frame(
-            snapshot.beauty(), layers, None, status, self._task.version, 1, False, self._task.setup
-        )
+        frame = Frame(snapshot.beauty(), layers, None, status, self._version, 1, False, self._setup)
         self._engine.listener.on_frame(self._filler.fill(frame))
         now = time.perf_counter()
         if now >= self._next_statistics or paused:
             self._next_statistics = now + STATISTICS_S
             statistics = self._engine.statistics_of(_SoFar(snapshot), self.held_s)
-            self._engine.listener.on_statistics(statistics, self._task.version)
+            self._engine.listener.on_statistics(statistics, self._version)
         return paused
 
 
