@@ -3,12 +3,15 @@
 """Measure the responsiveness of the window.
 
 For each stage, prints the seconds from reading it to the first image on the screen and to the first
-complete one, images per second while the camera orbits, milliseconds from stop to standstill
-(median and maximum of ten), and the longest time during which the window did not respond. Works
-without a display.
+complete one, images per second and CPU seconds per image while the camera orbits, the scale of
+these images and their noise (mean difference to a median of 3 x 3 pixels, relative to the mean),
+the seconds and CPU seconds from the last movement to an image at full size, milliseconds from stop
+to standstill (median and maximum of ten), and the longest time during which the window did not
+respond. Works without a display.
 """
 
 import argparse
+import math
 import os
 import statistics
 import sys
@@ -18,10 +21,19 @@ import time
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 
+def noise_of(image):
+    """Mean difference of an image to its median of 3 x 3 pixels, relative to its mean."""
+    import numpy as np
+
+    tone = np.sqrt(np.clip(image.mean(axis=2), 0.0, 1.0))
+    around = np.lib.stride_tricks.sliding_window_view(tone, (3, 3))
+    return float(np.abs(tone[1:-1, 1:-1] - np.median(around, axis=(2, 3))).mean() / tone.mean())
+
+
 class Run:
     """Measurements of one window with one stage."""
 
-    def __init__(self, application, stage, size, scratch):
+    def __init__(self, application, stage, options, scratch):
         from PySide6.QtCore import QSettings
 
         from wavecomb.gui.main_window import MainWindow
@@ -29,12 +41,14 @@ class Run:
 
         settings = QSettings(os.path.join(scratch, "window.ini"), QSettings.Format.IniFormat)
         self.application = application
-        self.window = MainWindow(Setup(width=size[0], height=size[1], spp=1 << 16), settings)
+        self.window = MainWindow(
+            Setup(width=options.size[0], height=options.size[1], spp=1 << 16), settings
+        )
         self.window.resize(1400, 860)
         self.window.show()
         self.session, self.viewport = self.window.session, self.window.viewport
         self.last, self.gap = time.perf_counter(), 0.0
-        self.stage = stage
+        self.stage, self.seconds = stage, options.seconds
 
     def beat(self):
         """Process window events and record how long they took."""
@@ -70,20 +84,32 @@ class Run:
         self.until(lambda: time.perf_counter() > whole + 1.0)
         self.gap = 0.0
         moving.clear()
-        start = time.perf_counter()
-        while time.perf_counter() < start + 3.0:
-            self.viewport.orbit(0.01, 0.0, moving=True)
-            self.beat()
-        shown = [scale for scale in moving if scale >= 1]
-        rate, scale = len(shown) / (time.perf_counter() - start), max(shown, default=0)
-        self.session.settle()
+        start, cpu = time.perf_counter(), time.process_time()
+        while time.perf_counter() < start + self.seconds:
+            # Back and forth, so that the camera stays in a room, and as often as a mouse moves.
+            step = 0.005 * math.cos(4.0 * (time.perf_counter() - start))
+            self.viewport.orbit(step, 0.0, moving=True)
+            due = time.perf_counter() + 0.01
+            while time.perf_counter() < due:
+                self.beat()
+        shown = list(moving)
+        cpu = (time.process_time() - cpu) / max(len(shown), 1)
+        rate = len(shown) / (time.perf_counter() - start)
+        noise = noise_of(self.viewport.frame_shown.beauty)
+        moved, back_cpu = time.perf_counter(), time.process_time()
+        back = self.until(lambda: self.viewport.frame_shown.scale == 1) - moved
+        back_cpu = time.process_time() - back_cpu
         stops = [self.stop() for _ in range(10)]
         return {
             "load_s": opened[0] - begun,
             "first_picture_s": first - opened[0],
             "whole_picture_s": whole - opened[0],
             "moving_pictures_per_s": rate,
-            "moving_scale": scale,
+            "moving_scale": statistics.median(shown or [0]),
+            "moving_cpu_s_per_picture": cpu,
+            "moving_noise": noise,
+            "full_size_after_s": back,
+            "full_size_after_cpu_s": back_cpu,
             "stop_ms": 1e3 * statistics.median(stops),
             "stop_most_ms": 1e3 * max(stops),
             "gap_ms": 1e3 * self.gap,
@@ -109,7 +135,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("stages", nargs="+")
     parser.add_argument("--size", nargs=2, type=int, default=(960, 540))
+    parser.add_argument("--seconds", type=float, default=3.0, help="duration of the orbit")
+    parser.add_argument("--scale", type=int, help="fix the reduction during the orbit")
     options = parser.parse_args()
+    if options.scale:
+        from wavecomb.gui.viewport import previews
+
+        previews.reduced_scale = lambda *_: options.scale
     from wavecomb.gui import theme
     from wavecomb.gui.app import make_application
 
@@ -117,7 +149,7 @@ def main():
     theme.apply("dark")
     for stage in options.stages:
         with tempfile.TemporaryDirectory() as scratch:
-            run = Run(application, stage, options.size, scratch)
+            run = Run(application, stage, options, scratch)
             figures = run.measure()
             run.window.close()
         sys.stdout.write(f"{os.path.basename(stage)}\n")

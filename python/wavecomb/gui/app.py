@@ -77,7 +77,7 @@ def run(
     from wavecomb.usd.stage.diagnostics import DiagnosticListener
 
     window = MainWindow(setup)
-    theme.apply(str(window.settings.value("theme", theme.SYSTEM)))
+    theme.apply(str(window.settings.value("theme", theme.DARK)))
     remove = install_hooks(window.message.show_error)
     before = [
         (one, signal.signal(one, lambda *_: window.close()))

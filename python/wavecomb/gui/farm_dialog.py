@@ -24,6 +24,7 @@ from PySide6.QtWidgets import (
 )
 
 from wavecomb.errors import WavecombError
+from wavecomb.gui import theme
 from wavecomb.gui.command import Command
 from wavecomb.gui.widgets import named
 
@@ -70,7 +71,9 @@ class FarmDialog(QDialog):
         )
         self.send = named(QPushButton("&Send"), "farm.send", "Send", "Write the job and render it")
         self.stop = named(QPushButton("S&top"), "farm.stop", "Stop", "Keeps finished tiles")
-        self.bar = named(QProgressBar(), "farm.bar", "Progress", "Finished tasks")
+        self.bar = named(QProgressBar(), "farm.bar", "Progress", "Finished tiles")
+        self.bar.setFormat("%v of %m tiles")
+        self.bar.setTextVisible(False)
         self.state = named(QLabel(), "farm.state", "State", "State of the job")
         self.state.setWordWrap(True)
         self.state.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -91,6 +94,7 @@ class FarmDialog(QDialog):
         buttons.addStretch(1)
         buttons.addWidget(self.send)
         buttons.addWidget(self.stop)
+        self.setMinimumWidth(theme.em(30))
         column = QVBoxLayout(self)
         column.addLayout(form)
         column.addLayout(buttons)
@@ -112,6 +116,7 @@ class FarmDialog(QDialog):
             options["frames"] = self.frames.text().strip()
             options.pop("frame", None)
         self.folder = None
+        self.bar.setMaximum(0)  # busy until the first tile arrives
         self.say("reading the stage \u2026")
         self._start([], module="wavecomb.farm.json_submission", text=json.dumps(wanted))
 
@@ -130,15 +135,16 @@ class FarmDialog(QDialog):
         else:
             found = found.get("progress", found)
             tasks, images = found["tasks"], found["images"]
+            self.bar.setTextVisible(True)
             self.bar.setMaximum(tasks["all"])
             self.bar.setValue(tasks["done"])
-            words = f"{images['done']} of {images['all']} images, "
-            words += f"{tasks['done']} of {tasks['all']} tiles"
-            self.say(f"{self.folder}: {found['state']}: {words}")
+            words = f"{images['done']} of {images['all']} images"
+            self.say(f"{self.folder}: {found['state']}, {words}")
 
     def _end(self, code: int, text: str, error: str) -> None:
         self.send.setEnabled(True)
         self.stop.setEnabled(False)
+        self.bar.setMaximum(max(self.bar.maximum(), 1))
         engine = self.engine.text() or "local"
         if error:
             self.say(error)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import QByteArray, QPointF, QSettings, QSize, Qt, QTimer
-from PySide6.QtGui import QCloseEvent
+from PySide6.QtGui import QCloseEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QDockWidget,
     QFileDialog,
@@ -22,16 +22,19 @@ from wavecomb.gui import theme
 from wavecomb.gui.actions import HistoryActions, UnsavedMark
 from wavecomb.gui.menus import CHECKED, make_menus
 from wavecomb.gui.messages import MessageBar, log_folder
-from wavecomb.gui.panels import make_panels
+from wavecomb.gui.panels import keep_half, make_panels
 from wavecomb.gui.scene.autosave import Autosave, make_question
+from wavecomb.gui.scene.notes_model import WARNING
 from wavecomb.gui.scene.scene_panel import ScenePanel
 from wavecomb.gui.shortcuts import ShortcutsDialog, make_about
 from wavecomb.gui.status import StatusLine
 from wavecomb.gui.viewport.display_bar import DisplayBar
+from wavecomb.gui.viewport.gizmo import Gizmo
 from wavecomb.gui.viewport.inspector import Inspector
 from wavecomb.gui.viewport.learned_panel import LearnedPanel
 from wavecomb.gui.viewport.render_bar import RenderBar
 from wavecomb.gui.viewport.session import Session, Setup
+from wavecomb.gui.viewport.timeline import Timeline
 from wavecomb.gui.viewport.view_history import ViewHistory
 from wavecomb.gui.viewport.viewport import Viewport
 from wavecomb.gui.widgets import TakesFiles, ask_file
@@ -55,16 +58,18 @@ class MainWindow(TakesFiles, QMainWindow):
         self.session = Session(setup, self)
         self.viewport = Viewport(self.session)
         self.message = MessageBar()
+        self.findings = MessageBar("findings")
         self.display = DisplayBar(self.session, self.viewport)
+        self.timeline = Timeline(self.session)
         self.render_bar = RenderBar(self.session, self)
         self.inspector = Inspector(self.session)
         self.status = StatusLine(self.session, self)
         self.views = ViewHistory(self.session, self)
         self.docks: dict[str, QDockWidget] = {}
-        self._save_path: str | None = None
         self._bottom_sized = False
         self._dialog: QWidget | None = None
         self._lay_out()
+        self.viewport.gizmo = Gizmo(self.viewport, self.session, self.scene.edits)
         self.actions_by_name, self._recent = make_menus(self)
         for name in ("pause", "stop", "restart", "region", "clear_region"):
             self.render_bar.addAction(self.actions_by_name[name])
@@ -79,8 +84,13 @@ class MainWindow(TakesFiles, QMainWindow):
         column = QVBoxLayout(centre)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        column.addWidget(self.message)
+        over = QVBoxLayout(self.viewport)
+        over.setContentsMargins(0, 0, 0, 0)
+        over.addWidget(self.message)
+        over.addWidget(self.findings)
+        over.addStretch(1)
         column.addWidget(self.viewport, 1)
+        column.addWidget(self.timeline)
         column.addWidget(self.display)
         self.setCentralWidget(centre)
         self.addToolBar(Qt.ToolBarArea.TopToolBarArea, self.render_bar)
@@ -97,10 +107,21 @@ class MainWindow(TakesFiles, QMainWindow):
             dock = self._add_dock(
                 panel.name, panel.title, panel.widget, panel.area, hidden=panel.hidden
             )
-            if panel.hidden:
+            if panel.area == Qt.DockWidgetArea.BottomDockWidgetArea:
                 dock.visibilityChanged.connect(self._size_bottom)
-        sides = [self.docks["scene"], self.docks["inspector"]]
+        self.docks["render"].raise_()
+        sides = [self.docks["scene"], self.docks["render"]]
         self.resizeDocks(sides, [theme.em(22), theme.em(20)], Qt.Orientation.Horizontal)
+        self._sizing = QTimer(self, singleShot=True, interval=0)
+        self._sizing.timeout.connect(self._share_width)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Leaves half of the width to the image."""
+        super().resizeEvent(event)
+        self._sizing.start()
+
+    def _share_width(self) -> None:
+        keep_half(self, self.viewport, self.docks.values())
 
     def _room(self, wide: int, high: int) -> QSize:
         """Limits a size to the screen, minus some space for the window frame."""
@@ -154,6 +175,9 @@ class MainWindow(TakesFiles, QMainWindow):
         for told in (session.failed, viewport.failed):
             told.connect(self.message.show_error)
         session.warned.connect(self.message.show_warning)
+        for told in (session.opened, session.noted):
+            told.connect(lambda stage: self._tell_findings())
+        self.findings.details.connect(self.scene.show_notes)
         session.opened.connect(lambda stage: self._opened())
         session.busy.connect(self._busy)
         session.state_changed.connect(self._state_changed)
@@ -209,6 +233,10 @@ class MainWindow(TakesFiles, QMainWindow):
             self._recent.add(path)
         self._retitle()
 
+    def _tell_findings(self) -> None:
+        rows = self.scene.notes.model.rows
+        self.findings.show_findings([f"{r.what}: {r.place}" for r in rows if r.kind == WARNING])
+
     def _retitle(self) -> None:
         path = self.session.path
         self.setWindowTitle("Wavecomb" if path is None else f"{path.name}[*] \u2014 Wavecomb")
@@ -229,13 +257,6 @@ class MainWindow(TakesFiles, QMainWindow):
 
     # ---- the picture -----------------------------------------------------------------------------
 
-    def save(self) -> None:
-        """Saves the image to the file of the previous save."""
-        if self._save_path is None:
-            self.save_as()
-        else:
-            self.save_to(self._save_path)
-
     def save_as(self) -> None:
         """Opens a dialog to choose an image file."""
         path = self.session.path
@@ -250,7 +271,6 @@ class MainWindow(TakesFiles, QMainWindow):
 
     def save_to(self, path: str) -> None:
         """Writes .exr (all layers) or .png (the displayed image)."""
-        self._save_path = path
         self.session.save(path, self.viewport.look)
 
     def toggle_pause(self) -> None:

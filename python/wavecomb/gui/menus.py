@@ -18,13 +18,14 @@ Window = Any
 MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
     (
         "&File",
-        ("open", "recent", "reload", "-", "save", "save_as", "-", "save_edits", "-", "quit"),
+        ("open", "recent", "reload", "-", "save", "save_as", "-", "save_picture", "-",
+         "quit"),
     ),
-    ("&Edit", ("undo", "redo")),
+    ("&Edit", ("undo", "redo", "-", "move", "rotate", "scale", "-", "parent")),
     (
         "&Render",
         ("pause", "stop", "restart", "-", "region", "clear_region", "fit_size", "-", "denoise",
-         "-", "farm"),
+         "-", "play", "farm"),
     ),
     (
         "&Camera",
@@ -70,19 +71,30 @@ def entries(window: Window) -> list[Entry]:
             "reload", "Re&load", window.reload, ["Ctrl+R"],
             "Reload the stage from disk and drop edits",
         ),
-        Entry("save", "&Save", window.save, ["Ctrl+S"], "Write the picture to the same file"),
         Entry(
-            "save_as", "Save &as\u2026", window.save_as, ["Ctrl+Shift+S"],
-            "Write all layers (EXR) or the displayed picture (PNG)",
+            "save", "&Save edits", scene.save, ["Ctrl+S"],
+            "Write the edits as a small USD layer over the stage, which is chosen the first time",
         ),
+        Entry("save_as", "Save edits &as layer\u2026", scene.ask_save, [], "Write another layer"),
         Entry(
-            "save_edits", "Save &edits as layer\u2026", scene.ask_save, [],
-            "Write the edits as a small USD layer over the stage",
+            "save_picture", "Save &picture\u2026", window.save_as, ["Ctrl+Shift+S"],
+            "Write all layers (EXR) or the displayed picture (PNG)",
         ),
         Entry("undo", "&Undo", scene.edits.undo, ["Ctrl+Z"], "Undo the last edit"),
         Entry(
             "redo", "&Redo", scene.edits.redo, ["Ctrl+Shift+Z", "Ctrl+Y"],
             "Redo the last undone edit",
+        ),
+        *(
+            Entry(
+                name, f"&{name.capitalize()}", lambda name=name: viewport.gizmo.set_mode(name),
+                [key], f"{name.capitalize()} the selected light or object by handles", local=True,
+            )
+            for name, key in (("move", "W"), ("rotate", "E"), ("scale", "R"))
+        ),
+        Entry(
+            "parent", "Select &parent", scene.select_parent, ["P"],
+            "Select the prim that contains the selected one", local=True,
         ),
         Entry("quit", "&Quit", window.close, ["Ctrl+Q"]),
         Entry(
@@ -103,8 +115,12 @@ def entries(window: Window) -> list[Entry]:
             "Render at the pixel size of the viewport",
         ),
         Entry(
-            "denoise", "&Denoise on, off", window.render_bar.denoise.toggle, ["Shift+D"],
-            "Denoise the picture with Open Image Denoise",
+            "denoise", "&Denoise on, off", window.docks["render"].widget().denoise.toggle,
+            ["Shift+D"], "Denoise the picture with Open Image Denoise",
+        ),
+        Entry(
+            "play", "Pla&y", window.timeline.toggle, ["Shift+Space"],
+            "Play or stop the frames of an animated stage", local=True,
         ),
         Entry(
             "farm", "Send to a &farm\u2026", window.send_to_farm, [],

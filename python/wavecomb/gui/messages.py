@@ -7,11 +7,11 @@ import datetime
 import sys
 import threading
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
 
-from PySide6.QtCore import QObject, QStandardPaths, Qt, QTimer
+from PySide6.QtCore import QObject, QStandardPaths, Qt, QTimer, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QToolButton, QWidget
 
 from wavecomb.gui import theme
@@ -22,21 +22,27 @@ WARNING_MS = 12000
 
 
 class MessageBar(QFrame):
-    """Message bar above the image. Errors stay until closed, warnings disappear after some time."""
+    """Message bar over the image. Errors and findings stay until closed, warnings for some time.
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    Signals:
+        details(): The user wants to know more about findings.
+    """
+
+    details = Signal()
+
+    def __init__(self, name: str = "message", parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setObjectName("message")
+        self.setObjectName(name)
         self.setFrameShape(QFrame.Shape.StyledPanel)
         self.setAutoFillBackground(True)
-        self._label = named(QLabel(), "message.text", "Message", "")
+        self._label = named(QLabel(), f"{name}.text", "Message", "")
         self._label.setWordWrap(True)
         self._label.setTextInteractionFlags(
             Qt.TextInteractionFlag.TextSelectableByMouse
             | Qt.TextInteractionFlag.TextSelectableByKeyboard
         )
         self._label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        close = named(QToolButton(), "message.close", "Close the message", "Close (Esc)")
+        close = named(QToolButton(), f"{name}.close", "Close the message", "Close (Esc)")
         close.setText("\u2715")
         close.setAutoRaise(True)
         close.clicked.connect(self.hide)
@@ -44,6 +50,10 @@ class MessageBar(QFrame):
         pad = theme.em(0.4)
         row.setContentsMargins(2 * pad, pad, pad, pad)
         row.addWidget(self._label, 1)
+        self._more = named(QToolButton(), f"{name}.details", "Details", "List all findings")
+        self._more.setText("Details")
+        self._more.clicked.connect(self.details)
+        row.addWidget(self._more, 0, Qt.AlignmentFlag.AlignTop)
         row.addWidget(close, 0, Qt.AlignmentFlag.AlignTop)
         self._timer = QTimer(self)
         self._timer.setSingleShot(True)
@@ -68,8 +78,20 @@ class MessageBar(QFrame):
         self._show(message, False)
         self._timer.start(WARNING_MS)
 
+    def show_findings(self, lines: Sequence[str]) -> None:
+        """Shows the first line and the number of the others until it is closed or replaced."""
+        more = f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""
+        text = lines[0] + more if lines else ""
+        if text and text != self._label.text():
+            self._show(text, False)
+            self._more.show()
+        elif not text:
+            self._label.clear()
+            self.hide()
+
     def _show(self, message: str, is_error: bool) -> None:
         self._is_error = is_error
+        self._more.hide()
         self._label.setText(" ".join(message.split()))
         self._colour()
         self.show()

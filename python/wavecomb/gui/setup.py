@@ -19,6 +19,12 @@ Region = tuple[int, int, int, int]
 NOT_LIVE = ("progressive", "crop")
 """Settings that do not apply to live renders, which always use progressive passes and the whole
 image."""
+NOT_IN_PREVIEWS = (
+    "adaptive", "noise", "time_limit", "guiding", "transport", "merge_radius", "firefly",
+    "integrator", "allocate",
+)  # fmt: skip
+"""Settings that have their defaults in reduced images."""
+PREVIEW_DEPTH = 3
 
 
 if TYPE_CHECKING:
@@ -87,7 +93,8 @@ class Setup(_Rows):
 
         Args:
             scale: Divisor of width and height.
-            preview: Whether to render only one sample per pixel.
+            preview: Whether to render only one sample per pixel, with few bounces and guides for
+                denoising.
 
         Raises:
             WavecombError, wavecomb._core.Error: A value is invalid. The message is one line.
@@ -98,13 +105,16 @@ class Setup(_Rows):
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in own}
         if self.region is not None:
             values["region"] = scaled_region(self.region, scale, self.width, self.height)
+        layers = self.layers()
         if preview:
+            layers = aov_names.with_others(layers, aov_names.GUIDES)
+            values |= {name: settings()[name].default for name in NOT_IN_PREVIEWS}
             # Measuring material costs would take longer than the preview.
-            values |= {"adaptive": 0.0, "noise": 0.0, "time_limit": 0.0, "costs": "model"}
+            values |= {"costs": "model", "max_depth": min(self.max_depth, PREVIEW_DEPTH)}
         else:
             values["progressive"] = True
         size = scaled_size(self.width, self.height, scale)
-        return make_settings(size, 1 if preview else self.spp, aovs=self.layers(), **values)
+        return make_settings(size, 1 if preview else self.spp, aovs=layers, **values)
 
 
 def scaled_size(width: int, height: int, scale: int) -> tuple[int, int]:

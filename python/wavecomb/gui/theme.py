@@ -15,8 +15,8 @@ CHOICES = (SYSTEM, DARK, LIGHT)
 # Window, base, alternate base, button, text, dimmed text, lines, highlight, link.
 _COLOURS = {
     DARK: (
-        "#34373c", "#1e2023", "#25272b", "#45494f", "#e4e6ea", "#8d939c", "#17181a", "#3d7ede",
-        "#7db0ff",
+        "#333333", "#202020", "#262626", "#454545", "#e2e2e2", "#939393", "#181818", "#3f74b5",
+        "#8ab4e8",
     ),
     LIGHT: (
         "#f2f3f5", "#ffffff", "#f6f7f9", "#e6e8ec", "#1b1d21", "#767c86", "#b9bec7", "#2f6fd6",
@@ -37,7 +37,7 @@ class _Theme(QObject):
 
     def __init__(self) -> None:
         super().__init__()
-        self.choice = SYSTEM
+        self.choice = DARK
 
 
 _theme: _Theme | None = None

@@ -19,7 +19,9 @@ def check_denoiser() -> None:
     needed("pyoidn", "denoising", extra="denoise")
 
 
-def denoise(beauty: Array, albedo: Array, normal: Array, *, threads: int = 0) -> Array:
+def denoise(
+    beauty: Array, albedo: Array, normal: Array, *, threads: int = 0, fast: bool = False
+) -> Array:
     """Denoises an image.
 
     Albedo and normals are denoised separately first and then guide the image as noise-free
@@ -30,6 +32,7 @@ def denoise(beauty: Array, albedo: Array, normal: Array, *, threads: int = 0) ->
         albedo: (height, width, 3) albedo.
         normal: (height, width, 3) means of unit normals.
         threads: Number of threads; 0 means all.
+        fast: Whether to skip denoising of the guides and to use a smaller network, for previews.
 
     Raises:
         WavecombError: The library is missing or fails.
@@ -38,13 +41,15 @@ def denoise(beauty: Array, albedo: Array, normal: Array, *, threads: int = 0) ->
     with oidn.Device() as device:
         if threads > 0:
             device.set_int("numThreads", threads)
+        # Pinned threads would wait for those of a render that runs at the same time.
+        device.set_bool("setAffinity", False)
         device.commit()
-        guides = {
-            name: _filtered(oidn, device, {name: _clean(image, low, 1.0)})
-            for name, image, low in (("albedo", albedo, 0.0), ("normal", normal, -1.0))
-        }
-        images = {"color": _clean(beauty, 0.0, None), **guides}
-        return _filtered(oidn, device, images, hdr=True, cleanAux=True)
+        guides = {"albedo": _clean(albedo, 0.0, 1.0), "normal": _clean(normal, -1.0, 1.0)}
+        images = {"color": _clean(beauty, 0.0, None)}
+        if fast:
+            return _filtered(oidn, device, {**images, **guides}, fast=True, hdr=True)
+        guides = {name: _filtered(oidn, device, {name: one}) for name, one in guides.items()}
+        return _filtered(oidn, device, {**images, **guides}, hdr=True, cleanAux=True)
 
 
 def _clean(image: Array, low: float, high: float | None) -> Array:
@@ -53,13 +58,17 @@ def _clean(image: Array, low: float, high: float | None) -> Array:
     return np.ascontiguousarray(np.clip(finite, low, high), dtype=np.float32)
 
 
-def _filtered(oidn: Any, device: Any, images: dict[str, Array], **flags: bool) -> Array:
+def _filtered(
+    oidn: Any, device: Any, images: dict[str, Array], *, fast: bool = False, **flags: bool
+) -> Array:
     output = np.empty_like(next(iter(images.values())))
     with oidn.Filter(device, "RT") as run:
         for name, image in {**images, "output": output}.items():
             run.set_image(name, image, oidn.OIDN_FORMAT_FLOAT3)
         for name, value in flags.items():
             run.set_bool(name, value)
+        if fast:
+            run.set_quality(oidn.OIDN_QUALITY_FAST)
         run.commit()
         run.execute()
     if (problem := device.get_error()) is not None:

@@ -122,6 +122,21 @@ class Look:
         widget = QApplication.focusWidget()
         return widget.text() if hasattr(widget, "text") else None
 
+    def handles(self):
+        """Returns the ends of the handles of the selection on the screen, by name."""
+        view = self.window.viewport
+        corner = view.mapToGlobal(QPoint(0, 0))
+        found = view.gizmo.handles().items()
+        return {name: [corner.x() + line[-1][0], corner.y() + line[-1][1]] for name, line in found}
+
+    def frame(self):
+        """Returns the frame of the timeline, and the one that the scene was loaded at."""
+        return [self.window.timeline.frame.value(), self.window.session.stage.frame]
+
+    def widths(self):
+        """Returns the widths of the window and of the area of the image."""
+        return [self.window.width(), self.window.viewport.width()]
+
     def picture(self):
         """Returns the position of the image on the screen."""
         port = self.window.viewport

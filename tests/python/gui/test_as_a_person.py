@@ -16,6 +16,7 @@ from mtlx_stage import write_referring, write_stage
 from parts import ASSETS, asset, needs
 from person import Person, screen
 from pxr import Sdf
+from test_gizmo import BALL, STAGE
 
 import wavecomb.usd
 from wavecomb.usd.stage.diagnostics import capture_diagnostics
@@ -204,6 +205,46 @@ def test_small_stages(person, tmp_path):
     me.key("ctrl+r")
     me.wait(lambda: me.ask("state")["edits"] == [], "the stage to be read again")
     assert me.settled()["message"] == ""
+    me.leave()
+
+
+@pytest.mark.slow
+def test_handles_timeline_keys_and_a_small_window(person, tmp_path):
+    """Moves a light and an object by handles, saves by keys, plays, and shrinks the window."""
+    path = tmp_path / "moved.usda"
+    path.write_text(STAGE)
+    me = person(path, size=(320, 240))
+    me.settled()
+    x, y, wide, high = me.ask("picture")
+    me.click([x + wide * 4 // 5, y + high // 2, 0, 0])
+    me.wait(lambda: me.ask("state")["selection"] == BALL, "the ball to be selected")
+    me.key("w")
+    me.wait(lambda: me.ask("handles"), "handles")
+    me.look(shot(tmp_path, "handles"))
+    start = [round(at) for at in me.ask("handles")["y"]]
+    me.drag(start, (0, -50), button=1)
+    me.wait(lambda: len(me.ask("state")["edits"]) == 2, "an edited transform")
+    me.settled()
+    me.look(shot(tmp_path, "moved"))
+    layer, picture = tmp_path / "edits.usda", tmp_path / "picture.exr"
+    me.key("ctrl+s")
+    me.answer("QFileDialog", str(layer))
+    me.wait(layer.exists, "the edits to be written")
+    assert "xformOp:transform:edit" in layer.read_text()
+    me.key("ctrl+shift+s")
+    me.answer("QFileDialog", str(picture))
+    me.wait(picture.exists, "the picture to be written")
+    me.click(me.ask("widget", "timeline.play"))
+    me.wait(lambda: me.ask("frame")[1] == 3.0, "the third frame")
+    me.look(shot(tmp_path, "playing"))
+    me.click(me.ask("widget", "timeline.play"))
+    me.settled()
+    now, loaded = me.ask("frame")
+    assert now == loaded
+    me.do("getactivewindow", "windowsize", 900, 600)
+    me.wait(lambda: me.ask("widths")[0] <= 900, "the window to shrink")
+    me.wait(lambda: me.ask("widths")[1] >= me.ask("widths")[0] // 2, "half of the width")
+    me.look(shot(tmp_path, "small"))
     me.leave()
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from wavecomb import _core
 from wavecomb.gui.viewport import navigate
-from wavecomb.gui.viewport.engine import reduced_scale
+from wavecomb.gui.viewport.previews import reduced_scale
 from wavecomb.image.files.image import read_layers
 
 
@@ -201,7 +201,7 @@ def test_pause_stop_and_resume(new_session, qtbot, cornell):
 def test_a_pause_that_comes_while_a_frame_is_made_is_told(new_session, qtbot, cornell):
     session = new_session(width=64, height=64, spp=100_000)
     engine = session._engine
-    take, taken = engine._listener.on_frame, []
+    take, taken = engine.listener.on_frame, []
 
     def pause_in_the_third(frame):
         taken.append(frame)
@@ -209,7 +209,7 @@ def test_a_pause_that_comes_while_a_frame_is_made_is_told(new_session, qtbot, co
             engine.pause()
         take(frame)
 
-    engine._listener.on_frame = pause_in_the_third
+    engine.listener.on_frame = pause_in_the_third
     session.open(cornell)
     qtbot.waitUntil(lambda: len(taken) >= 4, timeout=20000)
     assert [frame.status.get("paused", False) for frame in taken] == [False] * 3 + [True]

@@ -34,6 +34,34 @@ def test_an_empty_window_says_how_to_begin(window):
         window.actions_by_name[name].trigger()
 
 
+GONE = """#usda 1.0
+def Mesh "M" (prepend apiSchemas = ["MaterialBindingAPI"])
+{
+    int[] faceVertexCounts = [3]
+    int[] faceVertexIndices = [0, 1, 2]
+    point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
+    texCoord2f[] primvars:st = [(0, 0), (1, 0), (0, 1)] (interpolation = "vertex")
+    rel material:binding = </Look>
+}
+def Material "Look"
+{
+    token outputs:surface.connect = </Look/S.outputs:surface>
+    def Shader "S"
+    {
+        uniform token info:id = "UsdPreviewSurface"
+        color3f inputs:diffuseColor.connect = </Look/T.outputs:rgb>
+        token outputs:surface
+    }
+    def Shader "T"
+    {
+        uniform token info:id = "UsdUVTexture"
+        asset inputs:file = @gone.png@
+        float3 outputs:rgb
+    }
+}
+"""
+
+
 @pytest.mark.slow
 def test_drop_opens_a_stage(window, qtbot, cornell):
     data = QMimeData()
@@ -76,9 +104,10 @@ def test_an_error_is_shown_until_it_is_closed(cornell_window, qtbot, tmp_path):
 @pytest.mark.slow
 def test_controls_of_the_render(cornell_window, qtbot):
     window, bar = cornell_window, cornell_window.render_bar
+    controls = window.docks["render"].widget().controls
     for box, field, value in (
-        (bar.spp, "spp", 2), (bar.depth, "max_depth", 3), (bar.wide, "width", 64),
-        (bar.high, "height", 48),
+        (controls["spp"], "spp", 2), (controls["max_depth"], "max_depth", 3),
+        (bar.wide, "width", 64), (bar.high, "height", 48),
     ):  # fmt: skip
         box.setFocus()
         box.selectAll()
@@ -162,9 +191,10 @@ def test_a_missing_denoiser_is_told(cornell_window, monkeypatch):
         return real(name, *rest)
 
     monkeypatch.setattr(importlib, "import_module", without)
-    cornell_window.render_bar.denoise.click()
+    denoise = cornell_window.docks["render"].widget().denoise
+    denoise.click()
     assert "pip install 'pyoidn>=2.5'" in cornell_window.message.text()
-    assert not cornell_window.render_bar.denoise.isChecked()
+    assert not denoise.isChecked()
     assert not cornell_window.session.setup.denoise
 
 
@@ -280,6 +310,55 @@ def test_colours_reach_every_widget(window, qapp):
             assert (text.lightness() > 128) == is_dark, where
 
 
-def test_panels_leave_room_for_the_picture(window):
+def test_panels_leave_room_for_the_picture(window, qtbot):
     for name, dock in window.docks.items():
         assert dock.minimumSizeHint().width() <= 600, name
+    assert window.docks["scheduling"].isHidden(), "for researchers"
+    for size in ((1300, 700), (900, 600)):
+        window.resize(*size)
+        qtbot.waitUntil(lambda: window.viewport.width() >= window.width() // 2)
+
+
+def test_findings_are_told_over_the_picture(window, qtbot, tmp_path):
+    stage = tmp_path / "gone.usda"
+    stage.write_text(GONE)
+    with qtbot.waitSignal(window.session.opened, timeout=10000):
+        window.open(stage)
+    qtbot.waitUntil(lambda: "gone.png" in window.findings.text())
+    assert window.findings.parent() is window.viewport and window.message.text() == ""
+    window.scene.tabs.setCurrentIndex(0)
+    window.findings.findChild(object, "findings.details").click()
+    assert window.scene.tabs.currentWidget() is window.scene.notes
+    window.findings.findChild(object, "findings.close").click()
+    assert window.findings.text() == ""
+
+
+def test_the_render_panel_changes_settings(window):
+    panel, session = window.docks["render"].widget(), window.session
+    panel.controls["noise"].setValue(0.02)
+    assert session.setup.noise == 0.02 and session.setup.min_spp == session.setup.spp == 4
+    panel.controls["spp"].setValue(2)
+    assert session.setup.min_spp == 2
+    caustics = panel.controls["transport"]
+    caustics.setCurrentIndex(caustics.findText("light paths"))
+    caustics.activated.emit(caustics.currentIndex())
+    assert session.setup.transport == "light"
+    session.change(noise=0.0, transport="path")
+    assert panel.controls["noise"].text() == "off" and caustics.currentText() == "camera paths"
+
+
+def test_ctrl_s_saves_edits_and_asks_only_once(cornell_window, qtbot, tmp_path, monkeypatch):
+    window, asked = cornell_window, []
+    layer = tmp_path / "edits.usda"
+
+    def ask(*arguments, **options):
+        asked.append(options["start"])
+        arguments[3](str(layer))
+
+    monkeypatch.setattr("wavecomb.gui.scene.scene_panel.ask_file", ask)
+    window.activateWindow()
+    for count in range(2):
+        window.scene.edits.set_light(window.scene.lights.model.rows[0], "exposure", 1.0 + count)
+        QTest.keyClick(window, Qt.Key.Key_S, Qt.KeyboardModifier.ControlModifier)
+        assert f"exposure = {1 + count}" in layer.read_text()
+    assert len(asked) == 1

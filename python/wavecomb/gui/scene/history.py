@@ -57,7 +57,7 @@ class EditCommand(QUndoCommand):
         if not isinstance(other, EditCommand) or other.stretch != self.stretch:
             return False
         quick = other.typing or other.moment - self.moment < MERGE_S
-        if not quick or other.step.after.keys() != self.step.after.keys():
+        if not quick or not other.step.after.keys() <= self.step.after.keys():
             return False
         self.step, self.moment = self.step.then(other.step), other.moment
         return True

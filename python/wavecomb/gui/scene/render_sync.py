@@ -10,18 +10,22 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from pxr import Sdf, Usd
 
 from wavecomb.gui.scene.light_inputs import BRIGHTNESS, LightInput, inputs_of, light_inputs
 from wavecomb.gui.scene.stage_edits import Key, StageEdits, Step
+from wavecomb.gui.scene.transforms import moves_alone
 from wavecomb.usd.materials.parameters import (
     IN_INSTANCE,
     Parameter,
     as_stored,
+    light_transform,
     light_values,
     material_parameters,
 )
 from wavecomb.usd.materials.surface_values import surface_values
+from wavecomb.usd.stage.origin import to_scene_space
 
 if TYPE_CHECKING:
     from wavecomb.gui.viewport.session import Session
@@ -116,7 +120,10 @@ class RenderSync:
         """Applies a step to the stage and updates the render."""
         before = {} if step.structural else self.structures(step.prims)
         self.stage_edits.apply(step)
-        if step.structural or self.structures(step.prims) != before:
+        moves = any(".xformOp" in what for _, what in step.after)
+        simple = all(moves_alone(self.prim(str(path)), self.time) for path in step.prims)
+        structural = step.structural or (moves and not simple)
+        if structural or self.structures(step.prims) != before:
             self.session.rebuild(step.label)
         else:
             self.show_step(step)
@@ -219,6 +226,10 @@ class RenderSync:
                 for name, value in wanted.items()
                 if as_stored(have[name]) != as_stored(value)
             }
+            if on_stage is not None:
+                now = to_scene_space(light_transform(self.prim(path), self.time), stage.origin)
+                if not np.allclose(now, have["transform"], rtol=1e-5, atol=1e-6):
+                    values["transform"] = now
             if values:
                 self.session.edit_light(number, **values)
         self.session.light_edits.clear()

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from pxr import Sdf, Usd
+from pxr import Gf, Sdf, Usd
 from PySide6.QtCore import QObject, Signal
 
 from wavecomb.errors import WavecombError
@@ -16,6 +16,7 @@ from wavecomb.gui.scene.history import History
 from wavecomb.gui.scene.light_inputs import light_inputs
 from wavecomb.gui.scene.render_sync import RenderSync
 from wavecomb.gui.scene.stage_edits import Key, Opinion, Solo, StageEdits, Step
+from wavecomb.gui.scene.transforms import Placement, placement
 from wavecomb.gui.scene.visibility import HIDDEN, HIDDEN_ABOVE, show, state, uneditable
 from wavecomb.usd.materials.parameters import as_stored
 from wavecomb.usd.stage.time_codes import code_of
@@ -181,6 +182,16 @@ class SceneEdits(QObject, RenderSync):
         label = f"{name} of {path or 'soft dome'}"
         self._change(label, self.light_key(path, name), opinion)
 
+    # ---- transforms ----------------------------------------------------------------------------
+
+    def placement(self, path: str) -> Placement | None:
+        """Returns the transform of a prim, or None if it cannot be edited."""
+        return placement(self.prim(path), self.time) if self._is_open else None
+
+    def move(self, before: Placement, change: Gf.Matrix4d) -> None:
+        """Changes a transform by a matrix in world space, for row vectors."""
+        self._do(lambda edits: edits.plan(f"transform of {before.path}", before.moved(change)))
+
     # ---- history -------------------------------------------------------------------------------
 
     def undo(self) -> None:
@@ -248,6 +259,7 @@ class SceneEdits(QObject, RenderSync):
             self._forget(StageEdits(usd, code_of(loaded.frame)))
             self.changed.emit()
             return
+        self.stage_edits.time = code_of(loaded.frame)
         self.scene_changed.emit()
         # Edits that were made or undone during loading are not in the scene yet.
         for prim in {path for path, _ in self.stage_edits.edited()} | self._touched:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pxr import Sdf, UsdShade
@@ -51,6 +52,7 @@ class ScenePanel(QWidget):
         self.materials = MaterialsPanel(self.edits)
         self.lights = LightsPanel(self.edits)
         self.notes = NotesPanel(session)
+        self._layer: tuple[Path | None, str] | None = None  # stage and file of the last save
         self.tabs = QTabWidget()
         self.tabs.setObjectName("scene-tabs")
         self.tabs.setDocumentMode(True)
@@ -103,12 +105,23 @@ class ScenePanel(QWidget):
 
     def _action(self, name: str, call: Callable[[], None]) -> QAction:
         action = QAction(name, self)
-        action.setIconText(name)  # text of the button; the action's text also names the edit
+        action.setIconText(name.partition(" ")[0])
         action.setObjectName(name.rstrip("\u2026").lower().replace(" ", "-"))
         action.triggered.connect(lambda checked=False: call())
         return action
 
     # ---- edits ---------------------------------------------------------------------------------
+
+    def save(self) -> None:
+        """Writes the edits to the layer of the previous save, or asks for one."""
+        if self._layer and self._layer[0] == self.session.path:
+            self.edits.save(self._layer[1])
+        else:
+            self.ask_save()
+
+    def _save_to(self, path: str) -> None:
+        if self.edits.save(path):
+            self._layer = self.session.path, path
 
     def ask_save(self) -> None:
         """Asks for a file and writes the edits to it."""
@@ -116,7 +129,7 @@ class ScenePanel(QWidget):
         start = ""
         if stage is not None:
             start = str(stage.stage_path.with_name(f"{stage.stage_path.stem}_edits.usda"))
-        kinds, save = "USD text (*.usda)", self.edits.save
+        kinds, save = "USD text (*.usda)", self._save_to
         ask_file(self, "Save edits as layer", kinds, save, start=start, ending="usda")
 
     def _on_changed(self) -> None:
@@ -125,6 +138,15 @@ class ScenePanel(QWidget):
         self.state.setText(f"{len(lines)} edited" if lines else "")
         shown = lines[:30] + ([f"and {len(lines) - 30} more"] if len(lines) > 30 else [])
         self.state.setToolTip("\n".join(shown))
+
+    def select_parent(self) -> None:
+        """Selects the parent of the selected prim, unless it is the root."""
+        if parent := (self.session.selection or "").rpartition("/")[0]:
+            self.session.select(parent)
+
+    def show_notes(self) -> None:
+        """Shows the findings of the loader."""
+        self.tabs.setCurrentWidget(self.notes)
 
     # ---- what is selected ----------------------------------------------------------------------
 

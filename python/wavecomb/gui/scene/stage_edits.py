@@ -72,8 +72,8 @@ class Step:
         return Step(f"undo {self.label}", self.after, self.before, solo)
 
     def then(self, later: Step) -> Step:
-        """Returns this step and a later one with the same keys as a single step."""
-        return Step(later.label, self.before, later.after, self.solo)
+        """Returns this step and a later one, which has no further keys, as a single step."""
+        return Step(later.label, self.before, {**self.after, **later.after}, self.solo)
 
     @property
     def drags(self) -> bool:

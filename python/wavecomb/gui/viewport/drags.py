@@ -18,6 +18,7 @@ class Drag(Enum):
     SHIFT = auto()
     REGION = auto()
     PICK = auto()
+    GIZMO = auto()
 
 
 Left, Middle, Right = (

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.gui.setup import Setup
+from wavecomb.gui.setup import Setup, scaled_region
 from wavecomb.run.expressions import layer_of
 
 if TYPE_CHECKING:
@@ -26,8 +26,8 @@ class Frame:
     """An image of a live render. The arrays of a frame must not be modified.
 
     Attributes:
-        beauty: (height, width, 3), linear Rec.709. Pixels without samples hold values of the
-            reduced image of the same version.
+        beauty: (height, width, 3), linear Rec.709. A reduced image has no noise, nor does one in
+            which not all pixels have samples yet.
         layers: Layers of ``setup.aovs`` by name: (height, width) or (height, width, channels).
         denoised: (height, width, 3), perhaps of an earlier frame of this version; None if missing.
         status: samples_done, samples_total, passes, seconds, error and so on, as in
@@ -58,6 +58,22 @@ class Frame:
     def height(self) -> int:
         """Height in pixels."""
         return int(self.beauty.shape[0])
+
+    @property
+    def samples_done(self) -> int:
+        """Number of samples of all pixels."""
+        return int(self.status.get("samples_done", 0))
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every pixel that is rendered has a sample."""
+        samples = self.layers["samples"]
+        if self.setup.region is not None:
+            x0, y0, x1, y1 = scaled_region(
+                self.setup.region, self.scale, self.setup.width, self.setup.height
+            )
+            samples = samples[y0:y1, x0:x1]
+        return bool(samples.all())
 
     def names(self) -> list[str]:
         """Returns the names of layers that can be shown, the beauty first."""
@@ -93,19 +109,12 @@ def layers_of_snapshot(snapshot: Snapshot, names: tuple[str, ...]) -> dict[str, 
     return out
 
 
-def enlarged(image: Array, width: int, height: int) -> Array:
-    """Enlarges an image to (height, width, ...) by nearest pixels."""
-    rows = np.arange(height) * image.shape[0] // height
-    columns = np.arange(width) * image.shape[1] // width
-    return image[rows[:, None], columns[None, :]]
-
-
 # ---- Denoising of frames. Independent of Qt
 # ---------------------------------------------------------
 
 
 def denoised_frame(frame: Frame) -> tuple[Frame, Any]:
-    """Denoises a frame with Open Image Denoise.
+    """Denoises a frame with Open Image Denoise, faster if it is not the last.
 
     Returns None as image if guide layers are missing.
     """
@@ -115,4 +124,5 @@ def denoised_frame(frame: Frame) -> tuple[Frame, Any]:
     normal = frame.layers.get("guide_normal")
     if albedo is None or normal is None:
         return frame, None
-    return frame, denoise(frame.beauty, albedo, normal, threads=frame.setup.threads)
+    threads, fast = frame.setup.threads, not frame.final
+    return frame, denoise(frame.beauty, albedo, normal, threads=threads, fast=fast)

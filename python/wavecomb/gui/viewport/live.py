@@ -75,13 +75,17 @@ class News:
         self._put("ready", renderer)
 
 
-SETTLE_MS = 200
+SETTLE_MS = 50
 """Delay between the last movement and the full image, in milliseconds."""
 BURST_S = 0.15
 """Edits at shorter intervals, in seconds, count as a drag with reduced images."""
-WAIT_S = 0.4
+WAIT_S = 3.0
 """Largest time that an image may take during a movement before the next edit stops it, in
 seconds."""
+DENOISE_AGAIN = 1.5
+"""Factor of the number of samples after which a frame is denoised again."""
+LATE = 4
+"""A denoised image is late if the newest frame has more than this many times its samples."""
 
 IDLE, RENDERING, PAUSED, STOPPED, FINISHED = "idle", "rendering", "paused", "stopped", "finished"
 
@@ -126,7 +130,9 @@ class Live(QObject):
         self._pending = Edit()
         self._moving = False
         self._awaiting = False
+        self._is_reduced = False  # whether the task is only a reduced image
         self._submitted = 0.0
+        self._denoised = self._denoising = 0  # samples of the images that were denoised last
         self._settle = QTimer(self)
         self._settle.setSingleShot(True)
         self._settle.setInterval(SETTLE_MS)
@@ -141,12 +147,22 @@ class Live(QObject):
     # ---- methods for widgets
     # -------------------------------------------------------------------------
 
-    def begin(self, make: Callable[[], Renderer], loaded: LoadedStage | None, edit: Edit) -> None:
-        """Starts with a new scene. ``make`` creates its renderer on the render thread."""
+    def begin(
+        self,
+        make: Callable[[], Renderer],
+        loaded: LoadedStage | None,
+        edit: Edit,
+        *,
+        moving: bool = False,
+    ) -> None:
+        """Starts with a new scene. ``make`` creates its renderer on the render thread.
+
+        ``moving`` says whether a reduced image is enough.
+        """
         self._pending = Edit()
-        self._moving = False
+        self._moving = moving
         self.renderer = None
-        self._submit(Task(self.setup, 0, edit, False, loaded, make))
+        self._submit(Task(self.setup, 0, edit, moving, loaded, make))
 
     def change(self, **values: Any) -> bool:
         """Changes fields of the setup and restarts. Emits ``failed`` if a value is invalid.
@@ -196,10 +212,12 @@ class Live(QObject):
         self._settle.stop()
         if self._moving:
             self._moving = False
-            self._flush()
+            if self._pending or not (self._awaiting and self._is_reduced):
+                self._flush()  # otherwise after the reduced image, which is being rendered
 
     def restart(self) -> None:
         """Restarts from the first sample."""
+        self._moving = False
         self._flush()
 
     def pause(self) -> None:
@@ -244,6 +262,7 @@ class Live(QObject):
         # During a movement, the previous image may still be on its way to the screen.
         last = self.last_frame.version if self.last_frame is not None else self.version
         self.oldest = last if task.moving else self.version
+        self._is_reduced = task.moving
         self._awaiting, self._submitted = True, time.perf_counter()
         if self.state == PAUSED:
             self._engine.resume()
@@ -288,26 +307,38 @@ class Live(QObject):
             return
         self._awaiting = False
         last = self.last_frame
-        if last is not None and last.version == frame.version and last.scale == frame.scale:
-            frame = replace(frame, denoised=last.denoised)
+        if last is not None and (last.version, last.scale) == (frame.version, frame.scale):
+            # Without a result, the reduced image stays until the frame looks better.
+            if self._denoised or frame.samples_done <= LATE * frame.width * frame.height:
+                frame = replace(frame, denoised=last.denoised)
+        else:
+            self._denoised = self._denoising = 0
         self._show(frame)
         if frame.final and self.state == RENDERING:
             self._set_state(FINISHED)
-        if self.setup.denoise and not self._moving:
-            self._denoiser.submit(partial(denoised_frame, frame))
-        if self._moving and self._pending:
+        self._denoise(frame)
+        if self._is_reduced and (self._pending or not self._moving):
             self._flush()
 
     def _show(self, frame: Frame) -> None:
         self.last_frame = frame
         self.frame.emit(frame)
 
+    def _denoise(self, frame: Frame) -> None:
+        """Denoises a complete frame in the background; reduced images are denoised already."""
+        if not self.setup.denoise or frame.scale > 1 or not frame.is_complete:
+            return
+        if frame.final or frame.samples_done >= DENOISE_AGAIN * self._denoising:
+            self._denoising = frame.samples_done
+            self._denoiser.submit(partial(denoised_frame, frame))
+
     def _take_denoised(self, key: object, result: tuple[Frame, Any]) -> None:
         frame, denoised = result
-        if denoised is None:
-            return
         last = self.last_frame
-        if last is None or (last.version, last.scale) != (frame.version, frame.scale):
+        if denoised is None or last is None or not self.setup.denoise:
             return
-        if self.setup.denoise:
+        if (last.version, last.scale) != (frame.version, frame.scale):
+            return
+        if last.samples_done <= LATE * frame.samples_done:
+            self._denoised = frame.samples_done
             self._show(replace(last, denoised=denoised))

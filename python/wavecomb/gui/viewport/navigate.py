@@ -238,3 +238,22 @@ def _placed(pose: Pose, axes: Matrix, position: Vector) -> Pose:
     to_world[:3, :3] = right, np.cross(back, right), back
     to_world[3, :3] = position
     return replace(pose, to_world=to_world, path=None)
+
+
+def project(pose: Pose, points: Matrix, size: tuple[int, int]) -> Matrix | None:
+    """Returns the pixels (n, 2) of points (n, 3), or None if any of them is behind the camera.
+
+    Args:
+        pose: The camera; a latlong camera is not supported.
+        points: (n, 3) in scene space.
+        size: Width and height of the image.
+    """
+    local = (np.asarray(points, float) - pose.position) @ pose.to_world[:3, :3].T
+    depth = -local[:, 2]
+    if pose.projection == "latlong" or (depth <= 1e-6).any():
+        return None
+    if pose.projection == "orthographic":
+        depth = np.ones_like(depth)
+    x0, x1, y0, y1 = pose.fitted(*size)
+    across, up = local[:, 0] / depth, local[:, 1] / depth
+    return np.stack([(across - x0) / (x1 - x0) * size[0], (y1 - up) / (y1 - y0) * size[1]], axis=1)

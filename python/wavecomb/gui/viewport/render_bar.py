@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tool bar of the render: camera, size, samples, depth, denoising, region; pause, stop, restart."""
+"""Tool bar of the render: camera, size, region; pause, stop, restart."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Any
 
 from PySide6.QtCore import QSize
 from PySide6.QtWidgets import (
-    QCheckBox,
     QComboBox,
     QLabel,
     QSizePolicy,
@@ -24,10 +23,6 @@ from wavecomb.gui.viewport.cameras_model import CamerasModel
 from wavecomb.gui.viewport.session import Session, Setup
 from wavecomb.gui.widgets import caption, named
 from wavecomb.run.settings import MAX_EDGE
-
-_MOST: dict[str, dict[str, Any]] = {"width": {"most": MAX_EDGE}, "height": {"most": MAX_EDGE}}
-_NAMES = {"max_depth": "depth"}
-"""Names of controls that differ from those of their settings."""
 
 
 class RenderBar(QToolBar):
@@ -48,14 +43,7 @@ class RenderBar(QToolBar):
         self.camera.setModel(self.cameras)
         self.camera.activated.connect(self.cameras.choose)
         self.cameras.moved.connect(self._camera_changed)
-        self.wide, self.high, self.spp, self.depth = (
-            self._box(name) for name in ("width", "height", "spp", "max_depth")
-        )
-        self.denoise = named(
-            QCheckBox("Denoise"), "render.denoise", "Denoise",
-            "Denoise the picture with Open Image Denoise (Shift+D)",
-        )  # fmt: skip
-        self.denoise.toggled.connect(self._denoise_toggled)
+        self.wide, self.high = (self._box(name) for name in ("width", "height"))
         self._fill()
         session.setup_changed.connect(self._setup_changed)
         self._setup_changed(setup)
@@ -65,14 +53,12 @@ class RenderBar(QToolBar):
         self.setIconSize(QSize(theme.em(1.1), theme.em(1.1)))
         self.addWidget(self.camera)
         self.addSeparator()
-        for text, box in (
-            (" &Width ", self.wide), (" \u00d7 ", self.high), (" &Samples ", self.spp),
-            (" &Depth ", self.depth),
-        ):  # fmt: skip
-            self.addWidget(QLabel(text) if text == " \u00d7 " else caption(text, box))
+        for label, box in (
+            (caption(" &Size ", self.wide), self.wide),
+            (QLabel(" \u00d7 "), self.high),
+        ):
+            self.addWidget(label)
             self.addWidget(box)
-        self.addSeparator()
-        self.addWidget(self.denoise)
         self.addSeparator()
 
     # ---- cameras ---------------------------------------------------------------------------------
@@ -84,9 +70,9 @@ class RenderBar(QToolBar):
     # ---- settings --------------------------------------------------------------------------------
 
     def _box(self, name: str) -> QSpinBox:
-        box = control_of(replace(number(name), **_MOST.get(name, {})), self._change)
+        box = control_of(replace(number(name), most=MAX_EDGE), self._change)
         assert isinstance(box, QSpinBox)
-        box.setObjectName(f"render.{_NAMES.get(name, name)}")
+        box.setObjectName(f"render.{name}")
         box.setGroupSeparatorShown(False)
         box.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         return box
@@ -94,22 +80,6 @@ class RenderBar(QToolBar):
     def _change(self, name: str, value: Any) -> None:
         self._session.change(**{name: value})
 
-    def _denoise_toggled(self, on: bool) -> None:
-        if on:
-            from wavecomb.errors import WavecombError
-            from wavecomb.image.denoise import check_denoiser
-
-            try:
-                check_denoiser()
-            except WavecombError as error:
-                self._session.failed.emit(str(error))
-                self.denoise.setChecked(False)
-                return
-        self._session.change(denoise=on)
-
     def _setup_changed(self, setup: Setup) -> None:
-        for box in (self.wide, self.high, self.spp, self.depth):
+        for box in (self.wide, self.high):
             show_control(box, getattr(setup, str(box.property("field"))))
-        self.denoise.blockSignals(True)
-        self.denoise.setChecked(setup.denoise)
-        self.denoise.blockSignals(False)

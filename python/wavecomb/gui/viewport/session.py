@@ -96,6 +96,7 @@ class Session(Live):
         self._tasks.failed.connect(self.failed)
         self._request: Request | None = None
         self._request_wanted: Request | None = None
+        self._playing = False
         self._readings = itertools.count(1)
         self._reading = 0
         self._closed = False
@@ -146,9 +147,8 @@ class Session(Live):
         self.usd = None
         self.closing.emit()
         source = self._request.source
-        name = source.path.name
         request = Request(source, usd, None, True, self.setup.threads)
-        self._read(request, f"reading {name} again")
+        self._read(request, f"reading {source.path.name} again")
 
     def rebuild(self, reason: str) -> None:
         """Loads the stage again after edits of the session layer of ``usd``, keeping the camera.
@@ -161,6 +161,24 @@ class Session(Live):
         overrides = copied(self.usd.GetSessionLayer())
         request = Request(self._request.source, self.usd, overrides, False, self.setup.threads)
         self._read(request, reason)
+
+    def show_time(self, time: float, *, moving: bool = False) -> None:
+        """Loads the stage again at another time code, keeping edits and a free camera.
+
+        Args:
+            time: The time code.
+            moving: Whether others follow, so that a reduced image is enough until ``restart``.
+        """
+        if self._request is not None and self.usd is not None:
+            source = replace(self._request.source, time=time)
+            self._request = replace(self._request, source=source)
+            self._playing = moving
+            self.rebuild(f"reading frame {time:g}")
+
+    @property
+    def is_reading(self) -> bool:
+        """Whether the stage is being loaded."""
+        return self._loader.busy
 
     def _read(self, request: Request, what: str) -> None:
         if request.usd is not None and self.stage is not None:
@@ -193,12 +211,11 @@ class Session(Live):
         edit.camera = self.pose.options() if self.pose is not None else None
         make = partial(make_renderer, loaded.scene, self.setup.threads)
         for live in self._lives():
-            live.begin(make, loaded, edit.copied())
+            live.begin(make, loaded, edit.copied(), moving=self._playing)
+        self._playing = False
         self._tasks.end("load")
         self.opened.emit(loaded)
         self.camera_changed.emit(self.pose)
-        for line in loaded.scene.warnings:
-            self.warned.emit(line)
 
     def _take_failure(self, number: int, message: str) -> None:
         request = self._request_wanted
@@ -254,12 +271,10 @@ class Session(Live):
         if path is None:
             self.pose = replace(self.pose, path=None)
             self.camera_changed.emit(self.pose)
-            return
-        pose = self._pose_of(path)
-        if pose is None:
+        elif (pose := self._pose_of(path)) is not None:
+            self.set_camera(pose)
+        else:
             self.failed.emit(f"camera {path}: is not a supported camera; choose another")
-            return
-        self.set_camera(pose)
 
     def _pose_of(self, path: str) -> Pose | None:
         if self.usd is None or self._request is None:
@@ -286,15 +301,13 @@ class Session(Live):
 
     def pick(self, x: float, y: float) -> dict[str, Any] | None:
         """Returns the visible object at pixel (x, y) of the full-size image, or None."""
-        if self.renderer is None:
-            return None
-        return self.renderer.pick(float(x), float(y), self.setup.width, self.setup.height)
+        at = float(x), float(y), self.setup.width, self.setup.height
+        return None if self.renderer is None else self.renderer.pick(*at)
 
     def learned(self, x: float, y: float) -> dict[str, Any] | None:
         """Returns ``Renderer.learned`` for the surface at pixel (x, y), or None."""
-        if self.renderer is None:
-            return None
-        return self.renderer.learned(float(x), float(y), self.setup.width, self.setup.height)
+        at = float(x), float(y), self.setup.width, self.setup.height
+        return None if self.renderer is None else self.renderer.learned(*at)
 
     def select(self, path: str | None) -> None:
         """Selects a prim by its path; None clears the selection."""
@@ -321,7 +334,8 @@ class Session(Live):
             live.resume()
 
     def restart(self) -> None:
-        """Restarts from the first sample."""
+        """Restarts from the first sample, at full size."""
+        self._playing = False
         if self.stage is not None:
             super().restart()
 
@@ -378,9 +392,8 @@ class Session(Live):
         if self._closed:
             return
         self._closed = True
-        for live in self.twins:
-            live.shutdown()
-        self.twins.clear()
+        while self.twins:
+            self.twins.pop().shutdown()
         super().shutdown()
         self._loader.close(0.5)
         self._tasks.close()

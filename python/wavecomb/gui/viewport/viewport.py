@@ -23,7 +23,9 @@ from wavecomb.gui.viewport import navigate
 from wavecomb.gui.viewport.display import Developed, Look, develop_frame
 from wavecomb.gui.viewport.drags import Control, Drag, Left, Shift, drag_of
 from wavecomb.gui.viewport.frames import Frame
+from wavecomb.gui.viewport.gizmo import Gizmo
 from wavecomb.gui.viewport.navigate import Pose, Vector
+from wavecomb.gui.viewport.outline import Outline
 from wavecomb.gui.viewport.picture_view import PictureView
 from wavecomb.gui.viewport.session import Session
 from wavecomb.gui.worker import Worker
@@ -49,6 +51,8 @@ class Viewport(PictureView):
     Attributes:
         look: Display settings.
         frame_shown: The frame on the screen, or None.
+        marked: Outline of the selection.
+        gizmo: Handles that edit the selection, or None without a scene panel.
 
     Signals:
         hovered(object): (x, y) of the pixel under the cursor, or None.
@@ -82,6 +86,8 @@ class Viewport(PictureView):
         self._region_mode = False
         self._region_from: QPointF | None = None
         self._message = EMPTY
+        self.marked = Outline(session, self)
+        self.gizmo: Gizmo | None = None
         self._developer = Worker("develop", self)
         self._developer.done.connect(self._developed)
         self._developer.failed.connect(self._tell_failed)
@@ -92,6 +98,7 @@ class Viewport(PictureView):
     def close_threads(self) -> None:
         """Ends the threads before the window is destroyed."""
         self._developer.close()
+        self.marked.close()
 
     def set_look(self, look: Look) -> None:
         """Sets layer, exposure and view."""
@@ -115,6 +122,7 @@ class Viewport(PictureView):
         self.frame_shown = frame
         size = QSize(frame.setup.width, frame.setup.height)
         self.set_picture(to_qimage(shown.pixels), size, shown.legend)
+        self.marked.follow(frame)
         self.shown.emit(frame, found.look)
 
     def _tell_failed(self, key: object, line: str) -> None:
@@ -258,6 +266,8 @@ class Viewport(PictureView):
         drag = drag_of(event.button(), event.modifiers())
         if self._region_mode and event.button() == Left:
             drag, self._region_from = Drag.REGION, place
+        elif drag is Drag.PICK and self.gizmo is not None and self.gizmo.press(place):
+            drag = Drag.GIZMO
         self._drag, self._last, self._pressed = drag, place, place
         if drag in (Drag.ORBIT, Drag.PAN, Drag.DOLLY):
             self._aim(place)
@@ -278,7 +288,9 @@ class Viewport(PictureView):
             self.shift(by)
         elif self._drag is Drag.REGION:
             self.update()
-        self._tell_hover(place)
+        elif self._drag is Drag.GIZMO and self.gizmo is not None:
+            self.gizmo.drag(place)
+        self.hovered.emit(self._pixel(place))
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         """Ends a drag."""
@@ -286,6 +298,8 @@ class Viewport(PictureView):
         place = event.position()
         if drag in (Drag.ORBIT, Drag.PAN, Drag.DOLLY):
             self.session.settle()
+        elif drag is Drag.GIZMO and self.gizmo is not None:
+            self.gizmo.release()
         elif drag is Drag.REGION:
             region = self._region_of(place)
             self.set_region_mode(False)
@@ -349,17 +363,18 @@ class Viewport(PictureView):
         setup = self.session.setup
         return (x, y) if 0 <= x < setup.width and 0 <= y < setup.height else None
 
-    def _tell_hover(self, place: QPointF) -> None:
-        self.hovered.emit(self._pixel(place))
-
     # ---- painting ------------------------------------------------------------------------------
 
     def paint_over(self, painter: QPainter) -> None:
-        """Paints the region, or the message while there is no image."""
+        """Paints outline, gizmo and region, or the message while there is no image."""
         if self.image() is None:
             painter.setPen(QColor("#d8d8d8"))
             painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._message)
             return
+        self.marked.paint(painter)
+        if self.gizmo is not None:
+            self.gizmo.paint(painter)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
         if self._region_mode and self._drag is Drag.REGION and self._region_from is not None:
             self._paint_box(painter, QRectF(self._region_from, self._last).normalized(), True)
         region = self.session.setup.region

@@ -13,14 +13,15 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from pxr import Sdf, Usd, UsdGeom, UsdShade
+from numpy.typing import NDArray
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
 from wavecomb.light_table import EDITABLE, of_kind
 from wavecomb.material_table import own_parameters, programs
 from wavecomb.usd import mtlx
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
-from wavecomb.usd.lights.light import LightReader
+from wavecomb.usd.lights.light import Light, LightReader
 from wavecomb.usd.materials.colour_space import LINEAR, RAW, canonical
 from wavecomb.usd.materials.material import PREVIEW, surface_source
 from wavecomb.usd.materials.network import (
@@ -234,6 +235,22 @@ def light_values(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any] | None:
     """
     if not prim or str(prim.GetTypeName()) not in LIGHT_KINDS:
         return None
+    light, _ = _read_light(prim, time)
+    return {
+        row.name: light.options.get(row.name, row.default)
+        for row in of_kind(light.kind)
+        if row.kind in EDITABLE and row.name != "visible"
+    }
+
+
+def light_transform(prim: Usd.Prim, time: Usd.TimeCode) -> NDArray[np.float64]:
+    """Returns the transform (4, 4) to the world that the loader passes for a supported light."""
+    light, matrix = _read_light(prim, time)
+    return np.asarray(light.local @ np.array(matrix))
+
+
+def _read_light(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Light, Gf.Matrix4d]:
+    """Reads a light and its transform to the world."""
     matrix = IDENTITY
     xforms = UsdGeom.XformCache(time)
     for path in prim.GetPath().GetPrefixes():
@@ -248,12 +265,7 @@ def light_values(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any] | None:
     scale = abs(matrix.GetDeterminant3()) ** (1.0 / 3.0)
     context = LoadContext(prim.GetStage(), time, None)  # type: ignore[arg-type]
     reader = LightReader(context, None, LightGroups(context.report), _AnyProfile())
-    light = reader.read(prim, scale)
-    return {
-        row.name: light.options.get(row.name, row.default)
-        for row in of_kind(light.kind)
-        if row.kind in EDITABLE and row.name != "visible"
-    }
+    return reader.read(prim, scale), matrix
 
 
 def as_stored(value: Any) -> Any:

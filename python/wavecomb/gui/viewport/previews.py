@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reduced images without noise, shown during movements and before the first samples."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wavecomb.errors import WavecombError
+from wavecomb.gui.viewport.frames import Array, Frame
+
+_DARK = np.float32(0.05)
+"""Added to albedos before a division."""
+SCALES = (1, 2, 3, 4, 6, 8, 12)
+
+
+def reduced_scale(pixels: int, rate: float, overhead: float, limit: float) -> int:
+    """Returns the smallest reduction that renders one sample per pixel within a time limit.
+
+    Args:
+        pixels: Pixels of the full image.
+        rate: Samples per second; 0 if unknown.
+        overhead: Constant time of a render, in seconds.
+        limit: Time limit in seconds.
+
+    >>> reduced_scale(1_000_000, 2_000_000.0, 0.01, 0.06)
+    4
+    """
+    if rate <= 0.0:
+        rate = 300_000.0
+    for scale in SCALES:
+        if overhead + pixels / scale**2 / rate <= limit:
+            return scale
+    return SCALES[-1]
+
+
+class Pace:
+    """Model of the time of reduced images: constant time + pixels / rate, from recent images."""
+
+    def __init__(self) -> None:
+        self._sums = np.zeros(5)
+
+    def learn(self, pixels: int, seconds: float) -> None:
+        """Adds the time of an image; it counts 1.25 times as much as the one before."""
+        self._sums *= 0.8
+        self._sums += (1.0, pixels, seconds, pixels * pixels, pixels * seconds)
+
+    def scale(self, pixels: int, limit: float) -> int:
+        """Returns the smallest reduction of an image with this expected time in seconds."""
+        rate, constant = self._fit()
+        return reduced_scale(pixels, rate, constant, limit)
+
+    def _fit(self) -> tuple[float, float]:
+        """Returns pixels per second (0 if unknown) and constant seconds, by least squares.
+
+        An assumed empty image, of half the mean time and little weight, makes the solution unique.
+        It is optimistic, so that finer images are tried.
+        """
+        n, x, t, xx, xt = self._sums
+        if n == 0.0:
+            return 0.0, 0.03
+        mean_t, mean_x = t / n, x / n
+        n, t = n + 0.1, t + 0.1 * 0.5 * mean_t
+        fitted = (n * xt - x * t) / (n * xx - x * x)
+        slope = float(np.clip(fitted, 0.1 * mean_t / mean_x, mean_t / mean_x))
+        return 1.0 / slope, max(0.0, mean_t - slope * mean_x)
+
+
+def smooth(frame: Frame, back: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Returns the beauty of a reduced image without noise.
+
+    It is denoised or, without Open Image Denoise, shaded by the first hits.
+
+    Args:
+        frame: A frame with guide layers.
+        back: Unit vector opposite to the view direction.
+    """
+    from wavecomb.image.denoise import denoise
+
+    albedo, normal = frame.layers["guide_albedo"], frame.layers["guide_normal"]
+    try:
+        return denoise(frame.beauty, albedo, normal, threads=frame.setup.threads, fast=True)
+    except WavecombError:
+        return by_first_hit(frame.beauty, albedo, normal, back)
+
+
+def by_first_hit(beauty: Array, albedo: Array, normal: Array, back: Array) -> NDArray[np.float32]:
+    """Returns an image of the first hits, lit by a headlight of the beauty's mean brightness."""
+    lit = np.clip(albedo, 0.0, 1.0) * (0.3 + 0.7 * np.abs(normal @ back))[:, :, None]
+    hit = np.linalg.norm(normal, axis=2) > 0.5
+    if not hit.any():
+        return beauty
+    wanted, have = np.clip(beauty[hit], 0.0, 4.0).mean(), lit[hit].mean()
+    lit *= wanted / max(have, 1e-6)
+    return np.where(hit[:, :, None], lit, beauty).astype(np.float32)
+
+
+def enlarged(image: Array, width: int, height: int) -> Array:
+    """Enlarges an image to (height, width, ...), with bilinear interpolation."""
+    out = np.asarray(image, np.float32)
+    for axis, size in ((0, height), (1, width)):
+        count = out.shape[axis]
+        at = np.clip((np.arange(size) + 0.5) * count / size - 0.5, 0.0, count - 1)
+        low = at.astype(int)
+        weight = (at - low).astype(np.float32).reshape(-1, *(1,) * (out.ndim - axis - 1))
+        high = np.minimum(low + 1, count - 1)
+        out = out.take(low, axis) * (1.0 - weight) + out.take(high, axis) * weight
+    return out
+
+
+class Filler:
+    """Fills frames of the first pass, in which few pixels have samples, without noise.
+
+    Args:
+        preview: The reduced image; None leaves frames as they are.
+    """
+
+    def __init__(self, preview: Frame | None) -> None:
+        self._preview = preview
+        self._large: dict[str, Array] = {}
+
+    def fill(self, frame: Frame) -> Frame:
+        """Returns a frame whose pixels have the light of the reduced image.
+
+        Those with samples already have their albedo, so that textures and edges are sharp. A frame
+        in which all pixels have samples is returned unchanged.
+        """
+        preview = self._preview
+        if preview is None or frame.is_complete:
+            return frame
+        layers = (frame.layers, preview.layers)
+        names = [n for n in ("guide_albedo", "albedo") if all(n in one for one in layers)]
+        holes = frame.layers["samples"][:, :, None] == 0
+        if not names:
+            beauty = np.where(holes, self._enlarged("beauty", preview.beauty, frame), frame.beauty)
+        else:
+            low = preview.layers[names[0]] + _DARK
+            light = self._enlarged("light", preview.beauty / low, frame)
+            albedo = self._enlarged("albedo", low, frame)
+            beauty = light * np.where(holes, albedo, frame.layers[names[0]] + _DARK)
+        return replace(frame, beauty=beauty, denoised=beauty if frame.setup.denoise else None)
+
+    def _enlarged(self, name: str, image: Array, frame: Frame) -> Array:
+        if name not in self._large:
+            self._large[name] = enlarged(image, frame.width, frame.height)
+        return self._large[name]

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Denoising of a live render: only complete frames, no late results, no noise in previews."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wavecomb.gui.setup import Setup
+from wavecomb.gui.viewport.frames import Frame
+from wavecomb.gui.viewport.live import LATE
+from wavecomb.gui.viewport.navigate import orbit
+from wavecomb.gui.viewport.previews import Filler, Pace, by_first_hit, enlarged
+
+
+class SlowDenoiser:
+    """A denoiser whose first result comes late, and whose pixels state the samples of its input."""
+
+    def __init__(self):
+        self.inputs = []
+        self.hold = threading.Event()
+
+    def __call__(self, frame):
+        self.inputs.append(frame)
+        if len(self.inputs) == 1:
+            self.hold.wait(20.0)
+        time.sleep(0.05)
+        return frame, np.full(frame.beauty.shape, frame.samples_done, np.float32)
+
+
+def test_a_slow_denoiser_never_shows_incomplete_or_late_images(
+    new_session, qtbot, cornell, monkeypatch, final
+):
+    denoiser = SlowDenoiser()
+    monkeypatch.setattr("wavecomb.gui.viewport.live.denoised_frame", denoiser)
+    session = new_session(width=160, height=160, spp=64, denoise=True)
+    shown = []
+    session.frame.connect(shown.append)
+    session.open(cornell)
+    qtbot.waitUntil(lambda: bool(denoiser.inputs), timeout=20000)
+    first = denoiser.inputs[0]
+    qtbot.waitUntil(lambda: session.last_frame.samples_done > LATE * first.samples_done)
+    denoiser.hold.set()
+    last = final(session)
+    total = last.samples_done
+    qtbot.waitUntil(
+        lambda: (
+            session.last_frame.denoised is not None and session.last_frame.denoised.min() == total
+        ),
+        timeout=20000,
+    )
+    assert all(frame.is_complete and frame.layers["samples"].min() > 0 for frame in denoiser.inputs)
+    by_denoiser = [f for f in shown if f.denoised is not None and np.ptp(f.denoised) == 0]
+    assert all(f.denoised.flat[0] != first.samples_done for f in by_denoiser), "late, so dropped"
+    ages = [f.denoised.flat[0] for f in by_denoiser]
+    assert ages == sorted(ages)
+    assert len(denoiser.inputs) < 12, "the denoiser does not take the time of the render"
+
+
+@pytest.mark.slow
+def test_movements_show_no_noise(new_session, qtbot, cornell, final):
+    def roughness(image):
+        return np.abs(np.diff(np.clip(image, 0.0, 1.0), axis=1)).mean() / image.mean()
+
+    session = new_session(width=240, height=240, spp=1)
+    session.open(cornell)
+    raw = roughness(final(session).beauty)
+    shown = []
+    session.frame.connect(shown.append)
+
+    def has_moved():
+        session.set_camera(orbit(session.pose, np.zeros(3), 0.01, 0.0, "Y"), moving=True)
+        return len(shown) >= 6
+
+    qtbot.waitUntil(has_moved, timeout=20000)
+    previews = [frame for frame in shown if frame.status.get("preview")]
+    assert len(previews) >= 4, "the whole image starts only if the window does not respond"
+    assert max(roughness(frame.beauty) for frame in previews) < 0.3 * raw
+    final(session)
+    assert session.last_frame.scale == 1 and roughness(session.last_frame.beauty) > 0.8 * raw
+
+
+def test_incomplete_frames_have_light_of_the_reduced_image_and_their_albedo():
+    setup = Setup(width=8, height=4, denoise=True)
+    small = {"albedo": np.full((2, 4, 3), 0.45, np.float32)}
+    preview = Frame(np.full((2, 4, 3), 2.0, np.float32), small, None, {}, 1, 2, False, setup)
+    samples = np.zeros((4, 8), np.uint32)
+    samples[0, 0] = 1
+    layers = {"samples": samples, "albedo": np.full((4, 8, 3), 0.2, np.float32)}
+    noisy = np.random.default_rng(1).exponential(1.0, (4, 8, 3)).astype(np.float32)
+    whole = Frame(noisy, layers, None, {}, 1, 1, False, setup)
+    found = Filler(preview).fill(whole)
+    assert not whole.is_complete
+    assert found.beauty[0, 0] == pytest.approx(2.0 * (0.2 + 0.05) / (0.45 + 0.05))
+    assert found.beauty[1:] == pytest.approx(2.0) and np.array_equal(found.denoised, found.beauty)
+    plain = Filler(preview).fill(replace(whole, layers={"samples": samples}))
+    assert np.array_equal(plain.beauty[0, 0], noisy[0, 0]) and (plain.beauty[1:] == 2.0).all()
+    complete = replace(whole, layers={"samples": np.ones((4, 8), np.uint32)})
+    assert Filler(preview).fill(complete) is complete and Filler(None).fill(whole) is whole
+    region = replace(whole, setup=setup.changed(region=(0, 0, 1, 1)))
+    assert region.is_complete
+
+
+def test_enlarging_keeps_ramps():
+    ramp = np.linspace(0.0, 1.0, 5, dtype=np.float32)[None, :, None].repeat(3, 0)
+    large = enlarged(ramp, 20, 12)
+    assert large.shape == (12, 20, 1)
+    assert (np.diff(large[0, :, 0]) >= 0.0).all() and np.ptp(large, axis=0).max() == 0.0
+
+
+def test_first_hits_have_no_noise_and_the_brightness_of_the_beauty():
+    random = np.random.default_rng(1)
+    beauty = random.exponential(0.5, (32, 32, 3)).astype(np.float32)
+    normal = np.zeros((32, 32, 3), np.float32)
+    normal[:16, :, 2] = 1.0
+    lit = by_first_hit(beauty, np.full_like(beauty, 0.5), normal, np.array([0.0, 0.0, 1.0]))
+    assert np.ptp(lit[:16]) == 0.0
+    assert lit[0, 0, 0] == pytest.approx(np.minimum(beauty[:16], 4.0).mean(), rel=1e-5)
+    assert np.array_equal(lit[16:], beauty[16:]), "the background stays"
+
+
+def test_the_pace_of_previews_separates_constant_time_from_pixels():
+    pace, pixels = Pace(), 960 * 540
+    scales = []
+    for _ in range(30):
+        scale = pace.scale(pixels, 0.083)
+        scales.append(scale)
+        small = pixels // scale**2
+        pace.learn(small, 0.025 + small / 800_000)
+    assert set(scales[10:]) == {4}, scales  # 4: 66 ms; 3: 97 ms
+    for _ in range(30):
+        pace.learn(pixels // 16, 1.0)
+    assert pace.scale(pixels, 0.083) == 12, "the machine became slow"
