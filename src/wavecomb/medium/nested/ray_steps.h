@@ -151,9 +151,10 @@ inline size_t NestedMedia::advance(const NestedRays& all, const HitSpan& hits,
   const Mask<F> open = Mask<F>(r.hit.inst == U(kNoHit));
   F far = select(open, F(kFar), min(r.hit.t, F(kFar)));
   Mask<F> by_lights(false);
-  if (equiangular_) [[unlikely]] by_lights = r.active & is_lit<F>(medium) & (s.rest > kFar);
+  if (equiangular_) [[unlikely]]
+    by_lights = r.active & is_lit<F>(medium) & (s.rest > kFar);
   EquiangularDistribution<F> distribution;
-  if (any(by_lights)) [[unlikely]] distribution = sample_equiangular<F>(r, medium, far, by_lights);
+  if (any(by_lights)) distribution = sample_equiangular<F>(r, medium, far, by_lights);
   const Limit<F> limit = limit_of<F>(events, r);
   const Mask<F> stopped = r.active & (limit.length < far) & not_(s.rest < limit.length);
   far = select(stopped, limit.length, far);
