@@ -18,7 +18,7 @@ import numpy as np
 from wavecomb.gui.setup import Setup
 from wavecomb.gui.viewport.frames import Frame, layers_of_result
 from wavecomb.gui.viewport.previews import Filler, Pace, smooth
-from wavecomb.gui.viewport.watching import LOOK_S, Stopper, Watch
+from wavecomb.gui.viewport.watching import LOOK_S, Watch
 from wavecomb.run.error_messages import describe
 
 if TYPE_CHECKING:
@@ -228,7 +228,7 @@ class Engine:
     def _preview(self, renderer: Renderer, task: Task, scale: int) -> Frame | None:
         settings = task.setup.settings(scale, preview=True)
         start = time.perf_counter()
-        result = renderer.render(settings, watcher=Stopper(self), interval=LOOK_S)
+        result = renderer.render(settings, progress=lambda *_: not self.superseded, interval=LOOK_S)
         if result.cancelled:
             if (seconds := time.perf_counter() - start) > QUICK_S:
                 self._pace.learn(result.samples.size, seconds)

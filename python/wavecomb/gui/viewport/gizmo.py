@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +63,7 @@ class Gizmo(QObject):
 
     def __init__(self, view: PictureView, session: Session, edits: SceneEdits) -> None:
         super().__init__(view)
-        self._view, self._session, self._edits = view, session, edits
+        self._session, self._edits = session, edits
         self.mode = ""
         self._anchor: Anchor | None = None
         self._handle = ""
@@ -71,6 +71,10 @@ class Gizmo(QObject):
         self._change = np.eye(4)
         for told in (self._session.selected, self._session.opened, edits.changed):
             told.connect(lambda *_: self._refresh())
+
+    @property
+    def _view(self) -> PictureView:
+        return cast("PictureView", self.parent())  # an attribute would make a cycle of references
 
     def set_mode(self, mode: str) -> None:
         """Shows the handles of a mode, or none if they are shown already."""

@@ -317,7 +317,7 @@ class Live(QObject):
         if frame.final and self.state == RENDERING:
             self._set_state(FINISHED)
         self._denoise(frame)
-        if self._is_reduced and (self._pending or not self._moving):
+        if self._pending if self._moving else self._is_reduced:
             self._flush()
 
     def _show(self, frame: Frame) -> None:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,12 +65,16 @@ class Outline(QObject):
 
     def __init__(self, session: Session, view: PictureView) -> None:
         super().__init__(view)
-        self._session, self._view = session, view
+        self._session = session
         self._frame: Frame | None = None
         self._image: QImage | None = None
         self._worker = Worker("outline", self)
         self._worker.done.connect(self._take)
         session.selected.connect(lambda path: self._compute())
+
+    @property
+    def _view(self) -> PictureView:
+        return cast("PictureView", self.parent())  # an attribute would make a cycle of references
 
     def close(self) -> None:
         """Ends the thread."""

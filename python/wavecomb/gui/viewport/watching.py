@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Watchers of the render thread, which stop a render or take frames of it."""
+"""Watcher of the render thread, which takes frames of a render, pauses and stops it."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from wavecomb.gui.setup import Setup
 from wavecomb.gui.viewport.frames import Frame, layers_of_snapshot
@@ -18,35 +18,8 @@ LOOK_S = 0.03
 STATISTICS_S = 0.5
 
 
-class Host(Protocol):
-    """Interface of the engine, as its watchers see it."""
-
-    listener: Any
-    superseded: bool
-
-    @property
-    def paused(self) -> bool:
-        """Whether the render is paused."""
-
-    def wait(self, seconds: float) -> None:
-        """Waits until the render is resumed, at most for some seconds."""
-
-    def statistics_of(self, source: Any, held_s: float) -> dict[str, Any]:
-        """Returns the statistics of a snapshot."""
-
-
-class Stopper:
-    """Watcher that stops a render when it is superseded."""
-
-    def __init__(self, engine: Host) -> None:
-        self._engine = engine
-
-    def progress(self, status: Mapping[str, Any]) -> str | None:
-        """Requests a stop, or nothing."""
-        return "stop" if self._engine.superseded else None
-
-    def snapshot(self, snapshot: Snapshot) -> None:
-        """Ignores snapshots, which are not requested."""
+Host = Any
+"""An ``engine.Engine``, whose module imports this one."""
 
 
 class Watch:
