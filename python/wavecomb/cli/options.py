@@ -14,7 +14,7 @@ from wavecomb.load_options import Row, given, rows
 
 if TYPE_CHECKING:
     from wavecomb.usd import LoadedStage
-    from wavecomb.usd.render_settings.values import ProductSettings
+    from wavecomb.usd.render_settings.reader import ProductSettings
 
 F = TypeVar("F", bound=Callable[..., Any])
 

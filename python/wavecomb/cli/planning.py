@@ -24,7 +24,7 @@ from wavecomb.run.guiding_file import BEFORE, ENDING, Learning, check_trains_fie
 
 if TYPE_CHECKING:
     from wavecomb.run.checkpoint import Checkpoint
-    from wavecomb.usd.render_settings.values import ProductSettings
+    from wavecomb.usd.render_settings.reader import ProductSettings
 
 Peek = Callable[[StageOptions, str], "tuple[list[ProductSettings], Any]"]
 """Type of ``StageOptions.peek``: reads the render settings of a stage."""

@@ -20,7 +20,7 @@ from wavecomb.run.expressions import layer_of
 
 if TYPE_CHECKING:
     from wavecomb.run.sequence import Frames
-    from wavecomb.usd.render_settings.values import ProductSettings
+    from wavecomb.usd.render_settings.reader import ProductSettings
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,7 @@ import numpy as np
 from pxr import UsdShade
 
 from wavecomb.scenes.authoring import materials
-from wavecomb.scenes.authoring.material_network import Network
-from wavecomb.scenes.authoring.materials import Colour, MaterialInfo
+from wavecomb.scenes.authoring.materials import Colour, MaterialInfo, Network
 from wavecomb.scenes.authoring.patterns import Image
 from wavecomb.scenes.authoring.stage import StageWriter
 from wavecomb.scenes.authoring.textures import TextureInfo

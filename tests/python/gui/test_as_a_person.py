@@ -18,8 +18,7 @@ from person import Person, screen
 from pxr import Sdf
 
 import wavecomb.usd
-from wavecomb.usd.stage.diagnostics import capture_diagnostics
-from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.stage.report import LoadReport, capture_diagnostics
 
 pytestmark = needs("bin:Xvfb", "bin:xdotool", "bin:openbox")
 

@@ -20,8 +20,8 @@ from wavecomb.usd.materials.parameters import (
     as_stored,
     light_values,
     material_parameters,
+    surface_values,
 )
-from wavecomb.usd.materials.surface_values import surface_values
 
 if TYPE_CHECKING:
     from wavecomb.gui.viewport.session import Session

@@ -19,9 +19,8 @@ from wavecomb.usd.geometry.strands import StrandDetail
 from wavecomb.usd.geometry.subdivision import SubdivisionSurfaces
 from wavecomb.usd.geometry.triangulate import MeshError
 from wavecomb.usd.materials.assignment import DrawItem
-from wavecomb.usd.stage.context import LoadContext
+from wavecomb.usd.stage.context import LoadContext, problem_of
 from wavecomb.usd.stage.frame_cache import MeshCache
-from wavecomb.usd.stage.origin import problem_of
 from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:

@@ -29,7 +29,7 @@ from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:
-    from wavecomb.usd.geometry.screen_size import ViewSize
+    from wavecomb.usd.geometry.cage import ViewSize
 
 MAX_PRIMS = 100_000
 """Prims whose image size is computed; textures used only by later prims keep their detail."""

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
 
-from wavecomb.usd.stage.diagnostics import first_message
-from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.stage.report import LoadReport, first_message
 
 Rules = dict[str, str]
 """Rule for each path: exclude, explicit (only that path) or expand (the path and all below it)."""

@@ -96,8 +96,14 @@ class Assets:
             return self.length(prim)
         if _is_asset(prim):
             return len(path)
+        chain: list[Parent] = []
+        while parent.asset is None and parent.above is not None and not _is_asset(parent.prim):
+            chain.append(parent)
+            parent = parent.above
         if parent.asset is None:
             parent.asset = self.length(parent.prim)
+        for one in chain:
+            one.asset = parent.asset
         return parent.asset
 
     def length(self, prim: Usd.Prim) -> int:

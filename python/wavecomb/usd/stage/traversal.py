@@ -95,7 +95,7 @@ class Traversal:
         self.modes = DrawModes(self.time, self.report)
         self._kinds: dict[str, str] = {}
         self._counts: dict[Sdf.Path, int] = {}
-        self._names: dict[tuple[str, ...], frozenset[str]] = {}
+        self._names: dict[tuple[str, ...], tuple[frozenset[str], bool]] = {}
 
     def kind(self, prim: Usd.Prim) -> str:
         """Returns the kind of a prim, computed once per type name."""
@@ -172,11 +172,9 @@ class Traversal:
             if kind == "shading":
                 continue
             names: frozenset[str] = frozenset()
+            has_primvars = False
             if kind != "other":
-                listed = tuple(prim.GetAuthoredPropertyNames())
-                names = self._names.get(listed) or self._names.setdefault(
-                    listed, frozenset(listed)
-                )  # most prims share a set of names
+                names, has_primvars = self._names_of(prim)
                 if (
                     "visibility" in names
                     and word(prim.GetAttribute("visibility").Get(time)) == "invisible"
@@ -251,17 +249,25 @@ class Traversal:
             elif kind.startswith("unsupported"):
                 if shown:
                     self.report.missing(str(prim.GetTypeName()), prim.GetPath())
-            elif (
-                children
-                and kind in ("xform", "scope")
-                and any(name.startswith("primvars:") for name in names)
-            ):
+            elif children and has_primvars and kind in ("xform", "scope"):
                 inherited = inherit(prim, inherited)
             if children:
-                above = Parent(prim)
+                above = Parent(prim, parent)
                 for child in reversed(children):
                     stack.append((child, matrix, track, purpose, inherited, pick, above, mode))
         return found
+
+    def _names_of(self, prim: Usd.Prim) -> tuple[frozenset[str], bool]:
+        """Returns names of authored properties, a set that equal prims share.
+
+        The second result says whether there are primvars among them.
+        """
+        listed = tuple(prim.GetAuthoredPropertyNames())
+        known = self._names.get(listed)
+        if known is None:
+            known = frozenset(listed), any(name.startswith("primvars:") for name in listed)
+            self._names[listed] = known
+        return known
 
     def _stand_in(
         self,
