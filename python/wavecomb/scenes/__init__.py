@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wavecomb.errors import SceneError
 from wavecomb.scenes.authoring.stage import StageWriter
 from wavecomb.scenes.caustics import (
     build_caustics,
@@ -21,7 +22,6 @@ from wavecomb.scenes.caustics import (
     build_prism,
 )
 from wavecomb.scenes.drinks import build_candles, build_drinks
-from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.hair import build_fur, build_head
 from wavecomb.scenes.heavy import build_heavy
 from wavecomb.scenes.lights import build_lights, build_studio

@@ -10,10 +10,10 @@ import math
 
 import numpy as np
 
+from wavecomb.errors import SceneError
 from wavecomb.scenes.authoring import materials
 from wavecomb.scenes.authoring.materials import MaterialInfo
 from wavecomb.scenes.authoring.stage import StageWriter
-from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.models.teapot import teapot
 from wavecomb.scenes.options import SceneOptions
 

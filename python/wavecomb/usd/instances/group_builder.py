@@ -12,7 +12,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
 from wavecomb.usd.geometry.attributes import on_shape
 from wavecomb.usd.geometry.curves import CurveArrays, uniform_scale
-from wavecomb.usd.geometry.gprims import COUNTS, WORDS, GprimReader, add_shape
+from wavecomb.usd.geometry.gprims import COUNTS, WORDS, GprimReader, MemoryCheck, add_shape
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY, UV_NAMES, MeshArrays, is_translation
 from wavecomb.usd.geometry.strands import StrandDetail
 from wavecomb.usd.geometry.subdivision import SubdivisionSurfaces
@@ -32,10 +32,9 @@ from wavecomb.usd.materials.material import (
     MaterialTable,
     bound_materials,
 )
+from wavecomb.usd.stage.collections import LightGroups
 from wavecomb.usd.stage.context import LoadContext, world_to_scene
 from wavecomb.usd.stage.frame_cache import MeshCache
-from wavecomb.usd.stage.identity import LightGroups
-from wavecomb.usd.stage.memory_check import MemoryCheck
 from wavecomb.usd.stage.traversal import STRANDS, CollectedPrims, InstancePrim, Traversal
 
 LoadProgress = Callable[[int, int], None]

@@ -26,8 +26,8 @@ from wavecomb.usd.instances.point_instancer import are_valid
 from wavecomb.usd.lights.mesh_light import MeshLights
 from wavecomb.usd.materials.assignment import DrawItem, Parent
 from wavecomb.usd.materials.texture import MEGABYTE
+from wavecomb.usd.stage.collections import Assets
 from wavecomb.usd.stage.context import LoadContext
-from wavecomb.usd.stage.identity import Assets
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.volumes.grids import GridFacts, VolumeFacts
 from wavecomb.usd.volumes.volume import VolumeReader

@@ -35,9 +35,8 @@ from wavecomb.usd.materials.network import (
 )
 from wavecomb.usd.materials.pixels import Image
 from wavecomb.usd.materials.texture import TextureTable
-from wavecomb.usd.stage.collections import Collections, Rules
+from wavecomb.usd.stage.collections import Collections, LightGroups, Rules
 from wavecomb.usd.stage.context import LoadContext
-from wavecomb.usd.stage.identity import LightGroups
 
 KINDS = kind_of_prims()
 """Kinds of supported lights, by prim type."""

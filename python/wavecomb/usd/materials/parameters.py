@@ -45,8 +45,8 @@ from wavecomb.usd.materials.surface import (
     Surface,
 )
 from wavecomb.usd.materials.texture import TextureTable
+from wavecomb.usd.stage.collections import LightGroups
 from wavecomb.usd.stage.context import LoadContext
-from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.report import LoadReport
 
 IN_INSTANCE = "it is inside an instance, where USD does not accept opinions"

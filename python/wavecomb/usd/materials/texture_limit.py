@@ -24,8 +24,8 @@ from wavecomb.usd.lights.light import KINDS, LightReader
 from wavecomb.usd.materials.material import MaterialTable, bound_materials
 from wavecomb.usd.materials.pixels import Image, TextureError, read_header
 from wavecomb.usd.materials.texture import MEGABYTE, Key, TextureTable, stored_type
+from wavecomb.usd.stage.collections import LightGroups
 from wavecomb.usd.stage.context import LoadContext
-from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:

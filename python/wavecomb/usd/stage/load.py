@@ -45,9 +45,9 @@ from wavecomb.usd.lights.light import LightReader, LinkTable
 from wavecomb.usd.materials.material import MaterialTable
 from wavecomb.usd.materials.texture import MEGABYTE, TextureCache, TextureTable, texture_store
 from wavecomb.usd.render_settings.view import ViewSettings, check_view, view_settings
+from wavecomb.usd.stage.collections import LightGroups
 from wavecomb.usd.stage.context import WORLD, LoadContext, Origin, find_origin, to_scene_space
 from wavecomb.usd.stage.frame_cache import FrameCache
-from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.load_result import LoadedStage
 from wavecomb.usd.stage.ray_visibility import IGNORED, RayVisibility, check_exists, set_catchers
 from wavecomb.usd.stage.report import NOT_TEXT, LoadReport, capture_diagnostics, first_message
