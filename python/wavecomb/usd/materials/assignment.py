@@ -75,10 +75,9 @@ class DrawItem:
 
     @property
     def is_plain(self) -> bool:
-        """Whether the gprim has neither bindings nor display colours, as those of many stages."""
-        if self.material is not None or self.subsets or self.inherited or not self.names:
-            return False
-        return self.names.isdisjoint(_DISPLAYED)
+        """Whether a gprim without material has neither subsets nor display colours."""
+        is_alone = bool(self.names) and not self.subsets and not self.inherited
+        return is_alone and self.names.isdisjoint(_DISPLAYED)
 
 
 @dataclass
@@ -128,7 +127,7 @@ class Assigner:
             otherwise: Material id if there is neither a binding nor a display colour; None means
                 grey.
         """
-        if draw.is_plain:
+        if draw.material is None and draw.is_plain:
             return BoundMaterials(self.table.plain() if otherwise is None else otherwise)
         surface = None if draw.material is None else self._surface(draw, draw.material)
         self._report_hair(draw, mesh)

@@ -174,7 +174,12 @@ class Traversal:
             names: frozenset[str] = frozenset()
             has_primvars = False
             if kind != "other":
-                names, has_primvars = self._names_of(prim)
+                listed = tuple(prim.GetAuthoredPropertyNames())
+                known = self._names.get(listed)
+                if known is None:  # most prims share a set of names
+                    has_primvars = any(name.startswith("primvars:") for name in listed)
+                    known = self._names[listed] = frozenset(listed), has_primvars
+                names, has_primvars = known
                 if (
                     "visibility" in names
                     and word(prim.GetAttribute("visibility").Get(time)) == "invisible"
@@ -256,18 +261,6 @@ class Traversal:
                 for child in reversed(children):
                     stack.append((child, matrix, track, purpose, inherited, pick, above, mode))
         return found
-
-    def _names_of(self, prim: Usd.Prim) -> tuple[frozenset[str], bool]:
-        """Returns names of authored properties, a set that equal prims share.
-
-        The second result says whether there are primvars among them.
-        """
-        listed = tuple(prim.GetAuthoredPropertyNames())
-        known = self._names.get(listed)
-        if known is None:
-            known = frozenset(listed), any(name.startswith("primvars:") for name in listed)
-            self._names[listed] = known
-        return known
 
     def _stand_in(
         self,
