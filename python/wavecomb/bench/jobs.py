@@ -154,7 +154,6 @@ class Jobs:
 
 
 # ---- Renders before the sitting that record costs for the oracles, and their files
-# ----------------
 
 
 TRACE_SCHEMA = "wavecomb-trace/1"

@@ -254,7 +254,6 @@ def _bound_words(part: pd.DataFrame) -> str:
 
 
 # ---- Sections about a whole suite: roulette, effects, costs
-# ----------------------------------------
 
 
 def suite(out: Writer, results: Results) -> None:
