@@ -1,18 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Python module wavecomb._vdb: reading of .vdb and .nvdb files. Documented in
-/// python/wavecomb/_vdb.pyi. Loaded only for stages with volumes.
+/// Python module wavecomb._vdb: reading of .vdb and .nvdb files, and writing of .vdb files.
+/// Documented in python/wavecomb/_vdb.pyi. Loaded only for stages with volumes.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
 
 #include <cerrno>
 #include <initializer_list>
 #include <memory>
 #include <string>
 #include <system_error>
+#include <tuple>
+#include <vector>
 
 #include "files.h"
 #include "nano_tree.h"
+#include "writing.h"
 
 namespace nb = nanobind;
 
@@ -113,6 +119,35 @@ nb::dict bricks(const std::string& path, size_t number, uint64_t max_bytes, bool
   return d;
 }
 
+using Origins = nb::ndarray<const int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using Values = nb::ndarray<const float, nb::shape<-1, 512, -1>, nb::c_contig, nb::device::cpu>;
+using Box = std::tuple<std::array<int32_t, 3>, std::array<int32_t, 3>, float>;
+
+vdb::WrittenGrid grid_from(nb::handle described) {
+  vdb::WrittenGrid grid;
+  const auto get = [&](const char* name) { return described[name]; };
+  grid.name = nb::cast<std::string>(get("name"));
+  const auto origins = nb::cast<Origins>(get("origins"));
+  const auto values = nb::cast<Values>(get("values"));
+  grid.origins = origins.data();
+  grid.values = values.data();
+  grid.bricks = origins.shape(0);
+  grid.channels = static_cast<uint32_t>(values.shape(2));
+  grid.is_half = nb::cast<bool>(get("half"));
+  grid.index_to_object = nb::cast<std::array<double, 16>>(get("index_to_object"));
+  for (const auto& [first, last, value] : nb::cast<std::vector<Box>>(get("boxes")))
+    grid.boxes.push_back({first, last, value});
+  grid.has_tiles = nb::cast<bool>(get("tiles"));
+  return grid;
+}
+
+void write_grids(const std::string& path, const nb::list& described) {
+  std::vector<vdb::WrittenGrid> grids;
+  for (const nb::handle one : described) grids.push_back(grid_from(one));
+  const nb::gil_scoped_release release;
+  vdb::write_file(path, grids);
+}
+
 }  // namespace
 
 NB_MODULE(_vdb, m) {
@@ -133,5 +168,6 @@ NB_MODULE(_vdb, m) {
   m.def("grids", &grids, nb::arg("path"), nb::arg("heads") = false);
   m.def("bricks", &bricks, nb::arg("path"), nb::arg("number"), nb::arg("most_bytes"),
         nb::arg("background_is_zero"), nb::arg("drops_empty"));
+  m.def("write", &write_grids, nb::arg("path"), nb::arg("grids"));
   m.attr("nano_version") = vdb::nano_major_version();
 }

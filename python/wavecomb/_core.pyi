@@ -461,7 +461,7 @@ class SceneBuilder:
     ) -> int:
         """Adds a light of a kind of light_kinds(); ignores parameters that the kind does not have.
 
-        wavecomb.light_table describes the parameters. Raises Error.
+        wavecomb.core_table describes the parameters. Raises Error.
         """
     def add_mesh_light(
         self,
@@ -641,19 +641,19 @@ def light_kinds() -> list[tuple[str, tuple[str, ...]]]:
     """Returns the kinds of lights, including mesh lights, with their USD prim types."""
 
 def material_table() -> list[dict[str, Any]]:
-    """Returns the parameters of materials, fields of wavecomb.material_table.MaterialParameter."""
+    """Returns the parameters of materials, fields of wavecomb.core_table.MaterialParameter."""
 
 def aov_table() -> list[dict[str, Any]]:
     """Returns the AOVs besides beauty, as fields of wavecomb.run.aovs.Aov."""
 
 def program_table() -> list[dict[str, Any]]:
-    """Returns the shading programs, as fields of wavecomb.material_table.Program."""
+    """Returns the shading programs, as fields of wavecomb.core_table.Program."""
 
 def light_table() -> list[dict[str, Any]]:
-    """Returns the parameters of lights, as fields of wavecomb.light_table.LightParameter."""
+    """Returns the parameters of lights, as fields of wavecomb.core_table.LightParameter."""
 
 def camera_table() -> list[dict[str, Any]]:
-    """Returns the parameters of cameras, as fields of wavecomb.camera_table.CameraParameter."""
+    """Returns the parameters of cameras, as fields of wavecomb.core_table.CameraParameter."""
 
 def setting_table() -> list[dict[str, Any]]:
     """Returns the settings with a single value, as fields of wavecomb.options.Setting."""

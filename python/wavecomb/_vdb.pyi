@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plug-in that reads .vdb and .nvdb files; only ``wavecomb.vdb`` imports it."""
+"""Plug-in that reads .vdb and .nvdb files and writes .vdb files, for ``wavecomb.vdb`` only."""
 
 from typing import Any
 
@@ -25,4 +25,12 @@ def bricks(
     """Returns the voxels of the grid at a position in the file.
 
     Raises the errors of ``grids``, and TooLarge.
+    """
+
+def write(path: str, grids: list[dict[str, Any]]) -> None:
+    """Writes a .vdb file.
+
+    Each grid has a name, origins (n, 3) int32, values (n, 512, channels) float32,
+    index_to_object (16 numbers), boxes (first index, last index, value), and whether values are
+    stored in 16 bits (half) and nodes of one value as tiles. Raises OSError.
     """

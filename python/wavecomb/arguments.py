@@ -51,7 +51,7 @@ _ELSEWHERE = ("width", "height", "spp", "policy", "costs", "size")
 
 
 def keywords() -> set[str]:
-    """Returns the names of ``RenderKeywords`` (keywords.py), which is made from the same tables."""
+    """Returns the names of ``RenderKeywords`` (keywords.pyi), made from the same tables."""
     from wavecomb.options import settings
 
     return {*settings(), *(one.name for one in fields(LoadOptions)), "region"} - {*_ELSEWHERE}

@@ -33,6 +33,10 @@ class ArgumentError(WavecombError, TypeError):
     """An argument of a Python function has the wrong name or type; the message has an example."""
 
 
+class SceneError(WavecombError, ValueError):
+    """Error about an invalid option or imported file of a generated stage."""
+
+
 def join_core(core: Any) -> None:
     """Makes the errors of a native module subclasses of ``Error``.
 

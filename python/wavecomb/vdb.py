@@ -8,7 +8,9 @@ The plug-in is built if OpenVDB is installed (tools/setup_openvdb), and loaded o
 from __future__ import annotations
 
 import functools
+import hashlib
 import importlib
+import uuid
 from collections.abc import Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -18,7 +20,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb import vdb_writer
 from wavecomb.errors import WavecombError
 from wavecomb.run.isolation import memory
 
@@ -31,8 +32,11 @@ BRING = "tools/setup_openvdb && make build"
 ABSENT = f"OpenVDB, which this build is without ({BRING})"
 """Message if a .vdb file cannot be read without the plug-in."""
 
-BRICK = vdb_writer.BRICK
+BRICK = 8
 """Edge length of a brick in voxels."""
+
+_IDENTIFIER_AT = 21
+"""Offset of the identifier in a .vdb file, which is 36 characters long."""
 
 _NUMBERS = {"float", "double", "vec3s", "vec3d", "fp4", "fp8", "fp16", "fpn"}
 
@@ -209,22 +213,53 @@ def read(
 
 
 def write(path: str | Path, made: Sequence[Mapping[str, Any]]) -> None:
-    """Writes a .vdb file, also without OpenVDB; equal grids give equal bytes.
+    """Writes a .vdb file; equal grids give equal bytes.
 
     Args:
         path: File to write. The caller must make the write atomic.
         made: Grids with ``name``, ``origins``, ``values`` (as in ``Bricks``; float16 is stored in
             16 bits) and ``index_to_object``. With ``tiles``, bricks with a single value are stored
-            as tiles, which takes less space. ``boxes`` (first index, last index, value), which
-            begin and end at multiples of 8 voxels, are filled before bricks are added.
+            as tiles, which takes less space. ``boxes`` (first index, last index, value) are filled
+            before bricks are added.
 
     Raises:
-        WavecombError: The file has another extension, arrays are inconsistent, or the file cannot
-            be written.
+        WavecombError: The file has another extension, arrays are inconsistent, the file cannot be
+            written, or OpenVDB is missing.
     """
     if Path(path).suffix.lower() == ".nvdb":
         raise WavecombError(f"{path}: .nvdb files are read, not written: name a .vdb file")
-    vdb_writer.write(path, made)
+    plugin = _needed(path)
+    with _errors(plugin, path):
+        written = [_described(grid) for grid in made]
+        plugin.write(str(path), written)
+        # OpenVDB writes a random identifier; a hash makes files reproducible.
+        digest = hashlib.sha256()
+        for grid in written:
+            digest.update(repr([grid[name] for name in sorted(grid)]).encode())
+            digest.update(grid["origins"].tobytes() + grid["values"].tobytes())
+        with Path(path).open("r+b") as file:
+            file.seek(_IDENTIFIER_AT)
+            file.write(str(uuid.UUID(bytes=digest.digest()[:16], version=4)).encode())
+
+
+def _described(grid: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns a grid as the plug-in takes it; raises ValueError if its arrays are inconsistent."""
+    values, origins = np.asarray(grid["values"]), np.ascontiguousarray(grid["origins"], np.int32)
+    channels = 3 if values.ndim == 5 else 1
+    count = len(origins)
+    if origins.shape != (count, 3) or values.size != count * BRICK**3 * channels:
+        raise ValueError("bricks of another shape")
+    if (origins % BRICK).any():
+        raise ValueError("origins must be multiples of 8")
+    matrix = np.asarray(grid["index_to_object"], np.float64)
+    if matrix.shape != (4, 4) or not np.isfinite(matrix).all() or not np.linalg.det(matrix):
+        raise ValueError("a transform without an inverse")
+    return {
+        "name": grid["name"], "origins": origins, "half": values.dtype == np.float16,
+        "values": np.ascontiguousarray(values, np.float32).reshape(count, BRICK**3, channels),
+        "index_to_object": matrix.ravel().tolist(), "tiles": grid.get("tiles", False),
+        "boxes": list(grid.get("boxes", ())),
+    }  # fmt: skip
 
 
 @contextmanager

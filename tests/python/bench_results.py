@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from wavecomb.bench.columns import header_line, row_line
+from wavecomb.bench.results import header_line, row_line
 
 DEFAULTS: dict[str, Any] = {
     **{"suite": "made-up", "experiment": "policies", "stage": "mixed", "renderer": "wavecomb"},

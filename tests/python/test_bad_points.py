@@ -6,7 +6,7 @@ import pytest
 from usd_recorder import load, said
 
 import wavecomb
-from wavecomb.usd.geometry.invalid_points import replace_invalid_steps
+from wavecomb.usd.geometry.mesh_arrays import replace_invalid_steps
 
 NAN = float("nan")
 

@@ -18,7 +18,9 @@ import pytest
 from click.testing import CliRunner
 from parts import not_here
 
-from wavecomb.bench import columns, counters, machine, peers
+from wavecomb.bench import jobs, machine
+from wavecomb.bench import process as workers
+from wavecomb.bench import results as tables
 from wavecomb.bench.oracle import policy_of
 from wavecomb.bench.plan import Estimator, Limits, chosen, configurations, schedule
 from wavecomb.bench.process import run_process
@@ -206,15 +208,15 @@ def test_rows_come_back(tmp_path: Path) -> None:
         "hits_per_material": {"/M,1": 3},
     }
     file = tmp_path / "runs.csv"
-    file.write_text(columns.header_line() + columns.row_line(row) + "a-1,torn")
-    (read,) = columns.read_rows(file)
+    file.write_text(tables.header_line() + tables.row_line(row) + "a-1,torn")
+    (read,) = tables.read_rows(file)
     assert read["error"] == 'one, two "three"' and read["spp"] == 4 and read["render_s"] == 0.125
     assert read["rel_mse"] is None and read["noisy"] is True and read["wall_s"] is None
     assert read["hits_per_material"] == {"/M,1": 3}
     with pytest.raises(KeyError, match="speling"):
-        columns.row_line({"speling": 1})
-    assert all(c.meaning.endswith(".") for c in columns.COLUMNS)
-    assert len(set(columns.NAMES)) == len(columns.NAMES)
+        tables.row_line({"speling": 1})
+    assert all(c.meaning.endswith(".") for c in tables.COLUMNS)
+    assert len(set(tables.NAMES)) == len(tables.NAMES)
 
 
 # Noise
@@ -274,7 +276,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_a_suite_from_end_to_end(results: Path) -> None:
-    rows = columns.read_rows(results / "runs.csv")
+    rows = tables.read_rows(results / "runs.csv")
     assert sorted(row["run_id"] for row in rows) == [
         f"order.box.policy-{policy}-{k}" for policy in ("none", "oracle") for k in (0, 1)
     ]
@@ -282,7 +284,7 @@ def test_a_suite_from_end_to_end(results: Path) -> None:
     for row in rows:
         assert row["status"] == "ok" and (row["width"], row["height"], row["spp"]) == (16, 12, 4)
         assert row["policy"] in row["run_id"] and row["roulette"] == "throughput"
-        phases = sum(row[name] or 0.0 for name in columns.PHASE_COLUMNS)
+        phases = sum(row[name] or 0.0 for name in tables.PHASE_COLUMNS)
         assert phases == pytest.approx(row["threads"] * row["render_s"], rel=1e-6)
         order = row["keys_s"] + row["sort_s"] + row["materialize_s"]
         assert row["order_s"] == pytest.approx(order, abs=1e-8)
@@ -315,7 +317,7 @@ def test_everything_is_kept(results: Path) -> None:
     for key in ("cpu", "isa", "cores", "caches_bytes", "load_before", "versions", "native_sha256"):
         assert machine[key], key
     assert set(machine["counters"]["events"]) | set(machine["counters"]["missing"]) == set(
-        columns.COUNTER_COLUMNS
+        tables.COUNTER_COLUMNS
     )
     assert machine["noise"]["runs"] == 4 and len(machine["sittings"]) == 1
 
@@ -375,7 +377,7 @@ def test_stopped_and_resumed(tmp_path: Path, how: signal.Signals) -> None:
     assert result.exit_code == 0, result.stderr
     lines = csv.read_text().splitlines()
     assert lines[: len(done)] == done and len(lines) == 5
-    assert len({row["run_id"] for row in columns.read_rows(csv)}) == 4
+    assert len({row["run_id"] for row in tables.read_rows(csv)}) == 4
     assert len(jsonl.read_text().splitlines()) == 4
     assert len(json.loads((out / "machine.json").read_text())["sittings"]) == 2
 
@@ -388,13 +390,13 @@ def test_a_run_that_fails_is_a_row_and_is_tried_again(tmp_path: Path) -> None:
     suite = written(tmp_path, text.replace(', "oracle"', "").replace("tions = 2", "tions = 1"))
     result = bench("run", suite, "-o", tmp_path / "out")
     assert "FAILED" in result.stderr and "1 runs failed" in result.stderr
-    (row,) = columns.read_rows(tmp_path / "out" / "runs.csv")
+    (row,) = tables.read_rows(tmp_path / "out" / "runs.csv")
     assert row["status"] == "failed" and "bad.usda" in row["error"] and row["render_s"] is None
     from wavecomb.scenes import write_scene
 
     write_scene("cornell", tmp_path / "bad.usda")
     assert bench("run", suite, "-o", tmp_path / "out", "--resume", "--quiet").exit_code == 0
-    (row,) = columns.read_rows(tmp_path / "out" / "runs.csv")
+    (row,) = tables.read_rows(tmp_path / "out" / "runs.csv")
     assert row["status"] == "ok"
 
 
@@ -425,7 +427,7 @@ def test_time_limit(tmp_path: Path) -> None:
     arguments = ("run", written(tmp_path, text), "-o", tmp_path / "out", "--time-limit", 0.0001)
     result = bench(*arguments)
     assert result.exit_code == 0 and "4 runs are left" in result.stderr
-    assert columns.read_rows(tmp_path / "out" / "runs.csv") == []
+    assert tables.read_rows(tmp_path / "out" / "runs.csv") == []
 
 
 def test_processes_that_die_are_said() -> None:
@@ -436,12 +438,12 @@ def test_processes_that_die_are_said() -> None:
 
 
 def test_counters_count_between_start_and_stop(tmp_path: Path) -> None:
-    events = counters.available({"cycles": ("task-clock",)}).events
+    events = workers.available({"cycles": ("task-clock",)}).events
     if not events:
         not_here("perf does not count")
-    session = counters.Session(events, tmp_path / "perf.csv")
+    session = workers.Session(events, tmp_path / "perf.csv")
     code = (
-        "import json, sys; from wavecomb.bench.counters import Switch;"
+        "import json, sys; from wavecomb.bench.process import Switch;"
         "s = Switch(json.load(sys.stdin)['perf']); sum(range(10**7));"
         "s.start(); sum(range(10**5)); s.stop(); print(json.dumps({'status': 'ok'}))"
     )
@@ -453,7 +455,7 @@ def test_counters_count_between_start_and_stop(tmp_path: Path) -> None:
 
 
 def test_missing_peers_are_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(peers, "WORKER", tmp_path / "worker.py")
+    monkeypatch.setattr(jobs, "WORKER", tmp_path / "worker.py")
     result = bench("run", "peers", "-o", tmp_path / "out", "--only", "*mitsuba-llvm*")
     assert result.exit_code == 2 and "needs benchmarks/peers/worker.py" in result.stderr
     assert not (tmp_path / "out").exists()

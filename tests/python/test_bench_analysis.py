@@ -12,9 +12,8 @@ import pytest
 import scipy.stats
 from bench_results import POLICY_FACTORS, policy_rows, runs_of, write_folder
 
-from wavecomb.bench.analysis.costs import calibration, material_costs
 from wavecomb.bench.analysis.data import Results, cells, load
-from wavecomb.bench.analysis.factorial import effects
+from wavecomb.bench.analysis.factorial import calibration, effects, material_costs
 from wavecomb.bench.analysis.interval import (
     Estimate,
     bootstrap,

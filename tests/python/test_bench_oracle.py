@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
-from wavecomb.bench import columns
+from wavecomb.bench import results as tables
 from wavecomb.bench.oracle import BEST, EXACT, WORST, best_orders, ranks, recorded, shuffled
 from wavecomb.cli import main
 
@@ -89,7 +89,7 @@ def test_ranks_are_what_material_shades_by(tmp_path: Path) -> None:
     out = tmp_path / "out"
     done = CliRunner().invoke(main, ["bench", "run", str(suite), "-o", str(out)])
     assert done.exit_code == 0, done.stderr
-    rows = columns.read_rows(out / "runs.csv")
+    rows = tables.read_rows(out / "runs.csv")
     assert {row["policy"] for row in rows} == {"none", BEST, WORST}
     assert len({row["picture_sha256"] for row in rows}) == 1
     assert all(row["cost_prediction_r2"] is None for row in rows if row["policy"] != "none")

@@ -16,8 +16,8 @@ import pytest
 from added_rows import add_rows
 
 from wavecomb import _core as core
-from wavecomb import camera_table
-from wavecomb.camera_table import CameraParameter, camera_defaults, camera_parameters
+from wavecomb import core_table
+from wavecomb.core_table import CameraParameter, camera_defaults, camera_parameters
 
 ROOT = Path(__file__).parents[2]
 WINDOW = (-1.0, 1.0, -1.0, 1.0)
@@ -127,7 +127,7 @@ def test_what_is_missing_or_unknown_is_named() -> None:
 
 def test_lists_that_stand_elsewhere_are_the_tables() -> None:
     from wavecomb.load_options import PROJECTIONS
-    from wavecomb.usd.render_settings.values import CONFORMS
+    from wavecomb.usd.render_settings.reader import CONFORMS
 
     assert camera_parameters()["projection"].choices == PROJECTIONS
     assert camera_parameters()["conform"].choices == CONFORMS
@@ -157,7 +157,7 @@ def test_an_added_row_is_kept_by_poses_of_the_window(with_rows: None) -> None:
     pose = navigate.orbit(pose_of_scene(camera, "/Cam"), np.zeros(3), 0.1, 0.0, "Y")
     options = pose.options()
     assert (options["squint"], options["mood"], options["pixel_aspect"]) == (0.5, "calm", 2.0)
-    assert options.keys() == {"transform", *camera_table.camera_parameters()}
+    assert options.keys() == {"transform", *core_table.camera_parameters()}
 
 
 def test_an_added_row_is_taken_back_by_a_frame_without_it(with_rows: None) -> None:

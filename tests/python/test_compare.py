@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wavecomb.image.colour_maps import colour_map, signed_colour_map
 from wavecomb.image.compare.comparison import compare, luminance
 from wavecomb.image.compare.heatmap import MIN_WIDTH, heat_map, write_heat_map
 from wavecomb.image.files.image import read_image, srgb_from_linear, write_exr
+from wavecomb.image.layer_view import colour_map, signed_colour_map
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from pxr import Gf, Sdf, Usd
 import wavecomb
 from wavecomb import vdb
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY
-from wavecomb.usd.stage.origin import (
+from wavecomb.usd.stage.context import (
     CELL,
     INSTANCED,
     NEAR,

@@ -17,7 +17,7 @@ from usd_recorder import QUAD, Recorder, said
 import wavecomb
 from wavecomb import _core
 from wavecomb.scenes import write_scene
-from wavecomb.scenes.authoring.material_network import Network
+from wavecomb.scenes.authoring.materials import Network
 from wavecomb.usd import load_stage
 from wavecomb.usd.materialx.nodes.colours import color_divisor
 from wavecomb.usd.materialx.surfaces.hair import scale, variance

@@ -13,8 +13,7 @@ import OpenImageIO as oiio
 import pytest
 
 from wavecomb.image.files import image
-from wavecomb.image.files.output_file import check_writable, replacing
-from wavecomb.image.files.private_folder import remove_abandoned
+from wavecomb.image.files.output_file import check_writable, remove_abandoned, replacing
 
 
 @pytest.fixture

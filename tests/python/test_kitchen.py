@@ -10,7 +10,7 @@ import pytest
 from pxr import Usd, UsdGeom, UsdShade
 
 from wavecomb.scenes import write_scene
-from wavecomb.scenes.rooms.kitchen_materials import MATERIALS
+from wavecomb.scenes.rooms.room_materials import KITCHEN_MATERIALS as MATERIALS
 
 TOP = 0.92
 

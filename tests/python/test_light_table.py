@@ -13,7 +13,7 @@ from added_rows import add_rows
 from pxr import Sdf, Usd, UsdLux
 
 from wavecomb import _core as core
-from wavecomb.light_table import EDITABLE, MESH, LightParameter, light_parameters, of_kind
+from wavecomb.core_table import EDITABLE, MESH, LightParameter, light_parameters, of_kind
 
 ROOT = Path(__file__).parents[2]
 

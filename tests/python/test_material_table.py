@@ -13,7 +13,7 @@ from added_rows import add_rows
 from pxr import Usd, UsdShade
 
 from wavecomb import _core as core
-from wavecomb.material_table import (
+from wavecomb.core_table import (
     MaterialParameter,
     material_parameters,
     preview_programs,

@@ -14,8 +14,7 @@ from test_usd_material import surface
 from usd_recorder import Recorder, said, write
 
 from wavecomb.usd import load_stage, mtlx
-from wavecomb.usd.materials.parameters import material_parameters
-from wavecomb.usd.materials.surface_values import surface_values
+from wavecomb.usd.materials.parameters import material_parameters, surface_values
 from wavecomb.usd.materialx.surfaces.openpbr import MODELS
 
 PREVIEW = surface("color3f inputs:diffuseColor = (0.1, 0.2, 0.3)\nfloat inputs:roughness = 0.25")

@@ -17,8 +17,7 @@ from materialx_nodes import Node, patterns, points, run
 
 from wavecomb.usd.materialx.library import WIDTHS, definition_of, flat_graph, library
 from wavecomb.usd.materialx.nodes.network import PER_COMPONENT, primitive, support_of
-from wavecomb.usd.materialx.nodes.node_graphs import ExpandedGraph
-from wavecomb.usd.materialx.nodes.table import CATEGORIES
+from wavecomb.usd.materialx.nodes.node_graphs import CATEGORIES, ExpandedGraph
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "material-graphs.md"
 

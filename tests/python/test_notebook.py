@@ -20,9 +20,9 @@ from parts import needs
 import wavecomb
 from wavecomb import window
 from wavecomb.errors import WavecombError
-from wavecomb.image.embedded import encode_image, shrink
 from wavecomb.image.files.image import display, read_codes
 from wavecomb.image.rendered import Picture
+from wavecomb.image.thumbnails import encode_image, shrink
 from wavecomb.run import live_view
 
 

@@ -15,8 +15,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from wavecomb.cli import main
-from wavecomb.image.compare.folders import pair_up
-from wavecomb.image.files.collection import collect, images_of
+from wavecomb.image.compare.folders import collect, images_of, pair_up
 from wavecomb.image.files.image import display, read_codes, write_exr, write_png
 from wavecomb.image.thumbnails import DisplayOptions, contact_sheet, fit_image, wipe
 from wavecomb.run.frame_names import matching

@@ -12,9 +12,13 @@ from usd_recorder import QUAD, Recorder, write
 import wavecomb
 from wavecomb.image.files.image import write_png
 from wavecomb.usd import load_stage, open_stage
-from wavecomb.usd.materials.parameters import as_stored, light_values, material_parameters
+from wavecomb.usd.materials.parameters import (
+    as_stored,
+    light_values,
+    material_parameters,
+    surface_values,
+)
 from wavecomb.usd.materials.surface import DEFAULTS
-from wavecomb.usd.materials.surface_values import surface_values
 from wavecomb.usd.materialx.surfaces.inputs import definitions
 from wavecomb.usd.materialx.surfaces.openpbr import MODELS, layers_of
 

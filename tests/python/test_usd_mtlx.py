@@ -17,7 +17,7 @@ from wavecomb.image.files.image import write_png
 from wavecomb.usd import LoadReport, load_stage, mtlx, open_stage
 from wavecomb.usd.materialx.files import MAX_DEPTH, MtlxError
 from wavecomb.usd.materialx.references import translate
-from wavecomb.usd.stage.diagnostics import capture_diagnostics
+from wavecomb.usd.stage.report import capture_diagnostics
 
 GOLD = """<?xml version="1.0"?>
 <materialx version="1.38" colorspace="lin_rec709">

@@ -14,11 +14,9 @@ from typing import Any
 import click
 
 import wavecomb
-from wavecomb.camera_table import camera_parameters
 from wavecomb.cli import main
-from wavecomb.light_table import light_parameters
+from wavecomb.core_table import camera_parameters, light_parameters, material_parameters
 from wavecomb.load_options import LoadOptions, rows
-from wavecomb.material_table import material_parameters
 from wavecomb.options import default_text, settings
 from wavecomb.run import aovs
 

@@ -194,7 +194,6 @@ def _read(path: Path) -> str:
 
 
 # ---- Whether a machine was quiet enough for reliable timings
-# ---------------------------------------
 
 
 MAX_OTHERS = 0.05

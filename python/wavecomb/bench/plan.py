@@ -249,7 +249,6 @@ def _cache_mb(path: Path, text: str, limits: Limits) -> float:
 
 
 # ---- Duration of a sitting, estimated from existing results or from a short calibration
-# -----------
 
 
 _SIZE = 160

@@ -13,10 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from wavecomb.bench import machine, peers
-from wavecomb.bench.columns import run_row
-from wavecomb.bench.counters import available
-from wavecomb.bench.jobs import Jobs, check_files, generate, make_profile
+from wavecomb.bench import machine
+from wavecomb.bench.jobs import Jobs, check_files, check_peers, generate, make_profile, run_peer
 from wavecomb.bench.oracle import ORACLES
 from wavecomb.bench.plan import (
     Config,
@@ -28,8 +26,8 @@ from wavecomb.bench.plan import (
     from_results,
     schedule,
 )
-from wavecomb.bench.process import Outcome, run_worker
-from wavecomb.bench.results import ResultFolder
+from wavecomb.bench.process import Outcome, available, run_worker
+from wavecomb.bench.results import ResultFolder, run_row
 from wavecomb.bench.suite_model import WAVECOMB, Suite, only_stages
 from wavecomb.bench.worker import judge_picture
 from wavecomb.errors import WavecombError
@@ -112,7 +110,7 @@ class Sitting:
     def run(self) -> bool:
         """Executes the remaining runs. Returns False if the time limit stopped them."""
         check_files(self.configs)
-        peers.check({config.renderer for config in self.configs} - {WAVECOMB})
+        check_peers({config.renderer for config in self.configs} - {WAVECOMB})
         if self.options.resume:
             self.folder.resume(self.suite)
         else:
@@ -217,7 +215,7 @@ class Sitting:
         else:
             golden, threads = self.suite.golden, self._threads(config)
             stage = self.jobs.stage(config)
-            outcome = peers.run_peer(config, stage, golden.spp, golden.seed, path, threads)
+            outcome = run_peer(config, stage, golden.spp, golden.seed, path, threads)
         if outcome.answer["status"] != "ok":
             raise WavecombError(f"golden image of {config.stage}: {outcome.answer['error']}")
 
@@ -239,7 +237,7 @@ class Sitting:
         image = kept or self.folder.path / "images" / f".{run.config.name}.npy"
         spp = int(config.settings["spp"])
         stage, threads = self.jobs.stage(config), self._threads(config)
-        outcome = peers.run_peer(config, stage, spp, run.repetition, image, threads)
+        outcome = run_peer(config, stage, spp, run.repetition, image, threads)
         if outcome.answer["status"] == "ok":
             golden = {"file": str(self.jobs.golden(config)), "spp": self.suite.golden.spp}
             outcome.answer |= judge_picture(np.load(image), spp, golden if config.golden else None)

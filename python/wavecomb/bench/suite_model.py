@@ -106,7 +106,6 @@ class Suite:
 
 
 # ---- Choice of stages: additional ones from a folder, or only some of the suite
-# --------------------
 
 
 STAGE_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")

@@ -48,7 +48,7 @@ def main() -> None:
 def run(job: Job) -> dict[str, Any]:
     """Loads the stage, warms up, renders and compares the image."""
     from wavecomb import api
-    from wavecomb.bench.counters import Switch
+    from wavecomb.bench.process import Switch
     from wavecomb.run.cost_profile import load_costs
     from wavecomb.run.stats import plain
 

@@ -113,7 +113,7 @@ def compare_command(
     Exit codes: 0 equal (or within --tolerance, or the z-test finds no difference), 1 different, 2
     an error.
     """
-    from wavecomb.image.files.collection import is_many
+    from wavecomb.image.compare.folders import is_many
 
     many = is_many(a) or is_many(b)
     enter_to_read((heatmap, page, wipe))

@@ -23,7 +23,7 @@ from wavecomb.run.guiding_file import BEFORE, Learning, check_trains_field, lear
 from wavecomb.run.settings import check_options, has_error_layers
 
 if TYPE_CHECKING:
-    from wavecomb.usd.render_settings.values import ProductSettings
+    from wavecomb.usd.render_settings.reader import ProductSettings
 
 DEFAULT_SPP = 64
 ADAPTIVE_SPP = 1024

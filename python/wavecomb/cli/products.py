@@ -25,7 +25,7 @@ from wavecomb.run.guiding_file import ENDING
 from wavecomb.run.settings import DEFAULT_SIZE, make_settings
 
 if TYPE_CHECKING:
-    from wavecomb.usd.render_settings.values import ProductSettings
+    from wavecomb.usd.render_settings.reader import ProductSettings
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ def sheet_command(pictures: tuple[str, ...], output: str, **options: Any) -> Non
     """
     enter_to_read((output,))
     from wavecomb.errors import WavecombError
-    from wavecomb.image.files.collection import collect
+    from wavecomb.image.compare.folders import collect
     from wavecomb.image.files.output_file import check_writable
     from wavecomb.image.thumbnails import DisplayOptions
 

@@ -55,7 +55,7 @@ def join(job: Job, image: int, parts: Iterable[RenderedTile]) -> Picture:
     """
     shot, rectangles = job.shot(image), job.rectangles(image)
     check_cover(shot.region, rectangles)
-    x0, y0, _, _ = window = _window(shot)
+    x0, y0, _, _ = window = shot.window
     whole: dict[str, NDArray[Any]] = {}
     kept: list[RenderedTile] = []
     manifests: dict[str, dict[str, int]] = {}
@@ -108,13 +108,6 @@ def check_cover(region: Rectangle, tiles: Sequence[Rectangle]) -> None:
     if not seen.all():
         y, x = np.argwhere(seen == 0)[0]
         raise WavecombError(f"no tile has the pixel {x + x0}, {y + y0}")
-
-
-def _window(shot: Shot) -> Rectangle:
-    """Returns the rectangle of pixels that the image file holds."""
-    if shot.settings.get("crop") and shot.settings.get("region") is not None:
-        return shot.region
-    return 0, 0, int(shot.settings["width"]), int(shot.settings["height"])
 
 
 def _room(part: RenderedTile, name: str, window: Rectangle) -> NDArray[Any]:

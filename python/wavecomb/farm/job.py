@@ -53,6 +53,13 @@ class Shot:
         return x0, y0, x1, y1
 
     @property
+    def window(self) -> Rectangle:
+        """Rectangle of pixels that the image file holds."""
+        if self.settings.get("crop") and self.settings.get("region") is not None:
+            return self.region
+        return 0, 0, int(self.settings["width"]), int(self.settings["height"])
+
+    @property
     def is_adaptive(self) -> bool:
         """Whether the number of samples of a pixel depends on its error."""
         return bool(self.settings.get("adaptive"))

@@ -121,7 +121,7 @@ class Renderer:
 
         chosen = {**shot.settings, "threads": self._threads or shot.settings.get("threads", 0)}
         if self.job.tile_count(image) == 1:
-            return _core.Settings(**chosen), _whole(shot), 0
+            return _core.Settings(**chosen), shot.window, 0
         checks = error_checks_for(shot, checks)
         rendered = grown(tile, border(shot.settings, checks), shot.region)
         return _core.Settings(**{**chosen, "region": rendered, "crop": True}), rendered, checks
@@ -193,13 +193,6 @@ class Renderer:
             return picture_of(frames.render(settings), picture.stats, aovs=shot.aovs)
 
         return without_samples(render, _core.Settings(**{**shot.settings, "threads": 1}), 2)
-
-
-def _whole(shot: Shot) -> Rectangle:
-    """Returns the rectangle of pixels in a render of the whole image."""
-    if shot.settings.get("crop") and shot.settings.get("region") is not None:
-        return shot.region
-    return 0, 0, int(shot.settings["width"]), int(shot.settings["height"])
 
 
 def error_checks_for(shot: Shot, checks: int = 0) -> int:

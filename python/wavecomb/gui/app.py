@@ -74,7 +74,7 @@ def run(
     """Shows the window until it is closed, and returns the exit code."""
     application = make_application()
     from wavecomb.gui.main_window import MainWindow
-    from wavecomb.usd.stage.diagnostics import DiagnosticListener
+    from wavecomb.usd.stage.report import DiagnosticListener
 
     window = MainWindow(setup)
     theme.apply(str(window.settings.value("theme", theme.DARK)))

@@ -83,7 +83,7 @@ def read(request: Request) -> Read:
         WavecombError: The stage cannot be rendered.
     """
     from wavecomb.usd import LoadReport, mtlx, open_editable
-    from wavecomb.usd.stage.diagnostics import capture_diagnostics
+    from wavecomb.usd.stage.report import capture_diagnostics
 
     usd = request.usd
     if usd is None:
@@ -111,7 +111,7 @@ def _options(request: Request) -> dict[str, Any]:
 def _load(request: Request, overrides: Sdf.Layer | None) -> LoadedStage:
     """Loads the scene from a second stage, so that the window's stage stays usable meanwhile."""
     from wavecomb.usd import LoadReport, load_stage, open_stage
-    from wavecomb.usd.stage.diagnostics import capture_diagnostics
+    from wavecomb.usd.stage.report import capture_diagnostics
 
     said = LoadReport()
     with capture_diagnostics(said):

@@ -10,9 +10,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.image.embedded import base64_text, data_uri, encode_image, shrink, subsample
 from wavecomb.image.files.image import display
 from wavecomb.image.layer_view import is_light, show_layer
+from wavecomb.image.thumbnails import base64_text, data_uri, encode_image, shrink, subsample
 
 MAX_EDGE = 1600
 """Longer edge of an image in a notebook in pixels; larger images are reduced by averaging."""

@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.image.embedded import Kind, data_uri
-from wavecomb.image.thumbnails import DisplayOptions, fit_image
+from wavecomb.image.thumbnails import DisplayOptions, Kind, data_uri, fit_image
 
 MAX_FRAMES = 1000
 """Maximum number of images of a page."""

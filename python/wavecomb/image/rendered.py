@@ -237,8 +237,8 @@ class Picture:
 
     def _repr_png_(self) -> bytes:
         """Returns the image for a notebook, with highlights rolled off towards white."""
-        from wavecomb.image.embedded import encode_image
         from wavecomb.image.notebook import codes
+        from wavecomb.image.thumbnails import encode_image
 
         return encode_image(codes(self))
 

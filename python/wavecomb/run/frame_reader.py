@@ -10,19 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pxr import UsdGeom
 
-from wavecomb.camera_table import camera_defaults
+from wavecomb.core_table import camera_defaults
 from wavecomb.load_options import LoadOptions
 from wavecomb.usd import mtlx
 from wavecomb.usd.cameras.camera import camera_motion, read_camera
 from wavecomb.usd.geometry.shutter import find_motion
 from wavecomb.usd.layers.opening import open_stage
-from wavecomb.usd.render_settings.values import ProductSettings
+from wavecomb.usd.render_settings.reader import ProductSettings
 from wavecomb.usd.render_settings.view import check_view, view_settings
-from wavecomb.usd.stage.diagnostics import capture_diagnostics
+from wavecomb.usd.stage.context import find_origin, to_scene_space
 from wavecomb.usd.stage.frame_cache import FrameCache
 from wavecomb.usd.stage.load import load_stage
-from wavecomb.usd.stage.origin import find_origin, to_scene_space
-from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.stage.report import LoadReport, capture_diagnostics
 from wavecomb.usd.stage.time_codes import frame_number, time_code
 
 if TYPE_CHECKING:

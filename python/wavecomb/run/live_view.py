@@ -125,7 +125,7 @@ class IPythonView:
 
     def picture(self, png: bytes) -> None:
         """Shows the current image."""
-        from wavecomb.image.embedded import base64_text
+        from wavecomb.image.thumbnails import base64_text
 
         source = f"data:image/png;base64,{base64_text(png)}"
         self._picture = f"<br><img src='{source}' alt='the picture so far'>"
@@ -181,8 +181,8 @@ class LivePicture(Sink):
         """Shows the image unless the render has finished, since the final image follows."""
         if snapshot.finished:
             return
-        from wavecomb.image.embedded import encode_image, shrink
         from wavecomb.image.files.image import display
+        from wavecomb.image.thumbnails import encode_image, shrink
         from wavecomb.image.working_space import to_rec709
 
         small = to_rec709(shrink(snapshot.beauty(), PICTURE_EDGE), self._working)

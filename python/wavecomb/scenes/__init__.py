@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wavecomb.errors import SceneError
 from wavecomb.scenes.authoring.stage import StageWriter
-from wavecomb.scenes.candles import build_candles
 from wavecomb.scenes.caustics import (
     build_caustics,
     build_landscape,
@@ -21,13 +21,11 @@ from wavecomb.scenes.caustics import (
     build_pool,
     build_prism,
 )
-from wavecomb.scenes.cornell_box import build_cornell, build_cornell_dragon
-from wavecomb.scenes.drinks import build_drinks
-from wavecomb.scenes.errors import SceneError
+from wavecomb.scenes.drinks import build_candles, build_drinks
 from wavecomb.scenes.hair import build_fur, build_head
 from wavecomb.scenes.heavy import build_heavy
 from wavecomb.scenes.lights import build_lights, build_studio
-from wavecomb.scenes.mixed import build_dragon, build_mixed
+from wavecomb.scenes.mixed import build_cornell, build_cornell_dragon, build_dragon, build_mixed
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.rooms.kitchen import build_kitchen
 from wavecomb.scenes.rooms.room import build_room

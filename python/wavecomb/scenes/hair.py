@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf, UsdGeom, Vt
 
 from wavecomb.scenes.authoring import materials
-from wavecomb.scenes.authoring.material_network import Network
+from wavecomb.scenes.authoring.materials import Network
 from wavecomb.scenes.authoring.stage import StageWriter
-from wavecomb.scenes.candles import below_surface
+from wavecomb.scenes.drinks import below_surface
 from wavecomb.scenes.models.mesh import FloatArray, Mesh, grid_mesh, normalized, without_flat_faces
 from wavecomb.scenes.models.relief import ramp
 from wavecomb.scenes.models.shapes import turned

@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, UsdGeom, UsdLux
 
+from wavecomb.errors import SceneError
 from wavecomb.scenes.authoring import materials
 from wavecomb.scenes.authoring.stage import BOX, BOX_CORNERS, StageWriter
-from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.models.teapot import teapot
 from wavecomb.scenes.options import SceneOptions
 

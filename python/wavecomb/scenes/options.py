@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from wavecomb.scenes.errors import SceneError
+from wavecomb.errors import SceneError
 from wavecomb.scenes.models.dragon import dragon
 from wavecomb.scenes.models.mesh import Mesh
 

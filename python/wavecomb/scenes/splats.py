@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Vt
 
+from wavecomb.errors import SceneError
 from wavecomb.scenes.authoring import materials
 from wavecomb.scenes.authoring.stage import StageWriter
-from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.models.mesh import FloatArray, Mesh, face_areas, normalized
 from wavecomb.scenes.models.ply import ply_vertices
 from wavecomb.scenes.options import SceneOptions

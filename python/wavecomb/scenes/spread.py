@@ -16,13 +16,12 @@ from dataclasses import replace
 import numpy as np
 from pxr import UsdShade
 
+from wavecomb.errors import SceneError
 from wavecomb.scenes.authoring import materials
-from wavecomb.scenes.authoring.material_network import Network
-from wavecomb.scenes.authoring.materials import Colour, MaterialInfo
+from wavecomb.scenes.authoring.materials import Colour, MaterialInfo, Network
 from wavecomb.scenes.authoring.patterns import Image
 from wavecomb.scenes.authoring.stage import StageWriter
 from wavecomb.scenes.authoring.textures import TextureInfo
-from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.models.stones import TILE, build_field, check_field, grey_pattern, texture_edge
 from wavecomb.scenes.options import SceneOptions
 

@@ -16,12 +16,10 @@ from numpy.typing import NDArray
 from pxr import Gf, UsdLux, UsdVol
 
 from wavecomb import vdb
-from wavecomb.errors import WavecombError
+from wavecomb.errors import SceneError, WavecombError
 from wavecomb.scenes.authoring import materials
-from wavecomb.scenes.authoring.material_network import Network
-from wavecomb.scenes.authoring.materials import Colour
+from wavecomb.scenes.authoring.materials import Colour, Network
 from wavecomb.scenes.authoring.stage import StageWriter
-from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.options import SceneOptions
 
 Points = NDArray[np.float32]

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from wavecomb.errors import WavecombError
     from wavecomb.usd.layers.opening import open_editable, open_stage
-    from wavecomb.usd.render_settings.products import peek_products
+    from wavecomb.usd.render_settings.view import peek_products
     from wavecomb.usd.stage.load import load_stage
     from wavecomb.usd.stage.load_result import LoadedStage
     from wavecomb.usd.stage.report import Finding, LoadReport
@@ -40,7 +40,7 @@ _HOMES = {
     "load_stage": "wavecomb.usd.stage.load",
     "open_editable": "wavecomb.usd.layers.opening",
     "open_stage": "wavecomb.usd.layers.opening",
-    "peek_products": "wavecomb.usd.render_settings.products",
+    "peek_products": "wavecomb.usd.render_settings.view",
 }
 
 

@@ -19,8 +19,7 @@ from pxr import Sdf
 from test_gizmo import BALL, STAGE
 
 import wavecomb.usd
-from wavecomb.usd.stage.diagnostics import capture_diagnostics
-from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.stage.report import LoadReport, capture_diagnostics
 
 pytestmark = needs("bin:Xvfb", "bin:xdotool", "bin:openbox")
 

@@ -306,7 +306,7 @@ def test_what_usd_says_goes_to_the_notes(new_session, qtbot, final, tmp_path, ca
 def test_what_usd_says_on_this_thread(new_session, qtbot, final, tmp_path, capfd):
     from pxr import Tf
 
-    from wavecomb.usd.stage.diagnostics import DiagnosticListener
+    from wavecomb.usd.stage.report import DiagnosticListener
 
     session = new_session(width=SIZE, height=SIZE, spp=1)
     panel = ScenePanel(session)

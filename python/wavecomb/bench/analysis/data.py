@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.bench.columns import COLUMNS, read_rows
 from wavecomb.bench.oracle import BEST, COSTS, ORACLES
+from wavecomb.bench.results import COLUMNS, read_rows
 from wavecomb.errors import WavecombError
 from wavecomb.extras import needed
 from wavecomb.image.files.output_file import reason

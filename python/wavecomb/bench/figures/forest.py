@@ -192,7 +192,6 @@ def _panel(
 
 
 # ---- Figures of the verdicts: order, regret, the factorial, predicted costs, images
-# ---------------
 
 
 MAX_INTERACTIONS = 14

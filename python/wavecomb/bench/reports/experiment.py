@@ -6,11 +6,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from wavecomb.bench.analysis.costs import PREDICTIONS, calibration, material_costs
 from wavecomb.bench.analysis.data import BASELINES, BOUNDS
-from wavecomb.bench.analysis.factorial import effects, factors_of
+from wavecomb.bench.analysis.factorial import (
+    PREDICTIONS,
+    calibration,
+    effects,
+    factors_of,
+    material_costs,
+)
 from wavecomb.bench.analysis.ratios import means, order_effects, ratios, regrets
-from wavecomb.bench.columns import COUNTER_COLUMNS
 from wavecomb.bench.figures import forest
 from wavecomb.bench.figures import runs as run_figures
 from wavecomb.bench.figures.style import count_words, fixed
@@ -24,6 +28,7 @@ from wavecomb.bench.reports.tables import (
     ratio_table,
     regret_table,
 )
+from wavecomb.bench.results import COUNTER_COLUMNS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -249,7 +254,6 @@ def _bound_words(part: pd.DataFrame) -> str:
 
 
 # ---- Sections about a whole suite: roulette, effects, costs
-# ----------------------------------------
 
 
 def suite(out: Writer, results: Results) -> None:

@@ -16,8 +16,8 @@ from wavecomb.bench.figures.forest import difference_figure
 from wavecomb.bench.figures.style import CaptionedFigure
 from wavecomb.bench.reports.parts import Viewer, key_of
 from wavecomb.errors import WavecombError
-from wavecomb.image.embedded import data_uri, shrink
 from wavecomb.image.files.image import display, read_image
+from wavecomb.image.thumbnails import data_uri, shrink
 
 if TYPE_CHECKING:
     from wavecomb.bench.analysis.data import Results

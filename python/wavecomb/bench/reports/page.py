@@ -260,7 +260,6 @@ WORDS = {
 
 
 # ---- Warnings of a report, and facts about its machine
-# ---------------------------------------------
 
 
 FEW_ROUNDS = 5

@@ -9,8 +9,8 @@ from typing import Any
 
 from pxr import Gf, Sdf, Usd
 
+from wavecomb.core_table import EDITABLE, LightParameter, light_parameters, of_kind
 from wavecomb.gui.scene.form_model import COLOUR, NUMBER, SWITCH, Range
-from wavecomb.light_table import EDITABLE, LightParameter, light_parameters, of_kind
 from wavecomb.usd.lights.light import KINDS
 from wavecomb.usd.materials.parameters import as_stored
 

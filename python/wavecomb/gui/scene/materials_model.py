@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, Qt
 
+from wavecomb.core_table import material_parameters as known_parameters
 from wavecomb.gui.scene.form_model import (
     COLOUR,
     DRIVEN,
@@ -20,7 +21,6 @@ from wavecomb.gui.scene.form_model import (
     Range,
 )
 from wavecomb.gui.table_model import ColourRole, HeadedModel
-from wavecomb.material_table import material_parameters as known_parameters
 
 if TYPE_CHECKING:
     from wavecomb._core import Scene

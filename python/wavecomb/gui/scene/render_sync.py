@@ -23,9 +23,9 @@ from wavecomb.usd.materials.parameters import (
     light_transform,
     light_values,
     material_parameters,
+    surface_values,
 )
-from wavecomb.usd.materials.surface_values import surface_values
-from wavecomb.usd.stage.origin import to_scene_space
+from wavecomb.usd.stage.context import to_scene_space
 
 if TYPE_CHECKING:
     from wavecomb.gui.viewport.session import Session

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.camera_table import camera_defaults, camera_parameters
+from wavecomb.core_table import camera_defaults, camera_parameters
 from wavecomb.image.files.render_output import camera_window
 from wavecomb.usd.cameras.framing import fit, fit_flat
 

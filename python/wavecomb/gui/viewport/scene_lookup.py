@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from wavecomb.gui.viewport.engine import Edit
 from wavecomb.gui.viewport.navigate import Pose, pose_of
-from wavecomb.usd.stage.origin import WORLD, Origin, to_scene_space
+from wavecomb.usd.stage.context import WORLD, Origin, to_scene_space
 
 if TYPE_CHECKING:
     from pxr import Usd

@@ -36,7 +36,7 @@ from wavecomb.gui.viewport.scene_lookup import (
     prim_bounds,
 )
 from wavecomb.gui.worker import Tasks, Worker
-from wavecomb.usd.stage.origin import WORLD
+from wavecomb.usd.stage.context import WORLD
 
 if TYPE_CHECKING:
     from wavecomb._core import Scene

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.image.colour_maps import colour_map, signed_colour_map
 from wavecomb.image.compare.comparison import colour_pair, luminance
+from wavecomb.image.layer_view import colour_map, signed_colour_map
 
 if TYPE_CHECKING:
     from wavecomb.image.compare.comparison import Source

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from wavecomb.image.files import output_file
-from wavecomb.image.files.private_folder import remove_abandoned
+from wavecomb.image.files.output_file import remove_abandoned
 
 _HEAD = struct.Struct("=I")
 _MAX_BYTES = 1 << 20

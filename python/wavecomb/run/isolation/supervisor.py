@@ -27,7 +27,7 @@ from wavecomb import processes, terminal
 from wavecomb.boot import end_with_parent
 from wavecomb.errors import WavecombError
 from wavecomb.image.files import output_file
-from wavecomb.image.files.private_folder import PrivateFolder, remove_abandoned
+from wavecomb.image.files.output_file import PrivateFolder, remove_abandoned
 from wavecomb.run.isolation import memory, progress_notes, sandbox
 from wavecomb.run.isolation.outputs import Client, Mover, Outputs
 

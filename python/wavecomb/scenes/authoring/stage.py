@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, Vt
 
+from wavecomb.errors import SceneError
 from wavecomb.scenes.authoring.materials import MaterialInfo, plain
 from wavecomb.scenes.authoring.textures import TEXTURES, TextureInfo, sky, write_image
-from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.models.mesh import FloatArray, Mesh
 
 SUFFIXES = (".usda", ".usdc", ".usd")

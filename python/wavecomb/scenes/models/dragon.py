@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wavecomb.scenes.errors import SceneError
+from wavecomb.errors import SceneError
 from wavecomb.scenes.models.dragon_head import head_tubes, spike
 from wavecomb.scenes.models.mesh import FloatArray, Mesh, merge, normalized
 from wavecomb.scenes.models.relief import fluted, scaly

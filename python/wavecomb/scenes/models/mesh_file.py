@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from pxr import Gf, Tf, Usd, UsdGeom
 
-from wavecomb.scenes.errors import SceneError
+from wavecomb.errors import SceneError
 from wavecomb.scenes.models.mesh import (
     FloatArray,
     Mesh,

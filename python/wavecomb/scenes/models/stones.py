@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import UsdGeom, Vt
 
+from wavecomb.errors import SceneError
 from wavecomb.scenes.authoring import materials
 from wavecomb.scenes.authoring.patterns import Image
 from wavecomb.scenes.authoring.stage import StageWriter
 from wavecomb.scenes.authoring.textures import marble, weave, wood
-from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.models.mesh import Mesh, grid_mesh, without_flat_faces
 from wavecomb.scenes.options import SceneOptions
 

@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 
-from wavecomb.scenes.models.groups import Part
 from wavecomb.scenes.models.mesh import Mesh
 from wavecomb.scenes.models.shapes import (
+    Part,
     disc,
     mapped_flat,
     pillow,

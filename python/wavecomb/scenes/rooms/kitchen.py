@@ -13,13 +13,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from wavecomb.scenes.authoring.stage import StageWriter
-from wavecomb.scenes.models.groups import Part, add_instance, add_object, add_prototype
-from wavecomb.scenes.models.shapes import placed, rounded_box, tube, turn_about
+from wavecomb.scenes.models.shapes import (
+    Part,
+    add_instance,
+    add_object,
+    add_prototype,
+    placed,
+    rounded_box,
+    tube,
+    turn_about,
+)
 from wavecomb.scenes.models.teapot import teapot
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.rooms import kitchen_ware, tableware
-from wavecomb.scenes.rooms.kitchen_materials import JARS, MATERIALS, TILES
-from wavecomb.scenes.rooms.room_materials import write_textures
+from wavecomb.scenes.rooms import tableware
+from wavecomb.scenes.rooms.room_materials import JARS, TILES, write_textures
+from wavecomb.scenes.rooms.room_materials import KITCHEN_MATERIALS as MATERIALS
 
 _WIDTH, _DEPTH, _HEIGHT = 3.8, 3.4, 2.6
 _THICK, _INTO = 0.12, 0.02
@@ -147,11 +155,9 @@ def _front(
     door = rounded_box((x0 + gap, y0 + gap, z - 0.002), (x1 - gap, y1 - gap, z + 0.02), 0.004, 3)
     wide = x1 - x0
     if grip == "drawer":
-        bar = placed(
-            kitchen_ware.handle(min(0.6 * wide, 0.3)), (0.5 * (x0 + x1), y1 - 0.06, z + 0.02)
-        )
+        bar = placed(tableware.handle(min(0.6 * wide, 0.3)), (0.5 * (x0 + x1), y1 - 0.06, z + 0.02))
     else:
-        upright = placed(kitchen_ware.handle(0.16), turn=turn_about(2, 90.0))
+        upright = placed(tableware.handle(0.16), turn=turn_about(2, 90.0))
         side = x1 - 0.05 if grip == "right" else x0 + 0.05
         high = y1 - 0.14 if z > 0.5 else y0 + 0.14
         bar = placed(upright, (side, high, z + 0.02))
@@ -255,12 +261,10 @@ def _appliances(writer: StageWriter, columns: int) -> None:
         (rounded_box((cold0, 1.13, 0.60), (cold1, 1.86, 0.66), 0.012, 3), "LacquerRed"),
     ]
     for y in (0.86, 1.32):
-        upright = placed(kitchen_ware.handle(0.26), turn=turn_about(2, 90.0))
+        upright = placed(tableware.handle(0.26), turn=turn_about(2, 90.0))
         fridge.append((placed(upright, (cold0 + 0.06, y, 0.66)), "Chrome"))
     _put(writer, "Fridge", _BACK, fridge)
-    add_object(
-        writer, f"{_OBJECTS}/Tap", kitchen_ware.faucet(columns), _on(_BACK, (1.9, _TOP, 0.075))
-    )
+    add_object(writer, f"{_OBJECTS}/Tap", tableware.faucet(columns), _on(_BACK, (1.9, _TOP, 0.075)))
 
 
 def _things(writer: StageWriter, columns: int, options: SceneOptions) -> None:
@@ -274,15 +278,15 @@ def _things(writer: StageWriter, columns: int, options: SceneOptions) -> None:
         add_object(writer, f"{_OBJECTS}/{name}", parts, place, run.turn + turn)
 
     for k, content in enumerate(JARS):
-        put(f"Jar{content}", kitchen_ware.jar(columns, content), _BACK, 0.78 + 0.115 * k, 0.12)
-    put("Toaster", kitchen_ware.toaster(), _BACK, 0.98, 0.36, 14.0)
-    put("Plates", kitchen_ware.plates(columns, 7), _BACK, 1.36, 0.34)
-    put("Bottle", kitchen_ware.bottle(columns), _BACK, 1.30, 0.13)
+        put(f"Jar{content}", tableware.jar(columns, content), _BACK, 0.78 + 0.115 * k, 0.12)
+    put("Toaster", tableware.toaster(), _BACK, 0.98, 0.36, 14.0)
+    put("Plates", tableware.plates(columns, 7), _BACK, 1.36, 0.34)
+    put("Bottle", tableware.bottle(columns), _BACK, 1.30, 0.13)
     kettle = teapot(options.teapot_level).moved(_TEAPOT_SCALE, np.zeros(3))
     put("Kettle", [(kettle, "Copper")], _LEFT, 2.22, 0.16, 30.0, 0.004)
-    put("PotSmall", kitchen_ware.pot(columns, 0.085, "SatinSteel"), _LEFT, 1.91, 0.46, 20.0, 0.004)
-    put("PotLarge", kitchen_ware.pot(columns, 0.12, "LacquerRed"), _LEFT, 1.92, 0.17, 90.0, 0.004)
-    put("Knives", kitchen_ware.knives(), _LEFT, 2.52, 0.17, 8.0)
+    put("PotSmall", tableware.pot(columns, 0.085, "SatinSteel"), _LEFT, 1.91, 0.46, 20.0, 0.004)
+    put("PotLarge", tableware.pot(columns, 0.12, "LacquerRed"), _LEFT, 1.92, 0.17, 90.0, 0.004)
+    put("Knives", tableware.knives(), _LEFT, 2.52, 0.17, 8.0)
     bowl = (2.5, 0.34)
     put("Bowl", tableware.bowl(columns), _BACK, *bowl)
     for k, (x, y, z) in enumerate(tableware.fruit_places()):
@@ -303,7 +307,7 @@ def _things(writer: StageWriter, columns: int, options: SceneOptions) -> None:
     bar = tube([(2.38, rail, 0.06), (3.1, rail, 0.06)], 0.006, 12, 8)
     _put(writer, "Rail", _LEFT, [(bar, "Brass")])
     for k, radius in enumerate(high):
-        pan = kitchen_ware.hanging_pan(columns, radius, ("Copper", "CastIron", "SatinSteel")[k])
+        pan = tableware.hanging_pan(columns, radius, ("Copper", "CastIron", "SatinSteel")[k])
         place = _on(_LEFT, (2.66 + 0.19 * k, rail + 0.002, 0.06))
         add_object(writer, f"{_OBJECTS}/Pan{k}", pan, place, _LEFT.turn)
 
@@ -319,7 +323,7 @@ def _lamps(writer: StageWriter, columns: int) -> None:
         place = _on(_LEFT, (x, _SHELF - 0.004, 0.20))
         writer.rect_light(f"Strip{2 + k}", place, 0.03, 0.5, warm)
     cord = 0.62
-    shade = add_prototype(writer, "Pendant", kitchen_ware.pendant(columns, cord))
+    shade = add_prototype(writer, "Pendant", tableware.pendant(columns, cord))
     for k, (x, z) in enumerate(((1.35, 1.55), (2.0, 1.85), (2.65, 2.15))):
         add_instance(writer, f"{_OBJECTS}/Pendant{k}", shade, (x, _HEIGHT, z))
         writer.sphere_light(f"Bulb{k}", (x, _HEIGHT - cord - 0.11, z), 0.05, white)

@@ -13,11 +13,17 @@ import math
 import numpy as np
 
 from wavecomb.scenes.authoring.stage import StageWriter
-from wavecomb.scenes.models.groups import Part, add_instance, add_object, add_prototype
-from wavecomb.scenes.models.shapes import placed, rounded_box
+from wavecomb.scenes.models.shapes import (
+    Part,
+    add_instance,
+    add_object,
+    add_prototype,
+    placed,
+    rounded_box,
+)
 from wavecomb.scenes.models.teapot import teapot
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.rooms import furniture, tableware, wall
+from wavecomb.scenes.rooms import furniture, shell, tableware
 from wavecomb.scenes.rooms.room_materials import write_materials
 from wavecomb.scenes.rooms.shell import DEPTH, HEIGHT, WIDTH, build_shell
 
@@ -78,7 +84,7 @@ def _floor(writer: StageWriter, columns: int, rng: np.random.Generator) -> None:
     side = (0.97, 0.0, DEPTH - 0.42)
     add_object(writer, f"{_OBJECTS}/SideTable", furniture.side_table(columns), side)
     top = (side[0] + 0.02, furniture.SIDE_TABLE_TOP, side[2] + 0.02)
-    reading = _centred(wall.lying(wall.book(0.15, 0.22, 0.026, "BookRed"), 0.026, 128.0))
+    reading = _centred(shell.lying(shell.book(0.15, 0.22, 0.026, "BookRed"), 0.026, 128.0))
     add_object(writer, f"{_OBJECTS}/Book_SideTable", reading, top)
     lamp = furniture.floor_lamp(columns)
     add_object(writer, f"{_OBJECTS}/FloorLamp", lamp, (0.46, 0.0, DEPTH - 0.34))
@@ -121,7 +127,7 @@ def _table(writer: StageWriter, columns: int, options: SceneOptions) -> None:
     glass = add_prototype(writer, "Tumbler", tableware.tumbler(columns))
     for index, (x, z) in enumerate(((0.24, 0.21), (0.33, 0.28))):
         add_instance(writer, f"{_OBJECTS}/Tumbler_{index}", glass, at(x, z))
-    novel = _centred(wall.lying(wall.book(0.13, 0.20, 0.022, "BookBlue"), 0.022, 24.0))
+    novel = _centred(shell.lying(shell.book(0.13, 0.20, 0.022, "BookBlue"), 0.022, 24.0))
     add_object(writer, f"{_OBJECTS}/Book_Table", novel, at(-0.56, -0.02))
 
 
@@ -156,15 +162,15 @@ def _bookcase(
         """Converts a position along the bookcase's front, height and distance from the wall."""
         return back + out, height, middle - along
 
-    add_object(writer, f"{_OBJECTS}/Bookcase", wall.bookcase(), at(0.0, 0.0, 0.0), 90.0)
-    spine, number = wall.SHELF_DEPTH - 0.045, 0
-    first = -0.5 * wall.SHELF_WIDTH + wall.BOARD + 0.003
+    add_object(writer, f"{_OBJECTS}/Bookcase", shell.bookcase(), at(0.0, 0.0, 0.0), 90.0)
+    spine, number = shell.SHELF_DEPTH - 0.045, 0
+    first = -0.5 * shell.SHELF_WIDTH + shell.BOARD + 0.003
     for row, start, count, lean in _ROWS:
-        along, floor = first + start, wall.shelf_floor(row)
+        along, floor = first + start, shell.shelf_floor(row)
         for _ in range(count):
             height = float(rng.uniform(0.19, 0.27))
             width, thick = 0.72 * height, float(rng.uniform(0.018, 0.046))
-            parts = wall.book(width, height, thick, _COVERS[int(rng.integers(len(_COVERS)))])
+            parts = shell.book(width, height, thick, _COVERS[int(rng.integers(len(_COVERS)))])
             place = at(along, floor, spine + float(rng.uniform(-0.02, 0.01)))
             add_object(writer, f"{_OBJECTS}/Book_{number:02d}", parts, place, 90.0)
             along += thick + 0.0008
@@ -172,21 +178,21 @@ def _bookcase(
         if lean:
             height, thick = 0.185, 0.027
             along += height * math.sin(math.radians(lean))
-            parts = wall.leaning(wall.book(0.14, height, thick, "BookCream"), lean)
+            parts = shell.leaning(shell.book(0.14, height, thick, "BookCream"), lean)
             place = at(along, floor, spine)
             add_object(writer, f"{_OBJECTS}/Book_{number:02d}", parts, place, 90.0)
             number += 1
-    heap = wall.shelf_floor(2)
+    heap = shell.shelf_floor(2)
     for index, (size, thick, cover) in enumerate(
         ((0.26, 0.034, "BookGreen"), (0.23, 0.028, "BookRed"), (0.20, 0.022, "BookCream"))
     ):
         turn = 90.0 + (4.0, -7.0, 3.0)[index]
-        parts = _centred(wall.lying(wall.book(0.7 * size, size, thick, cover), thick, turn))
+        parts = _centred(shell.lying(shell.book(0.7 * size, size, thick, cover), thick, turn))
         place = at(0.36, heap, 0.14)
         add_object(writer, f"{_OBJECTS}/Book_{number:02d}", parts, place)
         heap += thick
         number += 1
-    top = wall.SHELF_TOP
+    top = shell.SHELF_TOP
     statue = tableware.statue(options.dragon_mesh())
     add_object(writer, f"{_OBJECTS}/Statue", statue, at(0.22, top, 0.15), 62.0)
     add_object(writer, f"{_OBJECTS}/Vase", tableware.vase(columns, rng), at(-0.38, top, 0.15))
@@ -201,6 +207,6 @@ def _walls(writer: StageWriter, columns: int) -> None:
         ("Hills", (0.90, 0.66), "Iron", 0.0, (WIDTH, 1.68, 3.5), -90.0),
     ]
     for index, (image, (width, height), frame, mat, place, turn) in enumerate(pictures):
-        parts = wall.picture(width, height, image, frame, mat)
+        parts = shell.picture(width, height, image, frame, mat)
         add_object(writer, f"{_OBJECTS}/Picture_{index}", parts, place, turn)
-    add_object(writer, f"{_OBJECTS}/Mirror", wall.mirror(columns), (0.0, 1.62, 1.98), 90.0)
+    add_object(writer, f"{_OBJECTS}/Mirror", shell.mirror(columns), (0.0, 1.62, 1.98), 90.0)

@@ -21,7 +21,7 @@ from wavecomb.usd.cameras.lens import lens_values, read_map
 from wavecomb.usd.geometry.shutter import Motion
 from wavecomb.usd.layers.population import matching_prims
 from wavecomb.usd.materials.network import number, pair, word
-from wavecomb.usd.render_settings.values import CONFORMS
+from wavecomb.usd.render_settings.reader import CONFORMS
 from wavecomb.usd.stage.report import LoadReport
 
 Matrix = NDArray[np.float64]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd
 
-from wavecomb.camera_table import camera_parameters
+from wavecomb.core_table import camera_parameters
 from wavecomb.errors import WavecombError
 from wavecomb.image.files.image import read_layers
 from wavecomb.usd.stage.report import LoadReport

@@ -12,14 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Usd
 
-from wavecomb.usd.geometry.invalid_points import WHY, invalid_point_mask, replace_invalid_steps
 from wavecomb.usd.geometry.mesh_arrays import (
     IDENTITY,
     UV_NAMES,
+    WHY,
     bake,
     bake_normals,
     check_matrix,
     extent,
+    invalid_point_mask,
+    replace_invalid_steps,
 )
 from wavecomb.usd.geometry.nurbs_curves import hermite_strands, nurbs_strands
 from wavecomb.usd.geometry.primvar import (

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads gprims of every kind into arrays and adds them to the scene."""
+"""Reads gprims of every kind into arrays, if they fit into memory, and adds them to the scene."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from pxr import Tf, Usd
 
+from wavecomb.errors import WavecombError
 from wavecomb.run.isolation import memory, progress_notes, time_limit
 from wavecomb.usd.geometry.curves import CurveArrays, CurveReader, over_shutter
 from wavecomb.usd.geometry.mesh import MeshReader
@@ -19,13 +20,52 @@ from wavecomb.usd.geometry.strands import StrandDetail
 from wavecomb.usd.geometry.subdivision import SubdivisionSurfaces
 from wavecomb.usd.geometry.triangulate import MeshError
 from wavecomb.usd.materials.assignment import DrawItem
-from wavecomb.usd.stage.context import LoadContext
+from wavecomb.usd.stage.context import LoadContext, problem_of
 from wavecomb.usd.stage.frame_cache import MeshCache
-from wavecomb.usd.stage.origin import problem_of
 from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:
     from wavecomb import _core
+
+MIN_BYTES = 20
+"""Least memory per mesh point in bytes: half a triangle of 12 bytes plus about 32 bytes in the
+
+acceleration structure.
+"""
+
+_SHARE = 8
+"""The check is skipped if layers are smaller than 1 / ``_SHARE`` of the available memory."""
+
+
+class MemoryCheck:
+    """Memory check for the meshes of one stage.
+
+    Points of a .usdc file stay in it until they are read.
+    """
+
+    def __init__(self, stage: Usd.Stage, time: Usd.TimeCode) -> None:
+        layer = stage.GetRootLayer()
+        self.file = layer.realPath or layer.identifier
+        self.time = time
+        self.is_enabled = time_limit.loaded_layers()[1] > memory.available_bytes() // _SHARE
+
+    def check(self, draws: Iterable[DrawItem]) -> None:
+        """Raises WavecombError if meshes that are not read yet need more memory than available."""
+        if not self.is_enabled:
+            return
+        points = 0
+        for draw in draws:
+            if draw.kind == "mesh":
+                points += len(draw.prim.GetAttribute("points").Get(self.time) or ())
+        needed, there = points * MIN_BYTES, memory.available_bytes()
+        if needed > there:
+            raise WavecombError(
+                f"{self.file}: meshes of {points:,} points need at least "
+                f"{needed / memory.MEGABYTE:,.0f} MB where {there / memory.MEGABYTE:,.0f} MB are "
+                f"left{memory.describe_limit()}; give more memory, or leave parts out by --mask or "
+                "--payloads"
+            )
+
 
 WORDS = {
     "mesh": "mesh", "patch": "NURBS patch", "shape": "mesh", "curves": "curves", "points": "points",

@@ -12,11 +12,6 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
 from wavecomb.usd.geometry.cage import SCHEMES, Cage, read_rules, sharp_edges
-from wavecomb.usd.geometry.invalid_points import (
-    invalid_point_mask,
-    remove_invalid_points,
-    replace_invalid_steps,
-)
 from wavecomb.usd.geometry.mesh_arrays import (
     IDENTITY,
     TETRAHEDRA,
@@ -28,8 +23,11 @@ from wavecomb.usd.geometry.mesh_arrays import (
     bake_normals,
     check_matrix,
     extent,
+    invalid_point_mask,
     is_translation,
     read_faces,
+    remove_invalid_points,
+    replace_invalid_steps,
     transform_shape,
 )
 from wavecomb.usd.geometry.primvar import (

@@ -20,8 +20,7 @@ from wavecomb.usd.geometry.curves import (
     thick_extent,
     uniform_scale,
 )
-from wavecomb.usd.geometry.invalid_points import invalid_point_mask
-from wavecomb.usd.geometry.mesh_arrays import IDENTITY, bake, check_matrix
+from wavecomb.usd.geometry.mesh_arrays import IDENTITY, bake, check_matrix, invalid_point_mask
 from wavecomb.usd.geometry.primvar import as_array
 from wavecomb.usd.geometry.strands import lay_out_points
 from wavecomb.usd.geometry.triangulate import MeshError

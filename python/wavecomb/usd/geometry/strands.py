@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf
 
+from wavecomb.usd.geometry.cage import ViewSize
 from wavecomb.usd.geometry.primvar import Primvar, PrimvarError
-from wavecomb.usd.geometry.screen_size import ViewSize
 from wavecomb.usd.stage.report import LoadReport
 
 Array = NDArray[np.float32]

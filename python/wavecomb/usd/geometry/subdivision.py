@@ -16,10 +16,9 @@ from wavecomb.errors import WavecombError
 from wavecomb.run.isolation.memory import machine_limit
 from wavecomb.usd.cameras.camera import View
 from wavecomb.usd.geometry.attributes import RefinedAttributes
-from wavecomb.usd.geometry.cage import Cage
+from wavecomb.usd.geometry.cage import Cage, ViewSize
 from wavecomb.usd.geometry.mesh_arrays import MeshArrays
 from wavecomb.usd.geometry.primvar import as_integers, spread
-from wavecomb.usd.geometry.screen_size import ViewSize
 from wavecomb.usd.instances.group import placements
 from wavecomb.usd.materials.assignment import BoundMaterials, DrawItem
 from wavecomb.usd.stage.context import LoadContext

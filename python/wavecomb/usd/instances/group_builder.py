@@ -12,7 +12,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
 from wavecomb.usd.geometry.attributes import on_shape
 from wavecomb.usd.geometry.curves import CurveArrays, uniform_scale
-from wavecomb.usd.geometry.gprims import COUNTS, WORDS, GprimReader, add_shape
+from wavecomb.usd.geometry.gprims import COUNTS, WORDS, GprimReader, MemoryCheck, add_shape
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY, UV_NAMES, MeshArrays, is_translation
 from wavecomb.usd.geometry.strands import StrandDetail
 from wavecomb.usd.geometry.subdivision import SubdivisionSurfaces
@@ -22,9 +22,8 @@ from wavecomb.usd.instances.instance_materials import (
     InstanceBindings,
     InstanceMaterials,
 )
-from wavecomb.usd.instances.placement import GroupInstancer, outline_of
+from wavecomb.usd.instances.placement import GroupInstancer, VolumeInstancer, outline_of
 from wavecomb.usd.instances.point_instancer import moved_instances, read_instances
-from wavecomb.usd.instances.volumes import VolumeInstancer
 from wavecomb.usd.lights.mesh_light import MeshLights
 from wavecomb.usd.materials.assignment import Assigner, BoundMaterials, DrawItem
 from wavecomb.usd.materials.material import (
@@ -33,11 +32,9 @@ from wavecomb.usd.materials.material import (
     MaterialTable,
     bound_materials,
 )
-from wavecomb.usd.stage.context import LoadContext
+from wavecomb.usd.stage.collections import LightGroups
+from wavecomb.usd.stage.context import LoadContext, world_to_scene
 from wavecomb.usd.stage.frame_cache import MeshCache
-from wavecomb.usd.stage.identity import LightGroups
-from wavecomb.usd.stage.memory_check import MemoryCheck
-from wavecomb.usd.stage.origin import world_to_scene
 from wavecomb.usd.stage.traversal import STRANDS, CollectedPrims, InstancePrim, Traversal
 
 LoadProgress = Callable[[int, int], None]

@@ -13,7 +13,7 @@ from pxr import Usd, UsdGeom
 from wavecomb.usd.geometry.primvar import as_array, as_integers
 from wavecomb.usd.geometry.shutter import Motion, Track
 from wavecomb.usd.geometry.triangulate import cross
-from wavecomb.usd.stage.origin import POSITIONS, positions_are_coarse
+from wavecomb.usd.stage.context import POSITIONS, positions_are_coarse
 from wavecomb.usd.stage.report import LoadReport
 
 Matrices = NDArray[np.float64]

@@ -13,8 +13,7 @@ from pxr import Ar, Sdf, Tf, Usd, UsdUtils
 from wavecomb.usd import mtlx
 from wavecomb.usd.layers.opening import open_stage
 from wavecomb.usd.materials.network import UDIM, asset_file, tile_files
-from wavecomb.usd.stage.diagnostics import capture_diagnostics
-from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.stage.report import LoadReport, capture_diagnostics
 
 
 @dataclass(frozen=True)

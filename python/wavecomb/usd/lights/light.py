@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
-from wavecomb.image.working_space import LUMINANCE, from_rec709
-from wavecomb.light_table import (
+from wavecomb.core_table import (
     EDITABLE,
     MESH,
     LightParameter,
@@ -20,6 +19,7 @@ from wavecomb.light_table import (
     light_parameters,
     of_kind,
 )
+from wavecomb.image.working_space import LUMINANCE, from_rec709
 from wavecomb.usd.lights.dome import DomeReader
 from wavecomb.usd.lights.filter_inputs import Gel, gel_of
 from wavecomb.usd.lights.filters import Filter, FilterReader
@@ -35,9 +35,8 @@ from wavecomb.usd.materials.network import (
 )
 from wavecomb.usd.materials.pixels import Image
 from wavecomb.usd.materials.texture import TextureTable
-from wavecomb.usd.stage.collections import Collections, Rules
+from wavecomb.usd.stage.collections import Collections, LightGroups, Rules
 from wavecomb.usd.stage.context import LoadContext
-from wavecomb.usd.stage.identity import LightGroups
 
 KINDS = kind_of_prims()
 """Kinds of supported lights, by prim type."""

@@ -27,6 +27,8 @@ from wavecomb.usd.stage.report import LoadReport
 
 FaceIds = NDArray[np.uint32]
 
+_DISPLAYED = ("primvars:displayColor", "primvars:displayOpacity")
+
 
 @dataclass(slots=True)
 class Parent:
@@ -34,10 +36,12 @@ class Parent:
 
     Attributes:
         prim: The parent prim.
-        asset: Number of path elements that name its asset, once ``identity.Assets`` computed it.
+        above: Its parent, if the traversal visited it.
+        asset: Length of the path of its asset, once ``identity.Assets`` computed it.
     """
 
     prim: Usd.Prim
+    above: Parent | None = None
     asset: int | None = None
 
 
@@ -68,6 +72,12 @@ class DrawItem:
     names: frozenset[str] = frozenset()
     kind: str = ""
     parent: Parent | None = None
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether a gprim without material has neither subsets nor display colours."""
+        is_alone = bool(self.names) and not self.subsets and not self.inherited
+        return is_alone and self.names.isdisjoint(_DISPLAYED)
 
 
 @dataclass
@@ -117,6 +127,8 @@ class Assigner:
             otherwise: Material id if there is neither a binding nor a display colour; None means
                 grey.
         """
+        if draw.material is None and draw.is_plain:
+            return BoundMaterials(self.table.plain() if otherwise is None else otherwise)
         surface = None if draw.material is None else self._surface(draw, draw.material)
         self._report_hair(draw, mesh)
         if surface is not None and not draw.subsets and is_uniform(surface):
@@ -343,6 +355,9 @@ class _Primvars:
 
         A ``width`` of 0 accepts any number of components, at most ``MAX_WIDTH``.
         """
+        draw = self._draw
+        if draw.names and not draw.inherited and f"primvars:{name}" not in draw.names:
+            return None
         key = name, width
         if key not in self._found:
             try:

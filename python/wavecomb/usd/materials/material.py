@@ -318,10 +318,10 @@ class MaterialTable:
 
         ``varying`` lists which of base_color and opacity read primvars at hits.
         """
-        r, g, b = (max(float(value), 0.0) for value in colour)
-        key = (r, g, b, float(opacity), *varying)
+        key = (*colour, opacity, *varying)
         number = self._plain.get(key)
         if number is None:
+            r, g, b = (max(float(value), 0.0) for value in colour)
             surface = fallback_surface((r, g, b), float(opacity), varying=varying)
             number = self._plain[key] = self.add(self.varied(surface, varying))
         return number

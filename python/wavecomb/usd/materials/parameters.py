@@ -2,22 +2,24 @@
 """Editable parameters of materials and lights, with the attributes that hold them.
 
 ``wavecomb.usd.materials.material`` reads surfaces; this module finds the attribute behind each
-constant, so that programs such as the viewer can write a change back to the stage.
+constant, so that programs such as the viewer can write a change back to the stage, and reads
+constants of a MaterialX material without its images.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdShade
 
-from wavecomb.light_table import EDITABLE, of_kind
-from wavecomb.material_table import own_parameters, programs
+from wavecomb.core_table import EDITABLE, of_kind, own_parameters, programs
 from wavecomb.usd import mtlx
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
@@ -35,9 +37,17 @@ from wavecomb.usd.materials.network import (
     value_of,
 )
 from wavecomb.usd.materials.preview_surface import INPUTS, constant, program_of
-from wavecomb.usd.materials.surface import COLOUR, COLOUR_PARAMETERS, SWITCH, InputDefinition
+from wavecomb.usd.materials.surface import (
+    COLOUR,
+    COLOUR_PARAMETERS,
+    DEFAULTS,
+    SWITCH,
+    InputDefinition,
+    Surface,
+)
+from wavecomb.usd.materials.texture import TextureTable
+from wavecomb.usd.stage.collections import LightGroups
 from wavecomb.usd.stage.context import LoadContext
-from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.report import LoadReport
 
 IN_INSTANCE = "it is inside an instance, where USD does not accept opinions"
@@ -230,7 +240,7 @@ def light_values(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any] | None:
     """Returns the parameters that the loader passes to ``SceneBuilder.add_light``.
 
     The light must be outside of instances. Returns numbers, colours and switches by the names of
-    ``wavecomb.light_table``: all parameters of this kind of light except its visibility. Returns
+    ``wavecomb.core_table``: all parameters of this kind of light except its visibility. Returns
     None if the prim is not a supported light.
     """
     if not prim or str(prim.GetTypeName()) not in LIGHT_KINDS:
@@ -281,3 +291,81 @@ def _other_space(attribute: Usd.Attribute | None) -> str | None:
     """Returns the colour space of an attribute unless it is linear Rec.709 or unauthored."""
     space = space_of(attribute)
     return space if space and canonical(space) not in (LINEAR, RAW) else None
+
+
+class _NoTextures:
+    """Substitute for the scene's textures: every file exists and none is opened."""
+
+    working = "rec709"
+
+    def __init__(self) -> None:
+        self._numbers: dict[Any, int] = {}
+
+    def image(self, path: str, prim: object) -> Any:
+        """Returns a dummy image with four channels."""
+        return SimpleNamespace(channels=4)
+
+    def add(self, *key: Any, **more: Any) -> int:
+        """Returns a different id for each different texture use."""
+        use = (key[0], *key[2:], *sorted(more.items()))
+        return self._numbers.setdefault(use, len(self._numbers))
+
+    def missing(self) -> int:
+        """Returns the id of the checker texture."""
+        return -1
+
+
+@dataclass(frozen=True)
+class SurfaceValues:
+    """The values of a material in the core.
+
+    Attributes:
+        constants: Keyword arguments of ``Renderer.edit``, without values from textures and graphs.
+        structure: Text that identifies textures and graphs with their constants, which cannot be
+            edited in an existing scene.
+    """
+
+    constants: Mapping[str, Any]
+    structure: str
+
+
+def surface_values(
+    prim: Usd.Prim, time: Usd.TimeCode, values: Mapping[str, Any] | None = None
+) -> SurfaceValues | None:
+    """Returns the values that the loader passes to the core; None if it is no MaterialX material.
+
+    Args:
+        prim: A material.
+        time: Time code at which attributes are evaluated.
+        values: Constants of the surface shader that replace the authored ones.
+    """
+    material = UsdShade.Material(prim)
+    kind, shader = surface_source(material) if material else ("", UsdShade.Shader())
+    if not kind or kind == PREVIEW:
+        return None
+    textures = cast(TextureTable, _NoTextures())
+    try:
+        surface = mtlx.surface(prim, time, textures, LoadReport(), shader, kind, values)
+    # The loader renders such a material in grey.
+    except (Tf.ErrorException, RecursionError):
+        return None
+    if surface is None:
+        return None
+    return SurfaceValues(_constants(surface), _structure(surface))
+
+
+def _constants(surface: Surface) -> dict[str, Any]:
+    parameters = dict(surface.parameters)
+    layers = parameters.pop("openpbr", {})
+    driven = set(surface.textures)
+    if surface.graph is not None:
+        driven |= {name for name, _ in surface.graph.outputs}
+    if "extinction" in driven or "transmission_tint" in driven:
+        driven |= {"transmission_color", "transmission_depth"}
+    every = {name: value for name, value in DEFAULTS.items() if name != "normal"}
+    every |= parameters | layers
+    return {name: value for name, value in every.items() if name not in driven}
+
+
+def _structure(surface: Surface) -> str:
+    return repr((sorted(surface.textures.items()), surface.uv_names, surface.graph))

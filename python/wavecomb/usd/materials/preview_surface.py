@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pxr import Usd, UsdShade
 
-from wavecomb.material_table import own_parameters, preview_programs, programs
+from wavecomb.core_table import own_parameters, preview_programs, programs
 from wavecomb.usd import mtlx
 from wavecomb.usd.graphs.surface_parameters import Drivers
 from wavecomb.usd.graphs.values import PARAMETERS

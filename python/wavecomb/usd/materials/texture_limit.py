@@ -24,12 +24,12 @@ from wavecomb.usd.lights.light import KINDS, LightReader
 from wavecomb.usd.materials.material import MaterialTable, bound_materials
 from wavecomb.usd.materials.pixels import Image, TextureError, read_header
 from wavecomb.usd.materials.texture import MEGABYTE, Key, TextureTable, stored_type
+from wavecomb.usd.stage.collections import LightGroups
 from wavecomb.usd.stage.context import LoadContext
-from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:
-    from wavecomb.usd.geometry.screen_size import ViewSize
+    from wavecomb.usd.geometry.cage import ViewSize
 
 MAX_PRIMS = 100_000
 """Prims whose image size is computed; textures used only by later prims keep their detail."""

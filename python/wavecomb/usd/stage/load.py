@@ -16,7 +16,7 @@ from pxr import Tf, Usd, UsdGeom
 from wavecomb.errors import WavecombError
 from wavecomb.image.working_space import from_rec709
 from wavecomb.load_options import LoadOptions
-from wavecomb.machine import give_back_memory
+from wavecomb.machine import give_back_memory, without_collection
 from wavecomb.run.isolation import progress_notes
 from wavecomb.run.isolation.memory import describe_limit
 from wavecomb.usd import mtlx
@@ -28,14 +28,14 @@ from wavecomb.usd.cameras.camera import (
     read_camera,
 )
 from wavecomb.usd.cameras.framing import corners, joined
+from wavecomb.usd.geometry.cage import ViewSize
 from wavecomb.usd.geometry.gprims import COUNTS
-from wavecomb.usd.geometry.screen_size import ViewSize
 from wavecomb.usd.geometry.shutter import find_motion
 from wavecomb.usd.geometry.strands import StrandDetail
 from wavecomb.usd.geometry.subdivision import SubdivisionSurfaces, parse_level
 from wavecomb.usd.instances.group import Group, changes_size, is_lit_by_emitters, placed_lights
 from wavecomb.usd.instances.group_builder import GroupBuilder, LoadProgress
-from wavecomb.usd.instances.volumes import add_volumes, report_grid_memory, report_ignored_volumes
+from wavecomb.usd.instances.placement import add_volumes, report_grid_memory, report_ignored_volumes
 from wavecomb.usd.layers.opening import list_contents, open_stage, select_variants
 from wavecomb.usd.layers.population import report_unloaded_payloads
 from wavecomb.usd.lights.dome import Y_TO_Z, soft_dome
@@ -45,14 +45,12 @@ from wavecomb.usd.lights.light import LightReader, LinkTable
 from wavecomb.usd.materials.material import MaterialTable
 from wavecomb.usd.materials.texture import MEGABYTE, TextureCache, TextureTable, texture_store
 from wavecomb.usd.render_settings.view import ViewSettings, check_view, view_settings
-from wavecomb.usd.stage.context import LoadContext
-from wavecomb.usd.stage.diagnostics import NOT_TEXT, capture_diagnostics, first_message
+from wavecomb.usd.stage.collections import LightGroups
+from wavecomb.usd.stage.context import WORLD, LoadContext, Origin, find_origin, to_scene_space
 from wavecomb.usd.stage.frame_cache import FrameCache
-from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.load_result import LoadedStage
-from wavecomb.usd.stage.origin import WORLD, Origin, find_origin, to_scene_space
 from wavecomb.usd.stage.ray_visibility import IGNORED, RayVisibility, check_exists, set_catchers
-from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.stage.report import NOT_TEXT, LoadReport, capture_diagnostics, first_message
 from wavecomb.usd.stage.time_codes import frame_number, time_code
 from wavecomb.usd.stage.traversal import Traversal
 
@@ -102,7 +100,7 @@ def load_stage(
     if cache is not None:
         reuse = cache.textures
     # Readers handle values that are not finite, so NumPy's warnings are disabled.
-    with capture_diagnostics(report), np.errstate(all="ignore"):
+    with capture_diagnostics(report), np.errstate(all="ignore"), without_collection():
         store = None
         if builder_factory is None:
             from wavecomb import _core

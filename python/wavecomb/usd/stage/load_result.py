@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.usd.render_settings.values import ProductSettings
+from wavecomb.usd.render_settings.reader import ProductSettings
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.volumes.info import VolumeFacts
+from wavecomb.usd.volumes.grids import VolumeFacts
 
 if TYPE_CHECKING:
     from wavecomb import _core

@@ -95,7 +95,7 @@ class Traversal:
         self.modes = DrawModes(self.time, self.report)
         self._kinds: dict[str, str] = {}
         self._counts: dict[Sdf.Path, int] = {}
-        self._names: dict[tuple[str, ...], frozenset[str]] = {}
+        self._names: dict[tuple[str, ...], tuple[frozenset[str], bool]] = {}
 
     def kind(self, prim: Usd.Prim) -> str:
         """Returns the kind of a prim, computed once per type name."""
@@ -172,11 +172,14 @@ class Traversal:
             if kind == "shading":
                 continue
             names: frozenset[str] = frozenset()
+            has_primvars = False
             if kind != "other":
                 listed = tuple(prim.GetAuthoredPropertyNames())
-                names = self._names.get(listed) or self._names.setdefault(
-                    listed, frozenset(listed)
-                )  # most prims share a set of names
+                known = self._names.get(listed)
+                if known is None:  # most prims share a set of names
+                    has_primvars = any(name.startswith("primvars:") for name in listed)
+                    known = self._names[listed] = frozenset(listed), has_primvars
+                names, has_primvars = known
                 if (
                     "visibility" in names
                     and word(prim.GetAttribute("visibility").Get(time)) == "invisible"
@@ -251,14 +254,10 @@ class Traversal:
             elif kind.startswith("unsupported"):
                 if shown:
                     self.report.missing(str(prim.GetTypeName()), prim.GetPath())
-            elif (
-                children
-                and kind in ("xform", "scope")
-                and any(name.startswith("primvars:") for name in names)
-            ):
+            elif children and has_primvars and kind in ("xform", "scope"):
                 inherited = inherit(prim, inherited)
             if children:
-                above = Parent(prim)
+                above = Parent(prim, parent)
                 for child in reversed(children):
                     stack.append((child, matrix, track, purpose, inherited, pick, above, mode))
         return found

@@ -16,8 +16,7 @@ from wavecomb.image.working_space import from_rec709
 from wavecomb.usd.materials.assignment import DrawItem
 from wavecomb.usd.materials.network import number
 from wavecomb.usd.stage.context import LoadContext
-from wavecomb.usd.volumes.grids import Field, Grid, GridTable, read_fields
-from wavecomb.usd.volumes.info import GridFacts
+from wavecomb.usd.volumes.grids import Field, Grid, GridFacts, GridTable, read_fields
 from wavecomb.usd.volumes.material import VolumeMaterials
 from wavecomb.usd.volumes.optical_properties import BLACK, Colour, OpticalProperties
 

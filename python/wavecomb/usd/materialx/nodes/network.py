@@ -16,8 +16,7 @@ from wavecomb.usd.materials.network import Source, holds_colour, read_colour, sh
 from wavecomb.usd.materialx.library import WIDTHS, FlatGraph, definition_of, flat_graph
 from wavecomb.usd.materialx.nodes import arnold
 from wavecomb.usd.materialx.nodes.node import OF_MATRICES, Handler, NodeCall
-from wavecomb.usd.materialx.nodes.node_graphs import ExpandedGraph
-from wavecomb.usd.materialx.nodes.table import CATEGORIES, PRIMITIVES
+from wavecomb.usd.materialx.nodes.node_graphs import CATEGORIES, PRIMITIVES, ExpandedGraph
 from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:

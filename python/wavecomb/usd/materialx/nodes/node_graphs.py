@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compiles nodes that are graphs of other nodes, by expanding the library's graphs in place."""
+"""Compiles nodes that are graphs of other nodes, by expanding the library's graphs in place.
+
+Nodes that have a handler are not expanded.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,17 @@ from wavecomb.usd.graphs.surface_parameters import NORMAL, NUMBER
 from wavecomb.usd.graphs.values import Value, numbers
 from wavecomb.usd.materials.network import Source
 from wavecomb.usd.materialx.library import WIDTHS, FlatGraph, FlatNode, PortSource
-from wavecomb.usd.materialx.nodes.node import NodeCall
+from wavecomb.usd.materialx.nodes import arithmetic, arnold, colours, geometric, images
+from wavecomb.usd.materialx.nodes.node import Handler, NodeCall
+
+PRIMITIVES: dict[str, Handler] = {
+    name: handler
+    for module in (arithmetic, arnold, colours, images, geometric)
+    for name, handler in module.NODES.items()
+}
+
+CATEGORIES = frozenset(PRIMITIVES)
+"""Node categories that are not expanded when library graphs are flattened."""
 
 NOT_NUMBERS = ("string", "filename", "geomname")
 """Types of inputs that hold text."""

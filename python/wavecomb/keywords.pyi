@@ -1,15 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Types of the keywords of ``load`` and ``render``, written by tools/update_stub.
 
-Type checkers and editors use them; nothing imports them when a program runs.
+Only type checkers and editors read this stub.
 """
-
-from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypedDict
-
 
 class StageKeywords(TypedDict, total=False):
     """Fields of ``LoadOptions`` for any function."""
@@ -40,13 +37,11 @@ class StageKeywords(TypedDict, total=False):
     subdivision: str | int
     strand_pixels: float
 
-
 class LoadKeywords(StageKeywords, total=False):
     """Keywords of ``load``."""
 
     size: tuple[int, int]
     threads: int
-
 
 class SettingKeywords(TypedDict, total=False):
     """Fields of ``Settings``."""
@@ -93,7 +88,6 @@ class SettingKeywords(TypedDict, total=False):
     cost_weight: float
     progressive: bool
     region: tuple[int, int, int, int] | None
-
 
 class RenderKeywords(StageKeywords, SettingKeywords, total=False):
     """Keywords of ``render``."""
