@@ -19,7 +19,7 @@ from wavecomb.usd.geometry.splats import PointReader, SplatArrays, SplatReader
 from wavecomb.usd.geometry.strands import StrandDetail
 from wavecomb.usd.geometry.subdivision import SubdivisionSurfaces
 from wavecomb.usd.geometry.triangulate import MeshError
-from wavecomb.usd.materials.assignment import DrawItem
+from wavecomb.usd.materials.draw_item import DrawItem
 from wavecomb.usd.stage.context import LoadContext, problem_of
 from wavecomb.usd.stage.frame_cache import MeshCache
 from wavecomb.usd.stage.report import LoadReport

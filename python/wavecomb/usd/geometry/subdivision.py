@@ -20,7 +20,8 @@ from wavecomb.usd.geometry.cage import Cage, ViewSize
 from wavecomb.usd.geometry.mesh_arrays import MeshArrays
 from wavecomb.usd.geometry.primvar import as_integers, spread
 from wavecomb.usd.instances.group import placements
-from wavecomb.usd.materials.assignment import BoundMaterials, DrawItem
+from wavecomb.usd.materials.assignment import BoundMaterials
+from wavecomb.usd.materials.draw_item import DrawItem
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.report import LoadReport
 

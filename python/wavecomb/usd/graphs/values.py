@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from wavecomb import _core
-from wavecomb.usd.graphs.simplification import simplified
 
 CODES = {name: number for number, name in enumerate(_core.GRAPH_CODES)}
 INPUTS = {name: number for number, name in enumerate(_core.GRAPH_INPUTS)}
@@ -22,11 +21,8 @@ PARAMETERS: dict[str, tuple[int, int]] = dict(_core.GRAPH_PARAMETERS)
 """Parameter -> (index of its first component, number of components)."""
 
 POINT_SIZE = 3 * len(INPUTS) - 3
-"""Floats per evaluation point.
-
-They are uv and its filter width, then three each for position, local position, normal, local
-normal, tangent, view direction and the three normal axes.
-"""
+"""Floats per evaluation point: uv and its filter width, then three each for position, local
+position, normal, local normal, tangent, view direction and the three normal axes."""
 
 OF_SPACE = ("local_position", "local_normal", "normal_x", "normal_y", "normal_z")
 """Inputs that depend on object space."""
@@ -200,11 +196,10 @@ class _Assembler:
     def _write(self, node: Node) -> None:
         operands, steps, copies = [0] * 4, 0, []
         for k, value in enumerate(node.operands):
-            place, step, copied = self._operand(value)
-            operands[k] = place
+            operands[k], step, copied = self._operand(value)
             steps |= step << k
             if copied:
-                copies.append((place, len(value)))
+                copies.append((operands[k], len(value)))
         to = self._place[node] = self._take(node.results)
         number = node.number if node.image is None else self._image(node.image)
         if node.attribute:
@@ -261,15 +256,29 @@ class _Assembler:
     def _release(self, at: int, width: int) -> None:
         self._free[at : at + width] = [True] * width
 
-    def _emit(
-        self, code: str, width: int, steps: int, to: int, operands: list[int], number: int
-    ) -> None:
-        self._ops.append((CODES[code], width, steps, 0, to, tuple(operands), number))
+    def _emit(self, code: str, width: int, steps: int, to: int, reads: list[int], n: int) -> None:
+        self._ops.append((CODES[code], width, steps, 0, to, tuple(reads), n))
 
 
 _WHOLE = {"dot", "cross", "rgbtohsv", "hsvtorgb", "image", "input", "copy"}
 _POINTS = {"noise2": 2, "noise3": 3, "fractal3": 3, "cell2": 2, "cell3": 3, "worley2": 2,
            "worley3": 3}  # fmt: skip
+
+
+def simplified(code: str, parts: tuple[Any, ...]) -> Any | None:
+    """Simplifies an operation algebraically; returns None if the operation is needed."""
+    a, b, c = (*parts, None, None)[:3]
+    if code == "add":
+        return b if a == 0.0 else a if b == 0.0 else None
+    if code == "multiply":
+        return 0.0 if a == 0.0 or b == 0.0 else b if a == 1.0 else a if b == 1.0 else None
+    if code in ("subtract", "divide", "power"):
+        return a if b == (0.0 if code == "subtract" else 1.0) else None
+    if code == "mix":
+        return a if c == 0.0 or a == b else b if c == 1.0 else None
+    if code == "select" and isinstance(a, float):
+        return b if a != 0.0 else c
+    return b if code == "select" and b == c else None
 
 
 class Expressions:

@@ -25,7 +25,8 @@ from wavecomb.usd.instances.instance_materials import (
 from wavecomb.usd.instances.placement import GroupInstancer, VolumeInstancer, outline_of
 from wavecomb.usd.instances.point_instancer import moved_instances, read_instances
 from wavecomb.usd.lights.mesh_light import MeshLights
-from wavecomb.usd.materials.assignment import Assigner, BoundMaterials, DrawItem
+from wavecomb.usd.materials.assignment import Assigner, BoundMaterials
+from wavecomb.usd.materials.draw_item import DrawItem
 from wavecomb.usd.materials.material import (
     INHERIT_MATERIAL,
     BindingScan,

@@ -24,7 +24,7 @@ from wavecomb.usd.instances.group import (
 )
 from wavecomb.usd.instances.point_instancer import are_valid
 from wavecomb.usd.lights.mesh_light import MeshLights
-from wavecomb.usd.materials.assignment import DrawItem, Parent
+from wavecomb.usd.materials.draw_item import DrawItem, Parent
 from wavecomb.usd.materials.texture import MEGABYTE
 from wavecomb.usd.stage.collections import Assets
 from wavecomb.usd.stage.context import LoadContext

@@ -9,7 +9,7 @@ import numpy as np
 from pxr import Sdf, UsdLux
 
 from wavecomb.usd.lights.light import LightReader
-from wavecomb.usd.materials.assignment import DrawItem
+from wavecomb.usd.materials.draw_item import DrawItem
 from wavecomb.usd.materials.material import MaterialTable
 from wavecomb.usd.materials.network import word
 from wavecomb.usd.materials.surface import Surface

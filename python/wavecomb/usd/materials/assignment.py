@@ -3,22 +3,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Sdf, Usd, UsdShade, Vt
+from pxr import Sdf, Usd, UsdShade, Vt
 
 from wavecomb.usd.geometry.attributes import MAX_WIDTH, PrimvarRequest, check_fit
 from wavecomb.usd.geometry.curves import CurveArrays
 from wavecomb.usd.geometry.mesh_arrays import MeshArrays
 from wavecomb.usd.geometry.primvar import PrimvarError, as_integers, find_primvar, in_linear
-from wavecomb.usd.geometry.shutter import Track
 from wavecomb.usd.geometry.triangulate import Topology
 from wavecomb.usd.graphs.binding import bound, with_uv_sets
 from wavecomb.usd.graphs.values import PARAMETERS, GraphTooLarge
+from wavecomb.usd.materials.draw_item import DrawItem
 from wavecomb.usd.materials.material import DEFAULT_COLOUR, MaterialTable
 from wavecomb.usd.materials.network import colour, number
 from wavecomb.usd.materials.surface import COLOUR_PARAMETERS, Surface
@@ -26,58 +26,6 @@ from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.report import LoadReport
 
 FaceIds = NDArray[np.uint32]
-
-_DISPLAYED = ("primvars:displayColor", "primvars:displayOpacity")
-
-
-@dataclass(slots=True)
-class Parent:
-    """A prim with its children's common properties.
-
-    Attributes:
-        prim: The parent prim.
-        above: Its parent, if the traversal visited it.
-        asset: Length of the path of its asset, once ``identity.Assets`` computed it.
-    """
-
-    prim: Usd.Prim
-    above: Parent | None = None
-    asset: int | None = None
-
-
-@dataclass(slots=True)
-class DrawItem:
-    """A gprim to draw.
-
-    Attributes:
-        prim: Mesh, implicit shape, curves, points or splats.
-        matrix: Transform from the gprim to its group.
-        inherited: Constant primvars of its ancestors.
-        subsets: GeomSubset prims that bind materials.
-        material: Material bound to the gprim.
-        subset_materials: Material bound to each subset.
-        track: Animated transform; replaces ``matrix`` if it changes while the shutter is open.
-        names: Names of properties with authored opinions (``authored_names``).
-        kind: Kind of geometry: mesh, patch, shape, curves, points or splats.
-        parent: The parent prim, if the traversal visited it.
-    """
-
-    prim: Usd.Prim
-    matrix: Gf.Matrix4d
-    inherited: Sequence[Any] = ()
-    subsets: Sequence[Usd.Prim] = ()
-    material: UsdShade.Material | None = None
-    subset_materials: list[UsdShade.Material | None] = field(default_factory=list)
-    track: Track | None = None
-    names: frozenset[str] = frozenset()
-    kind: str = ""
-    parent: Parent | None = None
-
-    @property
-    def is_plain(self) -> bool:
-        """Whether a gprim without material has neither subsets nor display colours."""
-        is_alone = bool(self.names) and not self.subsets and not self.inherited
-        return is_alone and self.names.isdisjoint(_DISPLAYED)
 
 
 @dataclass

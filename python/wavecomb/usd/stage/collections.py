@@ -9,7 +9,7 @@ from typing import Any
 
 from pxr import Kind, Sdf, Tf, Usd, UsdGeom, UsdShade
 
-from wavecomb.usd.materials.assignment import Parent
+from wavecomb.usd.materials.draw_item import Parent
 from wavecomb.usd.stage.report import LoadReport, first_message
 
 Rules = dict[str, str]

@@ -21,7 +21,7 @@ from wavecomb.usd.instances.group import AnimatedTransform
 from wavecomb.usd.instances.point_instancer import are_valid
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.lights.light import Light, LightReader
-from wavecomb.usd.materials.assignment import DrawItem, Parent
+from wavecomb.usd.materials.draw_item import DrawItem, Parent
 from wavecomb.usd.materials.network import word
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.draw_modes import DrawModes

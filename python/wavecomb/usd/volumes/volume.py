@@ -13,7 +13,7 @@ from pxr import Usd, UsdGeom, UsdVol
 
 from wavecomb import vdb
 from wavecomb.image.working_space import from_rec709
-from wavecomb.usd.materials.assignment import DrawItem
+from wavecomb.usd.materials.draw_item import DrawItem
 from wavecomb.usd.materials.network import number
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.volumes.grids import Field, Grid, GridFacts, GridTable, read_fields

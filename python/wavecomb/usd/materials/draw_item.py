@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A gprim to draw, with its binding and the primvars that it inherits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from pxr import Gf, Usd, UsdShade
+
+from wavecomb.usd.geometry.shutter import Track
+
+_DISPLAYED = ("primvars:displayColor", "primvars:displayOpacity")
+
+
+@dataclass(slots=True)
+class Parent:
+    """A prim with its children's common properties.
+
+    Attributes:
+        prim: The parent prim.
+        above: Its parent, if the traversal visited it.
+        asset: Length of the path of its asset, once ``identity.Assets`` computed it.
+    """
+
+    prim: Usd.Prim
+    above: Parent | None = None
+    asset: int | None = None
+
+
+@dataclass(slots=True)
+class DrawItem:
+    """A gprim to draw.
+
+    Attributes:
+        prim: Mesh, implicit shape, curves, points or splats.
+        matrix: Transform from the gprim to its group.
+        inherited: Constant primvars of its ancestors.
+        subsets: GeomSubset prims that bind materials.
+        material: Material bound to the gprim.
+        subset_materials: Material bound to each subset.
+        track: Animated transform; replaces ``matrix`` if it changes while the shutter is open.
+        names: Names of properties with authored opinions (``authored_names``).
+        kind: Kind of geometry: mesh, patch, shape, curves, points or splats.
+        parent: The parent prim, if the traversal visited it.
+    """
+
+    prim: Usd.Prim
+    matrix: Gf.Matrix4d
+    inherited: Sequence[Any] = ()
+    subsets: Sequence[Usd.Prim] = ()
+    material: UsdShade.Material | None = None
+    subset_materials: list[UsdShade.Material | None] = field(default_factory=list)
+    track: Track | None = None
+    names: frozenset[str] = frozenset()
+    kind: str = ""
+    parent: Parent | None = None
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether a gprim without material has neither subsets nor display colours."""
+        is_alone = bool(self.names) and not self.subsets and not self.inherited
+        return is_alone and self.names.isdisjoint(_DISPLAYED)
