@@ -109,8 +109,9 @@ class Setup(_Rows):
         if preview:
             layers = aov_names.with_others(layers, aov_names.GUIDES)
             values |= {name: settings()[name].default for name in NOT_IN_PREVIEWS}
-            # Measuring material costs would take longer than the preview.
-            values |= {"costs": "model", "max_depth": min(self.max_depth, PREVIEW_DEPTH)}
+            # Measuring material costs or light weights would take longer than the preview.
+            values |= {"costs": "model", "light_weights": "power"}
+            values["max_depth"] = min(self.max_depth, PREVIEW_DEPTH)
         else:
             values["progressive"] = True
         size = scaled_size(self.width, self.height, scale)

@@ -102,6 +102,10 @@ def test_an_object_moves_when_the_drag_ends(moved, qtbot):
         np.subtract(after[1], after[0]), np.subtract(before[1], before[0]), atol=1e-4
     )
     assert np.allclose(after[0][1:], before[0][1:], atol=1e-4), "in the plane of the view"
+    moved.scene.edits.undo()
+    qtbot.waitUntil(lambda: not moved.session._jobs, timeout=20000)
+    assert np.allclose(moved.session.scene.bounds_of(BALL), before)
+    assert moved.scene.edits.lines() == []
 
 
 def test_rotation_follows_the_cursor_and_scale_the_axes_of_the_prim(moved):
