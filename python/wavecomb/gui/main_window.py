@@ -28,13 +28,13 @@ from wavecomb.gui.scene.notes_model import WARNING
 from wavecomb.gui.scene.scene_panel import ScenePanel
 from wavecomb.gui.shortcuts import ShortcutsDialog, make_about
 from wavecomb.gui.status import StatusLine
-from wavecomb.gui.viewport.display_bar import DisplayBar
 from wavecomb.gui.viewport.gizmo import Gizmo
-from wavecomb.gui.viewport.inspector import Inspector
-from wavecomb.gui.viewport.learned_panel import LearnedPanel
-from wavecomb.gui.viewport.render_bar import RenderBar
+from wavecomb.gui.viewport.panels.display_bar import DisplayBar
+from wavecomb.gui.viewport.panels.inspector import Inspector
+from wavecomb.gui.viewport.panels.learned_panel import LearnedPanel
+from wavecomb.gui.viewport.panels.render_bar import RenderBar
+from wavecomb.gui.viewport.panels.timeline import Timeline
 from wavecomb.gui.viewport.session import Session, Setup
-from wavecomb.gui.viewport.timeline import Timeline
 from wavecomb.gui.viewport.view_history import ViewHistory
 from wavecomb.gui.viewport.viewport import Viewport
 from wavecomb.gui.widgets import TakesFiles, ask_file

@@ -15,8 +15,8 @@ from wavecomb.gui.compare.window import CompareWindow
 from wavecomb.gui.scene.scene_panel import ScenePanel
 from wavecomb.gui.scheduling.panel import SchedulingPanel
 from wavecomb.gui.scheduling.plots_panel import PlotsPanel
-from wavecomb.gui.viewport.learned_panel import LearnedPanel
-from wavecomb.gui.viewport.render_panel import RenderPanel
+from wavecomb.gui.viewport.panels.learned_panel import LearnedPanel
+from wavecomb.gui.viewport.panels.render_panel import RenderPanel
 from wavecomb.gui.viewport.session import Session
 
 _LEFT = Qt.DockWidgetArea.LeftDockWidgetArea

@@ -6,8 +6,8 @@ import pytest
 
 import wavecomb
 from wavecomb.gui.setup import Setup
-from wavecomb.gui.viewport.display_bar import EXPRESSION
-from wavecomb.gui.viewport.expression_dialog import aovs_with, problem_of
+from wavecomb.gui.viewport.panels.display_bar import EXPRESSION
+from wavecomb.gui.viewport.panels.expression_dialog import aovs_with, problem_of
 
 
 def test_what_is_wrong_is_said():

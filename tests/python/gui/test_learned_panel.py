@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from conftest import wait_final
 
-from wavecomb.gui.viewport.learned_panel import field_text, light_rows
+from wavecomb.gui.viewport.panels.learned_panel import field_text, light_rows
 from wavecomb.image.directions import density_map, map_directions, map_point, square_points
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -11,9 +11,9 @@ from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from wavecomb.gui import theme
 from wavecomb.gui.scheduling.plots import Bar, Bars
-from wavecomb.gui.viewport.cursor_panel import CursorPanel
 from wavecomb.gui.viewport.directions_view import DirectionsView
 from wavecomb.gui.viewport.navigate import UPS
+from wavecomb.gui.viewport.panels.cursor_panel import CursorPanel
 from wavecomb.gui.viewport.session import Session, Setup
 from wavecomb.image.directions import density_map, map_point
 

@@ -22,8 +22,8 @@ from PySide6.QtWidgets import (
 from wavecomb import ocio
 from wavecomb.gui import theme
 from wavecomb.gui.viewport import display
-from wavecomb.gui.viewport.expression_dialog import ExpressionDialog
 from wavecomb.gui.viewport.frames import Frame
+from wavecomb.gui.viewport.panels.expression_dialog import ExpressionDialog
 from wavecomb.gui.viewport.session import Session, Setup
 from wavecomb.gui.viewport.viewport import Viewport
 from wavecomb.gui.widgets import caption, choice, named, real, set_quietly

@@ -19,8 +19,8 @@ from PySide6.QtWidgets import (
 )
 
 from wavecomb.gui import theme
-from wavecomb.gui.viewport.cursor_panel import CursorPanel
 from wavecomb.gui.viewport.frames import Frame
+from wavecomb.gui.viewport.panels.cursor_panel import CursorPanel
 from wavecomb.gui.viewport.session import Session
 from wavecomb.gui.widgets import named
 from wavecomb.image.rendered import NOWHERE, in_world
