@@ -29,6 +29,7 @@ SEED ?= 1
 JOBS ?= $(shell nproc 2> /dev/null || echo 2)
 # Allows one build at a time per directory, also from different make processes.
 LOCK := $(if $(shell command -v flock),flock build/.lock)
+SETUP_LOCK := $(if $(LOCK),$(LOCK)-setup)
 ASAN_LOCK := $(if $(LOCK),$(LOCK)-asan)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_NO_INPUT := 1
@@ -47,12 +48,13 @@ help: ## Print this list
 
 # ---- set-up and build -------------------------------------------------------------------------
 
-build/.setup: tools/setup tools/setup_embree tools/setup_openvdb tools/debs cmake/embree_probe.cpp cmake/openvdb_probe.cpp \
+build/.setup: tools/setup tools/wheels tools/setup_embree tools/setup_openvdb tools/debs cmake/embree_probe.cpp cmake/openvdb_probe.cpp \
   constraints.txt pyproject.toml
-	@mkdir -p build && $(LOCK) tools/setup && touch $@
+	@mkdir -p build && $(SETUP_LOCK) tools/setup && touch $@
 
+# Parts of make test install these while the core is built.
 build/.setup-test: build/.setup
-	@$(LOCK) tools/setup test && touch $@
+	@$(SETUP_LOCK) tools/setup test && touch $@
 
 .PHONY: lanes
 lanes:
@@ -109,8 +111,8 @@ release: test-wheel test-sdist ## Build and test wheels and source distribution,
 denoiser = $(VENV)/python -c 'import pyoidn' 2> /dev/null
 render: build ## Render the Mixed scene to out/mixed.exr and out/mixed.png
 	@mkdir -p out
-	@test -e out/mixed.usdc || $(VENV)/wavecomb scene mixed -o out/mixed.usdc
-	@$(denoiser) || $(VENV)/python -m pip install -q -c constraints.txt 'pyoidn>=2.5' || true
+	@{ $(denoiser) || tools/wheels 'pyoidn>=2.5' || true; } & \
+	  test -e out/mixed.usdc || $(VENV)/wavecomb scene mixed -o out/mixed.usdc; wait
 	$(VENV)/wavecomb render out/mixed.usdc -o out/mixed.exr --png out/mixed.png --size 800 500 $$($(denoiser) && echo --denoise)
 
 # Not part of make test, since MkDocs is in a separate extra.
@@ -138,10 +140,12 @@ test-cpp: build build/.setup-test ## C++ tests of values, lanes and whole render
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet
 	$(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 
-# CHECKS=all builds all tests, kernels and checks, which takes five times as long to compile.
+# CHECKS=all builds all tests, kernels and checks, with line numbers in reports of addresses. It
+# takes five times as long to compile.
+ASAN_DEBUG = $(if $(filter all,$(CHECKS)),-g1,-g0)
 test-asan: build/.setup-test ## C++ tests of memory and whole renders under AddressSanitizer and UndefinedBehaviorSanitizer
 	@test -e $(ASAN)/build.ninja || $(ASAN_LOCK) $(VENV)/cmake -S . -B $(ASAN) -G Ninja --log-level=NOTICE \
-	  -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-Og -g1" -DWAVECOMB_SANITIZE=$(CHECKS) -DWAVECOMB_TESTS=$(CHECKS) \
+	  -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-Og $(ASAN_DEBUG)" -DWAVECOMB_SANITIZE=$(CHECKS) -DWAVECOMB_TESTS=$(CHECKS) \
 	  -DWAVECOMB_BATCH=ON
 	@$(ASAN_LOCK) $(VENV)/cmake --build $(ASAN) --target wavecomb_tests -j $(JOBS) -- --quiet
 	$(VENV)/ctest --test-dir $(ASAN) -j $(JOBS) --verbose --output-on-failure --no-tests=error
@@ -212,10 +216,10 @@ clang_without := RayRecording.StopsAtItsLimit
 clang_python := test_golden test_exactness test_api test_python_policy
 
 build/.setup-clang: build/.setup-test
-	@$(LOCK) tools/setup clang && touch $@
+	@$(SETUP_LOCK) tools/setup clang && touch $@
 
 build/.setup-arm64: build/.setup
-	@$(LOCK) tools/setup arm64 && touch $@
+	@$(SETUP_LOCK) tools/setup arm64 && touch $@
 
 # Tests the module in an environment with the packages of .venv but without its editable Wavecomb.
 # (Python ignores .pth files of another environment.)

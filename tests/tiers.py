@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,8 +21,13 @@ class Row:
 
 def matches(pattern: str, node: str) -> bool:
     """Whether a pattern matches a test or one of its cases; * stands for any text."""
+    return _compiled(pattern).fullmatch(node) is not None
+
+
+@functools.cache
+def _compiled(pattern: str) -> re.Pattern[str]:
     wanted = re.escape(pattern).replace(r"\*", ".*")
-    return re.fullmatch(rf"{wanted}(\[.*\])?", node, re.DOTALL) is not None
+    return re.compile(rf"{wanted}(\[.*\])?", re.DOTALL)
 
 
 def read(text: str) -> list[Row]:

@@ -33,6 +33,11 @@ inline bool is_long() {
   return is_on("WAVECOMB_LONG");
 }
 
+/// Whether this run includes a case of a table: all cases in long tests, otherwise every n-th.
+inline bool includes_case(size_t index, size_t n) {
+  return is_long() || index % n == 0;
+}
+
 }  // namespace wavecomb
 
 /// Skips or fails a test, or its SetUp, if a requirement is missing. `why_not` is a std::string

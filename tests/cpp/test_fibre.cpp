@@ -105,11 +105,13 @@ TEST(Fibre, SamplesFollowTheirDensity) {
 }
 
 TEST(Fibre, ReflectsAllLightWithoutAbsorption) {
+  size_t index = 0;
   for (Look look : looks()) {
     look.color = Vec(1, 1, 1);
     look.tint = {1, 1, 1};
     const Hair bsdf = hair(look);
     for (const Vec& wo : views()) {
+      if (!includes_case(index++, 5)) continue;
       // By importance sampling, and by uniform directions, which do not use the density.
       EXPECT_NEAR(furnace(bsdf, wo, 5000), 1, 0.005) << look.name << " " << wo.x << " " << wo.y;
       if (look.along < 0.2f) continue;
@@ -129,8 +131,12 @@ TEST(Fibre, ReflectsAllLightWithoutAbsorption) {
 }
 
 TEST(Fibre, AbsorptionAndTintsTakeLight) {
+  size_t index = 0;
   for (const Look& look : looks())
-    for (const Vec& wo : views()) EXPECT_LE(furnace(hair(look), wo, 2000), 1.005) << look.name;
+    for (const Vec& wo : views()) {
+      if (!includes_case(index++, 5)) continue;
+      EXPECT_LE(furnace(hair(look), wo, 2000), 1.005) << look.name;
+    }
   Look mute{"mute", 0.3f, 0.3f};
   mute.tint = {0, 0, 0};
   const BsdfSample<float> s = hair(mute).sample(seen_at(0.1, 0.2), 0.3f, 0.4f, 0.5f);

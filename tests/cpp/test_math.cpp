@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "lane_testing.h"
+#include "parts.h"
 
 namespace wavecomb {
 namespace {
@@ -15,14 +16,16 @@ using namespace lane_testing;
 constexpr double kPiD = 3.14159265358979323846;
 
 /// Floats that cover [lo, hi] uniformly and by magnitude, including the ends.
-std::vector<float> cover(float lo, float hi, size_t n = 400000) {
+std::vector<float> cover(float lo, float hi) {
   std::vector<float> x = {lo, hi};
+  const size_t n = is_long() ? 400000 : 100000;
+  const float step = is_long() ? 1.0001f : 1.0004f;
   for (size_t i = 0; i < n; ++i) {
     x.push_back(static_cast<float>(static_cast<double>(lo) + (static_cast<double>(hi) - lo) *
                                                                  static_cast<double>(i) /
                                                                  static_cast<double>(n)));
   }
-  for (float m = 0x1p-126f; m < hi; m *= 1.0001f) {
+  for (float m = 0x1p-126f; m < hi; m *= step) {
     x.push_back(m);
     if (-m >= lo) x.push_back(-m);
   }

@@ -27,11 +27,11 @@ using Vec = Vec3<float>;
 
 std::vector<double> cosines() {
   if (is_long()) return {0.03, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0};
-  return {0.05, 0.15, 0.4, 0.8, 1.0};
+  return {0.05, 0.4, 1.0};
 }
 std::vector<float> roughnesses() {
   if (is_long()) return {0.f, 0.05f, 0.13f, 0.2f, 0.3f, 0.37f, 0.45f, 0.6f, 0.7f, 0.8f, 0.9f, 1.f};
-  return {0.f, 0.13f, 0.3f, 0.55f, 0.8f, 1.f};
+  return {0.f, 0.13f, 0.55f, 1.f};
 }
 
 /// White parameters without absorption.

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "light_charts.h"
+#include "parts.h"
 
 namespace wavecomb {
 namespace {
@@ -155,8 +156,13 @@ Estimate estimate(const Lights& lights, const Vec3<float>& from, int samples) {
 }
 
 TEST(PicturedRect, IrradianceIsThatOfItsPicture) {
+  size_t index = 0;
   for (const Place& place : kPlaces)
     for (const auto& rgb : {spots(), half_dark(), noise()}) {
+      // Every place, and every image with two places.
+      const size_t diagonal = index + index / 3;
+      ++index;
+      if (!includes_case(diagonal, 3)) continue;
       const Lights lights = make_rect(place, rgb);
       const LightView view = lights.view();
       const LightRecord& r = view.lights[0];

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "parts.h"
 #include "program_cases.h"
 #include "wavecomb/path/program_reads.h"
 
@@ -138,7 +139,10 @@ TEST(Programs, ReciprocityHolds) {
 }
 
 TEST(Programs, WhiteFurnaceNeverGains) {
+  size_t index = 0;
   for (Case c : usual_cases()) {
+    // Most materials have three roughnesses, so that each roughness is in some cases.
+    if (!includes_case(index++, 4)) continue;
     c.params.base_color = Vec(1, 1, 1);
     with_bsdf(c, [&](const auto& bsdf) {
       for (const Vec& wo : views(c)) EXPECT_LE(furnace(bsdf, wo), 1.004) << c.name << " " << wo.z;
@@ -183,8 +187,10 @@ TEST(Programs, LosslessMaterialsPassTheWhiteFurnace) {
 
 TEST(Programs, MultipleScatteringKeepsTheEnergyOfMetals) {
   // The fit is accurate to 2 % (see LostEnergy).
+  size_t index = 0;
   for (float alpha : {0.1f, 0.2f, 0.3f, 0.5f, 0.7f, 1.f})
     for (const ProgramId id : {ProgramId::kMetal, ProgramId::kPrincipled}) {
+      if (!includes_case(index++, 3)) continue;
       const Case c = make_case("white metal", id, [&](P& p) {
         p.base_color = Vec(1, 1, 1), p.metallic = 1, p.roughness = std::sqrt(alpha);
       });
@@ -428,7 +434,7 @@ TEST(Programs, VariantsEqualTheirProgramsBitForBit) {
 TEST(Programs, NoInputGivesNonsense) {
   std::mt19937 rng(77);
   for (uint32_t id = 0; id < kSurfaceProgramCount; ++id)
-    for (int round = 0; round < 60000; ++round) {
+    for (int round = 0; round < (is_long() ? 60000 : 15000); ++round) {
       const Inputs in = random_inputs(rng);
       visit_program<float>(static_cast<ProgramId>(id), [&]<typename Bsdf>() {
         const float own = static_cast<float>(round % 5) / 4;

@@ -405,7 +405,7 @@ def test_type_checkers_find_misspelt_keywords(tmp_path: Path) -> None:
     done = subprocess.run(
         [
             sys.executable, "-m", "mypy", "--config-file", str(ROOT / "pyproject.toml"),
-            "--cache-dir", str(tmp_path), str(program),
+            "--cache-dir", str(ROOT / ".mypy_cache"), str(program),
         ],
         capture_output=True, text=True, cwd=ROOT, check=False,
     )  # fmt: skip
