@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Writes ray visibility, holdouts, shadow catchers and materials of volumes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .context import Translation, data_path, material_path, object_path
+from .usda import safe_name
+
+_BOUNCES = ("diffuse", "glossy", "transmission", "volume_scatter")
+SHAPES = {"MESH", "CURVE", "SURFACE", "FONT", "META", "CURVES", "POINTCLOUD", "VOLUME"}
+
+
+def write_visibility(into: Translation) -> None:
+    """Writes attributes of objects that some rays do not see, or that are holdouts."""
+    for thing in into.depsgraph.objects:
+        if thing.type not in SHAPES or thing.data is None:
+            continue
+        # Flags of Blender are not inherited by children, so they are written on the shape.
+        path = data_path(thing)
+        if into.instancing and thing.data.original.users > 1:
+            path = f"/root/prototypes/{safe_name(thing.name)}/{safe_name(thing.data.name)}"
+            path = path if _is_plain(thing) else data_path(thing)
+        flags = _flags(into, thing)
+        if thing.is_shadow_catcher:
+            into.options += ["--catcher", object_path(thing)]
+        if flags:
+            prim = into.layer.over(path)
+            for name in flags:
+                value = name == "holdout"
+                prim.set(f"bool primvars:wavecomb:{name}", value)
+        if thing.type == "VOLUME" and thing.material_slots and thing.material_slots[0].material:
+            prim = into.layer.over(path)
+            prim.apply("MaterialBindingAPI")
+            prim.relate("material:binding", material_path(thing.material_slots[0].material))
+
+
+def _is_plain(thing: Any) -> bool:
+    return not any(True for _ in ())
+
+
+def _flags(into: Translation, thing: Any) -> list[str]:
+    found = []
+    if not thing.visible_camera:
+        found.append("visibility:camera")
+    if not thing.visible_shadow:
+        found.append("visibility:shadow")
+    hidden = [kind for kind in _BOUNCES if not getattr(thing, f"visible_{kind}", True)]
+    if len(hidden) == len(_BOUNCES):
+        found.append("visibility:bounces")
+    elif hidden:
+        into.report.miss(f"object hidden from {', '.join(hidden)} rays only", thing.name)
+    if thing.is_holdout:
+        found.append("holdout")
+    return found
