@@ -64,7 +64,9 @@ def _describe(tree: Any, lines: list[str]) -> None:
         for name, prop in node.bl_rna.properties.items():
             if prop.type in {"BOOLEAN", "INT", "FLOAT", "ENUM", "STRING"} and name != "select":
                 value = getattr(node, name)
-                shown = list(value) if hasattr(value, "__len__") and prop.type != "STRING" else value
+                shown = (
+                    list(value) if hasattr(value, "__len__") and prop.type != "STRING" else value
+                )
                 lines.append(f"{name} {shown!r}")
         for socket in node.inputs:
             value = getattr(socket, "default_value", None)

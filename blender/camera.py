@@ -47,7 +47,7 @@ def write_camera(into: Translation, size: tuple[int, int]) -> None:
     settings.relate("camera", CAMERA)
     aspect = scene.render.pixel_aspect_x / scene.render.pixel_aspect_y
     settings.set("float pixelAspectRatio", float(aspect))
-    into.layer.metadata.append(f"renderSettingsPrimPath = \"{Path(SETTINGS)}\"")
+    into.layer.metadata.append(f'renderSettingsPrimPath = "{Path(SETTINGS)}"')
 
 
 def _has_cycles(scene: Any) -> bool:

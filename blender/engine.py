@@ -29,7 +29,7 @@ _sessions: dict[tuple[str, str], Session] = {}
 def close_sessions(*_: Any) -> None:
     """Removes the files of all renders."""
     chosen = settings.preferences()
-    keep = chosen is not None and chosen.keep_files or "WAVECOMB_KEEP" in os.environ
+    keep = (chosen is not None and chosen.keep_files) or "WAVECOMB_KEEP" in os.environ
     for session in _sessions.values():
         if keep:
             print(f"wavecomb: the stage is {session.folder}")
@@ -197,13 +197,15 @@ def arguments_of(
     found += ["--size", f"{size[0]}x{size[1]}", "--compression", "none", "--seed", str(chosen.seed)]
     found += ["--max-depth", str(chosen.max_depth), "--filter", chosen.filter]
     found += ["--guiding", chosen.guiding, "--transport", chosen.transport]
-    found += ["--firefly", chosen.firefly, "--lights", chosen.lights]
+    found += ["--firefly", chosen.firefly]
     for option, value in (
         ("--noise", chosen.noise), ("--time-limit", chosen.time_limit),
         ("--clamp-indirect", chosen.clamp_indirect), ("--threads", chosen.threads),
     ):  # fmt: skip
         if value > 0:
             found += [option, repr(value)]
+    if chosen.lights == "hidden":
+        found += ["--lights", "hidden"]
     if chosen.denoise:
         found.append("--denoise")
     if scene.render.film_transparent:

@@ -12,6 +12,7 @@ import bpy
 
 from .camera import CAMERA, write_camera
 from .context import Translation
+from .curves import write_curves
 from .lights import write_lights
 from .materials import write_materials
 from .motion import Sampled, write_motion
@@ -153,6 +154,7 @@ def export_stage(
     write_lights(into)
     write_world(into)
     write_materials(into)
+    write_curves(into)
     write_visibility(into)
     into.layer.save(into.file(CORRECTION))
     _write_root(into, scene)

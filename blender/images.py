@@ -6,6 +6,8 @@ from __future__ import annotations
 import os
 from typing import Any
 
+import numpy as np
+
 from .context import Translation
 from .usda import safe_name
 
@@ -30,11 +32,17 @@ READABLE = (
 )  # fmt: skip
 
 
-def file_of(into: Translation, image: Any) -> str | None:
+def file_of(into: Translation, image: Any, associate: bool = False) -> str | None:
     """Returns a file with the pixels of an image; None, after a message, if there is none.
 
     An image that is packed, generated, painted on or of an unusual format is saved to the folder
     of the stage.
+
+    Args:
+        into: The translation.
+        image: The image.
+        associate: Whether colours are multiplied by alpha, as Cycles does with straight alpha
+            where nothing uses the node's alpha. It multiplies encoded values.
     """
     import bpy
 
@@ -48,6 +56,9 @@ def file_of(into: Translation, image: Any) -> str | None:
             return path
         into.report.miss("packed or missing UDIM tiles", image.name)
         return None
+    alpha = _alpha_of(image) if associate else None
+    if alpha is not None:
+        return _saved(into, image, alpha)
     on_disk = image.source == "FILE" and not image.packed_files and not image.is_dirty
     if on_disk and path.lower().endswith(READABLE):
         if os.path.isfile(path):
@@ -57,7 +68,17 @@ def file_of(into: Translation, image: Any) -> str | None:
     return _saved(into, image)
 
 
-def _saved(into: Translation, image: Any) -> str | None:
+def _alpha_of(image: Any) -> np.ndarray | None:
+    """Returns the alpha of each pixel if some colours have to be multiplied by it."""
+    if image.alpha_mode != "STRAIGHT" or image.channels != 4 or not image.size[0]:
+        return None
+    pixels = np.empty(4 * image.size[0] * image.size[1], np.float32)
+    image.pixels.foreach_get(pixels)
+    alpha = pixels[3::4]
+    return alpha if float(alpha.min()) < 1.0 else None
+
+
+def _saved(into: Translation, image: Any, alpha: np.ndarray | None = None) -> str | None:
     if not image.has_data:
         # Reading a pixel makes Blender load the image.
         _ = image.pixels[:1] if image.size[0] else None
@@ -65,11 +86,19 @@ def _saved(into: Translation, image: Any) -> str | None:
         into.report.miss("image without pixels", image.name)
         return None
     ending = ".exr" if image.is_float else ".png"
-    file = into.file(f"image-{safe_name(image.name)}-{image.session_uid}{ending}")
+    kind = "image" if alpha is None else "associated"
+    file = into.file(f"{kind}-{safe_name(image.name)}-{image.session_uid}{ending}")
     if os.path.exists(file):
         return file
     copy = image.original.copy() if image.is_evaluated else image.copy()
     try:
+        if alpha is not None:
+            pixels = np.empty(4 * len(alpha), np.float32)
+            copy.pixels.foreach_get(pixels)
+            colours = pixels.reshape(-1, 4)
+            colours[:, :3] *= alpha[:, None]
+            colours[:, 3] = 1.0
+            copy.pixels.foreach_set(pixels)
         copy.file_format = "OPEN_EXR" if image.is_float else "PNG"
         copy.save(filepath=file)
     except RuntimeError as error:

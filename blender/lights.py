@@ -57,6 +57,8 @@ def _write(into: Translation, thing: Any, path: str, samples: dict[float, Any]) 
     if thing.lightgroup:
         prim.set("string wavecomb:lightGroup", thing.lightgroup)
     _links(into, thing, prim)
+    if into.scene.wavecomb.lights == "auto" and not thing.visible_camera:
+        prim.set("bool wavecomb:visible", False)
     hidden = [k for k in ("diffuse", "glossy", "transmission") if not _sees(thing, k)]
     if hidden:
         into.report.miss(f"light hidden from {' and '.join(hidden)} rays", thing.name)

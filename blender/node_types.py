@@ -58,7 +58,8 @@ def _generated(n: Nodes) -> Value | None:
     owners = {
         thing.data.name: thing
         for thing in n.into.scene.objects
-        if thing.type == "MESH" and any(s.material and s.material.name == n.owner for s in thing.material_slots)
+        if thing.type == "MESH"
+        and any(s.material and s.material.name == n.owner for s in thing.material_slots)
     }
     boxes = {tuple(tuple(round(v, 5) for v in c) for c in t.bound_box) for t in owners.values()}
     if len(boxes) != 1:
@@ -95,7 +96,8 @@ def _image(n: Nodes, node: Any, socket: Any) -> Value | None:
         return colour((0, 0, 0)) if socket.name == "Color" else number(0.0)
     if node.projection != "FLAT":
         return None
-    file = file_of(n.into, node.image)
+    uses_alpha = any(link.is_valid for link in node.outputs["Alpha"].links)
+    file = file_of(n.into, node.image, associate=not uses_alpha)
     if file is None:
         return None
     where = n.read(node, "Vector") if node.inputs["Vector"].links else _uv(n)
@@ -250,7 +252,9 @@ def _bright_contrast(n: Nodes, node: Any, socket: Any) -> Value:
     contrast, bright = n.read(node, "Contrast", "float"), n.read(node, "Bright", "float")
     slope = g.to("color3", g.op("add", contrast, number(1.0)))
     lift = g.op("subtract", bright, g.op("multiply", contrast, number(0.5)))
-    made = g.op("add", g.op("multiply", n.read(node, "Color", "color3"), slope), g.to("color3", lift))
+    made = g.op(
+        "add", g.op("multiply", n.read(node, "Color", "color3"), slope), g.to("color3", lift)
+    )
     return g.op("max", made, colour((0, 0, 0)))
 
 

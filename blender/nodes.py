@@ -9,7 +9,13 @@ from typing import Any
 from .context import Translation
 from .graph import Graph, Value, colour, number, vector
 
-KINDS = {"VALUE": "float", "INT": "float", "BOOLEAN": "float", "RGBA": "color3", "VECTOR": "vector3"}
+KINDS = {
+    "VALUE": "float",
+    "INT": "float",
+    "BOOLEAN": "float",
+    "RGBA": "color3",
+    "VECTOR": "vector3",
+}
 
 
 class Nodes:

@@ -76,7 +76,9 @@ CLASSES = (
     WAVECOMB_PT_performance,
 )
 
-_HIDDEN = frozenset({"RENDER_PT_freestyle", "VIEWLAYER_PT_layer_passes", "EEVEE_MATERIAL_PT_context_material"})
+_HIDDEN = frozenset(
+    {"RENDER_PT_freestyle", "VIEWLAYER_PT_layer_passes", "EEVEE_MATERIAL_PT_context_material"}
+)
 
 
 def _common() -> Iterator[Any]:

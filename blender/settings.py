@@ -61,8 +61,13 @@ class WavecombSettings(bpy.types.PropertyGroup):
         default="blackman-harris",
     )  # fmt: skip
     lights: EnumProperty(  # type: ignore[valid-type]
-        name="Light Shapes", description="Whether camera and mirrors see the shapes of lights",
-        items=[("visible", "Visible", ""), ("hidden", "Hidden", "")], default="visible",
+        name="Light Shapes", description="Whether camera and mirrors see the shapes of lights, "
+        "and whether these block other light",
+        items=[
+            ("auto", "By Ray Visibility", "A light is hidden if the camera does not see it"),
+            ("visible", "Visible", ""), ("hidden", "Hidden", ""),
+        ],
+        default="auto",
     )  # fmt: skip
     seed: IntProperty(name="Seed", default=0, min=0)  # type: ignore[valid-type]
     threads: IntProperty(  # type: ignore[valid-type]

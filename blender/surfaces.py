@@ -49,7 +49,9 @@ NEUTRAL: Surface = {
 def is_zero(value: Value) -> bool:
     """Returns whether a value is the constant 0 or black."""
     constant = value.constant
-    return constant is not None and not any(constant if isinstance(constant, tuple) else (constant,))
+    return constant is not None and not any(
+        constant if isinstance(constant, tuple) else (constant,)
+    )
 
 
 def surface_of(n: Nodes, socket: Any) -> Surface | None:
@@ -412,7 +414,10 @@ def _separate_colours(a: Surface, b: Surface) -> None:
             one["subsurface_color"] = one["base_color"]
             one["subsurface_weight"] = number(1.0)
             one["base_color"] = other["base_color"]
-            other["subsurface_weight"], other["subsurface_color"] = number(1.0), one["subsurface_color"]
+            other["subsurface_weight"], other["subsurface_color"] = (
+                number(1.0),
+                one["subsurface_color"],
+            )
             for key in ("specular_roughness", "specular_ior", "specular_color"):
                 if is_zero(one["specular_weight"]):
                     one[key] = other[key]

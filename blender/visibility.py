@@ -6,7 +6,6 @@ from __future__ import annotations
 from typing import Any
 
 from .context import Translation, data_path, material_path, object_path
-from .usda import safe_name
 
 _BOUNCES = ("diffuse", "glossy", "transmission", "volume_scatter")
 SHAPES = {"MESH", "CURVE", "SURFACE", "FONT", "META", "CURVES", "POINTCLOUD", "VOLUME"}
@@ -17,11 +16,12 @@ def write_visibility(into: Translation) -> None:
     for thing in into.depsgraph.objects:
         if thing.type not in SHAPES or thing.data is None:
             continue
-        # Flags of Blender are not inherited by children, so they are written on the shape.
-        path = data_path(thing)
-        if into.instancing and thing.data.original.users > 1:
-            path = f"/root/prototypes/{safe_name(thing.name)}/{safe_name(thing.data.name)}"
-            path = path if _is_plain(thing) else data_path(thing)
+        # Flags of Blender are not inherited by children, while those of USD are. The shapes of
+        # instances cannot be overridden.
+        path = data_path(thing) if thing.children else object_path(thing)
+        if thing.parent is not None and thing.parent.instance_type in ("VERTS", "FACES"):
+            # Blender draws the instances only; the exporter also writes the original.
+            into.layer.over(object_path(thing)).set("token visibility", "invisible")
         flags = _flags(into, thing)
         if thing.is_shadow_catcher:
             into.options += ["--catcher", object_path(thing)]
@@ -31,13 +31,9 @@ def write_visibility(into: Translation) -> None:
                 value = name == "holdout"
                 prim.set(f"bool primvars:wavecomb:{name}", value)
         if thing.type == "VOLUME" and thing.material_slots and thing.material_slots[0].material:
-            prim = into.layer.over(path)
+            prim = into.layer.over(data_path(thing))
             prim.apply("MaterialBindingAPI")
             prim.relate("material:binding", material_path(thing.material_slots[0].material))
-
-
-def _is_plain(thing: Any) -> bool:
-    return not any(True for _ in ())
 
 
 def _flags(into: Translation, thing: Any) -> list[str]:

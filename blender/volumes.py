@@ -107,12 +107,12 @@ def _define(
     volume.lines.append("token outputs:out")
     material.connect("token outputs:mtlx:volume", f"{path}/WavecombVolume.outputs:out")
     # The exporter's own surface would otherwise hide the medium.
-    material.lines.append("token outputs:surface = None")
-    material.lines.append("delete token outputs:surface.connect = None")
+    material.lines.append("token outputs:surface.connect = None")
 
 
 def _is_field(n: Nodes) -> bool:
     return any(
-        thing.type == "VOLUME" and any(s.material and s.material.name == n.owner for s in thing.material_slots)
+        thing.type == "VOLUME"
+        and any(s.material and s.material.name == n.owner for s in thing.material_slots)
         for thing in n.into.scene.objects
     )

@@ -82,7 +82,7 @@ def _image(into: Translation, prim: Any, node: Any) -> bool:
         return False
     space = space_of(into, node.image)
     prim.lines.append(f'asset inputs:texture:file = @{file}@ (colorSpace = "{space}")')
-    prim.set('token inputs:texture:format', "latlong")
+    prim.set("token inputs:texture:format", "latlong")
     prim.transform({into.time: turn.inverted().to_4x4() @ AXES})
     return True
 

@@ -38,7 +38,9 @@ def camera(at: Any = (0, -7, 3), target: Any = (0, 0, 0.8), **options: Any) -> A
     return thing
 
 
-def light(kind: str, energy: float, at: Any = (2, -2, 4), target: Any = (0, 0, 0), **options: Any) -> Any:
+def light(
+    kind: str, energy: float, at: Any = (2, -2, 4), target: Any = (0, 0, 0), **options: Any
+) -> Any:
     """Adds a light that shines at a point."""
     data = bpy.data.lights.new("light", kind)
     data.energy = energy
@@ -125,7 +127,9 @@ def floor(colour: Colour = (0.8, 0.8, 0.8), size: float = 12.0) -> Any:
     return thing
 
 
-def sphere(material: Any = None, at: Any = (0, 0, 1), radius: float = 1.0, segments: int = 96) -> Any:
+def sphere(
+    material: Any = None, at: Any = (0, 0, 1), radius: float = 1.0, segments: int = 96
+) -> Any:
     """Adds a smooth sphere."""
     bpy.ops.mesh.primitive_uv_sphere_add(
         location=at, radius=radius, segments=segments, ring_count=segments // 2
@@ -137,7 +141,9 @@ def sphere(material: Any = None, at: Any = (0, 0, 1), radius: float = 1.0, segme
     return thing
 
 
-def cube(material: Any = None, at: Any = (0, 0, 1), size: float = 2.0, turn: Any = (0, 0, 0.4)) -> Any:
+def cube(
+    material: Any = None, at: Any = (0, 0, 1), size: float = 2.0, turn: Any = (0, 0, 0.4)
+) -> Any:
     """Adds a cube."""
     bpy.ops.mesh.primitive_cube_add(location=at, size=size, rotation=turn)
     thing = bpy.context.object

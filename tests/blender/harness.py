@@ -111,7 +111,9 @@ def compare(cycles: list[Image], wavecomb: list[Image]) -> dict[str, float]:
     mean = max(float(a.mean()), 1e-9)
     ratio = float(b.mean()) / mean
     channels = [
-        float(b[..., i].mean() / a[..., i].mean()) for i in range(3) if a[..., i].mean() > 0.02 * mean
+        float(b[..., i].mean() / a[..., i].mean())
+        for i in range(3)
+        if a[..., i].mean() > 0.02 * mean
     ]
     blocks = [_blocks(image) for image in (a, b)]
     # The difference of the halves estimates the error of their mean, pooled over all blocks in
@@ -122,9 +124,7 @@ def compare(cycles: list[Image], wavecomb: list[Image]) -> dict[str, float]:
     sigma = np.sqrt(0.5 * own**2 + 0.5 * pooled**2)
     difference = np.abs(blocks[1] - blocks[0])
     outside = difference > 0.02 * blocks[0] + 4.0 * sigma + 1e-3 * mean
-    relative = np.where(
-        difference > 4.0 * sigma, difference / (blocks[0] + 0.05 * mean), 0.0
-    )
+    relative = np.where(difference > 4.0 * sigma, difference / (blocks[0] + 0.05 * mean), 0.0)
     alphas = [_blocks(np.mean(images, axis=0)[..., 3:]) for images in (cycles, wavecomb)]
     return {
         "ratio": ratio,

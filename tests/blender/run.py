@@ -13,6 +13,7 @@ import json
 import os
 import sys
 import traceback
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,8 @@ def run(one: ParityScene, output: Path) -> dict[str, Any]:
     messages = [line for line in lines.getvalue().splitlines() if line.startswith("wavecomb: ")]
     row["messages"] = list(dict.fromkeys(line.removeprefix("wavecomb: ") for line in messages))
     row["seconds"] = seconds
+    row["group"], row["about"] = one.group, (one.make.__doc__ or "").strip()
+    row["expected"] = asdict(one.expected)
     row["blender"] = bpy.app.version_string
     both = [np.mean(images[engine], axis=0) for engine in ("CYCLES", "WAVECOMB")]
     scale = 0.7 / max(float(np.percentile(both[0][..., :3], 95)), 1e-3)

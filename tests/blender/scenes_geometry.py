@@ -112,7 +112,9 @@ def _strands(material: Any, count: int = 1500, radius: float = 0.01) -> None:
     roots = random.uniform(-1.2, 1.2, (count, 2))
     t = np.linspace(0.0, 1.0, 5)
     bend = random.normal(0.0, 0.3, (count, 1, 2)) * t[None, :, None] ** 2
-    points = np.concatenate([roots[:, None, :] + bend, np.broadcast_to(1.5 * t[:, None], (count, 5, 1))], -1)
+    points = np.concatenate(
+        [roots[:, None, :] + bend, np.broadcast_to(1.5 * t[:, None], (count, 5, 1))], -1
+    )
     data.points.foreach_set("position", points.astype(np.float32).ravel())
     data.points.foreach_set("radius", np.full(5 * count, radius, np.float32))
     data.materials.append(material)
@@ -173,7 +175,9 @@ def instance_collection() -> None:
 def instance_vertices() -> None:
     """An object instanced on the vertices of another."""
     studio()
-    bpy.ops.mesh.primitive_grid_add(x_subdivisions=5, y_subdivisions=4, size=4, location=(0, 0, 0.4))
+    bpy.ops.mesh.primitive_grid_add(
+        x_subdivisions=5, y_subdivisions=4, size=4, location=(0, 0, 0.4)
+    )
     parent = bpy.context.object
     child = sphere(principled(base_color=(0.7, 0.4, 0.1)), at=(0, 0, 0), radius=0.25, segments=24)
     child.parent = parent
@@ -198,7 +202,9 @@ def instance_geometry_nodes() -> None:
     tree.links.new(entry.outputs[0], on_points.inputs["Points"])
     tree.links.new(info.outputs["Geometry"], on_points.inputs["Instance"])
     tree.links.new(on_points.outputs[0], leave.inputs[0])
-    bpy.ops.mesh.primitive_grid_add(x_subdivisions=4, y_subdivisions=4, size=3, location=(0, 0, 0.6))
+    bpy.ops.mesh.primitive_grid_add(
+        x_subdivisions=4, y_subdivisions=4, size=3, location=(0, 0, 0.6)
+    )
     bpy.context.object.modifiers.new("scatter", "NODES").node_group = tree
 
 
@@ -410,9 +416,21 @@ def combined_still_life() -> None:
     light("AREA", 200.0, shape="RECTANGLE", size=2.0, size_y=0.5)
     light("SPOT", 400.0, at=(-3, -3, 4), spot_size=1.0, spot_blend=0.4, shadow_soft_size=0.2)
     light("SUN", 0.5, angle=0.1, color=(1.0, 0.8, 0.6))
-    sphere(principled("glass", transmission_weight=1.0, roughness=0.05), at=(-1.3, -0.5, 0.6), radius=0.6)
-    sphere(principled("gold", metallic=1.0, base_color=(0.9, 0.6, 0.2), roughness=0.2), at=(1.3, 0, 0.7), radius=0.7)
-    sphere(principled("cloth", sheen_weight=0.8, base_color=(0.3, 0.1, 0.2)), at=(0, 1, 0.8), radius=0.8)
+    sphere(
+        principled("glass", transmission_weight=1.0, roughness=0.05),
+        at=(-1.3, -0.5, 0.6),
+        radius=0.6,
+    )
+    sphere(
+        principled("gold", metallic=1.0, base_color=(0.9, 0.6, 0.2), roughness=0.2),
+        at=(1.3, 0, 0.7),
+        radius=0.7,
+    )
+    sphere(
+        principled("cloth", sheen_weight=0.8, base_color=(0.3, 0.1, 0.2)),
+        at=(0, 1, 0.8),
+        radius=0.8,
+    )
     cube(textured("tiles")[0], at=(0, -1.4, 0.3), size=0.6)
 
 
@@ -462,7 +480,11 @@ def combined_mirrors() -> None:
     mirror = principled("mirror", metallic=1.0, roughness=0.0, base_color=(0.95, 0.95, 0.95))
     thing = cube(mirror, at=(0, 1.5, 1.2), size=2.4, turn=(0, 0, 0.1))
     thing.scale.y = 0.05
-    sphere(principled("car", base_color=(0.5, 0.02, 0.02), coat_weight=1.0), at=(-0.7, -0.6, 0.7), radius=0.7)
+    sphere(
+        principled("car", base_color=(0.5, 0.02, 0.02), coat_weight=1.0),
+        at=(-0.7, -0.6, 0.7),
+        radius=0.7,
+    )
     light("POINT", 60.0, at=(1.5, -0.5, 1.2), shadow_soft_size=0.2)
 
 

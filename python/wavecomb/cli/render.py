@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import click
 
+from wavecomb.blend import is_blend
+from wavecomb.blend import render as render_blend
 from wavecomb.cli.aovs import aov_options
 from wavecomb.cli.command import SettingCommand
 from wavecomb.cli.farm_tiles import TILE, check_tile, render_tile, tile_name
@@ -122,6 +125,9 @@ def render_command(part: str | None, **options: Any) -> None:
     stop the render and write the samples so far (exit codes 130 and 143). Files are never written
     partially. See docs/render.md and docs/aovs.md.
     """
+    if is_blend(options["stage"]):
+        frame = options["frame"]
+        raise click.exceptions.Exit(render_blend(options["stage"], frame, sys.argv[2:]))
     chosen_tile = None if part is None else check_tile(part, options)
     asked = Asked.take(options)
     written = asked.written()
