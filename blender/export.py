@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes the stage of a scene: geometry by Blender's exporter, everything else by this extension."""
+"""Writes the stage of a scene: geometry by the exporter of Blender, the rest by this extension."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads and writes uncompressed OpenEXR files with NumPy. Blender 4.2 brings no reader for Python."""
+"""Reads and writes uncompressed OpenEXR files. Blender 4.2 has no reader for Python."""
 
 from __future__ import annotations
 

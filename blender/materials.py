@@ -17,7 +17,8 @@ DEFAULT = f"{OWN}/Default"
 
 def write_materials(into: Translation) -> None:
     """Writes every material of a visible object, and the one of objects without material."""
-    _write(into, DEFAULT, dict(NEUTRAL, base_color=colour((0.8, 0.8, 0.8))), None)
+    default = dict(NEUTRAL, base_color=colour((0.8, 0.8, 0.8)), specular_weight=number(1.0))
+    _write(into, DEFAULT, default, None)
     into.layer.over(ROOT).apply("MaterialBindingAPI")
     into.layer.over(ROOT).relate("material:binding", DEFAULT)
     names: dict[str, str] = {}

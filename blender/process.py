@@ -83,7 +83,7 @@ class Render:
         """
         python, boot = locate(program)
         words = [python, "-I", boot, f"--parent={os.getpid()}", "wavecomb", "render", *arguments]
-        self._errors = tempfile.TemporaryFile()
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115
         try:
             self._process = subprocess.Popen(
                 [*words, "--progress", "json"],

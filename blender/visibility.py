@@ -21,7 +21,12 @@ def write_visibility(into: Translation) -> None:
         path = data_path(thing) if thing.children else object_path(thing)
         if thing.parent is not None and thing.parent.instance_type in ("VERTS", "FACES"):
             # Blender draws the instances only; the exporter also writes the original.
-            into.layer.over(object_path(thing)).set("token visibility", "invisible")
+            hidden = into.layer.over(object_path(thing))
+            if into.instancing:
+                hidden.metadata.append("active = false")
+            else:
+                # Instances refer to the shape below the original.
+                hidden.set("token visibility", "invisible")
         flags = _flags(into, thing)
         if thing.is_shadow_catcher:
             into.options += ["--catcher", object_path(thing)]

@@ -98,7 +98,9 @@ def _define(
     volume = layer.define(f"{path}/WavecombVolume", "Shader")
     volume.set("uniform token info:id", "ND_volume")
     volume.connect("token inputs:vdf", f"{path}/WavecombVdf.outputs:out")
-    if any(light):
+    if any(light) and not _is_field(n):
+        n.miss("emission of a volume in a mesh")
+    elif any(light):
         edf = layer.define(f"{path}/WavecombEdf", "Shader")
         edf.set("uniform token info:id", "ND_uniform_edf")
         edf.set("color3f inputs:color", light)

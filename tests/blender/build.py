@@ -195,3 +195,8 @@ def studio(strength: float = 0.4) -> None:
     light("AREA", 300.0, shape="SQUARE", size=1.5)
     world((strength, strength, strength))
     camera()
+
+
+def show_lights() -> None:
+    """Gives lights a shape in Wavecomb: smooth glass and mirrors show nothing else of a light."""
+    bpy.context.scene.wavecomb.lights = "visible"

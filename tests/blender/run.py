@@ -33,7 +33,7 @@ MODULES = (scenes_lights, scenes_materials, scenes_geometry)
 
 def run(one: ParityScene, output: Path) -> dict[str, Any]:
     """Renders one scene with both engines and two seeds; returns its row of the table."""
-    scene = harness.prepare(one.spp)
+    scene = harness.prepare(max(int(one.spp * float(os.environ.get("PARITY_SPP", "1"))), 1))
     one.make()
     lines = io.StringIO()
     images: dict[str, list[np.ndarray]] = {}

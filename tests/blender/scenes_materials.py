@@ -14,6 +14,7 @@ from build import (
     put,
     shader,
     shader_of,
+    show_lights,
     sphere,
     studio,
     textured,
@@ -27,6 +28,8 @@ def _ball(**inputs: Any) -> Any:
     studio()
     material = principled(**inputs)
     sphere(material)
+    if "transmission_weight" in inputs:
+        show_lights()
     return material
 
 
@@ -90,7 +93,7 @@ def principled_anisotropic() -> None:
     _ball(base_color=(0.8, 0.8, 0.8), metallic=1.0, roughness=0.4, anisotropic=0.7)
 
 
-@scene("Principled")
+@scene("Principled", 0.99, 1.015, 0.15, "another model of rough diffuse surfaces (EON)")
 def principled_diffuse_roughness() -> None:
     """A rough diffuse base, where Blender has it."""
     names = {"roughness": 1.0, "specular_ior_level": 0.0}
@@ -226,6 +229,7 @@ def shader_glossy() -> None:
 def shader_glass() -> None:
     """Glass BSDF."""
     _node("ShaderNodeBsdfGlass", Color=(0.9, 0.95, 1.0), Roughness=0.0, IOR=1.5)
+    show_lights()
 
 
 @scene("Shaders")
