@@ -8,8 +8,9 @@ from typing import Any
 from .context import OWN, ROOT, Translation, material_path
 from .graph import Graph, Value, colour, number
 from .hair import write_hair
+from .neutral import BLACK, NEUTRAL, Surface, is_zero
 from .nodes import Nodes
-from .surfaces import BLACK, NEUTRAL, Surface, is_zero, surface_of
+from .surfaces import surface_of
 from .volumes import write_volume
 
 DEFAULT = f"{OWN}/Default"

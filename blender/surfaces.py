@@ -7,51 +7,9 @@ from collections.abc import Callable
 from typing import Any
 
 from .graph import Value, colour, number, vector
+from .mixtures import mixed
+from .neutral import BLACK, NEUTRAL, Surface, is_zero
 from .nodes import Nodes
-
-Surface = dict[str, Value]
-
-BLACK, WHITE = colour((0, 0, 0)), colour((1, 1, 1))
-NEUTRAL: Surface = {
-    "base_weight": number(1.0),
-    "base_color": WHITE,
-    "base_metalness": number(0.0),
-    "base_diffuse_roughness": number(0.0),
-    "specular_weight": number(0.0),
-    "specular_color": WHITE,
-    "specular_roughness": number(0.5),
-    "specular_ior": number(1.5),
-    "specular_roughness_anisotropy": number(0.0),
-    "transmission_weight": number(0.0),
-    "transmission_color": WHITE,
-    "subsurface_weight": number(0.0),
-    "subsurface_color": WHITE,
-    "subsurface_radius": number(0.0),
-    "subsurface_radius_scale": WHITE,
-    "subsurface_scatter_anisotropy": number(0.0),
-    "coat_weight": number(0.0),
-    "coat_roughness": number(0.03),
-    "coat_ior": number(1.5),
-    "coat_color": WHITE,
-    "coat_darkening": number(0.0),
-    "fuzz_weight": number(0.0),
-    "fuzz_roughness": number(0.5),
-    "fuzz_color": WHITE,
-    "thin_film_weight": number(0.0),
-    "thin_film_thickness": number(0.0),
-    "thin_film_ior": number(1.33),
-    "emission_color": BLACK,
-    "geometry_opacity": number(1.0),
-}
-"""A white diffuse surface: values that an incomplete surface has."""
-
-
-def is_zero(value: Value) -> bool:
-    """Returns whether a value is the constant 0 or black."""
-    constant = value.constant
-    return constant is not None and not any(
-        constant if isinstance(constant, tuple) else (constant,)
-    )
 
 
 def surface_of(n: Nodes, socket: Any) -> Surface | None:
@@ -351,94 +309,6 @@ def _mix_shader(n: Nodes, node: Any) -> Surface:
     a, b = (surface_of(n, one) for one in sockets)
     black = dict(NEUTRAL, base_weight=number(0.0))
     return mixed(n, a or black, b or dict(black), factor)
-
-
-def mixed(n: Nodes, a: Surface, b: Surface, factor: Value) -> Surface:
-    """Interpolates two surfaces. Exact for one lobe each; otherwise inputs are averaged."""
-    g = n.graph
-    rest = g.op("subtract", number(1.0), factor) if factor.constant is None else None
-    rest = rest or number(1.0 - factor.constant)
-    for one, other, share in ((a, b, rest), (b, a, factor)):
-        if is_zero(other["geometry_opacity"]):
-            opacity = _product(n, one["geometry_opacity"], share)
-            return {**one, "geometry_opacity": opacity}
-    if _is_thin(a) != _is_thin(b):
-        translucent = _translucency(n, a, b, factor, rest)
-        if translucent is not None:
-            return translucent
-        n.approximate("mix of a thin and a solid surface")
-    a, b = dict(a), dict(b)
-    _separate_colours(a, b)
-    found: Surface = {}
-    for key in {**a, **b}:
-        left, right = a.get(key), b.get(key)
-        if left is None or right is None or key in ("geometry_normal", "geometry_thin_walled"):
-            if left != right and left is not None and right is not None:
-                n.approximate("mix of shaders with different normals (the first one's)")
-            found[key] = left if left is not None else right  # type: ignore[assignment]
-        else:
-            found[key] = g.mix(left, right, factor)
-    if _differs(a, b):
-        n.approximate("mix of two layered shaders (their inputs are averaged)")
-    return found
-
-
-def _is_thin(one: Surface) -> bool:
-    return "geometry_thin_walled" in one
-
-
-def _translucency(n: Nodes, a: Surface, b: Surface, factor: Value, rest: Value) -> Surface | None:
-    """Mix of a diffuse and a translucent shader: a thin wall, by its anisotropy."""
-    thin, solid, share = (a, b, rest) if _is_thin(a) else (b, a, factor)
-    if is_zero(thin["subsurface_weight"]) or not is_zero(solid["specular_weight"]):
-        return None
-    tint = n.graph.mix(solid["base_color"], thin["subsurface_color"], share)
-    found = dict(thin, subsurface_color=tint)
-    spread = n.graph.op("multiply", share, number(2.0)) if share.constant is None else None
-    found["subsurface_scatter_anisotropy"] = (
-        number(2.0 * share.constant - 1.0)
-        if spread is None
-        else n.graph.op("subtract", spread, number(1.0))
-    )
-    return found
-
-
-def _separate_colours(a: Surface, b: Surface) -> None:
-    """Gives a diffuse surface its colour by the subsurface lobe of radius 0.
-
-    The base colour is then free for the metal that it is mixed with.
-    """
-    for one, other in ((a, b), (b, a)):
-        is_metal = other["base_metalness"].constant == 1.0
-        if is_metal and is_zero(one["base_metalness"]) and is_zero(one["subsurface_weight"]):
-            one["subsurface_color"] = one["base_color"]
-            one["subsurface_weight"] = number(1.0)
-            one["base_color"] = other["base_color"]
-            other["subsurface_weight"], other["subsurface_color"] = (
-                number(1.0),
-                one["subsurface_color"],
-            )
-            for key in ("specular_roughness", "specular_ior", "specular_color"):
-                if is_zero(one["specular_weight"]):
-                    one[key] = other[key]
-            return
-
-
-def _differs(a: Surface, b: Surface) -> bool:
-    """Returns whether averaging changes more than weights."""
-    weights = {"base_weight", "emission_color", "base_metalness", "transmission_weight"}
-    changed = {k for k in a if k in b and a[k] != b[k]} - weights - {"geometry_opacity"}
-    if is_zero(a["base_weight"]) or is_zero(b["base_weight"]):
-        changed -= {"base_color", "specular_weight"}
-    return bool(changed - {"specular_weight", "subsurface_weight"})
-
-
-def _product(n: Nodes, a: Value, b: Value) -> Value:
-    if a.constant is not None and b.constant is not None:
-        return number(a.constant * b.constant)
-    if a.constant == 1.0:
-        return b
-    return n.graph.op("multiply", a, b)
 
 
 def _add_shader(n: Nodes, node: Any) -> Surface:

@@ -13,20 +13,13 @@ SHAPES = {"MESH", "CURVE", "SURFACE", "FONT", "META", "CURVES", "POINTCLOUD", "V
 
 def write_visibility(into: Translation) -> None:
     """Writes attributes of objects that some rays do not see, or that are holdouts."""
+    _hide_originals(into)
     for thing in into.depsgraph.objects:
         if thing.type not in SHAPES or thing.data is None:
             continue
         # Flags of Blender are not inherited by children, while those of USD are. The shapes of
         # instances cannot be overridden.
         path = data_path(thing) if thing.children else object_path(thing)
-        if thing.parent is not None and thing.parent.instance_type in ("VERTS", "FACES"):
-            # Blender draws the instances only; the exporter also writes the original.
-            hidden = into.layer.over(object_path(thing))
-            if into.instancing:
-                hidden.metadata.append("active = false")
-            else:
-                # Instances refer to the shape below the original.
-                hidden.set("token visibility", "invisible")
         flags = _flags(into, thing)
         if thing.is_shadow_catcher:
             into.options += ["--catcher", object_path(thing)]
@@ -39,6 +32,20 @@ def write_visibility(into: Translation) -> None:
             prim = into.layer.over(data_path(thing))
             prim.apply("MaterialBindingAPI")
             prim.relate("material:binding", material_path(thing.material_slots[0].material))
+
+
+def _hide_originals(into: Translation) -> None:
+    """Removes objects that their parent instances; the exporter writes the original as well."""
+    # The render's depsgraph does not list them.
+    for thing in into.depsgraph.scene.objects:
+        if thing.parent is None or thing.parent.instance_type not in ("VERTS", "FACES"):
+            continue
+        hidden = into.layer.over(object_path(thing))
+        if into.instancing:
+            hidden.metadata.append("active = false")
+        else:
+            # Instances refer to the shape below the original.
+            hidden.set("token visibility", "invisible")
 
 
 def _flags(into: Translation, thing: Any) -> list[str]:

@@ -6,8 +6,8 @@ from __future__ import annotations
 from typing import Any
 
 from .graph import Value
+from .neutral import Surface
 from .nodes import Nodes
-from .surfaces import Surface
 
 Colour = tuple[float, float, float]
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Expected:
-    """What a comparison must show.
+    """Bounds of a comparison.
 
     Attributes:
         low: Lowest ratio of the means, Wavecomb to Cycles.

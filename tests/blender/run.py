@@ -23,12 +23,14 @@ sys.path.insert(0, str(HERE))
 import bpy  # noqa: E402
 import harness  # noqa: E402
 import numpy as np  # noqa: E402
+import scenes_cameras  # noqa: E402
 import scenes_geometry  # noqa: E402
 import scenes_lights  # noqa: E402
 import scenes_materials  # noqa: E402
+import scenes_textures  # noqa: E402
 from registry import SCENES, ParityScene  # noqa: E402
 
-MODULES = (scenes_lights, scenes_materials, scenes_geometry)
+MODULES = (scenes_lights, scenes_materials, scenes_textures, scenes_geometry, scenes_cameras)
 
 
 def run(one: ParityScene, output: Path) -> dict[str, Any]:

@@ -195,7 +195,7 @@ def light_in_view() -> None:
 
 @scene("Lights")
 def light_emissive_mesh() -> None:
-    """A glowing ball."""
+    """An emissive ball."""
     _ground(0.02)
     glow = bpy.data.materials.new("glow")
     glow.use_nodes = True
