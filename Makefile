@@ -41,7 +41,7 @@ CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLis
 NATIVE_INPUTS := $(shell find src bindings 2> /dev/null)
 CPP_FILES := $(shell find src bindings tests/cpp tests/naive benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' -o -name '*.inl' \) 2> /dev/null)
 
-.PHONY: help setup setup-test build build-test-tools build-all-lanes build-lanes-before wheels sdist release render docs test test-fast test-cpp test-cpp-long test-py test-py-fast run-py run-py-fast run-py-long test-long fuzz test-asan test-asan-all test-tsan test-wheel test-sdist test-clang test-arm64 bench lint format clean
+.PHONY: help setup setup-test build build-test-tools build-all-lanes build-lanes-before wheels sdist release render docs test test-fast test-cpp test-cpp-long test-py test-py-fast run-py run-py-fast run-py-long test-long fuzz test-asan test-asan-all test-tsan test-wheel test-sdist test-clang test-arm64 setup-blender test-blender blender-extension bench lint format clean
 
 help: ## Print this list
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -260,6 +260,19 @@ bench: build ## Run micro-benchmarks; JSON goes to out/micro
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_benchmarks -j $(JOBS) -- --quiet
 	@mkdir -p out/micro; for program in $(BUILD)/benchmarks/micro/micro_*; do [ -f $$program ] || continue; \
 	  echo "== $$program"; $$program --benchmark_out=out/micro/$${program##*/micro_}.json || exit 1; done
+
+# Blender's wheels are 400 MB each, so they are not part of make setup and make test.
+setup-blender: ## Install Blender's Python wheels, oldest and newest supported, for test-blender
+	@tools/blender_wheels
+
+test-blender: build setup-blender ## Test the Blender extension, and compare its images with those of Cycles
+	$(VENV)/python -m pytest -q -o faulthandler_timeout=3600 tests/blender
+
+# Writes the zip that Blender installs.
+blender-extension: ## Build the Blender extension dist/wavecomb-blender.zip
+	@mkdir -p dist; rm -f dist/wavecomb-blender.zip
+	@$(VENV)/python -m zipfile -c dist/wavecomb-blender.zip blender/*.py blender/blender_manifest.toml blender/LICENSE
+	@ls dist/wavecomb-blender.zip
 
 # ---- style -------------------------------------------------------------------------------------
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import click
@@ -46,6 +47,10 @@ def render_command(part: str | None, **values: Any) -> None:
     stop the render and write the samples so far (exit codes 130 and 143). Files are never written
     partially. See docs/render.md and docs/aovs.md.
     """
+    if str(values["stage"]).lower().endswith(".blend"):
+        from wavecomb import blend
+
+        raise click.exceptions.Exit(blend.render(values["stage"], values["frame"], sys.argv[2:]))
     options = RenderOptions.parse(values)
     if part is not None:
         from wavecomb.cli.farm.tiles import render_tile

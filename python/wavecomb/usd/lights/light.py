@@ -138,7 +138,8 @@ class LightReader:
                 options["portals"] = portals
             normalize = False
         options["normalize"] = normalize
-        if self.hidden and kind in light_parameters()["visible"].kinds:
+        hidden = self.hidden or prim.GetAttribute("wavecomb:visible").Get(self.time) is False
+        if hidden and kind in light_parameters()["visible"].kinds:
             options["visible"] = False
         return Light(kind, options, local, self.filters.of(prim, kind))
 

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bakes the nodes of a world to an image, by Cycles in a separate process.
+
+A render engine cannot start another render while it runs, so the world is written to a .blend file
+that a second Blender opens. The image is kept as long as the world does not change.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+from typing import Any
+
+from .context import Translation
+
+WIDTH = 2048
+"""Pixels around the horizon."""
+LIMIT_S = 300.0
+
+
+def world(into: Translation, made: Any) -> str | None:
+    """Returns an equirectangular image of a world; None if it could not be baked."""
+    import bpy
+
+    original = made.original if made.is_evaluated else made
+    blend = into.file("world.blend")
+    bpy.data.libraries.write(blend, {original}, path_remap="ABSOLUTE", fake_user=True)
+    key = f"{original.name}\n{_content(original)}\n{into.time if _is_animated(original) else ''}"
+    name = f"world-{hashlib.sha256(key.encode()).hexdigest()[:16]}.exr"
+    file = into.file(name)
+    if os.path.exists(file):
+        return file
+    script = os.path.join(os.path.dirname(os.path.abspath(__file__)), "bake_world.py")
+    words = ["--", blend, original.name, file, str(WIDTH), repr(into.time)]
+    if bpy.app.binary_path:
+        program = [bpy.app.binary_path, "-b", "--factory-startup", "--disable-autoexec"]
+        command = [*program, "--python-exit-code", "1", "--python", script, *words]
+    else:
+        command = [sys.executable, "-I", script, *words]
+    try:
+        done = subprocess.run(command, capture_output=True, timeout=LIMIT_S, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return file if done.returncode == 0 and os.path.exists(file) else None
+
+
+def _is_animated(made: Any) -> bool:
+    tree = made.node_tree
+    return made.animation_data is not None or (tree and tree.animation_data is not None)
+
+
+def _content(made: Any) -> str:
+    """Returns a text that changes with anything in the node tree."""
+    lines: list[str] = []
+    _describe(made.node_tree, lines)
+    return "\n".join(lines)
+
+
+def _describe(tree: Any, lines: list[str]) -> None:
+    for node in tree.nodes:
+        lines.append(f"{node.bl_idname} {node.name} {node.mute}")
+        for name, prop in node.bl_rna.properties.items():
+            if prop.type in {"BOOLEAN", "INT", "FLOAT", "ENUM", "STRING"} and name != "select":
+                value = getattr(node, name)
+                shown = (
+                    list(value) if hasattr(value, "__len__") and prop.type != "STRING" else value
+                )
+                lines.append(f"{name} {shown!r}")
+        for socket in node.inputs:
+            value = getattr(socket, "default_value", None)
+            lines.append(repr(list(value) if hasattr(value, "__len__") else value))
+        image = getattr(node, "image", None)
+        if image is not None:
+            lines.append(f"{image.filepath} {image.session_uid}")
+        ramp = getattr(node, "color_ramp", None)
+        for stop in ramp.elements if ramp is not None else ():
+            lines.append(f"{stop.position} {list(stop.color)}")
+        if getattr(node, "node_tree", None) is not None:
+            _describe(node.node_tree, lines)
+    lines.extend(
+        f"{link.from_node.name} {link.from_socket.identifier} {link.to_node.name} "
+        f"{link.to_socket.identifier}"
+        for link in tree.links
+    )

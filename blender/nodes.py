@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Translates value nodes of Blender's materials to MaterialX."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from .context import Translation
+from .graph import Graph, Value, colour, number, vector
+
+KINDS = {
+    "VALUE": "float",
+    "INT": "float",
+    "BOOLEAN": "float",
+    "RGBA": "color3",
+    "VECTOR": "vector3",
+}
+
+
+class Nodes:
+    """Translates the nodes of one material.
+
+    Attributes:
+        into: The translation.
+        graph: Nodes that were made.
+        owner: Name of the material, for messages.
+        normal: Shading normal that the surface's normal input gave, if any.
+    """
+
+    def __init__(self, into: Translation, graph: Graph, owner: str) -> None:
+        self.into, self.graph, self.owner = into, graph, owner
+        self._known: dict[tuple[Any, ...], Value] = {}
+        self._groups: list[Any] = []
+
+    def read(self, node: Any, name: str | int, kind: str | None = None) -> Value:
+        """Returns the value of an input of a node."""
+        return self.socket(node.inputs[name], kind)
+
+    def socket(self, socket: Any, kind: str | None = None) -> Value:
+        """Returns the value of an input socket, converted to ``kind``."""
+        kind = kind or KINDS.get(socket.type, "float")
+        own = KINDS.get(socket.type, kind)
+        link = next((link for link in socket.links if link.is_valid and not link.is_muted), None)
+        if link is None:
+            return self.graph.to(kind, self._constant(socket, own))
+        found = self.output(link.from_node, link.from_socket)
+        if found is None:
+            return self.graph.to(kind, self._constant(socket, own))
+        return self.graph.to(kind, found)
+
+    @staticmethod
+    def _constant(socket: Any, kind: str) -> Value:
+        value = getattr(socket, "default_value", 0.0)
+        if kind == "float":
+            return number(value if not hasattr(value, "__len__") else value[0])
+        return colour(value) if kind == "color3" else vector(value)
+
+    def output(self, node: Any, socket: Any) -> Value | None:
+        """Returns the value of an output of a node; None, after a message, if not supported."""
+        from .node_types import TYPES
+
+        if node.mute:
+            return self._bypassed(node, socket)
+        if node.type == "REROUTE":
+            return self.socket(node.inputs[0], KINDS.get(node.inputs[0].type, "color3"))
+        if node.type == "GROUP":
+            return self._group(node, socket)
+        if node.type == "GROUP_INPUT":
+            return self._group_input(socket)
+        key = (*(id(group) for group in self._groups), node.name, socket.identifier)
+        if key not in self._known:
+            made: Callable[[Nodes, Any, Any], Value | None] | None = TYPES.get(node.type)
+            value = made(self, node, socket) if made is not None else None
+            if value is None:
+                self.miss(f"node {node.bl_label} (the input's own value instead)")
+                return None
+            self._known[key] = value
+        return self._known[key]
+
+    def _bypassed(self, node: Any, socket: Any) -> Value | None:
+        for link in node.internal_links:
+            if link.to_socket == socket:
+                return self.socket(link.from_socket)
+        return None
+
+    def _group(self, node: Any, socket: Any) -> Value | None:
+        """Continues inside a group."""
+        if node.node_tree is None:
+            return None
+        output = next((n for n in node.node_tree.nodes if n.type == "GROUP_OUTPUT"), None)
+        if output is None:
+            return None
+        inner = next((s for s in output.inputs if s.identifier == socket.identifier), None)
+        if inner is None:
+            return None
+        self._groups.append(node)
+        try:
+            return self.socket(inner, KINDS.get(inner.type))
+        finally:
+            self._groups.pop()
+
+    def _group_input(self, socket: Any) -> Value | None:
+        """Continues outside of the group."""
+        if not self._groups:
+            return None
+        group = self._groups.pop()
+        try:
+            outer = next((s for s in group.inputs if s.identifier == socket.identifier), None)
+            return None if outer is None else self.socket(outer, KINDS.get(outer.type))
+        finally:
+            self._groups.append(group)
+
+    def shader(self, socket: Any) -> tuple[Any, list[Any]] | None:
+        """Returns the shader node that drives a socket, with the groups around it."""
+        link = next((link for link in socket.links if link.is_valid and not link.is_muted), None)
+        if link is None:
+            return None
+        node, at = link.from_node, link.from_socket
+        if node.type == "REROUTE":
+            return self.shader(node.inputs[0])
+        if node.type == "GROUP_INPUT" and self._groups:
+            group = self._groups.pop()
+            outer = next(s for s in group.inputs if s.identifier == at.identifier)
+            return self.shader(outer)
+        if node.type == "GROUP" and node.node_tree is not None:
+            output = next((n for n in node.node_tree.nodes if n.type == "GROUP_OUTPUT"), None)
+            if output is None:
+                return None
+            self._groups.append(node)
+            inner = next(s for s in output.inputs if s.identifier == at.identifier)
+            return self.shader(inner)
+        return node, list(self._groups)
+
+    def within(self, groups: list[Any]) -> None:
+        """Sets the groups around the nodes that are read next."""
+        self._groups = list(groups)
+
+    def miss(self, feature: str) -> None:
+        """Reports a feature without effect."""
+        self.into.report.miss(feature, self.owner)
+
+    def approximate(self, feature: str) -> None:
+        """Reports an approximated feature."""
+        self.into.report.approximate(feature, self.owner)

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs Wavecomb as a separate process, with its own Python and its own OpenUSD."""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import shutil
+import signal
+import subprocess
+import tempfile
+import threading
+from collections.abc import Sequence
+from typing import Any
+
+_FOUND: dict[str, tuple[str, str]] = {}
+
+
+class WavecombError(Exception):
+    """Wavecomb could not be started or failed; the message is one line."""
+
+
+def locate(wanted: str) -> tuple[str, str]:
+    """Returns Wavecomb's Python and its module that starts isolated processes.
+
+    Args:
+        wanted: Program ``wavecomb`` or its Python; empty searches PATH.
+
+    Raises:
+        WavecombError: It was not found, or it does not start.
+    """
+    program = shutil.which(wanted or "wavecomb")
+    if program is None:
+        where = f"{wanted} is not a program" if wanted else "no wavecomb on PATH"
+        raise WavecombError(
+            f"Wavecomb was not found ({where}): install it with pip and set its program in the "
+            "preferences of the add-on"
+        )
+    if program not in _FOUND:
+        python = _python_of(program)
+        code = "import importlib.util as u; print(u.find_spec('wavecomb').origin)"
+        try:
+            done = subprocess.run(
+                [python, "-I", "-c", code], capture_output=True, text=True, timeout=60, check=False,
+                env=environment(),
+            )  # fmt: skip
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise WavecombError(f"{python} does not start: {error}") from error
+        if done.returncode != 0:
+            raise WavecombError(f"{python} has no Wavecomb: install it there with pip")
+        boot = os.path.join(os.path.dirname(done.stdout.strip()), "boot.py")
+        _FOUND[program] = (python, boot)
+    return _FOUND[program]
+
+
+def _python_of(program: str) -> str:
+    """Returns the interpreter of a script, from its first line, or the program itself."""
+    with open(program, "rb") as stream:
+        first = stream.readline(512)
+    if first.startswith(b"#!"):
+        words = first[2:].decode(errors="replace").split()
+        if words and "python" in os.path.basename(words[0]):
+            return words[0]
+    beside = os.path.join(os.path.dirname(program), "python")
+    return beside if os.path.exists(beside) and first.startswith(b"#!") else program
+
+
+def environment() -> dict[str, str]:
+    """Returns Blender's environment without variables that redirect Python, USD or libraries."""
+    drop = ("PYTHON", "PXR_", "USD_", "LD_PRELOAD", "MATERIALX", "OCIO")
+    return {k: v for k, v in os.environ.items() if not k.startswith(drop)}
+
+
+class Render:
+    """A running ``wavecomb render``."""
+
+    def __init__(self, program: str, arguments: Sequence[str]) -> None:
+        """Starts it; it ends with this process.
+
+        Raises:
+            WavecombError: It could not be started.
+        """
+        python, boot = locate(program)
+        words = [python, "-I", boot, f"--parent={os.getpid()}", "wavecomb", "render", *arguments]
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115
+        try:
+            self._process = subprocess.Popen(
+                [*words, "--progress", "json"],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=self._errors,
+                env=environment(),
+                start_new_session=True,
+            )
+        except OSError as error:
+            raise WavecombError(f"Wavecomb does not start: {error}") from error
+        self._events: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            try:
+                event = json.loads(line)
+            except ValueError:
+                continue
+            if isinstance(event, dict):
+                self._events.put(event)
+
+    def event(self, wait_s: float) -> dict[str, Any] | None:
+        """Returns the next progress event; None if there is none within ``wait_s``."""
+        try:
+            return self._events.get(timeout=wait_s)
+        except queue.Empty:
+            return None
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the process has not ended, or events of it are left."""
+        return self._process.poll() is None or not self._events.empty()
+
+    def stop(self) -> None:
+        """Asks it to stop, which keeps the samples so far; kills it if it does not."""
+        if self._process.poll() is None:
+            self._process.send_signal(signal.SIGTERM)
+
+    def kill(self) -> None:
+        """Kills it with its children."""
+        if self._process.poll() is None:
+            try:
+                os.killpg(self._process.pid, signal.SIGKILL)
+            except OSError:
+                self._process.kill()
+            self._process.wait()
+
+    def finish(self) -> list[str]:
+        """Waits for the end; returns warnings.
+
+        Raises:
+            WavecombError: It failed; the message is its last line.
+        """
+        code = self._process.wait()
+        self._reader.join(timeout=10.0)
+        self._errors.seek(0)
+        lines = self._errors.read().decode(errors="replace").splitlines()
+        self._errors.close()
+        lines = [line.strip() for line in lines if line.strip()]
+        if code == 0 or code in (128 + signal.SIGTERM, 128 + signal.SIGINT):
+            return lines
+        if code < 0:
+            name = signal.Signals(-code).name
+            raise WavecombError(f"Wavecomb was ended by {name}; Blender and the scene are intact")
+        errors = [line for line in lines if line.startswith(("error:", "Error:"))]
+        raise WavecombError((errors or lines or [f"Wavecomb ended with code {code}"])[-1])

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Renders .blend files: Blender, as a separate process, exports a stage.
+
+The translation is the Blender extension in ``blender/`` of a checkout, which has another licence
+and is not part of this package.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from wavecomb import processes
+from wavecomb.errors import WavecombError
+
+LIMIT_S = 1800.0
+"""Time limit of the export in seconds."""
+
+
+def extension() -> Path:
+    """Returns the folder of the Blender extension.
+
+    Raises:
+        WavecombError: It was not found.
+    """
+    named = os.environ.get("WAVECOMB_BLENDER_EXTENSION")
+    places = [Path(named)] if named else []
+    places.append(Path(__file__).resolve().parents[2] / "blender")
+    for place in places:
+        if (place / "export_file.py").is_file():
+            return place
+    raise WavecombError(
+        "the Blender extension was not found: set WAVECOMB_BLENDER_EXTENSION to the folder "
+        "`blender` of a checkout of Wavecomb"
+    )
+
+
+def program() -> list[str]:
+    """Returns the command that runs a script in Blender with scripts of files disabled.
+
+    It is ``$WAVECOMB_BLENDER``, a Blender or a Python with bpy; else ``blender`` on PATH; else this
+    Python if it has bpy.
+
+    Raises:
+        WavecombError: There is none of them.
+    """
+    named = os.environ.get("WAVECOMB_BLENDER")
+    found = shutil.which(named or "blender")
+    if found is None and named:
+        raise WavecombError(f"WAVECOMB_BLENDER: {named} is not a program")
+    if found is None and importlib.util.find_spec("bpy") is not None:
+        found = processes.interpreter()
+    if found is None:
+        raise WavecombError(
+            "rendering a .blend file needs Blender 4.2 or later: put `blender` on PATH, or set "
+            "WAVECOMB_BLENDER to it or to a Python with bpy"
+        )
+    if Path(found).name.startswith("python"):
+        return [found, "-I"]
+    options = ["--background", "--factory-startup", "--disable-autoexec"]
+    return [found, *options, "--python-exit-code", "1", "--python"]
+
+
+def export(blend: str, folder: str, frame: float | None) -> tuple[str, list[str], list[str]]:
+    """Exports the scene of a file.
+
+    Args:
+        blend: The file.
+        folder: Folder for the stage.
+        frame: Frame; None means the current one of the file.
+
+    Returns:
+        The stage, options of ``wavecomb render``, and messages about what was not translated.
+
+    Raises:
+        WavecombError: The file could not be exported.
+    """
+    if not os.path.isfile(blend):
+        raise WavecombError(f"{blend}: there is no such file")
+    script = str(extension() / "export_file.py")
+    words = [os.path.abspath(blend), folder, *([] if frame is None else [repr(frame)])]
+    try:
+        done = subprocess.run(
+            [*program(), script, "--", *words], stdin=subprocess.DEVNULL, capture_output=True,
+            text=True, errors="replace", timeout=LIMIT_S, check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired as error:
+        raise WavecombError(f"{blend}: Blender took more than {LIMIT_S:.0f} s") from error
+    except OSError as error:
+        raise WavecombError(f"Blender does not start: {error}") from error
+    result = Path(folder, "stage.json")
+    if done.returncode != 0 or not result.is_file():
+        lines = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
+        last = lines[-1].removeprefix("error: ") if lines else f"{blend}: Blender could not open it"
+        raise WavecombError(last)
+    row = json.loads(result.read_text(encoding="utf-8"))
+    return row["stage"], row["options"], row["messages"]
+
+
+def render(blend: str, frame: float | None, arguments: Sequence[str]) -> int:
+    """Runs ``wavecomb render`` on the exported stage of a file; returns its exit code.
+
+    Args:
+        blend: The file, one of ``arguments``.
+        frame: Frame to export; None means the current one of the file.
+        arguments: Arguments of the command.
+
+    Raises:
+        WavecombError: The file could not be exported.
+    """
+    with tempfile.TemporaryDirectory(prefix="wavecomb-blend-") as folder:
+        stage, options, messages = export(blend, folder, frame)
+        for line in messages:
+            print(line, file=sys.stderr)
+        at = list(arguments).index(blend)
+        words = [*arguments[:at], stage, *options, *arguments[at + 1 :]]
+        command = processes.command("wavecomb", "render", *words, parent=os.getpid())
+        child = processes.popen(command, start_new_session=False)
+        while True:
+            try:
+                code = child.wait()
+                return code if code >= 0 else 128 - code
+            except KeyboardInterrupt:
+                child.terminate()

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The table of parity scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Expected:
+    """Bounds of a comparison.
+
+    Attributes:
+        low: Lowest ratio of the means, Wavecomb to Cycles.
+        high: Highest ratio of the means.
+        outside: Largest fraction of blocks that differ by more than 2 % and four standard errors.
+        why: Reason for a difference; empty where the models are the same.
+    """
+
+    low: float = 0.99
+    high: float = 1.01
+    outside: float = 0.05
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class ParityScene:
+    """A scene made by script.
+
+    Attributes:
+        name: Name, which names its images.
+        group: Heading of the page.
+        make: Function that fills the empty scene.
+        expected: Bounds of the comparison.
+        spp: Samples per pixel of each of two renders.
+        messages: Words that the report of the translation must contain.
+    """
+
+    name: str
+    group: str
+    make: Callable[[], None]
+    expected: Expected
+    spp: int
+    messages: tuple[str, ...] = ()
+
+
+SCENES: dict[str, ParityScene] = {}
+
+
+def scene(
+    group: str,
+    low: float = 0.99,
+    high: float = 1.01,
+    outside: float = 0.05,
+    why: str = "",
+    spp: int = 128,
+    messages: tuple[str, ...] = (),
+) -> Callable[[Callable[[], None]], Callable[[], None]]:
+    """Adds a function to the table, under its name."""
+
+    def added(make: Callable[[], None]) -> Callable[[], None]:
+        expected = Expected(low, high, outside, why)
+        SCENES[make.__name__] = ParityScene(make.__name__, group, make, expected, spp, messages)
+        return make
+
+    return added

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The render engine: the command line's image, errors, cancelling, animation, .blend files."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).resolve().parent
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+def _rows(done: subprocess.CompletedProcess[str]) -> dict[str, object]:
+    lines = [line for line in done.stdout.splitlines() if line.startswith("ROW ")]
+    assert lines, done.stdout[-2000:] + done.stderr[-2000:]
+    found: dict[str, object] = {}
+    for line in lines:
+        found |= json.loads(line[4:])
+    return found
+
+
+def test_command_line_writes_the_same_image(blender: Run, tmp_path: Path) -> None:
+    """F12 and ``wavecomb render`` on the stage that it kept give the same values."""
+    row = _rows(blender(str(HERE / "engine_cases.py"), "same", str(tmp_path)))
+    assert row["same"] is True
+
+
+def test_errors_are_one_line(blender: Run, tmp_path: Path) -> None:
+    """A missing program, a missing camera and a killed process: Blender lives on."""
+    row = _rows(blender(str(HERE / "engine_cases.py"), "errors", str(tmp_path)))
+    assert "Wavecomb was not found" in str(row["program"])
+    assert "has no camera" in str(row["camera"])
+    assert "SIGKILL" in str(row["killed"])
+    assert row["alive"] is True
+
+
+def test_animation_exports_geometry_once(blender: Run, tmp_path: Path) -> None:
+    """Frames with motion blur reuse the exported geometry and equal frames rendered alone."""
+    row = _rows(blender(str(HERE / "engine_cases.py"), "animation", str(tmp_path)))
+    assert row["exports"] == 1
+    assert float(str(row["difference"])) < 1e-6
+
+
+def test_blend_file(blender: Run, tmp_path: Path) -> None:
+    """``wavecomb render scene.blend`` exports with scripts disabled."""
+    done = blender(str(HERE / "engine_cases.py"), "blend", str(tmp_path))
+    python = str(_rows(done)["python"])
+    environment = {**os.environ, "WAVECOMB_BLENDER": python}
+    wavecomb = str(Path(sys.prefix, "bin", "wavecomb"))
+    words = [wavecomb, "render", "a.blend", "-o", "a.exr", "--spp", "4", "--size", "64x48"]
+    made = subprocess.run(
+        words, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
+    assert made.returncode == 0, made.stderr
+    assert (tmp_path / "a.exr").exists()
+    assert not (tmp_path / "executed").exists()
+
+
+@pytest.mark.parametrize("content", [b"", b"BLENDER-v501nonsense"])
+def test_broken_blend_file_is_one_line(blender: Run, tmp_path: Path, content: bytes) -> None:
+    """A file that Blender cannot open."""
+    done = blender(str(HERE / "engine_cases.py"), "blend", str(tmp_path))
+    python = str(_rows(done)["python"])
+    (tmp_path / "b.blend").write_bytes(content)
+    made = subprocess.run(
+        [str(Path(sys.prefix, "bin", "wavecomb")), "render", "b.blend", "-o", "b.exr"],
+        cwd=tmp_path, env={**os.environ, "WAVECOMB_BLENDER": python}, capture_output=True,
+        text=True, check=False,
+    )  # fmt: skip
+    assert made.returncode == 2
+    assert len(made.stderr.strip().splitlines()) == 1
