@@ -706,8 +706,10 @@ class Settings:
     """Limits the image, in memory and in files, to the region. Default: False."""
     roulette: Literal["auto", "off", "throughput", "cost-aware", "efficient"]
     """Russian roulette: how paths are terminated early, without bias. Default: auto."""
+    quality: Literal["auto", "plain"]
+    """Whether pilot renders decide about `guiding` and `transport`. Default: auto."""
     transport: Literal["path", "light", "auto", "bdpt"]
-    """Where paths start. Default: path."""
+    """Where paths start. Default: auto."""
     light_aim: Literal["off", "on"]
     """Where light paths are aimed. Default: on."""
     merge_radius: float
@@ -724,7 +726,7 @@ class Settings:
     equiangular: Literal["off", "on"]
     """How scattering distances in homogeneous volumes are sampled. Default: off."""
     guiding: Literal["auto", "on", "off"]
-    """Path guiding: bounces also follow the learned incident light. Default: off."""
+    """Path guiding: bounces also follow the learned incident light. Default: auto."""
     learn_memory: int
     """Memory limit of learned data in MB. Default: 64."""
     adaptive: float

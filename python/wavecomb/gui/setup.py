@@ -20,6 +20,9 @@ NOT_LIVE = ("progressive", "crop")
 """Settings that do not apply to live renders, which always use progressive passes and the whole
 image."""
 
+_LIVE = {"quality": "plain"}
+"""Defaults that differ in live renders, whose first image should not wait for pilot renders."""
+
 
 if TYPE_CHECKING:
 
@@ -32,7 +35,11 @@ if TYPE_CHECKING:
 else:
     _Rows = make_dataclass(
         "_Rows",
-        [(row.name, Any, row.default) for row in settings().values() if row.name not in NOT_LIVE],
+        [
+            (row.name, Any, _LIVE.get(row.name, row.default))
+            for row in settings().values()
+            if row.name not in NOT_LIVE
+        ],
         frozen=True,
     )
 

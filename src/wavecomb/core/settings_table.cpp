@@ -185,6 +185,11 @@ std::vector<SettingInfo> work_settings() {
            {"efficient",
             "Survival by expected contribution and cost, learned before the first pass."}},
           "Russian roulette: how paths are terminated early, without bias."),
+      choice<&S::quality>(
+          "quality", "Quality",
+          {{"auto", "Path guiding and light paths where short pilot renders predict a gain."},
+           {"plain", "No pilot renders: `auto` means no path guiding and no light paths."}},
+          "Whether pilot renders decide about `guiding` and `transport`."),
       choice<&S::transport>("transport", "Transport",
                             {{"path", "Paths start at the camera only."},
                              {"light",

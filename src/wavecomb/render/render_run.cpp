@@ -32,12 +32,14 @@ std::vector<CryptoManifest> crypto_manifests(const Scene& scene,
 }  // namespace
 
 RenderRun::RenderRun(std::shared_ptr<const Scene> scene, const RenderPlan& plan,
-                     const RenderOptions& options, Watch& watch, double build_s)
+                     const RenderOptions& options, Watch& watch, double build_s,
+                     std::optional<TransportChoice> transport)
     : scene_(std::move(scene)),
       plan_(plan),
       options_(options),
       watch_(watch),
       build_s_(build_s),
+      transport_(std::move(transport)),
       costs_(*scene_, plan.traits, plan.settings),
       film_(plan.make_film()),
       context_(plan.make_context(film_, costs_, options.recorder,
@@ -110,8 +112,8 @@ void RenderRun::take_snapshot(bool is_finished) {
   check_textures();
   film_.update_light_path_aovs();
   if (!options_.snapshot) return;
-  options_.snapshot({film_, loop_.pass(), *pilots_.training, loop_.status(), is_finished,
-                     plan_.aovs.layer_names, [this] { return statistics(); }});
+  options_.snapshot({film_, loop_.pass(), *pilots_.training, transport_, loop_.status(),
+                     is_finished, plan_.aovs.layer_names, [this] { return statistics(); }});
 }
 
 void RenderRun::check_textures() const {
@@ -132,6 +134,7 @@ RenderStatistics RenderRun::statistics() const {
   s.error = status.error;
   s.allotment = loop_.allocation();
   s.guiding = pilots_.training->statistics;
+  s.transport = transport_;
   if (const LightAiming* aiming = pilots_.aiming.get(); aiming && aiming->paths > 0)
     s.light_aiming = {aiming->aim.count, aiming->paths, aiming->seconds};
   s.lights_without_paths = plan_.lights_without_paths;

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "wavecomb/render/passes/pass_loop.h"
 #include "wavecomb/render/passes/pass_runner.h"
 #include "wavecomb/render/pilots/pilots.h"
+#include "wavecomb/render/pilots/transport_choice.h"
 #include "wavecomb/render/render_plan.h"
 #include "wavecomb/render/renderer.h"
 #include "wavecomb/render/statistics/render_costs.h"
@@ -35,9 +37,11 @@ struct PilotShared {
 /// constructor outlive the run.
 class RenderRun {
  public:
-  /// `build_s` is the build time of the accelerator in seconds, for statistics.
+  /// `build_s` is the build time of the accelerator in seconds, for statistics. `transport` is the
+  /// choice that led to the plan, if the settings left it open.
   RenderRun(std::shared_ptr<const Scene> scene, const RenderPlan& plan,
-            const RenderOptions& options, Watch& watch, double build_s);
+            const RenderOptions& options, Watch& watch, double build_s,
+            std::optional<TransportChoice> transport);
 
   /// Runs the pilots and all passes. Calls `learned` on the worker thread when the pilots are done,
   /// unless the render was stopped before. Throws what callbacks and workers throw.
@@ -65,6 +69,7 @@ class RenderRun {
   const RenderOptions& options_;
   Watch& watch_;
   double build_s_;
+  std::optional<TransportChoice> transport_;
   RenderCosts costs_;
   Film film_;
   std::vector<std::byte> learned_before_;  ///< packed_training() of an earlier render

@@ -11,6 +11,7 @@
 #include "wavecomb/film/film.h"
 #include "wavecomb/render/passes/pass_plan.h"
 #include "wavecomb/render/pilots/guiding_training.h"
+#include "wavecomb/render/pilots/transport_choice.h"
 #include "wavecomb/render/render_status.h"
 #include "wavecomb/render/statistics/render_statistics.h"
 
@@ -20,7 +21,8 @@ namespace wavecomb {
 struct Snapshot {
   Film& film;
   const PassState& pass;
-  const GuidingTraining& training;  ///< from before the first pass; may be empty
+  const GuidingTraining& training;                  ///< from before the first pass; may be empty
+  const std::optional<TransportChoice>& transport;  ///< if the settings left it open
   RenderStatus status;
   bool finished;  ///< done, cancelled or out of time: no more samples follow
   const std::vector<std::string>& light_groups;  ///< light groups that the film keeps
