@@ -73,7 +73,7 @@ def save_learned(path: str | os.PathLike[str], learned: bytes) -> None:
     if not learned:
         raise WavecombError(
             f"{os.fspath(path)}: nothing was learned; a render learns from some 130,000 samples on "
-            "with guiding on, and from a million on with guiding auto"
+            "with guiding on, and from two million on with guiding auto"
         )
     import numpy as np
 

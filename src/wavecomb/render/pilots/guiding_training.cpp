@@ -22,7 +22,7 @@ constexpr uint64_t kTrainingShare = 8, kMaxTrainingPaths = 700'000, kMinTraining
 /// For Guiding::kAuto: least number of samples of a render for which a pilot render pays, and the
 /// number of samples for each training path of the first two rounds. The second round takes place
 /// only if the field of the first one reduces noise.
-constexpr uint64_t kMinAutoSamples = 1'000'000;
+constexpr uint64_t kMinAutoSamples = 2'000'000;
 constexpr std::array<uint64_t, 2> kAutoShares = {200, 40};
 constexpr uint64_t kMaxFirstPaths = 30'000, kMaxSecondPaths = 150'000;
 /// Camera samples and training paths per thread and second, assumed before the first round is
