@@ -264,8 +264,9 @@ Result run_render(const std::function<WavefrontRenderer&(const Settings&)>& rend
   if (!a.state.is_none()) {
     resumed = nb::cast<nb::dict>(a.state);
     options.resume = resumed_from(resumed);
+    options.learned = learned_in(resumed);
   }
-  if (!a.learned.is_none()) {
+  if (!a.learned.is_none() && options.learned.empty()) {
     const auto learned_bytes = nb::cast<nb::bytes>(a.learned);
     const auto* first = reinterpret_cast<const std::byte*>(learned_bytes.c_str());
     options.learned.assign(first, first + learned_bytes.size());
@@ -277,7 +278,9 @@ Result run_render(const std::function<WavefrontRenderer&(const Settings&)>& rend
     result.image = ready.render(settings, options);
     result.statistics = ready.statistics();
     result.profile = ready.cost_profile();
-    if (result.statistics.guiding.paths > 0) result.learned = ready.packed_learned();
+    const std::optional<TransportChoice>& choice = result.statistics.transport;
+    if (result.statistics.guiding.paths > 0 || (choice && choice->gain > 0))
+      result.learned = ready.packed_learned();
   }
   return result;
 }

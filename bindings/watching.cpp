@@ -64,7 +64,7 @@ nb::dict state_dict(const Snapshot& s) {
     d[("film." + block.name).c_str()] = view(block.bytes.data(), block.bytes.size());
   if (const DeepFilm& deep = s.film.aovs().deep(); !deep.empty())
     d["film.deep"] = owned(deep.packed());
-  if (std::vector<std::byte> learned = packed_training(s.training); !learned.empty())
+  if (std::vector<std::byte> learned = packed_training(s.training, s.transport); !learned.empty())
     d["learned.field"] = owned(std::move(learned));
   return d;
 }
@@ -192,11 +192,15 @@ std::function<std::vector<std::byte>(Film&, PassState&)> resumed_from(const nb::
       if (counts.size() != 0)
         std::memcpy(pass.allocation.counts.data(), counts.data(), counts.size());
     }
-    if (!state.contains("learned.field")) return std::vector<std::byte>();
-    const auto learned = nb::cast<Bytes>(state["learned.field"]);
-    const std::span<const std::byte> bytes = span_of(learned);
-    return std::vector<std::byte>(bytes.begin(), bytes.end());
+    return learned_in(state);
   };
+}
+
+std::vector<std::byte> learned_in(const nb::dict& state) {
+  if (!state.contains("learned.field")) return {};
+  const auto learned = nb::cast<Bytes>(state["learned.field"]);
+  const std::span<const std::byte> bytes = span_of(learned);
+  return {bytes.begin(), bytes.end()};
 }
 
 void bind_watching(nb::module_& m) {

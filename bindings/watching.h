@@ -14,6 +14,8 @@
 /// all three arguments must outlive the render.
 wavecomb::RenderOptions watched_by(const nanobind::object& progress,
                                    const nanobind::object& watcher, const nanobind::dict& settings);
+/// Returns RenderOptions::learned of the render that `state` is from, or nothing.
+std::vector<std::byte> learned_in(const nanobind::dict& state);
 /// Returns RenderOptions::resume for `state`, the result of an earlier Snapshot.state().
 std::function<std::vector<std::byte>(wavecomb::Film&, wavecomb::PassState&)> resumed_from(
     const nanobind::dict& state);

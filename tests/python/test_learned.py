@@ -108,7 +108,9 @@ def test_what_is_no_good_ends_in_a_line(
     assert done.exit_code == 2 and "no such file" in done.output and not out.exists()
     done = run("render", stage, "-o", out, "--guiding", "on", "--learn-from", "before")
     assert done.exit_code == 2 and "also give --frames" in done.output
-    done = run("render", stage, "-o", out, "--learn-to", tmp_path / "b.learned")
+    done = run(
+        "render", stage, "-o", out, "--quality", "plain", "--learn-to", tmp_path / "b.learned"
+    )
     assert done.exit_code == 2 and "this render trains no guiding field" in done.output
 
 

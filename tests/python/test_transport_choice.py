@@ -16,7 +16,7 @@ from wavecomb.scenes import write_scene
 pytest.importorskip("wavecomb._core")
 
 SIZE, SPP = 32, 4
-ENOUGH = {"size": (160, 160), "spp": 96}
+ENOUGH = {"size": (160, 160), "spp": 128}
 """Just enough samples for a pilot render."""
 
 
@@ -46,7 +46,7 @@ def test_auto_uses_light_paths_for_caustics_alike_for_all_schedules(caustics: Pa
     ("settings", "why"),
     [
         ({"size": (32, 32), "spp": 16}, "too few samples"),
-        ({"guiding": "auto"}, "do not go with guiding"),
+        ({"guiding": "on"}, "do not go with guiding"),
         ({"aovs": ("lpe:a=C.{10}D.*[LO]",)}, "no room for so many light path expressions"),
         ({"clamp_indirect": 1.0}, "do not go with clamp_indirect"),
     ],

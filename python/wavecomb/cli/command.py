@@ -50,7 +50,7 @@ GROUPS: dict[str, tuple[str, str]] = {
         "deep compression tile split deep_samples deep_tolerance",
     ),
     "Light transport": (
-        "guiding transport",
+        "quality guiding transport",
         "learn_from learn_to",
     ),
     "Performance": (

@@ -145,8 +145,8 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
         if learned["used"] and settings["roulette"] in ("auto", "efficient"):
             line += f"; {_percent(learned['survival'])} of paths continue after a bounce"
         lines.append(line)
-    elif settings.get("guiding") == "auto":
-        lines.append("not guided: too few samples to predict the gain")
+    elif settings.get("guiding") == "auto" and settings.get("quality", "auto") == "auto":
+        lines.append(f"not guided: {_why_not_guided(stats)}")
     if transport := stats.get("transport"):
         lines.append(_transport_line(transport))
     if aiming := stats.get("light_aiming"):
@@ -159,6 +159,15 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
         mean = (before + stats["counts"]["samples"]) / rendered_pixels(settings)
         lines.append(f"{stats['passes']} passes, {mean:.3g} samples per pixel")
     return lines
+
+
+def _why_not_guided(stats: Mapping[str, Any]) -> str:
+    """Returns why ``--guiding auto`` did not measure a gain."""
+    transport = stats.get("transport") or {}
+    given = stats["settings"].get("transport")
+    if transport.get("chosen") == "light" or given in ("light", "bdpt"):
+        return "guiding does not go with light paths"
+    return "too few samples to predict the gain"
 
 
 def _transport_line(chosen: Mapping[str, Any]) -> str:

@@ -54,9 +54,13 @@ class Learning:
 def check_trains_field(settings: Settings, option: str) -> None:
     """Raises WavecombError if a render with these settings trains no guiding field."""
     chosen = settings.to_dict()
-    if chosen["guiding"] == "off" and chosen["roulette"] != "efficient":
+    may_guide = chosen["guiding"] == "on" or (
+        chosen["guiding"] == "auto" and chosen["quality"] == "auto"
+    )
+    if not may_guide and chosen["roulette"] != "efficient":
         raise WavecombError(
-            f"{option}: this render trains no guiding field; give --guiding auto or on as well"
+            f"{option}: this render trains no guiding field; give --guiding on, or auto with "
+            "--quality auto"
         )
 
 
@@ -69,8 +73,8 @@ def save_learned(path: str | os.PathLike[str], learned: bytes) -> None:
     """
     if not learned:
         raise WavecombError(
-            f"{os.fspath(path)}: nothing was learned; a render is guided with guiding auto or on, "
-            "and learns from some 130,000 samples on"
+            f"{os.fspath(path)}: nothing was learned; a render learns from some 130,000 samples on "
+            "with guiding on, and from two million on with guiding auto"
         )
     import numpy as np
 

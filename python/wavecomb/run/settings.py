@@ -135,7 +135,8 @@ def image_bytes(settings: Settings, aovs: Sequence[str], light_groups: int = 1) 
     each = aov_names.bytes_per_pixel(others, light_groups)
     each += _ERROR_BYTES_PER_PIXEL * has_error_layers(settings)
     each += _CASCADE_BYTES_PER_PIXEL * (settings.firefly != "keep")
-    if settings.transport != "path":
+    may_have_splats = settings.transport != "auto" or settings.quality != "plain"
+    if settings.transport != "path" and may_have_splats:
         sums = 1 + has_error_layers(settings) + aov_names.splat_layers(aovs, light_groups)
         # Each pixel also stores the samples of its light path.
         each += _SPLAT_BYTES_PER_PIXEL * sums + 4

@@ -23,6 +23,10 @@ constexpr float default_filter_width(FilterKind kind) {
 }
 
 enum class IntegratorKind : uint8_t { kWavefront, kReference };
+/// Whether pilot renders before the first pass decide about path guiding and light paths, as far as
+/// Settings::guiding and Settings::transport leave it open (kAuto). kPlain: no pilot renders; there
+/// is neither.
+enum class Quality : uint8_t { kAuto, kPlain };
 /// Where paths start. kPath: at the camera. kLight: also one light path per camera path, combined
 /// by multiple importance sampling (docs/light-paths.md). kAuto: kLight if a pilot render predicts
 /// a gain (light_paths/render/transport_choice.h). kBdpt: as kLight, and vertices of both are
@@ -53,7 +57,7 @@ enum class TextureFilter : uint8_t { kAuto, kWhole };
 /// Distribution of a render's samples over pixels (render/passes/allotment.h).
 enum class Allocate : uint8_t { kEven, kError, kEfficiency };
 /// Path guiding with a field trained before the first pass (render/pilots/guiding_training.h).
-/// kAuto: if a pilot render predicts a gain.
+/// kAuto: if a pilot render predicts a gain, and paths start at the camera only.
 enum class Guiding : uint8_t { kAuto, kOn, kOff };
 /// Whether records are moved into shading order. kAuto: off, which is faster.
 enum class Materialize : uint8_t { kAuto, kOn, kOff };
@@ -94,15 +98,16 @@ struct Settings {
   TextureFilter texture_filter = TextureFilter::kAuto;
   LightSelection light_selection = LightSelection::kAuto;
   LightWeights light_weights = LightWeights::kCalibrated;
-  Guiding guiding = Guiding::kOff;
+  Guiding guiding = Guiding::kAuto;
   /// Also use equiangular sampling of distances in homogeneous volumes
   /// (medium/volume/equiangular.h).
   bool equiangular = false;
+  Quality quality = Quality::kAuto;
   uint32_t learn_memory_mb = 64;  ///< memory limit of learned data
   /// Sample every non-delta bounce by cosine.
   bool cosine_sampling = false;
   IntegratorKind integrator = IntegratorKind::kWavefront;
-  Transport transport = Transport::kPath;
+  Transport transport = Transport::kAuto;
   /// Aim light paths where earlier ones, traced before the first pass, contributed to the image
   /// (light_paths/render/light_aiming.h).
   bool light_aim = true;

@@ -200,6 +200,14 @@ std::vector<SettingInfo> work_settings() {
             "The survival probability of a path follows its expected contribution and cost, "
             "learned before the first pass."}},
           "Russian roulette, which terminates paths early without bias."),
+      choice<&S::quality>(
+          "quality", "Quality",
+          {{"auto",
+            "Path guiding and light paths are used where short pilot renders predict a gain."},
+           {"plain",
+            "No pilot renders: guiding and transport of mode auto mean no guiding and no light "
+            "paths."}},
+          "Whether short pilot renders decide about path guiding and light paths."),
       choice<&S::transport>("transport", "Transport",
                             {{"path", "Paths start at the camera only."},
                              {"light",

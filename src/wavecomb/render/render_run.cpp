@@ -32,12 +32,14 @@ std::vector<CryptoManifest> crypto_manifests(const Scene& scene,
 }  // namespace
 
 RenderRun::RenderRun(std::shared_ptr<const Scene> scene, const RenderPlan& plan,
-                     const RenderOptions& options, Watch& watch, double build_s)
+                     const RenderOptions& options, Watch& watch, double build_s,
+                     std::optional<TransportChoice> transport)
     : scene_(std::move(scene)),
       plan_(plan),
       options_(options),
       watch_(watch),
       build_s_(build_s),
+      transport_(std::move(transport)),
       costs_(*scene_, plan.traits, plan.settings),
       film_(plan.make_film()),
       joint_(plan.joint, plan.settings),
@@ -108,8 +110,8 @@ void RenderRun::take_snapshot(bool is_finished) {
   check_textures();
   film_.update_splat_aovs();
   if (!options_.snapshot) return;
-  options_.snapshot({film_, loop_.pass(), *pilots_.training, loop_.status(), is_finished,
-                     plan_.aovs.layer_names, [this] { return statistics(); }});
+  options_.snapshot({film_, loop_.pass(), *pilots_.training, transport_, loop_.status(),
+                     is_finished, plan_.aovs.layer_names, [this] { return statistics(); }});
 }
 
 void RenderRun::check_textures() const {
@@ -131,6 +133,7 @@ RenderStatistics RenderRun::statistics() const {
   s.allotment = loop_.allocation();
   s.guiding = pilots_.training->statistics;
   plan_.joint.report(pilots_.joint.get(), s);
+  s.transport = transport_;
   add_up(runner_, context_, *scene_, costs_, s);
   s.scene_bytes = scene_->bytes();
   s.accelerator_bytes = plan_.accelerator.bytes();

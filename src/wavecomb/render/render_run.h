@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,9 +36,11 @@ struct PilotShared {
 /// constructor outlive the run.
 class RenderRun {
  public:
-  /// `build_s` is the build time of the accelerator in seconds, for statistics.
+  /// `build_s` is the build time of the accelerator in seconds, for statistics. `transport` is the
+  /// choice that led to the plan, if the settings left it open.
   RenderRun(std::shared_ptr<const Scene> scene, const RenderPlan& plan,
-            const RenderOptions& options, Watch& watch, double build_s);
+            const RenderOptions& options, Watch& watch, double build_s,
+            std::optional<TransportChoice> transport);
 
   /// Runs the pilots and all passes. Calls `learned` on the worker thread when the pilots are done,
   /// unless the render was stopped before. Throws what callbacks and workers throw.
@@ -65,6 +68,7 @@ class RenderRun {
   const RenderOptions& options_;
   Watch& watch_;
   double build_s_;
+  std::optional<TransportChoice> transport_;
   RenderCosts costs_;
   Film film_;
   std::vector<std::byte> learned_before_;  ///< packed_training() of an earlier render

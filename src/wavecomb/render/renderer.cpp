@@ -36,13 +36,32 @@ struct WavefrontRenderer::Impl {
 
   /// Renders with settings whose transport is decided. Pilot renders pass data in `shared`.
   RenderedImage render(const Settings& settings, LightPathShare light_share,
-                       const RenderOptions& options, Watch& watch, const PilotShared& shared = {});
+                       const RenderOptions& options, Watch& watch, const PilotShared& shared = {},
+                       const std::optional<TransportChoice>& choice = {});
+  /// Decides the transport for `settings`, which leave it open.
+  TransportChoice choose(const Settings& settings, const RenderOptions& options, Watch& watch);
   /// Renders a small image for choose_transport(). Stops if `outer` is stopped.
   TransportPilot render_pilot(const Settings& settings, LightPathShare share, bool wants_squares,
                               const PilotShared& shared, const Watch& outer);
 };
 
 namespace {
+
+/// Decides what can be decided without pilot renders.
+Settings without_open_choices(Settings used) {
+  if (used.quality == Quality::kPlain) {
+    if (used.guiding == Guiding::kAuto) used.guiding = Guiding::kOff;
+    if (used.transport == Transport::kAuto) used.transport = Transport::kPath;
+  }
+  // Roulette by efficiency needs training whether or not guiding helps.
+  if (used.roulette == RouletteKind::kEfficient && used.guiding == Guiding::kAuto)
+    used.guiding = Guiding::kOff;
+  if (used.transport == Transport::kAuto) return used;
+  // Light paths contribute only light that is scattered at least once.
+  if (used.max_depth == 0) used.transport = Transport::kPath;
+  if (used.joins_light() && used.guiding == Guiding::kAuto) used.guiding = Guiding::kOff;
+  return used;
+}
 
 /// Marks the renderer as rendering during its lifetime.
 template <typename Impl>
@@ -132,7 +151,8 @@ std::optional<Pick> WavefrontRenderer::pick(float x, float y, uint32_t width,
 
 std::vector<std::byte> WavefrontRenderer::packed_learned() const {
   const std::lock_guard lock(impl_->mutex);
-  return impl_->learned ? packed_training(*impl_->learned->training) : std::vector<std::byte>();
+  if (!impl_->learned) return {};
+  return packed_training(*impl_->learned->training, impl_->learned->transport);
 }
 
 std::optional<LearnedData> WavefrontRenderer::learned(float x, float y, uint32_t width,
@@ -179,39 +199,53 @@ RenderedImage WavefrontRenderer::render(const Settings& settings, const RenderOp
   settings.check();
   Watch watch(options.interval_s);
   const Running running(*impl_, watch);
-  if (settings.transport != Transport::kAuto) {
-    // Light paths contribute only light that is scattered at least once.
-    Settings used = settings;
-    if (used.max_depth == 0) used.transport = Transport::kPath;
-    return impl_->render(used, {}, options, watch);
+  Settings used = without_open_choices(settings);
+  if (used.transport != Transport::kAuto) return impl_->render(used, {}, options, watch);
+  const TransportChoice choice = impl_->choose(used, options, watch);
+  used.transport = choice.transport;
+  if (used.time_limit > 0)
+    used.time_limit = std::max(1e-6f, used.time_limit - static_cast<float>(choice.seconds));
+  used = without_open_choices(used);
+  return impl_->render(used, choice.share, options, watch, {}, choice);
+}
+
+TransportChoice WavefrontRenderer::Impl::choose(const Settings& settings,
+                                                const RenderOptions& options, Watch& watch) {
+  if (!options.learned.empty()) {
+    TransportChoice earlier = unpacked_transport(options.learned);
+    // The scene or the settings may have changed since.
+    if (earlier.transport == Transport::kPath ||
+        (light_path_conflict(settings).what.empty() && light_path_conflict(*scene).what.empty()))
+      return earlier;
   }
+  if (options.resume) {  // from a version that stored no choice, and had no light paths by default
+    TransportChoice kept;
+    kept.why = "as in the render that is resumed";
+    return kept;
+  }
+  if (const auto kept = pilot_cache.transports.find(scene, settings)) return *kept;
   std::shared_ptr<const LightAiming> aiming;
   const PilotShared shared{&settings, &aiming};
   const TransportChoice choice = choose_transport(
-      *impl_->scene, settings,
+      *scene, settings,
       [&](const Settings& s, LightPathShare share, bool squares) {
-        return impl_->render_pilot(s, share, squares, shared, watch);
+        return render_pilot(s, share, squares, shared, watch);
       },
       [&] { return watch.stopped(); });
-  Settings chosen = settings;
-  chosen.transport = choice.transport;
-  if (chosen.time_limit > 0)
-    chosen.time_limit = std::max(1e-6f, chosen.time_limit - static_cast<float>(choice.seconds));
-  RenderedImage image = impl_->render(chosen, choice.share, options, watch);
-  const std::lock_guard lock(impl_->mutex);
-  impl_->statistics.transport = choice;
-  return image;
+  if (!watch.stopped()) pilot_cache.transports.keep(scene, settings, choice);
+  return choice;
 }
 
 RenderedImage WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare light_share,
                                               const RenderOptions& options, Watch& watch,
-                                              const PilotShared& shared) {
+                                              const PilotShared& shared,
+                                              const std::optional<TransportChoice>& choice) {
   const RenderPlan plan(*scene, *accel, settings, light_share, options.policy);
-  RenderRun run(scene, plan, options, watch, build_s);
+  RenderRun run(scene, plan, options, watch, build_s, choice);
   run.run(pilot_cache, shared, [&](const PilotResults& found) {
     const std::lock_guard lock(mutex);
     learned = std::make_shared<const Learned>(
-        Learned{scene, plan.view.lights.by_tree, found.lights, found.training});
+        Learned{scene, plan.view.lights.by_tree, found.lights, found.training, choice});
   });
   RenderStatistics s = run.statistics();
   const auto keep = [&] {

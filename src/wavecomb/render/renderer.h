@@ -65,8 +65,9 @@ struct RenderOptions {
   /// Restores the empty film and the pass state from a snapshot of a render with these settings.
   /// Returns the packed_training() of that render, or nothing to train again.
   std::function<std::vector<std::byte>(Film&, PassState&)> resume{};
-  /// packed_training() of an earlier render of such a scene, used instead of training. Empty: the
-  /// render trains. The result of resume() takes precedence.
+  /// packed_training() of an earlier render of such a scene, or of the render that is resumed. Used
+  /// instead of training and of choosing the transport. Empty: the render does both itself. The
+  /// result of resume() takes precedence for the training.
   std::vector<std::byte> learned{};
   /// Replaces the policy of the settings.
   const SchedulingPolicy* policy = nullptr;

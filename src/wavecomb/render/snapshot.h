@@ -20,7 +20,8 @@ namespace wavecomb {
 struct Snapshot {
   Film& film;
   const PassState& pass;
-  const GuidingTraining& training;  ///< training before the first pass; may be empty
+  const GuidingTraining& training;                  ///< from before the first pass; may be empty
+  const std::optional<TransportChoice>& transport;  ///< if the settings left it open
   RenderStatus status;
   bool finished;  ///< done, cancelled or out of time: no more samples follow
   const std::vector<std::string>& light_groups;  ///< light groups that the film keeps

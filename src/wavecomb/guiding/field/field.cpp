@@ -25,6 +25,10 @@ constexpr size_t kDirections = 8192;
 constexpr double kPrior = 64;
 /// Minimum number of records of a material before it limits guiding.
 constexpr double kMaterialRecords = 512;
+/// Factor on the survival probability of roulette. Moments from few training paths miss rare light,
+/// and a path that is terminated too often makes a bright pixel, while one that continues too often
+/// costs a few rays.
+constexpr double kSafety = 1.5;
 /// Fraction of bounces sampled by the BSDF in the first round, before moments are known.
 constexpr float kFirstShare = 0.5f;
 
@@ -294,37 +298,32 @@ uint64_t bounce_position_key(const GuidingGrid& grid, const Vec3<float>& p, uint
 void GuidingField::compute_survival(std::span<const BounceSample> training_samples,
                                     const PathStatistics& paths) {
   struct Sums {
-    double count = 0, value = 0, squared = 0, cost = 0;
+    double count = 0, squared = 0, cost = 0;
   };
   const size_t regions = parts_.bsdf_share.size();
   std::vector<Sums> sums(regions + 1);  // the last one: all regions
   parts_.survival.assign(regions, 0.f);
-  const auto for_each = [&, v = view()](const auto& add) {
-    for (const BounceSample& sample : training_samples) {
-      if (!v.grid) break;
-      const auto code = static_cast<uint32_t>(sample.position_key >> 3);
-      const uint32_t cell = detail::guiding_cell<float>(
-          v, compact_bits_3(code), compact_bits_3(code >> 1), compact_bits_3(code >> 2), true);
-      const uint32_t region =
-          parts_.cells[size_t{cell} * kGuidingAxes + (sample.position_key & 7u)];
-      if (region != kNoGuidingRegion) add(sums[region], sample);
-      add(sums[regions], sample);
-    }
-  };
-  for_each([](Sums& s, const BounceSample& sample) {
+  const auto add = [](Sums& s, const BounceSample& sample) {
     s.count += 1;
-    s.value += double{sample.value};
+    // Not clamped as values are: a region whose light varies strongly should terminate few paths.
+    if (std::isfinite(sample.squared)) s.squared += double{sample.squared};
     s.cost += double{sample.cost};
-  });
-  // Clamp squares as values are clamped: no bounce counts for more than sqrt(n) times the mean.
-  for_each([](Sums& s, const BounceSample& sample) {
-    s.squared += std::min(double{sample.squared}, s.value * s.value / s.count);
-  });
+  };
+  const GuidingView v = view();
+  for (const BounceSample& sample : training_samples) {
+    if (!v.grid) break;
+    const auto code = static_cast<uint32_t>(sample.position_key >> 3);
+    const uint32_t cell = detail::guiding_cell<float>(
+        v, compact_bits_3(code), compact_bits_3(code >> 1), compact_bits_3(code >> 2), true);
+    const uint32_t region = parts_.cells[size_t{cell} * kGuidingAxes + (sample.position_key & 7u)];
+    if (region != kNoGuidingRegion) add(sums[region], sample);
+    add(sums[regions], sample);
+  }
   for (size_t i = 0; i < regions; ++i) {
     const Sums& s = sums[i].count >= kMinRegionRecords ? sums[i] : sums[regions];
     if (s.cost > 0 && paths.variance > 0)
       parts_.survival[i] = static_cast<float>(
-          std::sqrt(std::max(s.squared, 0.0) / s.cost * paths.cost / paths.variance));
+          kSafety * std::sqrt(std::max(s.squared, 0.0) / s.cost * paths.cost / paths.variance));
   }
 }
 

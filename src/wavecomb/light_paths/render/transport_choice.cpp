@@ -18,9 +18,9 @@ namespace {
 constexpr uint32_t kTransportSamples = 8;
 constexpr uint64_t kMinTransportPixels = 400, kMaxTransportPixels = 16'384;
 /// A pilot render takes one of every kTransportShare samples of the render. With five images, of
-/// which three cost two or three times as much as the others, pilots take at most a fiftieth of the
+/// which three cost two or three times as much as the others, pilots take about a hundredth of the
 /// render.
-constexpr uint64_t kTransportShare = 500;
+constexpr uint64_t kTransportShare = 1000;
 constexpr std::array<uint32_t, 2> kTransportSeeds = {0x3c6ef372u, 0xa54ff53au};
 /// Costs in rays of a vertex: by kernels for camera paths only, and by kernels that support light
 /// paths.

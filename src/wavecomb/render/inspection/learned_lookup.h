@@ -13,6 +13,7 @@
 #include "wavecomb/core/vec3.h"
 #include "wavecomb/render/pilots/guiding_training.h"
 #include "wavecomb/render/pilots/light_calibration.h"
+#include "wavecomb/render/statistics/render_statistics.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
@@ -23,6 +24,7 @@ struct Learned {
   bool by_tree = false;                             ///< LightView::by_tree
   std::shared_ptr<const LightCalibration> lights;   ///< null if lights are selected by power
   std::shared_ptr<const GuidingTraining> training;  ///< may have no field
+  std::optional<TransportChoice> transport;         ///< if the settings left it open
 };
 
 /// Surface point at which learned data is looked up.

@@ -2,6 +2,7 @@
 #include "wavecomb/render/pilots/guiding_training.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -18,24 +19,26 @@ namespace {
 
 /// Training takes one path for every kTrainingShare samples of the render, within these limits.
 constexpr uint64_t kTrainingShare = 8, kMaxTrainingPaths = 700'000, kMinTrainingPaths = 16'384;
-/// The same for Guiding::kAuto, which does not train with fewer paths.
-constexpr uint64_t kAutoShare = 100, kMinAutoPaths = 200'000;
-/// Least number of training paths for Guiding::kAuto if cost limits them.
-constexpr uint64_t kMinAffordablePaths = 120'000;
-/// Training paths per thread and second, assumed before the first round is timed, and the divisors
-/// of a time limit that give the time for training (the second for Guiding::kAuto).
-constexpr double kTrainingPathsPerSecond = 50'000, kTimeShare = 8, kAutoTimeShare = 25;
+/// For Guiding::kAuto: least number of samples of a render for which a pilot render pays, and the
+/// number of samples for each training path of the first two rounds. The second round takes place
+/// only if the field of the first one reduces noise.
+constexpr uint64_t kMinAutoSamples = 2'000'000;
+constexpr std::array<uint64_t, 2> kAutoShares = {200, 40};
+constexpr uint64_t kMaxFirstPaths = 30'000, kMaxSecondPaths = 150'000;
+/// Camera samples and training paths per thread and second, assumed before the first round is
+/// timed, and the divisor of a time limit that gives the time for training.
+constexpr double kSamplesPerSecond = 100'000, kTrainingPathsPerSecond = 50'000, kTimeShare = 8;
 /// For Guiding::kAuto: divisors of the time limit after which training gives up, at first and once
 /// guiding is known to reduce noise.
 constexpr double kMaxTimeShare = 20, kMaxGuidedTimeShare = 4;
-/// For Guiding::kAuto: largest cost of training as a fraction of the cost of the render, and the
-/// cost of recording and sorting the vertices of a training path, as a factor on its rays and
+/// Cost of recording and sorting the vertices of a training path, as a factor on its rays and
 /// shading.
-constexpr double kAutoCostShare = 0.05, kRecordingCost = 1.5;
-/// Paths in each image of a pilot render, and limits of its samples per pixel. It renders fewer
-/// pixels rather than fewer samples, because the noise of Sobol samples falls with their number the
-/// faster the smoother a pixel is, and guiding makes the integrand less smooth.
-constexpr uint64_t kPilotPaths = 65'536;
+constexpr double kRecordingCost = 1.5;
+/// Each image of a pilot render takes one of every kPilotShare samples of the render, within these
+/// limits, and has a limited number of samples per pixel. It renders fewer pixels rather than fewer
+/// samples, because the noise of Sobol samples falls with their number the faster the smoother a
+/// pixel is, and guiding makes the integrand less smooth.
+constexpr uint64_t kPilotShare = 320, kMinPilotPaths = 2048, kMaxPilotPaths = 65'536;
 constexpr uint32_t kMinPilotSamples = 16, kMaxPilotSamples = 32;
 /// Samples per pixel from which the variance is estimated for learned roulette.
 constexpr uint32_t kSpreadSamples = 16;
@@ -43,36 +46,39 @@ constexpr uint32_t kSpreadSamples = 16;
 constexpr uint64_t kSpreadShare = 8;
 /// Fraction of paths with the largest differences that are left out of the variance.
 constexpr double kTrimmedPaths = 0.001;
-/// Least measured gain in efficiency for which the render is guided, and for which training
-/// continues after its first half. The first is well above 1, because pilot renders scatter and
-/// overestimate the gain of longer renders.
-constexpr double kMinGain = 1.5, kMinHalfwayGain = 1.2;
+/// Least measured gains in efficiency for which training continues after the first and the second
+/// round. The second is the one for which the render is guided.
+constexpr std::array<double, 2> kMinGains = {1.1, 1.25};
+/// Gain from which the third round takes the share of a render with Guiding::kOn; below, it takes a
+/// half of that.
+constexpr double kFullTrainingGain = 1.5;
 constexpr uint32_t kTrainingRounds = 3;
-/// Round after which the gain is measured, at about half of the training.
-constexpr uint32_t kHalfway = 1;
 
 /// Converts to a number of paths, at most kMaxTrainingPaths.
 uint64_t as_count(double paths) {
   return static_cast<uint64_t>(std::min(paths, static_cast<double>(kMaxTrainingPaths)));
 }
 
-/// Returns one path for every `share` samples of the render, at most kMaxTrainingPaths.
-uint64_t share_of_samples(const Settings& settings, uint64_t share) {
-  const uint64_t samples = uint64_t{settings.width} * settings.height * settings.spp;
-  return std::min(samples / share, kMaxTrainingPaths);
+uint64_t samples_of(const Settings& settings) {
+  return uint64_t{settings.width} * settings.height * settings.spp;
 }
 
-/// Returns the number of training paths, or 0 if they are too few to learn from.
+/// Returns the number of samples that the render is expected to take. With a time limit,
+/// Settings::spp may be out of reach.
+uint64_t expected_samples(const Settings& settings, uint32_t threads) {
+  const uint64_t samples = samples_of(settings);
+  if (!(settings.time_limit > 0)) return samples;
+  const double in_time = double{settings.time_limit} * threads * kSamplesPerSecond;
+  return in_time < static_cast<double>(samples) ? static_cast<uint64_t>(in_time) : samples;
+}
+
+/// Returns the number of training paths of a render with Guiding::kOn.
 uint64_t training_paths(const Settings& settings, uint32_t threads) {
-  const bool is_auto = settings.guiding == Guiding::kAuto;
-  uint64_t paths = share_of_samples(settings, is_auto ? kAutoShare : kTrainingShare);
-  // With a time limit, the sample count may be out of reach, so time bounds the training.
-  if (settings.time_limit > 0) {
-    const double trained = double{settings.time_limit} * threads * kTrainingPathsPerSecond /
-                           (is_auto ? kAutoTimeShare : kTimeShare);
-    paths = std::min(paths, as_count(trained));
-  }
-  return paths >= (is_auto ? kMinAutoPaths : kMinTrainingPaths) ? paths : 0;
+  uint64_t paths = std::min(samples_of(settings) / kTrainingShare, kMaxTrainingPaths);
+  if (settings.time_limit > 0)
+    paths = std::min(paths, as_count(double{settings.time_limit} * threads *
+                                     kTrainingPathsPerSecond / kTimeShare));
+  return paths;
 }
 
 /// Returns the mean cost and variance of a path, from the paths of the last round, which belong to
@@ -104,13 +110,14 @@ PathStatistics mean_path(const TrainingSamples& training_samples, std::span<cons
 /// whether the render uses the field.
 class Trainer {
  public:
-  Trainer(const WaveContext& render, const Scene& scene, const WaveSetup& waves, uint64_t budget,
+  Trainer(const WaveContext& render, const Scene& scene, const WaveSetup& waves,
           const std::function<bool()>& stopped)
       : pilot_settings_(whole_image(*render.settings)),
         settings_(pilot_settings_),
         waves_(waves),
         scene_(scene),
-        budget_(budget),
+        samples_(expected_samples(settings_, waves.threads)),
+        budget_(training_paths(settings_, waves.threads)),
         stopped_(stopped),
         aovs_(scene, pilot_settings_),
         film_(1, 1, aovs_.layout),
@@ -120,7 +127,9 @@ class Trainer {
         grid_(grid_of(scene)),
         order_(morton_pixel_order({0, 0, settings_.width, settings_.height})),
         pilot_samples_(std::clamp(settings_.spp, kMinPilotSamples, kMaxPilotSamples)),
-        pilot_pixels_(subset_of_pixels(order_, kPilotPaths / pilot_samples_)),
+        pilot_pixels_(subset_of_pixels(
+            order_,
+            std::clamp(samples_ / kPilotShare, kMinPilotPaths, kMaxPilotPaths) / pilot_samples_)),
         field_(std::make_shared<const GuidingField>(grid_)) {
     settings_.seed = 0x2545f491u;
     // Roulette multiplies the contribution of survivors, and this noise would hide the gain of
@@ -135,18 +144,12 @@ class Trainer {
   }
 
   GuidingTraining train() {
-    PilotRender without;
-    if (is_auto()) without = pilot(nullptr);
+    if (is_auto()) return train_if_it_pays();
     for (uint32_t round = 0; round < kTrainingRounds && !ended(); ++round) {
-      const double cost = run(round);
-      if (ended()) break;
-      if (!is_auto() && is_timed()) budget_ = max_paths();
-      if (is_auto() && !should_continue(round, cost, without)) return result(false);
+      run(round, (budget_ << round) / ((1u << kTrainingRounds) - 1));
+      if (is_timed() && !ended()) budget_ = max_paths();
     }
-    if (ended()) return result(false);
-    bool reduces_noise = field_->facts().regions > 0;
-    if (is_auto() && reduces_noise) reduces_noise = measure_gain(without) >= kMinGain;
-    return result(reduces_noise && !ended());
+    return result(field_->facts().regions > 0 && !ended());
   }
 
  private:
@@ -162,6 +165,26 @@ class Trainer {
   bool guides() const { return pilot_settings_.guiding != Guiding::kOff; }
   /// Returns whether the render was stopped or training has used up its time.
   bool ended() const { return stopped_() || seconds_since(start_) > max_s_; }
+
+  /// Trains for Guiding::kAuto. After each of the first two rounds, a pilot render decides whether
+  /// to continue.
+  GuidingTraining train_if_it_pays() {
+    const PilotRender without = pilot(nullptr);
+    for (uint32_t round = 0; round < kMinGains.size(); ++round) {
+      const uint64_t most = round == 0 ? kMaxFirstPaths : kMaxSecondPaths;
+      const double cost = run(round, std::min(samples_ / kAutoShares[round], most));
+      if (ended()) return result(false);
+      if (round == 0) measure_speed(cost, without);
+      if (measure_gain(without) < kMinGains[round] || ended()) return result(false);
+    }
+    // The render will be guided, so more training pays through a better field.
+    if (is_timed()) max_s_ = double{settings_.time_limit} / kMaxGuidedTimeShare;
+    budget_ = max_paths();
+    if (statistics_.gain < kFullTrainingGain) budget_ /= 2;
+    const uint64_t more = std::max(budget_, 2 * statistics_.paths) - statistics_.paths;
+    run(kTrainingRounds - 1, more);
+    return result(!ended());
+  }
 
   GuidingTraining result(bool used) {
     GuidingTraining out;
@@ -202,46 +225,25 @@ class Trainer {
     return statistics_.gain;
   }
 
-  /// For Guiding::kAuto, returns whether to continue after `round`, whose paths had the cost
-  /// `cost`. Updates the budget.
-  bool should_continue(uint32_t round, double cost, const PilotRender& without) {
-    if (round == 0) return limit_budget(cost, without);
-    if (round != kHalfway) return true;
-    const double gain = measure_gain(without);
-    if (gain >= kMinGain) {
-      // The render will be guided, so more training pays through a better field.
-      budget_ = std::max(budget_, max_paths());
-      if (is_timed()) max_s_ = double{settings_.time_limit} / kMaxGuidedTimeShare;
-    }
-    return gain >= kMinHalfwayGain;
-  }
-
-  /// Lowers the budget to what the cost of the image allows. `cost` is the cost of the first
-  /// round's paths. Returns false if too few paths are left.
-  bool limit_budget(double cost, const PilotRender& without) {
-    if (is_timed()) return true;
-    const auto samples = static_cast<double>(settings_.spp * uint64_t{order_.size()});
-    const double image_cost = samples * without.cost_of_sample();
+  /// Sets the number of training paths that cost as much as the image. `cost` is the cost of the
+  /// first round's paths.
+  void measure_speed(double cost, const PilotRender& without) {
     const double path = kRecordingCost * cost / static_cast<double>(statistics_.paths);
-    if (!(path > 0)) return true;
-    image_paths_ = image_cost / path;
-    budget_ = std::min(budget_, as_count(kAutoCostShare * image_paths_));
-    return budget_ >= kMinAffordablePaths;
+    if (path > 0) image_paths_ = static_cast<double>(samples_) * without.cost_of_sample() / path;
   }
 
   /// Returns the most training paths for a render that will be guided, from the speed so far.
   uint64_t max_paths() const {
-    const uint64_t most = share_of_samples(settings_, kTrainingShare);
+    const uint64_t most = std::min(samples_of(settings_) / kTrainingShare, kMaxTrainingPaths);
     if (!is_timed()) return std::min(most, as_count(image_paths_ / kTrainingShare));
     const auto trained = static_cast<double>(statistics_.paths);
     const double left = double{settings_.time_limit} / kTimeShare - seconds_since(start_);
     return std::min(most, as_count(trained * (1 + std::max(0.0, left) / training_s_)));
   }
 
-  /// Traces the paths of a round and builds the field from all training samples so far. Returns the
-  /// cost of the paths.
-  double run(uint32_t round) {
-    const uint64_t wanted = (budget_ << round) / ((1u << kTrainingRounds) - 1);
+  /// Traces the `wanted` paths of a round and builds the field from all training samples so far.
+  /// Returns the cost of the paths.
+  double run(uint32_t round, uint64_t wanted) {
     const auto samples = static_cast<uint32_t>(std::max<uint64_t>(1, wanted / order_.size()));
     const std::vector<uint32_t> pixels = subset_of_pixels(order_, wanted);
     const GuidingView guide = view();
@@ -295,7 +297,8 @@ class Trainer {
   Settings settings_;              ///< settings of the training paths
   const WaveSetup waves_;
   const Scene& scene_;
-  uint64_t budget_;
+  const uint64_t samples_;  ///< expected number of samples of the render
+  uint64_t budget_;         ///< number of training paths
   const std::function<bool()>& stopped_;
   const AovTables aovs_;
   Film film_;
@@ -337,9 +340,12 @@ bool needs_training(const Settings& settings) {
 GuidingTraining train_guiding(const WaveContext& render, const Scene& scene, const WaveSetup& waves,
                               const std::function<bool()>& stopped) {
   const Settings& settings = *render.settings;
-  const uint64_t budget = training_paths(settings, waves.threads);
-  if (!needs_training(settings) || settings.max_depth == 0 || budget == 0) return {};
-  return Trainer(render, scene, waves, budget, stopped).train();
+  if (!needs_training(settings) || settings.max_depth == 0) return {};
+  const bool is_long_enough = settings.guiding == Guiding::kAuto
+                                  ? expected_samples(settings, waves.threads) >= kMinAutoSamples
+                                  : training_paths(settings, waves.threads) >= kMinTrainingPaths;
+  if (!is_long_enough) return {};
+  return Trainer(render, scene, waves, stopped).train();
 }
 
 }  // namespace wavecomb

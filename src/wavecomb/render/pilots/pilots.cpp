@@ -9,10 +9,12 @@ namespace {
 /// Returns the training that a render uses: a new one, or that of an earlier render.
 std::shared_ptr<const GuidingTraining> training_for(const PilotInput& input,
                                                     const WaveContext& context, PilotCache& cache) {
-  if (input.learned.empty())
-    return cache.trainings.get(input.scene, context, input.plan.waves, input.stopped);
-  return std::make_shared<const GuidingTraining>(
-      unpacked_training(input.learned, *input.scene, input.plan.settings));
+  if (!input.learned.empty()) {
+    auto earlier = std::make_shared<const GuidingTraining>(
+        unpacked_training(input.learned, *input.scene, input.plan.settings));
+    if (earlier->statistics.paths > 0) return earlier;
+  }
+  return cache.trainings.get(input.scene, context, input.plan.waves, input.stopped);
 }
 
 }  // namespace

@@ -32,6 +32,7 @@ namespace wavecomb {
 struct PilotCache {
   LightCalibrationCache lights;
   GuidingTrainingCache trainings;
+  TransportChoiceCache transports;
 };
 
 /// Results of the pilots of one render.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/render/pilots/training_cache.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <type_traits>
@@ -13,7 +15,7 @@ namespace wavecomb {
 namespace {
 
 /// Version of the packed format. Increase it when the format changes.
-constexpr uint32_t kCacheFormat = 2;
+constexpr uint32_t kCacheFormat = 3;
 
 class ByteWriter {
  public:
@@ -99,6 +101,32 @@ void pass_parts(Archive& archive, Parts& parts) {
   archive.row(parts.survival);
 }
 
+/// Serialized form of a TransportChoice.
+struct PackedChoice {
+  uint8_t is_there = 0, uses_light = 0;
+  int32_t share = 0;  ///< exponent of LightPathShare
+  double gain = 0;
+};
+
+template <typename Archive, typename Choice>
+void pass_choice(Archive& archive, Choice& choice) {
+  archive.value(choice.is_there);
+  archive.value(choice.uses_light);
+  archive.value(choice.share);
+  archive.value(choice.gain);
+}
+
+/// Reads the format and the choice of the transport.
+PackedChoice read_choice(ByteReader& reader) {
+  uint32_t format = 0;
+  reader.value(format);
+  if (format != kCacheFormat)
+    throw Error("what was learned before is of another version; resume with that, or start anew");
+  PackedChoice choice;
+  pass_choice(reader, choice);
+  return choice;
+}
+
 /// Returns the settings with those that do not affect training reset to their defaults.
 Settings training_settings(Settings settings) {
   const Settings fresh;
@@ -123,12 +151,29 @@ Settings training_settings(Settings settings) {
   return settings;
 }
 
+/// Returns the settings with those that do not affect the choice of the transport reset to their
+/// defaults. AOVs and expressions stay, since some exclude light paths.
+Settings choice_settings(const Settings& settings) {
+  Settings kept = training_settings(settings);
+  kept.aovs = settings.aovs;
+  kept.expressions = settings.expressions;
+  return kept;
+}
+
 }  // namespace
 
-std::vector<std::byte> packed_training(const GuidingTraining& training) {
-  if (training.statistics.paths == 0) return {};
+std::vector<std::byte> packed_training(const GuidingTraining& training,
+                                       const std::optional<TransportChoice>& transport) {
+  if (training.statistics.paths == 0 && !transport) return {};
   ByteWriter writer;
   writer.value(kCacheFormat);
+  PackedChoice choice;
+  if (transport)
+    choice = {1, uint8_t{transport->transport == Transport::kLight}, transport->share.exponent,
+              transport->gain};
+  pass_choice(writer, choice);
+  writer.value(uint8_t{training.statistics.paths > 0});
+  if (training.statistics.paths == 0) return writer.take();
   pass_statistics(writer, training.statistics);
   writer.value(static_cast<uint8_t>(training.field ? 1 : 0));
   if (training.field) {
@@ -141,11 +186,14 @@ std::vector<std::byte> packed_training(const GuidingTraining& training) {
 GuidingTraining unpacked_training(std::span<const std::byte> bytes, const Scene& scene,
                                   const Settings& settings) {
   ByteReader reader(bytes);
-  uint32_t format = 0;
-  reader.value(format);
-  if (format != kCacheFormat)
-    throw Error("what was learned before is of another version; resume with that, or start anew");
+  read_choice(reader);
   GuidingTraining out;
+  uint8_t is_trained = 0;
+  reader.value(is_trained);
+  if (is_trained == 0) {
+    reader.end();
+    return out;
+  }
   pass_statistics(reader, out.statistics);
   uint8_t has_field = 0;
   reader.value(has_field);
@@ -162,6 +210,35 @@ GuidingTraining unpacked_training(std::span<const std::byte> bytes, const Scene&
   out.statistics.used = out.field != nullptr;
   out.statistics.is_reused = true;
   return out;
+}
+
+TransportChoice unpacked_transport(std::span<const std::byte> bytes) {
+  ByteReader reader(bytes);
+  const PackedChoice packed = read_choice(reader);
+  TransportChoice choice;
+  choice.why = packed.is_there != 0 ? "by an earlier render" : "as in an earlier render";
+  if (packed.is_there == 0) return choice;
+  if (packed.uses_light != 0) {
+    choice.transport = Transport::kLight;
+    choice.share.exponent = std::clamp(packed.share, -8, 8);
+  }
+  choice.gain = std::isfinite(packed.gain) ? std::max(0.0, packed.gain) : 0;
+  return choice;
+}
+
+std::optional<TransportChoice> TransportChoiceCache::find(const std::shared_ptr<const Scene>& scene,
+                                                          const Settings& settings) const {
+  if (!last_ || scene_.lock() != scene || settings_ != choice_settings(settings)) return {};
+  TransportChoice choice = *last_;
+  choice.seconds = 0;
+  return choice;
+}
+
+void TransportChoiceCache::keep(const std::shared_ptr<const Scene>& scene, const Settings& settings,
+                                const TransportChoice& choice) {
+  last_ = choice;
+  settings_ = choice_settings(settings);
+  scene_ = scene;
 }
 
 std::shared_ptr<const GuidingTraining> GuidingTrainingCache::get(

@@ -1,27 +1,53 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Reuse of a training by later renders, which skip their own: as bytes in a checkpoint, or in
-/// memory when a scene is rendered again.
+/// Reuse of a training and of the choice of the transport by later renders, which skip their own
+/// pilot renders: as bytes in a checkpoint, or in memory when a scene is rendered again.
 #pragma once
 
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "wavecomb/render/pilots/guiding_training.h"
+#include "wavecomb/render/statistics/render_statistics.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
 
-/// Serializes a training: the size of the field and a few hundred bytes. Returns nothing if nothing
-/// was learned, because the render is too short or was stopped.
-std::vector<std::byte> packed_training(const GuidingTraining& training);
+/// Serializes a training and the choice of the transport, if there is one: the size of the field
+/// and a few hundred bytes. Returns nothing if nothing was chosen or learned, because the settings
+/// decide, or because the render is too short or was stopped.
+std::vector<std::byte> packed_training(const GuidingTraining& training,
+                                       const std::optional<TransportChoice>& transport);
 
 /// Restores the training that packed_training() wrote, for the same scene and image size. Throws
 /// Error if `bytes` are damaged or of another version or build.
 GuidingTraining unpacked_training(std::span<const std::byte> bytes, const Scene& scene,
                                   const Settings& settings);
+
+/// Returns the choice of the transport that packed_training() wrote; Transport::kPath if there is
+/// none. Throws the same errors.
+TransportChoice unpacked_transport(std::span<const std::byte> bytes);
+
+/// Cache of the last choice of the transport, reused by renders of the same scene whose settings
+/// lead to the same choice: seed, region and scheduling may differ.
+///
+/// Contract: one thread at a time.
+class TransportChoiceCache {
+ public:
+  /// Returns the cached choice, or nothing.
+  std::optional<TransportChoice> find(const std::shared_ptr<const Scene>& scene,
+                                      const Settings& settings) const;
+  void keep(const std::shared_ptr<const Scene>& scene, const Settings& settings,
+            const TransportChoice& choice);
+
+ private:
+  std::weak_ptr<const Scene> scene_;
+  Settings settings_;
+  std::optional<TransportChoice> last_;
+};
 
 /// Cache of the last training, reused by renders of the same scene whose settings lead to the same
 /// training: seed, region, layers and scheduling may differ.

@@ -42,7 +42,8 @@ def field_text(setup: Setup, learned: dict[str, Any] | None) -> str:
         if learned["survival"] > 0:
             text += f" Learned roulette: {min(learned['survival'], 1.0):.2f} at throughput 1."
         return text
-    if setup.guiding == "off" and setup.roulette != "efficient":
+    may_guide = setup.guiding == "on" or (setup.guiding == "auto" and setup.quality == "auto")
+    if not may_guide and setup.roulette != "efficient":
         return "Bounces are not guided: choose Guiding in the Scheduling panel."
     return "No guiding field here: too few samples to learn from, or no predicted gain."
 

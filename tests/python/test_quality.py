@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Quality "auto", the default: what it decides, and that all parts of an image decide alike."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from stopping import StopAt
+
+import wavecomb
+from wavecomb.farm.tiling import is_better_whole, settings_of_tiles
+from wavecomb.scenes import write_scene
+
+_core = pytest.importorskip("wavecomb._core")
+
+ENOUGH = {"width": 160, "height": 160, "spp": 128}
+"""Just enough samples for all pilot renders."""
+PART = {**ENOUGH, "region": (60, 100, 76, 116), "crop": True}
+
+
+@pytest.fixture(scope="module")
+def caustics(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    path = tmp_path_factory.mktemp("quality") / "caustics.usdc"
+    write_scene("caustics", path)
+    return wavecomb.load(path).scene
+
+
+def render(scene: Any, **settings: Any) -> Any:
+    return _core.render(scene, _core.Settings(**{**PART, **settings}))
+
+
+@pytest.fixture(scope="module")
+def default(caustics: Any) -> Any:
+    """A part of an image by the defaults."""
+    return render(caustics)
+
+
+def test_the_defaults_leave_the_decision_to_pilots() -> None:
+    settings = _core.Settings().to_dict()
+    assert {name: settings[name] for name in ("quality", "guiding", "transport")} == {
+        "quality": "auto", "guiding": "auto", "transport": "auto",
+    }  # fmt: skip
+
+
+def test_the_defaults_use_light_paths_for_caustics(caustics: Any, default: Any) -> None:
+    choice = default.stats["transport"]
+    assert choice["chosen"] == "light" and choice["gain"] > 1.3
+    assert default.stats["guiding"] is None
+    assert not np.array_equal(default.beauty, render(caustics, quality="plain").beauty)
+
+
+def test_plain_is_what_is_left_without_both(caustics: Any) -> None:
+    plain = render(caustics, quality="plain")
+    assert plain.stats["transport"] is None and plain.stats["guiding"] is None
+    forced = render(caustics, guiding="off", transport="path")
+    assert np.array_equal(plain.beauty, forced.beauty)
+
+
+@pytest.mark.parametrize("quality", ["auto", "plain"])
+def test_each_part_can_be_forced(caustics: Any, quality: str) -> None:
+    way: dict[str, Any] = {"quality": quality, "spp": 2, "region": None, "crop": False}
+    light = render(caustics, **way, transport="light")
+    assert light.stats["transport"] is None and light.stats["guiding"] is None
+    guided = render(caustics, **{**way, "spp": 8}, guiding="on")
+    assert guided.stats["guiding"]["paths"] > 0
+    assert quality == "plain" or "guiding" in guided.stats["transport"]["why"]
+
+
+def test_all_parts_and_schedules_decide_alike(caustics: Any, default: Any) -> None:
+    for way in ({"threads": 1, "wave_size": 100, "policy": "material"}, {"lanes": 1, "threads": 2}):
+        other = render(caustics, **way)
+        assert other.stats["transport"]["gain"] == default.stats["transport"]["gain"], way
+        assert np.array_equal(other.beauty, default.beauty), way
+    wider = render(caustics, region=(50, 100, 76, 120))
+    assert np.array_equal(wider.beauty[:16, 10:26], default.beauty)
+
+
+def test_a_decision_is_handed_on(caustics: Any, default: Any) -> None:
+    """Neither a render that gets the decision of another nor a second one of a renderer repeats
+    the pilots."""
+    settings = _core.Settings(**PART)
+    again = _core.render(caustics, settings, learned=default.learned)
+    assert again.stats["transport"]["why"] == "by an earlier render"
+    assert again.stats["transport"]["gain"] == default.stats["transport"]["gain"]
+    assert np.array_equal(again.beauty, default.beauty)
+    renderer = _core.Renderer(caustics)
+    first = renderer.render(settings)
+    second = renderer.render(_core.Settings(**{**PART, "region": (50, 100, 76, 120)}))
+    assert first.stats["transport"]["seconds"] > 0 == second.stats["transport"]["seconds"]
+    assert np.array_equal(second.beauty[:16, 10:26], default.beauty)
+
+
+def test_a_resumed_render_keeps_its_decision(caustics: Any, default: Any) -> None:
+    stop = StopAt(1)
+    _core.render(caustics, _core.Settings(**PART), watcher=stop, interval=0.001)
+    again = _core.render(caustics, _core.Settings(**PART, threads=1), state=stop.state)
+    assert again.stats["transport"]["why"] == "by an earlier render"
+    assert np.array_equal(again.beauty, default.beauty)
+
+
+def test_more_samples_do_not_change_the_transport_of_a_render(caustics: Any) -> None:
+    """A render too short for light paths has no film for them when it is resumed with more."""
+    short = {**PART, "spp": 4}
+    stop = StopAt(1)
+    _core.render(caustics, _core.Settings(**short), watcher=stop, interval=0.001)
+    for state in (stop.state, {k: v for k, v in stop.state.items() if k != "learned.field"}):
+        more = _core.render(caustics, _core.Settings(**PART), state=state)
+        assert more.stats["transport"]["chosen"] == "path"
+        assert (more.samples == PART["spp"]).all()
+
+
+def test_tiles_do_without_pilots() -> None:
+    settings = _core.Settings().to_dict()
+    assert not is_better_whole(settings)
+    assert is_better_whole({**settings, "guiding": "on"})
+    assert settings_of_tiles(settings) == {**settings, "quality": "plain"}
+
+
+def test_a_room_is_guided_if_paths_start_at_the_camera(tmp_path: Path) -> None:
+    write_scene("room", tmp_path / "room.usdc", plain=True)
+    scene = wavecomb.load(tmp_path / "room.usdc").scene
+    stats = render(scene, spp=256, region=(0, 0, 4, 4), transport="path").stats
+    assert stats["guiding"]["used"] and stats["guiding"]["gain"] >= 1.25
