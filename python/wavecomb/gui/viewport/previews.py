@@ -130,11 +130,12 @@ class Filler:
         if preview is None or (frame.is_complete and frame.samples_done):
             return frame
         size = frame.width, frame.height
-        if self._whole is None and self._albedo is not None:
-            low = preview.layers["guide_albedo"] + _DARK
-            self._whole = enlarged(preview.beauty / low, *size) * (self._albedo + _DARK)
-        elif self._whole is None:
+        if self._whole is None:
             self._whole = enlarged(preview.beauty, *size)
+            if self._albedo is not None:
+                low = enlarged(preview.layers["guide_albedo"], *size) + _DARK
+                # The limits avoid dots at edges between dark and bright surfaces.
+                self._whole *= np.clip((self._albedo + _DARK) / low, 0.4, 2.0)
         holes = frame.layers["samples"][:, :, None] == 0
         keeps = self._albedo is None
         beauty = np.where(holes, self._whole, frame.beauty) if keeps else self._whole
