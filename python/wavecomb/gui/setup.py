@@ -95,13 +95,16 @@ class Setup(_Rows):
         guides = aov_names.GUIDES if self.denoise else ()
         return aov_names.with_others(aov_names.expand(self.aovs), guides)
 
-    def settings(self, scale: int = 1, *, preview: bool = False) -> Settings:
+    def settings(
+        self, scale: int = 1, *, preview: bool = False, depth: int = PREVIEW_DEPTH
+    ) -> Settings:
         """Returns the checked settings of the core.
 
         Args:
             scale: Divisor of width and height.
             preview: Whether to render only one sample per pixel, with few bounces and guides for
                 denoising.
+            depth: Largest number of bounces of a preview.
 
         Raises:
             WavecombError, wavecomb._core.Error: A value is invalid. The message is one line.
@@ -118,7 +121,7 @@ class Setup(_Rows):
             values |= {name: settings()[name].default for name in NOT_IN_PREVIEWS}
             # Measuring material costs or light weights would take longer than the preview.
             values |= {"costs": "model", "light_weights": "power"}
-            values["max_depth"] = min(self.max_depth, PREVIEW_DEPTH)
+            values["max_depth"] = min(self.max_depth, depth)
         else:
             values["progressive"] = True
         size = scaled_size(self.width, self.height, scale)

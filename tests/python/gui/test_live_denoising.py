@@ -84,23 +84,25 @@ def test_movements_show_no_noise(new_session, qtbot, cornell, final):
     assert session.last_frame.scale == 1 and roughness(session.last_frame.beauty) > 0.8 * raw
 
 
-def test_incomplete_frames_have_light_of_the_reduced_image_and_their_albedo():
+def test_incomplete_frames_have_light_of_the_reduced_image_and_albedo_of_first_hits():
     setup = Setup(width=8, height=4, denoise=True)
-    small = {"albedo": np.full((2, 4, 3), 0.45, np.float32)}
+    small = {"guide_albedo": np.full((2, 4, 3), 0.45, np.float32)}
     preview = Frame(np.full((2, 4, 3), 2.0, np.float32), small, None, {}, 1, 2, False, setup)
     samples = np.zeros((4, 8), np.uint32)
     samples[0, 0] = 1
-    layers = {"samples": samples, "albedo": np.full((4, 8, 3), 0.2, np.float32)}
+    albedo = np.full((4, 8, 3), 0.45, np.float32)
+    albedo[0] = 0.2
     noisy = np.random.default_rng(1).exponential(1.0, (4, 8, 3)).astype(np.float32)
-    whole = Frame(noisy, layers, None, {}, 1, 1, False, setup)
-    found = Filler(preview).fill(whole)
+    whole = Frame(noisy, {"samples": samples}, None, {"samples_done": 1}, 1, 1, False, setup)
+    found = Filler(preview, albedo).fill(whole)
     assert not whole.is_complete
-    assert found.beauty[0, 0] == pytest.approx(2.0 * (0.2 + 0.05) / (0.45 + 0.05))
+    assert found.beauty[0] == pytest.approx(2.0 * (0.2 + 0.05) / (0.45 + 0.05))
     assert found.beauty[1:] == pytest.approx(2.0) and np.array_equal(found.denoised, found.beauty)
-    plain = Filler(preview).fill(replace(whole, layers={"samples": samples}))
+    plain = Filler(preview).fill(whole)
     assert np.array_equal(plain.beauty[0, 0], noisy[0, 0]) and (plain.beauty[1:] == 2.0).all()
     complete = replace(whole, layers={"samples": np.ones((4, 8), np.uint32)})
-    assert Filler(preview).fill(complete) is complete and Filler(None).fill(whole) is whole
+    assert Filler(preview, albedo).fill(complete) is complete
+    assert Filler(None).fill(whole) is whole
     region = replace(whole, setup=setup.changed(region=(0, 0, 1, 1)))
     assert region.is_complete
 

@@ -376,7 +376,7 @@ def test_a_twin_follows_edits_with_settings_of_its_own(session, qtbot, final):
     session.edit_material(material_id(session, "Red"), base_color=(0.0, 0.9, 0.0))
     session.change(seed=3)
     frame = final(session)
-    qtbot.waitUntil(lambda: twin.last_frame is not None and twin.last_frame.final, timeout=10000)
+    final(twin)
     assert twin.setup.spp == 2 and twin.setup.seed == 0
     assert twin.last_frame.beauty[:, :20, 1].mean() == pytest.approx(
         frame.beauty[:, :20, 1].mean(), rel=0.2

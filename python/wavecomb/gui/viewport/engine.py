@@ -212,7 +212,9 @@ class Engine:
         if task.moving or (scale > 1 and not self._is_shown(task)):
             self._shown = self._preview(renderer, task, self._scale_for(task, MOVING_S))
         if not task.moving and not self.superseded:
-            self._whole(renderer, task, self._shown if scale > 1 else None)
+            filler = self._first_hits(renderer, task) if scale > 1 else Filler(None)
+            if not self.superseded:
+                self._whole(renderer, task, filler)
 
     def _is_shown(self, task: Task) -> bool:
         """Returns whether the last reduced image shows this scene with these settings."""
@@ -242,8 +244,23 @@ class Engine:
         self.listener.on_frame(frame)
         return frame
 
-    def _whole(self, renderer: Renderer, task: Task, preview: Frame | None) -> None:
-        filler = Filler(preview)
+    def _first_hits(self, renderer: Renderer, task: Task) -> Filler:
+        """Sends an image at full size: first hits with the light of the reduced image."""
+        if self._shown is None or task.setup.region is not None:
+            return Filler(self._shown)
+        result = renderer.render(
+            task.setup.settings(preview=True, depth=0), progress=lambda *_: not self.superseded,
+            interval=LOOK_S,
+        )  # fmt: skip
+        if result.cancelled:
+            return Filler(None)
+        layers, status = layers_of_result(result), {"samples_done": 0, "passes": 0, "preview": True}
+        frame = Frame(result.beauty, layers, None, status, task.version, 1, False, task.setup)
+        filler = Filler(self._shown, layers["guide_albedo"])
+        self.listener.on_frame(filler.fill(frame))
+        return filler
+
+    def _whole(self, renderer: Renderer, task: Task, filler: Filler) -> None:
         watch = Watch(self, task.setup, task.version, filler)
         setup = task.setup
         result = renderer.render(

@@ -326,7 +326,7 @@ class Live(QObject):
 
     def _denoise(self, frame: Frame) -> None:
         """Denoises a complete frame in the background; reduced images are denoised already."""
-        if not self.setup.denoise or frame.scale > 1 or not frame.is_complete:
+        if not self.setup.denoise or frame.status.get("preview") or not frame.is_complete:
             return
         if frame.final or frame.samples_done >= DENOISE_AGAIN * self._denoising:
             self._denoising = frame.samples_done

@@ -113,36 +113,30 @@ def enlarged(image: Array, width: int, height: int) -> Array:
 class Filler:
     """Fills frames of the first pass, in which few pixels have samples, without noise.
 
+    They have the light of a reduced image and the albedo of first hits at full size.
+
     Args:
         preview: The reduced image; None leaves frames as they are.
+        albedo: (height, width, 3) albedo at full size; None: the reduced image is enlarged.
     """
 
-    def __init__(self, preview: Frame | None) -> None:
-        self._preview = preview
-        self._large: dict[str, Array] = {}
+    def __init__(self, preview: Frame | None, albedo: Array | None = None) -> None:
+        self._preview, self._albedo = preview, albedo
+        self._whole: Array | None = None
 
     def fill(self, frame: Frame) -> Frame:
-        """Returns a frame whose pixels have the light of the reduced image.
-
-        Those with samples already have their albedo, so that textures and edges are sharp. A frame
-        in which all pixels have samples is returned unchanged.
-        """
+        """Returns the frame, or if it lacks samples, one that looks complete."""
         preview = self._preview
-        if preview is None or frame.is_complete:
+        if preview is None or (frame.is_complete and frame.samples_done):
             return frame
-        layers = (frame.layers, preview.layers)
-        names = [n for n in ("guide_albedo", "albedo") if all(n in one for one in layers)]
+        size = frame.width, frame.height
+        if self._whole is None:
+            self._whole = enlarged(preview.beauty, *size)
+            if self._albedo is not None:
+                low = enlarged(preview.layers["guide_albedo"], *size) + _DARK
+                # The limits avoid dots at edges between dark and bright surfaces.
+                self._whole *= np.clip((self._albedo + _DARK) / low, 0.4, 2.0)
         holes = frame.layers["samples"][:, :, None] == 0
-        if not names:
-            beauty = np.where(holes, self._enlarged("beauty", preview.beauty, frame), frame.beauty)
-        else:
-            low = preview.layers[names[0]] + _DARK
-            light = self._enlarged("light", preview.beauty / low, frame)
-            albedo = self._enlarged("albedo", low, frame)
-            beauty = light * np.where(holes, albedo, frame.layers[names[0]] + _DARK)
+        keeps = self._albedo is None
+        beauty = np.where(holes, self._whole, frame.beauty) if keeps else self._whole
         return replace(frame, beauty=beauty, denoised=beauty if frame.setup.denoise else None)
-
-    def _enlarged(self, name: str, image: Array, frame: Frame) -> Array:
-        if name not in self._large:
-            self._large[name] = enlarged(image, frame.width, frame.height)
-        return self._large[name]
