@@ -77,7 +77,7 @@ def principled_specular_high() -> None:
     _ball(base_color=(0.1, 0.3, 0.5), specular_ior_level=1.0, roughness=0.25)
 
 
-@scene("Principled")
+@scene("Principled", outside=0.15, why="grazing reflections are tinted too")
 def principled_specular_tint() -> None:
     """A tinted reflection."""
     _ball(base_color=(0.2, 0.2, 0.2), specular_tint=(1.0, 0.4, 0.2), ior=1.8, roughness=0.3)
@@ -123,7 +123,10 @@ def principled_transmission_half() -> None:
     _ball(transmission_weight=0.5, roughness=0.3, base_color=(0.8, 0.3, 0.2))
 
 
-@scene("Principled")
+SHARP = "sharp highlights and caustics of a light without shape converge slowly"
+
+
+@scene("Principled", 0.97, 1.01, 0.1, SHARP)
 def principled_coat() -> None:
     """A clear coat."""
     _ball(base_color=(0.6, 0.1, 0.1), roughness=0.6, coat_weight=1.0, coat_roughness=0.05)
