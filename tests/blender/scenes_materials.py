@@ -168,7 +168,10 @@ def principled_alpha() -> None:
     _ball(base_color=(0.7, 0.3, 0.2), alpha=0.4)
 
 
-@scene("Principled", spp=256)
+BOUNDARY = "another model of light at the boundary of the medium"
+
+
+@scene("Principled", 0.97, 1.03, 0.35, BOUNDARY, spp=256)
 def principled_subsurface() -> None:
     """Subsurface scattering with a short free path."""
     _ball(
@@ -177,7 +180,7 @@ def principled_subsurface() -> None:
     )  # fmt: skip
 
 
-@scene("Principled", spp=256)
+@scene("Principled", 0.97, 1.04, 0.35, BOUNDARY, spp=256)
 def principled_subsurface_deep() -> None:
     """Subsurface scattering with a long free path."""
     _ball(
@@ -212,7 +215,7 @@ def shader_diffuse() -> None:
     _node("ShaderNodeBsdfDiffuse", Color=(0.6, 0.3, 0.2))
 
 
-@scene("Shaders")
+@scene("Shaders", outside=0.15, why="another model of rough diffuse surfaces (EON)")
 def shader_diffuse_rough() -> None:
     """Rough Diffuse BSDF."""
     _node("ShaderNodeBsdfDiffuse", Color=(0.6, 0.3, 0.2), Roughness=0.8)
