@@ -240,7 +240,7 @@ def shader_translucent() -> None:
     _node("ShaderNodeBsdfTranslucent", Color=(0.7, 0.7, 0.3))
 
 
-@scene("Shaders")
+@scene("Shaders", 0.94, 1.01, 0.3, "the shadow of a coloured transparent shader is opaque")
 def shader_transparent() -> None:
     """Tinted Transparent BSDF."""
     _node("ShaderNodeBsdfTransparent", Color=(0.4, 0.7, 0.9))
@@ -257,7 +257,7 @@ def _mixture(first: str, second: str, factor: float, a: Any = None, b: Any = Non
     sphere(material)
 
 
-@scene("Shaders")
+@scene("Shaders", 0.92, 1.02, 0.35, SHARP)
 def mix_diffuse_glossy() -> None:
     """Mix of a diffuse and a glossy shader with their own colours."""
     _mixture(
