@@ -67,7 +67,7 @@ def texture_alpha() -> None:
     wall(material)
 
 
-@scene("Textures")
+@scene("Textures", 0.97, 1.03, 0.35, "not explained yet")
 def texture_normal_map() -> None:
     """A normal map."""
     studio()
