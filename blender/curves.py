@@ -14,7 +14,9 @@ from .usda import Prim, safe_name
 def write_curves(into: Translation) -> None:
     """Replaces what the exporter writes for curve objects: strands of a fixed width."""
     for thing in into.depsgraph.objects:
-        if thing.type not in ("CURVE", "SURFACE") or thing.data is None:
+        # The exporter of Blender 4.2 leaves texts out.
+        kinds = ("CURVE", "SURFACE") if into.instancing else ("CURVE", "SURFACE", "FONT")
+        if thing.type not in kinds or thing.data is None:
             continue
         mesh = thing.to_mesh()
         try:

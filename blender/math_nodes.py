@@ -107,8 +107,8 @@ def _checker(n: Nodes, node: Any, socket: Any) -> Value | None:
     odd = g.node("modulo_float", "float", in1=total, in2=number(2.0))
     odd = g.node("absval_float", "float", in_=odd)
     if socket.name in ("Fac", "Factor"):
-        return g.op("subtract", number(1.0), odd)
-    return g.mix(n.read(node, "Color1", "color3"), n.read(node, "Color2", "color3"), odd)
+        return odd
+    return g.mix(n.read(node, "Color2", "color3"), n.read(node, "Color1", "color3"), odd)
 
 
 def _gradient(n: Nodes, node: Any, socket: Any) -> Value | None:

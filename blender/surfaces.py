@@ -252,6 +252,7 @@ def _transparent(n: Nodes, node: Any) -> Surface:
         found["base_color"], found["base_weight"] = BLACK, number(1.0)
         found["geometry_opacity"] = number(1.0 - tint.constant[0])
         return found
+    n.approximate("coloured Transparent BSDF (its shadow is opaque)")
     # A thin wall without an interface that transmits the tint.
     found |= {"transmission_weight": number(1.0), "transmission_color": tint}
     found |= {"specular_weight": number(0.0), "specular_roughness": number(0.0)}

@@ -37,6 +37,11 @@ def main(folder: Path) -> None:
     """Writes the page and one sheet of images per group."""
     rows = {f.stem: json.loads(f.read_text()) for f in sorted(folder.glob("*.json"))}
     rows = {name: row for name, row in rows.items() if "ratio" in row and "group" in row}
+    for name, row in rows.items():
+        expected, noise = row["expected"], 3.0 * row["noise"]
+        is_near = expected["low"] - noise <= row["ratio"] <= expected["high"] + noise
+        if not is_near or row["outside"] > expected["outside"]:
+            print(f"outside of its bounds: {name} {row['ratio']:.4f} {row['outside']:.3f}")
     groups = list(dict.fromkeys(row["group"] for row in rows.values()))
     version = next(iter(rows.values()))["blender"]
     text = [HEAD.format(version=version)]

@@ -71,11 +71,25 @@ def _save(pixels: np.ndarray, file: Path) -> None:
     bpy.data.images.remove(image)
 
 
+def refresh(output: Path) -> None:
+    """Updates descriptions and bounds in rows of earlier renders."""
+    for name, one in SCENES.items():
+        file = output / f"{name}.json"
+        if file.exists():
+            row = json.loads(file.read_text())
+            row["group"], row["about"] = one.group, (one.make.__doc__ or "").strip()
+            row["expected"] = asdict(one.expected)
+            file.write_text(json.dumps(row, indent=1))
+
+
 def main(words: list[str]) -> int:
     """Runs the named scenes, or all."""
     output = Path(words[0])
     output.mkdir(parents=True, exist_ok=True)
     failed = 0
+    if "--refresh" in words:
+        refresh(output)
+        return 0
     for name in words[1:] or list(SCENES):
         try:
             row = run(SCENES[name], output)

@@ -237,7 +237,7 @@ def combined_room() -> None:
     camera(at=(0, -4.5, 2), target=(0, 2, 1.6), lens=28.0)
 
 
-@scene("Combined")
+@scene("Combined", outside=0.1, why="filtering of textures far away")
 def combined_outdoor() -> None:
     """Sun and sky on textured and instanced objects, with depth of field."""
     floor((0.3, 0.35, 0.2))
@@ -263,7 +263,7 @@ def combined_motion_lights() -> None:
     assert thing is not None
 
 
-@scene("Combined")
+@scene("Combined", 0.97, 1.02, 0.1, "caustics, which converge slowly")
 def combined_mirrors() -> None:
     """A mirror, a coated ball and a light that both show."""
     studio(0.1)

@@ -77,7 +77,7 @@ def principled_specular_high() -> None:
     _ball(base_color=(0.1, 0.3, 0.5), specular_ior_level=1.0, roughness=0.25)
 
 
-@scene("Principled")
+@scene("Principled", outside=0.15, why="grazing reflections are tinted too")
 def principled_specular_tint() -> None:
     """A tinted reflection."""
     _ball(base_color=(0.2, 0.2, 0.2), specular_tint=(1.0, 0.4, 0.2), ior=1.8, roughness=0.3)
@@ -123,7 +123,10 @@ def principled_transmission_half() -> None:
     _ball(transmission_weight=0.5, roughness=0.3, base_color=(0.8, 0.3, 0.2))
 
 
-@scene("Principled")
+SHARP = "sharp highlights and caustics of a light without shape converge slowly"
+
+
+@scene("Principled", 0.97, 1.01, 0.1, SHARP)
 def principled_coat() -> None:
     """A clear coat."""
     _ball(base_color=(0.6, 0.1, 0.1), roughness=0.6, coat_weight=1.0, coat_roughness=0.05)
@@ -165,7 +168,10 @@ def principled_alpha() -> None:
     _ball(base_color=(0.7, 0.3, 0.2), alpha=0.4)
 
 
-@scene("Principled", spp=256)
+BOUNDARY = "another model of light at the boundary of the medium"
+
+
+@scene("Principled", 0.97, 1.03, 0.35, BOUNDARY, spp=256)
 def principled_subsurface() -> None:
     """Subsurface scattering with a short free path."""
     _ball(
@@ -174,7 +180,7 @@ def principled_subsurface() -> None:
     )  # fmt: skip
 
 
-@scene("Principled", spp=256)
+@scene("Principled", 0.97, 1.04, 0.35, BOUNDARY, spp=256)
 def principled_subsurface_deep() -> None:
     """Subsurface scattering with a long free path."""
     _ball(
@@ -209,7 +215,7 @@ def shader_diffuse() -> None:
     _node("ShaderNodeBsdfDiffuse", Color=(0.6, 0.3, 0.2))
 
 
-@scene("Shaders")
+@scene("Shaders", outside=0.15, why="another model of rough diffuse surfaces (EON)")
 def shader_diffuse_rough() -> None:
     """Rough Diffuse BSDF."""
     _node("ShaderNodeBsdfDiffuse", Color=(0.6, 0.3, 0.2), Roughness=0.8)
@@ -234,7 +240,7 @@ def shader_translucent() -> None:
     _node("ShaderNodeBsdfTranslucent", Color=(0.7, 0.7, 0.3))
 
 
-@scene("Shaders")
+@scene("Shaders", 0.94, 1.01, 0.3, "the shadow of a coloured transparent shader is opaque")
 def shader_transparent() -> None:
     """Tinted Transparent BSDF."""
     _node("ShaderNodeBsdfTransparent", Color=(0.4, 0.7, 0.9))
@@ -251,7 +257,7 @@ def _mixture(first: str, second: str, factor: float, a: Any = None, b: Any = Non
     sphere(material)
 
 
-@scene("Shaders")
+@scene("Shaders", 0.92, 1.02, 0.35, SHARP)
 def mix_diffuse_glossy() -> None:
     """Mix of a diffuse and a glossy shader with their own colours."""
     _mixture(

@@ -29,7 +29,7 @@ def texture_image() -> None:
     wall(textured()[0])
 
 
-@scene("Textures")
+@scene("Textures", outside=0.15, why="filtering of textures")
 def texture_mapping() -> None:
     """An image, scaled, turned and moved."""
     studio()
@@ -67,7 +67,7 @@ def texture_alpha() -> None:
     wall(material)
 
 
-@scene("Textures")
+@scene("Textures", 0.97, 1.03, 0.35, "not explained yet")
 def texture_normal_map() -> None:
     """A normal map."""
     studio()
@@ -79,7 +79,7 @@ def texture_normal_map() -> None:
     wall(material)
 
 
-@scene("Textures")
+@scene("Textures", outside=0.2, why="sharp highlights converge slowly")
 def texture_roughness() -> None:
     """Roughness and metalness by an image."""
     studio()

@@ -16,7 +16,7 @@ HERE = Path(__file__).resolve().parent
 NAMES = [
     name
     for file in sorted(HERE.glob("scenes_*.py"))
-    for name in re.findall(r"^@scene\([^\n]*\)\ndef (\w+)\(", file.read_text(), re.M)
+    for name in re.findall(r"^@scene\(.*?\)\ndef (\w+)\(", file.read_text(), re.M | re.S)
 ]
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
