@@ -240,6 +240,13 @@ std::vector<SettingInfo> work_settings() {
       number<&S::roulette_depth>(
           "roulette_depth", "From depth", 0, kMaxDepth,
           "First vertex of a path at which Russian roulette may terminate it."),
+  };
+}
+
+/// Returns the settings of the choice of lights and directions.
+std::vector<SettingInfo> choice_settings() {
+  using S = Settings;
+  return {
       choice<&S::light_selection>(
           "light_selection", "Lights",
           {{"auto",
@@ -369,6 +376,7 @@ std::vector<SettingInfo> make_settings() {
   };
   add(SettingGroup::kImage, image_settings());
   add(SettingGroup::kWork, work_settings());
+  add(SettingGroup::kWork, choice_settings());
   add(SettingGroup::kWork, sample_settings());
   add(SettingGroup::kOrder, order_settings());
   return table;
