@@ -35,11 +35,6 @@ def _render(folder: Path, **variables: str) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
-def test_names_of_files() -> None:
-    assert blend.is_blend("a/B.BLEND")
-    assert not blend.is_blend("a.usd")
-
-
 def test_a_missing_blender_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "a.blend").write_bytes(b"")
     done = _render(tmp_path, WAVECOMB_BLENDER=str(tmp_path / "none"))

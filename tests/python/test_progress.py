@@ -151,7 +151,7 @@ def test_samples_that_an_ending_asks_for(
         (["--time-limit", -1], "must be above 0"),
         (["--every", 5], "--every applies to checkpoints: also give --checkpoint or --resume"),
         (["--preview-every", 5], "--preview-every applies to previews: also give --preview"),
-        (["--preview", "a.exr"], "--preview a.exr: the name must end in .png"),
+        (["--preview", "a.jpg"], "--preview a.jpg: the name must end in .exr or .png"),
         (["--resume", "none.ckpt"], "none.ckpt: no such file"),
         (["--checkpoint", "/proc/no/a.ckpt"], "cannot be written"),
     ],
@@ -183,6 +183,20 @@ def test_preview_grows(tmp_path: Path) -> None:
     wrote = [line for line in result.stdout.splitlines() if '"wrote"' in line]
     assert len(wrote) >= 3
     assert (read_image(preview) == read_image(tmp_path / "a.png")).all(), "the last is the picture"
+
+
+def test_a_preview_may_be_linear(tmp_path: Path) -> None:
+    pytest.importorskip("wavecomb._core")
+    from wavecomb.image.files.image import read_layers
+    from wavecomb.scenes import write_scene
+
+    write_scene("cornell", tmp_path / "a.usdc")
+    out, preview = tmp_path / "a.exr", tmp_path / "p.exr"
+    result = render(
+        tmp_path / "a.usdc", "-o", out, "--size", 16, 16, "--spp", 2, "--preview", preview
+    )
+    assert result.exit_code == 0, result.output
+    assert (read_layers(preview)["beauty"] == read_layers(out)["beauty"]).all()
 
 
 def test_ctrl_c_while_usd_is_loaded_is_not_lost(tmp_path: Path) -> None:

@@ -248,19 +248,20 @@ def _frames(options: RenderOptions) -> tuple[float, ...] | None:
 
 def _check_outputs(options: RenderOptions) -> None:
     """Raises WavecombError if an output file cannot be written or is named twice."""
-    outputs = [
+    outputs: list[tuple[str | None, str, Any]] = [
         (options.output, "-o", ".exr"),
         (options.png, "--png", ".png"),
         (options.deep, "--deep", ".exr"),
         (options.stats_file, "--stats", None),
         (options.costs, "--costs", None),
         (options.learn_to, "--learn-to", ENDING),
-        (options.preview, "--preview", ".png"),
+        (options.preview, "--preview", (".exr", ".png")),
         (options.checkpoint, "--checkpoint", None),
     ]
     for name, option, ending in outputs:
         if name is not None and ending is not None and not name.lower().endswith(ending):
-            endings = ".exr or .png" if option == "-o" else ending
+            several = option == "-o" or not isinstance(ending, str)
+            endings = ".exr or .png" if several else ending
             raise WavecombError(f"{option} {name}: the name must end in {endings}")
     if options.costs is not None and not options.costs.lower().endswith(".json"):
         sources = known_settings()["costs"].choices

@@ -182,7 +182,7 @@ class RenderOptions(FileOptions):
         "Continue from a checkpoint, and save to it unless --checkpoint is given.",
     )
     preview: str | None = declared(
-        "--preview FILE.png", "path", "Regularly write an image of the render in progress."
+        "--preview FILE.png|.exr", "path", "Regularly write an image of the render in progress."
     )
     preview_every: float = declared(
         "--preview-every S", "positive", "Interval between previews in seconds.  [default: 10]"

@@ -87,10 +87,14 @@ class PreviewSink(Sink):
         self._working = working_space
 
     def write(self, snapshot: Snapshot) -> None:
-        """Writes the beauty as PNG."""
+        """Writes the beauty: as PNG, or linear and uncompressed as EXR, by the file's name."""
+        from wavecomb.image.files.exr import write_exr
         from wavecomb.image.files.image import write_png
         from wavecomb.image.working_space import to_rec709
 
+        if os.fspath(self.path).lower().endswith(".exr"):
+            write_exr(self.path, {"beauty": snapshot.beauty()}, compression="none")
+            return
         shown = to_rec709(snapshot.beauty(), self._working)
         write_png(self.path, shown, exposure=self._exposure, tone_map=self._tone_map)
 
