@@ -710,11 +710,11 @@ class Settings:
     crop: bool
     """Stores only the pixels of the render region, in memory and in files. Default: False."""
     roulette: Literal["auto", "off", "throughput", "cost-aware", "efficient"]
-    """Russian roulette: how paths are terminated early, without bias. Default: auto."""
+    """Russian roulette, which terminates paths early without bias. Default: auto."""
     quality: Literal["auto", "plain"]
-    """Whether pilot renders decide about `guiding` and `transport`. Default: auto."""
+    """Whether short pilot renders decide about path guiding and light paths. Default: auto."""
     transport: Literal["path", "light", "auto", "bdpt"]
-    """Where paths start. Default: auto."""
+    """Whether paths start at the camera only or also at the lights. Default: auto."""
     light_aim: Literal["off", "on"]
     """How the starting points and directions of light paths are chosen. Default: on."""
     merge_radius: float
@@ -731,7 +731,7 @@ class Settings:
     equiangular: Literal["off", "on"]
     """How scattering distances in homogeneous volumes are sampled. Default: off."""
     guiding: Literal["auto", "on", "off"]
-    """Path guiding: bounces also follow the learned incident light. Default: auto."""
+    """Path guiding, which also samples bounces by learned incident light. Default: auto."""
     learn_memory: int
     """Memory limit of the path guiding field in MB. Default: 64."""
     adaptive: float
