@@ -10,10 +10,10 @@ BUILD := build/editable
 # Compile sources in unity batches. A clean build is faster, but rebuilding after an
 # edit is slower; OFF suits developers of the core.
 BATCH ?= ON
-# Lane widths: "default" means scalar lanes and the widest that the target supports, "all" means
-# every supported width. Later builds keep the widths of the last build.
+# Lane widths to compile: "default" means scalar code and the widest vectors of the target CPU, and
+# "all" means every supported width. Later builds keep the lane widths of the last build.
 LANES ?= $(shell cat build/.lanes 2> /dev/null || echo default)
-# Checks of make test-asan: ON or all.
+# Amount of checks in make test-asan: ON (the default checks) or all.
 CHECKS ?= ON
 ASAN := build/asan$(if $(filter all,$(CHECKS)),-all)
 TSAN := build/tsan
@@ -21,7 +21,8 @@ WHEEL := build/wheel
 CLANG := build/clang
 ARM64 := build/arm64
 VENV := .venv/bin
-# Libraries of make wheels: portable, or a list of instruction sets as in WAVECOMB_ISAS.
+# Native libraries in the wheels of make wheels: portable, or a list of instruction sets as in
+# WAVECOMB_ISAS.
 ISAS ?= portable
 # Options of make fuzz.
 MINUTES ?= 10
@@ -33,11 +34,11 @@ SETUP_LOCK := $(if $(LOCK),$(LOCK)-setup)
 ASAN_LOCK := $(if $(LOCK),$(LOCK)-asan)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_NO_INPUT := 1
-# Makes tools that search PATH find those of the environment.
+# Tools that search PATH find the programs of the environment first.
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
 CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLists.txt tests/naive/CMakeLists.txt benchmarks/micro/CMakeLists.txt)
-# Includes directories: their time changes when a file is added or removed.
+# The list includes directories, whose time changes when a file is added or removed.
 NATIVE_INPUTS := $(shell find src bindings 2> /dev/null)
 CPP_FILES := $(shell find src bindings tests/cpp tests/naive benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' -o -name '*.inl' \) 2> /dev/null)
 
@@ -81,8 +82,8 @@ setup: build/.setup ## Install build dependencies (system packages, .venv, Embre
 setup-test: build/.setup-test
 build: build/.built ## Build the core and the Python module into .venv (editable); LANES=all builds every lane width
 
-# Dependencies come from their own wheels. A staged Embree is part of this wheel. auditwheel must
-# not copy libraries: what it would take from the system is already included.
+# Dependencies come from separate wheels, except a staged Embree, which is part of Wavecomb's wheel.
+# auditwheel must not copy system libraries, since the wheel already includes all that it needs.
 wheels: build/.setup ## Build the distributable wheel in dist/, with every instruction set, checked by auditwheel
 	@$(VENV)/python -c 'import auditwheel' 2> /dev/null || $(VENV)/python -m pip install -q -c constraints.txt 'auditwheel>=6.8'
 	@echo "wheels: a library for each instruction set"
@@ -99,15 +100,15 @@ sdist: build/.setup ## Build the source distribution in dist/
 	@$(VENV)/python -c 'from scikit_build_core.build import build_sdist; build_sdist("dist")' > /dev/null
 	@ls dist/wavecomb-*.tar.gz
 
-# Uploads nothing; prints what to upload.
+# The target uploads nothing and only prints the files to upload.
 release: test-wheel test-sdist ## Build and test wheels and source distribution, and print what to upload
 	@$(VENV)/python -c 'import twine' 2> /dev/null || $(VENV)/python -m pip install -q -c constraints.txt 'twine>=6'
 	@$(VENV)/python tools/release
 
 # ---- use ---------------------------------------------------------------------------------------
 
-# The image of the README. Without the denoiser, which is optional and not available everywhere, it
-# is noisier.
+# Render the image of the README. The image is noisier without the denoiser, which is optional and
+# not available on every machine.
 denoiser = $(VENV)/python -c 'import pyoidn' 2> /dev/null
 render: build ## Render the Mixed scene to out/mixed.exr and out/mixed.png
 	@mkdir -p out
@@ -115,7 +116,7 @@ render: build ## Render the Mixed scene to out/mixed.exr and out/mixed.png
 	  test -e out/mixed.usdc || $(VENV)/wavecomb scene mixed -o out/mixed.usdc; wait
 	$(VENV)/wavecomb render out/mixed.usdc -o out/mixed.exr --png out/mixed.png --size 800 500 $$($(denoiser) && echo --denoise)
 
-# Not part of make test, since MkDocs is in a separate extra.
+# make test does not build the site, since MkDocs is in a separate extra.
 docs: build ## Build the documentation site in out/site
 	@$(VENV)/python -c 'import material' 2> /dev/null || $(VENV)/python -m pip install -q -c constraints.txt 'mkdocs-material>=9.5'
 	NO_MKDOCS_2_WARNING=1 $(VENV)/python -m mkdocs build --strict --quiet
@@ -135,7 +136,8 @@ test-fast: ## Lint, C++ tests, pytest without slow tests
 test-long: ## All tests with 10^6 samples, 500 random scenes, 100 kills, all sanitizers (over an hour)
 	@python3 tools/run_parts $@
 
-# Tests that depend on optimised code. The others are in test-asan (tests/cpp/CMakeLists.txt).
+# Run the tests that depend on optimised code. test-asan runs all other C++ tests
+# (tests/cpp/CMakeLists.txt).
 test-cpp: build build/.setup-test ## C++ tests of values, lanes and whole renders
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet
 	$(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
@@ -160,14 +162,15 @@ test-tsan: build/.setup-test ## C++ tests under ThreadSanitizer
 	TSAN_OPTIONS="suppressions=$(CURDIR)/tests/cpp/tsan.supp $(TSAN_OPTIONS)" \
 	  $(TSAN)/tests/cpp/wavecomb_tests --gtest_brief=1 $(if $(FILTER),--gtest_filter='$(FILTER)')
 
-# The naive integrator, a reference for statistical tests, and the program that writes .nvdb files.
+# Build the naive integrator, which is a reference for statistical tests, and the program that
+# writes .nvdb files.
 build-test-tools: build
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_test_tools -j $(JOBS) -- --quiet
 
 test-py: build-test-tools build/.setup-test ## Python and statistical tests
 	@$(MAKE) --no-print-directory run-py
 
-# These run without prerequisites, as parts of make test, which has built them.
+# These targets have no prerequisites: they run as parts of make test, which builds the programs.
 run-py:
 	$(VENV)/python -m pytest -q -n $(JOBS)
 
@@ -185,7 +188,7 @@ build-all-lanes:
 build-lanes-before:
 	@$(MAKE) --no-print-directory build LANES=$$(cat build/.lanes-before 2> /dev/null || echo "$(LANES)"); rm -f build/.lanes-before
 
-# All files of tests/cpp, with 10^6 samples.
+# Run all files of tests/cpp with 10^6 samples.
 test-cpp-long: build build/.setup-test
 	@trap '$(LOCK) $(VENV)/cmake -S . -B $(BUILD) --log-level=NOTICE -DWAVECOMB_TESTS=ON' EXIT; \
 	  $(LOCK) $(VENV)/cmake -S . -B $(BUILD) --log-level=NOTICE -DWAVECOMB_TESTS=all; \
@@ -202,17 +205,18 @@ test-wheel: wheels ## Install the wheel into a fresh environment and an empty ro
 test-sdist: sdist build/.setup-test ## Build the source distribution in a separate folder, and render
 	$(VENV)/python -m pytest -q -o faulthandler_timeout=3600 tests/packaging/test_sdist.py
 
-# Libraries compiled from source, since the distribution's are for another standard library or CPU.
+# These libraries are compiled from source, since the libraries of the distribution are for another
+# standard library or CPU.
 from_source := -DOpenSubdiv_SOURCE=$(CURDIR)/.deps/source/opensubdiv -DGoogleTest_SOURCE=/usr/src/googletest
-# Two lane widths and little optimisation: these builds test correctness, not speed.
+# The builds have two lane widths and little optimisation, since they test correctness, not speed.
 clang_widths = 1;$(if $(shell grep -m 1 -o avx2 /proc/cpuinfo 2> /dev/null),8,4)
-# The newest clang. Expanded when used, after tools/setup has installed it.
+# The newest clang. The variable is expanded when used, after tools/setup has installed clang.
 CLANGXX ?= $$(ls /usr/bin/clang++-[0-9]* | sort -V | tail -n 1)
-# The oneTBB wheel uses libstdc++, and an exception from a libc++ task ends the process. Leave out
-# the test of that.
+# The oneTBB wheel uses libstdc++, and an exception from a libc++ task ends the process, so the test
+# of exceptions in tasks is left out.
 clang_without := RayRecording.StopsAtItsLimit
-# The images were made by the reference integrator of the GCC build. Also compares the wavefront
-# with the scalar integrator, and tests functions called from Python.
+# The reference integrator of the GCC build rendered the reference images. The tests also compare
+# the wavefront with the scalar integrator, and call functions from Python.
 clang_python := test_golden test_exactness test_api test_python_policy
 
 build/.setup-clang: build/.setup-test
@@ -221,8 +225,8 @@ build/.setup-clang: build/.setup-test
 build/.setup-arm64: build/.setup
 	@$(SETUP_LOCK) tools/setup arm64 && touch $@
 
-# Tests the module in an environment with the packages of .venv but without its editable Wavecomb.
-# (Python ignores .pth files of another environment.)
+# Test the module in an environment with the packages of .venv but without the editable Wavecomb of
+# .venv. (Python ignores .pth files of another environment.)
 test-clang: build/.setup-clang ## C++ tests and the Python module with clang and libc++, which is close to macOS
 	@test -e $(CLANG)/build.ninja || $(LOCK) $(VENV)/cmake -S . -B $(CLANG) -G Ninja --log-level=NOTICE $(from_source) \
 	  -DCMAKE_CXX_COMPILER="$(CLANGXX)" -DCMAKE_CXX_FLAGS=-stdlib=libc++ -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" \
@@ -235,12 +239,12 @@ test-clang: build/.setup-clang ## C++ tests and the Python module with clang and
 	  $(VENV)/python -c "$$folder" > "$$site/others.pth"
 	LD_LIBRARY_PATH=$(CURDIR)/.venv/lib $(CLANG)/venv/bin/python -m pytest -q -n $(JOBS) -k "not come_out and not odd_objects" $(clang_python:%=tests/python/%.py)
 
-# Tests of code in lanes and of whole renders. Leaves out statistics, which take hours under
-# emulation and test formulas that do not depend on the CPU, and containers. ARM64_TESTS=all
-# includes them.
+# Run tests of code in lanes and of whole renders. Statistical tests take hours under emulation and
+# test formulas that do not depend on the CPU, so they are left out, as are tests of containers.
+# ARM64_TESTS=all includes all tests.
 arm64_tests := lanes rows math vec_frame warp sampler morton_hash camera_ray params programs variants surface texture curves \
   curve_clumps volumes subdivision accelerator motion wave renderer policies
-# Statistical tests of materials; each takes minutes under emulation.
+# Statistical tests of materials. Each test takes minutes under emulation.
 arm64_without := Programs.*Furnace*:Programs.DeltaLobes*:Programs.WeightIs*:Programs.Reciprocity*:Programs.MultipleScattering*
 ARM64_TESTS ?= $(subst $() ,;,$(strip $(arm64_tests)))
 test-arm64: build/.setup-arm64 ## C++ tests of NEON lanes, cross-compiled for ARM64, under qemu

@@ -177,6 +177,16 @@ def test_tags_in_code_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
+def test_brackets_of_links_alone_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "tools" / "words"))
+    plain = importlib.import_module("prose").plain
+    assert plain("Bits differ ([decision](a.md)).") == "Bits differ."
+    assert plain("Lenses bend rays ([lens](a.md#b),\n[visibility](c.md)), twice.") == (
+        "Lenses bend rays, twice."
+    )
+    assert plain("Bits differ (see [why](a.md)).") == "Bits differ (see why)."
+
+
 def test_words_are_counted_by_page(tmp_path: pathlib.Path) -> None:
     root = tree(tmp_path, {"docs/a.md": "one two\n", "docs/decisions/b.md": "three\n"})
     lines = run(root, "--count").stdout.splitlines()

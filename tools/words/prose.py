@@ -36,6 +36,7 @@ NO_PROSE = re.compile(
 SECTION = re.compile(r"[A-Z]\w+:")
 CODE_FENCE = re.compile(r"^\s*(?:```|~~~)")
 LINK = re.compile(r"!?\[([^\]]*)\]\([^)]*\)")
+LINKS_IN_BRACKETS = re.compile(rf"\s*\({LINK.pattern}(?:,\s+{LINK.pattern})*\)")
 
 
 @functools.lru_cache(maxsize=1)
@@ -105,8 +106,9 @@ def helps(name: str, text: str) -> Iterator[Text]:
 
 
 def plain(markdown: str) -> str:
-    """A paragraph without links, and without tags outside of code."""
-    return " ".join(LINK.sub(r"\1", re.sub(r"(`[^`]*`)|<[^>]+>", r"\1", markdown)).split())
+    """A paragraph without link targets, brackets of links alone, and tags outside of code."""
+    said = LINKS_IN_BRACKETS.sub("", re.sub(r"(`[^`]*`)|<[^>]+>", r"\1", markdown))
+    return " ".join(LINK.sub(r"\1", said).split())
 
 
 def prose_lines(text: str) -> Iterator[tuple[int, str]]:
