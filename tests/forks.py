@@ -33,7 +33,7 @@ HARMLESS = frozenset((
 which reads them. All other modules may be read at import."""
 
 _MOST = 100_000
-_Popen = subprocess.Popen  # tests may replace it by the class below
+_Popen = subprocess.Popen
 _server: Server | None = None
 cpu_s = 0.0
 """CPU time of the processes that the server forked and that have ended."""
@@ -209,7 +209,7 @@ def _import_everything() -> None:
     names += ["difflib", "runpy"]
     for name in names:
         if not name.startswith(("wavecomb.gui", "wavecomb._vdb")) and not name.endswith("__main__"):
-            # Modules of optional extras may be missing; commands that need them report it.
+            # Modules of optional extras may be missing; the commands that need them report it.
             with contextlib.suppress(ImportError):
                 importlib.import_module(name)
 
@@ -270,7 +270,8 @@ def _end(code: object) -> None:
 
 
 def _main(descriptor: int) -> None:
-    # NumPy's matrix products would start threads; commands set this variable as well.
+    # Set before NumPy is imported, since its matrix products would start threads; commands set this
+    # variable as well.
     mine = "OPENBLAS_NUM_THREADS" not in os.environ
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     here = os.path.dirname(os.path.abspath(__file__))
@@ -299,7 +300,6 @@ def _main(descriptor: int) -> None:
         if way == "-I":
             from wavecomb import boot
 
-            # The parent is the process that waits for it.
             alive = f"--parent={os.getppid()}"
             boot.main([alive if one.startswith("--parent=") else one for one in rest])
         elif way == "-m":

@@ -44,7 +44,7 @@ def made_again(name: str) -> ModuleType:
     assert spec is not None
     assert spec.loader is not None
     made = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = made  # dataclasses look modules up here
+    sys.modules[spec.name] = made
     try:
         spec.loader.exec_module(made)
     finally:

@@ -192,7 +192,7 @@ def install(monkeypatch: pytest.MonkeyPatch) -> Fake:
     fake = Fake()
     core = ModuleType("wavecomb._core")
     usd = ModuleType("wavecomb.usd")
-    usd.__path__ = [str(Path(wavecomb.__file__).parent / "usd")]  # submodules are the real ones
+    usd.__path__ = [str(Path(wavecomb.__file__).parent / "usd")]
     for name, value in {
         "Error": Error,
         "Settings": Settings,

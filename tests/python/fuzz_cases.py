@@ -172,7 +172,7 @@ def wrong_types(rng: random.Random, data: bytes) -> bytes:
     for path in rng.sample(attributes, rng.choice((1, 2, 4, 8))):
         old = layer.GetAttributeAtPath(path)
         name = old.name
-        owner = getattr(old.owner, "primSpec", old.owner)  # of an attribute inside a variant
+        owner = getattr(old.owner, "primSpec", old.owner)
         donor = layer.GetAttributeAtPath(rng.choice(attributes))
         if donor is None:
             continue

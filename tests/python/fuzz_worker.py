@@ -144,7 +144,7 @@ def main() -> None:
             sys.stderr.flush()
             if os.fstat(1).st_size:
                 words = os.pread(1, 4096, 0).decode(errors="replace")
-                # The supervisor filters these lines. Here, they are no fault.
+                # The supervisor filters these lines.
                 if not all(text.startswith(CHATTER) for text in words.splitlines()):
                     outcome, said = "wrong", f"spilt: {words}"
                 os.ftruncate(1, 0)

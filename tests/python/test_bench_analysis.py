@@ -168,7 +168,7 @@ def test_share_between_placebo_and_oracle(tmp_path: Path) -> None:
     assert wide.loc["random-runs"].share == pytest.approx(0.0)
     assert wide.loc["oracle"].share == pytest.approx(1.0)
     assert wide.loc["oracle"].verdict == "bound"
-    scalar = table.loc[1]  # order gains nothing there, so it has no share
+    scalar = table.loc[1]
     assert not scalar["gap_shown"].any()
     assert scalar["share"].isna().all()
 

@@ -59,7 +59,7 @@ def test_best_order_is_found(drift: bool) -> None:
     assert found["best_ns"] < found["mean_ns"] < found["worst_ns"]
     worst = of_program(found[WORST], names, "p")
     assert all(ord(b) != ord(a) + 1 for a, b in itertools.pairwise(worst))
-    if not drift:  # runs of neighbours; the fit shrinks pair costs towards the mean
+    if not drift:
         assert found["best_ns"] == pytest.approx((3 * 10 + 20 + 10 + 20) * RECORDS, rel=0.05)
 
 

@@ -374,7 +374,7 @@ def test_by_slurm(stage: Path, tmp_path: Path, slurm: Path) -> None:
         assert stat.S_IMODE((secrets / "tls.json").stat().st_mode) == 0o600
         for number in (tmp_path / "pids").read_text().split():
             with contextlib.suppress(ProcessLookupError):
-                os.killpg(int(number), signal.SIGTERM)  # as at the end of their time limit
+                os.killpg(int(number), signal.SIGTERM)
         _, said = client.communicate(timeout=200)
     finally:
         client.kill()

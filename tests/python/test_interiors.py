@@ -665,7 +665,7 @@ def test_a_search_in_many_meshes_takes_no_time() -> None:
         builder.set_camera(camera, projection="orthographic", window=(-1, 1, -1, 1))
         scene = builder.build()
         spent = time.process_time() - begin
-        wavecomb.render(scene, size=(4, 4), spp=1, transport="light")  # the glass is empty
+        wavecomb.render(scene, size=(4, 4), spp=1, transport="light")
         return spent
 
     seconds({})

@@ -120,7 +120,6 @@ def test_scaled_images_are_plain_textures(tmp_path):
     assert use["channel"] == "rgb" and use["scale"] == (0.25, 0.5, 0.125, 1.0)
     assert use["bias"] == (0.0625, 0.0625, 0.0625, 0.0)
     assert scene.textures[use["texture"]]["wrap"][0] == "mirror"
-    # (uv - pivot) / scale, a quarter turn clockwise, - offset + pivot.
     a, b, c, d, e, f = use["uv"]
     for u, v in ((0.0, 0.0), (0.3, 0.8)):
         x, y = (u - 0.5) / 0.5, (v - 0.5) / 0.25

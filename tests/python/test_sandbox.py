@@ -211,7 +211,7 @@ load_stage(place / "shot/s.usda")
 """
     wide = child(place, code)
     assert wide == {"secret": "done", "stage": "done"}
-    # Unlike in ``child``, the command line must not name the folder, or it would be readable.
+    # The command line must not name the folder, since the sandbox would make it readable.
     parent = PARENT.replace("choices.words = (place,)", "choices.words = ()")
     given = CHILD.replace("sys.argv[1]", repr(str(place))) + code + "\nprint(json.dumps(tried))"
     done = subprocess.run(

@@ -283,7 +283,7 @@ def compiled(
 def test_a_program(tmp_path: Path, compiler: list[str], nests: bool) -> None:
     traits = "kEmits | kGlossy | kNests | kSubsurface" if nests else "0"
     change = program(f"  X(minnaert, Minnaert, {traits}, 65)")
-    assert len(change) <= 3  # one of which is for the tests only
+    assert len(change) <= 3
     applied(tmp_path, change)
     done = compiled(
         tmp_path, compiler, text=USES_PROGRAM.replace("NESTS", "true" if nests else "false")

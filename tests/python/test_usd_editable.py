@@ -231,7 +231,7 @@ def test_defaults_of_the_loader_are_materialx_s(model):
     inputs = Defaults()
     layers_of(model, inputs)
     known = definitions(model)
-    inputs.found.pop("dielectric_priority", None)  # an input of Arnold without a definition
+    inputs.found.pop("dielectric_priority", None)
     assert inputs.found.keys() <= known.keys()
     for name, default in inputs.found.items():
         assert known[name].default == pytest.approx(default), name

@@ -238,7 +238,7 @@ def test_linking(tmp_path):
     }
     assert scene.sets[a["shadow_link"]] == {"/": "expand", "/World/Floor": "exclude"}
     assert b["shadow_link"] == a["shadow_link"] and "light_link" not in b
-    assert "light_link" not in c  # includeRoot is true, so all prims are included already
+    assert "light_link" not in c
     assert not loaded.report.unsupported
 
 
@@ -281,7 +281,7 @@ def test_links_by_membership_expression(tmp_path):
         "/heroes": "expand",
     }
     assert scene.sets[a["light_link"]] == hero
-    assert "shadow_link" not in a  # it contains all prims
+    assert "shadow_link" not in a
     assert scene.sets[b["light_link"]] == {**hero, "/Set/Ball": "expand"}
     assert not loaded.report.warnings
 
@@ -409,7 +409,7 @@ def test_default_dome_and_camera_know_what_is_up(tmp_path, up, axis):
     scene, loaded = load(tmp_path, f'#usda 1.0\n(upAxis = "{up}")\ndef Mesh "M" {{ {box} }}')
     assert pole(scene.lights[0])[axis] == 1
     frame = scene.camera["transform"]
-    assert frame[1, axis] > 0.8  # the camera's up vector
+    assert frame[1, axis] > 0.8
     assert np.linalg.det(frame[:3, :3]) == pytest.approx(1)
     # All corners are inside the image.
     points = np.append(scene.mesh("M")["positions"], np.ones((4, 1)), axis=1)

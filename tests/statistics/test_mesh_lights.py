@@ -149,7 +149,6 @@ def test_both_halves_of_mis_tell_of_the_same_light(shot: Any, mode: str) -> None
 
 
 def test_mirrors_show_what_cameras_see(shot: Any) -> None:
-    # its mirror image meets the light's plane at z = 0
     view = camera((0, 1, 2), (0, 0, 1), half=0.05)
     mesh = lamp("float inputs:intensity = 7", bound="G")
     close(shot(view, glossy(0), GLOW, mesh, spp=16), np.array((0.5, 1, 2)) * 0.9, 0.05)
@@ -251,11 +250,11 @@ def test_shaping(shot: Any) -> None:
     """A cone around the mesh's -z; focus and cone also affect the visible radiance."""
     for angle, expected in ((60, 1), (20, 0)):
         mesh = lamp(ALONE, f"float inputs:shaping:cone:angle = {angle}")
-        view = camera((0, 0.01, 0), (0.45, 1, 0), half=0.01)  # 24 degrees off the axis
+        view = camera((0, 0.01, 0), (0.45, 1, 0), half=0.01)
         close(shot(view, FLOOR, mesh, spp=4), expected if expected else 0, 1e-6)
     small = np.diag((0.05,) * 3 + (1,)) @ DOWN
     focused = lamp(ALONE, "float inputs:shaping:focus = 2", place=small)
-    where = camera((2, 1, 1), (1, 0, 0), half=1e-3)  # 45 degrees off axis, cos^2 = 1 / 2
+    where = camera((2, 1, 1), (1, 0, 0), half=1e-3)
     plain = lamp(ALONE, place=small)
     close(shot(where, FLOOR, focused), 0.5 * shot(where, FLOOR, plain), 4e-3)
 

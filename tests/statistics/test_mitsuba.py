@@ -281,7 +281,7 @@ def test_rough_gold_gives_back_what_single_scattering_loses(
     scene = recorded(view, light("Dome"), gold, sphere("Ball", "Gold", rings=64))
     peer = Reference(mitsuba, scene, PeerSettings(32, 32, 1))
     gain = (beauty(scene.scene, 32, 256, max_depth=1) - peer.render(256)).mean(axis=(0, 1))
-    gain *= (2 * 0.0165 * 60) ** 2 / np.pi  # per area of the visible disk
+    gain *= (2 * 0.0165 * 60) ** 2 / np.pi
     assert np.abs(gain - 0.0837 * np.array((0.92, 0.64, 0.12))).max() < 0.008
 
 

@@ -66,7 +66,7 @@ def test_irradiance(tmp_path: Path, beauty: Any, place: str) -> None:
     p = (local @ frame)[..., :3]
     d2 = (p**2).sum(-1)
     cos_floor = np.maximum(p[..., 1], 0) / np.sqrt(d2)
-    cos_light = np.maximum((p @ frame[2, :3]) / np.sqrt(d2), 0)  # the light's -z, towards the floor
+    cos_light = np.maximum((p @ frame[2, :3]) / np.sqrt(d2), 0)
     given = radiance(image.astype(np.float64), s, t) * (cos_floor * cos_light / d2)[..., None]
     expected = 0.5 / np.pi * given.mean((0, 1)) * WIDTH * HEIGHT
     assert np.abs(found / expected - 1).max() < 1e-2, (found, expected)

@@ -96,7 +96,7 @@ def window(qtbot, qapp, tmp_path):
     yield made
     made.close()
     made.deleteLater()
-    # Without this, old windows would remain and process every change of the theme.
+    # Delete old windows, which would otherwise process every change of the theme.
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 

@@ -78,7 +78,6 @@ def test_the_panel_follows_the_cursor(cornell_window, qtbot):
     assert panel.map.image.width() == 2 * panel.map.image.height()
     assert "of bounces are guided" in panel.note.text()
     assert not panel.grab().isNull()
-    # With following off, the clicked point stays.
     density = panel.learned["density"]
     panel.follow.setChecked(False)
     panel.hover((60, 20))

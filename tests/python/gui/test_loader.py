@@ -147,7 +147,7 @@ def test_variants_that_are_asked_for_are_selected_in_the_window(tmp_path: Path) 
     session = got.usd.GetSessionLayer()
     assert dict(session.GetPrimAtPath("/World").variantSelections) == {"rig": "one"}
     assert choices(got.usd) == {"rig": "one", "look": ""}
-    session.Clear()  # undone: the stage's own selection
+    session.Clear()
     assert choices(got.usd) == {"rig": "two", "look": ""}
 
 

@@ -246,12 +246,10 @@ def test_undo_in_a_field_undoes_the_edit(qtbot, tmp_path, looks):
     assert spin.value() == 0.5, "nothing more to take back"
     QTest.keyClick(spin, Qt.Key.Key_Y, Control)
     assert spin.value() == 0.75 and len(edits.lines()) == 1
-    # After Enter, the next value is a separate step.
     for text in ("0.25", "0.125"):
         type_value(spin, text)
     QTest.keyClick(spin, Qt.Key.Key_Z, Control)
     assert spin.value() == 0.25
-    # A search field has its own undo.
     field = window.scene.tree.field
     window.scene.tabs.setCurrentIndex(0)
     field.setFocus()
