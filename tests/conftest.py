@@ -44,7 +44,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
 @pytest.fixture(scope="session")
 def caustics(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The scene caustics with a coarse teapot."""
+    """Generate the scene caustics with a coarse teapot."""
     from wavecomb.scenes import write_scene
 
     path = tmp_path_factory.mktemp("caustics") / "caustics.usdc"

@@ -5,9 +5,9 @@ Importing `wavecomb` takes most of a second. `wavecomb(...)`, `code(...)` and `P
 to a server process, which has imported all modules, has a single thread, and forks for each
 request. The forked process uses the requested folder, variables and descriptors and then runs like
 `python -m` or `python -c`, with the same supervisor, sandbox, signals and exit codes as a command.
-Requests that a fork cannot serve start a process as usual: other programs, limits set by
-`preexec_fn`, and changes of variables that are read at import (all except `HARMLESS`). Tests of
-what is imported and when start real processes.
+A request that a fork cannot serve starts a process as usual: another program, limits set by
+`preexec_fn`, or a change of a variable that is read at import (all except `HARMLESS`). Tests of
+imports and their order start real processes.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ class Server:
             )
 
     def serves(self, variables: Mapping[str, str]) -> bool:
-        """Whether the variables that are read at import are those of the server."""
+        """Whether the variables that are read at import have the same values as in the server."""
         return _read_at_import(variables) == self._variables
 
     def fork(self, request: Mapping[str, Any], descriptors: Sequence[int]) -> socket.socket:
@@ -114,7 +114,7 @@ def _read_at_import(variables: Mapping[str, str]) -> dict[str, str]:
 
 
 class Popen(_Popen):
-    """`subprocess.Popen` that lets the server fork where this makes no difference."""
+    """A `subprocess.Popen` that lets the server fork the process if the result is the same."""
 
     _told: socket.socket | None = None
 

@@ -25,7 +25,7 @@ def add_rows(
         monkeypatch: Restores the table.
         table: Function that returns the table, as modules import it.
         added: The additional rows.
-        follow: Modules that derive data from the table at import.
+        follow: Modules that derive data from the table when they are imported.
     """
     for name in follow:  # import these first, so that later tests see them without the added rows
         importlib.import_module(name)

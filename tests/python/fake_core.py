@@ -57,7 +57,7 @@ class Finding(SimpleNamespace):
 
 
 class Fake:
-    """Behaviour and recorded calls of the fake."""
+    """Behaviour of the fake module, and the calls that it recorded."""
 
     def __init__(self) -> None:
         self.interrupt_at: float | None = None

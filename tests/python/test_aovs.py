@@ -114,7 +114,7 @@ def test_names_are_expanded() -> None:
 
 
 def test_every_row_of_the_table_finds_its_value(picture: wavecomb.Picture) -> None:
-    """Every AOV of the table gets a value. An AOV without one would be an empty layer."""
+    """Every AOV of the table gets a value. An AOV without a value would be an empty layer."""
     layers = {**picture.layers(), **picture.aovs}
     elsewhere = {
         "guided_share": "test_guiding.py", "by_light_paths": "test_techniques.py",

@@ -174,7 +174,7 @@ def test_share_between_placebo_and_oracle(tmp_path: Path) -> None:
 
 
 def test_order_is_apart_from_roulette(tmp_path: Path) -> None:
-    """Roulette halves the work, which must not count as an effect of order."""
+    """Roulette halves the work, which the analysis must not count as an effect of order."""
     runs = results(
         tmp_path,
         runs_of(

@@ -38,7 +38,7 @@ def page(folder: Path) -> str:
 
 @pytest.fixture(scope="module")
 def tree(page: str) -> ElementTree.Element:
-    """The page, parsed strictly: any HTML error fails the test."""
+    """The report page, parsed strictly: any HTML error fails the test."""
     return html5lib.HTMLParser(strict=True).parse(page)
 
 
@@ -47,7 +47,7 @@ def texts(tree: ElementTree.Element, tag: str) -> list[str]:
 
 
 def check_sound(tree: ElementTree.Element) -> None:
-    """Check ids, links, and what a screen reader needs."""
+    """Checks ids, links, and attributes that a screen reader needs."""
     ids = [element.get("id") for element in tree.iter() if element.get("id")]
     assert len(ids) == len(set(ids))
     for element in tree.iter():

@@ -315,7 +315,7 @@ def test_scenes_have_something_to_order(scene: str, scene_of: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_coherence_is_of_all_depths(scene: str, scene_of: Any) -> None:
-    """Coherence is measured at all depths, so one more depth hardly changes it."""
+    """Coherence is measured at all depths, so an additional depth hardly changes it."""
     settings: dict[str, Any] = {
         "policy": "material",
         "threads": 1,

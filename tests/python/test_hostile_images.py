@@ -33,7 +33,7 @@ def write(path: Path, kind: str, channels: int = 3, tile: int = 0) -> np.ndarray
 
 
 def package(path: Path, inner: str, data: bytes) -> str:
-    """Writes a .usdz package with one more file. Returns the asset path of that file."""
+    """Writes a .usdz package with one more file. Returns the asset path of the added file."""
     with zipfile.ZipFile(path, "w") as file:
         for name, content in (("s.usda", b"#usda 1.0\n"), (inner, data)):
             info = zipfile.ZipInfo(name)

@@ -96,7 +96,7 @@ def test_layers_are_the_same_for_all_schedules(stages: Any, transport: str) -> N
 
 
 def test_a_layer_is_the_same_alone(stages: Any) -> None:
-    """A layer does not depend on others or on a crop, and unrequested groups need no memory."""
+    """Layers do not depend on other layers or on a crop; unrequested groups need no memory."""
     first = render(stages["caustics"])
     alone = render(stages["caustics"], aovs=["direct", "light_key", "lpe:k=" + ASKED["k"]])
     assert "light_other" not in alone.aovs

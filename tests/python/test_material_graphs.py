@@ -312,7 +312,8 @@ def test_networks_in_circles_end(tmp_path):
 @pytest.mark.parametrize("category", ["power", "screen", "contrast", "safepower", "overlay"])
 def test_networks_too_deep_are_cut(tmp_path, category):
     """Networks that are too deep are cut at a node with a warning. All other inputs keep their
-    values."""
+    values.
+    """
     first = {"power": "in1", "safepower": "in1", "contrast": "in"}.get(category, "fg")
     nodes = "".join(
         node(

@@ -246,7 +246,7 @@ def test_defaults_of_the_loader_are_materialx_s(model):
 
 @pytest.mark.parametrize("model", sorted(MODELS))
 def test_surface_values_are_what_the_loader_gives_the_core(tmp_path, model):
-    """Each input with a value other than its default, one at a time and all together."""
+    """Tests each input with a value other than its default, one at a time and all together."""
     known, time = definitions(model), Usd.TimeCode.Default()
 
     def stage_of(values, file):

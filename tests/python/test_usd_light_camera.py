@@ -49,7 +49,7 @@ def test_colour_temperatures_are_those_of_black_bodies(kelvin):
 
 
 def test_colour_temperatures_agree_with_usdlux():
-    """Agrees with UsdLux's table within 0.3 % of the largest channel."""
+    """The colour agrees with UsdLux's table within 0.3 % of the largest channel."""
     from pxr import UsdLux
 
     for kelvin in range(2000, 10001, 250):
@@ -319,7 +319,7 @@ def test_predicates_of_expressions(tmp_path, predicate, rules, words):
 
 
 def test_expressions_are_evaluated_at_so_many_prims(tmp_path, monkeypatch):
-    """The number of visited prims is limited, since nested instances can be billions."""
+    """The number of visited prims is limited, since nested instances can make billions."""
     monkeypatch.setattr("wavecomb.usd.stage.collections.MAX_PRIMS", 5)
     scene, loaded = load(tmp_path, _EXPRESSIONS)
     assert "membershipExpression beyond 5 prims (cut there)" in said(loaded)

@@ -168,7 +168,7 @@ def test_normalize_divides_by_the_area(shot: Any, scale: float, scheme: str) -> 
 
 @pytest.mark.slow
 def test_sphere_of_triangles_is_a_sphere_light(shot: Any) -> None:
-    """Normalised and far away: radiance 1 / (4 pi r^2) over a visible disk of pi r^2."""
+    """A normalised light far away has radiance 1 / (4 pi r^2) over a visible disk of pi r^2."""
     ball = sphere("Lamp", "M", (0, 30, 0), rings=48)
     ball = ball.replace('["MaterialBindingAPI"]', '["LightAPI", "MaterialBindingAPI"]')
     power = "bool inputs:normalize = 1\nfloat inputs:intensity = 100\n"
@@ -177,7 +177,7 @@ def test_sphere_of_triangles_is_a_sphere_light(shot: Any) -> None:
 
 
 def test_textured_glow_is_tinted(shot: Any, tmp_path: Path) -> None:
-    """Equals the same texture with the tint in its scale, without a light."""
+    """The image equals that of the same texture with the tint in its scale, without a light."""
     pixels = np.random.default_rng(3).random((8, 8, 3)).astype(np.float32)
     out = oiio.ImageBuf(oiio.ImageSpec(8, 8, 3, "float"))
     out.set_pixels(oiio.ROI(), pixels)
@@ -202,7 +202,7 @@ def test_textured_glow_is_tinted(shot: Any, tmp_path: Path) -> None:
 
 
 def test_instances_are_lights_of_their_own(shot: Any) -> None:
-    """Two normalised instances of one prototype: each is divided by its own world-space area."""
+    """Two normalised instances of one prototype are each divided by their own world-space area."""
     inner = lamp(ALONE, "bool inputs:normalize = 1", place=None)
     big = np.diag((2.0, 2.0, 2.0, 1))
     prims = f"""class "Lamps" {{

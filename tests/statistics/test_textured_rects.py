@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 WIDTH, HEIGHT = 1.0, 0.7
 FLOOR = material("M", "diffuse", diffuseColor=(0.5, 0.5, 0.5))
 DOWN = camera((0, 5, 0), (0, 0, 0), half=0.004)
-"""Camera from above that sees 4 cm around the origin."""
+"""A camera above the floor that sees 4 cm around the origin."""
 PLACES = {
     "above": turned(-90) @ moved(0.8, 1.2, 0.3),
     "tilted": turned(-60, 70, 10) @ moved(0.8, 1.2, 0.3),

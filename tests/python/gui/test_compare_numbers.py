@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Comparison code that needs no window: sides, figures, FLIP in a process."""
+"""Comparison code that needs no window: image sides, figures, and FLIP in a process."""
 
 from __future__ import annotations
 

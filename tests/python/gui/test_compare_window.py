@@ -230,7 +230,9 @@ def test_without_a_stage_keeping_says_so(qtbot, window):
 
 @pytest.mark.slow
 def test_kept_picture_against_live_settings(qtbot, session):
-    """Another policy gives equal bits, another seed other noise. The viewport continues."""
+    """A render with another policy gives equal bits, and one with another seed other noise. The
+    viewport continues.
+    """
     window = CompareWindow(session)
     qtbot.addWidget(window)
     window.show()

@@ -27,7 +27,7 @@ def opened(path: Path, **more: object) -> Read:
 
 
 def written(folder: Path) -> Path:
-    """Writes ``RIG`` to a separate folder."""
+    """Writes the stage ``RIG`` to a separate folder."""
     inner = folder / "stage"
     inner.mkdir()
     (inner / "rig.usda").write_text(RIG)

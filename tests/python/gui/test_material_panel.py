@@ -225,7 +225,7 @@ def test_all_is_seen_at_the_usual_width(qtbot, tmp_path, looks):
 
 @pytest.mark.slow
 def test_undo_in_a_field_undoes_the_edit(qtbot, tmp_path, looks):
-    """A typed value is one undo step, however slowly typed. The field has no separate undo."""
+    """A typed value is one undo step, however slowly typed. The text field has no separate undo."""
     window = make_window(qtbot, tmp_path, looks)
     materials, edits = window.scene.materials, window.scene.edits
     materials.choose(f"{LOOKS}/Car")
