@@ -25,7 +25,7 @@ constexpr size_t kDirections = 8192;
 constexpr double kPrior = 64;
 /// Minimum number of records of a material before it limits guiding.
 constexpr double kMaterialRecords = 512;
-/// Fraction of bounces sampled by the BSDF in the first round, before moments are known.
+/// Fraction of bounces that the BSDF samples in the first round, before moments are known.
 constexpr float kFirstShare = 0.5f;
 
 uint32_t code_of(const GuidingGrid& grid, const float (&p)[3]) {
@@ -160,8 +160,8 @@ class GuidingFieldBuilder {
     }
   }
 
-  /// Returns the region of a cell and axis. Too few records: the region of the nearest ancestor
-  /// with enough, or kNoGuidingRegion.
+  /// Returns the region of a cell and axis. A cell with too few records uses the region of the
+  /// nearest ancestor with enough, or kNoGuidingRegion.
   uint32_t region_of(uint32_t depth, uint32_t axis) {
     RegionPart& part = levels_[depth][axis];
     if (part.count < kMinRegionRecords)
