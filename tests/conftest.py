@@ -16,8 +16,8 @@ import parts
 import pytest
 import tiers
 
-# A command in the sandbox starts a new Python process, which would delay hundreds of tests. Tests
-# of the sandbox pass --sandbox on.
+# Turn the sandbox off: a command in the sandbox starts a new Python process, which would delay
+# hundreds of tests. Tests of the sandbox pass --sandbox on.
 os.environ.setdefault("WAVECOMB_SANDBOX", "off")
 
 # Tests start hundreds of processes, which should not compile the package each time. A process in
@@ -44,7 +44,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
 @pytest.fixture(scope="session")
 def caustics(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The scene caustics with a coarse teapot."""
+    """Generate the scene caustics with a coarse teapot."""
     from wavecomb.scenes import write_scene
 
     path = tmp_path_factory.mktemp("caustics") / "caustics.usdc"

@@ -21,7 +21,7 @@ _file = os.environ.pop(FILE, None)  # not for pytest in tests
 
 
 def since_last() -> float:
-    """Seconds of CPU time since the last call in this process; 0 at first."""
+    """Return the seconds of CPU time since the last call in this process; 0 at first."""
     global _last
     times = os.times()
     now = times.user + times.system + times.children_user + times.children_system
@@ -39,7 +39,7 @@ def add(test: str, seconds: float) -> None:
 
 
 def save() -> None:
-    """Writes the seconds of all tests to the file that the environment names, if it does."""
+    """Write the seconds of all tests to the file that the environment variable names, if any."""
     if _file:
         Path(_file).write_text(json.dumps(_by_test, indent=1), encoding="utf-8")
 

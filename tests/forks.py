@@ -5,9 +5,9 @@ Importing `wavecomb` takes most of a second. `wavecomb(...)`, `code(...)` and `P
 to a server process, which has imported all modules, has a single thread, and forks for each
 request. The forked process uses the requested folder, variables and descriptors and then runs like
 `python -m` or `python -c`, with the same supervisor, sandbox, signals and exit codes as a command.
-Requests that a fork cannot serve start a process as usual: other programs, limits set by
-`preexec_fn`, and changes of variables that are read at import (all except `HARMLESS`). Tests of
-what is imported and when start real processes.
+A request that a fork cannot serve starts a process as usual: another program, limits set by
+`preexec_fn`, or a change of a variable that is read at import (all except `HARMLESS`). Tests of
+imports and their order start real processes.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ HARMLESS = frozenset((
 which reads them. All other modules may be read at import."""
 
 _MOST = 100_000
-_Popen = subprocess.Popen  # tests may replace it by the class below
+_Popen = subprocess.Popen
 _server: Server | None = None
 cpu_s = 0.0
 """CPU time of the processes that the server forked and that have ended."""
@@ -92,7 +92,7 @@ class Server:
             )
 
     def serves(self, variables: Mapping[str, str]) -> bool:
-        """Whether the variables that are read at import are those of the server."""
+        """Whether the variables that are read at import have the same values as in the server."""
         return _read_at_import(variables) == self._variables
 
     def fork(self, request: Mapping[str, Any], descriptors: Sequence[int]) -> socket.socket:
@@ -114,7 +114,7 @@ def _read_at_import(variables: Mapping[str, str]) -> dict[str, str]:
 
 
 class Popen(_Popen):
-    """`subprocess.Popen` that lets the server fork where this makes no difference."""
+    """A `subprocess.Popen` that lets the server fork the process if the result is the same."""
 
     _told: socket.socket | None = None
 
@@ -209,7 +209,7 @@ def _import_everything() -> None:
     names += ["difflib", "runpy"]
     for name in names:
         if not name.startswith(("wavecomb.gui", "wavecomb._vdb")) and not name.endswith("__main__"):
-            # Modules of optional extras may be missing; commands that need them report it.
+            # Modules of optional extras may be missing; the commands that need them report it.
             with contextlib.suppress(ImportError):
                 importlib.import_module(name)
 
@@ -270,7 +270,8 @@ def _end(code: object) -> None:
 
 
 def _main(descriptor: int) -> None:
-    # NumPy's matrix products would start threads; commands set this variable as well.
+    # Set before NumPy is imported, since its matrix products would start threads; commands set this
+    # variable as well.
     mine = "OPENBLAS_NUM_THREADS" not in os.environ
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     here = os.path.dirname(os.path.abspath(__file__))
@@ -299,7 +300,6 @@ def _main(descriptor: int) -> None:
         if way == "-I":
             from wavecomb import boot
 
-            # The parent is the process that waits for it.
             alive = f"--parent={os.getppid()}"
             boot.main([alive if one.startswith("--parent=") else one for one in rest])
         elif way == "-m":

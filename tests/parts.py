@@ -94,10 +94,10 @@ def written_scenes() -> list[str]:
 
 
 def only_where(condition: object, reason: str) -> pytest.MarkDecorator:
-    """Mark tests for certain machines or builds only. CI accepts the skip."""
+    """Mark tests for certain machines or builds only. CI accepts this kind of skip."""
     return pytest.mark.skipif(not condition, reason=NOT_HERE + reason)
 
 
 def not_here(reason: str) -> NoReturn:
-    """Skip a test that this machine or this build cannot run. CI accepts the skip."""
+    """Skip a test that this machine or this build cannot run. CI accepts this kind of skip."""
     pytest.skip(NOT_HERE + reason)

@@ -796,7 +796,7 @@ class Result:
         """(height, width, 3), world space."""
     @property
     def depth(self) -> NDArray[np.float32] | None:
-        """(height, width), along the camera's axis; infinite for pixels without a hit."""
+        """(height, width), depth along the camera's axis; infinite for pixels without a hit."""
     @property
     def aovs(self) -> dict[str, NDArray[np.float32]]:
         """Further requested AOVs: (height, width) or (height, width, channels)."""
@@ -838,7 +838,7 @@ class Result:
 
 class Snapshot:
     """State of a paused render, valid only during Watcher.snapshot(). After the call returns, any
-    use raises Error."""
+    use of the snapshot raises Error."""
 
     @property
     def finished(self) -> bool:

@@ -25,11 +25,11 @@ constexpr size_t kShortSamples = 20000;
 #endif
 constexpr size_t kLongSamples = 1000000;
 
-constexpr size_t kFineSamples = 800;  ///< minimum expected count of a fine cell
+constexpr size_t kFineSamples = 800;
 constexpr size_t kMaxFine = 1024, kMinFine = 16, kCoarse = 32;
-/// Leaves per cell for many samples and for few.
+/// Number of k-d tree leaves per cell, for many samples and for few.
 constexpr size_t kManyLeaves = 8, kFewLeaves = 3;
-/// Number of batteries in the whole program, for Sidak's correction.
+/// Number of test batteries in the whole program, for Sidak's correction.
 constexpr size_t kBatteries = 25;
 
 /// Observed and expected counts of cells of about equal mass.
@@ -41,8 +41,8 @@ struct Counts {
   }
 };
 
-/// Groups consecutive leaves into cells until each expects at least `least` samples. Leaves where
-/// nothing is expected form one last cell.
+/// Groups consecutive leaves into cells until each expects at least `least` samples. Leaves with an
+/// expected count of 0 form one last cell.
 struct Cells {
   Counts counts;
   std::vector<size_t> first_leaf;
@@ -71,7 +71,7 @@ Cells gather_cells(const Counts& leaves, double least) {
   return cells;
 }
 
-/// Identifies an atom. Draws with the same id but different probabilities are different atoms.
+/// Identifies an atom. Draws with the same id but different probabilities count as different atoms.
 using AtomKey = std::pair<uint64_t, double>;
 
 std::string describe(const Leaves::Leaf& leaf, double observed, double expected) {
@@ -210,8 +210,8 @@ Result compare(const Case& c, uint32_t seed, size_t samples) {
   result.nothing = static_cast<double>(nothing) / n;
   result.disagreeing = static_cast<double>(disagreeing) / static_cast<double>(checked);
 
-  // The remainder to 1 is the probability of no sample. It is widened by the integration error,
-  // which is not the sampler's fault.
+  // The remainder to 1 is the probability that the sampler returns no sample. The tolerance
+  // includes the integration error, which is not the sampler's fault.
   result.slack = std::max(c.slack, 60 / n);
   const double left = std::max(0.0, 1 - result.mass - result.atoms) * n;
   const double beyond =

@@ -51,9 +51,9 @@ struct Draw {
   enum class Kind : uint8_t { kNothing, kPlace, kAtom };
   Kind kind = Kind::kNothing;
   Place place;
-  uint64_t atom = 0;       ///< id of the atom
-  double probability = 0;  ///< probability of the atom, reported by the sampler
-  bool agrees = true;      ///< density and weight agree with the evaluation at the sampled point
+  uint64_t atom = 0;
+  double probability = 0;
+  bool agrees = true;  ///< density and weight agree with the evaluation at the sampled point
 
   static Draw nothing() { return {}; }
   static Draw at(const Place& place, bool agrees = true) {
@@ -76,7 +76,7 @@ struct Case {
   /// Tolerance of the integral of the density, which uses floats. It is larger where samples are so
   /// few that leaves are large.
   double slack = 5e-4;
-  /// True for smooth densities, whose lobes have tails that reveal them from a distance; false for
+  /// True for smooth densities, whose lobes have wide tails that pilot evaluations find; false for
   /// densities with jumps.
   bool is_smooth = true;
   /// Minimum number of integration boxes along each axis of a chart; large for densities that jump
@@ -85,15 +85,15 @@ struct Case {
 };
 
 struct Result {
-  std::vector<double> p_values;  ///< fine cells, then coarse cells
-  double mass = 0;               ///< integral of the density
-  double slack = 0;              ///< tolerance of `mass`
-  double atoms = 0;              ///< total probability of the atoms
-  double nothing = 0;            ///< fraction of draws without a sample
-  double disagreeing = 0;        ///< fraction of samples that do not agree
-  std::string worst;             ///< fine cell with the largest deviation
+  std::vector<double> p_values;
+  double mass = 0;
+  double slack = 0;  ///< tolerance of `mass`
+  double atoms = 0;
+  double nothing = 0;      ///< fraction of draws without a sample
+  double disagreeing = 0;  ///< fraction of samples that do not agree
+  std::string worst;       ///< fine cell with the largest deviation
 
-  /// Describes what is wrong at the given level for each p-value; empty if nothing is.
+  /// Describes the failure at the given level for each p-value; empty if the test passes.
   std::string fault(const Case& c, double level) const;
 };
 
@@ -116,14 +116,14 @@ double p_of_counts(const std::vector<double>& observed, const std::vector<double
 /// 1967).
 double sidak(double level, size_t tests);
 
-/// The cases of one test. By Sidak's correction, first over all batteries and then over the
-/// p-values of this one, a correct program passes with a probability of 99 %, whatever its seeds.
+/// The test cases of one chi-square battery. By Sidak's correction over all batteries and the
+/// p-values of each, a correct program passes with a probability of 99 %.
 class Battery {
  public:
   explicit Battery(std::string name);
   /// Compares a case, with its index as seed.
   void run(const Case& c);
-  /// Adds a p-value that was computed elsewhere.
+  /// Adds a p-value that the caller computed.
   void add(const std::string& name, double p_value);
   /// Expects all cases to pass, and prints their number and the lowest p-value.
   void judge() const;

@@ -41,9 +41,9 @@ class Integral {
       if (pilot[i].chart == chart) highest_ = std::max(highest_, 2 * c.density(pilot[i]));
   }
 
-  /// Integrates the density over a box. Pilot samples indicate where lobes are: a box is halved
-  /// until they fill it. Each half is then split until the result changes by little, and by less
-  /// than `tolerance`; each half gets 0.7 of the tolerance.
+  /// Integrates the density over a box. Splits a box until pilot samples fill it, since they
+  /// indicate where lobes are. Then splits each half until the integral changes by less than
+  /// `tolerance`; each half gets 0.7 of the tolerance.
   double over(const Box& box, Points first, Points last, double tolerance, int depth = 60) const {
     if (depth > 0 && last - first > 2) {
       const double fill[2] = {spread(box, first, last, 0), spread(box, first, last, 1)};
@@ -102,9 +102,9 @@ class Integral {
   }
 
   /// Whether `sum`, the integral over both halves of a box, is accurate enough, given `whole`, one
-  /// rule over the entire box. A lobe between the nodes may hide from both rules or look equally
-  /// small to both, but hardly from a third rule and the pilot samples as well. A box is also
-  /// accepted if it is so small that even the highest density in the chart would contribute little.
+  /// rule over the entire box. A narrow lobe may hide from both integration rules or look equally
+  /// small to both, but rarely also from a third rule and the pilot samples. A box is also accepted
+  /// if it is so small that even the highest density in the chart would contribute little.
   bool is_symbol(const Box& box, double whole, double sum, Points first, Points last,
                  double tolerance) const {
     const double area = box.extent(0) * box.extent(1), change = std::abs(sum - whole);
@@ -148,9 +148,9 @@ class Integral {
 
   const Case& case_;
   uint32_t chart_;
-  std::array<double, 2> widest_;        ///< maximum extent of a box along each axis
-  std::array<double, 2> first_, step_;  ///< start and width of columns and rows
-  double highest_ = 0;                  ///< estimate of the highest density in the chart
+  std::array<double, 2> widest_;
+  std::array<double, 2> first_, step_;
+  double highest_ = 0;
 };
 
 /// Boxes with about equal numbers of pilot samples: one k-d tree per chart, split at medians.
@@ -189,7 +189,7 @@ class Leaves {
   struct Node {
     size_t axis;
     double at;
-    int low, high;  ///< index of a node, or -1 - index of a leaf
+    int low, high;  ///< index of a k-d tree node, or -1 - index of a leaf
   };
 
   int split(const Box& box, Points first, Points last, size_t next = 0) {
@@ -207,8 +207,7 @@ class Leaves {
         std::nth_element(first, half, last,
                          [axis](const Point& a, const Point& b) { return a[axis] < b[axis]; });
         at = (*half)[axis];
-        can_split = at > box.low[axis] && at < box.high[axis];  // false if half of the points
-                                                                // coincide
+        can_split = at > box.low[axis] && at < box.high[axis];
       }
     }
     if (!can_split) {

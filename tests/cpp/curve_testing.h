@@ -60,7 +60,7 @@ inline CurveData strands(Primitive primitive, uint32_t n, uint32_t segments, flo
     for (uint32_t k = 0; k < points; ++k) {
       data.point(at, radius * (1.2f - static_cast<float>(k) / static_cast<float>(points)),
                  Vec3<float>(0, 0, 1) + random() * 0.3f);
-      // Cubics are smooth at joints: the steps before and after a joint are equal.
+      // Cubic curves are smooth at joints: the steps before and after a joint are equal.
       if (!cubic || k % 3 != 2)
         turn = along + random() * (0.6f * size / static_cast<float>(points));
       if (cubic && k % 3 == 0 && k > 0)

@@ -11,7 +11,8 @@
 
 namespace wavecomb::facet_integrals {
 
-/// Reflectance, and cosine of the refracted ray; 1 and 0 under total internal reflection.
+/// Returns the reflectance and the cosine of the refracted ray; 1 and 0 under total internal
+/// reflection.
 struct Crossing {
   double reflectance, cos_t;
 };
@@ -38,7 +39,7 @@ inline double mean_fresnel(double eta) {
 
 /// Visible GGX normals for a viewer of cosine `z` and azimuth `phi`, each with equal weight
 /// (midpoints of the map of Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps",
-/// 2023). Each has G2 / G1 of its reflected and its refracted direction.
+/// 2023). Each normal has the ratio G2 / G1 of its reflected and its refracted direction.
 class SeenFacets {
  public:
   SeenFacets(double z, double phi, double ax, double ay, double eta, int steps = 96) {
@@ -78,7 +79,7 @@ class SeenFacets {
   double up(Reflectance reflectance) const {
     return mean([&](const Facet& f) { return reflectance(f.cosine) * f.up; });
   }
-  /// Mean transmission for `transmittance`, a function of the same cosine.
+  /// Mean transmission for `transmittance`, a function of the cosine between normal and viewer.
   template <typename Transmittance>
   double down(Transmittance transmittance) const {
     return mean([&](const Facet& f) { return transmittance(f.cosine) * f.down; });

@@ -22,7 +22,7 @@ inline GraphOp op(GraphCode code, uint8_t width, uint16_t to, std::initializer_l
   return o;
 }
 
-/// Index of a parameter, or of one of its components.
+/// Returns the index of a material parameter, or of one of its components.
 inline uint16_t output(const char* name, uint32_t component = 0) {
   return static_cast<uint16_t>(graph_parameter(name) + component);
 }

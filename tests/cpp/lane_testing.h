@@ -151,7 +151,7 @@ inline std::array<std::vector<float>, 2> all_pairs(const std::vector<float>& val
   return pairs;
 }
 
-/// Error of y in units in the last place of the float closest to `exact`.
+/// Returns the error of y in units in the last place of the float closest to `exact`.
 inline double ulps(float y, double exact) {
   const float nearest = static_cast<float>(exact);
   if (y == nearest) return 0;

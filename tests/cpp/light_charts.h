@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Charts of lights as seen from a point, for chi_square.h. Each light has a chart on its surface,
-/// so narrow and wide lights are resolved equally well, and edges of lights are edges of charts.
+/// so cells resolve narrow and wide lights equally well, and edges of lights are edges of charts.
 /// All quantities are computed independently, in double precision.
 ///
 ///    rect      fractions of its edges
@@ -52,7 +52,7 @@ inline D3 unit(const D3& a) {
 
 class LightCharts {
  public:
-  /// The view and the arrays that it points to must outlive this object.
+  /// The light view and the arrays that it points to must outlive this object.
   LightCharts(const LightView& view, const Vec3<float>& from) : view_(view), from_(from) {
     for (uint32_t i = 0; i < view.count; ++i) seen_.push_back(see(i));
     for (uint32_t i = 0; i < view.infinite_count; ++i) {
@@ -89,7 +89,7 @@ class LightCharts {
   struct Ray {
     D3 dir;
     double distance = 0;
-    double solid_angle = 0;  ///< solid angle per dx dy; 0 if not visible
+    double solid_angle = 0;
   };
   Ray ray(const chi_square::Place& p) const {
     Ray r = any_ray(p);
@@ -114,12 +114,11 @@ class LightCharts {
     LightKind kind = LightKind::kRect;
     uint32_t light = 0, first_portal = 0, portals = 0;
     bool is_seen = true;
-    D3 p, u, v, n;                           ///< flat: p relative to the receiver; cones: v, n
-                                             ///< perpendicular to u
-    double area = 0;                         ///< flat: area per dx dy
-    double size = 0;                         ///< cones: 1 - cos; cylinder: maximum angle across
-    double distance = 0;                     ///< to the centre, or to the axis of a cylinder
-    double radius = 0, begin = 0, axis = 0;  ///< cylinder: extent along its axis
+    D3 p, u, v, n;
+    double area = 0;
+    double size = 0;
+    double distance = 0;
+    double radius = 0, begin = 0, axis = 0;
   };
 
   /// Returns the chart of the first portal of dome `light` that a direction passes through, or else
@@ -317,7 +316,7 @@ class LightCharts {
 };
 
 /// Tests sample_light with all lights of a view and receiver `to`: the choice of a light together
-/// with the point on it. Lights without extent are atoms.
+/// with the point on it. Lights without extent are atoms of the chi-square test.
 ///
 /// The density is the one that MIS uses for hits (light_hit, triangle_light_pdf, and the densities
 /// of infinite lights); it is 0 where no light arrives. A sample agrees if its density and weight
@@ -337,7 +336,6 @@ inline chi_square::Case light_case(std::string name, const LightView& view,
         const bool is_dome = r.kind == static_cast<uint32_t>(LightKind::kDome);
         h.pdf = is_dome ? detail::hit_dome_from<float>(view, r, to.p, dir, true).pdf
                         : detail::hit_distant<float>(detail::LightReader<float>(r, true), dir).pdf;
-        // light weights do not change it
         h.pdf *= view.by_tree ? view.tree.infinite_pdf[light] : r.selection_pdf;
         h.radiance = infinite_light_radiance<float>(
             view, light, {.from = to.p, .dir = dir, .is_delta = true}, true);

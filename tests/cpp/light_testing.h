@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Short ways to make lights for tests, and a double-precision ray tracer for single lights.
+/// Helpers that make lights for tests, and a double-precision ray tracer for single lights.
 #pragma once
 
 #include <optional>
@@ -18,7 +18,7 @@ struct Lights {
   std::vector<TextureView> views;
   std::vector<IesProfile> profiles;
   std::vector<MaterialRecord> records;
-  std::vector<TextureUseRecord> uses;  ///< textures of materials; only emission slots are set
+  std::vector<TextureUseRecord> uses;
   LightSet set;
 
   Lights() = default;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A test medium: homogeneous fog that fills all space. The medium uses all hooks that
+/// A test medium: homogeneous fog that fills all space. The test medium uses all hooks that
 /// integrators offer to media.
 #pragma once
 
@@ -13,8 +13,8 @@
 
 namespace wavecomb::media_testing {
 
-/// Isotropic phase function. The phase function replaces the program "principled", whose base
-/// colour becomes the albedo.
+/// Isotropic phase function. The medium's phase function replaces the program "principled", whose
+/// base colour becomes the albedo.
 template <typename F>
 class FogPhase : public BsdfTraits {
  public:
@@ -71,9 +71,10 @@ struct Fog {
   template <typename F>
   using Programs = ProgramList<DiffuseBsdf<F>, EmissiveBsdf<F>, FogPhase<F>>;
 
-  Vec3<float> extinction;     ///< extinction per unit of length; no channel is 0
+  Vec3<float> extinction;
   uint32_t material;          ///< a material of program "principled"
-  bool tracks_ratio = false;  ///< shadow ray transmittance by ratio tracking instead of exp
+  bool tracks_ratio = false;  ///< Whether shadow rays estimate transmittance by ratio tracking
+                              ///< instead of exp.
 
   /// Samples a distance by the extinction of a random channel, each with probability 1/3, weighted
   /// by the densities of all three:
@@ -111,8 +112,7 @@ struct Fog {
     for (uint32_t step = 0; any(on); ++step) {
       const F u = unit_float<F>(hash_u32<UInt<F>>(seed, UInt<F>(step)));
       x = select(on, F(x - log(F(1.f - u)) * (1.f / majorant)), x);
-      on = on & (x < p.t) & (max_component(product) > 1e-20f);  // rays to a dome are infinitely
-                                                                // long
+      on = on & (x < p.t) & (max_component(product) > 1e-20f);
       product = select<F>(on, product * kept, product);
     }
     return product;

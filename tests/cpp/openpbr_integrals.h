@@ -14,8 +14,8 @@ namespace wavecomb::facet_integrals {
 
 using Rgb = std::array<double, 3>;
 
-/// Sensor response to cos(2 pi opd / lambda) in linear Rec.709, 1 for an opd of 0; opd in
-/// nanometres (Belcour and Barla 2017, code that accompanies the paper).
+/// Sensor response to cos(2 pi opd / lambda) in linear Rec.709 for an optical path difference in
+/// nanometres; 1 for a difference of 0 (Belcour and Barla 2017, code that accompanies the paper).
 inline Rgb film_response(double opd) {
   constexpr double kTau = 2 * std::numbers::pi;
   const auto raw = [](double nm) {
@@ -39,7 +39,8 @@ inline Rgb film_response(double opd) {
 struct Film {
   double thickness, ior;
 
-  /// Reflectance at cosine c over a base with these amplitudes of reflection inside the film.
+  /// Reflectance at cosine c of the film over a base with these amplitudes of reflection inside the
+  /// film.
   Rgb over(double c, const Rgb& base_s, const Rgb& base_p) const {
     const double grown = std::clamp(thickness / 30, 0.0, 1.0);
     const double eta = 1 + (ior - 1) * grown * grown * (3 - 2 * grown);
@@ -141,8 +142,8 @@ class OpenPbrModel {
     }
   }
 
-  /// Radiance reflected in a white furnace towards cosine z and azimuth phi; `below` means from
-  /// inside.
+  /// Radiance that the material reflects in a white furnace towards cosine z and azimuth phi;
+  /// `below` views it from inside.
   Rgb seen(double z, double phi, bool below) const {
     const bool inside = below && glass_ > 0 && !thin_;
     const double eta = inside ? 1 / ior_ : ior_;
@@ -159,7 +160,7 @@ class OpenPbrModel {
       // Metal lobe.
       double base = metal_ * std::min(weight_, 1.0) * (1 + base_[k] * lost) *
                     facets.up([&](double c) { return filmed(over_metal_, c, metal(c)[k]); });
-      // Interface over a diffuse base, which receives the rest.
+      // A dielectric interface over a diffuse base, which receives the transmitted light.
       const double f0 = fresnel(1, gloss_ior_).reflectance;
       const double gloss = (1 + f0 * lost) * facets.up([&](double c) {
         return filmed(over_gloss_, c, fresnel(c, gloss_ior_).reflectance);
@@ -174,7 +175,6 @@ class OpenPbrModel {
   }
 
  private:
-  /// SeenFacets, or a single facet if the surface is smooth.
   class Seen {
    public:
     Seen(double z, double phi, double ax, double ay, double eta) : z_(z), eta_(eta) {
@@ -199,7 +199,7 @@ class OpenPbrModel {
     Rgb f;
     for (size_t k = 0; k < 3; ++k) {
       const double f0 = base_[k], schlick = std::pow(1 - c, 5);
-      // Edge tint: edge_ times Schlick's value at cosine 1 / 7 (Kutz et al. 2021).
+      // The edge tint multiplies edge_ by Schlick's value at cosine 1 / 7 (Kutz et al. 2021).
       const double at = f0 + (1 - f0) * std::pow(6.0 / 7, 5);
       const double b = at * (1 - edge_[k]) / (1.0 / 7 * std::pow(6.0 / 7, 6));
       f[k] = std::clamp(f0 + (1 - f0) * schlick - b * c * schlick * (1 - c), 0.0, 1.0);
@@ -207,8 +207,8 @@ class OpenPbrModel {
     return f;
   }
 
-  /// Reflection plus transmission of glass, relative to white glass without a film; per microfacet
-  /// for anisotropic glass.
+  /// Returns reflection plus transmission of glass, relative to white glass without a film;
+  /// integrates over microfacets if the glass is anisotropic.
   double through(const Seen& facets, double eta, bool inside, double white, size_t k) const {
     const auto reflectance = [&](double c, double index) {
       const double t = fresnel(c, eta).cos_t;
@@ -259,7 +259,7 @@ class OpenPbrModel {
     return (1 - up) / (1 - up * e);
   }
 
-  /// MaterialX's fit of Zeltner, Burley, Chiang 2022.
+  /// MaterialX's fit to the sheen model of Zeltner, Burley and Chiang, 2022.
   double fuzz_albedo(double x) const {
     const double y = std::clamp(fuzz_roughness_, 0.01, 1.0);
     const double s = y * (0.0206607 + 1.58491 * y) / (0.0379424 + y * (1.32227 + y));

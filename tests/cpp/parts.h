@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Optional requirements of tests. A test whose requirement is missing is skipped, or fails with
-/// WAVECOMB_STRICT=1 or in CI. Tests that take minutes run with WAVECOMB_LONG=1, which `make
-/// test-long` sets.
+/// Skips tests whose requirements, such as optional dependencies, are missing. A test whose
+/// requirement is missing is skipped, or fails with WAVECOMB_STRICT=1 or in CI. Tests that take
+/// minutes run with WAVECOMB_LONG=1, which `make test-long` sets.
 #pragma once
 #include <gtest/gtest.h>
 

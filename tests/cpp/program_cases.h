@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Table of materials with which all programs are tested.
+/// Table of materials that all tests of programs use.
 #pragma once
 
 #include <functional>
@@ -14,7 +14,7 @@ namespace wavecomb::program_cases {
 
 using P = OpenPbrParams<float>;
 
-/// A program and its parameters.
+/// A material program and its parameters.
 struct Case {
   std::string name;
   ProgramId program;
@@ -41,11 +41,11 @@ Case make_case(std::string name, ProgramId program, Edit edit, bool schlick = fa
   return c;
 }
 
-/// Row of the table: a material that can be made for any roughness of its main lobe.
+/// Row of the table: makes a material for any roughness of its main lobe.
 struct Row {
   std::string name;
   ProgramId program;
-  std::vector<float> usual;  ///< roughnesses that most tests use
+  std::vector<float> usual;
   std::function<void(P&, float roughness)> edit;
   bool schlick = false;
 
@@ -110,7 +110,7 @@ inline void add_openpbr(std::vector<Row>& all) {
   });
 }
 
-/// Returns the table. It includes materials without a roughness or with a fixed one.
+/// Returns the table. The table includes materials without a roughness or with a fixed one.
 inline std::vector<Row> table() {
   using Vec = Vec3<float>;
   std::vector<Row> all;
@@ -153,7 +153,7 @@ inline std::vector<Row> table() {
   return all;
 }
 
-/// Returns each material at its usual roughnesses.
+/// Returns each material at the roughnesses that most tests use.
 inline std::vector<Case> usual_cases() {
   std::vector<Case> cases;
   for (const Row& m : table())

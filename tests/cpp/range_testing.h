@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Textures and graphs of known ranges, and the kernel variants that materials get with them.
+/// Textures and graphs of known ranges, and the kernel variants selected for materials that use
+/// them.
 #pragma once
 
 #include "graph_ops.h"

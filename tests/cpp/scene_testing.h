@@ -229,7 +229,8 @@ inline Material make_material(ProgramId program, const Vec3<float>& color = {0.5
   m.roughness = roughness;
   return m;
 }
-/// Makes a material that emits and reflects like Lambert: a principled surface with index 1.
+/// Makes a material that emits and reflects like Lambert: a principled surface with a refractive
+/// index of 1.
 inline Material glowing(float albedo, float radiance) {
   Material m = make_material(ProgramId::kPrincipled, Vec3<float>(albedo), 1);
   m.emission = Vec3<float>(radiance);
@@ -404,7 +405,7 @@ inline ScenePtr emissive_meshes() {
   MeshData room = box({-2, -1, -2}, {2, 2, 2});
   room.indices.resize(30);
   room.face_materials.assign(10, floor);
-  room.face_materials[6] = textured;  // one triangle of the ceiling
+  room.face_materials[6] = textured;
   b.add_to_group(0, b.add_mesh(make_mesh(room)));
   const uint32_t group = b.add_group("lamp");
   Mesh ball = make_mesh(sphere(4, true));

@@ -28,7 +28,6 @@ struct Rays {
     slot.resize(n + 16, 0);
     std::iota(slot.begin(), slot.begin() + static_cast<long>(n), 0u);
   }
-  /// Points ray i from `o` to `to`.
   void aim(size_t i, const std::array<double, 3>& o, const std::array<double, 3>& to) {
     const double d[3] = {to[0] - o[0], to[1] - o[1], to[2] - o[2]};
     const double l = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
@@ -39,7 +38,7 @@ struct Rays {
       *dir[c] = static_cast<float>(d[c] / l);
     }
   }
-  /// Returns the rays in the given order, with their slots.
+  /// Returns the rays in the given order, with the pool slot of each.
   Rays in_order(const std::vector<uint32_t>& order) const {
     Rays moved(size);
     const auto move = [&](const auto& from, auto& to) {
@@ -170,7 +169,6 @@ void expect_hits_do_not_depend_on_packets(const EmbreeAccelerator& accel, const 
   }
 }
 
-/// Makes rays between random points of a cube.
 Rays random_rays(size_t n, float half, uint32_t seed) {
   Rays rays(n);
   std::mt19937 rng(seed);
@@ -208,12 +206,12 @@ std::shared_ptr<const Scene> soup_scene(uint32_t triangles) {
 }
 
 struct ExactHit {
-  double t, u, v, edge;  ///< edge: distance from the triangle's edge, in barycentrics
+  double t, u, v, edge;  ///< Distance from the triangle's edge, in barycentric coordinates.
   uint32_t prim, geom, inst;
 };
 
 /// Finds all hits of a ray in double precision (Moeller and Trumbore), nearest first. `slack`
-/// enlarges triangles by that much in barycentrics.
+/// enlarges triangles by that distance in barycentric coordinates.
 class BruteForce {
  public:
   explicit BruteForce(const Scene& scene) {
@@ -286,8 +284,8 @@ class BruteForce {
   std::vector<Triangle> triangles_;
 };
 
-/// Compares hits with brute force for `triangles` triangles, by a triangle list or the BVH. At
-/// least one ray in `one_in` must hit.
+/// Compares the hits of random rays with a brute-force search of `triangles` triangles, for a
+/// triangle list or a BVH. At least one ray in `one_in` must hit a triangle.
 void expect_brute_force(uint32_t triangles, HitRule rule, size_t one_in) {
   const auto scene = soup_scene(triangles);
   const EmbreeAccelerator accel(scene, 2, rule);
@@ -325,7 +323,7 @@ TEST(Accelerator, HitsEqualBruteForceInDoublePrecision) {
   expect_brute_force(60, HitRule::kCanonical, 2);
 }
 
-/// Scenes small enough for a triangle list, traced by the list and by the BVH.
+/// Traces scenes small enough for a triangle list by the list and by the BVH.
 class SmallScene : public testing::TestWithParam<HitRule> {};
 INSTANTIATE_TEST_SUITE_P(Accelerator, SmallScene,
                          testing::Values(HitRule::kList, HitRule::kCanonical),
@@ -384,9 +382,9 @@ TEST(Accelerator, CurvesAndPointsDoNotDependOnPackets) {
 }
 
 TEST(Accelerator, CameraRaysDoNotDependOnPackets) {
-  // Bundles of rays from one point, for which the coherent flag is meant, and from a lens. Lens
-  // rays graze the edges of the Cornell box from many points, where coherent packets differ (see
-  // below).
+  // Bundles of rays from one point or from a lens, as the coherent flag expects. Lens rays graze
+  // the edges of the Cornell box from many points, where coherent packets may differ from single
+  // rays.
   for (const auto& scene : {mixed(), cornell(), emissive_meshes()}) {
     const EmbreeAccelerator accel(scene, 2);
     for (const double radius : {0.0, 0.05, 0.5}) {
@@ -439,8 +437,8 @@ Rays rays_at_edges(const Mesh& mesh, const Affine& m, size_t n, uint32_t seed, F
   return rays;
 }
 
-/// Expects that coherent packets find nearly the same hits as single rays, on rays chosen to
-/// disagree.
+/// Expects that coherent packets find nearly the same hits as single rays, on rays that are likely
+/// to show differences.
 void expect_coherent_differs_seldom(const EmbreeAccelerator& accel, const Rays& rays) {
   const DenormalsOff denormals_off;
   const Keys keys(rays.size);
@@ -478,8 +476,9 @@ TEST(Accelerator, RaysAtSharedEdgesAndVerticesDoNotDependOnPackets) {
       SCOPED_TRACE(testing::Message() << "bump " << bump << (instanced ? ", instanced" : ""));
       const Rays rays = rays_at_edges(mesh, m, size_for_build(50000), 21, From::kAnywhere);
       expect_hits_do_not_depend_on_packets(accel, rays, false);
-      // Embree's coherent traversal tests boxes against a whole packet, and thereby finds triangles
-      // that a single ray misses by a rounding error. It is meant for rays from one point.
+      // Embree's coherent traversal tests boxes against a whole packet, and so finds triangles that
+      // a single ray misses by a rounding error. Coherent traversal is meant for rays from one
+      // point.
       expect_coherent_differs_seldom(accel, rays);
       expect_hits_do_not_depend_on_packets(
           accel, rays_at_edges(mesh, m, size_for_build(50000), 22, From::kPoint));
@@ -487,7 +486,7 @@ TEST(Accelerator, RaysAtSharedEdgesAndVerticesDoNotDependOnPackets) {
       expect_hits_do_not_depend_on_packets(accel, lens, false);
       expect_coherent_differs_seldom(accel, lens);
       if (bump > 0) continue;
-      // No ray passes through: the grid has no holes, except that rays may pass at its border.
+      // No ray passes through the grid except at its border, since the grid has no holes.
       const Hits hits = trace(accel, rays, 16, false, Keys(rays.size).keys());
       size_t missed = 0;
       for (size_t i = 0; i < rays.size; ++i) missed += hits.inst[i] == kNoHit;
@@ -513,7 +512,7 @@ TEST(Accelerator, ClosedMeshesHaveNoHoles) {
     const Hits hits = trace(accel, rays, width, false, Keys(n).keys());
     size_t missed = 0;
     for (size_t i = 0; i < n; ++i) missed += hits.inst[i] == kNoHit;
-    // Rays aim exactly at vertices; robust traversal misses about one in ten thousand.
+    // Rays aim exactly at vertices, where robust traversal misses about one in ten thousand.
     EXPECT_LE(missed, n / 10000 + 1) << width;
     const auto shadow = blocked(accel, rays, width, false, Keys(n).keys());
     EXPECT_GE(std::count(shadow.begin(), shadow.end(), 1u) + static_cast<long>(n / 10000 + 1),
@@ -586,7 +585,7 @@ TEST(Accelerator, ListsHaveNoHoles) {
   }
 }
 
-// Two coincident triangles: which one is reported depends on ids, not on packets.
+// Which of two coincident triangles is reported depends on their ids, not on packets.
 TEST(Accelerator, CoincidentSurfacesDoNotDependOnPackets) {
   SceneBuilder b;
   b.add_to_group(0, b.add_mesh(make_mesh(grid(8, 0.3f, 1))));
@@ -631,8 +630,8 @@ TEST(Accelerator, IncoherentRaysAtCrossingSurfacesDoNotDependOnPackets) {
   expect_hits_do_not_depend_on_packets(accel, rays.in_order(order));
 }
 
-/// Compares occlusion with hits for `triangles` triangles, by a triangle list or the BVH. At least
-/// one ray in `one_in` must be blocked.
+/// Compares occlusion with the hits of the same rays on `triangles` triangles, for a triangle list
+/// or a BVH. At least one ray in `one_in` must be blocked.
 void expect_occlusion_agrees(uint32_t triangles, HitRule rule, size_t one_in) {
   const auto scene = soup_scene(triangles);
   const EmbreeAccelerator accel(scene, 2, rule);
@@ -668,7 +667,7 @@ TEST_P(SmallScene, OcclusionAgreesWithIntersection) {
 TEST_P(SmallScene, LightShapesAreFoundByTheirRecord) {
   SceneBuilder b;
   b.add_light(make_light(LightKind::kSphere, {1, 1, 1}, translate(4, 0, 0)));
-  b.add_light(make_light(LightKind::kDome, {1, 1, 1}));  // first among the light records
+  b.add_light(make_light(LightKind::kDome, {1, 1, 1}));
   b.add_light(make_light(LightKind::kDisk, {1, 1, 1}, translate(0, 4, 0) * rotate(0, -90)));
   b.add_light(make_light(LightKind::kRect, {1, 1, 1},
                          translate(0, 0, -4) * rotate(1, 180) * scale(-2, 0.5f, 1)));
@@ -683,7 +682,7 @@ TEST_P(SmallScene, LightShapesAreFoundByTheirRecord) {
   const auto from_centre = [&](size_t i, double x, double y, double z) {
     rays.aim(i, {0, 0, 0}, {x, y, z});
   };
-  from_centre(0, 4, 0.4, 0);     // sphere of radius 0.5 at 4
+  from_centre(0, 4, 0.4, 0);
   from_centre(1, 4, 0.6, 0);     // beside it
   from_centre(2, 0.4, 4, 0.25);  // disk of radius 0.5
   from_centre(3, 0.4, 4, 0.35);
@@ -691,7 +690,7 @@ TEST_P(SmallScene, LightShapesAreFoundByTheirRecord) {
   from_centre(5, 0.9, 0.3, -4);
   from_centre(6, -4, 0, 0);  // a point light has no shape
   from_centre(7, 1, 1, 1);
-  rays.aim(8, {0, 0, -8}, {0, 0.1, 0});  // the back side of the rect
+  rays.aim(8, {0, 0, -8}, {0, 0.1, 0});
   const Keys keys(9);
   for (const uint32_t width : {1u, 4u, 8u, 16u}) {
     const Hits hits = trace(accel, rays, width, false, keys.keys());
@@ -720,10 +719,10 @@ TEST_P(SmallScene, CylinderLightsAreOpenAtTheirEnds) {
   const EmbreeAccelerator accel(b.build(), 1, GetParam());
   Rays rays(5);
   rays.aim(0, {0, 0, 0}, {1.9, 0, 3});
-  rays.aim(1, {2.1, 0, 0}, {2.1, 0, 3});   // beside the end of the tube
-  rays.aim(2, {-5, 0, 3}, {5, 0, 3});      // along the axis, through the tube
-  rays.aim(3, {-3, 0, 3}, {-2, 0.25, 3});  // in at one end, to the inner side
-  rays.aim(4, {0, 0, 3}, {0, 1, 3});       // from inside
+  rays.aim(1, {2.1, 0, 0}, {2.1, 0, 3});
+  rays.aim(2, {-5, 0, 3}, {5, 0, 3});
+  rays.aim(3, {-3, 0, 3}, {-2, 0.25, 3});
+  rays.aim(4, {0, 0, 3}, {0, 1, 3});  // from inside
   const Keys keys(5);
   const Hits hits = trace(accel, rays, 4, false, keys.keys());
   const double s = std::sqrt(1.9 * 1.9 + 9);
@@ -805,7 +804,7 @@ TEST_P(SmallScene, PresenceIsAProbability) {
         const double p = left * (layer < 3 ? opacity : 1);
         expected = p * static_cast<double>(n);
         left -= p;
-        // 16 comparisons: 4.5 sigma gives a false alarm rate of 1e-4 in total.
+        // With 16 comparisons, 4.5 sigma gives a false alarm rate of 1e-4 in total.
         EXPECT_NEAR(count[layer], expected, 4.5 * std::sqrt(expected * (1 - p)) + 1e-9) << layer;
       }
       // A different salt gives different random decisions.

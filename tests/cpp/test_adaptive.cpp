@@ -12,7 +12,7 @@
 namespace wavecomb {
 namespace {
 
-/// Adds samples to a pixel of a film, the way waves do.
+/// Adds samples to a pixel of a film, as waves do.
 void add_samples(Film& film, uint32_t x, uint32_t y, uint32_t n, const auto& sample) {
   Film::Pixel& p = film.pixel(x, y);
   for (uint32_t i = 0; i < n; ++i) {
@@ -41,7 +41,7 @@ TEST(ErrorSums, VarianceIsTheTwoPassOne) {
   std::exponential_distribution<float> light(0.5f);
   std::vector<double> seen;
   add_samples(film, 0, 0, 1000, [&](float* rgb) {
-    rgb[0] = 1e4f + light(rng);  // far from 0, where naive sums lose precision
+    rgb[0] = 1e4f + light(rng);  // The mean is far from 0, where naive sums lose precision.
     rgb[1] = rgb[2] = 2;
     seen.push_back(rgb[0]);
   });
@@ -76,8 +76,7 @@ Film noisy_film(uint32_t size, uint32_t samples, const auto& sigma, uint32_t see
 }
 
 TEST(ErrorMap, IsTheTrueErrorOnAverage) {
-  // The mean of |I - A| agrees with that of |I - truth|, and e agrees with its definition.
-  for (const uint32_t samples : {16u, 40u, 256u}) {  // 40 splits into halves of 24 and 16
+  for (const uint32_t samples : {16u, 40u, 256u}) {
     const Film film = noisy_film(64, samples, [](uint32_t, uint32_t) { return 0.5f; });
     const std::vector<float> beauty = film.beauty();
     double truth = 0, e = 0;
@@ -115,7 +114,7 @@ TEST(ErrorMap, FollowsTheNoise) {
   uint32_t off = 0;
   for (uint32_t y = 0; y < 64; ++y)
     for (uint32_t x = 0; x < 64; ++x) {
-      if (x >= 30 && x < 34) continue;  // windows that overlap the boundary
+      if (x >= 30 && x < 34) continue;
       const double ratio = map.error[y * 64 + x] / expected(x < 32 ? 0.1 : 0.8);
       off += ratio < 0.6 || ratio > 1.6;
     }
@@ -220,8 +219,8 @@ TEST(Adaptive, NoiseTargetIsMetByPicturesOfFewBrightPixels) {
   EXPECT_LT(c.active_count, 4u * 81 + 1) << "stars and their windows only";
 }
 
-/// Pixels whose camera samples have no noise but which receive light splats: the error comes from
-/// the half buffers of the splats.
+/// Tests pixels whose camera samples have no noise but which receive light splats: the error comes
+/// from the half buffers of the splats.
 TEST(ErrorMap, SeesTheNoiseOfSplats) {
   constexpr uint32_t kSize = 24, kSamples = 64, kPaths = kSize * kSize;
   std::mt19937 rng(7);
@@ -258,17 +257,18 @@ TEST(ErrorMap, SeesTheNoiseOfSplats) {
 }
 
 TEST(Adaptive, LightPathsGoOnAsFarAsTheirNoiseDecides) {
-  // Equal noise of splats and samples, n = m = 16, all pixels active: equal numbers of both.
+  // With equal noise of splats and samples, n = m = 16 and all pixels active, both get equal
+  // numbers of samples.
   EXPECT_EQ(light_samples_after({1, 1}, 16, 16, 64, 64, 1.0), 64u);
   // With a sixteenth of the pixels active, a sample of light paths costs 16 times as much.
   EXPECT_EQ(light_samples_after({1, 1}, 16, 16, 64, 64, 1.0 / 16), 16u);
   EXPECT_EQ(light_samples_after({1, 4}, 16, 16, 64, 64, 1.0 / 16), 32u);
-  // The number stays between the current count and the limit.
+  // The number of light paths stays between the current count and the limit.
   EXPECT_EQ(light_samples_after({1, 100}, 16, 16, 64, 64, 1.0), 64u);
   EXPECT_EQ(light_samples_after({100, 1}, 16, 16, 64, 64, 1e-3), 16u);
   EXPECT_EQ(light_samples_after({0, 0}, 16, 16, 64, 64, 1.0), 16u);
   EXPECT_EQ(light_samples_after({0, 1}, 16, 16, 64, 64, 1.0), 64u);
-  // Without half buffers, the noise is unknown.
+  // Without half buffers of the splats, their noise is unknown.
   EXPECT_EQ(light_samples_after({1, 0}, 1, 4, 16, 4, 1.0), 4u);
 }
 

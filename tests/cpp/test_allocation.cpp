@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Waves do not allocate memory while they run.
 #include <atomic>
 #include <cerrno>
 #include <cstdlib>
@@ -63,7 +62,8 @@ using namespace wave_testing;
 #if defined(WAVECOMB_COUNTS_ALLOCATIONS)
 
 TEST(Allocation, IsCounted) {
-  // Called by name, because compilers may omit allocations of new-expressions and containers.
+  // Calls operator new by name, because compilers may omit allocations of new-expressions and
+  // containers.
   const uint64_t before = allocations;
   void* volatile made = ::operator new(400);
   EXPECT_GE(allocations, before + 1);

@@ -58,7 +58,7 @@ TEST(SampleAllocation, GivesOutTheBudgetExactly) {
       EXPECT_EQ(total(a), uint64_t{spp} * size * size) << spp << " " << size;
       EXPECT_GE(facts.least, facts.pilot);
       EXPECT_EQ(facts.most, *std::max_element(a.counts.begin(), a.counts.end()));
-      // Counts of intermediate passes never decrease, and end at these values.
+      // Sample counts of intermediate passes never decrease, and end at these values.
       for (size_t i = 0; i < a.counts.size(); ++i) {
         EXPECT_EQ(a.at(i, a.spp), a.counts[i]);
         EXPECT_EQ(a.at(i, a.pilot), a.pilot);
@@ -69,7 +69,8 @@ TEST(SampleAllocation, GivesOutTheBudgetExactly) {
 }
 
 TEST(SampleAllocation, FollowsErrorAndCost) {
-  // Bands of 16 columns: quiet, noisy, noisy and 16 times as expensive, quiet.
+  // The film has bands of 16 columns: a quiet one, a noisy one, a noisy one that costs 16 times as
+  // much, and a quiet one.
   const auto counts = [](Allocate how) {
     const Settings s = allocated(64, 256, how);
     Film film = film_of(s);
@@ -141,7 +142,7 @@ TEST(SampleAllocation, IsUnbiasedWhereSamplesAreSkewed) {
               return allocate_samples(film, s, facts).counts;
             })),
             3.5);
-  // The test detects bias: counts that follow a pixel's own samples fail it.
+  // The test detects bias: it fails if the sample count of a pixel depends on its own samples.
   EXPECT_LT(bias_z([](Film& film, const Settings& s) {
               std::vector<uint32_t> n(film.pixel_count());
               for (size_t i = 0; i < n.size(); ++i) n[i] = film.pixel(i).r > 0 ? s.spp : 12;

@@ -38,7 +38,7 @@ TEST(Cryptomatte, MurmurHash3) {
 }
 
 TEST(Cryptomatte, IdsAreUsualFloats) {
-  // Names whose hashes have exponents 0 and 255 are rare, so search for some.
+  // Search for names whose hashes have exponents 0 and 255, which are rare.
   uint32_t zero = 0, full = 0;
   for (uint32_t i = 0; i < 4000; ++i) {
     const std::string name = numbered("n", i);
@@ -69,7 +69,7 @@ TEST(Cryptomatte, ManyIdsKeepTheirBounds) {
     std::map<uint32_t, uint32_t> exact;
     constexpr uint32_t kSamples = 4096;
     for (uint32_t i = 0; i < kSamples; ++i) {
-      // Ids of decreasing frequency: a few frequent ones and a long tail.
+      // Cryptomatte ids of decreasing frequency: a few frequent ones and a long tail.
       const double u = std::uniform_real_distribution<double>(0, 1)(rng);
       const auto id = static_cast<uint32_t>(300 * u * u * u * u * u) + 1;
       p.add(id);
@@ -90,7 +90,7 @@ TEST(Cryptomatte, ManyIdsKeepTheirBounds) {
   }
 }
 
-// The numbers in docs/aovs.md.
+// Expects the numbers that docs/aovs.md states.
 TEST(AovFilm, MemoryOfEveryAov) {
   const AovLayout all{AovSet{AovSet::kAll}, 4};
   const Film film(16, 9, all);
@@ -180,7 +180,7 @@ TEST(ObjectNames, SeenThroughInstances) {
   };
   b.add_to_group(0, mesh("/World/Set/Floor"));
   b.add_to_group(0, mesh("/World/Chairs/Red/Seat", 17));
-  // A tree that two prims instance; a nest inside the tree is a model.
+  // Two prims instance a tree; a nest inside the tree is a model.
   const uint32_t tree = b.add_group("tree", "/World/Tree_1");
   b.add_to_group(tree, mesh("/World/Tree_1/Leaves"));
   b.add_to_group(tree, mesh("/World/Tree_1/Top/Nest/Egg", 22));

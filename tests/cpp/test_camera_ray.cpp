@@ -58,7 +58,7 @@ TEST(CameraRay, WindowIsWidenedToThePicture) {
   Camera camera;  // 1 x 1
   expect_window(ray_at(camera, 200, 100, 0, 0, {0, 0, 0, 0}), -1, 0.5);
   expect_window(ray_at(camera, 100, 200, 0, 0, {0, 0, 0, 0}), -0.5, 1);
-  camera.window[0] = 0;  // shifted: the window keeps its centre
+  camera.window[0] = 0;
   camera.window[1] = 2;
   expect_window(ray_at(camera, 100, 100, 0, 0, {0, 0, 0, 0}), 0, 1);
   expect_window(ray_at(camera, 100, 100, 99, 99, kCentre), 2 - 0.01, -1 + 0.01);
@@ -71,7 +71,6 @@ TEST(CameraRay, TransformsToTheWorld) {
   EXPECT_NEAR(ray.o.y, 2, 1e-6);
   EXPECT_NEAR(ray.o.z, 3, 1e-6);
   EXPECT_NEAR(ray.d.x, 1, 1e-6);
-  // Left in the image is -z here, up is +y.
   EXPECT_LT(ray_at(camera, 2, 2, 0, 0, kCentre).d.z, 0);
   EXPECT_GT(ray_at(camera, 2, 2, 0, 0, kCentre).d.y, 0);
   // A scaled camera still has unit directions.
@@ -98,7 +97,6 @@ TEST(CameraRay, ThinLensKeepsTheFocalPlaneSharp) {
     mean[0] += ray.o.x / kRays;
     mean[1] += ray.o.y / kRays;
     square += r * r / kRays;
-    // All rays of a point on the film meet at distance 7: window (-0.5 + 2.25 / 8, 0.5 - 5.75 / 8).
     const double t = -7 / static_cast<double>(ray.d.z);
     EXPECT_NEAR(ray.o.x + t * ray.d.x, 7 * (-0.5 + 2.25 / 8), 5e-6);
     EXPECT_NEAR(ray.o.y + t * ray.d.y, 7 * (0.5 - 5.75 / 8), 5e-6);
@@ -107,7 +105,7 @@ TEST(CameraRay, ThinLensKeepsTheFocalPlaneSharp) {
   EXPECT_GT(widest, 0.299);
   EXPECT_NEAR(mean[0], 0, 0.005);
   EXPECT_NEAR(mean[1], 0, 0.005);
-  EXPECT_NEAR(square, 0.5 * 0.09, 0.001);  // uniform over the lens
+  EXPECT_NEAR(square, 0.5 * 0.09, 0.001);
 }
 
 TEST(CameraRay, NearAndFar) {
@@ -152,7 +150,7 @@ TEST(CameraRay, OrthographicAtCorners) {
     EXPECT_NEAR(ray.width, 2.5 * kConeShare, 1e-6);
   }
   const FilterTable table(FilterKind::kBox, 1);
-  EXPECT_FALSE(CameraSetup(camera, 4, 2, table).is_pinhole());  // rays have different origins
+  EXPECT_FALSE(CameraSetup(camera, 4, 2, table).is_pinhole());
   EXPECT_TRUE(CameraSetup(Camera{}, 4, 2, table).is_pinhole());
 }
 
@@ -166,10 +164,9 @@ TEST(CameraRay, CircleOfConfusion) {
     camera.focus_distance = 5;
     for (const double z : {2.0, 5.0, 9.0}) {
       const bool parallel = projection == Projection::kOrthographic;
-      const double middle = 0.25 * (parallel ? 1 : z);  // centre of a pixel in the right half of
-                                                        // the window
+      const double middle = 0.25 * (parallel ? 1 : z);
       double widest = 0;
-      for (const float v : {0.f, 0.25f, 0.5f, 0.75f}) {  // edge of the lens
+      for (const float v : {0.f, 0.25f, 0.5f, 0.75f}) {
         const CameraRay<float> ray = ray_at(camera, 2, 1, 1, 0, {0.5f, 0.5f, 0.f, v});
         const double t = -(z + ray.o.z) / ray.d.z;
         const double x = ray.o.x + t * ray.d.x - 2 * middle, y = ray.o.y + t * ray.d.y;
@@ -191,7 +188,7 @@ TEST(CameraRay, LatlongSeesAllDirections) {
   camera.far_clip = 5;
   camera.lens_radius = 1;  // latlong cameras ignore the lens
   const FilterTable table(FilterKind::kBox, 1);
-  const CameraSetup setup(camera, 8, 5, table);  // any aspect ratio: the projection fills the image
+  const CameraSetup setup(camera, 8, 5, table);
   const auto at = [&](float x, float y) {
     return ray_through<float>(setup, x, y, 0.3f, 0.6f, 0.f, true);
   };
@@ -227,7 +224,7 @@ TEST(CameraRay, ClippingPlanesCutOff) {
   EXPECT_NEAR(left.tfar, 0, 1e-5);
   camera.clip_planes = {{0, 0, 1, -1}};  // everything is clipped
   EXPECT_LE(ray_at(camera, 1, 1, 0, 0, kCentre).tfar, 0);
-  camera.clip_planes = {{0, 1, 0, -1}};  // parallel to the ray, which is on the clipped side
+  camera.clip_planes = {{0, 1, 0, -1}};
   EXPECT_LE(ray_at(camera, 1, 1, 0, 0, kCentre).tfar, 0);
 }
 
@@ -250,7 +247,7 @@ TEST(CameraRay, ConformPolicies) {
     EXPECT_EQ(fitted.half_x, half_x);
     EXPECT_EQ(fitted.half_y, half_y);
   }
-  Camera camera;  // 1 x 1; with pixels twice as wide as high, the image is 2 x 1
+  Camera camera;
   camera.pixel_aspect = 2;
   EXPECT_EQ(fitted_window(camera, 50, 50).half_x, 1.f);
   camera.conform = Conform::kCropAperture;

@@ -30,7 +30,7 @@ double filter_at(FilterKind kind, double x) {
   switch (kind) {
     case FilterKind::kBox:
       return 1;
-    case FilterKind::kGaussian:  // sigma is a third of the half width; shifted down to end at 0
+    case FilterKind::kGaussian:
       return std::exp(-4.5 * x * x) - std::exp(-4.5);
     case FilterKind::kBlackmanHarris:
       return 0.35875 + 0.48829 * std::cos(kPiD * x) + 0.14128 * std::cos(2 * kPiD * x) +
@@ -59,8 +59,8 @@ Camera make_camera(Projection projection, float lens) {
   return camera;
 }
 
-/// Where a ray of the pixel passes: on the image in pixels from the pixel centre, and on the lens
-/// in radii.
+/// Position where a ray of the pixel passes: on the image in pixels from the pixel centre, and on
+/// the lens in lens radii.
 struct Passed {
   double x, y, lens_x, lens_y;
 };
@@ -131,8 +131,8 @@ TEST(CameraSamples, FollowThePixelFilter) {
 }
 
 TEST(CameraSamples, FillTheLensEvenly) {
-  // First the squared distance from the centre of the lens and the azimuth in turns; then the
-  // squared distance together with the position on the image, which are independent.
+  // Tests the squared distance from the centre of the lens with the azimuth in turns, then the
+  // squared distance with the position on the image; both pairs are independent.
   Battery battery("lens");
   const FilterTable table(FilterKind::kGaussian, 3);
   const auto density = filter_density(FilterKind::kGaussian, 3);
@@ -211,7 +211,7 @@ TEST(CameraConnections, AreTheWayBack) {
 }
 
 // A latlong image continues at its opposite edge, and beyond a pole with an offset of half a turn.
-// Light there counts as much as in the middle, at the position where camera samples see it.
+// Light at the edge counts as much as in the middle, at the position where camera samples see it.
 TEST(CameraConnections, GoRoundAPictureOfAllDirections) {
   constexpr uint32_t kAcross = 24, kDown = 12;
   const FilterTable table(FilterKind::kGaussian, 4);
@@ -226,7 +226,7 @@ TEST(CameraConnections, GoRoundAPictureOfAllDirections) {
   const Film film(all, {}, false);
   Random random(5);
   for (int i = 0; i < 300; ++i) {
-    // Points near the edges; a camera sample of such a pixel may lie beyond the edge.
+    // Tests points near the edges; a camera sample of such a pixel may lie beyond the edge.
     const float x = 4 * random() - 2 + (i % 2 ? kAcross : 0);
     const float y = i % 3 == 0 ? 4 * random() - 2 + (i % 2 ? kDown : 0) : kDown * random();
     const CameraRay<float> ray = ray_through<float>(setup, x, y, 0.f, 0.f, 0.f, true);
@@ -241,7 +241,6 @@ TEST(CameraConnections, GoRoundAPictureOfAllDirections) {
       sum += double{w};
     });
     EXPECT_NEAR(sum, 1, 0.02) << x << " " << y;
-    // Pixels whose samples lie at (x, y) itself.
     for (uint32_t row = 0; row < kDown; ++row)
       for (uint32_t column = 0; column < kAcross; ++column) {
         const float own = table.density(x - (static_cast<float>(column) + 0.5f)) *

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cascaded outlier rejection: removes rare bright samples and nothing else.
+// Tests of cascaded outlier rejection, which removes rare bright samples and nothing else.
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -42,7 +42,6 @@ TEST(Cascades, TakeAwayTheOneSampleThatNobodyHasBeside) {
   add_sample(film, kMiddle, 4000, 2000, 0);
   const std::vector<float> beauty = film.beauty(), all = film.unbiased();
   EXPECT_GT(all[3 * kMiddle], 200.f);
-  // The remainder changes the pixel by about an eighth per layer.
   EXPECT_LT(beauty[3 * kMiddle], 1.5f);
   EXPECT_LT(beauty[3 * kMiddle + 1], 1.5f);
   EXPECT_EQ(beauty[3 * kMiddle + 2], 15 / 16.f);

@@ -26,7 +26,6 @@ using chi_square::Random;
 using chi_square::Result;
 using Vec = Vec3<float>;
 
-/// The level that the largest batteries use.
 constexpr double kLevel = 1e-7;
 /// `make test-long` uses as many samples as those batteries; with fewer samples, only larger faults
 /// are detected.
@@ -125,7 +124,7 @@ TEST(ChiSquare, FindsDensitiesThatLeanByTwoPercent) {
     return d(p) * (1 + 0.02 * kFault * std::sin(p.y));
   };
   EXPECT_NE(fault(c), "");
-  c = cosine_case();  // a power of the cosine in place of the cosine
+  c = cosine_case();
   c.density = [](const Place& p) {
     const double power = 1 + 0.05 * kFault;
     return p.chart == 0 ? (power + 1) / (2 * kPiD) * std::pow(1 - p.x, power) : 0;
@@ -157,7 +156,8 @@ TEST(ChiSquare, FindsLobesOfAnotherWidth) {
 
 TEST(ChiSquare, FindsLobesThatAreChosenTooOften) {
   const Principled material;
-  // The diffuse lobe comes first, a delta lobe last: each gets one per cent more or less.
+  // Compares samplers that give one per cent too many or too few samples to the diffuse or the
+  // delta lobe.
   for (const double percent : {1.0, -1.0}) {
     const auto change = [=](float l) {
       return std::clamp(static_cast<float>(l + 0.01 * kFault * percent * (l < 0.5f ? -1 : 1) *
@@ -182,7 +182,6 @@ TEST(ChiSquare, FindsDeltaLobesAndNothingMoreOftenThanStated) {
     return random() < 0.002 * kFault ? Draw::nothing() : d;
   };
   EXPECT_NE(fault(c), "");
-  // Samples where the density is 0.
   c = cosine_case();
   c.draw = [draw = c.draw](Random& random, bool check) {
     Draw d = draw(random, check);
@@ -193,7 +192,7 @@ TEST(ChiSquare, FindsDeltaLobesAndNothingMoreOftenThanStated) {
 }
 
 TEST(ChiSquare, FindsNarrowLobesOfAnotherShare) {
-  // Two per cent in a lobe of a thousandth of a radian, with a tenth too many samples.
+  // Tests a narrow lobe that should get two per cent of the samples and gets a tenth more.
   const Vec wo = direction(0.5, 0.4);
   const Ggx<float> ggx{1e-3f};
   constexpr double kShare = 0.02;

@@ -12,7 +12,8 @@
 namespace wavecomb {
 namespace {
 
-/// Plays a chooser against arms with given run times, and keeps the score.
+/// Simulates a chooser that selects among variants ("arms") with given run times, and keeps the
+/// score.
 class Game {
  public:
   /// Run time of an arm per packet in round i; preparation costs `prepare` per record.
@@ -73,8 +74,8 @@ TEST(Chooser, TriesEachArmThenTakesTheLeast) {
 }
 
 TEST(Chooser, WeighsRunningAgainstPreparing) {
-  // Sorting costs 10 ns per record. With 1600 records it halves 100 packets of 200 ns: it saves 10
-  // us and costs 16, a loss. At 2000 ns per packet it saves 100 us.
+  // Sorting costs 10 ns per record. With 1600 records, sorting halves 100 packets of 200 ns: it
+  // saves 10 us and costs 16 us. With 2000 ns per packet, sorting saves 100 us.
   Game inexpensive(2, fixed({200, 200}), {0, 10});
   inexpensive.work = {{100, 1600}, {50, 1600}};
   Game expensive(2, fixed({2000, 2000}), {0, 10});
@@ -85,7 +86,7 @@ TEST(Chooser, WeighsRunningAgainstPreparing) {
   }
   EXPECT_EQ(inexpensive.play(), 0u);
   EXPECT_EQ(expensive.play(), 1u);
-  // The same chooser with a queue that arrives grouped: there are no packets to save.
+  // Uses the same chooser with a queue that arrives grouped, for which sorting saves no packets.
   expensive.work = {{50, 1600}, {50, 1600}};
   EXPECT_EQ(expensive.play(), 0u);
 }
@@ -142,7 +143,7 @@ TEST(Chooser, OneSlowMeasurementIsForgiven) {
 }
 
 TEST(Chooser, TriesAgainAtEveryDepth) {
-  // Waves of eight depths: exploration must not always hit the same depth.
+  // In waves of eight depths, exploration must not always use the same depth.
   Chooser chooser(2);
   const std::vector<Work> work(2, Work{10, 100});
   std::vector<int> others(8);

@@ -92,7 +92,7 @@ TEST(ClosedForm, FloorUnderARect) {
   rect.normalize = true;
   expect_irradiance(rect, 3 / 0.84 * 4 * corner_irradiance(0.6, 0.35, 0.8), "normalized rect");
   rect.normalize = false;
-  rect.to_world = translate(0.6f, 0.8f, 0.35f) * rotate(0, -90);  // one corner above the point
+  rect.to_world = translate(0.6f, 0.8f, 0.35f) * rotate(0, -90);
   expect_irradiance(rect, 3 * corner_irradiance(1.2, 0.7, 0.8), "corner of a rect");
 }
 
@@ -117,7 +117,7 @@ TEST(ClosedForm, FloorUnderADistantLight) {
   sun.angle = 30;
   sun.to_world = rotate(0, -90);
   expect_irradiance(sun, 4 * kPiD * std::pow(std::sin(15 * kPiD / 180), 2), "sun at the zenith");
-  sun.to_world = rotate(2, 40) * rotate(0, -90);  // entirely above the horizon
+  sun.to_world = rotate(2, 40) * rotate(0, -90);
   expect_irradiance(
       sun, 4 * kPiD * std::pow(std::sin(15 * kPiD / 180), 2) * std::cos(40 * kPiD / 180), "sun");
 }
@@ -175,7 +175,7 @@ TEST(ClosedForm, WhiteFurnace) {
     SceneBuilder b;
     const uint32_t white = b.add_material(make_material(ProgramId::kDiffuse, {1, 1, 1}));
     MeshData m = open_box ? box({-1, -1, -1}, {1, 1, 1}) : sphere(16, false);
-    if (open_box) m.indices.resize(30);  // open towards the camera; light bounces around inside
+    if (open_box) m.indices.resize(30);
     b.add_to_group(0, b.add_mesh(make_mesh(m, white)));
     b.add_light(make_light(LightKind::kDome, {1, 1, 1}));
     b.set_camera(make_camera({0, 0, 4}, {0, 0, 0}, 0.3f));
@@ -187,7 +187,7 @@ TEST(ClosedForm, WhiteFurnace) {
 }
 
 TEST(ClosedForm, WhiteFurnaceOfCurves) {
-  // Tubes and spheres are closed, so all light that hits them is reflected; ribbons as well.
+  // Tubes and spheres are closed, so they reflect all light that hits them; ribbons do as well.
   for (const Primitive primitive : curve_testing::curved_primitives()) {
     SceneBuilder b;
     const uint32_t white = b.add_material(make_material(ProgramId::kDiffuse, {1, 1, 1}));
@@ -253,7 +253,7 @@ TEST(ClosedForm, MirrorChain) {
   WavefrontRenderer renderer(b.build());
   expect_radiance(renderer.render(settings(4, 4)), 2 * std::pow(f, 4), "four mirrors", 0.001, 2e-4);
   Settings s = settings(4, 4);
-  s.max_depth = 3;  // the path ends at the fourth mirror
+  s.max_depth = 3;
   EXPECT_EQ(mean_of(renderer.render(s)).mean, 0);
 }
 
@@ -352,7 +352,6 @@ TEST(ClosedForm, MultipleImportanceSamplingAgreesWithItsHalves) {
     SceneBuilder b;
     const uint32_t id = b.add_material(material);
     b.add_to_group(0, b.add_mesh(make_mesh(ground(9), id)));
-    // An occluder for part of the light.
     const uint32_t black = b.add_material(make_material(ProgramId::kDiffuse, {0, 0, 0}));
     b.add_to_group(0, b.add_mesh(make_mesh(box({-0.4f, 0.6f, -0.3f}, {0.1f, 0.7f, 0.4f}), black)));
     Light rect = make_light(LightKind::kRect, {4, 4, 4},

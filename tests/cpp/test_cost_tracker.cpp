@@ -52,8 +52,8 @@ TEST(CostTracker, TakeMovesMeasurementsAndLeavesCounts) {
 TEST(CostTracker, WhatIsBesideIsAShareOfEachTimedRecord) {
   CostTracker sum(2), worker(2);
   worker.count(Ids{0, 0, 0, 0, 1});
-  worker.charge(Ids{0, 0}, 40);   // two of four
-  worker.charge_untimed(0, 100);  // shared by all four
+  worker.charge(Ids{0, 0}, 40);  // two of four
+  worker.charge_untimed(0, 100);
   sum.take(worker);
   EXPECT_DOUBLE_EQ(sum.ns()[0], 40 + 2 * 25);
   worker.count(Ids{0, 0});
@@ -136,7 +136,7 @@ TEST(MergeCosts, NothingMeasuredChangesNothing) {
 TEST(MergeCosts, PredictionByHand) {
   const std::vector<MaterialTraits> traits(4);
   CostSnapshot costs = unknown(4, 0);
-  costs.material_ns = {40, 110, 0, 70};  // material 2 is unknown, material 3 is not measured
+  costs.material_ns = {40, 110, 0, 70};
   CostTracker tracker(4);
   tracker.charge(Ids{0, 0, 0}, 150);  // 50 each
   tracker.charge(Ids{1}, 100);
@@ -159,7 +159,7 @@ TEST(MergeCosts, PerfectAndPoorPredictions) {
   CostPrediction p = merge_costs(tracker, traits, 0.3f, costs);
   EXPECT_NEAR(p.r2, 1, 1e-9);
   EXPECT_NEAR(p.mean_error, 0, 1e-9);
-  costs.material_ns = {75, 75};  // the mean: explains nothing
+  costs.material_ns = {75, 75};
   p = merge_costs(tracker, traits, 0.3f, costs);
   EXPECT_NEAR(p.r2, 0, 1e-9);
   EXPECT_NEAR(p.mean_error, 50. / 150, 1e-9);

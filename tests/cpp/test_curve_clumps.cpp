@@ -87,8 +87,7 @@ TEST(CurveBvhNodes, HoldAllPiecesOfEachSegment) {
       EXPECT_EQ(found.size(), mesh.primitive_count());
       for (const auto& [prim, sub_segments] : found) {
         EXPECT_EQ(sub_segments.first, radius < 0.1f ? 4u : 1u);
-        if (sub_segments.first > 1)
-          continue;  // hulls of sub-segments lie within that of the segment
+        if (sub_segments.first > 1) continue;
         const Bounds& all = sub_segments.second;
         const Bounds one = curve_bounds(mesh, prim);
         EXPECT_TRUE(all.lo.x <= one.lo.x && all.lo.y <= one.lo.y && all.lo.z <= one.lo.z);

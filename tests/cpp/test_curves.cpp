@@ -33,7 +33,7 @@ V3 widen(const Vec3<float>& v) {
   return {v.x, v.y, v.z};
 }
 
-/// A segment by definition: Bernstein polynomials in double precision.
+/// Evaluates a curve segment by definition: Bernstein polynomials in double precision.
 struct Exact {
   const Mesh& mesh;
   uint32_t prim;
@@ -59,7 +59,6 @@ struct Exact {
       sum += weight(static_cast<int>(k), u) * mesh.radii[first() + k];
     return sum;
   }
-  /// Unit vector across a ribbon.
   V3 across(double u) const {
     constexpr double h = 1e-5;
     const V3 d = sub(point(std::min(u + h, 1.0)), point(std::max(u - h, 0.0)));
@@ -96,7 +95,7 @@ double brute_tube(const Exact& s, const V3& o, const V3& d) {
     for (int i = 0; i <= kSamples; ++i) {
       if (at[i] == kMissed || (i > 0 && at[i] > at[i - 1]) || (i < kSamples && at[i] > at[i + 1]))
         continue;
-      // f is -z for exits: its minimum is the largest z.
+      // For exit points f is -z, so its minimum is the largest z.
       const double z = -side * refine(f, i, kSamples);
       if (z > 0) best = std::min(best, z);
     }
@@ -146,7 +145,7 @@ TEST(Curves, HitsEqualBruteForceInDoublePrecision) {
   for (const Primitive primitive : curved_primitives())
     for (const float radius : {0.01f, 0.1f}) {
       SceneBuilder b;
-      // Curves of one segment each: hits do not depend on a continuation.
+      // Tests curves of one segment each, whose hits do not depend on a neighbouring segment.
       const uint32_t mesh_id = b.add_mesh(make_curves(strands(primitive, 30, 1, 1.f, radius, 3)));
       b.add_to_group(0, mesh_id);
       const auto scene = b.build();
@@ -170,7 +169,7 @@ TEST(Curves, HitsEqualBruteForceInDoublePrecision) {
         float fo[3], fd[3];
         for (int c = 0; c < 3; ++c) {
           fo[c] = o[c] = static_cast<float>(o[c]);
-          fd[c] = static_cast<float>(1.7 * aim[c]);  // t counts in units of |dir|
+          fd[c] = static_cast<float>(1.7 * aim[c]);
         }
         const V3 d{fd[0], fd[1], fd[2]};
         const double length = std::sqrt(dot(d, d));
@@ -214,7 +213,8 @@ TEST(Curves, HitsEqualBruteForceInDoublePrecision) {
         }
       }
       EXPECT_GT(hits, rays / 3);
-      // Grazing rays, where sampling and solving disagree about a hit; ribbons are grazed often.
+      // Grazing rays, for which dense sampling and the solver may disagree about a hit; many rays
+      // graze ribbons.
       EXPECT_LE(differing, rays / (mesh.is_ribbon() ? 150 : 500))
           << static_cast<int>(primitive) << ", radius " << radius;
     }
@@ -262,7 +262,7 @@ TEST(Curves, RaysThatLeaveDoNotHitWhatTheyLeave) {
         const V3 from = along({away, -away, away}, random(), 3);
         const V3 to = along({away + 0.2, -away, away}, random(), 0.6);
         const V3 apart = sub(from, {away, -away, away});
-        if (dot(apart, apart) < 2.25) continue;  // the point may be inside
+        if (dot(apart, apart) < 2.25) continue;
         const V3 d = unit(sub(to, from));
         const SingleRayHit h = trace_one(accel, narrow(from), narrow(d));
         if (h.inst == kNoHit) continue;
@@ -271,7 +271,6 @@ TEST(Curves, RaysThatLeaveDoNotHitWhatTheyLeave) {
                                                       narrow(d), false, true, true);
         const V3 n = widen(s.ng);
         EXPECT_LT(dot(d, n), 1e-3);
-        // From perpendicular to almost tangential.
         const double flat = std::pow(10.0, -6 * std::abs(uniform(rng)));
         const V3 side = unit(cross(n, random()));
         const Vec3<float> out = narrow(unit(along(side, n, flat)));
@@ -292,7 +291,7 @@ TEST(Curves, TubesHaveNoSeams) {
   CurveData ring;
   constexpr float k = 0.5522848f, r = 0.2f;
   const Vec3<float> corner[4] = {{1, 0, 0}, {0, 1, 0}, {-1, 0, 0}, {0, -1, 0}};
-  const auto control = [&](int q, float f) {  // beyond corner q, towards the next one
+  const auto control = [&](int q, float f) {
     const Vec3<float> p = corner[(q + 4) % 4], n = corner[(q + 5) % 4];
     return p + n * f;
   };
@@ -321,7 +320,6 @@ TEST(Curves, TubesHaveNoSeams) {
     const V3 p = along(middle, d, h.t);
     const double tube = std::hypot(std::hypot(p[0], p[1]) - 1, p[2]);
     EXPECT_NEAR(tube, r, 1e-3) << "a wall inside";
-    // At a seam from outside: the first hit is never on the inside.
     const V3 seam = widen(corner[i % 4]),
              at{seam[0] * (1 + r * std::cos(a)), seam[1] * (1 + r * std::cos(a)), r * std::sin(a)};
     const V3 out = along(at, unit(sub(at, seam)), 0.5);

@@ -23,7 +23,7 @@ DeepLayer layer_of(const std::vector<DeepSample>& samples, uint32_t all, const D
   return film.layer({all});
 }
 
-/// Composites R, G, B and A of all deep samples.
+/// Composites R, G, B and A of all deep samples of a pixel.
 std::array<double, 4> flattened(const DeepLayer& layer) {
   std::array<double, 4> out{};
   for (uint32_t i = 0; i < layer.counts[0]; ++i) {
@@ -38,9 +38,9 @@ TEST(DeepFilm, SamplesAtOneDepthAreOne) {
   const DeepLayer layer =
       layer_of({{2.f, false, {1, 0, 0}}, {2.01f, false, {3, 0, 0}}}, 4, {8, 0.01f});
   ASSERT_EQ(layer.counts[0], 1u);
-  EXPECT_FLOAT_EQ(layer.values[0], 1.f);     // (1 + 3) / 4
-  EXPECT_FLOAT_EQ(layer.values[3], 0.5f);    // two of four
-  EXPECT_FLOAT_EQ(layer.values[4], 2.005f);  // a surface has a single depth
+  EXPECT_FLOAT_EQ(layer.values[0], 1.f);   // (1 + 3) / 4
+  EXPECT_FLOAT_EQ(layer.values[3], 0.5f);  // two of four
+  EXPECT_FLOAT_EQ(layer.values[4], 2.005f);
   EXPECT_FLOAT_EQ(layer.values[5], 2.005f);
 }
 
@@ -50,7 +50,7 @@ TEST(DeepFilm, WhatIsBehindHasWhatTheFrontLeaves) {
   ASSERT_EQ(layer.counts[0], 2u);
   EXPECT_FLOAT_EQ(layer.values[3], 0.25f);
   EXPECT_FLOAT_EQ(layer.values[4], 1.f);
-  EXPECT_FLOAT_EQ(layer.values[6 + 3], 1.f / 3);  // one of the three that remain
+  EXPECT_FLOAT_EQ(layer.values[6 + 3], 1.f / 3);
   EXPECT_FLOAT_EQ(layer.values[6 + 0], 2.f / 3);
 }
 
@@ -81,7 +81,6 @@ TEST(DeepFilm, AnyNumberOfSamplesFlattensToTheirSum) {
     const auto flat = flattened(layer);
     EXPECT_NEAR(flat[0], r / 500, 1e-5 * r / 500);
     EXPECT_NEAR(flat[3], 300. / 500, 1e-5);
-    // In order and without overlap.
     float before = 0;
     for (uint32_t i = 0; i < layer.counts[0]; ++i) {
       const float* v = layer.values.data() + i * DeepLayer::kChannels;
@@ -140,7 +139,7 @@ TEST(DeepFilm, RefusesWhatIsOfAnotherPicture) {
   DeepFilm other(2, {4, 0.05f}), larger(200, {4, 0.05f});
   EXPECT_THROW(larger.unpack(bytes), Error);
   EXPECT_THROW(other.unpack({}), Error);
-  bytes[1] = std::byte{1};  // a bin that does not exist
+  bytes[1] = std::byte{1};
   EXPECT_THROW(other.unpack(bytes), Error);
   bytes[1] = std::byte{9};  // more than fit
   bytes.resize(bytes.size() + 9 * sizeof(DeepBin));

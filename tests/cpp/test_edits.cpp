@@ -20,7 +20,6 @@ namespace {
 using namespace scene_testing;
 using Clock = std::chrono::steady_clock;
 
-/// Values that edits may change.
 struct Values {
   std::vector<Material> materials;
   std::vector<Light> lights;
@@ -46,14 +45,14 @@ Values values() {
   return v;
 }
 
-/// Transforms that tests of moves use: of the floor, the mesh with face materials (mirrored), the
+/// Transforms for tests of moved meshes: the floor, the mesh with face materials (mirrored), the
 /// first ball and the panel.
 struct Placing {
   Affine floor, cut, ball, panel;
 };
 
 /// Instances that inherit materials, a mesh with face materials, and a world mesh. With `placing`,
-/// meshes of the world are instances after all others, and have these transforms.
+/// world meshes become instances with these transforms, after all other instances.
 ScenePtr build(const Values& v, const Placing* placing = nullptr) {
   SceneBuilder b;
   const uint32_t sky = add_texture(b, 16, 8, 3, random_texels(16 * 8 * 3, 0.f, 1.5f, 4));
@@ -291,7 +290,7 @@ TEST(Edits, ShareWhatDidNotChange) {
     auto next = std::make_unique<EmbreeAccelerator>(edited, *accel, 1);
     EXPECT_EQ(next->embree_scene() == accel->embree_scene(), change.keeps_hierarchy) << change.what;
     scene = edited;
-    accel = std::move(next);  // shared data must stay alive
+    accel = std::move(next);
   }
 }
 
@@ -331,7 +330,7 @@ TEST(Twins, RenderAtOnceEachItsOwnMaterials) {
   WavefrontRenderer renderer(build(v));
   const auto clone = renderer.clone();
   Values other = v;
-  other.materials[kLeaf].opacity = 0.2f;  // same BVH, different results of its filters
+  other.materials[kLeaf].opacity = 0.2f;
   other.materials[kFloor].base_color = {0, 1, 0};
   const Change change{"twin", {}, {kLeaf, kFloor}};
   clone->edit(edit_for(change, *clone->scene(), other));
@@ -359,7 +358,7 @@ TEST(Twins, OutliveTheirOrigin) {
 
 TEST(Stop, EndsARenderFromAnotherThread) {
   WavefrontRenderer renderer(cornell());
-  renderer.stop();  // no render is running: no effect
+  renderer.stop();
   Settings s;
   s.width = s.height = 256;
   s.spp = 1u << 16;  // would take hours
@@ -399,7 +398,7 @@ static_assert(
         std::is_same_v<CostProfile, decltype(std::declval<WavefrontRenderer&>().cost_profile())>,
     "another thread may replace them: callers get copies");
 
-/// For the thread sanitizer, and for copies of vectors while they are replaced.
+/// Lets the thread sanitizer observe copies of vectors while another thread replaces them.
 TEST(Renderer, StatisticsAreReadWhileAnotherThreadRenders) {
   WavefrontRenderer renderer(cornell());
   Settings s = small();
@@ -532,7 +531,7 @@ TEST(Picks, AgreeWithWhatThePictureShows) {
   Settings s = small();
   s.spp = 1;
   s.filter = FilterKind::kBox;
-  s.filter_width = 0.01f;  // rays through pixel centres
+  s.filter_width = 0.01f;
   s.aovs = AovSet{AovSet::kAll};
   const RenderedImage p = renderer.render(s);
   const AovLayer &material = layer(p, "material_id"), &instance = layer(p, "instance_id");

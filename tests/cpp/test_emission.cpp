@@ -60,7 +60,7 @@ LightView aimed(const Lights& lights) {
 struct Kind {
   const char* name;
   Lights lights;
-  double power;  ///< power of the green channel, W
+  double power;
 };
 
 std::vector<Kind> kinds() {
@@ -279,7 +279,7 @@ TEST(Emission, AimedCarriesTheSame) {
         };
         const bool first = meets({aim.x[0], aim.y[0], aim.z[0]}, aim.radius[0]);
         through += first ? 1 : 0;
-        // Infinite lights: paths that miss the scene do not count.
+        // Paths of infinite lights that miss the scene do not count.
         const bool counts = e.light >= view.infinite_count ||
                             meets({view.centre[0], view.centre[1], view.centre[2]}, view.radius);
         const double flux[2] = {counts ? double{e.flux.y} : 0, first ? double{e.flux.y} : 0};
@@ -312,7 +312,7 @@ TEST(Emission, AimedIsAsDenseAsWhoMeetsItIsTold) {
       if (!e.valid) continue;
       const float t = 0.5f + 3 * random();
       const float met = emission_density<float>(view, e.light, fma(e.d, t, e.o), -e.d, t, true);
-      // At the boundary of a sphere, rounding decides.
+      // At the boundary of a sphere, rounding decides whether a path hits it.
       differ += std::abs(met - e.density) > 5e-3f * e.density ? 1 : 0;
     }
     EXPECT_LE(differ, kPaths / 500) << kind.name;

@@ -50,8 +50,8 @@ Graph ramp(const char* parameter, uint16_t components, GraphInput input, uint16_
 
 /// A point on the triangle, computed independently of the code under test.
 struct Place {
-  float u, v;         ///< barycentrics, which equal the texture coordinates
-  Vec3<float> local;  ///< relative to (-0.5, -0.5, 0), edges of length 1
+  float u, v;
+  Vec3<float> local;
 };
 
 /// A material and its expected values.
@@ -97,7 +97,6 @@ std::vector<Case> cases() {
                  },
                  [](const Scene& s, const Place& at) {
                    const float value = texel(s, 0, at).r;
-                   // too close to the threshold to decide
                    if (std::abs(value - 0.5f) < 1e-4f) return -1.f;
                    return value < 0.5f ? 0.f : 1.f;
                  }});
@@ -150,7 +149,6 @@ std::vector<Case> cases() {
   return all;
 }
 
-/// 0: no mesh light; 1 to 3: a mesh light with each MaterialSync.
 constexpr int kModes = 4;
 
 void add_triangle(SceneBuilder& b, const Case& one, int mode, const Affine& place,

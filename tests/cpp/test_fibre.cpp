@@ -112,7 +112,7 @@ TEST(Fibre, ReflectsAllLightWithoutAbsorption) {
     const Hair bsdf = hair(look);
     for (const Vec& wo : views()) {
       if (!includes_case(index++, 5)) continue;
-      // By importance sampling, and by uniform directions, which do not use the density.
+      // Integrates by importance sampling, and by uniform directions, which do not use the density.
       EXPECT_NEAR(furnace(bsdf, wo, 5000), 1, 0.005) << look.name << " " << wo.x << " " << wo.y;
       if (look.along < 0.2f) continue;
       double sum = 0, mass = 0;

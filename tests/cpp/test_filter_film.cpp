@@ -124,7 +124,7 @@ TEST(Film, AovsAreMeans) {
   ASSERT_NE(aovs.sums(Aov::kAlbedo, pixel), nullptr);
   aovs.sums(Aov::kAlbedo, pixel)[1] = 2;
   aovs.sums(Aov::kNormal, pixel)[2] = -1;
-  for (const float depth : {2.f, 3.f, 4.f}) {  // one of four rays missed
+  for (const float depth : {2.f, 3.f, 4.f}) {
     aovs.add(Aov::kDepth, pixel, &depth);
     aovs.count_hit(pixel);
   }
@@ -140,7 +140,7 @@ TEST(Film, FinishGivesTheSameMeans) {
   std::uniform_real_distribution<double> uniform(-3, 3);
   for (uint32_t y = 0; y < film.height(); ++y)
     for (uint32_t x = 0; x < film.width(); ++x) {
-      const uint32_t n = x + 5 * y;  // the first pixel has no samples
+      const uint32_t n = x + 5 * y;
       film.pixel(x, y) = {uniform(rng), uniform(rng), uniform(rng), n};
       const size_t pixel = film.index(x, y);
       for (const Aov aov : {Aov::kAlbedo, Aov::kNormal, Aov::kDepth})

@@ -71,7 +71,7 @@ TEST(GraphRanges, FollowArithmetic) {
   expect_range(range_after({op(C::kSelect, 1, 8, {2, k1, k2})}), 1, 2);
   expect_range(range_after({op(C::kSelect, 1, 8, {5, k1, k2})}), 1, 1);
   expect_range(range_after({op(C::kSelect, 1, 8, {k0, k1, k2})}), 2, 2);
-  // Other operations, and those without bounds, may return anything; NaN becomes the minimum.
+  // Operations without known bounds may return anything; NaN becomes the minimum.
   expect_range(range_after({op(C::kExp, 1, 8, {2})}), 0, 100);
   expect_range(range_after({op(C::kMultiply, 1, 8, {0, k0})}), 0, 100);
   expect_range(range_after({op(C::kMax, 1, 8, {0, k2})}), 2, 100);
@@ -79,7 +79,7 @@ TEST(GraphRanges, FollowArithmetic) {
   expect_range(range_after({op(C::kClamp, 1, 8, {1, kQuarter, k2})}), 0.25f, 2);
 }
 
-/// Random programs at random points: no result leaves its range.
+/// Evaluates random graph programs at random points: no result leaves its range.
 TEST(GraphRanges, NoResultLeavesThem) {
   using C = GraphCode;
   constexpr C kCodes[] = {C::kAdd,   C::kSubtract, C::kMultiply, C::kMix, C::kMin,  C::kMax,

@@ -28,8 +28,8 @@ TrainingRecord bounce(float x, float y, float z, uint8_t axis, const Vec3<float>
   return {{x, y, z}, {w.x, w.y, w.z}, 0.f, 0, axis, value, 1.f, 1.f, 0.f, 1.f};
 }
 
-/// Makes bounces all over the unit cube. On surfaces that face axis k they point roughly along axis
-/// k, more closely in the right half.
+/// Makes bounces all over the unit cube. Bounces on surfaces that face axis k point roughly along
+/// axis k, more closely in the right half.
 std::vector<TrainingRecord> many_bounces(uint32_t count, uint32_t seed) {
   Random random(seed);
   std::vector<TrainingRecord> records;
@@ -63,7 +63,7 @@ TEST(Guide, OctahedralMapKeepsAreas) {
     ASSERT_NEAR(back.x, u, 2e-3) << v;
     ASSERT_NEAR(back.y, v, 2e-3) << u;
   }
-  // Corners, where the octahedral map folds.
+  // Tests corners, where the octahedral map folds.
   for (const float u : {0.f, 0.5f, kOneMinusEpsilon})
     for (const float v : {0.f, 0.5f, kOneMinusEpsilon})
       EXPECT_NEAR(length(octahedral_direction(u, v)), 1, 1e-5);
@@ -121,7 +121,7 @@ TEST(Guide, SpheresKnowHowFarLightIs) {
   for (int i = 0; i < 2000; ++i) {
     const Vec3<float> p = guiding(), d = lamp - p;
     records.push_back(bounce(p.x, p.y, p.z, 2, normalize(d)));
-    // Half the distance: the light comes through a hole at the lamp's position.
+    // At half the distance, the light comes through a hole at the lamp's position.
     records.back().inverse_distance = 0.5f / length(d);
   }
   const GuidingField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
@@ -210,7 +210,7 @@ TEST(Guide, SamplesFollowTheirDensity) {
     for (uint32_t axis = 0; axis < kGuidingAxes; ++axis) {
       const auto guiding = look_up_guiding<float>(view, {x, 0.3f, 0.6f}, axis, 0, true);
       ASSERT_TRUE(guiding.guided);
-      // Over the equal-area square, where the density is constant per bin.
+      // Integrates over the equal-area square, where the density is constant per bin.
       chi_square::Case c{"axis " + std::to_string(axis),
                          {{0, 1, 0, 1, kGuidingSide, kGuidingSide}},
                          [=](const Place& p) {
@@ -249,14 +249,14 @@ TEST(Guide, CellsKnowTheirOwnLight) {
 
 TEST(Guide, FewBouncesLeanOnWhatIsAround) {
   std::vector<TrainingRecord> records = many_bounces(20000, 3);
-  // A corner with hardly any training samples.
+  // A corner region has hardly any training samples.
   std::erase_if(records, [](const TrainingRecord& r) {
     return r.p[0] < 0.25f && r.p[1] < 0.25f && r.p[2] < 0.25f;
   });
   const GuidingField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
   const auto guiding = look_up_guiding<float>(field.view(), {0.1f, 0.1f, 0.1f}, 0, 0, true);
   EXPECT_TRUE(guiding.guided);
-  // Positions outside of the bounds, and NaN positions.
+  // Looks up positions outside of the bounds, and NaN positions.
   for (const float x : {-5.f, 9.f, kNan, kInf})
     look_up_guiding<float>(field.view(), {x, x, x}, 3, 0, true);
   const GuidingField empty(kUnitGrid, {}, 1, true, true, size_t{64} << 20);
@@ -272,7 +272,7 @@ TEST(Guide, BouncesAreWeighed) {
   const uint64_t at = bounce_position_key(kUnitGrid, {0.5f, 0.5f, 0.5f}, 2);
   std::vector<BounceSample> training_samples(3000, {at, 0.f, 0.f, 2.f});
   training_samples.insert(training_samples.end(), 1000, {at, 4.f, 16.f, 6.f});
-  // No training samples of surfaces that face another axis.
+  // Cells contain no training samples of surfaces that face another axis.
   training_samples.insert(training_samples.end(), 10,
                           {bounce_position_key(kUnitGrid, {0.1f, 0.1f, 0.9f}, 3), 9.f, 81.f, 1});
   field.compute_survival(training_samples, {27, 0.5});
@@ -293,7 +293,7 @@ TEST(Guide, MemoryIsBounded) {
   EXPECT_GT(small.facts().guided_regions, 5u);
 }
 
-/// The chosen fraction has the smallest second moment.
+/// The chosen guiding fraction has the smallest second moment.
 TEST(Guide, SharesFollowMoments) {
   ShareMoments bad, valid, none;
   Random random(8);
@@ -301,7 +301,7 @@ TEST(Guide, SharesFollowMoments) {
     TrainingRecord r{};
     r.pdf = r.bsdf_pdf = 0.3f;
     r.guiding_pdf = 3.f * random() + 2.f;
-    valid.add(share_ratios(r), 1);  // where the light is, the field samples ten times as often
+    valid.add(share_ratios(r), 1);
     r.guiding_pdf = 0.01f;
     bad.add(share_ratios(r), 1);
     r.guiding_pdf = 0;
@@ -311,7 +311,7 @@ TEST(Guide, SharesFollowMoments) {
   EXPECT_EQ(kBsdfShares[bad.best()], 1.f);
   EXPECT_EQ(none.count, 0);
   EXPECT_EQ(kBsdfShares[none.best()], 1.f);
-  // Where the field does not help, nothing is guided.
+  // Where the guiding field does not reduce noise, no bounces are guided.
   std::vector<TrainingRecord> records = many_bounces(50000, 9);
   for (TrainingRecord& r : records) r.guiding_pdf = 1e-3f;
   const GuidingField field(kUnitGrid, records, 1, false, true, size_t{64} << 20);
@@ -328,8 +328,8 @@ TEST(Guide, SharesFollowMoments) {
   EXPECT_NEAR(better.facts().guided_share, 0.75, 1e-6);
 }
 
-/// A field that is restored from its parts is equal to the original. Parts that would mislead
-/// kernels are refused.
+/// A guiding field that is restored from its arrays is equal to the original. The constructor
+/// refuses arrays that would mislead kernels.
 TEST(Guide, IsMadeOfItsPartsAgain) {
   const auto records = many_bounces(80000, 11);
   // The grid is so large that all samples fall into few top-level entries, which are divided.

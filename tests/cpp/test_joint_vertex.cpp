@@ -7,7 +7,7 @@
 namespace wavecomb {
 namespace {
 
-/// BSDF that counts its evaluations.
+/// A BSDF that counts its evaluations.
 struct CountingBsdf {
   struct View {};
   static inline int evaluations = 0;

@@ -176,7 +176,6 @@ TEST(Lanes, Masks) {
       const uint32_t other = (bits * 0x9e3779b9u >> 9) & kAll;
       ASSERT_EQ(lane_bits<F>(Mask<F>(m & make_mask<F>(other))), bits & other);
       ASSERT_EQ(lane_bits<F>(Mask<F>(m | make_mask<F>(other))), bits | other);
-      // The same lanes as an integer mask.
       ASSERT_EQ(lane_bits<UInt<F>>(Mask<UInt<F>>(m)), bits);
     }
     for (size_t n = 0; n <= kWidth<F> + 3; ++n) {
@@ -203,7 +202,6 @@ TEST(Lanes, SelectLoadStoreLane) {
         ASSERT_EQ(first_active(x, make_mask<F>(bits)), a[std::countr_zero(bits)]);
       }
     }
-    // Byte arrays of any alignment.
     alignas(64) char bytes[80];
     for (size_t offset = 0; offset < 8; ++offset) {
       store(bytes + offset, load<F>(a));
@@ -225,7 +223,7 @@ TEST(Lanes, GatherReadsActiveLanesOnly) {
       uint32_t index[16], wild[16];
       for (size_t k = 0; k < 16; ++k) {
         index[k] = static_cast<uint32_t>(rng()) % 1000u;
-        wild[k] = (bits >> k & 1u) ? index[k] : 0x7fffff00u;  // inactive lanes have invalid indices
+        wild[k] = (bits >> k & 1u) ? index[k] : 0x7fffff00u;
       }
       const U i = load<U>(wild);
       const Mask<F> m = make_mask<F>(bits);
@@ -315,7 +313,7 @@ TEST(Lanes, CompressStoreKeepsOrderAndCounts) {
         ASSERT_EQ(out[k], expected[k]);
         ASSERT_EQ(out_words[k], expected_words[k]);
       }
-      for (size_t k = kWidth<F>; k < out.size(); ++k) {  // nothing is written past one packet
+      for (size_t k = kWidth<F>; k < out.size(); ++k) {
         ASSERT_EQ(out[k], -7.f);
         ASSERT_EQ(out_words[k], 77u);
       }
@@ -335,7 +333,7 @@ TEST(Lanes, Lookup16ReadsATable) {
         ASSERT_EQ(lane(value, k), table[index[k]]) << kWidth<F> << " lanes, lane " << k;
     };
     uint32_t index[16];
-    for (uint32_t shift = 0; shift < 16; ++shift) {  // each entry in each lane
+    for (uint32_t shift = 0; shift < 16; ++shift) {
       for (uint32_t k = 0; k < 16; ++k) index[k] = (k + shift) % 16;
       expect(index);
     }
@@ -351,7 +349,7 @@ TEST(Lanes, Lookup256ReadsATable) {
   alignas(64) float table[256];
   for (float& x : table) x = static_cast<float>(rng());
   for_each_lane_type([&]<typename F>() {
-    for (uint32_t shift = 0; shift < 256; ++shift) {  // each entry in each lane
+    for (uint32_t shift = 0; shift < 256; ++shift) {
       uint32_t index[16];
       for (uint32_t k = 0; k < 16; ++k) index[k] = (k * 37 + shift) % 256;
       const F value = lookup256<F>(table, load<UInt<F>>(index));

@@ -42,7 +42,6 @@ std::vector<double> without_floor(std::vector<double> shares, const std::vector<
 
 TEST(LightBalance, IsTheSquareRootOfTheSecondMoment) {
   const std::vector<double> power{0.9, 0.05, 0.05};
-  // The third part contributes at one vertex in four.
   const auto shares = without_floor(balanced({{0.5, {{4, 0}, {4, 0}, {4, 0}, {4, 0}}},
                                               {0.2, {{1, 0}, {1, 0}, {1, 0}, {1, 0}}},
                                               {0.3, {{2, 0}, {0, 0}, {0, 0}, {0, 0}}}},
@@ -56,8 +55,8 @@ TEST(LightBalance, IsTheSquareRootOfTheSecondMoment) {
 TEST(LightBalance, WhatBouncesFindHasTheFloor) {
   const std::vector<double> power{0.8, 0.2};
   const double floor = LightBalance::kFloor * (0.25 + 0.4);
-  // Uniform domes, dimmer and brighter than the lamp: g = radiance * b, half of the dome is below
-  // the horizon.
+  // Tests uniform domes, dimmer and brighter than the light: g = radiance * b, half of the dome is
+  // below the horizon.
   for (const double radiance : {0.05, 0.5, 2.0}) {
     const auto shares =
         balanced({{0.6, {{radiance * 2, 2}, {0, 0}}}, {0.4, {{0.5, 0.01}, {0.5, 0.01}}}}, power);
@@ -158,7 +157,7 @@ TEST(NodeBalance, FollowsWhatIsBelow) {
   for (int i = 0; i < 20; ++i) few.add(true, 0.5, 1, 1);
   for (int i = 0; i < 2000; ++i) {
     even.add(i % 2 == 0, 0.5, 1, 1);
-    if (i % 2 == 0) blocked.add(true, 0.5, 1, 1);  // and light from the left is blocked
+    if (i % 2 == 0) blocked.add(true, 0.5, 1, 1);
     stronger.add(i % 2 == 0, 0.5, i % 2 == 0 ? 4 : 1, 1);
     broken.add(true, 0.5, std::numeric_limits<double>::quiet_NaN(), 1);
   }

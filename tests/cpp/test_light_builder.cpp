@@ -223,14 +223,14 @@ TEST(LightBuilder, FewStrongLightsHaveASmallTable) {
   weights[0] = 1e6;
   std::vector<uint32_t> bins, numbers;
   const PowerTable table = build_power_table(weights, 1, bins, numbers);
-  // Half of the power; 1 % of it is distributed equally among lights. Tolerance: one unit of the
-  // bins.
+  // Half of the power is expected; 1 % of it is distributed equally among lights. The tolerance is
+  // one unit of the bins.
   EXPECT_NEAR(numbers[0], 0.99 * 0x1p24 / 2, 1 << 14);
   EXPECT_EQ(table.split, numbers[0]);
   EXPECT_LE(table.triangle_bins, 1024u);
 }
 
-/// The density is positive wherever the bilinear image is.
+/// The density of dome samples is positive wherever the bilinear image is.
 TEST(DomeDistribution, PositiveWhereverTheBilinearImageIs) {
   std::mt19937 rng(3);
   const uint32_t sizes[][2] = {{1, 1},   {2, 1},      {8, 4},      {17, 9},
@@ -259,7 +259,6 @@ TEST(DomeDistribution, PositiveWhereverTheBilinearImageIs) {
       Light light = make_light(LightKind::kDome);
       light.texture = texture;
       lights.build({light});
-      // Points near bright texels.
       for (uint32_t y = 0; y < h; ++y)
         for (uint32_t x = 0; x < w; ++x) {
           const float* texel = &rgb[3 * (size_t{y} * w + x)];
@@ -313,8 +312,8 @@ void expect_intervals(const Distribution2D& d, uint32_t row, uint32_t n,
   }
 }
 
-/// Counts at and next to cumulative values (all, or a few hundred of them), and random counts;
-/// padded to a multiple of 16.
+/// Tests counts at and next to cumulative values (all, or a few hundred of them), and random
+/// counts, padded to a multiple of 16.
 std::vector<uint32_t> hard_counts(const uint16_t* cumulative, uint32_t n, std::mt19937& rng) {
   std::vector<uint32_t> x;
   const auto add = [&](uint32_t count) {
@@ -358,14 +357,14 @@ TEST(DomeDistribution, SearchByLinesEqualsSearchOfTheWholeRow) {
       Lights lights;
       const uint32_t texture = lights.add_texture(w, h, rgb);
       const Distribution2D d = build_dome_distribution(lights.views[texture], {1, 1, 1});
-      if (*std::max_element(rgb.begin(), rgb.end()) == 0) {  // an image smaller than its bands
+      if (*std::max_element(rgb.begin(), rgb.end()) == 0) {
         EXPECT_EQ(d.width, 0u);
         continue;
       }
       ASSERT_GT(d.width, 0u);
       ASSERT_EQ(d.coarse.size(), d.height + 1);
       SCOPED_TRACE(testing::Message() << w << " x " << h << ", image " << image);
-      // All rows, or about twenty of many; the marginal distribution follows them.
+      // Tests all rows, or about twenty of many; the marginal distribution follows them.
       for (uint32_t y = 0; y <= d.height;
            y += y == d.height ? 1 : std::min(d.height - y, 1 + d.height / 20)) {
         const uint32_t n = y == d.height ? d.height : d.width;

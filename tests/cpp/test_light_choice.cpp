@@ -51,7 +51,8 @@ void count(Battery& battery, const std::string& name, const LightView& view,
   battery.add(name, chi_square::p_of_counts(observed, expected));
 }
 
-/// Makes each record a separate part, and the triangles, or the whole tree, another one.
+/// Puts each light record into a separate part, and the triangles, or the whole tree, into another
+/// one.
 LightParts parts_of(const LightSet& set, bool by_tree) {
   LightParts parts;
   parts.by_tree = by_tree;
@@ -68,7 +69,6 @@ LightParts parts_of(const LightSet& set, bool by_tree) {
   if (!by_tree) parts.of_mesh = {{set.first_triangle(), static_cast<uint32_t>(parts.size() - 1)}};
   return parts;
 }
-/// Shares that are unrelated to power.
 std::vector<double> odd_shares(size_t n) {
   std::vector<double> shares(n);
   Numbers number(31);

@@ -48,7 +48,7 @@ double cylinder_irradiance(double length, double radius, const Vec3<float>& from
   return 3 * sum * length * radius * 2 * kPiD / kN / kN;
 }
 
-/// A kind that lacks members does not compile (light/kinds/kinds.h).
+/// A light kind that lacks members does not compile (light/kinds/kinds.h).
 struct KindWithoutEmission : FlatKind {
   static LightKindInfo describe();
   template <typename F>
@@ -95,9 +95,9 @@ TEST(Cylinder, IrradianceIsTheSumOverItsSurface) {
 }
 
 TEST(Cylinder, PlacesAlongALineOfItAreNotRounded) {
-  // Seen from 0.01 above a line of the surface, two lengths away, all sines of the inclination
-  // differ from 1 by only about 1e-6, 30 float steps. A naive formula places samples
-  // 0.05 apart and up to 0.03 beside the light.
+  // Seen from 0.01 above a line of the cylinder, two lengths away, all sines of the inclination
+  // differ from 1 by only about 1e-6, 30 float steps. A naive formula places samples 0.05 apart and
+  // up to 0.03 beside the light.
   Light light = make_light(LightKind::kCylinder);
   light.length = 2;
   const Lights lights({light});
@@ -192,7 +192,7 @@ TEST(Shaping, ConeIsHardOrSmooth) {
   }
   EXPECT_NEAR(sent(all_soft, off_axis(45)).y, 1.5, 1e-4);
   EXPECT_FLOAT_EQ(sent({0, {}, 180, 0.3f}, off_axis(179)).y, 3);  // 180: no cone
-  // The axis is the transformed -z, and scale does not matter.
+  // The light's axis is the transformed -z, and scale does not affect it.
   EXPECT_FLOAT_EQ(sent(hard, {1, 0, 0}, rotate(0, -90) * scale(3, 2, 5)).y, 3);
   EXPECT_EQ(sent(hard, {-1, 0, 0}, rotate(0, -90) * scale(3, 2, 5)).y, 0);
 }
@@ -212,8 +212,8 @@ TEST(Ies, BilinearBetweenItsAngles) {
   EXPECT_NEAR(candela(15, 90, shaping), 5, 5e-4);
   EXPECT_NEAR(candela(15, 45, shaping), 6, 6e-4);
   EXPECT_NEAR(candela(60, 90, shaping), 1.5, 1e-3);
-  EXPECT_NEAR(candela(60, 225, shaping), 2.25, 2e-3);  // half-way from 90 to 360 degrees
-  EXPECT_EQ(candela(91, 0, shaping), 0);               // outside
+  EXPECT_NEAR(candela(60, 225, shaping), 2.25, 2e-3);
+  EXPECT_EQ(candela(91, 0, shaping), 0);  // outside
   Shaping wide = shaping;
   wide.ies_angle_scale = 2;  // theta / 2
   EXPECT_NEAR(candela(30, 0, wide), 7, 7e-4);
@@ -253,7 +253,8 @@ TEST(Ies, MeanIsExactAndNormalizes) {
   // Spherical mean of a profile that is linear in theta from 1 to 0: 1/2 integral sin (1 - theta /
   // pi) = 1 / 2.
   EXPECT_NEAR((IesProfile{{0, 180}, {0}, {1, 0}}).mean(), 0.5, 1e-12);
-  // From 1 to 0 over a hemisphere: integral sin (1 - 2 theta / pi) = 1 - 2 / pi.
+  // The mean of a profile that is linear from 1 to 0 over a hemisphere is the integral of sin (1 -
+  // 2 theta / pi) = 1 - 2 / pi.
   EXPECT_NEAR((IesProfile{{0, 90}, {0}, {1, 0}}).mean(), 1 - 2 / kPiD, 1e-12);
   EXPECT_NEAR((IesProfile{{0, 90, 180}, {0, 360}, {5, 5, 5, 5, 5, 5}}).mean(), 5, 1e-6);
   Shaping shaping{0, {}, 180, 0, 0};
@@ -298,7 +299,7 @@ TEST(Shaping, BothTechniquesSeeTheSame) {
           sample_light<float>(view, Vec3<float>(0, 0, 0), number(), number(), number(), true);
       if (!s.valid) continue;
       const auto t = trace(view, {0, 0, 0}, s.wi);
-      if (!t) continue;  // rounding moved the ray past an edge
+      if (!t) continue;
       const auto hit = light_hit<float>(view, 0u, Vec3<float>(0, 0, 0), s.wi, *t, true);
       if (hit.pdf == 0) continue;
       EXPECT_NEAR(hit.radiance.x, s.weight.x * s.pdf, 2e-3 * hit.radiance.x + 1e-4);

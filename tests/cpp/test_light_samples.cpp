@@ -207,7 +207,7 @@ TEST(LightSamples, OfShapedLightsFollowTheirDensity) {
 }
 
 TEST(LightSamples, OfManyLightsFollowTheirDensity) {
-  // Selection of a light and position on it, by power and by light tree.
+  // Tests the selection of a light together with the position on it, by power and by light tree.
   Battery battery("many lights");
   const Lights lights = random_lights(is_long() ? 60 : 20, 7, 3);
   Numbers number(21);

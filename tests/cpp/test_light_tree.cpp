@@ -57,8 +57,8 @@ TEST(LightTree, ProbabilitiesAddUpToOne) {
   }
 }
 
-/// Every light that contributes at a receiver can be selected. Checked by a point on the light's
-/// front side above the receiver's horizon.
+/// Every light that contributes at a receiver can be selected. A point on the light's front side
+/// above the receiver's horizon shows that the light contributes.
 TEST(LightTree, WhatShinesCanBeChosen) {
   const Lights lights = random_lights(300, 8);
   const LightView power = lights.view(), view = by_tree(lights);
@@ -71,7 +71,6 @@ TEST(LightTree, WhatShinesCanBeChosen) {
     ++seen;
   }
   EXPECT_GT(seen, 4000);
-  // The same light again, found by its index.
   Numbers again(9);
   for (int k = 0; k < 40000; ++k) {
     const Vec3<float> p = k % 3 == 0 ? again.point(1) : again.point(12), n = again.direction();
@@ -107,7 +106,7 @@ TEST(LightTree, BothHalvesOfMisAgree) {
   }
   EXPECT_GT(finite, 5000);
 
-  double variance[2] = {0, 0};  // relative to the incident light
+  double variance[2] = {0, 0};
   for (int k = 0; k < 12; ++k) {
     const Vec3<float> p = number.point(12), n = number.direction();
     LightReceiver<float> to(p, pack_normal<float>(n));
@@ -126,8 +125,8 @@ TEST(LightTree, BothHalvesOfMisAgree) {
       mean[way] = sum / kSamples;
       error2[way] = (sum2 / kSamples - mean[way] * mean[way]) / kSamples;
     }
-    // Both probabilities are 0 where no light arrives. Compilers may evaluate arguments in any
-    // order, so positions differ between compilers.
+    // Both probabilities are 0 where no light arrives. Draw the random numbers in separate
+    // statements: compilers may evaluate arguments in any order, so positions would differ.
     EXPECT_LE(std::abs(mean[0] - mean[1]), 4.5 * std::sqrt(error2[0] + error2[1])) << k;
     for (int way = 0; way < 2; ++way) variance[way] += error2[way] / (mean[0] * mean[0] + 1e-12);
   }
@@ -250,9 +249,9 @@ TEST(LightTree, HundredThousandTrianglesAreQuick) {
   const LightTree tree = build_light_tree(lights.set, powers);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   RecordProperty("build_ms", static_cast<int>(1e3 * seconds.count()));
-  EXPECT_LT(seconds.count(), 20);  // generous, for busy machines
+  EXPECT_LT(seconds.count(), 20);
   ASSERT_EQ(tree.nodes.size(), triangles.size() - 1);
-  // Deep enough for all lights, and reasonably balanced.
+  // The light tree is deep enough for all lights, and reasonably balanced.
   const LightTree again = build_light_tree(lights.set, powers);
   EXPECT_EQ(tree.trails, again.trails);
   EXPECT_LT(*std::max_element(tree.trails.begin(), tree.trails.end()), 1u << 31);

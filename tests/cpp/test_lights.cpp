@@ -43,7 +43,7 @@ struct Case {
   Vec3<float> from{0, 0, 0};
 };
 
-/// One case per sampling method, seen from the origin.
+/// Tests one case per sampling method, seen from the origin.
 std::vector<Case> sampling_cases() {
   std::vector<Case> cases;
   const auto add = [&](const char* name, const Light& light) {
@@ -192,8 +192,7 @@ const Vec3<float> kUp{0, 0, 1}, kOrigin{0, 0, 0};
 
 TEST(Irradiance, RectAboveAPoint) {
   // A rect with a corner above the point: E = L / 2 (a / A atan(b / A) + b / B atan(a / B)), A =
-  // sqrt(1 + a^2), B = sqrt(1 + b^2), with sides a and b in units of the height. Four such rects
-  // form one.
+  // sqrt(1 + a^2), B = sqrt(1 + b^2), with sides a and b in units of the height.
   for (const float size : {0.1f, 1.f, 10.f}) {
     Light light = make_light(LightKind::kRect, translate(0, 0, 2) * scale(2 * size, 4 * size, 1));
     const double a = size / 2, b = 2 * size / 2, big_a = std::sqrt(1 + a * a),
@@ -201,7 +200,6 @@ TEST(Irradiance, RectAboveAPoint) {
     const double corner =
         3 / 2.0 * (a / big_a * std::atan(b / big_a) + b / big_b * std::atan(a / big_b));
     EXPECT_NEAR(irradiance(Lights({light}), kOrigin, kUp) / (4 * corner), 1, 2e-3) << size;
-    // No light behind the rect.
     EXPECT_EQ(irradiance(Lights({light}), {0, 0, 5}, -kUp, 10), 0);
   }
 }
@@ -226,7 +224,7 @@ TEST(Irradiance, SphereNearAndFar) {
           make_light(LightKind::kSphere, translate(static_cast<float>(distance * std::sin(tilt)), 0,
                                                    static_cast<float>(distance * cosine)));
       light.radius = 1;
-      if (distance < 1.1 && tilt > 0) continue;  // partly below the horizon
+      if (distance < 1.1 && tilt > 0) continue;
       const double exact = kPiD * 3 / distance / distance * cosine;
       EXPECT_NEAR(irradiance(Lights({light}), kOrigin, kUp, 300) / exact, 1, 2e-3)
           << distance << ", " << tilt;
@@ -316,8 +314,7 @@ TEST(Irradiance, TriangleAgreesWithRect) {
 }
 
 TEST(TexturedLights, RectShowsItsImageUprightFromTheFront) {
-  // Top row red, green; bottom row blue, white. The rect emits along -z and is seen from z < 0,
-  // with +y up.
+  // The rect emits along -z and is seen from z < 0, with +y up.
   Lights lights;
   Light light = make_light(LightKind::kRect);
   light.color = {1, 1, 1};
@@ -327,7 +324,7 @@ TEST(TexturedLights, RectShowsItsImageUprightFromTheFront) {
     return light_hit<float>(lights.view(), 0u, Vec3<float>{x, y, -1}, {0, 0, 1}, 1.f, true)
         .radiance;
   };
-  // Looking along +z with +y up, right is -x.
+  // For a viewer that looks along +z with +y up, right is -x.
   EXPECT_NEAR(seen(0.25f, 0.25f).x, 1, 1e-5);  // upper left: red
   EXPECT_NEAR(seen(0.25f, 0.25f).y, 0, 1e-5);
   EXPECT_NEAR(seen(-0.25f, 0.25f).y, 1, 1e-5);  // upper right: green
@@ -335,7 +332,6 @@ TEST(TexturedLights, RectShowsItsImageUprightFromTheFront) {
   EXPECT_NEAR(seen(0.25f, -0.25f).z, 1, 1e-5);  // lower left: blue
   EXPECT_NEAR(seen(0.25f, -0.25f).x, 0, 1e-5);
   EXPECT_NEAR(seen(-0.25f, -0.25f).x, 1, 1e-5);
-  // No light at the back.
   EXPECT_EQ(
       light_hit<float>(lights.view(), 0u, Vec3<float>{0, 0, 1}, {0, 0, -1}, 1.f, true).radiance.y,
       0);
@@ -369,7 +365,7 @@ TEST(TexturedLights, DomeFollowsOpenExrsConvention) {
     paint(48, y, 2, 1);  // s = 3/4: blue
   }
   for (uint32_t y = 0; y < 3; ++y)
-    for (uint32_t x = 0; x < kW; ++x) rgb[3 * (y * kW + x)] = 7;  // the top rows: the pole +y
+    for (uint32_t x = 0; x < kW; ++x) rgb[3 * (y * kW + x)] = 7;
   light.texture = lights.add_texture(kW, kH, rgb);
   lights.build({light});
   const auto seen = [&](float x, float y, float z) {
@@ -459,7 +455,7 @@ TEST(LightLanes, PacketsGiveTheBitsOfScalars) {
     for (size_t i = 0; i < kN; ++i) column.push_back(static_cast<float>(rng() >> 8) * 0x1p-24f);
   for (size_t i = 0; i < kN; ++i)
     for (size_t c = 0; c < 3; ++c) in[c][i] = in[c][i] * 8 - 4;
-  for (size_t i = 0; i < kN / 4; ++i) in[3][i] = 0.5f;  // packets with equal lights
+  for (size_t i = 0; i < kN / 4; ++i) in[3][i] = 0.5f;
   std::vector<uint32_t> ids(kN);
   for (uint32_t i = 0; i < kN; ++i)
     ids[i] = i < kN / 4 ? i / 64 % view.count : static_cast<uint32_t>(rng()) % view.count;

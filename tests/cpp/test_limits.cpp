@@ -76,7 +76,6 @@ TextureDesc image(uint32_t width, uint32_t height, uint32_t channels, TexelForma
   return desc;
 }
 
-/// Lays out an image. Returns the error message, or "" and the view.
 std::string layout_refusal(const TextureDesc& desc, TextureView& view) {
   view = {};
   view.format = desc.format;
@@ -160,7 +159,7 @@ TEST(Limits, the_tree_alone_chooses_among_more_lights_than_a_table_can) {
       refusal([&] { chooses_by_tree(LightSelection::kPower, alone); }),
       "by power one of 16,777,215 lights can be chosen; the scene has 102 lights and emissive "
       "triangles; choose --light-selection tree");
-  // Selections and their probabilities do not use the table.
+  // Light selection and its probabilities do not use the table.
   by_tree.by_tree = alone.by_tree = true;
   const LightReceiver<float> to(Vec3<float>{4, 5, 2});
   for (uint32_t i = 0; i < 1000; ++i) {

@@ -74,7 +74,7 @@ TEST(Multipliers, ScaleTheDiffuseResponse) {
     Stage stage(grey());
     Light light = disk();
     light.diffuse = factor;
-    light.specular = 0.5f;  // without effect on a diffuse floor
+    light.specular = 0.5f;
     stage.b.add_light(light);
     expect_mean(checked(stage.b.build(), settings()),
                 0.6 / kPiD * kUnderDisk * static_cast<double>(factor), "diffuse");
@@ -133,7 +133,7 @@ TEST(HiddenLights, ShineAndAreNotMet) {
   Light light = disk();
   light.visible = false;
   stage.b.add_light(light);
-  Light above = disk(1);  // a light that the hidden one would occlude
+  Light above = disk(1);
   above.to_world = facing_down(1.2f);
   stage.b.add_light(above);
   const double from_above = kPiD * 3 * 0.25 / (1.2 * 1.2 + 0.25);

@@ -45,7 +45,7 @@ std::string named(const char* name, double value) {
   return std::string(name) + " " + std::to_string(value).substr(0, 6);
 }
 
-/// Squared roughnesses of 0.032, the narrowest lobe, 0.1, 0.3 and 1.
+/// Tests squared roughnesses of 0.032 (the narrowest lobe), 0.1, 0.3 and 1.
 std::vector<float> alphas() {
   return is_long() ? std::vector<float>{0.001024f, 0.01f, 0.09f, 1.f}
                    : std::vector<float>{0.001024f, 0.09f};

@@ -34,7 +34,7 @@ TEST(Fresnel, DielectricMatchesReference) {
       const double c = i / 1000.0;
       const float f = fresnel_dielectric(static_cast<float>(c), static_cast<float>(n)).reflectance;
       const double n_float = static_cast<float>(n), c_float = static_cast<float>(c);
-      const bool critical = std::abs(n * n - (1 - c * c)) < 1e-3;  // the slope is infinite there
+      const bool critical = std::abs(n * n - (1 - c * c)) < 1e-3;
       EXPECT_NEAR(f, fresnel_reference(c_float, n_float), critical ? 2e-3 : 2e-6) << n << " " << c;
     }
 }
@@ -46,8 +46,7 @@ TEST(Fresnel, KnownValues) {
   // 1))^2 / 2.
   EXPECT_NEAR(fresnel_dielectric(1 / std::sqrt(1 + 2.25f), 1.5f).reflectance,
               0.5f * std::pow(1.25f / 3.25f, 2.f), 1e-6f);
-  EXPECT_EQ(fresnel_dielectric(0.5f, 1 / 1.5f).reflectance,
-            1.f);  // total internal reflection: the critical angle is 41.8 degrees
+  EXPECT_EQ(fresnel_dielectric(0.5f, 1 / 1.5f).reflectance, 1.f);
   EXPECT_EQ(fresnel_dielectric(0.5f, 1 / 1.5f).cos_t, 0.f);
   EXPECT_EQ(fresnel_dielectric(0.f, 1.5f).reflectance, 1.f);
   EXPECT_EQ(fresnel_dielectric(0.f, 1.f).reflectance, 0.f);
@@ -86,7 +85,7 @@ TEST(Fresnel, F82TintHitsItsTwoColours) {
   EXPECT_NEAR(at_82.y, 0.7f * schlick.y, 1e-5f);
   EXPECT_NEAR(at_82.z, 0.2f * schlick.z, 1e-5f);
   EXPECT_NEAR(f(0.f).y, 1.f, 1e-6f);
-  // Hemispherical mean, where nothing is clamped.
+  // Computes the hemispherical mean with parameters for which nothing is clamped.
   double mean = 0;
   for (int i = 0; i < 10000; ++i) {
     const float c = (static_cast<float>(i) + 0.5f) / 10000.f;
@@ -116,7 +115,8 @@ TEST(Ggx, ProjectedNormalsCoverTheSurfaceOnce) {
     double sum = 0;
     const int n = 20000;
     for (int i = 0; i < n; ++i) {
-      // tan theta = alpha sqrt(x / (1 - x)) makes the integrand constant if D is right.
+      // The substitution tan theta = alpha sqrt(x / (1 - x)) makes the integrand constant if D is
+      // right.
       const double x = (i + 0.5) / n, tan2 = static_cast<double>(alpha) * alpha * x / (1 - x);
       const double z = 1 / std::sqrt(1 + tan2);
       const double dz_dx =
@@ -137,8 +137,7 @@ TEST(Ggx, VisibleNormalsProjectToTheViewersArea) {
       const int n = 400;
       for (int i = 0; i < n; ++i)
         for (int j = 0; j < n; ++j) {
-          const double y = (i + 0.5) / n,
-                       x = 1 - (1 - y) * (1 - y);  // removes the singularity of 1 / z
+          const double y = (i + 0.5) / n, x = 1 - (1 - y) * (1 - y);
           const double z = 1 / std::sqrt(1 + static_cast<double>(alpha) * alpha * x / (1 - x));
           const Vec h = direction(z, 2 * bsdf_testing::kPiD * (j + 0.5) / n);
           sum += 2 * (1 - y) * std::max(0.0, static_cast<double>(dot(wo, h))) / z;

@@ -15,7 +15,7 @@ using namespace lane_testing;
 
 constexpr double kPiD = 3.14159265358979323846;
 
-/// Floats that cover [lo, hi] uniformly and by magnitude, including the ends.
+/// Returns floats that cover [lo, hi] uniformly and by magnitude, including the ends.
 std::vector<float> cover(float lo, float hi) {
   std::vector<float> x = {lo, hi};
   const size_t n = is_long() ? 400000 : 100000;
@@ -53,7 +53,7 @@ double worst_error(const std::vector<float>& x, const std::vector<float>& y,
 TEST(Math, SinCos) {
   const auto sine = [](auto x) { return sincos_2pi(x).sin; };
   const auto cosine = [](auto x) { return sincos_2pi(x).cos; };
-  // The argument is exact in turns: reduce it in double before multiplying by 2 pi.
+  // Reduce the argument, which is exact in turns, in double before multiplying by 2 pi.
   const auto sin_d = [](double x) { return std::sin(2 * kPiD * std::remainder(x, 1.0)); };
   const auto cos_d = [](double x) { return std::cos(2 * kPiD * std::remainder(x, 1.0)); };
   for (const auto& [lo, hi] : {std::pair{-1.f, 1.f}, {-100.f, 100.f}, {-1048575.f, 1048575.f}}) {
@@ -63,7 +63,7 @@ TEST(Math, SinCos) {
     expect_lanes_agree(x, sine, "sin");
     expect_lanes_agree(x, cosine, "cos");
   }
-  // Relative error near the zeros of both functions.
+  // Measures the relative error near the zeros of sine and cosine.
   const auto x = cover(-0.124f, 0.124f);
   EXPECT_LE(worst_ulps(x, map<float>(x, sine), sin_d), 2.5);
   EXPECT_LE(worst_ulps(x, map<float>(x, cosine), cos_d), 2.5);
@@ -71,7 +71,7 @@ TEST(Math, SinCos) {
     EXPECT_EQ(sincos_2pi(q).sin, static_cast<float>(std::round(sin_d(q))));
     EXPECT_EQ(sincos_2pi(q).cos, static_cast<float>(std::round(cos_d(q))));
   }
-  for (const float v : x) {  // results lie on the unit circle
+  for (const float v : x) {
     const auto [s, c] = sincos_2pi(v);
     ASSERT_NEAR(static_cast<double>(s) * s + static_cast<double>(c) * c, 1, 4e-7);
   }

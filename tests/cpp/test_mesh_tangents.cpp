@@ -38,7 +38,7 @@ Surface<float> surface_at(const Scene& scene, uint32_t prim, float u, float v) {
 V unit(const V& v) {
   return v * (1 / length(v));
 }
-/// Tangent in the plane of the shading normal, as used in frames.
+/// Returns the tangent in the plane of the shading normal, as shading frames use it.
 V grain(const Surface<float>& s) {
   return make_frame<float>(s.ns, s.dpdu, s.handedness).s;
 }
@@ -60,8 +60,7 @@ TEST(Directions, ComeBackFromTheirCodes) {
   std::normal_distribution<float> normal;
   for (int i = 0; i < 20000; ++i) {
     V v{normal(rng), normal(rng), normal(rng)};
-    if (i < 27)  // along axes and diagonals, where the square folds
-      v = {float(i % 3 - 1), float(i / 3 % 3 - 1), float(i / 9 - 1)};
+    if (i < 27) v = {float(i % 3 - 1), float(i / 3 % 3 - 1), float(i / 9 - 1)};
     const uint32_t code = encode_direction(v);
     const V back = decode_direction<float>(code);
     if (length(v) == 0) {
@@ -193,7 +192,7 @@ TEST(Tangents, WhatCancelsOutIsTheTrianglesOwn) {
   fan.normals.assign(21, 0);
   for (size_t i = 1; i < 21; i += 3) fan.normals[i] = 1;
   fan.normals_at = Attribute::kVertex;
-  // Texture coordinates per corner, so that u continues past the last spoke.
+  // Uses texture coordinates per corner, so that u continues past the last spoke.
   for (int i = 0; i < 6; ++i)
     fan.uvs.insert(fan.uvs.end(), {0.5f, 1, float(i) / 6, 0, float(i + 1) / 6, 0});
   fan.uvs_at = Attribute::kCorner;
@@ -307,7 +306,7 @@ TEST(Tangents, LanesAgree) {
 }
 
 TEST(Tangents, ThreadsChangeNoBit) {
-  const Mesh mesh = make_mesh(sphere(200, true));  // more than one batch
+  const Mesh mesh = make_mesh(sphere(200, true));
   ASSERT_GT(mesh.triangle_count(), 2u * 65536u);
   MeshTangents one, many;
   with_threads(1, [&] { one = make_tangents(mesh); });
@@ -328,7 +327,8 @@ TEST(Tangents, AnEditedSceneHasThoseOfOneBuiltAnew) {
     return std::vector<uint32_t>(p, p + ball.positions.size() / 3);
   };
   EXPECT_EQ(codes(*edited), codes(*anew));
-  // Shared if an edit does not affect tangents, removed if no material needs them.
+  // An edited scene shares tangents if the edit does not affect them, and drops them if no material
+  // needs them.
   metal.base_color = {1, 0, 0};
   EXPECT_EQ(edited->edited({.materials = {{0, metal}}})->view().tangents, edited->view().tangents);
   metal.openpbr.anisotropy = 0;

@@ -41,7 +41,7 @@ TEST(Morton, Lanes) {
   });
 }
 
-/// Inverse of hash_u32. Since it exists, the hash is a bijection.
+/// Inverse of hash_u32. The hash is a bijection, since it has an inverse.
 uint32_t unhash(uint32_t x) {
   x ^= x >> 16;
   x *= 0x43021123u;
@@ -79,7 +79,7 @@ TEST(Hash, FlipsHalfOfTheBits) {
 }
 
 TEST(Hash, TwoWordsRarelyCollide) {
-  // 2^18 pairs into 2^32: about n^2 / 2^33 = 8 collisions.
+  // Hashing 2^18 pairs into 2^32 values gives about n^2 / 2^33 = 8 collisions.
   std::vector<uint32_t> all;
   for (uint32_t a = 0; a < 512; ++a)
     for (uint32_t b = 0; b < 512; ++b) all.push_back(hash_u32(a, b));

@@ -102,14 +102,15 @@ TEST(Motion, MovingPointsAndCurvesCoverTheirShare) {
     builder.add_to_group(0, builder.add_mesh(std::move(mesh)));
     Camera camera = make_camera({0, 0, 1000}, {0, 0, 0}, 0.001f);
     builder.set_camera(camera);
-    // Of its path of length 9, it is fully visible for 0.2, then half visible on average for 0.6.
+    // Of the disk's path of length 9, it is fully visible for 0.2, then half visible on average for
+    // 0.6.
     const double seen = kPiD * 0.09, crossing = (0.2 + 0.5 * 0.6) / 9;
     EXPECT_NEAR(mean(builder.build(), 1u << 18), seen * (1 + crossing) / 3, 2e-3) << tube;
   }
 }
 
 TEST(Motion, EveryStepCounts) {
-  // Forth and back: 0 to 0.8 to 0.
+  // The edge moves from 0 to 0.8 and back to 0.
   SceneBuilder builder;
   builder.add_material(glowing());
   const MeshData out = half_plane(-0.5f), in = half_plane(0.3f);
@@ -123,7 +124,7 @@ TEST(Motion, MovingInstanceAndNestedOnesCoverTheirShare) {
   builder.add_material(glowing());
   const uint32_t inner = builder.add_group("inner"), outer = builder.add_group("outer");
   builder.add_to_group(inner, builder.add_mesh(make_mesh(half_plane(-0.5f), 0)));
-  // Nested motion: by 0.2 and by 0.6, the outer one in three steps.
+  // Nested motion moves the inner group by 0.2 and the outer one by 0.6 in three steps.
   const Affine by[2] = {translate(0, 0, 0), translate(0.2f, 0, 0)};
   const Affine on[4] = {translate(0, 0, 0), translate(0.2f, 0, 0), translate(0.4f, 0, 0),
                         translate(0.6f, 0, 0)};
@@ -159,7 +160,8 @@ TEST(Motion, TimesAreSpreadEvenlyAndDisturbNothing) {
       ++bins[static_cast<size_t>(t * 16)];
     }
     EXPECT_NEAR(sum / 4096, 0.5, 0.02);
-    // Stratified: each sixteenth of the shutter gets a sixteenth of the samples.
+    // Time samples are stratified: each sixteenth of the shutter interval gets a sixteenth of the
+    // samples.
     if (kind == SamplerKind::kSobol) {
       for (const int n : bins) EXPECT_EQ(n, 256);
     }
@@ -215,7 +217,7 @@ ScenePtr moving_scene(bool moving_camera) {
     builder.add_to_group(group, builder.add_mesh(swaying(primitive, 1, seed + 50, 1)));
     ++seed;
   }
-  // A moving light: visible, but not sampled.
+  // The moving light is visible, but not sampled.
   const Affine fly[2] = {translate(0, 3, 0), translate(2, 3, 0)};
   const uint32_t lamp = builder.add_group("lamp");
   builder.add_to_group(lamp, builder.add_mesh(make_mesh(sphere(4, false), 3)));
@@ -323,7 +325,7 @@ TEST(Motion, SurfacesAreWhereRaysMeetThem) {
 /// Rays to vertices, edges and faces of a mesh at their positions at the time of the ray, many of
 /// them parallel to an axis.
 struct AimedRays {
-  std::vector<float> column[8];  ///< origin, direction, tfar, time
+  std::vector<float> column[8];
 
   AimedRays(const Mesh& mesh, size_t n, uint32_t seed) {
     std::mt19937 rng(seed);
@@ -392,7 +394,7 @@ TEST(Motion, PacketsMeetWhatRaysAloneDo) {
       if (width > accel.native_width()) continue;
       HitBuffer& h = hits.emplace_back(n);
       auto& occluded = blocked.emplace_back(n + 16);
-      // In chunks, which changes the composition of packets.
+      // Traces in chunks, which changes the composition of packets.
       for (size_t first = 0; first < n; first += 16 * width + 5) {
         const size_t m = std::min<size_t>(16 * width + 5, n - first);
         accel.intersect(
@@ -423,7 +425,7 @@ TEST(Motion, BadMotionIsRefused) {
   expect_refused([] {
     SceneBuilder b;
     Mesh mesh = make_mesh(half_plane(0));
-    mesh.steps = 3;  // four points cannot be split into three steps
+    mesh.steps = 3;
     b.add_mesh(mesh);
   });
   expect_refused([] {

@@ -27,7 +27,7 @@ P edited(Edit edit) {
   return p;
 }
 
-/// Two directions of cosine-weighted density, on either side for transmissive materials.
+/// Draws two directions of cosine-weighted density, on either side for transmissive materials.
 struct Pair {
   Vec o, i;
 };
@@ -191,7 +191,7 @@ TEST(OpenPbr, LayersAreNotReciprocalByTheFiguresOfItsPage) {
                       {"film on glass 0.2", film(0.2f, 1), 0.0028},
                       {"film on glass 0.5", film(0.5f, 1), 0.067},
                       {"film on glass 1", film(1.f, 1), 0.423}};
-  // Narrow lobes get few pairs: the tolerance is a sixth, or 0.1 %.
+  // Materials with narrow lobes get few pairs, so the tolerance is a sixth, or 0.1 %.
   for (const Row& row : rows)
     EXPECT_NEAR(asymmetry(row.params), row.size, std::max(row.size / 6, 1e-3)) << row.name;
 }

@@ -41,7 +41,6 @@ P white() {
   return p;
 }
 
-/// Mean weight of samples, without radiance scaling.
 Rgb measured(const Bsdf& bsdf, const Vec& wo, uint32_t samples) {
   Rgb sum{0, 0, 0};
   for (uint32_t i = 0; i < samples; ++i) {
@@ -56,8 +55,8 @@ Rgb measured(const Bsdf& bsdf, const Vec& wo, uint32_t samples) {
 
 /// Tolerances for tables and sampling noise.
 struct Bounds {
-  double loss = 0.008, gain = 0.003;  ///< limits relative to the prediction
-  double most = 1.002;                ///< absolute limit
+  double loss = 0.008, gain = 0.003;
+  double most = 1.002;  ///< absolute limit
   std::vector<double> azimuths = {0.3};
   uint32_t samples = is_long() ? 32768 : 8192;
 };
@@ -217,7 +216,7 @@ TEST(OpenPbrEnergy, FilmsGainNothing) {
     float metallic, transmission, wall, coat;
   };
   constexpr float kFilms[3][2] = {{120, 1.25f}, {350, 1.8f}, {900, 1.5f}};
-  uint32_t turn = 0;  // one film each, unless in long tests
+  uint32_t turn = 0;
   for (const Kind& kind :
        {Kind{"film on gloss", 0, 0, 0, 0}, Kind{"film on metal", 1, 0, 0, 0},
         Kind{"film on glass", 0, 1, 0, 0}, Kind{"film on a wall", 0, 1, 1, 0},

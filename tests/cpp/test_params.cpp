@@ -132,12 +132,12 @@ void expect_lanes_equal_scalar(const MaterialView& view) {
     float u[W], v[W], width[W], wide[kValues * W], narrow[kValues];
     const uint32_t one = rng() % 3;
     for (size_t i = 0; i < W; ++i) {
-      material[i] = round % 2 ? one : rng() % 3;  // uniform and mixed packets
+      material[i] = round % 2 ? one : rng() % 3;
       u[i] = unit(rng);
       v[i] = unit(rng);
       width[i] = rng() % 3 ? std::abs(unit(rng)) * 0.2f : 0.f;
     }
-    const uint32_t off = rng();  // some lanes are inactive
+    const uint32_t off = rng();
     Mask<F> active = Mask<F>((lane_index<F>() & UInt<F>(off)) == UInt<F>(0u));
     if (round % 5 == 0) active = Mask<F>(true);
     record<F>(view, wavecomb::load<UInt<F>>(material), {wavecomb::load<F>(u), wavecomb::load<F>(v)},
@@ -165,7 +165,7 @@ void expect_own_by_material(const MaterialView& view) {
     uint32_t material[W];
     const uint32_t one = rng() % 3;
     for (uint32_t& m : material) m = round % 2 ? one : rng() % 3;
-    const uint32_t off = rng();  // some lanes are inactive
+    const uint32_t off = rng();
     const Mask<F> active = Mask<F>((lane_index<F>() & UInt<F>(off)) == UInt<F>(0u));
     const auto own = detail::specific_values<3, F>(view, wavecomb::load<UInt<F>>(material), active);
     for (size_t k = 0; k < own.size(); ++k) {
@@ -242,7 +242,7 @@ TEST_F(ParamsTest, ValuesAreBroughtIntoRange) {
   EXPECT_EQ(p.ior, 1 / kMaxIor);
   EXPECT_EQ(p.normal.z, 1.f);
   r.normal[0] = 2;
-  r.normal[2] = -1;  // points down: clamped to the horizon
+  r.normal[2] = -1;
   r.ior = nan;
   p = fetch_params<kAllInputs, float>(view_, 0u, {0, 0}, 0.f, true);
   EXPECT_GT(p.normal.z, 0.f);

@@ -115,7 +115,6 @@ TEST(PassPlan, AllPixelsInMortonOrder) {
 
 TEST(PassPlan, TakesActivePixelsBelowTheTarget) {
   const std::vector<uint32_t> order = morton_pixel_order({0, 0, 3, 2});
-  //                                       an interrupted pass, and one pixel left at 16
   const std::vector<uint32_t> samples = {32, 48, 64, 16, 64, 32};
   const std::vector<uint8_t> active = {1, 1, 1, 1, 0, 0};
   const auto plan =

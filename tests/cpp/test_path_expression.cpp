@@ -38,7 +38,6 @@ constexpr Pair kPairs[] = {
     {"C < T D > . *", "d.*"},
 };
 
-/// State of the automaton after some events.
 uint32_t state_after(const PathAutomaton& a, const std::vector<uint32_t>& events) {
   uint32_t state = 0;
   for (const uint32_t e : events) state = a.next[state * PathAutomaton::kNextWords + e];
@@ -89,7 +88,7 @@ TEST(PathExpression, IsTheLeastAutomaton) {
     return PathAutomaton(std::vector<NamedExpression>{{"a", text}}, kKeys).states();
   };
   EXPECT_EQ(states("C.*"), 1u);
-  EXPECT_EQ(states("C[LO]"), 2u);  // including the state where nothing can match any more
+  EXPECT_EQ(states("C[LO]"), 2u);
   EXPECT_EQ(states("C(.|.)*.*(D*.*)*"), 1u);
   EXPECT_EQ(states("C<RD>.*[LO]"), 3u);
 }
@@ -121,7 +120,7 @@ TEST(PathExpression, ErrorsNameThePlace) {
   EXPECT_NE(message_of("a b", "C.*").find("letters, digits and underscores"), std::string::npos);
   EXPECT_NE(message_of("a", "CsL").find("cut-outs"), std::string::npos);
   EXPECT_NE(message_of("a", std::string(200, '(')).find("nested too deep"), std::string::npos);
-  EXPECT_EQ(message_of("a", "C.*<L.'nobody'>"), "");  // group names are resolved with the scene
+  EXPECT_EQ(message_of("a", "C.*<L.'nobody'>"), "");
   EXPECT_THROW(PathAutomaton(std::vector<NamedExpression>{{"a", "C.*<L.'nobody'>"}}, kKeys), Error);
   EXPECT_THROW(check_expressions(std::vector<NamedExpression>{{"a", "C.*"}, {"a", "CL"}}), Error);
 }
@@ -159,7 +158,8 @@ TEST(BackwardAutomaton, MeetsTheForwardOneAnywhere) {
   }
 }
 
-/// Which of the last eleven events were diffuse: 2^11 states backwards, few states forwards.
+/// The expression asks which of the last eleven events were diffuse, which takes 2^11 states
+/// backwards and few states forwards.
 TEST(BackwardAutomaton, RefusesWhatIsTooMuch) {
   const PathAutomaton forward(std::vector<NamedExpression>{{"a", "C.{10}D.*[LO]"}}, kKeys);
   EXPECT_LT(forward.states(), 20u);

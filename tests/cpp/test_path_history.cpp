@@ -93,7 +93,7 @@ TEST(PathHistory, IsOneForAllSchedules) {
           EXPECT_TRUE(field->sums() == expected->sums())
               << lanes << " lanes, waves of " << wave_size << ", policy " << policy;
         }
-    // The first vertices are the same if fewer are kept.
+    // The first vertices are the same if the history stores fewer.
     EXPECT_LT(field_of({s}, 64, 1)->total().vertices, total.vertices);
   }
 }

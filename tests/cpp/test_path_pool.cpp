@@ -40,7 +40,7 @@ void for_each_packet_of_slots(uint32_t seed, const Function& f) {
   std::vector<uint32_t> slots(kSlots);
   std::iota(slots.begin(), slots.end(), 0u);
   std::shuffle(slots.begin(), slots.end(), rng);
-  slots.resize(kSlots + 16, 0x7fffff00u / 16);  // inactive lanes have invalid indices
+  slots.resize(kSlots + 16, 0x7fffff00u / 16);
   for (size_t i = 0; i < kSlots; i += kWidth<F>)
     f(load<UInt<F>>(slots.data() + i), first_lanes<F>(kSlots - i));
 }
@@ -59,7 +59,6 @@ TEST(PathPool, PathsComeBackFromTheirSlots) {
       ASSERT_EQ(std::bit_cast<uint32_t>(row[14]), 100 * s + 0xff800001u);
       ASSERT_EQ(std::bit_cast<uint32_t>(row[15]), 100 * s + 0x7fc00001u);
     }
-    // Shadow rays and radiance are unchanged.
     ASSERT_TRUE(std::all_of(pool.shadows, pool.radiance + kSlots * kRadianceWords,
                             [](float x) { return x == 0; }));
     for_each_packet_of_slots<F>(2, [&](const U& slot, const Mask<F>& active) {

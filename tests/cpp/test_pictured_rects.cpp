@@ -13,14 +13,12 @@ using namespace light_testing;
 
 constexpr uint32_t kTexelsX = 12, kTexelsY = 8;
 
-/// A few bright texels on a dim background.
 std::vector<float> spots() {
   std::vector<float> rgb(size_t{kTexelsX} * kTexelsY * 3, 0.02f);
   for (const uint32_t texel : {2 * kTexelsX + 3, 5 * kTexelsX + 9, 5 * kTexelsX + 8})
     for (uint32_t c = 0; c < 3; ++c) rgb[texel * 3 + c] = 40;
   return rgb;
 }
-/// Half of the image is black, the rest coloured.
 std::vector<float> half_dark() {
   std::vector<float> rgb;
   std::mt19937 rng(3);
@@ -60,8 +58,8 @@ Lights make_rect(const Place& place, const std::vector<float>& rgb) {
   return lights;
 }
 
-/// Where a direction hits the rect, as fractions of its edges, and the squared distance over area
-/// and cosine, which converts area density to solid angle density.
+/// Point where a direction hits the rect, as fractions of its edges, and the squared distance over
+/// area and cosine, which converts area density to solid angle density.
 struct OnRect {
   double a, b, distance2, measure;
 };
@@ -159,7 +157,7 @@ TEST(PicturedRect, IrradianceIsThatOfItsPicture) {
   size_t index = 0;
   for (const Place& place : kPlaces)
     for (const auto& rgb : {spots(), half_dark(), noise()}) {
-      // Every place, and every image with two places.
+      // Tests every position of the rect, and every image at two positions.
       const size_t diagonal = index + index / 3;
       ++index;
       if (!includes_case(diagonal, 3)) continue;
@@ -198,7 +196,8 @@ TEST(PicturedRect, ThePictureTakesNoiseAway) {
                      std::to_string(gain));
       std::printf("%s, %s: %.2f times less variance\n", bright ? "spots" : "noise", place.name,
                   gain);
-      // A few bright spots: much less noise. A noisy image: never much more.
+      // A few bright spots give much less noise when sampled by texture. A noisy image never gives
+      // much more noise when sampled by texture.
       EXPECT_GT(gain, bright ? 5 : 0.7) << place.name << (bright ? ", spots" : ", noise");
     }
 }
@@ -206,7 +205,7 @@ TEST(PicturedRect, ThePictureTakesNoiseAway) {
 TEST(PicturedRect, EvenAndBlackPictures) {
   const Lights grey =
       make_rect(kPlaces[1], std::vector<float>(size_t{kTexelsX} * kTexelsY * 3, 0.25f));
-  EXPECT_EQ(grey.set.records[0].distribution, kNoDistribution);  // sampled by solid angle
+  EXPECT_EQ(grey.set.records[0].distribution, kNoDistribution);
   EXPECT_TRUE(grey.set.distributions.empty());
   const Lights plain({make_light(LightKind::kRect, kPlaces[1].rect)});
   for (const float u : {0.1f, 0.5f, 0.9f}) {

@@ -21,7 +21,7 @@ namespace {
 
 using Order = std::vector<uint32_t>;
 
-/// Records with every column that a policy may use, and the properties of their materials.
+/// Records with every column that a policy may use, and the material properties that policies read.
 struct Records {
   std::vector<uint32_t> program, material, position_key, texture_key;
   std::vector<float> throughput, scratch;
@@ -37,7 +37,7 @@ struct Records {
     position_key.push_back(position);
     texture_key.push_back(texture);
   }
-  /// Only the columns that the policy declares, as in a render.
+  /// Fill only the columns that the policy declares, as a render does.
   ShadingQueueView view(uint32_t columns) {
     scratch.assign(traits.size(), -1.f);  // stale data
     ShadingQueueView v;
@@ -65,7 +65,7 @@ Order order_of(std::string_view name, Records& records) {
   return order;
 }
 
-/// Five materials of two programs, as in the tables below.
+/// Five materials of two programs.
 Records by_hand() {
   Records r;
   r.traits = {{1, MaterialTraits::kNone, 0},
@@ -123,7 +123,7 @@ TEST(Policies, TextureIsTypeThenMemory) {
   EXPECT_EQ(order_of("texture", r), (Order{4, 2, 6, 1, 5, 0, 3, 7}));
   r.costs.material_ns = {1, 9, 3, 7, 5};
   EXPECT_EQ(order_of("texture", r), (Order{4, 2, 6, 1, 5, 0, 3, 7})) << "costs do not matter";
-  r.traits[1].texture_bytes = uint64_t{1} << 60;  // exceeds the 56 bits of the key
+  r.traits[1].texture_bytes = uint64_t{1} << 60;
   EXPECT_EQ(order_of("texture", r), (Order{4, 2, 6, 1, 5, 0, 3, 7}));
 }
 
@@ -246,7 +246,7 @@ TEST(Policies, EqualAStableSortOfTheTable) {
 
 TEST(Policies, BatchesCoverTheQueueOnce) {
   for (const std::string& name : policy_names()) {
-    if (name == "adaptive") continue;  // selects among the other policies
+    if (name == "adaptive") continue;
     for (const size_t n : kSizes) {
       for (const bool materialize : {false, true}) {
         Records r = random_records(n, 7);

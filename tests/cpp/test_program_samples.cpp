@@ -28,7 +28,7 @@ bool agrees(const BsdfSample<float>& s, const BsdfEval<float>& e) {
          near(s.weight.y, e.f_cos.y) && near(s.weight.z, e.f_cos.z);
 }
 
-/// Delta lobes are atoms, distinguished by side, weight and probability.
+/// Delta lobes are atoms of the chi-square test, distinguished by side, weight and probability.
 template <typename Bsdf>
 chi_square::Case sampling_case(std::string name, const Bsdf& bsdf, const Vec& wo) {
   chi_square::Case c;
@@ -64,7 +64,7 @@ std::vector<Seen> roughnesses() {
   return {{0.03f, all}, {0.032f, all}, {0.1f, all}, {0.3f, all}, {1.f, all}};
 }
 
-/// Calls f(case, cosines), once for materials without a roughness.
+/// Calls f(case, cosines) for each roughness, or once for materials without one.
 template <typename Function>
 void for_each_case(const Function& f) {
   for (const Row& row : table()) {
@@ -76,7 +76,6 @@ void for_each_case(const Function& f) {
   }
 }
 
-/// Split into tests that can run in parallel.
 template <typename Wanted>
 void expect_follow(const char* name, size_t least, const Wanted& wanted) {
   Battery battery(name);
@@ -111,7 +110,7 @@ TEST(ProgramSamples, OfOpenPbrThatTransmitsFollowTheirDensity) {
                 [](const Case& c) { return c.program == ProgramId::kOpenPbr && !c.two_sided(); });
 }
 
-/// A program with bounces sampled by the setting cosine_sampling.
+/// A program whose bounces are sampled with the setting cosine_sampling.
 template <typename Bsdf>
 struct ByCosine {
   static constexpr bool kTransmits = false;
@@ -122,7 +121,7 @@ struct ByCosine {
     return ShadeSettings(s);
   }();
 
-  /// Replaces the vertex, which enables the setting.
+  /// Replaces the path vertex, which enables the setting cosine_sampling.
   static constexpr bool has(Feature /*feature*/) { return true; }
 
   BsdfEval<float> eval(const Vec& wo, const Vec& wi) const {

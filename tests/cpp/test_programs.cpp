@@ -38,7 +38,7 @@ TEST(Programs, TableFindsEachProgram) {
 }
 
 TEST(Programs, DeltaLobesAreChosenAsOftenAsStated) {
-  // cosine_sampling scales the density of other lobes by 1 - delta_probability. Sample values are
+  // cosine_sampling scales the density of other lobes by 1 - delta_probability. Random numbers are
   // stratified, so the error is one stratum per lobe.
   for (const Case& c : usual_cases())
     with_bsdf(c, [&](const auto& bsdf) {
@@ -186,7 +186,7 @@ TEST(Programs, LosslessMaterialsPassTheWhiteFurnace) {
 }
 
 TEST(Programs, MultipleScatteringKeepsTheEnergyOfMetals) {
-  // The fit is accurate to 2 % (see LostEnergy).
+  // The fit of lost energy is accurate to 2 % (see LostEnergy).
   size_t index = 0;
   for (float alpha : {0.1f, 0.2f, 0.3f, 0.5f, 0.7f, 1.f})
     for (const ProgramId id : {ProgramId::kMetal, ProgramId::kPrincipled}) {
@@ -203,7 +203,6 @@ TEST(Programs, MultipleScatteringKeepsTheEnergyOfMetals) {
     }
 }
 
-/// Bits of one sample and one evaluation.
 template <typename Bsdf, typename F>
 void record_bits(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>& wi, const F& l, const F& u,
                  const F& v, float* out) {
@@ -385,7 +384,7 @@ TEST(Programs, PacketEqualsScalarBitForBit) {
   }
 }
 
-/// Returns `p` with only these features.
+/// Returns `p` with only these material features.
 P with_parts(P p, ProgramId program, uint32_t parts) {
   const auto lacks = [parts](Part part) { return (parts & part) == 0; };
   if (lacks(kMetalPart)) {
@@ -406,7 +405,7 @@ P with_parts(P p, ProgramId program, uint32_t parts) {
 template <uint32_t kVariant>
 void expect_variant_equals_program() {
   constexpr ProgramId kId = program_of(kVariant);
-  if constexpr (kVariant >= kProgramCount) {  // variants, or the full program
+  if constexpr (kVariant >= kProgramCount) {
     using Full = Program<kId, float>;
     using Least = VariantBsdf<kVariant, float>;
     std::mt19937 rng(500 + kVariant);

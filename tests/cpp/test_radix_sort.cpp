@@ -115,7 +115,7 @@ TEST(Policies, GiveStablePermutations) {
   Queue queue(3000);
   RadixSorter sorter(3000);
   for (const std::string& name : policy_names()) {
-    if (name == "adaptive") continue;  // selects among the other policies
+    if (name == "adaptive") continue;
     const auto policy = make_policy(name);
     EXPECT_EQ(policy->name(), name);
     for (const size_t n : {0u, 1u, 7u, 3000u}) {
@@ -123,7 +123,7 @@ TEST(Policies, GiveStablePermutations) {
       EXPECT_EQ(view.size(), n);
       if (!policy->order(view, queue.costs, {sorter.keys(), n})) continue;
       const std::vector<uint64_t> keys(sorter.keys(), sorter.keys() + n);
-      // Policies are pure: the same queue gets the same keys.
+      // Policies have no state: the same queue gets the same keys.
       ASSERT_TRUE(policy->order(view, queue.costs, {sorter.keys(), n}));
       EXPECT_TRUE(std::equal(keys.begin(), keys.end(), sorter.keys())) << name;
       std::vector<uint32_t> order(n);

@@ -90,7 +90,7 @@ TEST(RayOrder, KeysRiseAlongTheMortonCurve) {
   for (const uint32_t code : codes) {
     Ray r{{0, 0, 0}, {1, 1, 1}};
     const std::array<uint32_t, 3> cell = cell_of(code);
-    for (size_t c = 0; c < 3; ++c)  // the middle of the cell
+    for (size_t c = 0; c < 3; ++c)
       r.o[c] = grid.lo[c] + (static_cast<float>(cell[c]) + 0.5f) / grid.scale[c];
     rays.push_back(r);
   }
@@ -131,7 +131,7 @@ TEST(RayOrder, DirectionKeysAreOctantAndLongAxes) {
       }
     }
   });
-  // Both keys fit next to the outcome of shading.
+  // The keys of a ray and of a shadow ray fit into a 32-bit word next to the outcome of shading.
   static_assert(kDirectionKeys <=
                 1u << (ShadingQueue::kShadowKeyShift - ShadingQueue::kRayKeyShift));
   static_assert(ShadingQueue::kRayKeyShift >= 2 && ShadingQueue::kShadowKeyShift <= 26);
@@ -201,7 +201,7 @@ TEST(RayOrder, SortByDirectionEqualsStableSort) {
       std::stable_sort(pairs.begin(), pairs.end(),
                        [](const auto& a, const auto& b) { return a.first < b.first; });
       for (const auto& pair : pairs) expected.push_back(pair.second);
-      expected.push_back(77u);  // nothing is written past the last entry
+      expected.push_back(77u);
       EXPECT_EQ(sorted, expected) << n << " rays, " << keys << " keys";
     }
 }
@@ -224,7 +224,6 @@ struct BareWave {
   }
 };
 
-/// Writes a shadow ray to its row of ten 32-bit words.
 void store_shadow(const PathPool& pool, uint32_t slot, const Ray& r, float first) {
   float* row = pool.shadows + slot * kRowWords<ShadowRow>;
   std::copy_n(r.o, 3, row);
@@ -269,7 +268,7 @@ TEST(RayOrder, QueuesAreOrderedStablyAndFetchedFromTheirSlots) {
             done = static_cast<RayOrder>(choice.arm);
             ASSERT_LT(choice.arm, Wave::kRayOrders);
           }
-          if (n <= kWidth<F>) done = RayOrder::kSlot;  // a single packet is not ordered
+          if (n <= kWidth<F>) done = RayOrder::kSlot;
           std::vector<uint64_t> keys(n, 0);
           if (done == RayOrder::kDirection)
             std::copy(key.begin(), key.end(), keys.begin());

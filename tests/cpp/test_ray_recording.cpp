@@ -38,7 +38,7 @@ TEST(RayRecording, KeepsEveryRayAndChangesNothing) {
 }
 
 TEST(RayRecording, EmbreeAloneHitsWhatARenderHits) {
-  // Instances and every kind of light, including round ones.
+  // A scene with instances and every kind of light, including round ones.
   const ScenePtr scene = mixed();
   WavefrontRenderer renderer(scene, 2);
   RayRecording recording(scene, kPlenty);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Plans of renders, and the pilots that run before the first pass.
+/// Tests of render plans and of the pilot renders that run before the first pass.
 #include <gtest/gtest.h>
 
 #include "scene_testing.h"

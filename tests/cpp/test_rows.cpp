@@ -117,7 +117,6 @@ TEST(Rows, LoadRowsReadsActiveRowsAndNothingElse) {
 }
 
 TEST(Rows, LoadRowsOfReadsEachLanesOwnArray) {
-  // Each array ends at the end of its memory.
   std::vector<std::unique_ptr<GuardedWords>> memory;
   std::mt19937 rng(2);
   for (int i = 0; i < 5; ++i) {
@@ -153,7 +152,7 @@ TEST(Rows, StoreRowsWritesActiveRowsAndNothingElse) {
   const GuardedWords memory;
   std::mt19937 rng(3);
   for_each_row<2, 4, 8, 16>([&]<typename F, size_t N>() {
-    // Room for one row per lane plus one row in between, up to the end of the page.
+    // Leaves room for one row per lane plus one row in between, up to the end of the page.
     constexpr uint32_t kPlaces = kWidth<F> + 1;
     uint32_t* const base = memory.end() - kPlaces * N;
     for (const uint32_t bits : mask_patterns<F>()) {

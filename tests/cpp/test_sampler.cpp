@@ -40,7 +40,8 @@ uint32_t reverse(uint32_t x) {
 }
 
 TEST(Sobol, DirectionNumbersAreThoseOfJoeAndKuo) {
-  // new-joe-kuo-6: dimension 2: s 1, m 1; 3: s 2, a 1, m 1 3; 4: s 3, a 1, m 1 3 1.
+  // Parameters of new-joe-kuo-6: dimension 2 has s 1, m 1; dimension 3 has s 2, a 1, m 1 3;
+  // dimension 4 has s 3, a 1, m 1 3 1.
   const auto c1 = sobol_columns(1, 0, {1}, 20), c2 = sobol_columns(2, 1, {1, 3}, 20),
              c3 = sobol_columns(3, 1, {1, 3, 1}, 20);
   for (uint32_t k = 0; k < 20; ++k) {
@@ -92,13 +93,13 @@ TEST(Sobol, LaineKarrasIsAnOwenScramble) {
     const uint32_t y = detail::laine_karras(x, seed);
     for (uint32_t b = 0; b < 32; ++b) {
       const uint32_t changed = y ^ detail::laine_karras(x ^ 1u << b, seed);
-      ASSERT_EQ(changed & ((1u << b) - 1u), 0u);  // lower bits are unaffected
-      ASSERT_TRUE(changed >> b & 1u);             // scrambling permutes each tree node
+      ASSERT_EQ(changed & ((1u << b) - 1u), 0u);
+      ASSERT_TRUE(changed >> b & 1u);
     }
   }
 }
 
-/// Expects the net property of 2^m points: each elementary interval of area 2^-m holds one.
+/// Expects the net property of 2^m points: each elementary interval of area 2^-m holds one point.
 void expect_net(const std::vector<std::pair<float, float>>& points) {
   const auto m = static_cast<uint32_t>(std::countr_zero(points.size()));
   for (uint32_t a = 0; a <= m; ++a) {
@@ -146,8 +147,8 @@ TEST(Sobol, EveryDimensionIsStratifiedSingly) {
 }
 
 TEST(Sobol, EqualsNaiveOwenScrambledSobol) {
-  // Shuffled index, textbook generator matrices, and a digit-by-digit scramble: descends the tree
-  // and flips each bit by the hash of the bits above.
+  // Reference sampler: shuffles the index, applies textbook generator matrices, and scrambles digit
+  // by digit, flipping each bit by the hash of the bits above.
   const std::vector<uint32_t> columns[4] = {
       sobol_columns(0, 0, std::vector<uint32_t>(20, 1), 20), sobol_columns(1, 0, {1}, 20),
       sobol_columns(2, 1, {1, 3}, 20), sobol_columns(3, 1, {1, 3, 1}, 20)};
@@ -155,7 +156,7 @@ TEST(Sobol, EqualsNaiveOwenScrambledSobol) {
     uint32_t result = 0;
     for (uint32_t b = 0; b < 32; ++b) {
       const uint32_t above = b == 0 ? 0 : x >> (32 - b) << (32 - b);
-      // Bit 31 - b of the scrambled prefix with a 0 at this position decides whether to flip.
+      // Bit 31 - b of the scrambled prefix, with a 0 at this position, decides whether to flip.
       const uint32_t flip = reverse(detail::laine_karras(reverse(above), seed)) >> (31 - b) & 1u;
       result |= ((x >> (31 - b) & 1u) ^ flip) << (31 - b);
     }
@@ -201,7 +202,7 @@ TEST(Sampler, SetsDimensionsPixelsAndSeedsDoNotCorrelate) {
             for (size_t d = 0; d < 4; ++d) columns[first + d].push_back(static_cast<double>(v[d]));
           }
         }
-    // Independent columns: sigma = 1 / sqrt(n) = 0.0156; 96 x 95 / 2 pairs.
+    // For independent columns, sigma = 1 / sqrt(n) = 0.0156; there are 96 x 95 / 2 pairs.
     for (size_t a = 0; a < columns.size(); ++a)
       for (size_t b = a + 1; b < columns.size(); ++b) {
         ASSERT_LT(std::fabs(correlation(columns[a], columns[b])), 0.08) << a << ", " << b;

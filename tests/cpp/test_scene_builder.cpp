@@ -273,7 +273,7 @@ TEST(SceneBuilder, DeepChainsOfGroups) {
   EXPECT_EQ(scene->instances()[0].to_world.t.x, kLevels);
 }
 
-/// The same product of transforms in double precision.
+/// Computes the same product of transforms in double precision.
 struct Affine64 {
   double a[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
   Affine64() = default;
@@ -316,7 +316,7 @@ TEST(SceneBuilder, NestedGroupsFlatten) {
   b.add_instance(0, tree, t[0], materials[2]);
   b.add_instance(0, tree, t[1]);
   const auto scene = b.build();
-  // Per tree: two branches with a mesh each, and two leaves per branch.
+  // Each tree has two branches with a mesh each, and two leaves per branch.
   ASSERT_EQ(scene->instances().size(), 12u);
   EXPECT_EQ(scene->unique_triangles(), 2u);
   EXPECT_EQ(scene->instanced_triangles(), 12u);
@@ -406,7 +406,6 @@ TEST(SceneBuilder, BuildLeavesTheBuilderEmpty) {
   const auto second = b.build();
   EXPECT_EQ(second->unique_triangles(), 0u);
   EXPECT_EQ(second->lights().size(), 0u);
-  // The first scene is unchanged.
   EXPECT_EQ(first->groups()[0].meshes.size(), 1u);
   EXPECT_EQ(first->view().material_program[0], static_cast<uint32_t>(ProgramId::kMetal));
 }
@@ -445,7 +444,7 @@ TEST(SceneBuilder, EmissiveFacesBecomeLights) {
   lamp.emission = {0, 0, 0};
   const uint32_t off = b.add_material(lamp);
   Material glossy = make_material(ProgramId::kDiffuse);
-  glossy.emission = {5, 5, 5};  // diffuse programs do not emit
+  glossy.emission = {5, 5, 5};
   const uint32_t diffuse = b.add_material(glossy);
   const uint32_t group = b.add_group("group");
   b.add_to_group(group, b.add_mesh(make_mesh(triangle(), dull)));
@@ -472,8 +471,7 @@ TEST(SceneBuilder, EmissiveFacesBecomeLights) {
     const LightSet& set = scene->light_set();
     return set.triangles[light_of(inst, geom) + face - set.first_triangle()];
   };
-  EXPECT_EQ(record(1, 1, 0).selection_pdf,
-            0);  // the non-emissive face exists but is never selected
+  EXPECT_EQ(record(1, 1, 0).selection_pdf, 0);
   EXPECT_GT(record(1, 1, 1).selection_pdf, 0);
   EXPECT_FLOAT_EQ(std::fabs(record(1, 1, 1).m[2]), 0.5f);
   EXPECT_FLOAT_EQ(std::fabs(record(2, 1, 1).m[2]), 2.f);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Material simplification: constant textures become constants, and features that textures and
-// graphs cannot reach are dropped. Neither simplification changes the image.
+// graphs cannot reach are dropped. Simplifying the material does not change the image.
 #include "wavecomb/material/description/simplified_material.h"
 
 #include "range_testing.h"
@@ -21,7 +21,7 @@ TEST(SettledMaterial, WhatIsTheSameAllOverIsAConstant) {
   at(m, Input::kOpacity) = use(4);                            // above 1 everywhere
   at(m, Input::kBaseColor) = scaled_use(5, 4, 0.5f, 0.125f);  // fma
   at(m, Input::kSpecularColor) = use(5, 1);                   // green for all
-  at(m, Input::kEmission) = scaled_use(5, 4, 1e25f, -1e24f);  // exceeds the limit of emission
+  at(m, Input::kEmission) = scaled_use(5, 4, 1e25f, -1e24f);
   at(m, Input::kNormal) = use(1);
   const Material s = simplified(m, {}, textures);
   EXPECT_EQ(s.metallic, 0.f);
@@ -38,7 +38,7 @@ TEST(SettledMaterial, WhatIsTheSameAllOverIsAConstant) {
     EXPECT_EQ(s.has_texture(input), input == Input::kClearcoat || input == Input::kNormal)
         << kInputNames[i];
   }
-  // An input that keeps its texture also keeps the constant which the texture hides.
+  // An input that keeps its texture also keeps the constant that the texture replaces.
   EXPECT_EQ(s.clearcoat, m.clearcoat);
 }
 
@@ -179,7 +179,6 @@ void expect_same_images(const Material& a, const Material& b, const std::string&
   expect_same_images(scene_of(a), scene_of(b), what);
 }
 
-/// A texture use that reads only the lower left corner of its texture, without filtering.
 TextureUse corner_of(uint32_t texture) {
   TextureUse u = use(texture);
   u.uv = {0, 0, 0.1f, 0, 0, 0.1f};
@@ -208,7 +207,7 @@ TEST(SettledMaterial, PicturesAreThoseOfTheTextureAndOfTheConstant) {
     for (const Case& c : kCases) {
       Material m = make_material(program, {0.7f, 0.5f, 0.4f}, 0.3f);
       if (c.input == Input::kClearcoatRoughness) m.clearcoat = 0.5f;
-      // Another texture, so that all three variants use the same frame.
+      // Uses another texture, so that all three variants have the same frame.
       at(m, c.input == Input::kBaseColor ? Input::kSpecularColor : Input::kBaseColor) = use(2);
       Material same = m, other = m, constant = m;
       at(same, c.input) = corner_of(c.constant);

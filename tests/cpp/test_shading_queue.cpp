@@ -51,7 +51,6 @@ void expect_records(const ShadingQueue& queue, const std::vector<Record>& record
     for (uint32_t c = 0; c < Q::kColumns; ++c)
       ASSERT_EQ(queue.uints(static_cast<Q::Column>(c))[i], r.column[c]) << c << ", " << i;
     ASSERT_EQ(std::memcmp(queue.row(i), r.row.data(), sizeof(r.row)), 0) << i;
-    // Indexed by arrival, wherever the record is.
     ASSERT_EQ(queue.slot[i], records[i].slot);
     ASSERT_EQ(queue.outcome[i], records[i].outcome);
   }
@@ -68,9 +67,7 @@ TEST(ShadingQueue, MaterializeMovesColumnsAndRows) {
       EXPECT_FALSE(queue.ordered);
       EXPECT_TRUE(queue.moved);
       expect_records(queue, records, order);
-      // The arrival index of each record is still known.
       EXPECT_EQ(std::vector<uint32_t>(queue.sorted_indices, queue.sorted_indices + n), order);
-      // Already in order: nothing moves.
       const float* before = queue.row(0);
       queue.materialize();
       EXPECT_EQ(queue.row(0), before);
@@ -112,7 +109,7 @@ TEST(ShadingQueue, ColumnsAreAlignedAndApart) {
       EXPECT_TRUE(other < begin || other >= begin + 4 * (a.words + SoaBlock::kPad));
     }
   }
-  // Records count twice, because they are moved from one block to another.
+  // Records count twice, because the queue moves them from one block to another.
   EXPECT_GE(queue.bytes(), 4u * 100 * (2u * Q::kColumns + 2u * kWords + 3u));
 }
 

@@ -17,7 +17,7 @@ TEST(Soa, ColumnsAreAlignedZeroAndRoomy) {
     for (size_t c = 0; c < 3; ++c) {
       EXPECT_EQ(reinterpret_cast<uintptr_t>(block.floats(c)) % 64, 0u);
       EXPECT_EQ(reinterpret_cast<void*>(block.floats(c)), block.uints(c));
-      // A packet may start at any index below the capacity.
+      // Writes a packet at any index below the capacity.
       for (size_t i = 0; i < capacity + SoaBlock::kPad - 1; ++i) {
         EXPECT_EQ(block.uints(c)[i], 0u);
         block.uints(c)[i] = static_cast<uint32_t>(100000 * (c + 1) + i);

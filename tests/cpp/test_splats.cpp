@@ -43,7 +43,7 @@ TEST(LightSplatList, IsAsLongAsItWasMade) {
   EXPECT_TRUE(list.add({3, 1, 1, 1}));
 }
 
-/// Floating-point sums would depend on the order; these do not.
+/// Floating-point sums would depend on the order of addition; fixed-point sums do not.
 TEST(LightSplatLayer, OrderAndThreadsDoNotShow) {
   constexpr uint32_t kPixels = 64, kLists = 40;
   std::mt19937 rng(3);
@@ -91,10 +91,9 @@ ScenePtr floor_and_point() {
 }
 
 /// Light tracer for tests. Traces one path from the light per sample of a pixel, and connects its
-/// hit to the camera:
-///    I_j += 4 pi I / N  rho / pi  cos_theta_p / (r^2 cos^3_alpha A_j)
-/// where A_j is the area of pixel j in the camera's window at distance 1, and alpha is the angle
-/// between its points and the axis. The floor is convex, so nothing is occluded.
+/// hit to the camera: I_j += 4 pi I / N rho / pi cos_theta_p / (r^2 cos^3_alpha A_j) where A_j is
+/// the area of pixel j in the camera's window at distance 1, and alpha is the angle between its
+/// points and the axis.
 class LightTracer final : public Integrator {
  public:
   LightTracer(const EmbreeAccelerator& accel, const CameraSetup& camera, const Camera& description,
@@ -214,8 +213,8 @@ TEST(Splats, LightTracingIsOnePictureForAllSchedules) {
       }
 }
 
-/// Light tracing and path tracing agree in each of 64 pixels. With 4.6 standard errors of a Poisson
-/// count each, one run in 3,000 fails by chance (Sidak).
+/// Light tracing and path tracing agree in each of 64 pixels within 4.6 standard errors of a
+/// Poisson count, which one run in 3,000 exceeds by chance (Sidak).
 TEST(Splats, LightTracingAgreesWithPathTracing) {
   const ScenePtr scene = floor_and_point();
   const Settings s = light_settings();
@@ -236,7 +235,7 @@ TEST(Splats, LightTracingAgreesWithPathTracing) {
   EXPECT_NEAR(mean_of(light.image).mean, mean_of(path).mean, kSanitized ? 0.02 : 0.004);
 }
 
-/// Light splats are stored in the blocks that checkpoints save, and count as memory of the film.
+/// Light splats are in the memory blocks that checkpoints save, and count as memory of the film.
 TEST(Splats, GoWithTheFilm) {
   Film film(2, 1, {AovSet{0}});
   const size_t plain = film.bytes(), blocks = film.blocks().size();

@@ -75,7 +75,8 @@ TEST(Subdivision, DisplacementOfOneFaceIsSharedAtItsEdges) {
     for (size_t k = 0; k < 3; ++k)
       square += std::pow(double{moved.positions[i + k]} - still.positions[i + k], 2);
     const double distance = std::sqrt(square);
-    // None, all, or the fraction of adjacent faces: a half at edges, a third at corners.
+    // The offset from the surface is none, all, or the fraction of adjacent faces: a half at edges,
+    // a third at corners.
     double nearest = 1;
     for (const double share : {0.0, 1.0 / 3, 0.5, 1.0})
       nearest = std::min(nearest, std::abs(distance - 0.5 * share));
@@ -162,7 +163,7 @@ TEST(Subdivision, ManyFacesOnOneEdgeAreKeptSharp) {
   EXPECT_EQ(mesh.faces.size(), size_t{5 * 128});
   for (size_t i = 0; i < mesh.normals.size(); i += 3) {
     EXPECT_NEAR(std::hypot(mesh.normals[i], mesh.normals[i + 1], mesh.normals[i + 2]), 1.0, 1e-5);
-    EXPECT_NEAR(mesh.normals[i + 2], 0.0, 1e-5);  // the pages are vertical
+    EXPECT_NEAR(mesh.normals[i + 2], 0.0, 1e-5);
   }
 }
 
@@ -244,7 +245,8 @@ TEST(EdgePixels, OfASquareBeforeTheCamera) {
   EXPECT_NEAR(seen, 2 * 100 / std::sqrt(10001.0), 1e-9);
   placed[14] = 100;
   EXPECT_NEAR(edge_pixels(square, sizes, corners, placed.data(), view), seen / 8, 1e-9);
-  // Orthographic: the same size at any distance. All directions visible: also behind the camera.
+  // An orthographic camera sees the same size at any distance. A camera that sees all directions
+  // refines surfaces behind it as well.
   view.is_parallel = true;
   view.half[0] = view.half[1] = 2;
   placed[14] = -1000;
@@ -254,7 +256,7 @@ TEST(EdgePixels, OfASquareBeforeTheCamera) {
   placed[14] = 100;
   EXPECT_NEAR(edge_pixels(square, sizes, corners, placed.data(), view), seen, 1e-9);
   view.is_all_round = false;
-  // The quad surrounds the camera: the size stays finite.
+  // If a quad surrounds the camera, its size stays finite.
   placed[14] = 0;
   EXPECT_LE(edge_pixels(square, sizes, corners, placed.data(), view), 200.0);
 }

@@ -69,7 +69,7 @@ MeshData attributed_soup(Attribute normals_at, Attribute uvs_at, uint32_t seed) 
   std::mt19937 rng(seed + 100);
   std::uniform_real_distribution<float> uniform(-1, 1);
   if (normals_at != Attribute::kNone) {
-    // Around the face's normal, of various lengths.
+    // Makes vertex normals around the face's normal, of various lengths.
     for (size_t f = 0; f < 40; ++f) {
       const auto p = [&](size_t k) {
         const float* q = &m.positions[9 * f + 3 * k];
@@ -261,7 +261,7 @@ SpawnCounts spawn_around(const Scene& scene, const EmbreeAccelerator& accel, uin
     if (h.inst != inst) continue;
     const Surface<float> s =
         setup_surface<float>(scene.view(), {h.inst, mesh, h.prim, h.u, h.v}, d, false, true, true);
-    // Within rounding errors of an edge of the body either side is correct.
+    // Within rounding errors of an edge of the body, either side is correct.
     const float edge = std::min({h.u, h.v, 1 - h.u - h.v});
     if (edge * size < 32.0 * static_cast<double>(s.offset)) continue;
     for (int k = 0; k < 4; ++k) {
@@ -298,8 +298,7 @@ TEST(Surface, SpawnedRaysNeitherHitTheirOwnSurfaceNorLeak) {
     for (const float s : {1e-3f, 1.f, 1e5f})
       for (const float shift : {0.f, 10.f, 1000.f})
         for (const bool instanced : {false, true}) {
-          if (shift == 1000 && c.pairs && c.mesh.positions[1] != -1)
-            continue;  // thinner than float precision
+          if (shift == 1000 && c.pairs && c.mesh.positions[1] != -1) continue;
           const Affine m = translate(shift * s, -0.7f * shift * s, 0.3f * shift * s) *
                            rotate(0, 33) * rotate(2, 21) * scale(s, s, s);
           SceneBuilder b;
@@ -348,7 +347,7 @@ TEST(Surface, HugeGroundNextToSmallObjects) {
   const uint32_t ground_mesh = scene->groups()[0].meshes[0];
   size_t covered = 0;
   for (size_t i = 0; i < size_for_build(20000, 4); ++i) {
-    // Near and far points of the ground, seen at all angles, also under the box.
+    // Tests near and far points of the ground, seen at all angles, also under the box.
     const double far = i % 2 ? 0.4 : 3000;
     const V3 at{12 + far * uniform(rng), 0, -7 + far * uniform(rng)};
     const V3 from =
@@ -449,7 +448,6 @@ TEST(Surface, LanesAgreeWhateverTheirNeighboursAre) {
           for (size_t c = 0; c < kFloats; ++c)
             lane_testing::expect_same(scalar[c], packets[c], "surface");
         }
-        // A partial packet of up to 7 lanes.
         const auto tail = run.template operator()<F>(random_order, 39, with_uv, with_terminator);
         for (size_t c = 0; c < kFloats; ++c)
           for (size_t i = 0; i < 39; ++i)
@@ -484,7 +482,7 @@ TEST(Facing, BentNormalsAreSeenAndMirrorWhatIsAboveTheSurface) {
       EXPECT_NEAR(dot3(b, b), 1, 1e-5);
       EXPECT_GT(side * dot3(w, b), 0) << i;
       EXPECT_GT(side * dot3(mirrored, wide(ng)), 0.8 * std::min(0.9 * c, 0.01) - 1e-6) << i;
-      // Directions that reflect above the surface are unchanged.
+      // Shading normals that reflect the viewing direction above the surface are unchanged.
       const V3 f{lane(facing.x, 0), lane(facing.y, 0), lane(facing.z, 0)};
       const V3 before = 2 * dot3(w, f) * f - w;
       if (side * dot3(before, wide(ng)) > 0.011) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Folder `surface`: rays, lights and shading read the same values at a hit.
+// Tests of folder `surface`: rays, lights and shading read the same values at a hit.
 #include "curve_testing.h"
 #include "lane_testing.h"
 #include "wavecomb/geometry/hit/hit_material.h"
@@ -162,7 +162,7 @@ TEST(SurfaceValues, PointsAtRestAreThoseOfShading) {
       ASSERT_TRUE(same_bits(rest[0], s.uv.x) && same_bits(rest[1], s.uv.y));
       continue;
     }
-    s.ns = s.ng;  // geometric normal, without adjustment towards the viewer
+    s.ns = s.ng;
     const auto shaded = values_of<float>(graph_point<float>(view, hit, s, dir, 0.f, true));
     for (size_t k = 0; k < rest.size(); ++k) ASSERT_NEAR(rest[k], shaded[k], 1e-5f) << k;
   }

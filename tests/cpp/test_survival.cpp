@@ -126,11 +126,11 @@ TEST(Survival, HasTheSameMeanForAbsurdCostsAndFields) {
   }
 }
 
-/// Roulette at the second vertex: formula against simulation.
+/// Compares the formula of roulette at the second vertex with a simulation.
 TEST(Survival, PathsWithoutRouletteTellOfItsMoments) {
   for (const double q : {0.25, 0.6, 1.0}) {
-    // A bounce halves the throughput and contributes 2; the next leaves a third and contributes x,
-    // which is 0 or 6 with equal probability.
+    // A bounce halves the throughput and contributes 2; the next bounce multiplies the throughput
+    // by a third and contributes x, which is 0 or 6 with equal probability.
     const double ray = 1, vertex = 2;
     double squared = 0, cost = 0, played = 0, played_cost = 0;
     for (const double x : {0.0, 6.0}) {

@@ -50,7 +50,8 @@ TEST(Half, RoundsToNearestEven) {
       continue;
     }
     ASSERT_EQ(float_to_half(x), half);
-    // Half-way to the next value rounds to even; either side of half-way is unambiguous.
+    // Conversion to half precision rounds ties to even; values on either side of a tie are
+    // unambiguous.
     const double next = half_value(static_cast<uint16_t>(h + 1));
     if ((h & 0x7fff) >= 0x7bff || !std::isfinite(next)) continue;
     const auto middle = static_cast<float>((static_cast<double>(x) + next) / 2);
@@ -78,7 +79,8 @@ TEST(Srgb, TableAndItsInverse) {
 }
 
 TEST(Srgb, RoundsAtEveryStep) {
-  // Finds by bisection the float at which the value changes: half a step above, on the exact curve.
+  // Finds by bisection the float at which the encoded value changes: half a step above, on the
+  // exact curve.
   for (int i = 0; i < 255; ++i) {
     float below = kSrgbToLinear[static_cast<size_t>(i)],
           above = kSrgbToLinear[static_cast<size_t>(i + 1)];
@@ -96,7 +98,7 @@ TEST(Srgb, RoundsAtEveryStep) {
 struct Image {
   TextureDesc desc;
   std::vector<unsigned char> bytes;
-  std::vector<Color4> linear;  ///< row 0 at the top
+  std::vector<Color4> linear;
 
   Color4& at(uint32_t x, uint32_t y) { return linear[size_t{y} * desc.width + x]; }
 };
@@ -230,7 +232,6 @@ TEST(Texture, PyramidIsTheBoxFilterInLinearLight) {
                 const auto t = texel_at(view, n, x, y);
                 for (size_t c = 0; c < 4; ++c) {
                   const double exact = level.at(x, y)[c];
-                  // half a step in encoded values
                   if (format == TexelFormat::kU8 && srgb && c < 3) {
                     const auto code = static_cast<double>(linear_to_srgb(t[c]));
                     ASSERT_GE(exact, srgb_decode((code - 0.501) / 255) - 1e-7);
@@ -329,7 +330,6 @@ std::vector<float> look_up_one(const TextureView& view, const std::vector<float>
   return out;
 }
 
-/// Random bits for n lookups.
 std::vector<uint32_t> random_bits(size_t n, uint32_t seed) {
   std::vector<uint32_t> bits(n);
   for (size_t i = 0; i < n; ++i)
@@ -376,7 +376,7 @@ TEST(Lookup, OneTexelHasTheMeanOfTheFilter) {
           }
       mean /= kLevels * kPlaces * kPlaces;
       const double filtered = double{lookup<float>(view, s[i], t[i], width[i], true).r};
-      // Weights of the two levels, and of two texels per axis, are rounded to half of the grid's
+      // The weights of two levels and of two texels per axis are rounded to half of the grid's
       // resolution; texels differ by 4 at most.
       EXPECT_NEAR(mean, filtered, 4 * (0.5 / kLevels + 1.0 / kPlaces)) << i;
     }
@@ -413,7 +413,7 @@ TEST(Lookup, AgreesWithTheReferenceInAllFormatsAndWraps) {
 }
 
 TEST(Lookup, FinestLevelAloneGivesTheSameBits) {
-  // Packets without coarse lanes take a fast path; packets with one do not.
+  // Packets without lanes of coarse footprints take a fast path; packets with one do not.
   Image image = make_image(64, 32, 4, TexelFormat::kU8, true);
   const Texture texture = make_texture(image);
   const auto s = padded({}, 512, -1.f, 2.f, 31), t = padded({}, 512, -1.f, 2.f, 32);
@@ -488,7 +488,7 @@ TEST(Lookup, IdPerLane) {
   std::vector<uint32_t> id(4096);
   std::mt19937 rng(54);
   for (size_t i = 0; i < id.size(); ++i) {
-    id[i] = i < 1024 ? 3u : static_cast<uint32_t>(rng()) % 6u;  // the first packets have equal ids
+    id[i] = i < 1024 ? 3u : static_cast<uint32_t>(rng()) % 6u;
     if (id[i] == 5) id[i] = kNoTexture;
   }
   std::vector<float> expected;
@@ -542,7 +542,7 @@ TEST(Tiles, AreLookedUpWhereTheyLie) {
         EXPECT_EQ(std::tie(one.r, one.g, one.b, one.a), std::tie(all.r, all.g, all.b, all.a));
       }
   }
-  // Tile 1003 and everything outside is missing.
+  // Tile 1003 and every tile outside are missing.
   for (const auto& [s, t] : {std::pair{2.5f, 0.5f}, {-0.5f, 0.5f}, {0.5f, -1e30f}, {10.f, 0.5f}}) {
     const auto none = lookup<float>(texture.view(), s, t, 0.25f, true);
     EXPECT_EQ(std::tie(none.r, none.g, none.b, none.a), std::make_tuple(0.25f, 0.5f, 0.75f, 1.f));
@@ -626,7 +626,7 @@ TEST(Texture, KeepsItsFormatInMemory) {
 }
 
 TEST(Texture, AnyOrderOfWorkGivesTheSameBits) {
-  // In reverse order; the result must also match in the memory beyond the image edges.
+  // The lookups run in reverse order; the results must also match beyond the image edges.
   const ForEach backwards = [](size_t n, const std::function<void(size_t)>& body) {
     while (n > 0) body(--n);
   };

@@ -95,7 +95,7 @@ TEST(TextureRange, NoLookupLeavesIt) {
 }
 
 TEST(TextureRange, IsThatOfTheTexels) {
-  // Blocks of 8 x 8, so that coarser levels have the same values.
+  // The image has blocks of 8 x 8 equal texels, so coarser levels have the same values.
   std::vector<float> values(24 * 16 * 4);
   for (size_t i = 0; i < values.size(); ++i) {
     const size_t texel = i / 4, block = texel / 24 / 8 * 3 + texel % 24 / 8;
@@ -109,7 +109,7 @@ TEST(TextureRange, IsThatOfTheTexels) {
       near(texture->range().high[c], static_cast<float>(50 + c) / 255.f);
     }
   }
-  // A single texel counts, wherever it is.
+  // A range includes single texels anywhere in the image.
   for (const size_t i : {size_t{0}, size_t{17}, size_t{30 * 30 - 1}}) {
     std::vector<float> one(30 * 30, 0.5f);
     one[i] = 1.f;
@@ -138,8 +138,9 @@ TEST(TextureRange, WhatIsTheSameAllOverIsExact) {
         }
 }
 
-/// a + (b - a) t has rounding errors: filtering 1 and 1e-9 gives 0 in places. It never crosses 0,
-/// so non-negative values stay non-negative and non-positive values non-positive.
+/// a + (b - a) t has rounding errors: filtering 1 and 1e-9 gives 0 in places. The interpolated
+/// value never crosses 0, so non-negative values stay non-negative and non-positive values
+/// non-positive.
 TEST(TextureRange, FiltersRoundButNeverPass0) {
   std::vector<float> values(64 * 64);
   for (size_t i = 0; i < values.size(); ++i) values[i] = i % 2 == 0 ? 1.f : 1e-9f;
@@ -153,7 +154,7 @@ TEST(TextureRange, FiltersRoundButNeverPass0) {
   const TexturePtr below = texture_of(values, 64, 1, TexelFormat::kF32);
   EXPECT_EQ(below->range().high[0], 0.f);
   expect_within(seen(*below, 4), below->range(), "below");
-  // The largest texels do not overflow.
+  // Filtering the largest texels does not overflow.
   for (size_t i = 0; i < values.size(); ++i) values[i] = i % 3 == 0 ? 3e38f : -3e38f;
   const TexturePtr huge = texture_of(values, 64, 1, TexelFormat::kF32);
   EXPECT_TRUE(std::isfinite(huge->range().high[0]) && std::isfinite(huge->range().low[0]));

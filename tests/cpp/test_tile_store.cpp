@@ -71,7 +71,7 @@ TEST(TileQueue, WhatIsMissedSoonStaysLonger) {
   // A tile that was evicted long ago counts as new.
   load(queue, 10, 8);
   EXPECT_EQ(queue.state(10), State::kFirst);
-  // The second queue does not take all memory.
+  // The tile store's second queue does not take all memory.
   for (int round = 0; round < 5; ++round)
     for (uint32_t tile = 20; tile < 30; ++tile)
       if (queue.state(tile) == State::kAbsent) load(queue, tile, 8);
@@ -194,7 +194,7 @@ TEST_F(TileStoreTest, GridsLeaveLessForTextures) {
   store->register_grid(&grid, kGrid);
   add(0);
   EXPECT_EQ(store->statistics().file_bytes, 0u);
-  add(1);  // fits into the limit, except for the grid
+  add(1);
   EXPECT_GT(store->statistics().file_bytes, 0u);
   const auto read_all = [&] {
     for (size_t i = 0; i < places.size(); ++i) EXPECT_TRUE(is_intact(i));
@@ -308,8 +308,8 @@ TEST_F(TileStoreTest, NoMemoryForATileIsSaidAndReadersGoOn) {
   std::string refused;
   std::thread([&] {
     filters = take_memory_away();
-    // In memory: the caller of add gets the error. Then the store switches to its file and starts
-    // threads.
+    // With storage in memory, the caller of `add` gets the error. After that, the store switches to
+    // its file and starts threads.
     const auto small = content(3, 100'000);
     refused = message([&] { store->add(small.data(), small.size()); });
     add(4);

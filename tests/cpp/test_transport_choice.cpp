@@ -41,7 +41,7 @@ TransportPilot pilot(uint32_t seed, LightPathShare share, float camera_noise, fl
   return out;
 }
 
-/// Makes pilots for all ratios. `left` is the standard deviation over eight samples of a pixel of
+/// Makes pilots for all ratios. `left` is the standard deviation, over eight samples of a pixel, of
 /// the light that light paths find.
 TransportPilots trials_of(float left, float camera_noise, float light_noise, float light) {
   TransportPilots pilots;
@@ -66,8 +66,8 @@ TEST(TransportGain, IsBelowOneWhereLightPathsBringNothing) {
 }
 
 TEST(TransportGain, IsTheRatioOfVariancesByCosts) {
-  // Variance of camera paths plus that of the remaining light: 1 + 3 without light paths, and 1 + 1
-  // with one light path per camera path.
+  // Adds the variance of camera paths to that of the remaining light: 1 + 3 without light paths,
+  // and 1 + 1 with one light path per camera path.
   const TransportGain gain = gain_of(0.1f * std::sqrt(3.f), 0.1f, 0.1f);
   const double path = kRays + 0.7 * kRecords, joint = kRays + 0.8 * kRecords;
   EXPECT_EQ(gain.share.exponent, 0);
@@ -107,7 +107,7 @@ TEST(TransportGain, CountsLightThatCameraPathsDoNotFind) {
   EXPECT_LT(gain_of(1e6f, 0.05f, 0.f, 0.001f).gain, 1) << "and this is hardly seen";
 }
 
-/// The noise of camera paths as estimated from light paths, compared with the actual noise.
+/// Compares the noise of camera paths as estimated from light paths with the actual noise.
 TEST(CameraSquares, AreTheVarianceOfCameraPaths) {
   // A light in the floor illuminates a rough mirror above, which reflects onto the floor.
   SceneBuilder b;

@@ -53,7 +53,7 @@ TEST(Variants, MaterialsGetTheLeastThatShowsAll) {
   EXPECT_EQ(principled([](Material& m) { m.opacity = 0.9f; }), "principled");
   EXPECT_EQ(principled([](Material& m) { at(m, Input::kOpacity).texture = 0; }), "principled");
   EXPECT_EQ(principled([](Material& m) { m.emission = {0, 0, 1}; }), "principled");
-  // Presence is not part of the BSDF.
+  // Presence is not part of the BSDF, so it does not change the variant.
   EXPECT_EQ(principled([](Material& m) { m.opacity = 0.9f, m.presence = true; }), "gloss");
   EXPECT_EQ(principled([](Material& m) {
               at(m, Input::kOpacity).texture = 0, m.opacity_threshold = 0.5f;

@@ -10,7 +10,7 @@ namespace {
 using namespace lane_testing;
 using V = Vec3<float>;
 
-/// Unit vectors all over the sphere, starting with axes and directions near the poles.
+/// Returns unit vectors all over the sphere, starting with axes and directions near the poles.
 std::vector<V> directions() {
   std::vector<V> all;
   for (const float s : {-1.f, 1.f}) {
@@ -146,7 +146,7 @@ TEST(Frame, TangentIsKeptWhereItCan) {
     if (sine < 1e-3) continue;
     expect_orthonormal(f, 1e-6 / sine);
     ASSERT_GT(dot(f.s, tangent), 0);
-    ASSERT_NEAR(dot(f.t, tangent), 0, 1e-5 / sine);  // the tangent lies in the plane of s and n
+    ASSERT_NEAR(dot(f.t, tangent), 0, 1e-5 / sine);
   }
 }
 

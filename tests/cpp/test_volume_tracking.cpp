@@ -117,7 +117,7 @@ TEST(VolumeGrid, BadGridsAreRefused) {
 
 VolumeCounts counts;  ///< not evaluated
 
-/// Means of one(key) per channel, with standard errors.
+/// Returns the means of one(key) per channel, with standard errors.
 struct Means {
   double mean[3], error[3];
 };
@@ -164,7 +164,7 @@ std::vector<Case> cases() {
                    const double x = overlap(t, 0, 1);
                    return std::array{0.5 * x, x, 2 * x};
                  }});
-  // Two that overlap, one of them grey.
+  // Two volumes that overlap, one of them grey.
   out.push_back({"two boxes",
                  {make_box({0, -1, -1}, {1, 1, 1}, {0.3f, 1, 1.5f}),
                   make_box({0.5f, -1, -1}, {2, 1, 1}, {0.4f, 0.4f, 0.4f})},
@@ -205,7 +205,7 @@ TEST(VolumeTracking, TransmittanceIsTheExponential) {
   }
 }
 
-/// One light beside the rays of the cases, and one beyond their end.
+/// One light is beside the rays of the cases, and one beyond their end.
 std::shared_ptr<const Scene> two_lamps() {
   SceneBuilder b;
   for (const float x : {0.6f, 2.5f}) {
@@ -272,7 +272,7 @@ TEST(VolumeTracking, FlightsPassAndStopAsOftenAsTheySay) {
                               }),
                      {1 - pass(0), 1 - pass(1), 1 - pass(2)}, c.name + ", stops");
       }
-      // Position: the mean of exp(-x), integrated on a fine grid.
+      // The expected position is the mean of exp(-x), integrated on a fine grid.
       std::array<double, 3> expected{};
       constexpr int n = 20000;
       for (int i = 0; i < n; ++i) {
@@ -295,7 +295,8 @@ TEST(VolumeTracking, EmissionIsTheIntegral) {
   for (Case& c : cases()) {
     c.volumes[0].emission = {1, 2, 0.5f};
     const Records r(c.volumes);
-    // int_0^t eps(x) exp(-depth(x)) dx; the first volume emits in proportion to its density.
+    // The expected emission is int_0^t eps(x) exp(-depth(x)) dx; the first volume emits in
+    // proportion to its density.
     const auto density = [&](double t) {
       if (c.name != "wedge") return t > 1 && t < 2 ? 1.0 : 0.0;
       if (t < 1 || t > 2 + 1 / 32.) return 0.0;

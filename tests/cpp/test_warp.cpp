@@ -15,7 +15,7 @@ using chi_square::Draw;
 using chi_square::Place;
 using chi_square::Random;
 
-/// A warp to charts with a given density.
+/// A warp from the unit square to charts with a given density.
 template <typename Density, typename Map>
 chi_square::Case warp_case(std::string name, std::vector<chi_square::Chart> charts,
                            const Density& density, const Map& map) {
@@ -26,7 +26,6 @@ chi_square::Case warp_case(std::string name, std::vector<chi_square::Chart> char
   };
   return c;
 }
-/// Point (x, angle of (a, b) in turns).
 Place with_turn(double x, double a, double b) {
   return {0, x, std::atan2(b, a) / (2 * kPiD) + 0.5};
 }
@@ -87,7 +86,7 @@ TEST(Warp, JacobianIsOneOverTheDensity) {
   for (int i = 0; i < 2000; ++i) {
     const double u = 0.02 + 0.96 * (rng() % 1000) / 1000.0,
                  v = 0.02 + 0.96 * (rng() % 1000) / 1000.0;
-    // Away from the creases of the concentric and triangle maps.
+    // Avoids the creases of the concentric and triangle maps.
     if (std::fabs(u - v) < 0.01 || std::fabs(u + v - 1) < 0.01) continue;
     const auto disk = [](float a, float b) {
       const auto d = square_to_disk(a, b);

@@ -68,9 +68,9 @@ TEST(Watch, AStopDuringASnapshotIsNotLost) {
 
 TEST(Watch, SnapshotsAreTakenWhileWorkStandsStill) {
   Watch watch;
-  uint64_t steps = 0;  // not atomic: the snapshot may read it
+  uint64_t steps = 0;
   uint64_t last = 0;
-  std::atomic<uint64_t> told = 0;  // last number of steps that the thread with snapshots has seen
+  std::atomic<uint64_t> told = 0;
   int snapshots = 0;
   watch.run(
       [&] {
@@ -81,7 +81,7 @@ TEST(Watch, SnapshotsAreTakenWhileWorkStandsStill) {
           }
           EXPECT_FALSE(watch.stopped());
           watch.rest();
-          EXPECT_FALSE(watch.halted());  // requests take effect at the next step
+          EXPECT_FALSE(watch.halted());
         }
       },
       [&] { return told > last ? Request::kSnapshot : Request::kContinue; },

@@ -72,7 +72,7 @@ TEST(Wave, LightsByTreeAreOnePicture) {
   s.width = s.height = 19;
   for (const ScenePtr& scene : {cornell(), mixed(), emissive_meshes()}) expect_one_image(scene, s);
 }
-/// A ball, a strand and a floor under 40 point lights.
+/// A scene with a ball, a strand and a floor under 40 point lights.
 ScenePtr under_point_lights() {
   SceneBuilder b;
   const uint32_t grey = b.add_material(make_material(ProgramId::kDiffuse, {0.6f, 0.6f, 0.6f}));
@@ -92,8 +92,8 @@ ScenePtr under_point_lights() {
   return b.build();
 }
 
-// A light sample includes its selection probability, so the tree is not descended again by the
-// light's trail. Bounces do not hit point lights, so wrong trails must not change the image.
+// A light sample includes its selection probability, so MIS need not descend the light tree again.
+// Bounces do not hit point lights, so wrong trails must not change the image.
 TEST(Wave, LightSamplesDescendTheTreeOnce) {
   Settings s = small_settings();
   s.light_selection = LightSelection::kTree;
@@ -111,7 +111,7 @@ TEST(Wave, LightSamplesDescendTheTreeOnce) {
   }
 }
 
-// The test above can fail: with lights that bounces hit, trails count.
+// Verifies that the previous test can fail: with lights that bounces hit, trails affect the image.
 TEST(Wave, LightsThatBouncesHitNeedTrails) {
   Settings s = small_settings();
   s.light_selection = LightSelection::kTree;
@@ -200,7 +200,7 @@ TEST(Wave, PacketsOfRaysDoNotShow) {
 }
 
 TEST(Wave, LargeWaves) {
-  // More than 65,536 paths, so that the largest wave is full.
+  // Uses more than 65,536 paths, so that the largest wave is full.
   if (kSanitized) GTEST_SKIP() << "too slow under sanitizers";
   const ScenePtr scene = cornell();
   const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 2u);
@@ -418,7 +418,7 @@ TEST(Wave, AovsOfASimpleScene) {
   b.set_camera(make_camera({0, 0, 2}, {0, 0, 0}));
   const RenderedImage p = WavefrontRenderer(b.build()).render(small_settings());
   for (size_t i = 0; i < p.depth.size(); ++i) {
-    EXPECT_NEAR(p.depth[i], 5, 1e-5);  // along the camera's axis, at every pixel
+    EXPECT_NEAR(p.depth[i], 5, 1e-5);
     EXPECT_FLOAT_EQ(p.albedo[3 * i], 0.8f);
     EXPECT_FLOAT_EQ(p.albedo[3 * i + 1], 0.2f);
     EXPECT_NEAR(p.normal[3 * i], 0, 1e-6);

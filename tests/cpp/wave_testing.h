@@ -40,7 +40,6 @@ class WaveRun {
         aovs_(*scene_, case_.settings),
         film_(case_.settings.width, case_.settings.height, aovs_.layout),
         pixels_(morton_pixel_order(case_.settings.rendered())) {
-    // "adaptive" selects among all others.
     for (const std::string& name : policy_names())
       if (name != "adaptive" &&
           (case_.settings.policy == "adaptive" || case_.settings.policy == name))

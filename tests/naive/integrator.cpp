@@ -30,7 +30,7 @@ bool is_positive(const Rgb& c) {
 struct Ray {
   Vec3<F> o, d;
   bool is_seen = true;  ///< set for camera rays and mirror directions, false for uniform directions
-  uint32_t link = 0;    ///< light linking class of the surface where it starts
+  uint32_t link = 0;
   F cone_width = 0, cone_spread = 0;
 
   /// Returns the path state that production functions expect. Their only use of the density is to
@@ -208,7 +208,7 @@ class Integrator {
       Vec3<F> n = s.ns;
       if ((record.textured_inputs & (input_bit(Input::kNormal) | kGraphNormal)) != 0) {
         n = normalize(make_frame<F>(n, s.dpdu, s.handedness).to_world(params.normal));
-        // A normal that points away from the viewer is bent until it is perpendicular to the ray.
+        // Bends a normal that points away from the viewer until it is perpendicular to the ray.
         const F towards = dot(ray.d, s.ng) < 0 ? 1.f : -1.f, seen = -dot(ray.d, n) * towards;
         if (seen < 1e-3f) n = normalize(n + ray.d * (-towards * (1e-3f - seen)));
       }
@@ -248,7 +248,8 @@ class Integrator {
     }
     if (!bsdf.has_non_delta()) return passed * out;
 
-    // Start at the same point as production's light samples, so that all estimates agree.
+    // Starts light rays at the same point as production's light samples, so that all estimates
+    // agree.
     next.o = spawn_origin<F>(s, -ray.d);
     next.is_seen = false;
     out += delta_lights(bsdf, s, frame, wo, next);
@@ -343,7 +344,8 @@ class Integrator {
     return sum + sampled_only_meshes(f_cos, diffuse, ray) + hidden_meshes(f_cos, diffuse, ray);
   }
 
-  /// Returns the same contribution for mesh lights, from all surfaces along the ray.
+  /// Returns the contribution of mesh lights that production finds only by light samples, from all
+  /// surfaces along the ray.
   Rgb sampled_only_meshes(const Rgb& f_cos, const Rgb& diffuse, const Ray& ray) {
     Rgb sum(0.f);
     F before = 0;
@@ -367,7 +369,7 @@ class Integrator {
     return sum;
   }
 
-  /// Returns the same contribution for mesh lights that rays cannot hit, triangle by triangle.
+  /// Returns the contribution of mesh lights that rays cannot hit, triangle by triangle.
   Rgb hidden_meshes(const Rgb& f_cos, const Rgb& diffuse, const Ray& ray) {
     const LightView& view = scene_.lights;
     Rgb sum(0.f);

@@ -16,8 +16,8 @@
 /// uniform directions, whether or not other objects are in front of them. Their visibility is
 /// tested with their own shadow set.
 ///
-/// Beyond the first vertex, textures are read with the footprint after a diffuse bounce. So scenes
-/// with textured indirect light are exact for diffuse surfaces only.
+/// Beyond the first vertex of a path, textures are read with the footprint after a diffuse bounce.
+/// Scenes with textured indirect light are therefore exact for diffuse surfaces only.
 #pragma once
 
 #include <cstdint>
@@ -30,9 +30,10 @@ namespace wavecomb {
 
 struct NaiveSettings {
   uint32_t width = 16, height = 16;
-  uint32_t samples = 16;    ///< samples per pixel, uniform over the pixel
-  uint32_t max_depth = 1;   ///< same as Settings::max_depth
-  uint32_t directions = 1;  ///< uniform directions at the first vertex; one at later vertices
+  uint32_t samples = 16;  ///< samples per pixel, uniform over the pixel
+  uint32_t max_depth = 1;
+  uint32_t directions = 1;  ///< uniform directions sampled at the first vertex; later vertices
+                            ///< sample one
   /// Random numbers used to find delta lobes; 0 for scenes without delta lobes.
   uint32_t delta_tries = 0;
   uint64_t seed = 0;

@@ -31,7 +31,7 @@ inline double dot3(const Double3n& a, const Double3n& b) {
 }
 
 /// Returns the smaller solution t > 0 of a t^2 + 2 b t + c = 0, or 0 if there is none. Only rays
-/// from outside enter the shape.
+/// from outside enter the light's shape.
 inline double entry(double a, double b, double c) {
   const double root2 = b * b - a * c;
   if (!(a > 0) || !(root2 > 0) || !(c > 0)) return 0;
@@ -62,7 +62,8 @@ inline double meets(const LightRecord& light, const Vec3<float>& origin,
   const double r = light.radius;
   if (kind == LightKind::kSphere) return entry(dot3(d, d), dot3(d, from), dot3(from, from) - r * r);
   if (kind == LightKind::kCylinder) {
-    // Perpendicular to the axis u. The ends are open, and the inside does not emit.
+    // Perpendicular to the axis u. Both ends of the cylinder are open, and its inside does not
+    // emit.
     const double uu = dot3(u, u), du = dot3(d, u), fu = dot3(from, u);
     const double t = entry(dot3(d, d) - du * du / uu, dot3(d, from) - du * fu / uu,
                            dot3(from, from) - fu * fu / uu - r * r);
@@ -72,7 +73,7 @@ inline double meets(const LightRecord& light, const Vec3<float>& origin,
   return 0;
 }
 
-/// Returns the distance for a triangle, which emits on both sides.
+/// Returns the distance at which a ray hits a triangle, which emits on both sides.
 inline double meets(const TriangleLight& light, const Vec3<float>& origin,
                     const Vec3<float>& direction) {
   const Double3n o = of(origin), d = of(direction), p = of(light.p), u = of(light.u),

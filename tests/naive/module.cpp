@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The Python module wavecomb_naive. It imports wavecomb._core first, whose scenes it renders.
+/// The Python module wavecomb_naive. The module imports wavecomb._core first, whose scenes it
+/// renders.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/shared_ptr.h>

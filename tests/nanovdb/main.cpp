@@ -24,7 +24,8 @@
 #include <new>
 #include <stdexcept>
 
-// Declared here because the libraries are those of OpenVDB, and their headers may not be installed.
+// Declare these functions here because they belong to OpenVDB's libraries, whose headers may not be
+// installed.
 extern "C" {
 int blosc_compress_ctx(int level, int shuffle, size_t type_size, size_t bytes, const void* from,
                        void* to, size_t most, const char* name, size_t block, int threads);

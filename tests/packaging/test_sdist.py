@@ -64,7 +64,7 @@ def test_without_a_compiler_it_says_what_to_install(sources: Path, tmp_path: Pat
 def test_it_builds_and_renders(sources: Path, tmp_path: Path) -> None:
     # Reuse the dependencies that tools/setup_embree would stage again.
     (sources / ".deps").symlink_to(ROOT / ".deps")
-    # One lane width and little optimisation, because only the build matters here.
+    # Build one lane width with little optimisation, because only the build matters here.
     defines = {
         "WAVECOMB_LANE_WIDTHS": "1",
         "WAVECOMB_BATCH": "ON",
@@ -79,7 +79,7 @@ def test_it_builds_and_renders(sources: Path, tmp_path: Path) -> None:
         cwd=sources,
     )
     (wheel,) = tmp_path.glob("wavecomb-*.whl")
-    # A new environment with its dependencies: oneTBB is in the environment's lib folder.
+    # Create a new environment with its dependencies: oneTBB is in the environment's lib folder.
     environment = tmp_path / "env"
     succeed([sys.executable, "-m", "venv", "--without-pip", environment])
     python = environment / "bin/python"

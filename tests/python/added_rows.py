@@ -25,7 +25,7 @@ def add_rows(
         monkeypatch: Restores the table.
         table: Function that returns the table, as modules import it.
         added: The additional rows.
-        follow: Modules that derive data from the table at import.
+        follow: Modules that derive data from the table when they are imported.
     """
     for name in follow:  # import these first, so that later tests see them without the added rows
         importlib.import_module(name)
@@ -44,7 +44,7 @@ def made_again(name: str) -> ModuleType:
     assert spec is not None
     assert spec.loader is not None
     made = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = made  # dataclasses look modules up here
+    sys.modules[spec.name] = made
     try:
         spec.loader.exec_module(made)
     finally:

@@ -246,7 +246,7 @@ def statistics(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def write_pictures(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Writes golden images and noisy ones. The noise is shared by all policies but cost-benefit."""
+    """Writes golden images and noisy ones. All policies but cost-benefit have the same noise."""
     rng = np.random.default_rng(6)
     y, x = np.mgrid[0:48, 0:64] / 48.0
     golden = np.stack([0.2 + 0.5 * x / 1.3, 0.3 + 0.4 * y, 0.5 - 0.2 * x * y], axis=2)

@@ -57,7 +57,7 @@ class Finding(SimpleNamespace):
 
 
 class Fake:
-    """Behaviour and recorded calls of the fake."""
+    """Behaviour of the fake module, and the calls that it recorded."""
 
     def __init__(self) -> None:
         self.interrupt_at: float | None = None
@@ -192,7 +192,7 @@ def install(monkeypatch: pytest.MonkeyPatch) -> Fake:
     fake = Fake()
     core = ModuleType("wavecomb._core")
     usd = ModuleType("wavecomb.usd")
-    usd.__path__ = [str(Path(wavecomb.__file__).parent / "usd")]  # submodules are the real ones
+    usd.__path__ = [str(Path(wavecomb.__file__).parent / "usd")]
     for name, value in {
         "Error": Error,
         "Settings": Settings,

@@ -94,7 +94,7 @@ def splice(rng: random.Random, data: bytes) -> bytes:
 
 
 def tail_words(rng: random.Random, data: bytes) -> bytes:
-    """Applies ``huge_words`` near the end, where .usdc has sections and .usdz file names."""
+    """Applies ``huge_words`` near the end of a file, where .usdc has sections, .usdz names."""
     start = len(data) * 2 // 3
     return data[:start] + huge_words(rng, data[start:])
 
@@ -123,7 +123,7 @@ def _resized(rng: random.Random, text: str) -> str:
 
 
 def change_words(rng: random.Random, data: bytes) -> bytes:
-    """Replaces numbers, types, lists and paths in the text. The result usually still parses."""
+    """Replaces numbers, types, lists and paths in the text. The text usually still parses."""
     text = data.decode()
     paths = _PATH.findall(text)
     for _ in range(rng.choice((1, 1, 2, 3, 6))):
@@ -172,7 +172,7 @@ def wrong_types(rng: random.Random, data: bytes) -> bytes:
     for path in rng.sample(attributes, rng.choice((1, 2, 4, 8))):
         old = layer.GetAttributeAtPath(path)
         name = old.name
-        owner = getattr(old.owner, "primSpec", old.owner)  # of an attribute inside a variant
+        owner = getattr(old.owner, "primSpec", old.owner)
         donor = layer.GetAttributeAtPath(rng.choice(attributes))
         if donor is None:
             continue

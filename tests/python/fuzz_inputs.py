@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Broken inputs other than stages and images.
 
-IES profiles, MaterialX, meshes, files that renders write, names of image files. Each case is made
-from a valid file by the mutations of ``fuzz_cases``. ``fuzz_worker`` and the command decide by the
-file name how to read it.
+The inputs are IES profiles, MaterialX, meshes, files that renders write, and names of image files.
+Each case is made from a valid file by the mutations of ``fuzz_cases``. ``fuzz_worker`` and the
+command decide by the file name how to read it.
 """
 
 from __future__ import annotations
@@ -266,9 +266,9 @@ def vdb_bytes(name: str = "a.vdb", packed: str = "none", bits: str = "32") -> by
 
 
 def _nvdb(rng: random.Random, mutate: Mutation) -> bytes:
-    """Returns a broken .nvdb file: mutated anywhere, in its headers, or at nonzero words.
+    """Returns a .nvdb file that is mutated anywhere, in its headers, or at nonzero words.
 
-    Most of such a file is zeros that are not read.
+    Most of a .nvdb file is zeros that are not read.
     """
     packed, bits = rng.choice(("none", "none", "zip", "blosc")), rng.choice(("32", "8", "n"))
     data = vdb_bytes("a.nvdb", packed, bits)
@@ -298,7 +298,7 @@ STRANGE = (
 
 
 def swap_words(rng: random.Random, data: bytes) -> bytes:
-    """Replaces words of a text by other words of it, or by unusual ones."""
+    """Replaces words of a text by other words of the text, or by unusual ones."""
     for _ in range(rng.choice((1, 1, 2, 4))):
         found = list(_WORDS.finditer(data))
         if not found:
@@ -409,7 +409,7 @@ INPUTS = (
     *(("nvdb",) if vdb.nano_version() and nvdb.writer() else ()),
 )  # fmt: skip
 BY_COMMAND = ("product names",)
-"""Kinds that only the command can check, because it writes the files."""
+"""Kinds of inputs that only the command can check, because it writes the files."""
 
 
 def words_for(case: Path) -> list[str]:

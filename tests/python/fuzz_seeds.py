@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Valid stages and images from which ``fuzz_cases`` makes broken ones.
 
-The seed stages are small and contain one of everything that the loader reads, so that most
+The seed stages are small and contain an example of everything that the loader reads, so that most
 mutations have an effect.
 """
 

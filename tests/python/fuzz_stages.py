@@ -2,8 +2,8 @@
 """Fuzzes the loader and the renderer with thousands of broken inputs: ``make fuzz MINUTES=10``.
 
 A case is determined by its kind, the seed and a number (``fuzz_cases``). Workers (``fuzz_worker``)
-load and render cases one after another, without a sandbox, so that crashes of libraries are seen.
-A case that crashes its worker or exceeds the time limit is then given to ``wavecomb render``, as a
+load and render cases one after another, without a sandbox, so that crashes of libraries are seen. A
+case that crashes its worker or exceeds the time limit is then given to ``wavecomb render``, as a
 user would run it. The command must print one clear line and exit with code 2 within the limit.
 
     python tests/python/fuzz_stages.py                       # 2,000 cases of seed 1, a table
@@ -54,9 +54,9 @@ class Verdict:
         number: Number of the case within its kind.
         outcome: rendered, warned, refused or contained (a library crashed, and the user got one
             line); wrong or hang, which are faults.
-        said: The message, or a description of the fault.
+        said: The message of the loader, or a description of the fault.
         seconds: Time of the worker or of the command.
-        death: How the worker ended, if it did.
+        death: How the worker ended, if it ended.
     """
 
     kind: str
@@ -68,15 +68,15 @@ class Verdict:
 
     @property
     def name(self) -> str:
-        """Returns the argument of --case."""
+        """Parses the argument of --case and returns it."""
         return f"{self.kind}/{self.number}"
 
 
 class Watch:
     """Limit on the CPU time of a process and its children.
 
-    A busy machine that halts processes for a while then causes no false hangs. A process that waits
-    for ever is detected by a longer limit on wall-clock time.
+    Since the limit is on CPU time, a busy machine that halts processes for a while causes no false
+    hangs. A process that waits for ever is detected by a longer limit on wall-clock time.
     """
 
     PATIENCE = 12
@@ -88,7 +88,9 @@ class Watch:
         self._busy_s = self._idle_s = 0.0
 
     def is_over(self) -> bool:
-        """Returns whether a limit is exceeded. Call about ten times per second."""
+        """Returns whether the process exceeds a limit. The caller calls this function about ten
+        times per second.
+        """
         now, cpu = time.monotonic(), self._cpu_s()
         passed, computed = now - self._last, max(0.0, cpu - self._cpu)
         self._busy_s += min(passed, computed)
@@ -116,7 +118,9 @@ class Worker:
         self._process: subprocess.Popen[str] | None = None
 
     def judge(self, stage: Path) -> tuple[str, str, str]:
-        """Returns (outcome, said, death). The outcome is "died" or "hang" if there is no answer."""
+        """Returns (outcome, message, end of the worker). The outcome is "died" or "hang" if the
+        worker does not answer.
+        """
         process = self._started()
         assert process.stdin is not None
         process.stdin.write(f"{stage}\n")

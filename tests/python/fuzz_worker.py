@@ -18,13 +18,15 @@ from pathlib import Path
 from typing import NoReturn, TextIO
 
 LOAD_LIMIT_S = 1.5
-"""Time limit for loading. The default would make thousands of cases take hours."""
+"""Time limit for loading. The default limit would make thousands of cases take hours."""
 
 OUTCOMES = ("rendered", "warned", "refused", "wrong")
 
 
 def read(case: Path) -> tuple[str, str]:
-    """Reads an input that is not a stage, as its name requires. Returns (outcome, message)."""
+    """Reads an input that is not a stage, by the reader that its file name requires. Returns
+    (outcome, message).
+    """
     import wavecomb
     from wavecomb.image.merge import merge
     from wavecomb.run.cost_profile import load_costs
@@ -110,7 +112,9 @@ def watch_writes(inside: str) -> list[str]:
 
 
 def give_up(answers: TextIO, line: str) -> NoReturn:
-    """Answers and ends the process. USD composes without end, so nothing else stops it."""
+    """Answers and ends the process. USD composes such a stage without end, so nothing else stops
+    it.
+    """
     answer = {"outcome": "refused", "said": line, "ended": True}
     print(json.dumps(answer), file=answers, flush=True)
     os._exit(0)
@@ -144,7 +148,7 @@ def main() -> None:
             sys.stderr.flush()
             if os.fstat(1).st_size:
                 words = os.pread(1, 4096, 0).decode(errors="replace")
-                # The supervisor filters these lines. Here, they are no fault.
+                # The supervisor filters these lines.
                 if not all(text.startswith(CHATTER) for text in words.splitlines()):
                     outcome, said = "wrong", f"spilt: {words}"
                 os.ftruncate(1, 0)

@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @functools.cache
 def writer() -> Path | None:
-    """Returns the program that writes them, or None if it is not built."""
+    """Returns the program that writes .nvdb files, or None if it is not built."""
     found = sorted(ROOT.glob("build/*/tests/nanovdb/wavecomb_nvdb_writer"))
     return found[0] if found else None
 

@@ -114,7 +114,7 @@ def test_names_are_expanded() -> None:
 
 
 def test_every_row_of_the_table_finds_its_value(picture: wavecomb.Picture) -> None:
-    """Every AOV of the table gets a value. An AOV without one would be an empty layer."""
+    """Every AOV of the table gets a value. An AOV without a value would be an empty layer."""
     layers = {**picture.layers(), **picture.aovs}
     elsewhere = {
         "guided_share": "test_guiding.py", "by_light_paths": "test_techniques.py",
@@ -124,7 +124,7 @@ def test_every_row_of_the_table_finds_its_value(picture: wavecomb.Picture) -> No
         if name in elsewhere:
             assert not layers[name].any(), elsewhere[name]
             continue
-        if name == "transmittance":  # for volumes: test_volume_aovs.py
+        if name == "transmittance":
             assert (layers[name] == 1).all()
             continue
         kept = [n for n in layers if n.startswith("light_")] if row.kind == "groups" else [name]
@@ -200,7 +200,6 @@ def test_positions_lie_where_the_matrices_say(picture: wavecomb.Picture) -> None
     clip = points @ picture.metadata["worldToNDC"]
     ndc = clip[:, :2] / clip[:, 3:]
     place = np.column_stack([(ndc[:, 0] + 1) * 32 - 0.5 - x, (1 - ndc[:, 1]) * 24 - 0.5 - y])
-    # The nearest of sixteen samples is well within the pixel.
     assert np.abs(place).max() < 1.0
     assert np.sqrt((place**2).sum(axis=1)).mean() < 0.3
     camera = points @ picture.metadata["worldToCamera"]

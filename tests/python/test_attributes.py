@@ -174,7 +174,6 @@ def test_nodes_of_networks_read_primvars(tmp_path):
     assert set(whole.names) == {"displayColor", "st1"}
     assert set(scene.mesh("A")["attributes"]) == {"displayColor", "st1"}
     assert scene.mesh("A")["uvs"].shape == (9, 2) and "several sets" not in said(loaded)
-    # B has no varying input, and without st1 the product is 0.
     assert scene.mesh("B")["attributes"] == {}
     assert scene.material_of("/B")["base_color"] == pytest.approx((0.5, 0.5, 0.5))
     rest_of_it = scene.graphs[scene.material_of("/B")["graph"]]
@@ -232,7 +231,7 @@ def test_opacity_by_a_primvar_cuts_out(tmp_path):
     x, y = np.meshgrid((np.arange(16) + 0.5) / 8, (15.5 - np.arange(16)) / 8)
     expected = interpolated(np.stack([x.ravel(), y.ravel()], axis=1), opacity, "uniform")
     expected = expected.reshape(16, 16)
-    clear = np.abs((x - y) - np.rint(x - y)) > 0.1  # pixels on diagonals see two faces
+    clear = np.abs((x - y) - np.rint(x - y)) > 0.1
     assert clear.sum() > 150
     assert albedo[clear] / albedo.max() == pytest.approx(expected[clear], abs=0.25)
     assert (albedo[clear & (expected == 0)] == 0).all()

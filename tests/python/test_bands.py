@@ -165,7 +165,9 @@ def grows(folder: Path) -> bool:
 @pytest.mark.slow
 @pytest.mark.parametrize("frames", [False, True])
 def test_a_stopped_picture(stage: Path, tmp_path: Path, frames: bool) -> None:
-    """A stopped single image is written with empty rows; a stopped frame is not written."""
+    """A stopped render of a single image writes empty rows; a stopped frame of a sequence is not
+    written.
+    """
     file = tmp_path / ("a.1.exr" if frames else "a.exr")
     name = str(tmp_path / "a.#.exr") if frames else str(file)
     words = ["--frames", "1-2"] if frames else []

@@ -168,13 +168,13 @@ def test_share_between_placebo_and_oracle(tmp_path: Path) -> None:
     assert wide.loc["random-runs"].share == pytest.approx(0.0)
     assert wide.loc["oracle"].share == pytest.approx(1.0)
     assert wide.loc["oracle"].verdict == "bound"
-    scalar = table.loc[1]  # order gains nothing there, so it has no share
+    scalar = table.loc[1]
     assert not scalar["gap_shown"].any()
     assert scalar["share"].isna().all()
 
 
 def test_order_is_apart_from_roulette(tmp_path: Path) -> None:
-    """Roulette halves the work, which must not count as an effect of order."""
+    """Roulette halves the work, which the analysis must not count as an effect of order."""
     runs = results(
         tmp_path,
         runs_of(

@@ -22,7 +22,7 @@ RECORDS = 1000
 def trace_of(
     names: dict[str, str], cost: Any, orders: list[list[str]], drift: bool = False
 ) -> list[dict[str, Any]]:
-    """Returns recordings in which a material takes the time cost(predecessor, material)."""
+    """Returns recordings in which shading a material takes the time cost(predecessor, material)."""
     rng = random.Random(3)
     recordings = []
     for order in orders:
@@ -46,7 +46,7 @@ def of_program(order: list[str], names: dict[str, str], program: str) -> list[st
 
 @pytest.mark.parametrize("drift", [False, True])
 def test_best_order_is_found(drift: bool) -> None:
-    """A material that follows its alphabetical predecessor costs half. The machine may drift."""
+    """A material costs half if it follows its alphabetical predecessor. The machine may drift."""
     names = {"a": "p", "b": "p", "c": "p", "d": "p", "x": "q", "y": "q"}
 
     def cost(before: str, name: str) -> float:
@@ -59,7 +59,7 @@ def test_best_order_is_found(drift: bool) -> None:
     assert found["best_ns"] < found["mean_ns"] < found["worst_ns"]
     worst = of_program(found[WORST], names, "p")
     assert all(ord(b) != ord(a) + 1 for a, b in itertools.pairwise(worst))
-    if not drift:  # runs of neighbours; the fit shrinks pair costs towards the mean
+    if not drift:
         assert found["best_ns"] == pytest.approx((3 * 10 + 20 + 10 + 20) * RECORDS, rel=0.05)
 
 
@@ -79,7 +79,9 @@ def test_many_materials_go_by_the_greedy_way() -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("forked")
 def test_ranks_are_what_material_shades_by(tmp_path: Path) -> None:
-    """A suite with both oracles: equal images, ranks in the trace, every material once."""
+    """A suite with the best and the worst order: equal images, ranks in the trace, and each
+    material once.
+    """
     suite = tmp_path / "orders.toml"
     suite.write_text(
         'name = "orders"\nrepetitions = 1\nwarm_up = 0\n[stage.box]\nscene = "cornell"\n'

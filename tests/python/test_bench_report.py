@@ -38,7 +38,7 @@ def page(folder: Path) -> str:
 
 @pytest.fixture(scope="module")
 def tree(page: str) -> ElementTree.Element:
-    """The page, parsed strictly: any HTML error fails the test."""
+    """The report page, parsed strictly: any HTML error fails the test."""
     return html5lib.HTMLParser(strict=True).parse(page)
 
 
@@ -47,7 +47,7 @@ def texts(tree: ElementTree.Element, tag: str) -> list[str]:
 
 
 def check_sound(tree: ElementTree.Element) -> None:
-    """Check ids, links, and what a screen reader needs."""
+    """Checks ids, links, and attributes that a screen reader needs."""
     ids = [element.get("id") for element in tree.iter() if element.get("id")]
     assert len(ids) == len(set(ids))
     for element in tree.iter():
@@ -121,7 +121,7 @@ def test_viewers(tree: ElementTree.Element) -> None:
     assert len(viewers) == 2
     for viewer in viewers:
         pictures = list(viewer.iter(HTML + "img"))
-        assert len(pictures) == 3  # cost-benefit, all other policies, golden
+        assert len(pictures) == 3
         for select in viewer.iter(HTML + "select"):
             assert len(list(select)) == len(pictures)
     named = "".join(viewers[0].itertext())
@@ -180,7 +180,7 @@ def test_markdown_page(folder: Path) -> None:
 def test_markdown_says_what_the_page_says(folder: Path, tree: ElementTree.Element) -> None:
     """The Markdown has the page's headings, findings, captions and unfolded tables."""
     text = " ".join((folder.parent / "docs" / "made-up.md").read_text(encoding="utf-8").split())
-    silent = ("Read the figures with care", "Words")  # the second contains folded parts only
+    silent = ("Read the figures with care", "Words")
     for heading in texts(tree, "h2"):
         assert heading in silent or f"## {heading}" in text
     viewers = [e for e in tree.iter(HTML + "div") if e.get("class") == "viewer"]

@@ -52,7 +52,7 @@ OF_NAME: dict[str, Any] = {
     "aperture_blades": 5.0,
     "lens_map": [[0.0, 0.0, 1.0, 0.0], [0.0, 1.0, 1.0, 1.0]],
 }
-"""The same for parameters with a smaller range of values."""
+"""Values for parameters with a smaller range."""
 
 
 def _other(row: CameraParameter) -> Any:

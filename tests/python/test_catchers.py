@@ -82,7 +82,6 @@ def test_what_is_not_a_catcher_looks_as_ever(caught: wavecomb.Picture, tmp_path:
     whole = _render(_stage(tmp_path))
     ball = _render(_stage(tmp_path), holdouts=["/Floor"]).aovs["alpha"] == 1
     assert ball.any()
-    # This includes light from the floor.
     np.testing.assert_array_equal(caught.beauty[ball], whole.beauty[ball])
 
 

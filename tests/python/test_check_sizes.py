@@ -60,7 +60,7 @@ def test_long_functions(tmp_path: Path, head: str) -> None:
     """80 lines are allowed, 81 are not, whatever the head looks like."""
     before = head.splitlines()[:-1]
     outer = sum(line.endswith("{") for line in before)
-    own = 0 if outer else len(before)  # the lines of a function's head
+    own = 0 if outer else len(before)
     inner = BODY.splitlines(keepends=True)[: 78 - own]
     close = "}\n" + "};\n" * outer
     assert found(tmp_path, "src/a.h", f"{head}\n{''.join(inner)}{close}") == []

@@ -117,7 +117,7 @@ def test_a_limit_is_kept_by_a_render_that_had_none(cornell: Any) -> None:
     assert begun.state["pass.target"] == 1 << 14 and done.max() > 0
     limited = _core.Settings(**settings, time_limit=0.5)
     state, least = begun.state, done.min()
-    for _ in range(2):  # first when some pixels have no samples yet, then when all have
+    for _ in range(2):
         ended = StopAt(1000)
         result = _core.render(cornell.scene, limited, watcher=ended, state=state)
         assert result.stats["seconds"]["render"] < 2
@@ -129,7 +129,7 @@ def test_more_is_to_come_when_a_render_goes_on(cornell: Any) -> None:
     settings = _core.Settings(width=48, height=40, noise=0.0001, spp=1 << 16)
     begun = StopAt(2)
     _core.render(cornell.scene, settings, watcher=begun)
-    begun.state["pass.target"] = 1 << 14  # as later in a long render
+    begun.state["pass.target"] = 1 << 14
 
     class First:
         def __init__(self) -> None:
@@ -348,7 +348,7 @@ def test_resumed_files_have_the_same_layers(stage: Path, tmp_path: Path) -> None
         invoke(stage, "-o", two, "--resume", file)
         assert list(read_layers(one)) == list(read_layers(two))
     more = ["--compression", "dwaa", "--spp", 1 << 20]
-    refused = invoke(stage, "-o", two, "--resume", file, *more, code=2)  # refused before the render
+    refused = invoke(stage, "-o", two, "--resume", file, *more, code=2)
     assert "compression dwaa would spoil CryptoObject00" in refused.stderr
 
 

@@ -45,7 +45,6 @@ def test_the_lens_shows_the_lamp_where_optics_says(tmp_path: Path) -> None:
     from pxr import Gf, Usd, UsdGeom
 
     stage = Usd.Stage.Open(str(path))
-    # The camera is above the axis at the wall, with no lens between them.
     camera = UsdGeom.Camera.Get(stage, "/World/Camera")
     view = Gf.Matrix4d().SetLookAt(Gf.Vec3d(1.5, 1.4, 0), Gf.Vec3d(4, 1.4, 0), Gf.Vec3d(0, 1, 0))
     camera.GetPrim().GetAttribute("xformOp:transform").Set(view.GetInverse())

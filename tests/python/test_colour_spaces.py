@@ -160,7 +160,6 @@ _SRGB = ' colorspace="srgb_texture"'
         (_SRGB, ' colorspace="none"', "", 0.5),
         (' colorspace="lin_rec709"', "", "", 0.5),
         ("", "", "", 0.5),
-        # A colour space in the document overrides that of prims that reference it.
         ("", ' colorspace="lin_rec709"', NAME, 0.5),
     ],
 )

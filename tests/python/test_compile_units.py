@@ -29,8 +29,8 @@ def units_with(tmp_path_factory: pytest.TempPathFactory) -> dict[str, set[str]]:
     ninja = Path(sys.executable).with_name("ninja")
     if not ninja.exists() or not (BUILD / ".ninja_deps").exists():
         not_here("the library was not built by make build")
-    # Use a copy of the logs: Ninja repairs logs that it opens, and another Ninja may be building
-    # the C++ tests at the same time.
+    # Ninja repairs logs that it opens, and another Ninja may be building the C++ tests, so use a
+    # copy of the logs.
     folder = tmp_path_factory.mktemp("build")
     for entry in BUILD.iterdir():
         if entry.name.startswith(".ninja_"):

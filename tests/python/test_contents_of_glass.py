@@ -28,14 +28,14 @@ def moved(x: float) -> Any:
 def scene(
     *, tinted: bool = True, stone: bool = True, lamp: float = 3.0, graph: Any = None, **layers: Any
 ) -> Any:
-    """A ball of glass around the origin, with a grey card in it and a light at x = ``lamp``.
+    """A ball of glass around the origin, with a grey card inside and a light at x = ``lamp``.
 
     Args:
         tinted: The glass absorbs.
-        stone: The card is inside of the glass, else beside it.
+        stone: Whether the card is inside of the glass; otherwise it is beside it.
         lamp: Position of the light.
         graph: Adds a graph to a builder and returns its number.
-        layers: Of OpenPBR, of the glass.
+        layers: Layer parameters of OpenPBR for the glass.
     """
     builder = wavecomb.SceneBuilder()
     more = {} if tinted else {"transmission_depth": 0.0, "transmission_color": (1, 1, 1)}
@@ -71,7 +71,7 @@ def image(renderer: Any, **more: Any) -> bytes:
 
 
 def refuses_light_paths(renderer: Any) -> bool:
-    """Returns whether light paths are refused because of what is in absorbing glass."""
+    """Returns whether light paths are refused because absorbing glass contains objects."""
     try:
         image(renderer, transport="light")
     except _core.Error as error:
@@ -106,7 +106,7 @@ FAR, INSIDE = 3.0, 0.5
 def test_edits_search_glass_again(
     before: dict[str, Any], edit: dict[str, Any], after: dict[str, Any] | None
 ) -> None:
-    """An edited scene has the image and refuses what the scene built with these values does."""
+    """An edited scene gives the same image and refusals as a scene built with the edited values."""
     renderer = _core.Renderer(scene(**before))
     first = image(renderer)
     count = len(renderer.scene.materials)
@@ -155,7 +155,7 @@ def graph_of(**driven: Any) -> Any:
 
 
 def test_glass_with_a_graph_elsewhere_is_searched() -> None:
-    """Constant absorption counts whatever else a graph drives, be it the transmission."""
+    """Constant absorption counts even if a graph drives other parameters, such as transmission."""
     tint = {"transmission_color": tuple(np.exp(-SIGMA))}
     for driven, weight in (("roughness", 1.0), ("transmission_weight", 0.0)):
         for stone in (True, False):
@@ -167,7 +167,7 @@ def test_glass_with_a_graph_elsewhere_is_searched() -> None:
 
 
 def test_absorption_by_a_graph() -> None:
-    """Light paths are refused, and what is inside is said not to be dimmed."""
+    """Light paths are refused, and a warning says that objects inside are not dimmed."""
     for stone, lamp in ((True, FAR), (False, INSIDE), (False, FAR)):
         made = scene(graph=graph_of(extinction=1.0), stone=stone, lamp=lamp)
         with pytest.raises(_core.Error, match="absorption comes from a value graph") as error:

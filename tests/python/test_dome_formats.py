@@ -47,7 +47,7 @@ def mirrored_ball():
     return d, np.where(z2 > 0, 4 * (2 / SIZE) ** 2, 0)
 
 
-FACES = {  # column, row: forward, right, up
+FACES = {
     (1, 1): ((0, 0, 1), (-1, 0, 0), (0, 1, 0)),
     (1, 0): ((0, 1, 0), (-1, 0, 0), (0, 0, -1)),
     (1, 2): ((0, -1, 0), (-1, 0, 0), (0, 0, 1)),

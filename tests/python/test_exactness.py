@@ -65,7 +65,7 @@ def texture_scene() -> Any:
     mirror = builder.add_material("metal", name="Mirror", roughness=0.0, base_color=(0.9, 0.9, 0.9))
     tile(-10.0, -10.0, 2.5, 20.0, 1.0, mirror)
     behind = np.eye(4)
-    behind[3, :3] = (1.0, 2.5, 2.0)  # behind the camera, facing the tiles
+    behind[3, :3] = (1.0, 2.5, 2.0)
     builder.add_light("rect", behind, color=(9, 8, 7), width=2, height=2, name="Lamp")
     builder.add_light("dome", np.eye(4), color=(0.3, 0.4, 0.5), name="Sky")
     builder.set_camera(np.eye(4), window=(-1.5, 1.5, -1.0, 1.0))
@@ -315,7 +315,7 @@ def test_scenes_have_something_to_order(scene: str, scene_of: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_coherence_is_of_all_depths(scene: str, scene_of: Any) -> None:
-    """Coherence is measured at all depths, so one more depth hardly changes it."""
+    """Coherence is measured at all depths, so an additional depth hardly changes it."""
     settings: dict[str, Any] = {
         "policy": "material",
         "threads": 1,

@@ -312,7 +312,7 @@ def test_bits_of_a_part_that_flip_anywhere_are_found(stage: Path, tmp_path: Path
 # ---- images --------------------------------------------------------------------------------------
 
 ALL = [*(name for name in names() if name != "cost"), "light_groups"]
-"""All AOVs but measured costs."""
+"""All AOVs except the measured cost."""
 KINDS: dict[str, dict[str, Any]] = {
     "plain": {},
     "all layers": {"aovs": ALL, "spp": 16},

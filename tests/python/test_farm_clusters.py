@@ -145,7 +145,7 @@ def cluster(
 
 @pytest.mark.slow
 def test_by_dask(stage: Path, tmp_path: Path) -> None:
-    """Equals the render in one process. Workers read a changed stage again."""
+    """The image equals that of a render in one process. Workers read a changed stage again."""
     here = tmp_path / "s.usda"
     here.write_text(f"#usda 1.0\n( subLayers = [@{stage}@] )\n")
     folder = made(here, tmp_path)
@@ -229,7 +229,7 @@ print(max(client.run(cpu).values()))
 
 
 def idle(address: str, variables: dict[str, str]) -> bool:
-    """Returns whether all workers are idle."""
+    """Returns whether all workers of a cluster are idle."""
     done = subprocess.run(
         [sys.executable, "-c", IDLE, address], env={**os.environ, **variables},
         capture_output=True, text=True, timeout=60,
@@ -276,7 +276,9 @@ def test_a_cluster_without_workers(stage: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_one_image_is_of_one_class(stage: Path, tmp_path: Path) -> None:
-    """A worker of another machine class gets no task. The class that has parts is preferred."""
+    """A worker of another machine class gets no task. The farm prefers the machine class that has
+    rendered parts.
+    """
     folder = made(stage, tmp_path)
     other = "import wavecomb.farm.machine_class as m; m.probe_hash = lambda: 'other'"
     (tmp_path / "other.py").write_text(other)
@@ -358,7 +360,9 @@ def slurm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.slow
 def test_by_slurm(stage: Path, tmp_path: Path, slurm: Path) -> None:
-    """The folder name contains shell code. Workers whose time is over are replaced."""
+    """The folder name contains shell code. Slurm workers at the end of their time limit are
+    replaced.
+    """
     place = tmp_path / "a\n#SBATCH --x\ntouch RAN; $(touch RAN)"
     place.mkdir()
     folder = made(stage, place, 20_000)
@@ -374,7 +378,7 @@ def test_by_slurm(stage: Path, tmp_path: Path, slurm: Path) -> None:
         assert stat.S_IMODE((secrets / "tls.json").stat().st_mode) == 0o600
         for number in (tmp_path / "pids").read_text().split():
             with contextlib.suppress(ProcessLookupError):
-                os.killpg(int(number), signal.SIGTERM)  # as at the end of their time limit
+                os.killpg(int(number), signal.SIGTERM)
         _, said = client.communicate(timeout=200)
     finally:
         client.kill()

@@ -63,7 +63,7 @@ def test_one_image_by_two_workers(stage: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_frames_where_one_fails(stage: Path, tmp_path: Path) -> None:
-    """The frames without errors are written. Resuming renders only missing or damaged files."""
+    """The farm writes the frames without errors. Resuming renders only missing or damaged files."""
     names, job = tmp_path / "a.##.exr", tmp_path / "job"
     words = ("--frames", "1-3", *SMALL, "--stats", tmp_path / "a.##.json")
     made = run("farm", "submit", stage, "-o", names, *words, "--job", job, "--on", "none")

@@ -143,7 +143,7 @@ def test_files_that_differ(tmp_path: Path) -> None:
 
 
 def test_a_texture_that_goes_while_a_job_runs(tmp_path: Path) -> None:
-    """The images fail with the name of the texture. No placeholder is drawn."""
+    """The images fail with the name of the missing texture. No placeholder is drawn."""
     write_image(tmp_path / "a.png", np.zeros((4, 4, 3), np.uint8))
     stage = tmp_path / "s.usda"
     stage.write_text("#usda 1.0\n" + textured("M", "a.png", 1))

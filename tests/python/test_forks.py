@@ -52,7 +52,6 @@ def test_code(end: str, tmp_path: Path) -> None:
     environment = {**os.environ, "HOME": str(tmp_path)}
     words = ["-c", CODE.replace("{end}", end), "a", "--b"]
     fresh, forked = both(words, cwd=tmp_path, env=environment, start_new_session=end == "0")
-    # A traceback of the forked process has an additional frame.
     assert forked[:2] == fresh[:2]
     assert forked[2].splitlines()[-1:] == fresh[2].splitlines()[-1:]
 

@@ -91,7 +91,7 @@ def cube(stage, path, x, colour):
 
 @pytest.fixture
 def shot(tmp_path):
-    """Three squares and a camera. Tests add the animation."""
+    """Three squares and a camera. Tests add animation to the stage."""
     path = tmp_path / "shot.usda"
     stage = Usd.Stage.CreateNew(str(path))
     for i, colour in enumerate([(1, 0, 0), (0, 1, 0), (0, 0, 1)]):

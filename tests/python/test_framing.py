@@ -192,7 +192,7 @@ def test_a_group_of_many_things_keeps_few_points():
     [(10_000, 1 << 12, 20e6), pytest.param(100_000, 1 << 15, 150e6, marks=pytest.mark.long)],
 )
 def test_millions_of_places_are_looked_at_in_parts(monkeypatch, count, block, most):
-    """Distances are computed in blocks; all at once would need 4 kB per instance."""
+    """Distances are computed in blocks, since all at once would need 4 kB per instance."""
     monkeypatch.setattr(framing, "_BLOCK", block)
     chance = np.random.default_rng(5)
     transforms = np.tile(np.eye(4), (count, 1, 1))

@@ -177,7 +177,6 @@ def test_what_needs_no_operation_has_none():
     assert make.op("mix", p, make.input("normal"), zero) == p
     assert make.op("select", one, p, zero) == p
     assert make.op("power", p, one) == p == make.op("divide", p, one)
-    # Known components of a vector are folded.
     value = make.op("multiply", p, numbers(2.0, 0.0, 1.0))
     assert value[1] == 0.0 and value[2] == p[2]
     assert is_constant(make.op("add", numbers(1.0, 2.0), numbers(3.0)))
@@ -205,9 +204,9 @@ def test_equal_operations_are_one_and_dead_ones_none():
     p = make.input("position")
     a = make.op("sin", make.op("add", p, numbers(1.0)))
     b = make.op("sin", make.op("add", p, numbers(1.0)))
-    make.op("noise3", p, width=3)  # its result is not used
+    make.op("noise3", p, width=3)
     graph = assemble(dict(enumerate(make.op("add", a, b))))
-    assert graph.count == 4  # input, add, sin, add
+    assert graph.count == 4
 
 
 def test_registers_are_used_again():
@@ -216,7 +215,7 @@ def test_registers_are_used_again():
     for i in range(400):
         value = make.op("sin", make.op("add", value, numbers(0.1 * i)))
     graph = assemble(dict(enumerate(value)))
-    assert graph.count == 800  # the first addition, of 0, is dropped
+    assert graph.count == 800
     top = np.frombuffer(graph.ops, values._OP)["to"].max()
     assert top < 12
 

@@ -37,9 +37,8 @@ def BasisCurves "C" ( prepend apiSchemas = ["MaterialBindingAPI"] ) {
 def read(folder: Path, more: str = "", mesh: bool = False, **inputs: Any) -> tuple[Any, str]:
     """Returns the material of a strand, and the messages of loading.
 
-    ``inputs`` are those of the hair node. "roughness" and "absorption" choose the nodes that feed
-    it, and
-    "of" sets the inputs of the absorption node.
+    ``inputs`` are the inputs of the hair node. "roughness" and "absorption" choose the nodes that
+    feed it, and "of" sets the inputs of the absorption node.
     """
     text = STRAND.replace("MORE", more)
     if mesh:
@@ -118,7 +117,7 @@ def test_melanin(tmp_path: Path) -> None:
 
 
 def test_plain_values(tmp_path: Path) -> None:
-    """Variances, scales and absorption set directly, without helper nodes."""
+    """Variances, scales and absorption are set directly, without helper nodes."""
     scene, told = read(
         tmp_path, roughness_R=(variance(0.35), scale(0.45)),
         roughness_TT=(0.16 * variance(0.35), scale(0.45)),

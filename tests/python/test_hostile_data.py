@@ -276,7 +276,7 @@ def test_manifests_and_matrices_that_lie(tmp_path: Path) -> None:
 
 
 def test_a_layer_is_no_path(tmp_path: Path) -> None:
-    """A layer name cannot lead out of the folder when --split-aovs makes it a file name."""
+    """A layer name that --split-aovs uses as file name cannot lead out of the folder."""
     a, b = tmp_path / "a.exr", tmp_path / "bb.exr"
     layers = {"beauty": (4, 4, 3), "samples": (4, 4, 1), "../../evil": (4, 4, 1)}
     exr(a, layers)

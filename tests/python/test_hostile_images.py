@@ -33,7 +33,7 @@ def write(path: Path, kind: str, channels: int = 3, tile: int = 0) -> np.ndarray
 
 
 def package(path: Path, inner: str, data: bytes) -> str:
-    """Writes a .usdz package with one more file. Returns the asset path of that file."""
+    """Writes a .usdz package with one more file. Returns the asset path of the added file."""
     with zipfile.ZipFile(path, "w") as file:
         for name, content in (("s.usda", b"#usda 1.0\n"), (inner, data)):
             info = zipfile.ZipInfo(name)
@@ -47,11 +47,11 @@ def package(path: Path, inner: str, data: bytes) -> str:
 @pytest.mark.parametrize(
     ("name", "kind", "channels", "tile", "bytes_"),
     [
-        ("a.png", "uint8", 3, 0, 6),  # the buffer of the library and ours
+        ("a.png", "uint8", 3, 0, 6),
         ("a.exr", "half", 4, 0, 16),
-        ("a.exr", "half", 9, 0, 18 + 8),  # the library decodes all nine channels
-        ("a.tif", "uint16", 3, 0, 6 + 6),  # a band of floats does not count
-        ("a.tif", "uint16", 3, 16, 6 + 12 + 6),  # read at once as floats, then converted to half
+        ("a.exr", "half", 9, 0, 18 + 8),
+        ("a.tif", "uint16", 3, 0, 6 + 6),
+        ("a.tif", "uint16", 3, 16, 6 + 12 + 6),
         ("a.exr", "float", 3, 0, 24),
     ],
 )

@@ -18,7 +18,7 @@ WIDE = 4.0
 
 
 def filled(builder: Any, ior: float, roughness: float = 0.0, **layers: Any) -> int:
-    """Returns a glass or liquid, or with index 1 a fog bounded by the mesh."""
+    """Returns a glass or liquid, or a fog bounded by the mesh if the index is 1."""
     return int(
         builder.add_material(
             "openpbr",
@@ -69,7 +69,7 @@ def test_a_clear_slab_absorbs_as_it_should() -> None:
 
 
 def test_a_camera_in_fog_knows_where_it_is() -> None:
-    """A camera at 5 is inside of a slab from -2 to 20, and sees only what lies below it."""
+    """A camera at 5 is inside of a slab from -2 to 20, and sees only the part below it."""
     builder = wavecomb.SceneBuilder()
     slab(builder, -2.0, 20.0, filled(builder, 1.0, **absorbing(SIGMA)))
     slab(builder, -1.0, 1.0, filled(builder, 1.0, **absorbing(2 * SIGMA)))
@@ -83,7 +83,9 @@ def test_a_camera_in_fog_knows_where_it_is() -> None:
     [((1.0, 0.0), (1.0, 1.0)), ((0.0, 0.0), (0.75, 1.25)), ((-1.0, 2.0), (0.75, 1.25))],
 )
 def test_where_two_overlap_the_higher_priority_is_there(priorities: Any, lengths: Any) -> None:
-    """Where two slabs overlap, the higher priority or else the last entered one counts."""
+    """Where two slabs overlap, the one with the higher priority counts, or else the last entered
+    one.
+    """
     builder = wavecomb.SceneBuilder()
     other = SIGMA[::-1]
     for (low, high), sigma, priority in zip(
@@ -314,7 +316,7 @@ def thin_fog(as_mesh: bool, seed: int, x: float = 3.0, **more: Any) -> Any:
 
 
 def test_fog_in_a_mesh_has_no_more_noise() -> None:
-    """Noise equals that of a volume: the first free-flight samples are well distributed."""
+    """The noise equals that of a volume, since free-flight samples are well distributed."""
     mesh, volume = (
         np.array([thin_fog(as_mesh, seed, depth=4) for seed in range(8)])
         for as_mesh in (True, False)
@@ -385,7 +387,9 @@ def scene(hidden: bool = False) -> Any:
 
 @pytest.mark.parametrize(("equiangular", "hidden"), [("off", False), ("on", False), ("off", True)])
 def test_one_picture_for_all_schedules(equiangular: str, hidden: bool) -> None:
-    """Lanes, waves, threads, policies, packets and the reference integrator give the same bits."""
+    """All lane widths, waves, threads, policies, packets and the reference integrator give the same
+    bits.
+    """
     made = scene(hidden)
 
     def render(**settings: Any) -> Any:
@@ -452,7 +456,7 @@ def Camera "Camera"
 
 
 def test_a_volume_terminal_fills_a_mesh(tmp_path: Path) -> None:
-    """Coefficients are per metre, and a unit of this stage is half a metre."""
+    """Coefficients are per metre, and a scene unit of this stage is half a metre."""
     file = tmp_path / "fog.usda"
     file.write_text(FOG)
     stage = wavecomb.load(file, camera="/Camera")
@@ -572,7 +576,7 @@ def test_light_paths_do_not_go_with_objects_in_absorbing_glass(low: float, refus
 
 
 def glass_ball(builder: Any, inwards: bool = False, radius: float = 1.0, **layers: Any) -> int:
-    """Adds a ball of absorbing glass around the origin, or with ``inwards`` a hollow."""
+    """Adds a ball of absorbing glass around the origin, or a hollow with ``inwards``."""
     mesh = ball(radius, 24)
     faces = mesh.faces.astype(np.uint32)
     material = filled(builder, 1.5, **{**absorbing(SIGMA), **layers})
@@ -665,7 +669,7 @@ def test_a_search_in_many_meshes_takes_no_time() -> None:
         builder.set_camera(camera, projection="orthographic", window=(-1, 1, -1, 1))
         scene = builder.build()
         spent = time.process_time() - begin
-        wavecomb.render(scene, size=(4, 4), spp=1, transport="light")  # the glass is empty
+        wavecomb.render(scene, size=(4, 4), spp=1, transport="light")
         return spent
 
     seconds({})

@@ -144,7 +144,8 @@ class Killer:
             assert process.returncode in (0, -signal.SIGKILL), errors
             killed += process.returncode != 0
             self.look()
-            if process.returncode == 0:  # it ended before it was killed; start again
+            if process.returncode == 0:  # If the process ended before the signal, start another
+                # one.
                 ended += 1
                 assert all((self.folder / name).exists() for name in self.kind.outputs("a"))
                 for name in self.kind.outputs("a"):

@@ -22,7 +22,7 @@ pytest.importorskip("wavecomb._core")
 
 SIZE = 64
 SPP = 32
-"""The fewest samples of which an eighth suffices to train a field."""
+"""The smallest number of samples of which an eighth suffices to train a guiding field."""
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from wavecomb import _core
 pytestmark = needs("wavecomb._core")
 
 SIZE, SPP, SEEDS = 48, 60, 5
-"""Enough samples that an eighth of them trains a field."""
+"""A number of samples of which an eighth suffices to train a guiding field."""
 
 WAYS: list[dict[str, Any]] = [
     {"guiding": "on"},

@@ -247,7 +247,6 @@ def test_karmas_doors_stand_on_the_light_or_before_it(tmp_path):
     assert edge.sum() < free.sum(), "an edge alone dims, too"
     lit = free[:, :, 0] > 0
     shares = got[:, :, 0] / np.where(lit, free[:, :, 0], 1)
-    # The left half is dark. From the bottom, half of the square gets brighter smoothly.
     assert (shares[:, :8] == 0).all() and lit.sum() > 100
     y = (7.5 - np.arange(16)) * 0.25 + 3
     t = np.clip(y / 6 / 0.5, 0, 1)[:, None] * np.ones((1, 8))
@@ -263,7 +262,6 @@ def test_karmas_gobo_lies_over_the_cone(tmp_path):
     light = lamp("SphereLight", CONE + "\nrel light:filters = </Gobo>")
     got = picture(tmp_path, FLOOR + light + KARMA.format("Gobo", "kma_lfilter_gobo", body))
     free = picture(tmp_path, FLOOR + lamp("SphereLight", CONE))
-    # The centre of a texel is at a quarter of the square.
     assert got[1:3, 1:3, 0].mean() / free[1:3, 1:3, 0].mean() == pytest.approx(0.5, rel=0.1)
     assert got[13:, 13:].max() < 0.01 * got.max() and got[:, :, 1:].max() == 0
 
@@ -281,9 +279,7 @@ def test_gels_multiply_all_light(tmp_path, kind):
     both = "\nrel light:filters = [</Gel>, </Mult>]"
     free = picture(tmp_path, FLOOR + lamp(kind, body))
     got = picture(tmp_path, FLOOR + lamp(kind, body + both) + gel + mult)
-    grey = (
-        0.5 * 0.5 * (0.2126 + 0.5 * 0.7152)
-    )  # product of both filters, with half of the diffuse light
+    grey = 0.5 * 0.5 * (0.2126 + 0.5 * 0.7152)
     lit = free[:, :, 0] > 0
     assert got[lit] / free[lit] == pytest.approx(np.full((lit.sum(), 3), grey), rel=1e-3)
 
@@ -328,5 +324,4 @@ def test_filters_are_placed_with_their_lights(tmp_path):
         """
     scene, _ = load(tmp_path, proto)
     assert [light["filter"] for light in scene.lights] == [0, 1]
-    # The window is at z = -1 in the filter's space.
     assert [f[0][3, :3].tolist() for f in scene.filters] == [[3, 0, -1], [5, 0, -1]]

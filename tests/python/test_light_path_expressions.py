@@ -151,11 +151,11 @@ def test_they_are_what_other_layers_say(loaded: Any) -> None:
 
 
 def test_diffuse_light_is_what_lights_without_specular_give(loaded: Any, tmp_path: Path) -> None:
-    """The diffuse part, in light samples and bounces, equals the light of a diffuse-only light."""
+    """The diffuse layer, in light samples and bounces, equals the light of a diffuse-only light."""
     seen = _render(loaded, {"a": "C<RD><L.'key'>", "b": "C<RD>B"}, spp=256)
     other = wavecomb.load(_stage(tmp_path, 0))
     only = _render(other, {"a": "C.<L.'key'>", "b": "C.B"}, spp=256)
-    ball = np.s_[8:17, 3:11]  # has diffuse and specular lobes
+    ball = np.s_[8:17, 3:11]
     for name in "ab":
         want = _layer(only, name)[ball].mean(axis=(0, 1))
         assert _layer(seen, name)[ball].mean(axis=(0, 1)) == pytest.approx(want, rel=0.03), name

@@ -96,7 +96,7 @@ def test_layers_are_the_same_for_all_schedules(stages: Any, transport: str) -> N
 
 
 def test_a_layer_is_the_same_alone(stages: Any) -> None:
-    """A layer does not depend on others or on a crop, and unrequested groups need no memory."""
+    """Layers do not depend on other layers or on a crop; unrequested groups need no memory."""
     first = render(stages["caustics"])
     alone = render(stages["caustics"], aovs=["direct", "light_key", "lpe:k=" + ASKED["k"]])
     assert "light_other" not in alone.aovs
@@ -107,7 +107,6 @@ def test_a_layer_is_the_same_alone(stages: Any) -> None:
     for name in ("indirect", "light_key", "lpe_k"):
         got, want = part.aovs[name][y0:y1, x0:x1], first.aovs[name][y0:y1, x0:x1]
         assert got.tobytes() == want.tobytes(), name
-    # Splats of the beauty and of three layers, and the sample count of light paths.
     camera = render(stages["caustics"], transport="path", aovs=["direct", "light_key", "lpe:k=C.*"])
     film = [p.stats["memory_bytes"]["film"] for p in (alone, camera)]
     assert film[0] - film[1] == SIZE[0] * SIZE[1] * (4 * 48 + 4)

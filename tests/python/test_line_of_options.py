@@ -47,7 +47,7 @@ class Follower:
         self.visits: list[str] = []
 
     def holds(self, value: Any, depth: int = 3) -> bool:
-        """Returns whether a value is, or contains, that of an option."""
+        """Returns whether a value is, or contains, the value of an option."""
         if isinstance(value, (str, int, float, tuple)) and value in self.given:
             return True
         if isinstance(value, _core.Settings):

@@ -68,7 +68,7 @@ def test_reading_ahead_changes_nothing(tmp_path: Path) -> None:
         )
     (one, a), (many, b) = loads
     assert a.report.lines() == b.report.lines()
-    assert len(one.textures) == len(many.textures) == 9  # with the placeholder, 0.png twice
+    assert len(one.textures) == len(many.textures) == 9
     for x, y in zip(one.textures, many.textures, strict=True):
         assert x["srgb"] == y["srgb"] and np.array_equal(x["pixels"], y["pixels"])
     warnings = [line for line in b.report.lines() if "cannot be read" in line]
@@ -93,8 +93,8 @@ def test_few_images_lie_ready(monkeypatch: pytest.MonkeyPatch) -> None:
     while len(read) < 3 and time.monotonic() < deadline:
         time.sleep(0.001)
     time.sleep(0.02)
-    assert sorted(read) == ["a", "bad", "image0"]  # one more than the number of threads
-    assert ahead.read("image19").channels == 3  # not yet read: read at once
+    assert sorted(read) == ["a", "bad", "image0"]
+    assert ahead.read("image19").channels == 3
     with pytest.raises(TextureError, match="broken"):
         ahead.read("bad")
     for k in range(19):
@@ -281,7 +281,7 @@ print((memory("VmHWM") - before) / count)
 
 @LINUX
 def test_instances_are_not_held_twice_while_a_scene_is_made() -> None:
-    """An instance needs about 150 bytes. The builder's copy is freed before records are made."""
+    """An instance needs about 150 bytes. The builder frees its copy before records are made."""
     pytest.importorskip("wavecomb._core")
     run = subprocess.run([sys.executable, "-c", MANY], capture_output=True, text=True, check=True)
     assert 100 < float(run.stdout) < 260, run.stdout

@@ -120,7 +120,6 @@ def test_scaled_images_are_plain_textures(tmp_path):
     assert use["channel"] == "rgb" and use["scale"] == (0.25, 0.5, 0.125, 1.0)
     assert use["bias"] == (0.0625, 0.0625, 0.0625, 0.0)
     assert scene.textures[use["texture"]]["wrap"][0] == "mirror"
-    # (uv - pivot) / scale, a quarter turn clockwise, - offset + pivot.
     a, b, c, d, e, f = use["uv"]
     for u, v in ((0.0, 0.0), (0.3, 0.8)):
         x, y = (u - 0.5) / 0.5, (v - 0.5) / 0.25
@@ -313,7 +312,8 @@ def test_networks_in_circles_end(tmp_path):
 @pytest.mark.parametrize("category", ["power", "screen", "contrast", "safepower", "overlay"])
 def test_networks_too_deep_are_cut(tmp_path, category):
     """Networks that are too deep are cut at a node with a warning. All other inputs keep their
-    values."""
+    values.
+    """
     first = {"power": "in1", "safepower": "in1", "contrast": "in"}.get(category, "fg")
     nodes = "".join(
         node(

@@ -26,14 +26,13 @@ NOT_ON_THE_PATH = {"isa.py", "usd/stage/report.py"}
 """Files that do not count: choice of the native library, and messages about the stage."""
 
 NATIVE = (
-    "bindings/materials.cpp",  # add_material and add_texture
-    "bindings/scene_values.cpp",  # keywords to members of Material
+    "bindings/materials.cpp",
+    "bindings/scene_values.cpp",
     "src/wavecomb/material/description/material.h",  # Material and MaterialRecord
-    # Material without inputs that have no effect:
     "src/wavecomb/material/description/simplified_material.cpp",
     "src/wavecomb/material/description/scene_materials.cpp",  # Material to MaterialRecord
-    "src/wavecomb/material/inputs/inputs.inl",  # inputs at a hit: constants and textures
-    "src/wavecomb/material/params.h",  # MaterialRecord to parameters at a hit
+    "src/wavecomb/material/inputs/inputs.inl",
+    "src/wavecomb/material/params.h",
 )
 KERNELS = {
     "UsdPreviewSurface": (

@@ -163,7 +163,7 @@ def test_an_added_row_of_a_program_is_read_from_its_attribute(
         stage = Usd.Stage.CreateInMemory()
         stage.GetRootLayer().ImportFromString(STAGE % (program, attribute))
         prim, time = stage.GetPrimAtPath("/M"), Usd.TimeCode.Default()
-        textures: Any = None  # no textures to read
+        textures: Any = None
         reader = PreviewReader(prim, time, textures, LoadReport())
         read = reader.read(UsdShade.Shader(stage.GetPrimAtPath("/M/S"))).parameters
         traced = traced_parameters(prim, time)

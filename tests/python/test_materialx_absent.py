@@ -76,7 +76,7 @@ def test_its_surfaces_are_grey_and_said_in_one_line(tmp_path, absent):
 def test_its_nodes_are_left_out_of_preview_surfaces(tmp_path, absent):
     loaded = loaded_of(write(tmp_path, MIXED))
     assert len(lines(loaded)) == 1 and "nodes left out: /Mat/P" in lines(loaded)[0]
-    assert loaded.scene.material_of("M")["roughness"] == 0.5  # the default of UsdPreviewSurface
+    assert loaded.scene.material_of("M")["roughness"] == 0.5
 
 
 def test_its_files_are_left_out_and_said_in_one_line(tmp_path, absent):

@@ -129,7 +129,7 @@ def test_defaults_of_primitives_are_the_library_s(category):
             if kind in WIDTHS and text and not item.getDefaultGeomPropString():
                 full.give(**{item.getName(): text})
         if identifier in ("ND_image_color4", "ND_image_vector4", "ND_hextiledimage_color4"):
-            full.give(default="0, 0, 0, 1")  # a missing file is drawn opaque
+            full.give(default="0, 0, 0, 1")
         for output in patterns()[identifier]:
             ours, theirs = bare.value(output), full.value(output)
             if all(isinstance(x, float) for x in (*ours, *theirs)):  # folded constants

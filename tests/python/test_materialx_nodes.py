@@ -257,7 +257,6 @@ def test_images_of_gltf_are_placed_as_its_graph_says():
     assert use["channel"] == "rgb" and use["scale"] == (1, 1, 1, 1)
     a, b, c, d, e, f = use["uv"]
     for u, v in ((0.0, 0.0), (0.3, 0.8)):
-        # About (0, 1): scaled, turned counter-clockwise, moved by (offset x, - offset y).
         x, y = 2 * u, 4 * (v - 1)
         expected = (-y + 0.25, x - 0.5 + 1)
         assert (a * u + b * v + c, d * u + e * v + f) == pytest.approx(expected, abs=1e-5)

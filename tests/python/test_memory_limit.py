@@ -36,7 +36,7 @@ sys.exit(code)
 
 
 def run(*words: object, limit: float = LIMIT_MB) -> subprocess.CompletedProcess[str]:
-    """Runs the command. The last line of its output is its peak memory in KB."""
+    """Runs the command. The last line of the output is the command's peak memory in KB."""
     command = [sys.executable, "-m", "wavecomb", *map(str, words), "--memory-limit", str(limit)]
     return subprocess.run(
         [sys.executable, "-c", PEAK_OF, *command],
@@ -45,7 +45,7 @@ def run(*words: object, limit: float = LIMIT_MB) -> subprocess.CompletedProcess[
 
 
 def packed_indices(folder: Path) -> list[object]:
-    """Writes 400 MB of indices compressed to 130 KB. Returns a command that reads them."""
+    """Writes 400 MB of indices compressed to 130 KB. Returns a command that reads these indices."""
     stage = Usd.Stage.CreateNew(str(folder / "bomb.usdc"))
     mesh = UsdGeom.Mesh.Define(stage, "/M")
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.zeros((3, 3), np.float32)))
@@ -58,7 +58,7 @@ def packed_indices(folder: Path) -> list[object]:
 
 
 def packed_texture(folder: Path) -> list[object]:
-    """Writes 320 MB of pixels compressed to a few MB. Returns a command that reads them."""
+    """Writes 320 MB of pixels compressed to a few MB. Returns a command that reads these pixels."""
     spec = oiio.ImageSpec(9000, 9000, 4, "uint8")
     output = oiio.ImageOutput.create(str(folder / "t.tif"))
     spec.attribute("compression", "zip")

@@ -52,7 +52,7 @@ def test_moving_transforms_become_moving_instances(tmp_path):
     scene, loaded = load(tmp_path, stage(camera(0, 0.5) + MOVING % QUAD), frame=1)
     ((name, motion),) = scene.motions
     assert name == "/Mover/Quad" and motion.shape == (1, 2, 4, 4)
-    assert motion[0, :, 3, 0].tolist() == [0.0, 1.0]  # two units per frame, over half a frame
+    assert motion[0, :, 3, 0].tolist() == [0.0, 1.0]
     assert loaded.shutter == (0.0, 0.5)
     # The points are those of the stage: not transformed, and not copied.
     assert scene.mesh("Quad")["positions"].tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
@@ -158,7 +158,6 @@ def test_velocities_move_points_that_have_one_sample(tmp_path):
     ).replace("(24,0,0)]", "(24,0,0)] }").replace("(0,576,0)]", "(0,576,0)] }")  # fmt: skip
     scene, _ = load(tmp_path, stage(camera(0, 1) + timed), frame=1)
     moved = scene.mesh("Quad")["positions"][:, 0]
-    # One unit per frame, and half a unit per frame squared.
     when = np.linspace(0, 1, len(moved))
     assert len(moved) == 3
     assert np.allclose(moved, np.stack([when, 0.5 * when**2, 0 * when], axis=1), atol=1e-5)
@@ -226,7 +225,7 @@ def SphereLight "Lamp" {
     assert scene.camera["motion"].shape == (2, 4, 4)
     assert scene.camera["motion"][:, 3, 0].tolist() == [0.0, 1.0]
     assert scene.camera["transform"][3, 0] == 0.0  # at the frame
-    assert scene.lights[0]["transform"][3, 0] == 1.0  # in the middle of the shutter interval
+    assert scene.lights[0]["transform"][3, 0] == 1.0
     assert scene.lights[0]["motion"][:, 3, 0].tolist() == [0.0, 2.0]
     assert "mid-shutter" not in said(loaded)
 
@@ -310,7 +309,6 @@ def test_blur_is_the_mean_of_still_frames(tmp_path, more):
     z = np.abs(mean - blurred.beauty).max(axis=2) / np.maximum(sigma.max(axis=2), 2e-3)
     assert np.quantile(z, 0.95) < 3 and z.max() < 8
     assert abs(mean.mean() - blurred.beauty.mean()) < 2e-3
-    # The image is blurred: it differs from the first still.
     assert np.abs(stills[0] - blurred.beauty).max() > 0.2
 
 

@@ -90,13 +90,12 @@ def test_a_moving_light_is_the_mean_of_still_ones(tmp_path: Path, kind: str) -> 
     blocks = [p.reshape(passes, 5, 4, 5, 4, 3).mean(axis=(2, 4)) for p in (blurred, stills)]
     means = [b.mean(axis=0) for b in blocks]
     variance = sum(b.var(axis=0, ddof=1) / passes for b in blocks)
-    # Sixteen stills approximate the shutter interval with an error below one per cent.
+    # Sixteen still images approximate the shutter interval with an error below one per cent.
     z = np.abs(means[0] - means[1]) / np.sqrt(variance + (0.01 * means[1] + 1e-4) ** 2)
-    assert z.max() < 6.0, z.max()  # 75 tests with 14 degrees of freedom
+    assert z.max() < 6.0, z.max()
     wholes = [p.mean(axis=(1, 2, 3)) for p in (blurred, stills)]
     noise = np.sqrt(sum(x.var(ddof=1) / passes for x in wholes))
     assert abs(wholes[0].mean() - wholes[1].mean()) < 5.0 * noise + 0.005 * wholes[1].mean()
-    # The image is blurred.
     middle = wavecomb.render(
         load_stage(path, frame=1.5, motion_blur=False), spp=64, seed=5, **SETTINGS
     ).beauty
@@ -139,7 +138,7 @@ def DomeLight "Sky" {
 def test_steps_follow_the_motion(tmp_path: Path) -> None:
     scene, _ = load(tmp_path, HEADER + LIGHTS["inherited"] % GOES, frame=1)
     light = scene.lights[0]
-    assert light["transform"][3, 0] == 0.0  # in the middle of the shutter interval
+    assert light["transform"][3, 0] == 0.0
     assert light["motion"][[0, -1], 3, 0].tolist() == [-1.5, 1.5] and len(light["motion"]) > 2
     assert not load_stage(stage(tmp_path, "rect"), frame=1, motion_blur=False).scene.moves
 

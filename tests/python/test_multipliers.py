@@ -93,7 +93,7 @@ def test_parts_add_up_to_the_whole(tmp_path: Path) -> None:
     specular = passes(lamp(tmp_path, MULTIPLIED % (0, 1)), 200)
     mixed = passes(lamp(tmp_path, MULTIPLIED % (0.5, 2)), 300)
     whole = passes(lamp(tmp_path), 400)
-    floor = np.s_[:, 12:]  # the lights are not visible there
+    floor = np.s_[:, 12:]
     seen = whole[:, :12].mean()
     assert diffuse[:, :12].mean() > 0 and seen > 0
 

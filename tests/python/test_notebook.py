@@ -139,7 +139,7 @@ def test_a_notebook_shows_a_bar_and_the_picture_so_far(notebook: Handle) -> None
     bars = [one for one in notebook.shown if "<progress" in one]
     assert "samples/s" in bars[0]
     assert any("<img src='data:image/png;base64," in one for one in bars)
-    assert notebook.shown[-1] == ""  # replaced by the rendered image
+    assert notebook.shown[-1] == ""
     before = len(notebook.shown)
     plain = wavecomb.render(scene(), size=(192, 192), spp=200, seed=3, progress=False)
     assert len(notebook.shown) == before
@@ -241,7 +241,7 @@ def test_a_window_opens_and_closes(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     opened = wavecomb.view()
     until = time.monotonic() + 60
-    # Its signal handlers are installed once its second thread runs.
+    # The process has installed its signal handlers once its second thread runs.
     while len(os.listdir(f"/proc/{opened.pid}/task")) < 2 and time.monotonic() < until:
         time.sleep(0.1)
     assert opened.is_open

@@ -168,7 +168,7 @@ def test_a_shift_is_found_and_placed() -> None:
     whole = z_test(a + 0.01, b, variance_a=variance)
     assert not whole.agrees
     assert whole.worst_tile is None
-    a[16:24, 8:16, 1] *= 1.05  # a shift by one standard deviation in one tile of 64 pixels
+    a[16:24, 8:16, 1] *= 1.05
     local = z_test(a, b, variance_b=variance)
     assert not local.agrees
     assert local.worst_tile == (8, 16)

@@ -85,7 +85,7 @@ def test_anything_else_is_left_to_the_long_way(counts: list[int], indices: list[
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_points_that_are_nowhere_are_left_to_it(value: float, axis: int) -> None:
     points = SQUARE.copy()
-    points[3, axis] = value  # no triangle uses this point
+    points[3, axis] = value
     faces = np.array([3], np.int32), np.array([0, 1, 2], np.int32)
     assert bake_and_triangulate(points, *faces, IDENTITY) is None
     assert bake_and_triangulate(SQUARE, *faces, IDENTITY) is not None

@@ -384,7 +384,7 @@ STARTERS = {
     "sys": {"executable"},
 }  # fmt: skip
 CLUSTERS = {"multiprocessing", "ProcessPoolExecutor", "LocalCluster", "Nanny", "SubprocessCluster"}
-"""Users of multiprocessing. A file with one must call isolate_multiprocessing()."""
+"""Users of multiprocessing. A file that uses such a module must call isolate_multiprocessing()."""
 
 WORTH_PARSING = re.compile(
     rf"\b({'|'.join(CLUSTERS)}|subprocess|pty|asyncio|QProcess)\b|sys\.executable"
@@ -406,7 +406,7 @@ def starts(tree: ast.AST) -> list[str]:
 
 
 def type_only(text: str) -> str:
-    """Removes uses of subprocess.Popen as a type."""
+    """Removes uses of subprocess.Popen as a type from a text."""
     return text.replace("subprocess.Popen[", "Popen[")
 
 

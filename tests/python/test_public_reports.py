@@ -166,7 +166,7 @@ def test_primvars_of_instances_inside_a_point_instancer(tmp_path: Path) -> None:
 
 
 def test_materials_below_prototypes(tmp_path: Path) -> None:
-    """OpenUSD 3483: materials below the prototypes' scope, one of which is not used."""
+    """OpenUSD 3483: materials below the scope of the prototypes, one of which no prim uses."""
     look = material("Blue", BLUE).replace("/World/Blue", "/World/Many/Prototypes/Blue")
     ball = f"""( {BOUND} ) {{
                 rel material:binding = </World/Many/Prototypes/Blue>
@@ -264,7 +264,7 @@ def test_the_primvar_goes_before_the_attribute(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("rule", ["all", "none"])
 def test_face_varying_coordinates_of_subdivided_meshes(rule: str, tmp_path: Path) -> None:
-    """arnold-usd 632: the rule determines the interpolation at the boundary of seams."""
+    """arnold-usd 632: the rule of a mesh determines the interpolation at the boundary of seams."""
     body = f"""def Mesh "Quads" {{
         int[] faceVertexCounts = [4, 4]
         int[] faceVertexIndices = [0, 1, 4, 3, 1, 2, 5, 4]

@@ -77,10 +77,9 @@ def test_sees_what_is_documented(scene: Any) -> None:
     assert picture.stats["settings"]["policy"] == "watching"
     assert wavecomb.compare(picture, render(scene, "none")).equal
     gc.collect()
-    # Queues of a single record are not ordered.
     records = sum(len(queue["material"]) for queue, _, _ in seen)
     assert 0.99 < records / picture.stats["counts"]["records"] <= 1
-    for queue, costs, keys in seen:  # arrays stay valid after the render
+    for queue, costs, keys in seen:
         n = len(queue["material"])
         assert keys.dtype == np.uint64
         assert keys.shape == (n,)
@@ -187,7 +186,6 @@ def test_exceptions_come_out(scene: Any, threads: int, calls: int) -> None:
 
     with pytest.raises(Mishap, match=f"after {calls}"):
         render(scene, Policy(order), threads=threads)
-    # The renderer can be used again.
     assert wavecomb.compare(render(scene, "program"), render(scene, "none")).equal
 
 

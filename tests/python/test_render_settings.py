@@ -107,8 +107,8 @@ def test_what_is_no_good_is_named_and_left_out(tmp_path):
     ("window", "region"),
     [
         ((0, 0, 1, 1), None),
-        ((0, 0.5, 0.5, 1), (0, 0, 10, 5)),  # the upper left quarter, since y is up
-        ((0.24, 0, 1, 0.26), (5, 7, 20, 10)),  # pixels with their centres inside
+        ((0, 0.5, 0.5, 1), (0, 0, 10, 5)),
+        ((0.24, 0, 1, 0.26), (5, 7, 20, 10)),
         ((-1, -1, 2, 0.5), (0, 5, 20, 10)),
     ],
 )
@@ -212,7 +212,7 @@ def test_all_products_are_rendered_of_one_scene(tmp_path):
     assert run("render", stage, "--spp", 2, "--output-dir", tmp_path) == (0, "")
     one, two = (read_layers(tmp_path / f"{name}.exr") for name in ("one", "two"))
     assert list(one) == ["beauty", "depth"] and one["beauty"].shape == (20, 30, 3)
-    spec = oiio.ImageInput.open(str(tmp_path / "two.exr")).spec()  # only its data window
+    spec = oiio.ImageInput.open(str(tmp_path / "two.exr")).spec()
     assert (spec.x, spec.y, spec.width, spec.height) == (0, 0, 10, 5)
     assert (spec.full_x, spec.full_y, spec.full_width, spec.full_height) == (0, 0, 20, 10)
     assert two["beauty"].shape == (5, 10, 3) and (two["beauty"] > 0).all()

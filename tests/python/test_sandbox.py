@@ -55,7 +55,7 @@ def trying(name, deed):
 
 @pytest.fixture
 def place() -> Iterator[Path]:
-    """Folders for outputs and for the stage, and one that is neither. Not below /tmp."""
+    """Folders for outputs, for the stage, and a third folder. Not below /tmp."""
     with tempfile.TemporaryDirectory(dir=Path.home(), prefix="wavecomb-test-") as name:
         folder = Path(name)
         for one in ("out", "shot", "secret"):
@@ -67,7 +67,9 @@ def place() -> Iterator[Path]:
 
 
 def child(place: Path, code: str, *, reads: str = "", status: int = 0) -> dict[str, str]:
-    """Runs code in the sandbox. Returns what it tried, and how each attempt ended."""
+    """Runs code in the sandbox and returns its attempts. The result has the outcome of each
+    attempt.
+    """
     given = CHILD + code + "\nprint(json.dumps(tried))"
     done = subprocess.run(
         [sys.executable, "-c", PARENT, str(place), reads, given],
@@ -211,7 +213,7 @@ load_stage(place / "shot/s.usda")
 """
     wide = child(place, code)
     assert wide == {"secret": "done", "stage": "done"}
-    # Unlike in ``child``, the command line must not name the folder, or it would be readable.
+    # The command line must not name the folder, since the sandbox would make it readable.
     parent = PARENT.replace("choices.words = (place,)", "choices.words = ()")
     given = CHILD.replace("sys.argv[1]", repr(str(place))) + code + "\nprint(json.dumps(tried))"
     done = subprocess.run(
@@ -292,7 +294,9 @@ def test_a_crash_is_one_line(place: Path, deed: str, words: str) -> None:
 
 
 def test_shared_mappings_count_as_memory(place: Path) -> None:
-    """RLIMIT_DATA does not count shared mappings. A control group does, if one can be created."""
+    """RLIMIT_DATA does not count shared mappings. A control group counts them, if one can be
+    created.
+    """
     group = memory.Group.make(300_000_000)
     if group is None:
         not_here("no control group may be made here")

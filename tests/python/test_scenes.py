@@ -308,7 +308,7 @@ def test_spread_has_what_was_asked_for(tmp_path: Path) -> None:
         "plastic",
     }
     assert scene.triangles == pytest.approx(40_000, rel=0.1)
-    assert scene.instanced_triangles == scene.triangles  # no instances: all use memory
+    assert scene.instanced_triangles == scene.triangles
     own = [size for name, size in scene.textures if "stone_" in name]
     assert len(own) == 200 and sum(own) == pytest.approx(6e6, rel=0.2)
     dear = {
@@ -439,7 +439,6 @@ def test_sky_is_a_bright_half(tmp_path: Path) -> None:
     assert np.isfinite(image).all() and image.min() >= 0.0
     assert image[:60].mean() > image[70:].mean()
     assert image.max() > 50.0
-    # No seam: the first and last column are neighbours.
     step = np.abs(image[:, 0] - image[:, -1]).mean()
     assert step < 3.0 * np.abs(np.diff(image, axis=1)).mean() + 0.01
 

@@ -167,7 +167,7 @@ def test_an_added_row_is_kept_in_checkpoints_where_it_shows(with_rows: None) -> 
     values = {name: row.default for name, row in settings().items()}
     values |= {row.name: row.default for row in ADDED}
     kept = image_settings(values)
-    assert {"tea_time", "biscuit", "milk"} <= kept.keys()  # same.BITS lacks biscuit
+    assert {"tea_time", "biscuit", "milk"} <= kept.keys()
     assert "cups" not in kept
 
 

@@ -34,7 +34,7 @@ def lit(has_smoke: bool, is_blocked: bool, **more: Any) -> Any:
 
 @pytest.mark.parametrize("integrator", ["wavefront", "reference"])
 def test_a_coloured_shadow_has_come_through_smoke(integrator: str) -> None:
-    """The shadow colour is attenuated by the smoke."""
+    """The smoke attenuates the shadow colour."""
     pixels = {
         (has_smoke, is_blocked): lit(has_smoke, is_blocked, integrator=integrator)
         for has_smoke in (False, True)

@@ -182,7 +182,7 @@ def test_the_site_is_built_without_warnings(tmp_path: Path) -> None:
         assert (tmp_path / "cpp/classwavecomb_1_1SceneBuilder.html").is_file()
         assert "cpp/annotated.html" in (tmp_path / "reference/cpp.html").read_text("utf-8")
     browser = shutil.which("chromium")
-    if browser:  # search works when pages are opened as files
+    if browser:
         page = f"{(tmp_path / 'index.html').as_uri()}?q=guiding"
         options = ["--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=20000"]
         shown = subprocess.run([browser, *options, "--dump-dom", page], capture_output=True,

@@ -41,7 +41,7 @@ def make_stage(*, mesh_order=None, indices, weights, each, constant=False, metho
     rest = [BIND[0], BIND[1] * BIND[0].GetInverse(), BIND[2] * BIND[1].GetInverse()]
     skeleton.GetRestTransformsAttr().Set(rest)
     animation = UsdSkel.Animation.Define(stage, "/Root/Anim")
-    animation.GetJointsAttr().Set(["A/B", "A"])  # another order than the skeleton, and without C
+    animation.GetJointsAttr().Set(["A/B", "A"])
     animation.GetScalesAttr().Set(Vt.Vec3hArray([(1, 1, 1), (1, 1, 1)]))
     for time in (1, 2, 4):
         turns = [Gf.Quatf(turn.GetQuat()) for turn, _ in pose(time)]
@@ -78,7 +78,7 @@ def skinned(time, indices, weights, rest=POINTS):
     local = [
         Gf.Matrix4d(turn_a, Gf.Vec3d(at_a)),
         Gf.Matrix4d(turn_b, Gf.Vec3d(at_b)),
-        Gf.Matrix4d().SetTranslate((0, 0, 2)),  # C is in its rest pose
+        Gf.Matrix4d().SetTranslate((0, 0, 2)),
     ]
     world = [np.array(local[0])]
     for matrix in local[1:]:
@@ -92,7 +92,7 @@ def skinned(time, indices, weights, rest=POINTS):
             joint = joints[indices[i, k]]
             points[i] += weights[i, k] * homogeneous[i] @ joint
             normals[i] += weights[i, k] * NORMALS[i] @ np.linalg.inv(joint[:3, :3]).T
-    # Skeleton space is translated by 0.5. The transform of the mesh is ignored.
+    # The transform of the mesh is ignored.
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     return points[:, :3] + np.array([0.5, 0, 0]), normals
 
@@ -183,12 +183,12 @@ def test_blend_shapes_with_inbetweens():
     between.SetOffsets(Vt.Vec3fArray.FromNumpy(half.astype(np.float32)))
     frown = UsdSkel.BlendShape.Define(stage, "/Root/Mesh/Frown")
     frown.GetOffsetsAttr().Set(Vt.Vec3fArray.FromNumpy(other[:2].astype(np.float32)))
-    frown.GetPointIndicesAttr().Set([4, 6])  # affects two points only
+    frown.GetPointIndicesAttr().Set([4, 6])
     binding = UsdSkel.BindingAPI(stage.GetPrimAtPath("/Root/Mesh"))
     binding.CreateBlendShapesAttr().Set(["smile", "frown"])
     binding.CreateBlendShapeTargetsRel().SetTargets([smile.GetPath(), frown.GetPath()])
     animation = UsdSkel.Animation.Get(stage, "/Root/Anim")
-    animation.GetBlendShapesAttr().Set(["frown", "smile"])  # another order than the mesh
+    animation.GetBlendShapesAttr().Set(["frown", "smile"])
     weights = {1.0: (0.25, 0.2), 2.0: (1.0, 0.5), 4.0: (-0.5, 0.8)}
     for time, values in weights.items():
         animation.GetBlendShapeWeightsAttr().Set(Vt.FloatArray(values), time)
@@ -207,7 +207,7 @@ def test_blend_shapes_with_inbetweens():
 
 
 def test_skins_that_do_not_fit_rest():
-    stage = make_stage(indices=[0, 1], weights=[1.0, 1.0], each=1)  # for two of seven points
+    stage = make_stage(indices=[0, 1], weights=[1.0, 1.0], each=1)
     mesh, loaded = read(stage, frame=2)
     assert np.allclose(mesh["positions"], POINTS + np.array([0, 3, 0]), atol=1e-5)
     assert "rest pose" in said(loaded)

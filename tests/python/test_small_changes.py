@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files to edit for a program, a light, a setting, an AOV or a transport, and that they compile.
 
-Each example edits a copy of the sources as the pages of docs/ describe it. Lists and tables made
-by hand anywhere else would make the number of files grow, or the edited tree not compile.
+Each example edits a copy of the sources as the pages of docs/ describe. Lists and tables made by
+hand anywhere else would make the number of files grow, or the edited tree not compile.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Change = dict[str, tuple[str, ...]]
 
 
 def header(name: str) -> str:
-    """Returns the include of a header of the core, wherever it stands."""
+    """Returns the include line of a core header, in any folder."""
     (path,) = (ROOT / CORE).rglob(name)
     return f'#include "wavecomb/{path.relative_to(ROOT / CORE)}"\n'
 
@@ -283,7 +283,7 @@ def compiled(
 def test_a_program(tmp_path: Path, compiler: list[str], nests: bool) -> None:
     traits = "kEmits | kGlossy | kNests | kSubsurface" if nests else "0"
     change = program(f"  X(minnaert, Minnaert, {traits}, 65)")
-    assert len(change) <= 3  # one of which is for the tests only
+    assert len(change) <= 3
     applied(tmp_path, change)
     done = compiled(
         tmp_path, compiler, text=USES_PROGRAM.replace("NESTS", "true" if nests else "false")

@@ -568,7 +568,7 @@ def test_the_largest_instance_counts(tmp_path):
     assert level_of(loaded) == 5
     behind = text.replace("(0, 0, 0), ", "(0, 0, 8), ")
     _, loaded = load(tmp_path, behind, subdivision="auto", size=(200, 200))
-    assert level_of(loaded) == 2  # an edge of 25 pixels, at the same distance behind the camera
+    assert level_of(loaded) == 2
 
 
 def test_memory_bounds_automatic_levels(tmp_path, monkeypatch):
@@ -629,7 +629,6 @@ def test_degenerate_faces_and_shapes_that_are_no_manifolds(tmp_path):
     line = mesh(points, [[0, 1], [0, 1, 2, 3]])
     recorder, loaded = load(tmp_path, line, subdivision=2)
     assert "fewer than three corners: drawn as polygons" in said(loaded)
-    # Three quads share an edge.
     book = mesh(points, [[0, 1, 2, 3], [1, 0, 4, 5], [0, 1, 7, 6]])
     recorder, loaded = load(tmp_path, book, subdivision=3)
     assert "not manifold: sharp there" in said(loaded)

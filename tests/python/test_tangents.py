@@ -82,7 +82,7 @@ def brushed_cone(path: Path, sides: int, rows: int) -> None:
 
 
 def test_a_coarse_cone_shines_as_a_fine_one(tmp_path: Path) -> None:
-    """With a constant tangent per triangle, the highlight would break at every edge."""
+    """With a constant tangent per triangle, highlights would break at every edge."""
     brushed_cone(tmp_path / "coarse.usda", 16, 2)
     brushed_cone(tmp_path / "fine.usda", 120, 20)
     coarse, fine = (

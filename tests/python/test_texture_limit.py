@@ -118,7 +118,7 @@ def test_the_scene_takes_what_was_planned(tmp_path, stage, monkeypatch):
     limit = 0.9 * WHOLE
     loaded = load_stage(write(tmp_path, stage), texture_limit=limit / 1e6, size=(64, 64))
     total = sum(size for _, size in loaded.scene.textures) - pyramid_bytes(128, 64, 3, np.float32)
-    assert total <= limit  # in addition to the default dome
+    assert total <= limit
     halved = pyramid_bytes(128, 128, 3, np.uint8)
     assert total in {halved + pyramid_bytes(2**k, 2**k, 3, np.uint8) for k in range(9)}
 

@@ -331,7 +331,7 @@ def test_reading_ahead_keeps_to_its_limit(tmp_path):
         most = max(most, len(ahead._ready))
         assert (ahead.read(file).take() == i).all()
     ahead.close()
-    assert most == 3  # two images and the missing one
+    assert most == 3
 
 
 def test_the_file_goes_where_it_is_told_to(monkeypatch, tmp_path):

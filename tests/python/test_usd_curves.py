@@ -11,7 +11,7 @@ from usd_recorder import INHERIT, Recorder, load, said
 
 from wavecomb.usd import load_stage
 
-MATRICES = {  # of the USD documentation: rows for t^3, t^2, t, 1
+MATRICES = {
     "bezier": [[-1, 3, -3, 1], [3, -6, 3, 0], [-3, 3, 0, 0], [1, 0, 0, 0]],
     "bspline": [[-1 / 6, 0.5, -0.5, 1 / 6], [0.5, -1, 0.5, 0], [-0.5, 0, 0.5, 0],
                 [1 / 6, 4 / 6, 1 / 6, 0]],

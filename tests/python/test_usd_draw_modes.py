@@ -31,7 +31,7 @@ def cards(geometry, *textures):
 
 @pytest.fixture
 def card(tmp_path):
-    """An image with a transparent left part."""
+    """An image whose left part is transparent."""
     image = OpenImageIO.ImageBuf(OpenImageIO.ImageSpec(2, 2, 4, "uint8"))
     image.set_pixels(
         OpenImageIO.ROI(0, 2, 0, 2), np.array([[[0, 0, 0, 0], [1, 0.5, 0, 1]]] * 2, np.float32)

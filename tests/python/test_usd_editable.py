@@ -231,7 +231,7 @@ def test_defaults_of_the_loader_are_materialx_s(model):
     inputs = Defaults()
     layers_of(model, inputs)
     known = definitions(model)
-    inputs.found.pop("dielectric_priority", None)  # an input of Arnold without a definition
+    inputs.found.pop("dielectric_priority", None)
     assert inputs.found.keys() <= known.keys()
     for name, default in inputs.found.items():
         assert known[name].default == pytest.approx(default), name
@@ -246,7 +246,7 @@ def test_defaults_of_the_loader_are_materialx_s(model):
 
 @pytest.mark.parametrize("model", sorted(MODELS))
 def test_surface_values_are_what_the_loader_gives_the_core(tmp_path, model):
-    """Each input with a value other than its default, one at a time and all together."""
+    """Tests each input with a value other than its default, one at a time and all together."""
     known, time = definitions(model), Usd.TimeCode.Default()
 
     def stage_of(values, file):

@@ -107,7 +107,7 @@ def test_lights_share_a_profile(tmp_path):
     first, second = scene.lights
     assert (first["ies"], first["ies_angle_scale"], first["ies_normalize"]) == (0, -0.5, True)
     assert (second["ies"], second["ies_angle_scale"], second["ies_normalize"]) == (0, 0, False)
-    assert first["cone_angle"] == 90  # the default of ShapingAPI
+    assert first["cone_angle"] == 90
     assert len(scene.profiles) == 1 and scene.profiles[0]["candela"].tolist() == [[10, 4]]
     assert not loaded.report.warnings
 

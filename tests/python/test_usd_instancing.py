@@ -103,7 +103,7 @@ def test_own_bindings_of_a_prototype_win_unless_weaker(tmp_path):
     found = names(scene)
     assert found[10] == "/A" and found[20] == "/B"
     assert "Own" in found[0]
-    assert len(scene.meshes) == 2  # one group for all that override
+    assert len(scene.meshes) == 2
 
 
 def test_collections_reach_into_instances(tmp_path):

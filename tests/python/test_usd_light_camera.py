@@ -49,7 +49,7 @@ def test_colour_temperatures_are_those_of_black_bodies(kelvin):
 
 
 def test_colour_temperatures_agree_with_usdlux():
-    """Agrees with UsdLux's table within 0.3 % of the largest channel."""
+    """The colour agrees with UsdLux's table within 0.3 % of the largest channel."""
     from pxr import UsdLux
 
     for kelvin in range(2000, 10001, 250):
@@ -238,7 +238,7 @@ def test_linking(tmp_path):
     }
     assert scene.sets[a["shadow_link"]] == {"/": "expand", "/World/Floor": "exclude"}
     assert b["shadow_link"] == a["shadow_link"] and "light_link" not in b
-    assert "light_link" not in c  # includeRoot is true, so all prims are included already
+    assert "light_link" not in c
     assert not loaded.report.unsupported
 
 
@@ -281,7 +281,7 @@ def test_links_by_membership_expression(tmp_path):
         "/heroes": "expand",
     }
     assert scene.sets[a["light_link"]] == hero
-    assert "shadow_link" not in a  # it contains all prims
+    assert "shadow_link" not in a
     assert scene.sets[b["light_link"]] == {**hero, "/Set/Ball": "expand"}
     assert not loaded.report.warnings
 
@@ -319,7 +319,7 @@ def test_predicates_of_expressions(tmp_path, predicate, rules, words):
 
 
 def test_expressions_are_evaluated_at_so_many_prims(tmp_path, monkeypatch):
-    """The number of visited prims is limited, since nested instances can be billions."""
+    """The number of visited prims is limited, since nested instances can make billions."""
     monkeypatch.setattr("wavecomb.usd.stage.collections.MAX_PRIMS", 5)
     scene, loaded = load(tmp_path, _EXPRESSIONS)
     assert "membershipExpression beyond 5 prims (cut there)" in said(loaded)
@@ -409,7 +409,7 @@ def test_default_dome_and_camera_know_what_is_up(tmp_path, up, axis):
     scene, loaded = load(tmp_path, f'#usda 1.0\n(upAxis = "{up}")\ndef Mesh "M" {{ {box} }}')
     assert pole(scene.lights[0])[axis] == 1
     frame = scene.camera["transform"]
-    assert frame[1, axis] > 0.8  # the camera's up vector
+    assert frame[1, axis] > 0.8
     assert np.linalg.det(frame[:3, :3]) == pytest.approx(1)
     # All corners are inside the image.
     points = np.append(scene.mesh("M")["positions"], np.ones((4, 1)), axis=1)

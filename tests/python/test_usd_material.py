@@ -742,7 +742,7 @@ def test_files_with_the_same_bytes_are_one_texture(tmp_path):
     )
     uses = scene.material_of("M")["textures"]
     images = [one for one in scene.textures if one["pixels"].dtype == np.uint8]
-    assert len(images) == 1  # without the default dome
+    assert len(images) == 1
     assert uses["base_color"]["texture"] == uses["emission"]["texture"] == 0
 
 

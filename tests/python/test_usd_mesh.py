@@ -319,7 +319,7 @@ def test_sharp_creases_split_normals(tmp_path):
     on_top = flat[:, 2] > 0
     assert mesh["normals"][on_top] == pytest.approx(np.tile([0, 0, 1], (2, 3, 1)))
     sides = mesh["normals"][np.abs(flat[:, 2]) < 1e-6]
-    assert np.abs(sides[..., 0]).min() > 0.3  # the upright edges stay smooth
+    assert np.abs(sides[..., 0]).min() > 0.3
 
 
 def test_bilinear_and_none_are_flat(tmp_path):

@@ -372,7 +372,7 @@ def test_as_openusd_reads_it(name: str) -> None:
         top = theirs.GetPrimAtPath(f"/MaterialX/{scope}")
         for prim in Usd.PrimRange(top) if top else ():
             if prim.GetName().startswith("ND_"):
-                continue  # OpenUSD names it by its definition, Wavecomb by its node
+                continue
             for attribute in prim.GetAttributes():
                 other = ours.GetAttributeAtPath(attribute.GetPath())
                 assert other and other.GetTypeName() == attribute.GetTypeName(), attribute

@@ -286,7 +286,7 @@ def test_prims_in_prims_a_thousand_deep(tmp_path):
 
 @pytest.mark.slow
 def test_instances_that_multiply_take_no_step_each(tmp_path):
-    """2^60 cameras and lights in sixty prototypes."""
+    """Sixty nested prototypes contain 2^60 cameras and lights."""
     text = ""
     for i in range(60):
         inside = "".join(

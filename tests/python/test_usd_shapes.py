@@ -25,7 +25,6 @@ def capsule(r, s, h):
     return area + 2 * PI * (r * r + s * s), volume + 2 * PI * (r**3 + s**3) / 3
 
 
-# prim, attributes, area, volume, extent
 SHAPES = [
     ("Sphere", "", 4 * PI, 4 * PI / 3, (1, 1, 1)),
     ("Sphere", "double radius = 3", 36 * PI, 36 * PI, (3, 3, 3)),

@@ -247,7 +247,7 @@ def test_what_cannot_be_drawn_is_left_out(tmp_path, text, says):
 
 
 def two_nurbs(knots="0, 0, 0, 0, 1, 1, 1, 1", point="0, 1, 0", more=""):
-    """Returns two cubic curves of one segment each. The arguments apply to the second."""
+    """Returns two cubic curves of one segment each. The arguments apply to the second curve."""
     return f"""def NurbsCurves "C" {{
         int[] curveVertexCounts = [4, 4]
         point3f[] points = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (3, 0, 0),

@@ -244,7 +244,7 @@ def test_modes_of_emission(
     found, scene, _ = the_volume(tmp_path, text)
     assert found["emission"] == pytest.approx(emission)
     assert (found["glow"] is not None) == has_grid
-    assert bool(scene.lights) == (mode == "none")  # an emissive volume counts as a light
+    assert bool(scene.lights) == (mode == "none")
 
 
 CLOSURE = """uniform token info:id = "ND_volume"

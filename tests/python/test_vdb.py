@@ -245,7 +245,7 @@ def test_tables_that_lead_in_a_circle_are_refused(tmp_path: Path) -> None:
     vdb.write(path, [{"name": "d", **noise(3)}])
     data = bytearray(path.read_bytes())
     size = struct.pack("<q", len(data))
-    at = data.rindex(size, 0, 400)  # the end of the only grid
+    at = data.rindex(size, 0, 400)
     data[at : at + 8] = struct.pack("<q", 57)
     path.write_bytes(data)
     with pytest.raises(WavecombError, match="grid offsets are out of order"):

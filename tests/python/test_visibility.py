@@ -81,7 +81,6 @@ def test_a_holdout_is_a_hole(plain: wavecomb.Picture, tmp_path: Path) -> None:
     hole, rest = ball == 1, ball == 0
     assert hole.any() and (held.aovs["alpha"][hole] == 0).all() and not held.beauty[hole].any()
     assert np.isinf(held.depth[hole]).all()
-    # Its shadows and its light on other objects stay equal bit for bit.
     np.testing.assert_array_equal(held.beauty[rest], plain.beauty[rest])
     by_stage = _render(tmp_path, "bool primvars:arnold:matte = 1")
     assert by_stage.beauty.tobytes() == held.beauty.tobytes()

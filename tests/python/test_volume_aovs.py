@@ -119,7 +119,6 @@ def test_opacity_is_half_where_it_should_be(tmp_path: Path, picture: wavecomb.Pi
     depth = _render(thick, spp=512).aovs["half_depth"].astype(np.float64)
     assert depth.mean() == pytest.approx(3 + math.log(2) / 1.5, rel=0.01)
     assert depth.std() < 0.08
-    # 0.37 of the light reaches the wall.
     assert 4.2 < picture.aovs["half_depth"].mean() < 4.55
     thin = _load(tmp_path, 0.001 + 0 * ABSORPTION)
     np.testing.assert_allclose(_render(thin).aovs["half_depth"], 6, rtol=0.015)
@@ -134,7 +133,6 @@ def test_light_of_volumes_is_a_layer(picture: wavecomb.Picture) -> None:
     exact = np.array([0.2, 0.1, 0.05]) / sigma * (1 - np.exp(-2 * sigma))
     assert glow == pytest.approx(exact, rel=0.02)
     assert (volume.mean(axis=(0, 1)) > 1.2 * glow).all()
-    # Light groups also contain all of it.
     groups = picture.aovs["light_other"]
     np.testing.assert_allclose(groups, picture.beauty, rtol=1e-5, atol=1e-6)
 
@@ -147,7 +145,6 @@ def test_cryptomatte_covers_by_opacity(picture: wavecomb.Picture) -> None:
         picture.aovs["crypto_object"], picture.manifests["crypto_object"]["/Wall"]
     )
     np.testing.assert_allclose(fog + wall, 1, atol=1e-6)
-    # Each channel decides for a third of the paths.
     through = np.exp(-2 * (ABSORPTION + SCATTERING)).mean()
     assert wall.mean() == pytest.approx(through, abs=0.01)
     material = wavecomb.cryptomatte.matte(

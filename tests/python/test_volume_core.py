@@ -70,7 +70,7 @@ def test_a_grid_that_grows_along_the_ray(kind: Any) -> None:
 
 
 def test_emission_and_absorption() -> None:
-    """eps / sigma (1 - exp(-sigma x)) in addition to exp(-sigma x) of the wall."""
+    """The emission eps / sigma (1 - exp(-sigma x)) is added to exp(-sigma x) of the wall."""
     builder = _core.SceneBuilder()
     builder.add_volume(
         IDENTITY,
@@ -126,7 +126,7 @@ def test_an_isotropic_half_space() -> None:
 
 
 def test_one_picture_whatever_renders_it() -> None:
-    """Integrators, lanes, threads, waves, regions and guiding give the same bits."""
+    """All integrators, lanes, threads, waves, regions and guiding modes give the same bits."""
     rng = np.random.default_rng(7)
     voxels = np.where(rng.random((16, 16, 16)) < 0.5, 0.0, rng.random((16, 16, 16))) * 4.0
     builder = _core.SceneBuilder()

@@ -54,7 +54,7 @@ def picture(builder: Any, spp: int, **more: Any) -> Any:
 def seen_through_a_slab(x: Any, seconds: tuple[float, float], sigma: float, edge: float) -> Any:
     """Returns the mean of exp(-sigma d(x - v t) L) over the shutter.
 
-    d is the density of a slab [-edge, edge], which falls linearly to 0 within a voxel.
+    The density d of a slab [-edge, edge] falls linearly to 0 within a voxel.
     """
     voxel = 2 * edge / 15
     times = np.linspace(*seconds, 801)
@@ -83,7 +83,6 @@ def test_the_opacity_of_a_slab_that_moves_evenly(kind: Any) -> None:
     error = rows.std(axis=0, ddof=1) / np.sqrt(len(rows)) + 1e-3
     assert np.all(np.abs(rows.mean(axis=0) - exact) < 5 * error)
     assert abs(rows.mean() - exact.mean()) < 2e-3
-    # The slab is visible where it is never at the frame time.
     assert exact[-4] < 0.95 and rows.mean(axis=0)[-4] < 0.96
 
 
@@ -150,7 +149,7 @@ def test_one_picture_whatever_renders_it() -> None:
 
 
 def test_a_render_goes_on_bit_for_bit() -> None:
-    """Resumed passes and adaptive sampling work as without motion."""
+    """Resumed passes and adaptive sampling also work with motion."""
     scene = swirl()
     once = wavecomb.render(scene, size=(16, 12), spp=16)
     parts = wavecomb.render(scene, size=(16, 12), spp=16, progressive=True)

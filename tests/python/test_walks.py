@@ -175,7 +175,7 @@ def add_ball(builder: Any, radius: float, material: int) -> None:
 
 
 def test_a_black_sphere_lets_through_what_misses_all_collisions() -> None:
-    """Chords of uniform light have the density l / (2 R^2)."""
+    """Chords of a sphere in uniform light have the density l / (2 R^2)."""
     radius, free_paths = 1.0, (2.0, 1.0, 0.5)
     builder = wavecomb.SceneBuilder()
     material = skin(builder, subsurface_color=(0, 0, 0), subsurface_radius=free_paths)
@@ -284,7 +284,7 @@ def test_a_radius_that_is_not_finite_is_told() -> None:
 
 
 def test_what_comes_from_below_has_a_layer() -> None:
-    """Subsurface light has a layer, which a diffuse wall does not contribute to."""
+    """Subsurface light has a layer, to which diffuse walls do not contribute."""
     seen = []
     for radius in ((1, 1, 1), (0, 0, 0)):
         builder = wavecomb.SceneBuilder()

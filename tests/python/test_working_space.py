@@ -83,7 +83,7 @@ def test_colours_of_openpbr_are_converted(tmp_path):
         assert got["specular_color"] == pytest.approx(expected)
         for name in layers:
             assert got["openpbr"][name] == pytest.approx(expected), name
-        assert got["openpbr"]["coat_ior"] == pytest.approx(1.6)  # numbers are not converted
+        assert got["openpbr"]["coat_ior"] == pytest.approx(1.6)
 
 
 def test_colours_beyond_rec709_are_kept(tmp_path):
@@ -92,7 +92,7 @@ def test_colours_beyond_rec709_are_kept(tmp_path):
     )
     scene, _ = load(tmp_path, text, working_space="acescg")
     assert scene.lights[0]["color"] == pytest.approx((2, 0, 0), abs=1e-4)
-    scene, _ = load(tmp_path, text)  # at the limit of the Rec.709 gamut
+    scene, _ = load(tmp_path, text)
     assert scene.lights[0]["color"] == pytest.approx((3.4101, 0, 0), abs=1e-3)
 
 
@@ -143,7 +143,7 @@ def test_textures_are_converted_by_what_they_are(tmp_path):
     assert colour["pixels"].dtype == np.float16 and not colour["srgb"]
     expected = from_rec709(linear, "acescg")
     assert colour["pixels"][0, 0] == pytest.approx(expected, rel=2e-3)
-    assert rough["pixels"].dtype == np.uint8 and rough["srgb"]  # only decoded from sRGB
+    assert rough["pixels"].dtype == np.uint8 and rough["srgb"]
 
 
 def test_unknown_working_space(tmp_path):

@@ -23,7 +23,7 @@ class Recorder:
         self.camera = None
         self.grids, self.volumes = [], []
         self.visibility = []  # (path, rays)
-        self.motions = []  # (name of a group, its transforms over the shutter)
+        self.motions = []
 
     def add_texture(self, pixels, *, srgb, wrap_s="repeat", wrap_t="repeat", name=""):
         assert pixels.ndim == 3 and 1 <= pixels.shape[2] <= 4 and pixels.flags.c_contiguous
@@ -63,7 +63,7 @@ class Recorder:
         asset_length=0,
         mesh_light=None,
     ):
-        steps = positions.shape[:-2]  # shutter steps of a deforming mesh
+        steps = positions.shape[:-2]
         n, m = positions.shape[-2], len(indices)
         assert positions.dtype == np.float32 and positions.shape == (*steps, n, 3)
         assert indices.dtype == np.uint32 and indices.shape == (m, 3)

@@ -53,7 +53,7 @@ class Golden:
         size: Width and height; multiples of 8.
         reference_spp: Samples of each of the reference's 32 batches.
         spp: Samples of each of the test's 16 batches.
-        settings: Settings of both renders.
+        settings: Settings of the reference and of the test render.
     """
 
     name: str
@@ -121,7 +121,7 @@ def golden_names() -> list[str]:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Result of a test; `good` if the images differ only by noise."""
+    """Result of a comparison with a reference; `good` if the images differ only by noise."""
 
     pixels: float
     blocks: float
@@ -130,7 +130,7 @@ class Verdict:
 
     @property
     def good(self) -> bool:
-        """Whether all three parts pass."""
+        """Whether pixels, blocks and the image mean all pass."""
         from scipy import stats
 
         limit = stats.norm.isf(MEAN_SIGNIFICANCE / 6.0)

@@ -42,7 +42,7 @@ def batches(render: Callable[[int], NDArray[np.float32]], count: int, first_seed
 
 @dataclass(frozen=True)
 class Agreement:
-    """Result of the tests.
+    """Result of the comparison of two renderers.
 
     Attributes:
         accepted: Fraction of pixels and channels that pass.

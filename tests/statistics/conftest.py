@@ -78,8 +78,8 @@ def beauty() -> Render:
 def fewer(request: pytest.FixtureRequest) -> int:
     """Divisor of sample counts: 4 in `make test`, 1 in `make test-long`.
 
-    `make test-long` therefore detects differences half as large. The noise determines the level of
-    Welch's t, so fewer samples do not cause more failures.
+    `make test-long` therefore detects differences half as large as `make test`. The noise
+    determines the level of Welch's t, so fewer samples do not cause more failures.
     """
     return int(request.param)
 

@@ -31,7 +31,7 @@ class Fault:
     """A fault that was fixed.
 
     Attributes:
-        name: Description of the fault.
+        seed: Seed of the pairs.py stage that reveals the fault.
         seed: Seed of the stage of pairs.py that reveals it.
         changes: (file, text of the fix, text without the fix).
     """

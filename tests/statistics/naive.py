@@ -48,7 +48,7 @@ def naive_module() -> ModuleType:
     """Import the naive integrator of this build.
 
     Raises:
-        ImportError: It is not built, or older than the core.
+        ImportError: The module is not built, or older than the core.
     """
     import wavecomb._core  # noqa: F401  # its scenes are taken
 
@@ -99,7 +99,7 @@ class Comparison:
         return self.worst > limit(self.z.size * scenes)
 
     def is_sure(self, scenes: int) -> bool:
-        """Whether a difference exceeds normal noise and also what a few rare paths can make.
+        """Whether a difference exceeds both normal noise and the effect of a few rare bright paths.
 
         Welch's t takes the variance from the batches. Where a few paths carry most of the light, a
         render that has found none of them has a small variance and the wrong mean. If both renders
@@ -117,12 +117,12 @@ class Comparison:
 
 
 def level(tests: int) -> float:
-    """Level of one of this number of tests, by Sidak's correction."""
+    """Significance level of one of this number of tests, by Sidak's correction."""
     return float(-np.expm1(np.log1p(-LEVEL) / tests))
 
 
 def limit(tests: int) -> float:
-    """Limit of |z| for this number of tests."""
+    """Limit of |z| for each of this number of tests."""
     return float(stats.norm.isf(level(tests) / 2.0))
 
 
@@ -130,11 +130,11 @@ def typical_contribution(batches: Array, samples: int) -> Array:
     """Contribution of a path, averaged with the contribution as weight, (height, width, 3).
 
     It is the ratio of variance to mean of single samples, which is E[x^2] / E[x] for rare paths. If
-    all light comes from paths of one contribution, it is that contribution.
+    all light comes from paths of one contribution, the value is that contribution.
 
     Args:
         batches: Images, (n, height, width, 3).
-        samples: Number of samples per pixel of each.
+        samples: Number of samples per pixel of each image.
     """
     mean = np.abs(batches.mean(axis=0))
     return np.where(mean > 0, samples * batches.var(axis=0, ddof=1) / np.maximum(mean, 1e-300), 0.0)
@@ -151,8 +151,8 @@ def judge(
     """Compare two images given as batches.
 
     Args:
-        ours: Images of one side, (n, height, width, 3).
-        naive: Images of the other side.
+        ours: Images of the first renderer, (n, height, width, 3).
+        naive: Images of the second renderer.
         tolerance: Relative difference to ignore.
         samples: Number of samples per pixel of a batch, for ``Comparison.events``.
         contribution: Least value of ``Comparison.contribution``, from earlier comparisons.

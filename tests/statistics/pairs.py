@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random stages by every pair of settings that must agree in expectation.
+"""Compare renders of random stages with pairs of settings that must agree in expectation.
 
     .venv/bin/python tests/statistics/pairs.py 17                    # one seed, with its images
     .venv/bin/python tests/statistics/pairs.py --from 0 --count 500  # many; exit code 1 on a fault
@@ -13,9 +13,9 @@ that Sidak's correction leaves of 1 % for all comparisons of a run.
 
 Where a few paths carry most of the light, z is not normal: a render that has found none of them has
 a small variance. Such a difference is a fault only if it is more than these paths can make by
-chance (``Comparison.is_sure``). Else it is repeated with ``FURTHER`` times as many samples. If it
-is too large even then, the comparison is undecided. A run in which more than ``MOST_UNDECIDED`` of
-the stages have such comparisons fails.
+chance (``Comparison.is_sure``). Otherwise the comparison is repeated with ``FURTHER`` times as many
+samples. If the difference is too large even then, the comparison is undecided. A run in which more
+than ``MOST_UNDECIDED`` of the stages have such comparisons fails.
 """
 
 from __future__ import annotations
@@ -78,11 +78,11 @@ CHOICES: dict[str, tuple[Any, ...]] = {
 FURTHER = 300
 """Factor of the samples of a last repeat, for differences that a few rare paths can make."""
 MOST_UNDECIDED = 0.01
-"""Share of the stages of a run that may have undecided comparisons; one stage always may."""
+"""Fraction of the stages of a run that may have undecided comparisons; one stage always may."""
 MERGED_TOLERANCE = 0.03
-"""Relative difference that a blurred caustic may make to the image mean, by loss at edges."""
+"""Relative difference that a blurred caustic may cause in the image mean, by loss at edges."""
 SMOOTH_TOLERANCE = 0.01
-"""Relative difference that light paths may make on smooth coarse meshes.
+"""Relative difference that light paths may cause on smooth coarse meshes.
 
 A ball of 8 rings of faces differs by up to 0.5 %, and by a quarter of that with twice as many
 (docs/light-paths.md).
@@ -91,7 +91,7 @@ A ball of 8 rings of faces differs by up to 0.5 %, and by a quarter of that with
 
 @dataclass(frozen=True)
 class Variant:
-    """Settings to compare with the plain ones.
+    """Settings to compare with the plain settings.
 
     Attributes:
         name: Short name for messages.
@@ -111,7 +111,7 @@ class Result:
     Attributes:
         variant: The variant that was compared.
         found: The comparison; None if the renderer refuses the settings for this stage.
-        refusal: The renderer's message in that case.
+        refusal: The renderer's message if it refuses the settings.
         tries: Number of comparisons made, with growing numbers of samples.
     """
 
@@ -121,7 +121,7 @@ class Result:
     tries: int = 1
 
     def is_fault(self, tests: int) -> bool:
-        """Whether the difference is too large for chance, as one of so many comparisons."""
+        """Whether the difference is too large for chance, given the number of comparisons."""
         return self.found is not None and self.found.is_sure(tests)
 
     def is_undecided(self, tests: int) -> bool:
@@ -130,7 +130,7 @@ class Result:
 
 
 def is_open(found: Comparison, tests: int) -> bool:
-    """Whether Welch's t calls a difference a fault that a few rare paths can make."""
+    """Whether Welch's t reports a fault although a few rare paths can cause the difference."""
     return found.is_fault(tests) and not found.is_sure(tests)
 
 
@@ -189,7 +189,7 @@ class Renders:
         """Returns the settings to compare a variant with: plain ones, or light paths.
 
         Camera paths cannot find a point or a direction through a smooth lobe, and light paths can.
-        So where a stage has both, only renders with light paths agree with each other.
+        If a stage has both, only renders with light paths agree with each other.
         """
         transport = variant.settings.get("transport", "path")
         unseen = {"sun light", "point light"} & set(self.scene.features)
@@ -256,7 +256,7 @@ class Renders:
 
         Args:
             variant: Settings to compare.
-            turn: Later turns have more samples and other seeds.
+            turn: Number of the comparison; later ones have more samples and other seeds.
             contribution: Largest contribution that earlier turns have found (naive.judge).
         """
         more = (1, *MORE, FURTHER)[turn]

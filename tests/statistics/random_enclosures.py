@@ -16,7 +16,9 @@ from random_materials import Materials, colour, number
 from stages import box, matrix, moved, quad, sphere, turned
 
 KINDS = ("lit shell", "thin wall", "lit subsurface", "nested glass", "touching light")
-"""Kinds of enclosures. Consecutive seeds cycle through them; every sixth seed has none."""
+"""Kinds of enclosures. Consecutive seeds cycle through the kinds of enclosures; every sixth seed
+has none.
+"""
 
 
 class Enclosures:

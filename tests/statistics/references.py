@@ -140,7 +140,7 @@ class Reference:
             recorded: The scene.
             settings: Image size and path depth.
             kind: Class derived from ``MitsubaScene`` that adds features which cannot be recorded.
-            about: All parameters of such a class; part of the key.
+            about: All parameters of that class; part of the cache key.
         """
         from mitsuba_bridge import MitsubaScene
         from recorded import Recorded

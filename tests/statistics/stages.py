@@ -30,7 +30,7 @@ def numbers(values: Any) -> str:
 
 
 def matrix(rows: Array) -> str:
-    """Transform op of a prim, for row vectors."""
+    """Transform op of a prim, as a matrix for row vectors."""
     inner = ", ".join("(" + ", ".join(f"{v:.17g}" for v in row) + ")" for row in rows)
     return (
         f"matrix4d xformOp:transform = ( {inner} )\n"

@@ -33,7 +33,7 @@ def test_accepts_noise(spread: float) -> None:
 
 
 def test_finds_one_percent_everywhere() -> None:
-    """The noise of the mean image is 0.2 % here; in real tests it is 0.02 to 0.2 %."""
+    """The noise of the mean image is 0.2 % in this test; in real tests it is 0.02 to 0.2 %."""
     assert passes(noise(0), noise(1))
     assert not passes(noise(0) * 1.01, noise(1))
 

@@ -154,7 +154,7 @@ def test_smooth_glass_keeps_all_energy(shot: Any) -> None:
 
 FLOOR = material("M", "diffuse", diffuseColor=(0.5, 0.5, 0.5))
 DOWN = camera((0, 5, 0), (0, 0, 0), half=0.004)
-"""Camera from above that sees 4 cm around the origin."""
+"""A camera above the floor that sees 4 cm around the origin."""
 
 
 def floor_radiance(shot: Any, *lights: str) -> NDArray[np.float64]:

@@ -105,7 +105,7 @@ def textured(threshold: float = 0.0) -> str:
 
 
 def driven() -> str:
-    """Opacity by a graph: 1/2 + x, with x along the square in object space."""
+    """Opacity by a value graph: 1/2 + x, with x along the square in object space."""
     return f"""def Material "G" {{
         token outputs:mtlx:surface.connect = </World/G/Surface.outputs:out>
         def Shader "Surface" {{

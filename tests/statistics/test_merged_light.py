@@ -41,7 +41,6 @@ def test_a_floor_under_glass(tmp_path: Path, beauty: Any) -> None:
     expected = albedo / np.pi * power * sum(reflected) * (1 - r) / (1 + r)
     settings: dict[str, Any] = {"max_depth": 12, "sampler": "sobol", "transport": "light"}
     found = beauty(stage, 32, 256, merge_radius=2.0, **settings)
-    # 2 % more light comes via floor and plate.
     assert found.mean() == pytest.approx(1.015 * expected, rel=0.06)
     assert beauty(stage, 16, 16, **settings).max() == 0.0
 

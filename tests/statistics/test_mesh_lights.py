@@ -149,7 +149,6 @@ def test_both_halves_of_mis_tell_of_the_same_light(shot: Any, mode: str) -> None
 
 
 def test_mirrors_show_what_cameras_see(shot: Any) -> None:
-    # its mirror image meets the light's plane at z = 0
     view = camera((0, 1, 2), (0, 0, 1), half=0.05)
     mesh = lamp("float inputs:intensity = 7", bound="G")
     close(shot(view, glossy(0), GLOW, mesh, spp=16), np.array((0.5, 1, 2)) * 0.9, 0.05)
@@ -169,7 +168,7 @@ def test_normalize_divides_by_the_area(shot: Any, scale: float, scheme: str) -> 
 
 @pytest.mark.slow
 def test_sphere_of_triangles_is_a_sphere_light(shot: Any) -> None:
-    """Normalised and far away: radiance 1 / (4 pi r^2) over a visible disk of pi r^2."""
+    """A normalised light far away has radiance 1 / (4 pi r^2) over a visible disk of pi r^2."""
     ball = sphere("Lamp", "M", (0, 30, 0), rings=48)
     ball = ball.replace('["MaterialBindingAPI"]', '["LightAPI", "MaterialBindingAPI"]')
     power = "bool inputs:normalize = 1\nfloat inputs:intensity = 100\n"
@@ -178,7 +177,7 @@ def test_sphere_of_triangles_is_a_sphere_light(shot: Any) -> None:
 
 
 def test_textured_glow_is_tinted(shot: Any, tmp_path: Path) -> None:
-    """Equals the same texture with the tint in its scale, without a light."""
+    """The image equals that of the same texture with the tint in its scale, without a light."""
     pixels = np.random.default_rng(3).random((8, 8, 3)).astype(np.float32)
     out = oiio.ImageBuf(oiio.ImageSpec(8, 8, 3, "float"))
     out.set_pixels(oiio.ROI(), pixels)
@@ -203,7 +202,7 @@ def test_textured_glow_is_tinted(shot: Any, tmp_path: Path) -> None:
 
 
 def test_instances_are_lights_of_their_own(shot: Any) -> None:
-    """Two normalised instances of one prototype: each is divided by its own world-space area."""
+    """Two normalised instances of one prototype are each divided by their own world-space area."""
     inner = lamp(ALONE, "bool inputs:normalize = 1", place=None)
     big = np.diag((2.0, 2.0, 2.0, 1))
     prims = f"""class "Lamps" {{
@@ -251,11 +250,11 @@ def test_shaping(shot: Any) -> None:
     """A cone around the mesh's -z; focus and cone also affect the visible radiance."""
     for angle, expected in ((60, 1), (20, 0)):
         mesh = lamp(ALONE, f"float inputs:shaping:cone:angle = {angle}")
-        view = camera((0, 0.01, 0), (0.45, 1, 0), half=0.01)  # 24 degrees off the axis
+        view = camera((0, 0.01, 0), (0.45, 1, 0), half=0.01)
         close(shot(view, FLOOR, mesh, spp=4), expected if expected else 0, 1e-6)
     small = np.diag((0.05,) * 3 + (1,)) @ DOWN
     focused = lamp(ALONE, "float inputs:shaping:focus = 2", place=small)
-    where = camera((2, 1, 1), (1, 0, 0), half=1e-3)  # 45 degrees off axis, cos^2 = 1 / 2
+    where = camera((2, 1, 1), (1, 0, 0), half=1e-3)
     plain = lamp(ALONE, place=small)
     close(shot(where, FLOOR, focused), 0.5 * shot(where, FLOOR, plain), 4e-3)
 

@@ -187,7 +187,7 @@ def test_several_lights(check: Check, recorded: Any, tmp_path: Path) -> None:
 
 
 def test_emissive_mesh(check: Check, recorded: Any) -> None:
-    """A closed emitter, because ours emit to both sides and Mitsuba's only outwards."""
+    """Uses a closed emitter, because Wavecomb's emit to both sides and Mitsuba's only outwards."""
     lamp = material("Lamp", "emissive", emissiveColor=(5, 7, 3))
     scene = recorded(
         VIEW, GREY, BLUE, lamp, ground("Grey"), sphere("Ball", "Blue", (0, 1, 0)),
@@ -211,7 +211,7 @@ def test_gold(check: Check, recorded: Any, tmp_path: Path, roughness: float) -> 
     """A conductor with measured index.
 
     Mitsuba's masking and shadowing are separable, ours are height-correlated; and Mitsuba omits
-    multiple scattering, which we compensate. The differences are invisible up to alpha 0.04.
+    multiple scattering, which we compensate. These differences are invisible up to alpha 0.04.
     """
     dome = light("Dome", texture=write_sky(tmp_path))
     gold = material("Gold", "metal", eta=GOLD_ETA, k=GOLD_K, roughness=roughness)
@@ -267,12 +267,12 @@ def test_highlight(check: Check, recorded: Any, program: str) -> None:
 def test_rough_gold_gives_back_what_single_scattering_loses(
     mitsuba: ModuleType, beauty: Any, recorded: Any
 ) -> None:
-    """At alpha 0.2 in a white furnace Mitsuba's gold loses about 7 %, ours does not.
+    """At alpha 0.2 in a white furnace, Mitsuba's gold loses about 7 %, Wavecomb's does not.
 
     By hand: GGX of alpha 0.2025 loses L = 0.0837 on average (integral of G2 / G1 over visible
     normals). Further bounces return the fraction F^2 (1 - L) / (1 - F L) of this energy, which is
     0.92, 0.64 and 0.12 for the mean reflectances F of red, green and blue, 0.97, 0.81 and 0.36. A
-    distant ball gains this amount.
+    distant ball gains this amount of energy.
     """
     from mitsuba_bridge import PeerSettings
 
@@ -281,7 +281,7 @@ def test_rough_gold_gives_back_what_single_scattering_loses(
     scene = recorded(view, light("Dome"), gold, sphere("Ball", "Gold", rings=64))
     peer = Reference(mitsuba, scene, PeerSettings(32, 32, 1))
     gain = (beauty(scene.scene, 32, 256, max_depth=1) - peer.render(256)).mean(axis=(0, 1))
-    gain *= (2 * 0.0165 * 60) ** 2 / np.pi  # per area of the visible disk
+    gain *= (2 * 0.0165 * 60) ** 2 / np.pi
     assert np.abs(gain - 0.0837 * np.array((0.92, 0.64, 0.12))).max() < 0.008
 
 

@@ -146,7 +146,7 @@ def test_what_is_refused_is_no_fault(tmp_path: Path) -> None:
 
 
 SHAPE = (10, 12, 12, 3)
-"""Ten batches of 12 x 12 pixels."""
+"""Ten batches of images of 12 x 12 pixels."""
 
 
 def flat(mean: float, seed: int) -> Any:
@@ -166,7 +166,7 @@ def sparse(mean: float, seed: int, paths: float) -> Any:
 
 
 def dimmed(image: Any) -> Any:
-    """The image with a left third that has a tenth of the light."""
+    """The expected image, whose left third has a tenth of the light."""
     image[:, :, :4] /= 10
     return image
 
@@ -216,7 +216,7 @@ def test_contributions_of_earlier_comparisons_count() -> None:
 
 
 def test_what_is_open_is_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Open comparisons have a last turn, which decides or leaves them undecided."""
+    """Undecided comparisons have a last turn, which decides or leaves them undecided."""
     turns: list[tuple[str, int]] = []
 
     def compare(self: Renders, variant: Variant, turn: int, contribution: Any = 0.0) -> Comparison:

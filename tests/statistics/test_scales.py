@@ -52,7 +52,7 @@ def scaled(folder: Path, scale: float, place: tuple[float, float, float] = (0, 0
 
 @pytest.mark.slow
 def test_scales(tmp_path: Path, beauty: Any) -> None:
-    """Independent noise: a separate seed range for each scale."""
+    """Each scale has a separate range of seeds, so that noise is independent."""
     unit = scaled(tmp_path, 1.0)
     b = batches(lambda seed: beauty(unit, 64, 64, seed=seed, max_depth=5), 8, first_seed=700)
     for k, scale in enumerate(SCALES):
@@ -76,7 +76,7 @@ def test_far_from_the_origin(tmp_path: Path, beauty: Any) -> None:
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3, 1e5])
 def test_same_noise(tmp_path: Path, beauty: Any, scale: float) -> None:
-    """Equal random numbers: apart from rounding, pixels differ where a few paths diverge."""
+    """With equal random numbers, pixels differ only by rounding and where a few paths diverge."""
     scale = 2.0 ** round(np.log2(scale))
     a, b = (beauty(scaled(tmp_path, s), 48, 4, max_depth=5) for s in (scale, 1.0))
     close = np.isclose(a, b, rtol=1e-3, atol=1e-4).all(axis=2)

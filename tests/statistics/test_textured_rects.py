@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 WIDTH, HEIGHT = 1.0, 0.7
 FLOOR = material("M", "diffuse", diffuseColor=(0.5, 0.5, 0.5))
 DOWN = camera((0, 5, 0), (0, 0, 0), half=0.004)
-"""Camera from above that sees 4 cm around the origin."""
+"""A camera above the floor that sees 4 cm around the origin."""
 PLACES = {
     "above": turned(-90) @ moved(0.8, 1.2, 0.3),
     "tilted": turned(-60, 70, 10) @ moved(0.8, 1.2, 0.3),
@@ -66,7 +66,7 @@ def test_irradiance(tmp_path: Path, beauty: Any, place: str) -> None:
     p = (local @ frame)[..., :3]
     d2 = (p**2).sum(-1)
     cos_floor = np.maximum(p[..., 1], 0) / np.sqrt(d2)
-    cos_light = np.maximum((p @ frame[2, :3]) / np.sqrt(d2), 0)  # the light's -z, towards the floor
+    cos_light = np.maximum((p @ frame[2, :3]) / np.sqrt(d2), 0)
     given = radiance(image.astype(np.float64), s, t) * (cos_floor * cos_light / d2)[..., None]
     expected = 0.5 / np.pi * given.mean((0, 1)) * WIDTH * HEIGHT
     assert np.abs(found / expected - 1).max() < 1e-2, (found, expected)

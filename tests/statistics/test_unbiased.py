@@ -14,7 +14,7 @@ from stages import camera, ground, light, look_at, material, quad, sphere, write
 import wavecomb
 
 _plain: dict[Any, Any] = {}
-"""Cached images with plain settings, the reference for several tests."""
+"""Cached images with plain settings, which several tests use as reference."""
 
 
 @pytest.fixture(scope="module")
@@ -75,9 +75,7 @@ def test_seeds_are_independent(cornell: Any, beauty: Any, sampler: str) -> None:
 
 
 def rel_mse(picture: Any, reference: Any) -> float:
-    """As in the benchmarks, without the worst 1 % of pixels: the edge of the light, which is
-    chance.
-    """
+    """Errors exclude the worst 1 % of pixels, at the edge of the light, as benchmarks do."""
     error = ((picture - reference) ** 2 / (reference**2 + 0.01)).mean(axis=2).ravel()
     return float(np.sort(error)[: -error.size // 100].mean())
 

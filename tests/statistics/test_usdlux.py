@@ -17,11 +17,11 @@ import usdlux
 from usdlux_judge import Verdict, judge
 
 FEW = ("sphere:18", "rect:28", "cylinder:1", "disk:1", "iesTest:5")
-"""A colour temperature, a soft cone, shapes, and a profile scaled by -0.5."""
+"""Stages with a colour temperature, a soft cone, shapes, and a profile scaled by -0.5."""
 
 
 def files(pictures: tuple[str, ...]) -> list[str]:
-    """Reference files of the suite for these images."""
+    """Reference files of the UsdLux suite for these images."""
     found = []
     for stage, _, frame in (picture.partition(":") for picture in pictures):
         found += [
@@ -45,7 +45,7 @@ def test_a_few_pictures(tmp_path: Path) -> None:
 @needs_asset(*files(("sphere:1", "dome:1", "visibleRect:1")))
 @pytest.mark.parametrize("size", ["256", "512"])
 def test_the_whole_suite(size: str, tmp_path: Path) -> None:
-    """The whole suite with 256 samples: means within 0.5 %, blocks within noise."""
+    """Renders the whole suite with 256 samples: means agree within 0.5 %, blocks within noise."""
     assert usdlux.main(["--size", size, "--spp", "256", "-o", str(tmp_path)]) == 0
 
 

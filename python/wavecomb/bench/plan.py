@@ -266,7 +266,7 @@ class Estimator:
     Attributes:
         start_s: Time in seconds of a process that renders almost nothing of a small stage.
         rate: Samples per second and thread, by number of lanes. Other renderers are assumed to be
-            equally fast.
+            as fast as Wavecomb.
         measured: Wall times in seconds of finished runs, by configuration.
     """
 

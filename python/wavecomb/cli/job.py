@@ -188,7 +188,7 @@ class Job:
     def _caught(
         self, picture: Picture, shot: Shot, settings: Any, is_stopped: Callable[[], bool]
     ) -> Picture:
-        """Adds the shadows on catchers to an image; leaves them out if the render was stopped."""
+        """Adds the shadows on catchers to an image, unless the render was stopped."""
 
         def render(how: Mapping[str, str]) -> Any:
             shot.load(None, **how)

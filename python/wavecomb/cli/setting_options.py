@@ -149,7 +149,7 @@ ImageSize = tuple[int, int] | Percent
 
 
 class SizeType(click.ParamType):
-    """Type of --size. ``SettingCommand`` joins two words to one before."""
+    """Type of --size. ``SettingCommand`` has joined the two words of a size to one."""
 
     name = "size"
 

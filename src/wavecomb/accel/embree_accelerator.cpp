@@ -79,7 +79,7 @@ struct EmbreeAccelerator::Impl {
   uint32_t first_world, first_light;         ///< as in EmbreeHierarchy
   uint32_t native;                           ///< rays in the widest native packet
   std::unique_ptr<const TriangleList> list;  ///< replaces the BVH in small scenes; otherwise null
-  bool is_hair;                              ///< most primitives are curve segments
+  bool is_hair;                              ///< Whether most primitives are curve segments.
 
   Impl(std::shared_ptr<const Scene> of, std::shared_ptr<const EmbreeHierarchy> built)
       : scene(std::move(of)),
@@ -145,7 +145,7 @@ struct EmbreeAccelerator::Impl {
   template <uint32_t W, typename Ray>
   static void load_rays(Ray& ray, int* valid, const RaySpan& rays, size_t base, size_t n) {
     for (uint32_t i = 0; i < W; ++i) valid[i] = i < n ? -1 : 0;
-    // Columns are padded, so reading a whole packet past the end is safe.
+    // Columns are padded by a packet, so reads may go past their end.
     std::memcpy(ray.org_x, rays.ox + base, 4 * W);
     std::memcpy(ray.org_y, rays.oy + base, 4 * W);
     std::memcpy(ray.org_z, rays.oz + base, 4 * W);
@@ -224,7 +224,7 @@ struct EmbreeAccelerator::Impl {
   /// calls filters with single rays, whose position in the packet is unknown, so the native width
   /// is the limit. Moving instances use single rays, since Embree inverts their transform with
   /// different operations for packets and single rays, which changes hits. Incoherent rays in hair
-  /// also use single rays, because they soon share no boxes.
+  /// also use single rays, because rays of a packet soon traverse different BVH nodes.
   uint32_t packet(uint32_t width, bool coherent, const PresenceKeys& keys) const {
     const bool parts = is_hair && !coherent && !keys.object;
     return parts || view.motion.instances ? 1 : std::min(width, native);

@@ -14,8 +14,8 @@ namespace wavecomb {
 /// Rays to trace, in SoA layout. Directions are unit vectors; tnear is 0.
 struct RaySpan {
   const float *ox, *oy, *oz, *dx, *dy, *dz;
-  const float* tfar;     ///< maximum distance; null means unlimited
-  const uint32_t* slot;  ///< path slots for PresenceKeys; null: the ray index is used
+  const float* tfar;     ///< maximum distance of each ray; null means unlimited
+  const uint32_t* slot;  ///< path slots for PresenceKeys; null means that the ray index is the slot
   size_t size;
   const float* time = nullptr;  ///< shutter time in [0, 1]; null means 0
 };
@@ -51,8 +51,8 @@ struct PresenceKeys {
   const uint32_t* shadow_set = nullptr;
   uint32_t shadow_stride = 0;
   uint32_t ray_kind = kVisibleToCamera;  ///< a RayVisibility flag
-  /// object_of() of the only object that each ray can hit, with the stride of the hashes. Such rays
-  /// hit no lights. Null: rays hit all objects.
+  /// object_of() of the only object that each ray can hit, with the stride of the hashes. Rays that
+  /// are restricted to one object hit no lights. Null means that rays hit all objects.
   const uint32_t* object = nullptr;
 };
 

@@ -55,7 +55,7 @@ void for_hits(const Arguments& args, RTCRayN* rays, CurveQuery query, const Want
       intersect({args.primID});
       continue;
     }
-    // tfar is negative after an occlusion hit.
+    // Embree sets tfar to a negative value after an occlusion hit.
     uint32_t left = curves.nodes->may_hit(args.primID, *ray, tfar);
     for (; left != 0 && tfar >= 0; left &= left - 1)
       intersect(
@@ -131,7 +131,7 @@ RTCGeometry make_curve_geometry(RTCDevice device, const CurveGeometry& user, Hit
   const size_t count = user.nodes ? user.nodes->count() : user.mesh->primitive_count();
   rtcSetGeometryUserPrimitiveCount(g, static_cast<unsigned>(count));
   rtcSetGeometryTimeStepCount(g, user.mesh->steps);
-  rtcSetGeometryUserData(g, const_cast<CurveGeometry*>(&user));  // callbacks only read the data
+  rtcSetGeometryUserData(g, const_cast<CurveGeometry*>(&user));  // Callbacks only read the data.
   rtcSetGeometryBoundsFunction(g, curve_box, nullptr);
   const bool is_bare = rule == HitRule::kEmbree;
   rtcSetGeometryIntersectFunction(g, is_bare ? intersect_curves_bare : intersect_curves);

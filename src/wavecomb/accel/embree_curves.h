@@ -15,8 +15,8 @@ namespace wavecomb {
 struct CurveGeometry {
   const Mesh* mesh;
   uint32_t id;       ///< mesh index
-  bool is_filtered;  ///< some hits may be rejected by presence, visibility or light linking
-  bool is_fibre;     ///< rays hit it from outside only
+  bool is_filtered;  ///< whether presence, visibility or light linking may reject hits
+  bool is_fibre;     ///< whether rays hit the curves from outside only
   /// Curve BVH nodes that are Embree's primitives. Null for points and deforming curves, whose
   /// primitives are passed individually.
   std::unique_ptr<const CurveBvhNodes> nodes;

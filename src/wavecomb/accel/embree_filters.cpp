@@ -122,8 +122,8 @@ void intersect_lights(const RTCIntersectFunctionNArguments* args) {
     if (args->valid[i] == 0) continue;
     const float t = intersect_light_shape(args->geometryUserPtr, ray, n, i);
     if (t == 0.f || t > best->t[i]) continue;
-    // Ties go to the smaller instance id, and the world has the largest, then to the smaller
-    // geometry.
+    // Among hits at equal distance, the smaller instance id wins (the world has the largest id),
+    // then the smaller geometry id.
     if (t == best->t[i] && (RTCHitN_instID(hit, n, i, 0) != RTC_INVALID_GEOMETRY_ID ||
                             RTCHitN_geomID(hit, n, i) < args->geomID))
       continue;

@@ -46,7 +46,7 @@ void store_bounds(const Bounds& b, RTCBounds& out);
 void light_box(const RTCBoundsFunctionArguments* args);
 /// Keeps the closest hit by the rule of closest_filter.
 void intersect_lights(const RTCIntersectFunctionNArguments* args);
-/// Keeps any closest hit, for queries without a QueryContext.
+/// Keeps the closest hit without a tie rule, for queries without a QueryContext.
 void intersect_lights_bare(const RTCIntersectFunctionNArguments* args);
 void occlude_lights(const RTCOccludedFunctionNArguments* args);
 

@@ -185,7 +185,7 @@ void EmbreeHierarchy::attach_light(uint32_t id, const LightGeometry& shape) cons
   } else {
     RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_USER);
     rtcSetGeometryUserPrimitiveCount(g, 1);
-    rtcSetGeometryUserData(g, const_cast<LightGeometry*>(&shape));  // callbacks only read the data
+    rtcSetGeometryUserData(g, const_cast<LightGeometry*>(&shape));  // Callbacks only read the data.
     rtcSetGeometryBoundsFunction(g, light_box, nullptr);
     rtcSetGeometryIntersectFunction(
         g, rule_ != HitRule::kEmbree ? intersect_lights : intersect_lights_bare);

@@ -18,8 +18,9 @@ struct EmbreeDevice;
 
 /// Embree geometries of meshes, scenes of groups, and the top-level scene with light shapes.
 ///
-/// Contract: immutable. Keeps the mesh arrays alive. Of the materials it depends only on which
-/// meshes need the presence filter; the filter reads the materials of the traced scene.
+/// Contract: immutable. Keeps the mesh arrays alive. The hierarchy depends on materials only by the
+/// choice of meshes that need the presence filter; the filter reads the materials of the traced
+/// scene.
 class EmbreeHierarchy {
  public:
   /// `origin`: hierarchy of a scene with the same meshes, whose device, geometries and groups are

@@ -14,7 +14,8 @@ struct LightGeometry {
   LightShape shape = LightShape::kNone;
   LightRecord light{};                  ///< only kind, p, u, v and radius are set
   const LightKindInfo* kind = nullptr;  ///< null for kNone
-  LightMotion motion{};                 ///< motion, if any; such lights use LightShape::kCustom
+  LightMotion motion{};                 ///< motion of the light, if any; moving lights use
+                                        ///< LightShape::kCustom
   std::vector<LightStep> steps;
 
   bool operator==(const LightGeometry& other) const;

@@ -42,8 +42,8 @@ class TriangleList {
   struct Triangle {
     float n[3], p[3];
     uint16_t vertex[3];
-    bool filtered;       ///< hits must pass accepts_hit()
-    bool in_same_plane;  ///< n and p equal those of the previous triangle
+    bool filtered;       ///< whether hits must pass accepts_hit()
+    bool in_same_plane;  ///< whether n and p equal those of the previous triangle
     uint32_t mesh;
   };
   struct Vertex {

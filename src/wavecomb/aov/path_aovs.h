@@ -131,7 +131,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   void survive(uint32_t depth, const UInt<F>& slot, const F& q, const Mask<F>& active) const {
     if (!bounces_ || depth == 0) return;
     BounceRow<F> row = load_row<BounceRow, F>(bounces_.rows, slot, active);
-    row.survived += q - 1.f;  // add_bounce() has counted the bounce with probability 1
+    row.survived += q - 1.f;  // add_bounce() has already counted the bounce with probability 1.
     store_row<BounceRow, F>(bounces_.rows, slot, row, active);
   }
 
@@ -254,8 +254,8 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   void resolve_light(AovFilm& film, size_t pixel, const SlotRange& slots,
                      const float* radiance) const;
   void resolve_work(AovFilm& film, size_t pixel, const SlotRange& slots) const;
-  /// Calls put(aov, words) for each AOV of vertices of this kind that is kept. `words` holds its
-  /// first word in the row of slot 0.
+  /// Calls put(aov, words) for each stored AOV of vertices of this kind. `words` holds its first
+  /// word in the row of slot 0.
   template <typename Put>
   void for_each_vertex_aov(AovKind kind, const Put& put) const;
 

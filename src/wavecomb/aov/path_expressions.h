@@ -56,7 +56,7 @@ struct ColourStates {
     return (states >> (kBits * colour)) & kMask;
   }
   /// Returns the state after a scattering, by the automaton's table `next`. Scatterings in volumes
-  /// and subsurface bodies have no lobes.
+  /// and subsurface bodies have no diffuse or glossy lobes.
   template <typename F>
   static UInt<F> next(const uint32_t* table, const UInt<F>& state, const UInt<F>& event,
                       const UInt<F>& lobe, const Mask<F>& active) {

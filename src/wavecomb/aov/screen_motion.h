@@ -9,7 +9,8 @@
 namespace wavecomb {
 
 /// Returns the image position of a point at a shutter time, in pixels from the upper left corner,
-/// seen through the centre of a lens without distortion. Not for latlong cameras.
+/// seen through the centre of a lens without distortion. The function does not support latlong
+/// cameras.
 template <typename F>
 inline Vec2<F> project_to_image(const CameraSetup& camera, const Vec3<F>& p, const F& time,
                                 const Mask<F>& active) {

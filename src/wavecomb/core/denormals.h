@@ -25,7 +25,7 @@ class DenormalsOff {
   static uint64_t control() { return _mm_getcsr(); }
   static void set_control(uint64_t word) { _mm_setcsr(static_cast<unsigned>(word)); }
 #elif defined(__aarch64__)
-  static constexpr uint64_t kFlush = uint64_t{1} << 24;  // FPCR.FZ flushes both
+  static constexpr uint64_t kFlush = uint64_t{1} << 24;  // FPCR.FZ flushes results and operands.
   static uint64_t control() {
     uint64_t word;
     asm volatile("mrs %0, fpcr" : "=r"(word));

@@ -32,7 +32,8 @@ struct Sample4 {
   F x, y, z, w;
 };
 
-/// Sets of four dimensions that a path uses once: film position and lens, and shutter time.
+/// Sets of four dimensions that a path uses once: for the film position and lens, and for the
+/// shutter time.
 inline constexpr uint32_t kCameraSet = 0;
 inline constexpr uint32_t kTimeSet = 0xffffffffu;
 
@@ -48,8 +49,8 @@ enum class VertexSet : uint32_t {
 /// Upper limit of depths with distinct sets.
 inline constexpr uint32_t kSetDepths = 1u << 23;
 
-/// Returns the index of a set. The first two sets alternate from 1 on; each other has a separate
-/// block.
+/// Returns the index of a set. The first two sample sets alternate from 1 on; each other set has a
+/// separate block.
 inline constexpr uint32_t vertex_set(VertexSet name, uint32_t depth) {
   const auto i = static_cast<uint32_t>(name);
   return i < 2 ? 1 + i + 2 * depth : (i << 24) + depth;

@@ -120,11 +120,11 @@ struct Settings {
   std::vector<NamedExpression> expressions;       ///< for Aov::kExpressions
   uint32_t deep_samples = DeepLimits{}.most;      ///< maximum samples of a deep pixel
   float deep_tolerance = DeepLimits{}.tolerance;  ///< depth tolerance of deep images
-  /// Adaptive sampling: stop sampling a pixel when its error (ErrorMap::error) is at most this. 0
-  /// means off.
+  /// Adaptive sampling: stop sampling a pixel when its error (ErrorMap::error) is at most this
+  /// value. 0 means off.
   float adaptive = 0;
-  /// Adaptive sampling: stop when the image's mean relative error is at most this. 0 means off.
-  /// Cannot be combined with `adaptive`.
+  /// Adaptive sampling: stop when the image's mean relative error is at most this value. 0 means
+  /// off. Cannot be combined with `adaptive`.
   float noise = 0;
   uint32_t min_spp = 16;  ///< adaptive sampling: samples before the first error estimate
   /// Distribution of samples if spp or a time limit gives their total number.
@@ -133,17 +133,19 @@ struct Settings {
   float time_limit = 0;
   /// Make domes and distant lights transparent to the camera, for compositing.
   bool alpha = false;
-  bool error = false;  ///< store error and variance estimates even if nothing else needs them
-  /// Pixels to render; others get no samples. If not set, all. Pixels are the same as in the whole
-  /// image, except in adaptive renders, which estimate errors within the region only.
+  bool error = false;  ///< whether to store error and variance estimates even if no setting needs
+                       ///< them
+  /// Pixels to render; others get no samples. If not set, all pixels are rendered. Pixels are the
+  /// same as in the whole image, except in adaptive renders, which estimate errors within the
+  /// region only.
   std::optional<Region> region;
   /// Pixels along each edge beyond the camera window; included in width and height.
   uint32_t overscan = 0;
   bool crop = false;  ///< restrict the film and the image to the region
   // ---- below: how the image is computed; never changes it ----
-  uint32_t threads = 0;    ///< 0 means all that the process may use
+  uint32_t threads = 0;    ///< number of threads; 0 means all that the process may use
   uint32_t wave_size = 0;  ///< paths per wave, 64 to 2^20; 0 means the default
-  uint32_t lanes = 0;      ///< 1, 4, 8 or 16; 0 means the widest that was built
+  uint32_t lanes = 0;      ///< lanes of kernels: 1, 4, 8 or 16; 0 means the widest that was built
   /// Packets are faster; both find bit-identical hits (docs/decisions/canonical-hits.md).
   Traversal traversal = Traversal::kPackets;
   std::string policy = "code";

@@ -43,7 +43,7 @@ void write(Settings& settings, const SettingValue& value) {
     settings.*kMember = static_cast<T>(std::get<int64_t>(value));
 }
 
-/// Returns a row without limits.
+/// Returns a row of the settings table without limits.
 template <auto kMember>
 SettingInfo row(const char* name, const char* label, const char* help) {
   SettingInfo info;
@@ -63,7 +63,7 @@ SettingInfo number(const char* name, const char* label, double least, double mos
   info.zero = zero;
   return info;
 }
-/// Returns a row of a number whose default depends on other settings; `used` returns the value in
+/// Returns a row for a number whose default depends on other settings; `used` returns the value in
 /// use.
 template <auto kMember>
 SettingInfo number_or_unset(const char* name, const char* label, double least, double most,
@@ -108,13 +108,13 @@ SettingInfo with_steps(SettingInfo info, std::vector<double> steps, const char* 
   return info;
 }
 
-/// Marks a setting as one that changes the expectation of the image.
+/// Marks the row of a setting that changes the expectation of the image.
 SettingInfo in_expectation(SettingInfo info) {
   info.changes_expectation = true;
   return info;
 }
 
-/// Marks a setting that leaves the bits of the image unchanged at equal samples.
+/// Marks the row of a setting that leaves the bits of the image unchanged at equal samples.
 SettingInfo same_bits(SettingInfo info) {
   info.changes_bits = false;
   return info;

@@ -44,11 +44,12 @@ struct SettingInfo {
   bool changes_expectation = false;
   SettingGroup group = SettingGroup::kImage;
   double least = 0, most = -1;         ///< range of numbers; no limits if least > most
-  const char* zero = "";               ///< meaning of 0, if it has a special one
+  const char* zero = "";               ///< meaning of the value 0, if it is special
   std::vector<double> steps;           ///< allowed values besides 0; empty means all
   std::vector<SettingChoice> choices;  ///< choices in the order of the enum
 
-  bool may_be_none = false;  ///< None is allowed; the default then depends on other settings
+  bool may_be_none = false;  ///< whether None is allowed; the default then depends on other
+                             ///< settings
 
   SettingValue (*read)(const Settings&) = nullptr;
   void (*write)(Settings&, const SettingValue&) = nullptr;

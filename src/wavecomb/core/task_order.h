@@ -12,7 +12,8 @@
 namespace wavecomb {
 
 /// Annotations of one parallel loop: code before the loop happens before its tasks, and they happen
-/// before join(). Tasks are not ordered among each other. Does nothing in other builds.
+/// before join(). Tasks are not ordered among each other. Does nothing in builds without
+/// ThreadSanitizer.
 ///
 ///     const TaskOrder order;
 ///     tbb::parallel_for(size_t{0}, n, order.around([&](size_t i) { ... }));
@@ -28,7 +29,8 @@ class TaskOrder {
   /// Contract: this object and `body` outlive the task.
   template <typename Body>
   auto around(const Body& body) const {
-    // Not sanitised, since the captures are read before the annotation takes effect.
+    // Not instrumented by ThreadSanitizer, since the captures are read before the annotation takes
+    // effect.
     return [this, &body](const auto&... arguments) WAVECOMB_NO_TSAN {
       const Task task(*this);
       body(arguments...);

@@ -61,7 +61,7 @@ class AovFilm {
     double* to = sums(aov, pixel);
     for (uint32_t c = 0; c < row_of(aov).channels; ++c) to[c] += double{values[c]};
   }
-  /// Adds a value to a median AOV that is stored; infinity means that the sample has no value.
+  /// Adds a value to a stored median AOV; infinity means that the sample has no value.
   void add_to_median(Aov aov, size_t pixel, float value) {
     MedianSketch(sums(aov, pixel)).add(double{value});
   }

@@ -45,7 +45,7 @@ class Film {
   Pixel& pixel(uint32_t x, uint32_t y) { return pixels_[index(x, y)]; }
   ErrorSums& error(uint32_t x, uint32_t y) { return errors_[index(x, y)]; }
   /// Allocates sums for light splats in units of `unit`, for `paths` light path indices of which
-  /// each stands for `scale` light paths per sample. The beauty becomes the pixel means plus the
+  /// each stands for `scale` light paths per sample. The beauty then is the sum of pixel means and
   /// splat means; AOVs get splat sums as well.
   void allocate_light_splats(FixedPoint unit, size_t paths = 0, double scale = 1) {
     splats_ = LightSplatLayer(pixels_.size(), unit, paths, scale, has_error());

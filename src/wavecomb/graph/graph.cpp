@@ -61,7 +61,7 @@ Shape shape_of(const GraphOp& op) {
   }
 }
 
-/// Returns the smallest allowed vector width of an operation.
+/// Returns the smallest vector width that an operation allows.
 uint32_t min_width(GraphCode code) {
   const bool three =
       code == GraphCode::kCross || code == GraphCode::kRgbToHsv || code == GraphCode::kHsvToRgb;

@@ -91,7 +91,8 @@ inline constexpr uint32_t kNoGraph = 0xffffffffu;
 struct GraphOp {
   uint8_t code;   ///< GraphCode
   uint8_t width;  ///< components, 1 to 4
-  uint8_t steps;  ///< bit k set: operand k is a vector; otherwise one value for all components
+  uint8_t steps;  ///< if bit k is set, operand k is a vector; otherwise one value serves all
+                  ///< components
   uint8_t pad = 0;
   uint16_t to;  ///< first register written; must not overlap registers that are read
   uint16_t from[4];

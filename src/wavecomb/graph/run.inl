@@ -195,7 +195,7 @@ struct GraphStep {
   }
 };
 
-/// Runs arithmetic on components. Returns false for other operations.
+/// Runs arithmetic on components. Returns false for operations that are not arithmetic.
 template <typename F>
 WAVECOMB_INLINE bool run_arithmetic(const GraphStep<F>& op) {
   switch (static_cast<GraphCode>(op.code.code)) {

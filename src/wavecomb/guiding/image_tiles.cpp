@@ -44,7 +44,7 @@ ImageTiles::ImageTiles(const Settings& settings, std::span<const uint32_t> pixel
   const auto mean = [&](const Tile& t) {
     return t.count == 0 ? 0 : kStep * static_cast<double>(t.sum) / static_cast<double>(t.count);
   };
-  // Regularized as relMSE is, since few paths can miss the light of a tile.
+  // Regularises the division as relMSE does, since few paths can miss the light of a tile.
   const double least = 0.05 * mean(all) * mean(all);
   for (const Tile& tile : tiles) {
     const double m = mean(tile);
@@ -65,7 +65,7 @@ void ImageTiles::apply(GuidingView& view) const {
   if (!is_lit()) return;
   view.tiles = table_.data();
   view.tile_rows = rows_;
-  // Slightly less, so that rounding never leads beyond the last tile.
+  // Uses a slightly smaller factor, so that rounding never leads beyond the last tile.
   view.tiles_of_x = static_cast<float>(rows_) / static_cast<float>(width_) * (1 - 0x1p-20f);
   view.tiles_of_y = static_cast<float>(rows_) / static_cast<float>(height_) * (1 - 0x1p-20f);
 }

@@ -30,7 +30,7 @@ class ImageTiles {
   /// Returns one over the brightness of the image at a pixel: the mean over its tile, with each
   /// path clamped to 64 times the median. Contract: is_lit().
   double inverse_scale(uint32_t pixel) const { return inverse_[of(pixel)]; }
-  /// By tile, row by row; empty if no path contributed light.
+  /// Inverse brightness by tile, row by row; empty if no path contributed light.
   const std::vector<double>& inverse_scales() const { return inverse_; }
   /// Writes the tiles to `view`, if any path contributed light.
   void apply(GuidingView& view) const;

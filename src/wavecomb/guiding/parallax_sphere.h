@@ -22,7 +22,7 @@ namespace wavecomb {
 /// Sphere on which the incident light of a region is assumed to lie.
 struct ParallaxSphere {
   float centre[3] = {};        ///< centre of the region's positions
-  float inverse_distance = 0;  ///< 1 / radius; 0 means: no parallax
+  float inverse_distance = 0;  ///< 1 / radius; 0 means no parallax compensation
 };
 
 /// Maximum distance of a shading point from the centre, in radii.

@@ -39,8 +39,8 @@ struct BounceSample {
 /// Expected cost and variance of a camera path under roulette, or their means over paths.
 struct PathStatistics {
   double cost = 0;  ///< expected cost, in rays
-  /// Variance that roulette adds to a path. For the mean over paths: the whole variance over the
-  /// squared brightness of the image.
+  /// Variance that roulette adds to a path. For the mean over paths: the whole variance divided by
+  /// the squared brightness of the image.
   double variance = 0;
   double vertices = 0, survivors = 0;  ///< expected vertices tested by roulette, and survivors
 };

@@ -16,9 +16,9 @@ namespace wavecomb {
 
 /// Purpose of shading the vertices of light paths.
 enum class LightVertexUse : uint8_t {
-  kToCamera,  ///< connect them to the camera
-  kStore,     ///< connect them to the camera and store them
-  kConnect,   ///< connect the stored ones to the camera paths in the same slots
+  kToCamera,  ///< connect the vertices to the camera
+  kStore,     ///< connect the vertices to the camera and store them
+  kConnect,   ///< connect the stored vertices to the camera paths in the same slots
 };
 
 /// Light paths of a worker, and their couplings to its camera paths: the Buffers of a joint

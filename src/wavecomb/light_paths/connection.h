@@ -3,8 +3,8 @@
 ///
 /// Bounces and light samples of camera paths leave a surface from one of two origins o_s, depending
 /// on their side (path/steps/light_connection.h). A vertex of a light path at p' arrives at p
-/// instead of o_s. It uses the connection from o_s to p', like a bounce of a camera path that hits
-/// p': light paths start at p' without its terminator offset.
+/// instead of o_s. The light path uses the ray from o_s to p', like a bounce of a camera path that
+/// hits p', since light paths start at p' without its terminator offset.
 #pragma once
 
 #include "wavecomb/core/vec.h"

@@ -26,9 +26,10 @@ struct LightPathContext {
                      paths_per_sample)),
         merge_scale(grid ? settings.merge_radius / kConeShare : 0.f) {}
 
-  const LightSplatFilter* filter = nullptr;  ///< of connections to the camera; null: no light paths
+  const LightSplatFilter* filter = nullptr;  ///< density of connections to the camera; null without
+                                             ///< light paths
   const MergeGrid* grid = nullptr;           ///< points to merge with; null without merging
-  /// Receives the contributions of light paths instead of the film, unless null.
+  /// Receives the contributions of light paths instead of the film if it is not null.
   AimSamples* aim_samples = nullptr;
   bool connects = false;  ///< whether vertices of camera paths connect to vertices of light paths
   float share = 1;        ///< 1 / N, where N is the number of light paths in the image per sample

@@ -120,7 +120,7 @@ struct LightVertexResult {
   LightPathState<F> next;  ///< beside v.next
   F x, y;                  ///< film position in pixels, if there is a shadow ray
   Vec3<F> p;               ///< position of the vertex
-  Mask<F> is_candidate;    ///< whether vertices of camera paths may connect to it
+  Mask<F> is_candidate;    ///< whether vertices of camera paths may connect to the vertex
 };
 
 /// Vertices of camera paths to connect vertices of light paths to, instead of the camera.

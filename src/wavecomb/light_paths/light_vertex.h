@@ -175,7 +175,7 @@ WAVECOMB_INLINE void record_scattering(const Vertex<F, kFeatures>& v, const Path
         path_point.at.bsdf, viewer.local, path_point.l);
 }
 
-/// Returns the value of a light splat: its contribution `light` or, with camera_squares, the
+/// Returns the value of a light splat: its contribution `light` or, with camera_squares, its
 /// addition to the variance of camera paths. `relative_density` is the density of camera paths
 /// relative to light paths.
 template <typename F>

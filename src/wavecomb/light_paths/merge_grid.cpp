@@ -13,8 +13,8 @@
 namespace wavecomb {
 namespace {
 
-/// Range of the binary exponents of radii, and exponent of the cell size relative to the radius. A
-/// sphere overlaps at most two cells along each axis.
+/// Range of the binary exponents of radii, and exponent of the cell size relative to the radius.
+/// The sphere of a point overlaps at most two cells along each axis.
 constexpr int kMinExponent = -60, kMaxExponent = 60, kCellExponent = 2;
 constexpr size_t kChunk = 8192;
 

@@ -37,16 +37,25 @@ namespace wavecomb {
 
 /// Compile-time properties of a program. A program derives from this and overrides what differs.
 struct BsdfTraits {
-  static constexpr bool kEmits = false;          ///< its materials may emit
-  static constexpr bool kAbsorbs = false;        ///< attenuates rays inside: Params::transmittance
-  static constexpr bool kHasNonDelta = true;     ///< has lobes that light samples can evaluate
-  static constexpr bool kTransmits = false;      ///< non-delta lobes may lead to the other side
-  static constexpr bool kHasSubsurface = false;  ///< has subsurface walks and `enters(wo, wi)`
-  static constexpr bool kHasTerminator = true;   ///< offsets rays at the shadow terminator
-  static constexpr bool kTextured = true;        ///< its materials may read textures or graphs
-  static constexpr bool kReadsIor = false;       ///< reads the index of refraction
-  static constexpr bool kOnSurface = true;       ///< shades hits; otherwise has an `interact`
-  static constexpr bool kOnGaussianSplats = false;  ///< provides the emission of Gaussian splats
+  static constexpr bool kEmits = false;          ///< whether materials of the program may emit
+  static constexpr bool kAbsorbs = false;        ///< whether the program attenuates rays inside:
+                                                 ///< Params::transmittance
+  static constexpr bool kHasNonDelta = true;     ///< whether the program has lobes that light
+                                                 ///< samples can evaluate
+  static constexpr bool kTransmits = false;      ///< whether non-delta lobes may lead to the other
+                                                 ///< side
+  static constexpr bool kHasSubsurface = false;  ///< whether the program has subsurface random
+                                                 ///< walks and `enters(wo, wi)`
+  static constexpr bool kHasTerminator = true;   ///< whether the program offsets rays at the shadow
+                                                 ///< terminator
+  static constexpr bool kTextured = true;        ///< whether materials of the program may read
+                                                 ///< textures or graphs
+  static constexpr bool kReadsIor = false;       ///< whether the program reads the index of
+                                                 ///< refraction
+  static constexpr bool kOnSurface = true;       ///< whether the program shades hits; otherwise it
+                                                 ///< has an `interact`
+  static constexpr bool kOnGaussianSplats = false;  ///< whether the program provides the emission
+                                                    ///< of Gaussian splats
   /// Scatters like a whole fibre around an axis: x of the local frame lies along the fibre
   /// (geometry/hit/fibre_frame.h), and there are no two sides. Such a BSDF is not reciprocal, so
   /// light paths exclude it.

@@ -23,8 +23,8 @@ class EnergyTables {
   /// (eta - 1) / (eta + 1) of the last index node, for eta = kMaxIor = 10.
   static constexpr float kLastIndex = 9.f / 11.f;
   static constexpr uint32_t kPlane = kCosines * kRoughnesses, kVolume = kPlane * kIndices;
-  /// Number of nodes of a quadrature rule. Each takes two planes: the square root of the cosine,
-  /// and the weight.
+  /// Number of nodes of a quadrature rule. Each node takes two planes of the table: the square root
+  /// of the cosine, and the weight.
   static constexpr uint32_t kRule = 6, kRuleAt = kPlane + 3 * kVolume;
   /// Anisotropic surfaces: nodes by sqrt(cosine), |cos phi|, sqrt(alpha_y / alpha_x) and
   /// sqrt(alpha_x).

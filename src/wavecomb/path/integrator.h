@@ -26,15 +26,15 @@ struct WaveTask {
   uint32_t path_count() const { return pixel_count * samples; }
 };
 
-/// Statistics and training data of a worker; null if the integrator has none. Read them only while
+/// Statistics and training data of a worker; null if the integrator has none. Read these only while
 /// the worker is idle, except `counts`, which its own thread may read at any time.
 struct WorkerView {
   const PhaseClock* clock = nullptr;
   const Counts* counts = nullptr;
   const CoherenceCounts* coherence = nullptr;
-  const Chooser* policies = nullptr;  ///< how often it used each policy
+  const Chooser* policies = nullptr;  ///< how often the worker used each policy
   CostTracker* costs = nullptr;
-  size_t bytes = 0;  ///< size of its buffers
+  size_t bytes = 0;  ///< size of the worker's buffers
 };
 
 /// Estimates the image by tracing the tasks that workers submit.

@@ -35,7 +35,7 @@ struct HistoryRow {
   WAVECOMB_FIELDS(p, wi, throughput, pdf, radiance, material, axis, bsdf_pdf)
 };
 
-/// Shaded vertex that a path arrived at and leaves. Valid while its references are.
+/// Shaded vertex that a path arrived at and leaves. The object is valid while its references are.
 template <typename F>
 struct ShadedVertex {
   const PathState<F>& path;  ///< on arrival

@@ -250,8 +250,8 @@ inline Color<F> clean(const Color<F>& c, float limit) {
   return ContributionLimit<F>(c, limit).of(c);
 }
 
-/// Returns the luminance limit of a contribution after `bounces` scatterings. Direct light has
-/// none.
+/// Returns the luminance limit of a contribution after `bounces` scatterings. Direct light has no
+/// limit.
 inline float clamp_limit(const ShadeSettings& s, uint32_t bounces) {
   return bounces > 1 ? s.clamp_indirect : 0.f;
 }

@@ -8,7 +8,7 @@
 
 namespace wavecomb {
 
-/// Number of depths with a separate counter. Deeper ones are added to the last.
+/// Number of depths with a separate counter. Deeper vertices are added to the last counter.
 inline constexpr uint32_t kCountedDepths = 32;
 
 /// Counters of ray segments in volumes.

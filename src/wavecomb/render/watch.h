@@ -31,11 +31,11 @@ class Watch {
   void run(const std::function<void()>& work, const std::function<Request()>& poll,
            const std::function<void()>& snapshot);
 
-  /// Asks the work to end soon. Any thread may call this.
+  /// Asks the work to end soon. Any thread may call this function.
   void stop() { stopped_ = true; }
 
-  // Called by the work:
-  /// Whether the work should pause or end soon. Any thread may call this.
+  // Called by the work: Whether the work should pause or end soon. Any thread may call this
+  /// function.
   bool halted() const { return stopped() || halted_.load(std::memory_order_relaxed); }
   /// Whether the work should end.
   bool stopped() const { return stopped_.load(std::memory_order_relaxed); }

@@ -45,8 +45,9 @@ struct SceneView {
   float scale = 1;  ///< radius of the bounding sphere
   bool has_presence = false;
   bool has_emissive_meshes = false;
-  bool has_curves = false;  ///< some mesh is curves, points or splats
-  bool has_motion = false;  ///< some mesh, instance or light moves while the shutter is open
+  bool has_curves = false;  ///< whether some mesh consists of curves, points or splats
+  bool has_motion = false;  ///< whether some mesh, instance or light moves while the shutter is
+                            ///< open
 };
 
 /// Memory used by the arrays of a scene, in bytes.
@@ -65,7 +66,7 @@ struct SceneEdit {
   std::map<uint32_t, Light> lights{};        ///< by index into Scene::lights
   /// By prim path (ObjectNames): transform in world space that everything at or below the prim has,
   /// after its transform in the scene as it was built; the identity puts it back. Lights in
-  /// `lights` do not follow. Paths that are not listed keep their last move.
+  /// `lights` do not follow these moves. Paths that are not listed keep their last move.
   std::map<std::string, Affine> moves{};
 };
 

@@ -29,8 +29,8 @@ struct SceneCounts {
       0;  ///< sets of geometry that lights are linked to, a bit each, times classes
 };
 
-/// Throws Error for the first count that exceeds its limit. The message says in one line which it
-/// is, how many there are, and what to do.
+/// Throws Error for the first count that exceeds its limit. The message says in one line which
+/// count it is, how many objects there are, and what to do.
 void check_counts(const SceneCounts& counts);
 
 /// Formats 16777216 as "16,777,216".

@@ -41,7 +41,7 @@ void Chooser::learn(uint32_t depth, size_t arm, const Work& work, double run_ns,
   Stat& s = stat(depth, arm);
   const auto update = [&](double& mean, double ns) {
     if (s.tries <= 1)
-      mean = ns;  // the first measurement ran with cold caches, so the second replaces it
+      mean = ns;  // The first measurement ran with cold caches, so the second replaces it.
     else if (s.tries < kFirstTries)
       mean = std::min(mean, ns);
     else

@@ -42,8 +42,10 @@ class ShadingQueue {
 
   size_t size = 0;
   uint32_t* sorted_indices = nullptr;  ///< a permutation of 0 .. size-1 if `ordered` or `moved`
-  bool ordered = false;                ///< sorted_indices gives the shading order of the records
-  bool moved = false;  ///< records are in shading order; record i arrived as sorted_indices[i]
+  bool ordered = false;                ///< whether sorted_indices gives the shading order of the
+                                       ///< records
+  bool moved = false;  ///< whether records are in shading order; record i arrived as
+                       ///< sorted_indices[i]
 
   /// Path slot and shading outcome, always in arrival order.
   uint32_t *slot = nullptr, *outcome = nullptr;

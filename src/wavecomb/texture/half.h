@@ -6,8 +6,8 @@
 
 namespace wavecomb {
 
-/// Converts the half in the low 16 bits to float. Exact, including infinities and NaN. Uses no
-/// denormal floats, so that flush-to-zero modes have no effect.
+/// Converts the half in the low 16 bits to float. The conversion is exact, including infinities and
+/// NaN. Uses no denormal floats, so that flush-to-zero modes have no effect.
 template <typename F>
 inline F half_to_float(const UInt<F>& half) {
   const UInt<F> exponent = half & 0x7c00u;

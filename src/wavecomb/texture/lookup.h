@@ -17,7 +17,7 @@ namespace wavecomb {
 template <typename F>
 struct Footprint {
   F width;                 ///< in uv units
-  bool one_texel = false;  ///< read one random texel instead of all under the filter
+  bool one_texel = false;  ///< whether to read one random texel instead of all under the filter
   UInt<F> bits{0u};        ///< random bits, used if one_texel is set
 
   /// Footprint for full filtering.

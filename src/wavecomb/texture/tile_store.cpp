@@ -291,7 +291,9 @@ void TileStore::serve(const std::byte* at, std::byte* buffer) {
   std::unique_lock lock(mutex_);
   const uint32_t tile = tile_at(at);
   const std::byte* tile_address = address(tile);
-  if (queue_.state(tile) == TileQueue::State::kLoading) return;  // the loading thread wakes readers
+  if (queue_.state(tile) == TileQueue::State::kLoading)
+    return;  // The loading thread wakes the
+             // readers.
   if (queue_.state(tile) != TileQueue::State::kAbsent)
     return faults_.wake(tile_address, tile_bytes_);
   queue_.begin(tile);

@@ -27,7 +27,8 @@ namespace {
 
 /// Opens a userfaultfd descriptor; returns -1 and sets errno on failure.
 int open_faults() {
-  // User-mode only: unprivileged users may not handle faults that occur in the kernel.
+  // Handle only faults in user mode: unprivileged users may not handle faults that occur in the
+  // kernel.
   const auto fd =
       static_cast<int>(::syscall(SYS_userfaultfd, O_CLOEXEC | O_NONBLOCK | UFFD_USER_MODE_ONLY));
   if (fd < 0) return -1;
@@ -135,7 +136,7 @@ size_t UserFaults::wait(const std::byte** addresses) noexcept {
       if (messages[i].event == UFFD_EVENT_PAGEFAULT)
         addresses[count++] =
             reinterpret_cast<const std::byte*>(uintptr_t{messages[i].arg.pagefault.address});
-    if (count > 0) return count;  // otherwise another thread took the events
+    if (count > 0) return count;  // Otherwise, another thread took the events.
   }
 }
 

@@ -40,7 +40,7 @@ struct WaveContext {
   const EmbreeAccelerator* accel;
   const Settings* settings;
   const CameraSetup* camera;
-  /// Scheduling policies. With several, each worker chooses one for each queue.
+  /// Scheduling policies. With several policies, each worker chooses one for each queue.
   std::span<const SchedulingPolicy* const> policies;
   std::span<const MaterialTraits> traits;
   const CostSnapshot* costs;           ///< for scheduling policies
@@ -53,8 +53,9 @@ struct WaveContext {
   RayRecorder* recorder;               ///< receives the rays of benchmarks, otherwise null
   const AovTables* aovs = nullptr;     ///< object names and groups for AOVs; null if unused
   HistoryReader* histories = nullptr;  ///< receives vertices of finished paths; null if unused
-  const GuidingView* guide = nullptr;  ///< guides bounces, or is in training; null without guiding
-  bool discards = false;  ///< if true, paths serve `histories` only, and the film gets none
+  const GuidingView* guide = nullptr;  ///< guiding field that guides bounces, or is in training;
+                                       ///< null without guiding
+  bool discards = false;  ///< if true, paths serve only `histories`, and the film gets none
   JointTransport::Context joint{};  ///< transport that is combined with camera paths, if any
 
   /// Returns whether the scene has volumes, nested dielectrics or subsurface scattering.

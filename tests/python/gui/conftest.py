@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fixtures for tests of the window without a screen. QT_QPA_PLATFORM overrides "offscreen"."""
+"""Fixtures for tests of the window without a screen. The environment variable QT_QPA_PLATFORM
+overrides the platform "offscreen".
+"""
 
 import gc
 import os
@@ -80,7 +82,7 @@ def new_session(qtbot):
 
 @pytest.fixture
 def window(qtbot, qapp, tmp_path):
-    """An empty window with separate settings, 96 x 96 pixels and 4 samples."""
+    """An empty window with separate settings, for images of 96 x 96 pixels and 4 samples."""
     from PySide6.QtCore import QCoreApplication, QEvent, QSettings
 
     from wavecomb.gui import theme
@@ -96,7 +98,7 @@ def window(qtbot, qapp, tmp_path):
     yield made
     made.close()
     made.deleteLater()
-    # Without this, old windows would remain and process every change of the theme.
+    # Delete old windows, which would otherwise process every change of the theme.
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 

@@ -2,7 +2,7 @@
 """Runs `wavecomb view` and reports the positions and texts of its widgets.
 
 Run as `person_window.py FD view ...`. Reads questions as JSON lines from stdin and writes answers
-to the file descriptor FD. The program never acts on the window: all input comes from the X server.
+to the file descriptor FD. The program never controls the window: all input comes from the X server.
 """
 
 import json

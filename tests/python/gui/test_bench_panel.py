@@ -131,7 +131,7 @@ def test_a_suite_is_stopped_resumed_and_its_report_opened(qtbot, panel, pages, t
     out = choose(qtbot, panel, tmp_path)
     QTest.mouseClick(button(panel, "benchStart"), LEFT)
     assert session.state == "paused" and not button(panel, "benchStart").isEnabled()
-    session.restart()  # as an edit would
+    session.restart()
     assert session.state == "paused"
     qtbot.waitUntil(lambda: panel.bar.maximum() == 3 and panel.bar.value() >= 1, timeout=120000)
     begun = time.monotonic()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Comparison code that needs no window: sides, figures, FLIP in a process."""
+"""Comparison code that needs no window: image sides, figures, and FLIP in a process."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_layers_that_both_have() -> None:
     assert common_layers(a, side(2, normal=picture(5))) == ["beauty", "normal"]
     assert common_layers(a, None) == ["beauty", "depth", "normal"]
     assert common_layers(None, None) == []
-    one = Side("a PNG", {"grey": picture()})  # for its only layer, the file name is shown
+    one = Side("a PNG", {"grey": picture()})
     assert common_layers(one, a) == ["beauty"]
 
 

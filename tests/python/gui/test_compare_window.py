@@ -82,7 +82,7 @@ def test_numbers_of_dropped_files(qtbot, pair, files):
     assert text["Largest difference"] == "0.5 near 7, 4"
     assert float(text["FLIP, mean"]) > 0.0
     assert text["Other layers"] == "albedo"
-    drop(pair.view, QPoint(pair.view.width() - 5, 10), files["a"])  # the right half is B
+    drop(pair.view, QPoint(pair.view.width() - 5, 10), files["a"])
     qtbot.waitUntil(lambda: pair.b.side.name == "a.exr")
     settled(qtbot, pair)
     assert verdict(pair) == "beauty: bit for bit the same"
@@ -123,7 +123,7 @@ def test_keys_switch_flip_and_move_the_line(qtbot, pair):
     QTest.mouseMove(view, QPoint(round(view.width() * 0.75), 50))
     QTest.mouseRelease(view, LEFT, pos=QPoint(round(view.width() * 0.75), 50))
     assert view.wipe == pytest.approx(0.75, abs=0.01)
-    assert view.zoom is None  # the line moved, not the image
+    assert view.zoom is None
 
 
 def test_what_a_wipe_shows(qtbot, pair):
@@ -147,7 +147,7 @@ def test_what_a_wipe_shows(qtbot, pair):
 
 def test_zoom_and_pan_are_linked_and_the_pixel_stays(qtbot, pair):
     view = pair.view
-    at = QPointF(view.width() * 0.75, view.height() * 0.4)  # in the pane of B
+    at = QPointF(view.width() * 0.75, view.height() * 0.4)
     before = view.pixel_at(at)
     for _ in range(4):
         event = QWheelEvent(
@@ -163,7 +163,7 @@ def test_zoom_and_pan_are_linked_and_the_pixel_stays(qtbot, pair):
         QApplication.sendEvent(view, event)
     assert view.zoom is not None and view.pixel_at(at) == before
     twin = at - view.target(1).topLeft() + view.target(0).topLeft()
-    assert view.pixel_at(twin) == before  # the same point in A
+    assert view.pixel_at(twin) == before
     QTest.mousePress(view, LEFT, pos=at.toPoint())
     QTest.mouseMove(view, (at + QPointF(40, 0)).toPoint())
     QTest.mouseRelease(view, LEFT, pos=(at + QPointF(40, 0)).toPoint())
@@ -195,7 +195,7 @@ def test_maps(qtbot, pair):
         image = pair.view.image("D")
         assert (image.width(), image.height()) == (30, 20)
         assert image.pixelColor(7, 4).lightness() > 0
-        if not kind.startswith("flip"):  # FLIP depends on neighbours
+        if not kind.startswith("flip"):
             assert image.pixelColor(20, 15).lightness() == 0
     combo.setCurrentIndex(combo.findData("z"))
     assert "needs a variance" in pair.view.message
@@ -230,7 +230,9 @@ def test_without_a_stage_keeping_says_so(qtbot, window):
 
 @pytest.mark.slow
 def test_kept_picture_against_live_settings(qtbot, session):
-    """Another policy gives equal bits, another seed other noise. The viewport continues."""
+    """A render with another policy gives equal bits, and one with another seed other noise. The
+    viewport continues.
+    """
     window = CompareWindow(session)
     qtbot.addWidget(window)
     window.show()

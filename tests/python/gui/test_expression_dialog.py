@@ -72,7 +72,6 @@ def test_typed_checked_and_shown(cornell_window, qtbot):
     version = session.version
     display.choose_layer("lpe_direct")
     assert session.version == version, "a layer that is kept needs no new render"
-    # Another expression of the same name replaces it.
     dialog = display.ask_expression()
     dialog.text.setText("CO")
     dialog.show_layer.click()

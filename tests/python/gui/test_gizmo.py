@@ -111,7 +111,7 @@ def test_an_object_moves_when_the_drag_ends(moved, qtbot):
 def test_rotation_follows_the_cursor_and_scale_the_axes_of_the_prim(moved):
     moved.session.change(spp=1)
     before = world(moved, KEY)
-    ring = 12  # a quarter of the ring about z
+    ring = 12
     moved.drag(KEY, Qt.Key.Key_E, "z", (-15, -15), ring)
     turned = world(moved, KEY)
     assert np.allclose(turned[3], before[3], atol=1e-6), "about its origin"

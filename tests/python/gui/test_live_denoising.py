@@ -18,7 +18,9 @@ from wavecomb.gui.viewport.previews import Filler, Pace, by_first_hit, enlarged
 
 
 class SlowDenoiser:
-    """A denoiser whose first result comes late, and whose pixels state the samples of its input."""
+    """A denoiser whose first result comes late, and whose pixels hold the sample count of its
+    input.
+    """
 
     def __init__(self):
         self.inputs = []

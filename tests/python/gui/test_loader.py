@@ -27,7 +27,7 @@ def opened(path: Path, **more: object) -> Read:
 
 
 def written(folder: Path) -> Path:
-    """Writes ``RIG`` to a separate folder."""
+    """Writes the stage ``RIG`` to a separate folder."""
     inner = folder / "stage"
     inner.mkdir()
     (inner / "rig.usda").write_text(RIG)
@@ -147,7 +147,7 @@ def test_variants_that_are_asked_for_are_selected_in_the_window(tmp_path: Path) 
     session = got.usd.GetSessionLayer()
     assert dict(session.GetPrimAtPath("/World").variantSelections) == {"rig": "one"}
     assert choices(got.usd) == {"rig": "one", "look": ""}
-    session.Clear()  # undone: the stage's own selection
+    session.Clear()
     assert choices(got.usd) == {"rig": "two", "look": ""}
 
 

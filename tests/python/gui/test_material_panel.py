@@ -225,7 +225,7 @@ def test_all_is_seen_at_the_usual_width(qtbot, tmp_path, looks):
 
 @pytest.mark.slow
 def test_undo_in_a_field_undoes_the_edit(qtbot, tmp_path, looks):
-    """A typed value is one undo step, however slowly typed. The field has no separate undo."""
+    """A typed value is one undo step, however slowly typed. The text field has no separate undo."""
     window = make_window(qtbot, tmp_path, looks)
     materials, edits = window.scene.materials, window.scene.edits
     materials.choose(f"{LOOKS}/Car")
@@ -246,12 +246,10 @@ def test_undo_in_a_field_undoes_the_edit(qtbot, tmp_path, looks):
     assert spin.value() == 0.5, "nothing more to take back"
     QTest.keyClick(spin, Qt.Key.Key_Y, Control)
     assert spin.value() == 0.75 and len(edits.lines()) == 1
-    # After Enter, the next value is a separate step.
     for text in ("0.25", "0.125"):
         type_value(spin, text)
     QTest.keyClick(spin, Qt.Key.Key_Z, Control)
     assert spin.value() == 0.25
-    # A search field has its own undo.
     field = window.scene.tree.field
     window.scene.tabs.setCurrentIndex(0)
     field.setFocus()

@@ -206,7 +206,9 @@ def test_a_difference_holds_only_with_repeats() -> None:
 
 
 def test_no_difference_is_claimed_where_repeats_do_not_hold_it() -> None:
-    """One pair differs clearly since the machine was slower. Repeats show no difference."""
+    """One pair of runs differs clearly because the machine was slower. Repeated runs show no
+    difference.
+    """
     log = RunLog()
     for i, drift in enumerate((1.2, 0.9, 1.1, 0.85)):
         fill(log, PROGRAM, 1.0, noise=0.01, seed=30 + i)

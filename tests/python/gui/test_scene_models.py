@@ -146,7 +146,7 @@ def test_materials_are_listed_with_costs(edits):
     ids = len(model.rows[red].ids)
     assert model.index(red, materials_model.RECORDS).data() == f"{1200 * ids:,}"
     assert model.index(red, materials_model.COST).data() == "41"
-    edits.session.reload()  # the stage is missing until it is read again
+    edits.session.reload()
     assert model.rows == []
 
 

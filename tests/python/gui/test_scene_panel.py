@@ -109,7 +109,6 @@ def test_space_and_eye_toggle(panel, same_as_saved, qtbot, stage_path):
     hidden = same_as_saved(panel)
     before = picture(stage_path)
     assert (hidden != before).any()
-    # The eye icon shows it again, and undo hides it.
     with qtbot.waitSignal(panel.session.opened, timeout=20000):
         click(view, row(panel, "/World/Things/Ball", VISIBILITY))
     assert (same_as_saved(panel) == before).all()
@@ -299,7 +298,7 @@ def test_lights_off_and_alone(panel, same_as_saved, qtbot, stage_path):
         click(view, model.index(0, 2), box(view))
     assert panel.edits.is_hidden("/World/Lights/Key")
     off = same_as_saved(panel)
-    assert len(model.rows) == 3  # a hidden light is still listed
+    assert len(model.rows) == 3
     for number in (1, 2):
         with qtbot.waitSignal(panel.session.opened, timeout=20000):
             click(view, model.index(number, 3), box(view))
@@ -313,7 +312,7 @@ def test_lights_off_and_alone(panel, same_as_saved, qtbot, stage_path):
 
 def test_emission_in_a_stage_without_lights(open_panel, stage_path, tmp_path, same_as_saved, qtbot):
     stage = Usd.Stage.Open(str(stage_path))
-    stage.SetEditTarget(stage.GetSessionLayer())  # the file's layer is shared with other tests
+    stage.SetEditTarget(stage.GetSessionLayer())
     stage.GetPrimAtPath("/World/Lights").SetActive(False)
     dark = stage_path.with_name("dark.usda")
     stage.Flatten().Export(str(dark))

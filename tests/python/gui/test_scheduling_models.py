@@ -18,7 +18,7 @@ SETUP = {"width": 4, "height": 3, "seed": 0, "roulette": "throughput", "costs": 
 
 def test_fingerprint_is_of_bits() -> None:
     picture = np.linspace(0, 1, 36, dtype=np.float32).reshape(3, 4, 3)
-    again = picture[::-1].copy()[::-1]  # equal, but with another memory layout
+    again = picture[::-1].copy()[::-1]
     assert fingerprint(picture) == fingerprint(again)
     again = picture.copy()
     again[1, 2, 0] = np.nextafter(again[1, 2, 0], np.float32(2))

@@ -34,7 +34,7 @@ def panel(session: Any, qtbot: Any) -> SchedulingPanel:
     made.resize(420, 900)
     made.show()
     qtbot.waitExposed(made)
-    session.restart()  # gives the indicator an image to compare with
+    session.restart()
     settle(made, session, qtbot)
     assert made.light.verdict.kind == "first"
     return made
@@ -224,7 +224,7 @@ def test_adaptive_sampling(panel: SchedulingPanel, session: Any, qtbot: Any) -> 
     settle(panel, session, qtbot)
     assert panel.light.verdict.kind == "first"
     choose(panel, "policy", "none")
-    expect_same(panel, session, qtbot, 1)  # the sample counts are unchanged too
+    expect_same(panel, session, qtbot, 1)
     choose(panel, "adaptive_mode", "noise")
     assert session.setup.noise == 0.5 and session.setup.adaptive == 0, "the target as it was"
     type_number(panel, "min_spp", "64")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Edits in the session layer: equal to USD's own, undo, and export as a layer."""
+"""Edits in the session layer equal USD's own edits, can be undone, and are exported as a layer."""
 
 import pytest
 from pxr import Sdf, Usd, UsdGeom

@@ -257,7 +257,7 @@ def test_a_worker_may_go_before_its_job(qapp, qtbot):
     worker.submit(gate.job("a"))
     shiboken6.delete(worker)
     gate.open.set()
-    qtbot.wait(50)  # the result has no receiver
+    qtbot.wait(50)
 
 
 def test_jobs_hold_nothing_of_qt(qapp, worker):

@@ -65,7 +65,6 @@ def test_a_signal_closes_it(cornell, tmp_path):
         [*COMMAND, str(cornell), "--size", "64", "64"], env=env, stderr=subprocess.PIPE, text=True
     )
     kept, until = tmp_path / "Wavecomb" / "Wavecomb.conf", time.monotonic() + 60
-    # A stage in the list of recent files is open.
     while not (kept.exists() and "cornell.usda" in kept.read_text()):
         assert window.poll() is None and time.monotonic() < until
         time.sleep(0.1)

@@ -70,7 +70,6 @@ def test_orbit(viewport, button, modifiers):
     assert np.linalg.norm(session.pose.position - pivot) == pytest.approx(
         np.linalg.norm(before.position - pivot)
     )
-    # Dragging to the right moves the camera to its left.
     assert (session.pose.position - before.position) @ before.right < 0
     assert session.pose.path is None
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Opens, uses and closes a window without pytest, for tests of threads and garbage.
 
-Run as ``window_story.py STAGE FOLDER TIMES``, it does so while one thread collects garbage all the
-time, and every other thread collects after every few allocations.
+With the arguments ``STAGE FOLDER TIMES``, one thread collects garbage all the time, and every other
+thread collects after every few allocations.
 """
 
 import faulthandler

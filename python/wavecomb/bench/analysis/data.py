@@ -134,7 +134,7 @@ def cells(
     """Yields groups of runs that agree in every setting except ``vary`` and ``ignore``.
 
     A case of a suite may change settings that have no column. The name of the configuration
-    separates such groups.
+    separates groups of such cases.
     """
     varied = {vary} if isinstance(vary, str) else set(vary)
     keys = [name for name in SETTINGS if name not in varied and name not in ignore]

@@ -62,8 +62,8 @@ def bootstrap(rounds: Array, statistic: Statistic, *, positive: bool = False) ->
     Below ``MIN_ROUNDS_FOR_BOOTSTRAP`` rows the interval is value +- t(n - 1) times the jackknife's
     standard error (Tukey 1958), of the logarithm if ``positive``. From there on it is SciPy's BCa
     bootstrap (Efron 1987) whose level is widened for small n: t(n - 1) sqrt(n / (n - 1)) replaces
-    the normal quantile (Hesterberg 2015), because resampling alone is too narrow by
-    sqrt((n - 1) / n). The seed is fixed.
+    the normal quantile (Hesterberg 2015), because resampling alone is too narrow by sqrt((n - 1) /
+    n). The bootstrap uses a fixed seed.
 
     Args:
         rounds: (n, k): one row per round, one column per configuration; NaN marks a missing run,

@@ -113,7 +113,7 @@ def order_effects(runs: pd.DataFrame, metric: str = "shade_and_order_s") -> pd.D
     Returns:
         One row per stratum and policy: ``stratum``, ``policy``, ``cells``, ``n``; ``ratio``,
         ``low``, ``high``, ``p`` (Holm's over the table), ``verdict``; ``placebo_ratio`` and
-        ``share`` with ``_low`` and ``_high``; ``gap_shown``. The bounds come last.
+        ``share`` with ``_low`` and ``_high``; ``gap_shown``. The rows of the bounds come last.
     """
     strata: dict[tuple[Any, ...], list[pd.DataFrame]] = {}
     for cell, group in cells(runs.dropna(subset=[metric]), "policy"):

@@ -23,7 +23,7 @@ class Part:
 
     Attributes:
         kind: Name of the macro of the templates that renders it.
-        summary: If not empty, the part is folded behind this line; Markdown leaves it out.
+        All marks except "heading" are CSS classes.
     """
 
     kind: ClassVar[str]
@@ -112,7 +112,7 @@ def table(
     note: str = "",
     summary: str = "",
 ) -> Table:
-    """Makes a table of cells and plain texts. Always folds a long one."""
+    """Makes a table of cells and plain texts. Always folds a long table."""
     filled = [[c if isinstance(c, Cell) else Cell(c) for c in row] for row in rows]
     if not summary and len(rows) > MAX_ROWS:
         summary = f"{caption} ({len(rows)} rows)"

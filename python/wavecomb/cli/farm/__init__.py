@@ -148,8 +148,8 @@ def task_command(job: str, image: int, tile: str, maps: tuple[str, ...]) -> None
 def assemble_command(names: tuple[str, ...], maps: tuple[str, ...], as_json: bool) -> None:
     """Join the tiles of a JOB, or the tiles beside an IMAGE, to images in this process.
 
-    `wavecomb farm task` or `wavecomb render --tile` renders the tiles. An image with missing tiles
-    is an error that names them; all other images are written.
+    Applies path maps to this process. An image with missing tiles is an error that names them; all
+    other images are written.
     """
     from wavecomb.farm.api import assemble_job
 

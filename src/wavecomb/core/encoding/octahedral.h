@@ -34,7 +34,7 @@ inline uint32_t encode_direction(const Vec3<float>& v) {
 /// Returns the unit direction of a code, or the zero vector for kNoDirection.
 template <typename F>
 inline Vec3<F> decode_direction(const UInt<F>& code) {
-  // Reads the lower 16 bits as a signed number.
+  // Reads the lower 16 bits of a code as a signed number.
   const auto number = [](const UInt<F>& bits) {
     return F(F(Int<F>((bits & 0xffffu) ^ 0x8000u)) - 32768.f) * (1.f / 32767.f);
   };

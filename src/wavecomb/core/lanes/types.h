@@ -11,7 +11,7 @@
 #include <cstring>
 #include <type_traits>
 
-/// For kernels that are called once or twice per packet. Inlining keeps their results in registers
+/// For kernels that are called once or twice per packet. Inlining keeps kernel results in registers
 /// and removes unused ones; compilers alone would refuse because the caller is large.
 #define WAVECOMB_INLINE inline __attribute__((always_inline))
 /// For lambdas that must be inlined.

@@ -57,7 +57,7 @@ class PathNfa {
     return static_cast<uint32_t>(edges_.size() - 1);
   }
   /// Adds a pattern that starts at `from`, which must have no incoming edges from the pattern.
-  /// Returns its end state.
+  /// Returns the end state of the pattern.
   uint32_t add(const PathPattern& p, uint32_t from) {
     using Kind = PathPattern::Kind;
     if (p.kind == Kind::kSequence) {

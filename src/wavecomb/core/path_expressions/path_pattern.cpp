@@ -206,7 +206,7 @@ class ExpressionParser {
   /// Parses the part after '<': type of event, type of scattering, and light group.
   PathSymbols event() {
     PathSymbols s = parse_position(".CLOBERTVW");
-    // Ends of paths have no scattering type, so <L.> is L.
+    // Ends of paths have no scattering type, so <L.> equals L.
     if (peek() != '>' && peek() != '\'') {
       const PathSymbols scattered = parse_position(".DGS");
       PathSymbols scattering;

@@ -98,7 +98,7 @@ WAVECOMB_INLINE Vector<W> join(const Vector<B>* parts) {
     return join_two<W / 2>(join<B, W / 2>(parts), join<B, W / 2>(parts + W / B / 2),
                            std::make_index_sequence<W>());
 }
-/// Returns words Start .. Start + sizeof...(I) - 1 of a vector.
+/// Returns words Start .. Returns elements Start to Start + sizeof...(I) - 1 of a vector.
 template <size_t Start, size_t W, size_t... I>
 WAVECOMB_INLINE Vector<sizeof...(I)> part(const Vector<W>& v, std::index_sequence<I...>) {
   return __builtin_shufflevector(v, v, (Start + I)...);

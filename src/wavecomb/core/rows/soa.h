@@ -14,11 +14,11 @@ namespace wavecomb {
 /// bytes and padded, so that a packet may be read or written at any index below the capacity.
 class SoaBlock {
  public:
-  static constexpr size_t kPad = 16;  ///< padding past the capacity, in values
+  static constexpr size_t kPad = 16;  ///< The padding past the capacity, in values.
 
   SoaBlock() = default;
   SoaBlock(size_t columns, size_t capacity)
-      // The extra 16 values keep columns from sharing cache sets.
+      // The padding has 16 more values, so that columns start in different cache sets.
       : stride_(((capacity + kPad) + 15) / 16 * 16 + 16),
         data_(static_cast<uint32_t*>(std::aligned_alloc(64, columns * stride_ * 4))),
         bytes_(columns * stride_ * 4) {

@@ -11,18 +11,18 @@
 namespace wavecomb {
 
 /// Radius in pixels of the square window over which errors are averaged. The two halves of a single
-/// pixel may agree by chance; those of 25 pixels hardly do.
+/// pixel may agree by chance, but rarely those of all 25 pixels of the window.
 inline constexpr uint32_t kErrorWindow = 2;
 
 /// Error estimates of an image.
 struct ErrorMap {
-  /// Error of each pixel: the mean over the window of
-  ///   e = sum over rgb |I - A| / sqrt(sum over rgb I)
-  /// with I the mean of all samples and A the mean of one half of them (Dammertz, Hanika and
-  /// Keller, "A Hierarchical Automatic Stopping Condition for Monte Carlo Global Illumination",
-  /// WSCG 2010, equation 1). With light splats, I and A each include the splats, whose half is
-  /// summed separately. For independent samples |I - A| is distributed like |I - truth|. Infinite
-  /// if no pixel of the window has an error estimate yet; pixels that are not finite count as 0.
+  /// Error of each pixel: the mean over the window of e = sum over rgb |I - A| / sqrt(sum over rgb
+  ///   I) with I the mean of all samples and A the mean of one half of them (Dammertz, Hanika and
+  ///   Keller, "A Hierarchical Automatic Stopping Condition for Monte Carlo Global Illumination",
+  ///   WSCG 2010, equation 1). With light splats, I and A each include the splats, whose half is
+  ///   summed separately. For independent samples |I - A| is distributed like |I - truth|. The
+  ///   error is infinite if no pixel of the window has an estimate yet; pixels that are not finite
+  ///   count as 0.
   std::vector<float> error;
   /// sum |I - A| / sum I over all pixels and channels; infinite if no pixel has an estimate yet.
   double mean_relative = 0;

@@ -143,8 +143,9 @@ class LightSplatLayer {
     add(list);
     LightSplatSums::plus(paths_[0], paths);
   }
-  /// Returns whether a light path's sample belongs to the half. Every second sample does, since
-  /// each sample of all light paths uses its own sequence (light_paths/light_path.h).
+  /// Returns whether a light path's sample belongs to the half. Every second sample belongs to the
+  /// half, since each sample of all light paths uses a separate sequence
+  /// (light_paths/light_path.h).
   static bool is_in_half(uint32_t sample) { return sample % 2 == 0; }
   /// Records that light path index `path` was traced for samples [first, first + count).
   void done(size_t path, uint32_t first, uint32_t count) {

@@ -49,7 +49,8 @@ class SegmentTest {
   /// Finds hits on the sub-segment of `node`. `outside`: skips hits from inside.
   void run(bool outside, uint32_t node) {
     side_ = -1;
-    // Entry points of a tube behind the ray origin also matter, since the ray may start inside.
+    // The search includes entry points behind the ray origin, since the ray may start inside the
+    // tube.
     if (mesh_.is_ribbon() || outside) z_near_ = 0;
     // From inside, the ray may leave the tube in another sub-segment, so search the whole segment.
     if (mesh_.is_ribbon() || outside) return search_node(node);
@@ -275,7 +276,7 @@ class SegmentTest {
   /// (regula falsi).
   void intersect_ribbon_between(double u0, double f0, double u1, double f1) {
     double u = u0;
-    int kept = 0;  // end that the last step kept: -1 or 1
+    int kept = 0;  // which end of the bracket the last step kept: -1 or 1
     for (int i = 0; i < kRibbonSteps && u1 - u0 > 1e-15; ++i) {
       u = std::clamp((f1 * u0 - f0 * u1) / (f1 - f0), u0, u1);
       const double f = across(u);

@@ -126,8 +126,8 @@ inline Vec3<F> sphere_normal(const F& u, const F& v) {
 }
 
 /// Bits of Mesh::indices of curves: index of a segment's first control point, and whether the curve
-/// continues before or after the segment. If it does, the control point before or after those of
-/// the segment gives the direction in which it continues.
+/// continues before or after the segment. If the curve continues, the adjacent control point gives
+/// the direction in which it continues.
 inline constexpr uint32_t kCurveContinuesBefore = 0x80000000u, kCurveContinuesAfter = 0x40000000u;
 inline constexpr uint32_t kCurveFirstPoint = 0x3fffffffu;
 

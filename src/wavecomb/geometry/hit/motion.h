@@ -102,9 +102,9 @@ class MovingRows {
 template <typename F>
 struct MovedInstance {
   Mask<F> moves;
-  MatrixLanes<F> to_world;  ///< set in lanes that move
+  MatrixLanes<F> to_world;  ///< lanes whose instances move
   F side;                   ///< sign of the determinant of to_world
-  F size;                   ///< bound of all terms of a world position
+  F size;                   ///< bound of all terms of a world position, for the rounding error
 };
 
 /// Returns the transforms of moving instances. `maps` holds `row` and `t` of the instances at rest.

@@ -26,8 +26,8 @@ struct TrianglePoint {
 };
 
 /// Returns a bound of the rounding error: all terms of the interpolated point and, with a smaller
-/// weight, the triangle's corners, from which traversal subtracts the ray's origin. All axes count,
-/// since the products of traversal mix them.
+/// weight, the triangle's corners, from which traversal subtracts the ray's origin. The bound
+/// covers all axes, since the products of traversal mix them.
 template <typename F>
 WAVECOMB_INLINE F rounding_offset(const InstanceMaps<F>& maps, const TrianglePoint<F>& at) {
   const Vec3<F> q0 = abs3(at.p0), q1 = abs3(at.p1), q2 = abs3(at.p2);

@@ -104,7 +104,7 @@ struct Mesh {
   /// Returns the number of control points of a segment.
   size_t segment_points() const { return is_cubic() ? 4 : 2; }
   size_t triangle_count() const { return is_curved() ? 0 : indices.size() / 3; }
-  /// Returns the number of triangles, curve segments, points or splats.
+  /// Returns the number of triangles, curve segments, points or splats of the mesh.
   size_t primitive_count() const {
     if (is_dots()) return vertex_count();
     return is_curved() ? indices.size() : indices.size() / 3;

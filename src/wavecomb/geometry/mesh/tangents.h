@@ -24,7 +24,7 @@ struct SceneMaterials;
 /// cancel out and those of triangles without area in the texture are kNoDirection.
 struct MeshTangents {
   std::vector<uint32_t> codes;  ///< one per vertex or corner, step after step
-  bool at_corners = false;      ///< set if some vertex has more than one tangent
+  bool at_corners = false;      ///< whether some vertex has more than one tangent
 };
 
 /// Makes the tangents of a mesh with normals and texture coordinates. Runs in parallel; the result

@@ -11,7 +11,8 @@ namespace wavecomb {
 /// Triangulation of a polygon.
 struct PolygonTriangulation {
   std::vector<int64_t> corners;  ///< 3 per triangle, n - 2 triangles for n corners
-  uint64_t untested = 0;         ///< ears cut without a test, once the step limit was reached
+  uint64_t untested = 0;         ///< number of ears that were cut without a test, after the step
+                                 ///< limit
 };
 
 /// Step limit of clip_ears, about a second. In the worst known cases a face of 100,000 corners

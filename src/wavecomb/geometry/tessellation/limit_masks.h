@@ -138,7 +138,8 @@ template <Sdc::SchemeType kScheme, typename V>
 void refine(const Sdc::Options& options, const Far::TopologyLevel& level,
             const Far::TopologyLevel& next, const V* from, V* to) {
   const Sdc::Scheme<kScheme> scheme(options);
-  // Edge and vertex children read the values of face children. Loop has no face children.
+  // Edge and vertex children read the values of face children; Loop has no face children. Loop has
+  // no face children.
   if constexpr (kScheme != Sdc::SCHEME_LOOP)
     in_bands(level.GetNumFaces(), [&] {
       return [&, weights = std::vector<float>()](int face) mutable {

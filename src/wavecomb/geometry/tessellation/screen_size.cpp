@@ -58,7 +58,8 @@ double edge_pixels(std::span<const float> points, std::span<const int32_t> face_
       const Point& b = projected[static_cast<size_t>(corners[at + (c + 1) % count])];
       const Point along = b - a, middle = (a + b) * 0.5;
       const double length = length_of(along);
-      // The distance is at least half the edge length, so edges that pass the camera stay finite.
+      // The distance is at least half the edge length, so edges that pass the camera have a finite
+      // size.
       const double distance = view.is_parallel ? 1 : std::max(length_of(middle), 0.5 * length);
       if (!(distance > 0)) continue;
       const double pixels = view.pixels * length / distance;

@@ -20,7 +20,8 @@ namespace {
 namespace Far = OpenSubdiv::Far;
 namespace Sdc = OpenSubdiv::Sdc;
 
-/// First message of OpenSubdiv on this thread. OpenSubdiv's callbacks are global to the process.
+/// First error message of OpenSubdiv on this thread. OpenSubdiv's callbacks are global to the
+/// process.
 thread_local std::string last_message;
 
 void catch_messages() {
@@ -280,8 +281,8 @@ std::vector<uint32_t> Subdivision::normal_sectors(const RefinedFaces& faces,
     return refiner_->scheme == Scheme::kBilinear &&
            refiner_->base_of(around[0]) != refiner_->base_of(around[1]);
   };
-  // Vertices whose faces may be separated by sharp edges. They are few: all threads search for
-  // them, and one thread numbers them in order.
+  // Vertices whose faces may be separated by sharp edges. Such vertices are few: all threads search
+  // for them, and one thread numbers them in order.
   const size_t points = refiner_->vertices_of(refiner_->level());
   std::vector<std::vector<int>> cut((points + masks::kBand - 1) / masks::kBand);
   parallel_bands(points, masks::kBand, [&](size_t first, size_t end) {

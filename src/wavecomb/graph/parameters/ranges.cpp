@@ -51,20 +51,20 @@ ValueRange abs_of(const ValueRange& a) {
   return {crosses ? 0.f : std::min(std::abs(a.low), std::abs(a.high)), most, a.nan};
 }
 
-/// Range of "`b` if `a` is not 0, else `c`".
+/// Returns the range of "`b` if `a` is not 0, else `c`".
 ValueRange select_of(const ValueRange& a, const ValueRange& b, const ValueRange& c) {
   if (!a.nan && a.low == 0 && a.high == 0) return c;
   return a.low > 0 || a.high < 0 ? b : hull(b, c);
 }
 
-/// Range of "1 if `a` is below `b`, else 0".
+/// Returns the range of "1 if `a` is below `b`, else 0".
 ValueRange less_of(const ValueRange& a, const ValueRange& b) {
   if (!a.nan && !b.nan && a.high < b.low) return exactly(1);
   return {0, a.low >= b.high ? 0.f : 1.f, false};
 }
 
 ValueRange divide_of(const ValueRange& a, const ValueRange& b) {
-  // A divisor of one sign makes the quotient monotonic.
+  // A divisor that does not change sign makes the quotient monotonic.
   if (b.low <= 0 && b.high >= 0) return {};
   return at_ends([](float x, float y, float) { return x / y; }, a, b);
 }

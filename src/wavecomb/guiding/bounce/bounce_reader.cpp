@@ -55,7 +55,7 @@ void BounceReader::read(const PathHistory& history, uint32_t slot, const Color<f
   std::array<bool, kVertices> is_sample;
   uint32_t count = 0;
   Color<float> throughput(1.f);
-  double reached = 1;  // probability that a path with roulette gets here
+  double reached = 1;  // Probability that a path with roulette reaches the vertex.
   // The vertex at the maximum depth has no bounce.
   for (; count < std::min(history.count(slot), plan_.max_depth); ++count) {
     const HistoryRow<float> v = history.vertex(slot, count);
@@ -74,7 +74,8 @@ void BounceReader::read(const PathHistory& history, uint32_t slot, const Color<f
             is_bright && !is_black_path ? double{contribution} : 0.0, 1,
             plan_.costs.vertex(v.material)};
     if (count + 1 >= plan_.roulette_depth) {
-      // Throughput over brightness of a path that got here, divided by its survival probability.
+      // Throughput over image brightness of a path that reached the vertex, divided by its survival
+      // probability.
       const double share = double{arrived} * double{inverse_scale} / reached;
       step.survival = guiding.known
                           ? double{efficient_survival<float>(guiding, static_cast<float>(share))}

@@ -29,7 +29,7 @@ constexpr double kMaterialRecords = 512;
 /// and a path that is terminated too often makes a bright pixel, while one that continues too often
 /// costs a few rays.
 constexpr double kSafety = 1.5;
-/// Fraction of bounces sampled by the BSDF in the first round, before moments are known.
+/// Fraction of bounces that the BSDF samples in the first round, before moments are known.
 constexpr float kFirstShare = 0.5f;
 
 uint32_t code_of(const GuidingGrid& grid, const float (&p)[3]) {
@@ -164,8 +164,8 @@ class GuidingFieldBuilder {
     }
   }
 
-  /// Returns the region of a cell and axis. Too few records: the region of the nearest ancestor
-  /// with enough, or kNoGuidingRegion.
+  /// Returns the region of a cell and axis. A cell with too few records uses the region of the
+  /// nearest ancestor with enough, or kNoGuidingRegion.
   uint32_t region_of(uint32_t depth, uint32_t axis) {
     RegionPart& part = levels_[depth][axis];
     if (part.count < kMinRegionRecords)

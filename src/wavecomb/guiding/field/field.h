@@ -44,7 +44,7 @@ uint64_t bounce_position_key(const GuidingGrid& grid, const Vec3<float>& p, uint
 
 /// Summary figures of a field.
 struct GuidingFieldStatistics {
-  uint64_t records = 0;  ///< bounces that contribute light
+  uint64_t records = 0;  ///< number of bounces that contribute light
   uint32_t cells = 0, regions = 0, guided_regions = 0;
   /// Mean probability that the field samples a bounce, and second moment of the mixture relative to
   /// that of the BSDF alone. Both are weighted by the contribution of bounces to the image.

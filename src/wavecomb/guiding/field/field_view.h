@@ -45,7 +45,8 @@ struct GuidingView {
   /// image, before it is clamped (guiding/roulette.h).
   const float* survival = nullptr;
   const float* material_share = nullptr;  ///< per material: minimum of bsdf_share
-  /// 1 / (brightness of the image) in tile_rows x tile_rows tiles; null means: not known.
+  /// 1 / (brightness of the image) in tile_rows x tile_rows tiles; null if the brightness is not
+  /// known
   const float* tiles = nullptr;
   uint32_t tile_rows = 0;
   float tiles_of_x = 0, tiles_of_y = 0;  ///< tiles per pixel

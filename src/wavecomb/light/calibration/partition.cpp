@@ -57,8 +57,8 @@ void add_meshes(const Scene& scene, LightParts& parts, std::vector<Candidate>& o
     if (powers[m] > 0) out.push_back({powers[m], meshes[m]->name, kNoLight, m});
 }
 
-/// Makes one part of each candidate, in their order. If there are more than `most`, the weakest
-/// together form the last part.
+/// Makes one part of each candidate, in their order. If there are more candidates than `most`, the
+/// weakest together form the last part.
 void make_parts(const std::vector<Candidate>& candidates, size_t most, LightParts& parts) {
   std::vector<size_t> by_power(candidates.size());
   std::iota(by_power.begin(), by_power.end(), size_t{0});
@@ -98,7 +98,8 @@ void build_tree_tables(const LightSet& set, const LightTree& tree, const LightPa
     const uint32_t part = parts.of_record[i];
     if (part == kNoPart) continue;
     const double share = shares[part] * double{tree.infinite_pdf[i]} / parts.power[part];
-    // Leave at least a thousandth to the tree, and one random value to each later light.
+    // Leaves a probability of at least a thousandth to the tree, and one random value to each later
+    // light.
     const uint32_t reserved =
         std::min(kNumbers / 1000, left - remaining_lights) + remaining_lights - 1;
     --remaining_lights;

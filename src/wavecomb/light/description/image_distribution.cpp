@@ -203,9 +203,9 @@ double squares(const Distribution2D& d, const Size& size) {
 }  // namespace
 
 Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<float>& color) {
-  // Clamped at the poles.
+  // The row is clamped at the poles.
   const Cells cells = cell_means(texture, color, kMaxDomeHeight, Wrap::kClamp);
-  // The integral of the sine over the row: cos(top) - cos(bottom).
+  // The measure of a row is the integral of the sine over it: cos(top) - cos(bottom).
   return make_distribution(cells, [&](uint32_t y) {
     return std::cos(std::numbers::pi * y / cells.height) -
            std::cos(std::numbers::pi * (y + 1) / cells.height);

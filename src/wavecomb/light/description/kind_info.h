@@ -50,13 +50,13 @@ struct LightKindInfo {
   /// Sets position, area, radiance and power. Null if the records are made elsewhere.
   void (*make)(LightBuild&, const Light&, LightBuildContext&) = nullptr;
   /// Sets bounds for the light tree, which are initialized to `light.p` and the intensity power /
-  /// pi. Null if the kind is not in the tree.
+  /// pi. Null if the light tree does not contain the kind.
   void (*bound)(LightCluster&, const LightRecord& light, double power) = nullptr;
   /// Returns the shape of a record. Null if rays cannot hit this kind.
   LightShape (*shape)(const LightRecord&) = nullptr;
   /// For LightShape::kCustom: a slightly enlarged bounding box, and the distance to the hit along d
-  /// in units of |d|, or 0 if there is none ahead. `o` is relative to light.p. One ray at a time in
-  /// double precision, so that a hit does not depend on the other rays of its packet.
+  /// in units of |d|, or 0 if there is none ahead. `o` is relative to light.p. Tests one ray at a
+  /// time in double precision, so that a hit does not depend on the other rays of its packet.
   Bounds (*box)(const LightRecord&) = nullptr;
   double (*intersect)(const LightRecord&, const double* o, const double* d) = nullptr;
 

@@ -76,14 +76,15 @@ struct LightFilter {
 };
 
 /// Intensity distribution of an IES file, expanded to the full circle: candela on a grid of angles
-/// in degrees, both ascending. It is interpolated bilinearly and is 0 outside the vertical angles.
+/// in degrees, both ascending. The intensity is interpolated bilinearly and is 0 outside the
+/// vertical angles.
 struct IesProfile {
   std::vector<float> vertical;    ///< angle from the axis, within [0, 180], two or more values
   std::vector<float> horizontal;  ///< 0 to 360; a single value for a rotationally symmetric profile
   std::vector<float> candela;     ///< [horizontal][vertical]
 
   /// Returns the mean over the sphere of directions, or over a hemisphere if the vertical angles
-  /// span no more than one. It is exact for profiles that are linear in both angles.
+  /// span no more than one. The mean is exact for profiles that are linear in both angles.
   double mean() const;
   bool covers_sphere() const { return vertical.back() - vertical.front() > 95.7f; }
 };
@@ -117,7 +118,7 @@ struct Light {
   float angle = 0.53f;          ///< apparent diameter of a distant light, degrees
   /// UsdLux `normalize`: divide by the world-space area, or by the solid angle for distant lights.
   bool normalize = false;
-  /// For a rect (u to the right, v up as seen from the front) or a dome (latlong).
+  /// Texture of a rect (u to the right, v up as seen from the front) or a dome (latlong).
   uint32_t texture = kNoTexture;
   uint32_t group = 0;  ///< light group id of SceneBuilder::light_group
   Shaping shaping;     ///< used by area lights and point lights

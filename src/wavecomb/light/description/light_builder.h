@@ -84,8 +84,8 @@ struct LightSet {
   LightView view(const MaterialView& materials) const;
 };
 
-/// Maximum number of lights for selection by power, whose random number has 24 bits. With more
-/// lights, only the light tree is used.
+/// Maximum number of lights for selection by power, whose random number has 24 bits. Scenes with
+/// more lights use only the light tree.
 inline constexpr uint32_t kMaxPowerLights = (1u << 24) - 1;
 /// Maximum number of lights: kernels address triangle records of 16 32-bit words each with 32-bit
 /// indices.
@@ -114,10 +114,10 @@ struct LightInputs {
   const LightSet* before = nullptr;
   std::span<const IesProfile> profiles = {};
   std::span<const MeshLightInstance> mesh_lights = {};  ///< each has passed check_mesh_light
-  /// For more lights no table for selection by power is built.
+  /// For more lights, no table for selection by power is built.
   size_t max_power_lights = kMaxPowerLights;
-  /// The light tree takes as much memory as everything else. With kWhenChosen it is built only if
-  /// LightSelection::kAuto selects by tree.
+  /// The light tree takes as much memory as everything else together. With kWhenChosen it is built
+  /// only if LightSelection::kAuto selects by tree.
   TreeTime tree_time = TreeTime::kNow;
   std::span<const LightFilter> filters = {};
 };

@@ -229,7 +229,8 @@ struct LightTreeView {
   float effective_lights = 0;
 };
 
-/// Packed light linking (light/description/linking.h). Null if no light is linked.
+/// Packed light linking (light/description/linking.h); null if no light is linked. Null if no light
+/// is linked.
 struct LinkView {
   const uint32_t* classes = nullptr;
   const uint32_t* members = nullptr;
@@ -255,7 +256,7 @@ struct LightView {
   /// null.
   const float* selection_pdf = nullptr;
   LightTreeView tree;
-  bool by_tree = false;  ///< select lights by `tree` instead of `power_table`
+  bool by_tree = false;  ///< whether to select lights by `tree` instead of `power_table`
   uint32_t count = 0;    ///< number of records and triangles
   uint32_t first_triangle = 0;
   uint32_t infinite_count = 0;
@@ -273,8 +274,9 @@ struct LightView {
   const ShadowRecord* shadows = nullptr;  ///< null if all shadows are plain
   /// Record of the mesh light of each triangle, or kNoLight. Null if there are no mesh lights.
   const uint32_t* mesh_lights = nullptr;
-  bool has_effects = false;      ///< some record is sampled_only or has multipliers
-  bool has_multipliers = false;  ///< some record's diffuse or specular is not 1
+  bool has_effects = false;      ///< whether some record is sampled_only or has multipliers
+  bool has_multipliers = false;  ///< whether the diffuse or specular multiplier of some record is
+                                 ///< not 1
   LinkView links;
   /// Textures, and the materials of triangles whose emission or opacity varies.
   MaterialView materials;
@@ -283,7 +285,7 @@ struct LightView {
   float centre[3] = {0, 0, 0};
   float radius = 0, reach = 0;
   bool emits_paths() const { return radius > 0; }
-  const LightAim* aim = nullptr;  ///< target spheres of light paths; null for none
+  const LightAim* aim = nullptr;  ///< target spheres of light paths; null without aiming
   // Geometry for opacity graphs that read positions; null for a light set without geometry.
   const MeshRecord* meshes = nullptr;
   const InstanceRecord* instances = nullptr;

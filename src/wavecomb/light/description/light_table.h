@@ -38,7 +38,7 @@ inline constexpr uint32_t kVisibleShape = 8;  ///< rays can hit its shape
 inline constexpr uint32_t kTextured = 16;     ///< supports a texture
 inline constexpr uint32_t kInfinite = 32;     ///< surrounds the scene at infinite distance
 inline constexpr uint32_t kFiltered = 64;     ///< supports light filters
-/// The radiance of such lights is the background of light path expressions.
+/// The radiance of lights with this trait is the background of light path expressions.
 inline constexpr uint32_t kBackground = 128;
 }  // namespace light_trait
 
@@ -75,7 +75,7 @@ struct LightParameter {
 };
 
 /// Returns all parameters except kind, name and to_world, in the order in which fingerprints hash
-/// them. Those specific to one kind come last.
+/// them. Parameters specific to one kind come last.
 std::span<const LightParameter> light_table();
 /// Returns the row of a parameter, or null for an unknown name.
 const LightParameter* find_light_parameter(std::string_view name);

@@ -59,7 +59,7 @@ bool rotation_between(const Affine& from, const Affine& to, Matrix& x) {
   const double det = x[0][0] * (x[1][1] * x[2][2] - x[1][2] * x[2][1]) -
                      x[0][1] * (x[1][0] * x[2][2] - x[1][2] * x[2][0]) +
                      x[0][2] * (x[1][0] * x[2][1] - x[1][1] * x[2][0]);
-  return det > 0.5;  // a reflection is not a rotation
+  return det > 0.5;  // A reflection is not a rotation.
 }
 
 /// Writes the unit quaternion of a rotation, with the sign that is closer to `before`.

@@ -37,7 +37,7 @@ struct BoundingSphere {
   double centre[3];
   double radius;
 };
-/// Returns a ball that contains the ball `at_rest` in all poses of a light that moves.
+/// Returns a ball that contains the ball `at_rest` in all poses of a moving light.
 BoundingSphere swept_bounds(const LightMotion& motion, std::span<const LightStep> steps,
                             const BoundingSphere& at_rest);
 /// Returns bounds of a light over its whole motion, from its bounds at mid-shutter.

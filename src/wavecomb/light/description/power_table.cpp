@@ -75,7 +75,8 @@ PowerTable build_power_table(std::span<const double> weights, size_t first_trian
   const size_t emitting = count_emitting(weights),
                emitting_of[2] = {count_emitting(groups[0]), count_emitting(groups[1])};
   PowerTable table;
-  if (emitting == 0) {  // no random number selects a light; any table will do
+  if (emitting == 0) {  // If no light emits, no random number selects a light, and any table will
+                        // do.
     table.split = first_triangle > 0 ? kNumbers : 0;
     table.shift[0] = table.shift[1] = 24;
     bins.assign(1, 0);

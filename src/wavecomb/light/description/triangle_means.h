@@ -7,8 +7,8 @@
 namespace wavecomb {
 
 /// Returns whether light sampling can aim at the emission of a material: it can unless the graph
-/// reads inputs that are known only when a path hits the surface. Other emission is found only by
-/// paths that hit the surface.
+/// reads inputs that are known only when a path hits the surface. Only paths that hit the surface
+/// find other emission.
 bool can_aim_at(const Material& material, const GraphSet& graphs);
 
 /// Sets the radiance of a triangle with known corners to the emission of `material`: exact if it is
@@ -17,8 +17,8 @@ bool can_aim_at(const Material& material, const GraphSet& graphs);
 void set_mean_emission(const SceneGeometry& geometry, const SceneMaterials& materials,
                        const Material& material, EmissiveTriangle& triangle);
 
-/// Sets the opacity of a triangle to that of `material`, exact or an estimated mean as above: 1 if
-/// opacity is not presence, and never 0 if it varies.
+/// Sets the opacity of a triangle to that of `material`, exact if it is constant, otherwise an
+/// estimate of its mean: 1 if opacity is not presence, and never 0 if it varies.
 void set_mean_opacity(const SceneGeometry& geometry, const SceneMaterials& materials,
                       const Material& material, EmissiveTriangle& triangle);
 

@@ -86,7 +86,7 @@ inline F aim_of_kind(const LightView& view, const LightReader<F>& light, const V
 /// Spheres that the lanes select with a random number in [0, 1).
 template <typename F>
 struct AimChoice {
-  Mask<F> aims;  ///< aimed lanes; the others use the light's own distribution
+  Mask<F> aims;  ///< lanes whose paths are aimed; the others use the light's own distribution
   Vec3<F> centre;
   F radius;
 

@@ -2,9 +2,8 @@
 /// UsdLuxShadowAPI: shadows with a limited distance, and coloured shadows.
 ///
 /// A shadow whose nearest occluder is at distance t has the strength s(t) = ((D - t) / f)^gamma
-/// from D - f to D, 1 before and 0 beyond. Shadow rays end at
-///   L = D - f u^(1 / gamma),   u uniform in [0, 1),
-/// so that P(L > t) = s(t). In the mean, these random shadow rays give that shadow.
+/// from D - f to D, 1 before and 0 beyond. Shadow rays end at L = D - f u^(1 / gamma), u uniform in
+/// [0, 1), so that P(L > t) = s(t). The mean of these random shadow rays is that shadow.
 ///
 /// Emission that a bounce hits cannot reproduce this, so only light samples find such lights.
 #pragma once

@@ -57,7 +57,8 @@ template <typename F>
 struct CylinderSpan {
   F begin, size;     ///< z_0 / h_0, and z_1 / h_1 - z_0 / h_0
   F rest;            ///< 1 - |begin|
-  Mask<F> one_side;  ///< whether both ends are ahead of the point, or both behind it
+  Mask<F> one_side;  ///< whether both ends of the cylinder are ahead of the point, or both behind
+                     ///< it
 };
 /// Computes the visible interval without differences of nearly equal numbers. If both ends are on
 /// one side, the numerator of the size, z_1 h_0 - z_0 h_1, equals s^2 (z_1^2 - z_0^2) / (z_1 h_0 +
@@ -123,7 +124,7 @@ inline KindSample<F> sample_cylinder(const LightReader<F>& light, const Vec3<F>&
 }
 
 /// Returns radiance and density for a ray from `origin` that hit the cylinder at distance t. The
-/// inside is dark.
+/// inside of a cylinder is dark.
 template <typename F>
 inline KindHit<F> hit_cylinder(const LightReader<F>& light, const Vec3<F>& origin,
                                const Vec3<F>& dir, const F& t) {

@@ -8,7 +8,8 @@ namespace {
 
 using namespace record_builder;
 
-/// Sets the world axes of the dome: rotation and mirroring, without scale. The pole has priority.
+/// Sets the world axes of the dome: rotation and mirroring, without scale. The pole has priority
+/// over the other axes.
 void set_axes(LightRecord& record, const Affine& m) {
   const Double3 y = unit(to_double(m.axis(1)));
   Double3 z = to_double(m.axis(2));

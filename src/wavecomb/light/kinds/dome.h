@@ -72,7 +72,7 @@ inline KindSample<F> sample_dome_constant(const LightReader<F>& light, const F& 
   return {square_to_sphere(u, v), F(kFarAway), light.radiance(), F(kInv4Pi), Mask<F>(false)};
 }
 
-/// Samples domes of all lanes, one image after the other.
+/// Samples the domes of all lanes, one image after the other.
 template <typename F>
 inline KindSample<F> sample_dome_light(const LightView& view, const LightReader<F>& light,
                                        const F& u, const F& v, const Mask<F>& active) {
@@ -175,7 +175,7 @@ inline KindSample<F> sample_dome(const LightView& view, const UInt<F>& lights,
   return sample_dome_light<F>(view, light, u, v, active);
 }
 
-/// Samples a path in a direction by the distribution of the image. Does not use portals.
+/// Samples a path in a direction by the distribution of the image. The path does not use portals.
 template <typename F>
 inline KindEmission<F> emit_dome(const EmissionQuery<F>& q) {
   const KindSample<F> direction = sample_dome_light<F>(q.view, q.light, q.s, q.t, q.lanes);

@@ -29,7 +29,7 @@ inline Color<F> mesh_light_sample_radiance(const LightView& view, const UInt<F>&
 
 /// Returns the factor for emission that a path hits, for a light with these multipliers. `share` is
 /// the diffuse fraction of the path's last bounce; the rest is specular. Cameras see the light
-/// without multipliers. `is_specular_view` marks paths that light sampling cannot produce.
+/// without these multipliers. `is_specular_view` marks paths that light sampling cannot produce.
 template <typename F>
 inline Color<F> factor_of_hit(const F& diffuse, const F& specular, const Mask<F>& sampled_only,
                               const Mask<F>& is_specular_view, bool from_camera,

@@ -80,7 +80,7 @@ inline SphericalRect<F> make_spherical_rect(const LightReader<F>& light, const V
   const F right = between(r.x1), left = between(r.x0);
   r.solid_angle = right - left;
   r.begin = kPi + left;
-  const F least(1e-30f);  // avoids 0 / 0 on the line of an edge
+  const F least(1e-30f);  // This avoids 0 / 0 on the line of an edge.
   r.near_y = 1.f / sqrt(max(edge0, least));
   r.b0 = -r.y0 * r.near_y;
   r.b1 = r.y1 / sqrt(max(edge1, least));
@@ -136,7 +136,7 @@ inline F texture_share(const SphericalRect<F>& r, const F& area, float spread) {
   return select(r.usable, sixteenths, F(14.f)) * 0.0625f;
 }
 
-/// Returns the lanes whose rectangle is sampled by an image.
+/// Returns the lanes whose rectangles are sampled by an image.
 template <typename F>
 inline Mask<F> has_light_texture(const LightReader<F>& light, const Mask<F>& active) {
   return active & Mask<F>(light.texture() != UInt<F>(kNoTexture)) &

@@ -44,7 +44,7 @@ template <typename F>
                                             const Mask<F>& active) {
   constexpr uint32_t kWords = sizeof(TriangleUvs) / 4;
   const auto row = load_rows<8, F>(view.triangle_uvs, index * kWords, active);
-  // Vertex 2 goes first, since the order of float sums matters.
+  // Interpolation starts with vertex 2, since the order of float sums matters.
   const UvTriangle<F> corners({row[0], row[1]}, {row[4], row[5]}, {row[2], row[3]});
   const Vec2<F> uv = corners.at(b.y, b.x);
   const MeshPosition<F> mesh_position{float_bits<F>(row[6]), float_bits<F>(row[7]), b.x, b.y};
@@ -81,7 +81,7 @@ inline Color<F> triangle_radiance(const TriangleReader<F>& light, const LightVie
   const Mask<F> varies = active & (light.radiance.x < 0.f);
   if (none(varies)) [[likely]]
     return light.radiance;
-  // Copies, so that the values that plain triangles use can stay in registers.
+  // These are copies, so that the values that plain triangles use can stay in registers.
   const UInt<F> material = float_bits<F>(light.radiance.y), index = float_bits<F>(light.radiance.z);
   const Vec2<F> at = b;
   const Vec3<F> point = q;

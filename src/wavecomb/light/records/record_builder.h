@@ -11,9 +11,9 @@ namespace wavecomb::record_builder {
 
 inline constexpr double kPiD = 3.14159265358979323846;
 
-/// Smaller areas are indistinguishable from 0 in float. Lights of such areas are dark.
+/// Smaller areas are indistinguishable from 0 in float. Lights with smaller areas are dark.
 inline constexpr double kMinArea = 1e-36;
-/// Largest radiance. Products of larger values overflow.
+/// Largest radiance. Products of larger values would overflow.
 inline constexpr double kMaxRadiance = 1e30;
 
 struct Double3 {

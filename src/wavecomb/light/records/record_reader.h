@@ -39,7 +39,7 @@ struct LightReader : RecordReader<F> {
 };
 
 /// Returns the record with the links and multipliers of light `light`: its own or, for a triangle,
-/// the record of its mesh light. Returns kNoLight for triangles that are only emissive.
+/// the record of its mesh light. Returns kNoLight for triangles that are not part of a mesh light.
 template <typename F>
 inline UInt<F> record_of(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
   using U = UInt<F>;

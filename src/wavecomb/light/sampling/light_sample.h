@@ -67,10 +67,10 @@ F triangle_light_pdf(const LightView& view, const UInt<F>& light, const LightRec
                      const Vec3<F>& dir, const F& t, const Mask<F>& active);
 
 /// Factors for lights with diffuse and specular multipliers, and for lights that only light
-/// sampling finds. Used only with LightView::has_effects.
+/// sampling finds. These factors are used only with LightView::has_effects.
 template <typename F>
 struct LightEffect {
-  F diffuse, specular;   ///< multipliers of the diffuse and of the other response
+  F diffuse, specular;   ///< multipliers of the diffuse response and of the specular response
   Mask<F> sampled_only;  ///< LightRecord::sampled_only
   Mask<F> applies;       ///< whether sampled_only is set or a multiplier is not 1
   UInt<F> shadow;        ///< LightRecord::shadow

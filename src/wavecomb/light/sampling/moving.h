@@ -27,7 +27,8 @@ struct LightPose {
   Vec3<F> point_to_world(const Vec3<F>& p) const { return to_world(p - origin) + position; }
 };
 
-/// Returns the pose of light records `light` at `time`. Used only with LightView::motions.
+/// Returns the pose of light records `light` at `time`. The pose is used only with
+/// LightView::motions.
 template <typename F>
 [[gnu::noinline]] LightPose<F> light_pose(const LightView& view, const UInt<F>& light,
                                           const F& time, const Mask<F>& lanes) {

@@ -28,8 +28,8 @@ constexpr double kPathVertex = 0.7, kJointVertex = 0.8;
 /// With merging, additional costs in rays of a camera path (which may store a merge point) and of
 /// a light vertex.
 constexpr double kMergedPath = 1, kMergedVertex = 1;
-/// Fraction of the noisiest pixels that are also left out for a second estimate. A single pixel may
-/// hold most of the noise of a small image, which makes results differ between pilot renders.
+/// Fraction of the noisiest pixels that a second estimate also leaves out. A single pixel may hold
+/// most of the noise of a small image, which makes results differ between pilot renders.
 constexpr double kNoisiest = 0.01;
 /// Light that is rarely found makes nearly all pixels black and the others far too bright. Its
 /// squared error is limited to this many squares of the light at the pixel.

@@ -64,13 +64,15 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings,
 
 /// Small pilot renders of `width` columns.
 struct TransportPilots {
-  std::array<TransportPilot, 2> with[kCandidateShares.size()];  ///< by ratio, two seeds each
-  std::vector<double> variance;  ///< by pixel, per sample: of light left to camera paths
+  std::array<TransportPilot, 2> with[kCandidateShares.size()];  ///< results by ratio of light
+                                                                ///< paths, with two seeds each
+  std::vector<double> variance;  ///< squared noise by pixel, per sample, of the light left to
+                                 ///< camera paths
   uint32_t width = 0;
   bool merges = false;
 };
 struct TransportGain {
-  double gain = 0;  ///< best efficiency over a render without light paths
+  double gain = 0;  ///< best efficiency relative to a render without light paths
   LightPathShare share;
 };
 /// Returns the predicted gain for a render with `longer` times as many samples.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Tables of the kernels for light paths, by program id. Each kernel is compiled in a separate unit
+/// Tables of the kernels for light paths, by program id. A separate unit compiles each kernel
 /// (wave/kernels/kernel_matrix.h); this header only declares them.
 #pragma once
 
@@ -8,7 +8,7 @@
 
 namespace wavecomb {
 
-// Defined in shade_light_batch.h and light_vertex.h.
+// The kernels are defined in shade_light_batch.h and light_vertex.h.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                        uint32_t depth, size_t begin, size_t end);

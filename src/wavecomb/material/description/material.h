@@ -61,7 +61,8 @@ struct Material {
   float clearcoat_roughness = 0.01f;
   float opacity = 1;
   float ior = 1.5f;
-  float opacity_threshold = 0;  ///< > 0: opacity below it counts as 0, other opacity as 1
+  float opacity_threshold = 0;  ///< If above 0, opacity below it counts as 0 and other opacity as
+                                ///< 1.
   /// Measured complex index of refraction of a conductor (metal only), used instead of F0 and F82
   /// if any component of k is > 0.
   Vec3<float> conductor_eta{0, 0, 0}, conductor_k{0, 0, 0};
@@ -144,7 +145,7 @@ struct MaterialView {
   const OpenPbrRecord* openpbr = nullptr;
   /// By material; null if no material's program has specific parameters.
   const ProgramParameterRecord* own = nullptr;
-  const float* energy = nullptr;  ///< EnergyTables; set if a material needs them
+  const float* energy = nullptr;  ///< energy tables (EnergyTables), if a material needs them
   GraphView graphs{};
 };
 

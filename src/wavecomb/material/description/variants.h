@@ -12,9 +12,9 @@ namespace wavecomb {
 
 /// Features of the programs principled and openpbr that a variant can omit.
 enum Part : uint32_t {
-  kTexturePart = 1,        ///< reads textures or a value graph
+  kTexturePart = 1,        ///< The material reads textures or a value graph.
   kEmissionPart = 2,       ///< emission
-  kMetalPart = 4,          ///< metallic above 0, or F0 by specular_color
+  kMetalPart = 4,          ///< The material has metallic above 0, or F0 by specular_color.
   kCoatPart = 8,           ///< clearcoat
   kTransmissionPart = 16,  ///< straight or refracted transmission
   // openpbr only:

@@ -24,7 +24,7 @@ struct Ggx {
   F alpha;
 
   /// D(h) of Walter et al., "Microfacet Models for Refraction through Rough Surfaces", EGSR 2007,
-  /// eq. 33. Written in slopes, which stays accurate for h.z near 1.
+  /// eq. 33. The formula uses slopes, which stay accurate for h.z near 1.
   F d(const Vec3<F>& h) const { return d_along(h, F(1.f)); }
   /// D(h) for h along the vector `sum` of squared length `length2`:
   ///   (alpha |s|^2 / (alpha^2 s_z^2 + s_x^2 + s_y^2))^2 / pi

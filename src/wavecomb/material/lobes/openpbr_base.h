@@ -293,7 +293,8 @@ struct OpenPbrBase {
     Vec3<F> wi;
     Mask<F> crosses;
   };
-  /// Samples a direction. It may lie on the wrong side of the surface, where eval returns 0.
+  /// Samples a direction. The direction may lie on the wrong side of the surface, where eval
+  /// returns 0.
   Sample sample(const View& v, const Vec3<F>& wo, const F& choice, const F& u, const F& w) const {
     Vec3<F> h(F(0.f), F(0.f), F(1.f));
     if (!all(smooth)) h = select<F>(smooth, h, ggx.sample_visible(wo, u, w));

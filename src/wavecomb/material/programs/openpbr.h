@@ -39,12 +39,13 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   static constexpr bool kReadsIor = true;
   static constexpr bool kEmits = (kParts & kEmissionPart) != 0;
   static constexpr bool kAbsorbs = (kParts & kTransmissionPart) != 0;
-  // True for all variants, because light selection in the light tree depends on it.
+  // The value is true for all variants, because light selection in the light tree depends on it.
   static constexpr bool kTransmits = true;
   static constexpr bool kHasSubsurface = kBack;
   static constexpr bool kTextured = (kParts & (kTexturePart | kAnisotropyPart)) != 0;
   using Params = OpenPbrParams<F>;
-  /// All inputs or none, because one textured input suffices to align the frame with the texture.
+  /// The set has all inputs or none, because one textured input suffices to align the frame with
+  /// the texture.
   static constexpr uint32_t kInputs =
       !kTextured ? 0u
                  : input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |

@@ -16,17 +16,14 @@
 namespace wavecomb {
 
 /// Clearcoat over specular reflection over { diffuse, straight transmission } ("UsdPreviewSurface
-/// Specification", OpenUSD); two-sided:
-///   specular       GGX with multiple scattering, which is sampled as diffuse. F90 = 1, and
-///                  F0 = lerp(((1 - ior) / (1 + ior))^2, base_color, metallic), or specular_color
-///                  in the specular workflow;
-///   diffuse        base_color (1 - metallic) opacity, times the transmission of the specular
-///                  interface by its rough albedo (RoughInterface);
-///   transmission   (1 - opacity) times the transmission of the interface, straight through;
-///   clearcoat      GGX of the same index times `clearcoat`. It dims the layers below by its albedo
-///                  at the more grazing of the two directions, which is reciprocal and adds no
-///                  energy.
-/// docs/decisions/preview-surface.md compares it with the specification and other renderers.
+/// Specification", OpenUSD); two-sided: specular GGX with multiple scattering, which is sampled as
+/// diffuse. F90 = 1, and F0 = lerp(((1 - ior) / (1 + ior))^2, base_color, metallic), or
+/// specular_color in the specular workflow; diffuse base_color (1 - metallic) opacity, times the
+/// transmission of the specular interface by its rough albedo (RoughInterface); transmission (1 -
+/// opacity) times the transmission of the interface, straight through; clearcoat GGX of the same
+/// index times `clearcoat`. The clearcoat dims the layers below by its albedo at the more grazing
+/// of the two directions, which is reciprocal and adds no energy. docs/decisions/preview-surface.md
+/// compares it with the specification and other renderers.
 ///
 /// A variant compiled for some of the features (material/description/variants.h) gives bitwise
 /// equal results for materials that use no others.
@@ -43,7 +40,8 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
   static constexpr bool kReadsIor = true;
   static constexpr bool kEmits = (kParts & kEmissionPart) != 0;
   static constexpr bool kTextured = (kParts & kTexturePart) != 0;
-  /// All inputs or none, because one textured input suffices to align the frame with the texture.
+  /// The set has all inputs or none, because one textured input suffices to align the frame with
+  /// the texture.
   static constexpr uint32_t kInputs =
       !kTextured ? 0u
                  : input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |

@@ -16,8 +16,8 @@ namespace {
 
 /// Maximum number of bounding cells of a field; with more, cells are made larger.
 constexpr double kMaxCells = 1 << 22;
-/// Rounding tolerance of kernels, in bricks. It keeps the box of a cell without motion from
-/// reaching into neighbouring cells.
+/// Rounding tolerance of kernels, in bricks. This tolerance keeps the box of a cell without motion
+/// from reaching into neighbouring cells.
 constexpr double kBrickSlack = 1e-5;
 
 struct WideBox {

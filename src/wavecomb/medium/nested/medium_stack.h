@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Medium stack of a path: the bounds that it has entered and not left (Schmidt and Budge, "Simple
-/// Nested Dielectrics in Ray Traced Images", 2002). Where several overlap, the one with the highest
-/// priority counts, and among equal priorities the last one entered.
+/// Medium stack of a path: the medium boundaries (meshes) that it has entered and not left (Schmidt
+/// and Budge, "Simple Nested Dielectrics in Ray Traced Images", 2002). Where several meshes
+/// overlap, the one with the highest priority counts, and among equal priorities the last one
+/// entered.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -10,7 +11,7 @@
 
 namespace wavecomb {
 
-/// Size of the stack. If it overflows, the first bound entered is forgotten.
+/// Size of the stack. If the stack overflows, it drops the first boundary that was entered.
 inline constexpr size_t kMaxMediumStack = 4;
 /// Material of an empty entry.
 inline constexpr uint32_t kNoMaterial = 0xffffffffu;
@@ -43,8 +44,8 @@ class MediumStack {
     r.material_2 = material_[2], r.material_3 = material_[3];
   }
 
-  /// Updates the stack for the bound that the last vertex's ray, selected by `bit` (Crossing), has
-  /// crossed.
+  /// Updates the stack for the medium boundary that the last vertex's ray, selected by `bit`
+  /// (Crossing), has crossed.
   void cross(const MeshMediaView& view, const UInt<F>& object, const UInt<F>& crossed, Crossing bit,
              const Mask<F>& active) {
     const auto has = [&](Crossing b) { return Mask<F>((crossed & uint32_t{b}) != U(0u)); };
@@ -74,7 +75,7 @@ class MediumStack {
     }
   }
 
-  /// Returns the bound that counts, the one with the highest priority.
+  /// Returns the entry that counts, the one with the highest priority.
   MediumBoundary<F> top(const MeshMediaView& view, const Mask<F>& active) const {
     MediumBoundary<F> best{U(kNoMaterial), U(kNoMaterial)};
     F most(-kInfinity);
@@ -90,7 +91,7 @@ class MediumStack {
     return best;
   }
 
-  /// Returns the lanes that have entered a bound of the geometry `object`.
+  /// Returns the lanes whose stack contains the geometry `object`.
   Mask<F> contains(const U& object) const {
     Mask<F> any_of(false);
     for (size_t k = 0; k < kMaxMediumStack; ++k)
@@ -109,7 +110,7 @@ class MediumStack {
       left = left & Mask<U>(not_(Mask<F>(here)));
     }
   }
-  /// Leaves the last entered bound of the geometry `object` in `lanes`, if there is one.
+  /// Removes the last entry of the geometry `object` in `lanes`, if there is one.
   void leave(const U& object, const Mask<F>& lanes) {
     Mask<F> left = lanes;
     for (size_t k = kMaxMediumStack; k-- > 0;) {
@@ -136,11 +137,12 @@ class MediumStack {
   U object_[kMaxMediumStack], material_[kMaxMediumStack];
 };
 
-/// Bound that a ray hits.
+/// Medium boundary that a ray hits.
 template <typename F>
 struct BoundaryHit {
   MediumStack<F> after;  ///< medium stack on the other side
-  /// Whether the ray passes unchanged, since another bound has priority or this one has no effect.
+  /// Whether the ray passes unchanged, since another boundary has priority or this one has no
+  /// effect.
   Mask<F> passes;
   F outer;  ///< index of refraction on the outer side
 };
@@ -167,7 +169,7 @@ inline BoundaryHit<F> cross_boundary(const MeshMediaView& view, const MediumStac
   const U kind = gather_field<F>(view.media, &MeshMedium<float>::kind, bound.material, lanes);
   const Mask<F> clear =
       Mask<F>(kind == U(static_cast<uint32_t>(BoundaryKind::kClear))) & (hit.outer == 1.f);
-  // A bound that is left without having been entered stays visible.
+  // A boundary that a ray leaves without having entered it stays visible.
   hit.passes =
       lanes & (clear | (same(current, top_after) & (enters | before.contains(bound.object))));
   return hit;

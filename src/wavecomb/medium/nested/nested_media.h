@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Rays through media inside meshes, from bound to bound.
+/// Rays through media inside meshes, from one medium boundary to the next.
 ///
-/// A ray through media k with absorption a_k and scattering s_k, over lengths t_k, has
-///   throughput *= exp(-sum a_k t_k)
-/// and collides after an exponentially distributed optical depth of scattering, which a hero
-/// channel samples (medium/volume/tracking.h). Each medium is homogeneous, so a new distance is
-/// sampled where a medium begins. If lights guide distances, it is sampled when the next bound or
-/// surface is known.
+/// A ray through media k with absorption a_k and scattering s_k, over lengths t_k, has throughput
+///   *= exp(-sum a_k t_k) and collides after an exponentially distributed optical depth of
+///   scattering, which a hero channel samples (medium/volume/tracking.h). Each medium is
+///   homogeneous, so a new distance is sampled where a medium begins. If lights guide distances,
+///   the distance is sampled when the next boundary or surface is known.
 ///
 /// Scattering behind a refractive boundary skips light sampling, since no shadow ray can reach a
 /// light, and continues as a random walk. Where the walk hits a surface, it becomes a path again,
-/// with MIS weight 1 for the emission it hits. Scattering inside a clear bound, which does not
+/// with MIS weight 1 for the emission it hits. Scattering inside a clear boundary, which does not
 /// refract, is an event with light sample, bounce and MIS, as in volumes.
 #pragma once
 
@@ -106,7 +105,7 @@ class NestedMedia {
   /// neither stops nor attenuates it, but the ray still enters and leaves it.
   template <typename F>
   Mask<F> is_visible(const Rays<F>& r, const UInt<F>& object, const Mask<F>& lanes) const;
-  /// Returns the medium inside a bound, or none if the ray does not see the bound.
+  /// Returns the medium inside a boundary, or none if the ray does not see the boundary.
   template <typename F>
   MeshMedium<F> medium_of(const Rays<F>& r, const MediumBoundary<F>& bound,
                           const Mask<F>& active) const {
@@ -130,8 +129,8 @@ class NestedMedia {
             gather<U>(events.material, r.ray_index, Mask<U>(may))};
   }
   /// Returns the distance at which a ray continues past a hit at t that neither stops it nor bounds
-  /// a medium. The step is just above rounding error, since a bound may follow closely. Hitting the
-  /// same surface again only costs time.
+  /// a medium. The step is just above rounding error, since a medium boundary may follow closely.
+  /// Hitting the same surface again only costs time.
   template <typename F>
   F past_hit(const F& t) const {
     return fma(t, F(1.f + 0x1p-20f), F(scene_.scale * 0x1p-21f));
@@ -161,8 +160,8 @@ class NestedMedia {
   template <typename F>
   Mask<F> scatter_ray(const NestedRays& all, Rays<F>& r, const MeshMedium<F>& medium,
                       const F& length, const Mask<F>& lanes) const;
-  /// Advances rays to their next bound or collision, finishes those that end, and lists the others
-  /// from `left` on. Returns the number of listed rays.
+  /// Advances rays to their next medium boundary or collision, finishes those that end, and lists
+  /// the others from `left` on. Returns the number of listed rays.
   template <typename F>
   size_t advance(const NestedRays& all, const HitSpan& hits, const NestedEvents& events, Rays<F>& r,
                  size_t left) const;
@@ -259,8 +258,8 @@ inline void NestedMedia::sample_flight(const NestedRays& rays, const HitSpan& hi
     left += scene_.visibility ? store_active<F>(rays, r, active, left)
                               : advance<F>(rays, hits, events, r, left);
   }
-  // The first hits leave out bounds that are invisible to these rays. The rays must still enter and
-  // leave them.
+  // The first hits leave out medium boundaries that are invisible to these rays. The rays must
+  // still enter and leave these boundaries.
   if (scene_.visibility) keys.ray_kind = kVisibleToAll;
   run<F>(rays, left, keys, [&](Rays<F>& r, size_t at) {
     r.kind = kind;
@@ -272,7 +271,7 @@ template <typename F>
 inline void NestedMedia::attenuate(const NestedRays& rays, const float* most,
                                    float* const (&product)[3], PresenceKeys keys) const {
   using U = UInt<F>;
-  // Rays also enter and leave bounds that do not attenuate them.
+  // Rays also enter and leave boundaries that do not attenuate them.
   const PresenceKeys requested = keys;
   keys.ray_kind = kVisibleToAll;
   keys.shadow_set = nullptr;
@@ -308,8 +307,8 @@ inline void NestedMedia::attenuate(const NestedRays& rays, const float* most,
   });
 }
 
-/// A ray in an arbitrary direction leaves the bounds that it has not entered. The first one that it
-/// leaves is the innermost.
+/// A ray in an arbitrary direction leaves the boundaries that it has not entered. The first
+/// boundary that it leaves is the innermost one.
 inline MediumStack<float> NestedMedia::stack_at(Vec3<float> p, float time,
                                                 PresenceKeys keys) const {
   keys.ray_kind = kVisibleToAll;

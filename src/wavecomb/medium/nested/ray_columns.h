@@ -65,7 +65,7 @@ struct NestedRayState {
   Color<F> throughput;
   F start;  ///< length covered since the last collision
   F first;  ///< SubsurfaceWalk::first
-  /// Distance to the next collision, or kFar. Until something scatters it is kFar (1 + u), which
+  /// Distance to the next collision, or kFar. Before the first scattering it is kFar (1 + u), which
   /// stores the random number u of the first distance; u is stratified over a pixel's samples. For
   /// shadow rays it is the remaining length.
   F rest;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Steps of rays through media inside meshes, each to the next bound or collision. Included by
-/// nested_media.h.
+/// Steps of rays through media inside meshes, each to the next medium boundary or collision.
+/// Included by nested_media.h.
 #pragma once
 
 #include "wavecomb/medium/nested/nested_media.h"
@@ -19,7 +19,7 @@ inline Mask<F> NestedMedia::is_visible(const Rays<F>& r, const UInt<F>& object,
   const LinkView& links = scene_.lights.links;
   const Mask<F> linked = visible & Mask<F>(r.shadow_set != U(0u));
   if (!links.members || none(linked)) return visible;
-  // This is the test of casts_shadow() (accel/presence.h).
+  // Applies the test of casts_shadow() (accel/presence.h).
   const U set = select(Mask<U>(linked), r.shadow_set, U(1u)) - 1u;
   const U link = gather<U>(links.classes, object, Mask<U>(linked));
   const U word = gather<U>(links.members, (link - 1u) * links.words + (set >> 5), Mask<U>(linked));
@@ -209,7 +209,7 @@ inline size_t NestedMedia::advance(const NestedRays& all, const HitSpan& hits,
     row.crossed = U(0u);
     row.outer = boundary.outer;
     row.medium = current.material;
-    // Rays that leave the scene from an unclosed mesh.
+    // These rays leave the scene from a mesh that is not closed.
     s.start = select(open & not_(collides) & not_(stopped), F(kInfinity), s.start);
     const U by_event = select(Mask<U>(event), U(scene_.nested_media.event_material),
                               U(uint32_t{Flights::kNoEvent}));

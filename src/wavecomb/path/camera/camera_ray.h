@@ -141,7 +141,8 @@ inline LocalRay<F> local_ray(const CameraSetup& camera, const F& x, const F& y, 
   if (camera.lens_radius > 0) {
     const Vec2<F> lens = aperture_point<F>(camera, u, v);
     const Vec3<F> p{lens.x, lens.y, F(0.f)};
-    // Towards the point in focus, d * focus_distance, from the lens, scaled back to z = -1.
+    // The direction points from the lens to the point in focus, d * focus_distance, scaled back to
+    // z = -1.
     d = {fma(p.x, F(-1.f / camera.focus_distance), d.x),
          fma(p.y, F(-1.f / camera.focus_distance), d.y), F(-1.f)};
     o = is_parallel ? Vec3<F>{o.x + p.x, o.y + p.y, F(0.f)} : p;

@@ -28,7 +28,7 @@ template <typename Bsdf, typename F>
 struct SurfaceHitPoint {
   UInt<F> textured_inputs;  ///< MaterialRecord::textured_inputs
   Mask<F> reads_texture;    ///< lanes that need uv and a tangent along u
-  bool textured;            ///< whether any lane does
+  bool textured;            ///< whether any lane needs texture coordinates
   Surface<F> s;
 
   template <uint32_t kFeatures>
@@ -121,7 +121,7 @@ WAVECOMB_INLINE MaterialLookup<Bsdf, F> look_up_material(const Vertex<F, kFeatur
     footprint = footprint_of<F>(v, F(path.cone_width * s.uv_per_length / sqrt(view_cosine)));
   }
   const auto make_point = [&](const Mask<F>& lanes) {
-    // Copies, so that the originals can stay in registers. Only value graphs use them.
+    // These copies let the originals stay in registers. Only value graphs use them.
     const MeshHit<F> at = v.hit;
     const Surface<F> surface = s;
     const Vec3<F> dir = path.dir;

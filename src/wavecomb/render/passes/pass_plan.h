@@ -43,12 +43,12 @@ struct PassState {
 /// Settings that determine passes.
 struct PassRules {
   uint32_t spp = 1;      ///< most samples per pixel
-  uint32_t min_spp = 0;  ///< adaptive: samples before the first error check
+  uint32_t min_spp = 0;  ///< in adaptive renders: samples before the first error check
   bool adaptive = false;
-  bool timed = false;        ///< the render has a time limit
-  uint32_t step = 16;        ///< samples that a pass adds if not adaptive
-  bool progressive = false;  ///< sample counts double from one sample on
-  uint32_t pilot = 0;        ///< a pass ends at this sample count; 0 if pixels are sampled evenly
+  bool timed = false;        ///< whether the render has a time limit
+  uint32_t step = 16;        ///< samples that a pass adds if the render is not adaptive
+  bool progressive = false;  ///< whether sample counts double from one sample on
+  uint32_t pilot = 0;        ///< sample count at which a pass ends; 0 if pixels are sampled evenly
 };
 
 /// Time until the limit, and rendering speed so far.
@@ -58,10 +58,11 @@ struct TimeLeft {
 };
 
 /// Returns whether an adaptive render checks errors when its pixels have `n` samples. The first
-/// check is at min_spp, rounded up to a multiple of kCheckSamples, and the last at spp. The step in
-/// between is a quarter of the power of two below n, at least kCheckSamples. So a pixel gets at
-/// most a quarter more samples than it needs, and sample counts are sums of two or three Sobol
-/// nets. Since only n decides, wave size and thread count do not change the image.
+/// check is at min_spp, rounded up to a multiple of kCheckSamples, and the last at spp. Checks at
+/// about n samples are a quarter of the largest power of two below n apart, but at least
+/// kCheckSamples. A pixel therefore gets at most a quarter more samples than it needs, and sample
+/// counts are sums of two or three Sobol nets. The checks depend only on n, so wave size and thread
+/// count do not change the image.
 bool is_check(uint32_t n, const PassRules& rules);
 
 /// Returns the sample count of the first check after `done` samples.

@@ -35,7 +35,8 @@ struct GuidingStatistics {
   double survival = 1;
   bool used = false;  ///< whether the render uses the field for bounces or roulette
   double seconds = 0;
-  bool is_reused = false;  ///< taken over from an earlier render or a checkpoint
+  bool is_reused = false;  ///< whether the training was taken over from an earlier render or a
+                           ///< checkpoint
 };
 
 /// Result of the training.

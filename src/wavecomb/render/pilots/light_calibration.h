@@ -25,7 +25,7 @@ struct LightCalibration {
   uint32_t paths = 0;
   uint32_t tilted_nodes = 0;  ///< light tree nodes with changed odds
   double seconds = 0;
-  bool kept = false;  ///< taken over from an earlier render
+  bool kept = false;  ///< whether the calibration was taken over from an earlier render
 };
 
 /// Calibrates the lights of `scene` for the size of the whole image, the filter, max_depth and the

@@ -14,7 +14,7 @@
 
 namespace wavecomb {
 
-// Defined in wave/stages/shade_batch.h and vertex.h.
+// The kernels are defined in wave/stages/shade_batch.h and vertex.h.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Joint>
 void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                  uint32_t depth, size_t begin, size_t end);
