@@ -66,7 +66,8 @@ TEST(JointVertex, EvaluatesTheBsdfOnlyWhereItCounts) {
                                    .inverse_cos = 1.f,
                                    .connection_ratio = 0.f,
                                    .merges = c.merges,
-                                   .radius2 = 0.f};
+                                   .radius2 = 0.f,
+                                   .connects = false};
     const Vec3<float> up{0, 0, 1};
     CountingBsdf::evaluations = 0;
     const float r = joint.towards<CountingBsdf>(v, CountingInteraction{}, up, up, up, c.wanted);
