@@ -73,7 +73,8 @@ TEST(Pilots, FindWhatARenderNeedsAndKeepIt) {
     const RenderPlan plan(*scene, accelerator, settings, {}, nullptr);
     RenderCosts costs(*scene, plan.traits, settings);
     Film film = plan.make_film();
-    const WaveContext context = plan.make_context(film, costs, nullptr, nullptr);
+    const JointPasses passes(plan.joint, settings);
+    const WaveContext context = plan.make_context(film, costs, nullptr, passes);
     const auto no = [] { return false; };
     PilotResults found = run_pilots({.scene = scene,
                                      .plan = plan,
@@ -81,7 +82,7 @@ TEST(Pilots, FindWhatARenderNeedsAndKeepIt) {
                                      .costs = costs,
                                      .light_settings = settings,
                                      .learned = {},
-                                     .aiming = nullptr,
+                                     .joint = nullptr,
                                      .stopped = no,
                                      .halted = no},
                                     cache);
@@ -93,7 +94,7 @@ TEST(Pilots, FindWhatARenderNeedsAndKeepIt) {
   };
   const PilotResults first = pilots_of(s);
   ASSERT_TRUE(first.lights && first.training);
-  EXPECT_FALSE(first.aiming) << "no paths start at lights";
+  EXPECT_FALSE(first.joint) << "no paths start at lights";
   EXPECT_GT(first.training->statistics.paths, 0u);
   EXPECT_FALSE(first.training->statistics.is_reused);
   EXPECT_EQ(first.lights->tables.shares.size(), first.lights->parts.size());
@@ -107,7 +108,7 @@ TEST(Pilots, FindWhatARenderNeedsAndKeepIt) {
   EXPECT_EQ(pilots_of(s).training->statistics.paths, 0u);
   s.transport = Transport::kLight;
   const PilotResults aimed = pilots_of(s);
-  ASSERT_TRUE(aimed.aiming);
+  ASSERT_TRUE(aimed.joint);
 }
 
 }  // namespace
