@@ -321,11 +321,11 @@ def test_a_full_disk_on_one_worker(stage: Path, tmp_path: Path) -> None:
     run._fetch(future)
     run._take(*run._ended.get(timeout=1))
     assert [batch.tiles for batch in run._ready] == [[Task(0, 3)]] and not run._out.failed
-    run._query_workers()
+    run._workers.query()
     assert run._capacity() == 1
     run._check()
     client.amounts["two"] = 0
-    run._next_query = 0.0
-    run._query_workers()
+    run._workers._next_query = 0.0
+    run._workers.query()
     with pytest.raises(WavecombError, match="No space left"):
         run._check()

@@ -364,6 +364,7 @@ def test_what_does_not_start_is_an_error_from_any_thread(monkeypatch: pytest.Mon
 # ---- nobody else does ----------------------------------------------------------------------------
 
 PROGRAMS = {
+    "blend.py": "Blender",
     "bench/process.py": "perf",
     "bench/machine.py": "git",
     "farm/clusters.py": "Slurm's commands",

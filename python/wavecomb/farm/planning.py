@@ -19,7 +19,6 @@ from wavecomb.farm.tiling import (
     choose_tiles,
     is_better_whole,
     needs_whole,
-    settings_of_tiles,
 )
 
 _UNKNOWN_WORKERS = 4
@@ -67,9 +66,6 @@ def complete(
         )
         regions = [shot.region for shot in job.shots]
         tiles = choose_tiles(regions, len(job.images), workers or _UNKNOWN_WORKERS, whole)
-    if tiles != (1, 1) and learned is None:
-        shots = tuple(replace(s, settings=settings_of_tiles(s.settings)) for s in job.shots)
-        job = replace(job, shots=shots)
     field = None if learned is None else hashlib.sha256(learned).hexdigest()
     done = replace(job, tiles=tiles, learned=field)
     if done.task_count() > MAX_TASKS:

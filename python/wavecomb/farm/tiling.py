@@ -197,24 +197,14 @@ def is_better_whole(settings: Mapping[str, Any], has_guiding_field: bool = False
     """Returns whether each tile has a high cost in addition to its pixels.
 
     This is the case for a border, for training a guiding field, and for tracing all light paths.
-    ``has_guiding_field`` says that the guiding field is already trained. Settings that pilot
-    renders would decide do not count, since tiles do without them (``settings_of_tiles``).
+    ``has_guiding_field`` says that the guiding field is already trained.
     """
-    learns = settings.get("guiding") == "on" or settings.get("roulette") == "efficient"
+    learns = settings.get("guiding", "off") != "off" or settings.get("roulette") == "efficient"
     return (
         bool(settings.get("adaptive"))
-        or settings.get("transport") in ("light", "bdpt")
+        or settings.get("transport") in ("light", "bdpt", "auto")
         or (learns and not has_guiding_field)
     )
-
-
-def settings_of_tiles(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns settings for tiles that no earlier render hands its guiding data.
-
-    Each tile would repeat the pilot renders of the whole image, which cost up to a few per cent of
-    it, so tiles do without pilot renders.
-    """
-    return {**settings, "quality": "plain"}
 
 
 def check_tiles(settings: Mapping[str, Any], tiles: tuple[int, int]) -> None:
