@@ -125,7 +125,7 @@ class SubdivisionSurfaces:
 
     def is_displaced(self, draw: DrawItem) -> bool:
         """Returns whether a material that is bound to a mesh displaces its points."""
-        # Nearly all meshes have no subsets.
+        # Nearly all meshes have no GeomSubsets.
         if not draw.subsets:
             material = draw.material
             return material is not None and bool(self.materials.surface(material).displacement)
@@ -207,7 +207,7 @@ class SubdivisionSurfaces:
         levels = Counter(surface.level for surface in self._all if surface.cage.scheme != "none")
         waiting = deque(surface for surface in self._all if surface.level or surface.moves)
         if self.cache is None:
-            # Releases unrefined cages now and refined ones after refinement.
+            # Releases unrefined cages now and the rest after refinement.
             self._all = []
         while waiting:
             self._refine(self._next_batch(waiting))
@@ -351,7 +351,7 @@ class SubdivisionSurfaces:
         """Describes polygons that are displaced without subdivision."""
         topology = cage.topology
         out: dict[str, Any] = {
-            # These triangles already have the correct winding.
+            # The refined triangles already have the correct winding.
             "left_handed": False,
             "triangles": topology.triangles,
             "triangle_faces": np.ascontiguousarray(topology.face_ids(), np.uint32),
