@@ -22,12 +22,12 @@ class Entry:
     Attributes:
         name: Object name without the prefix "action.".
         text: Text in the menu, with a mnemonic.
-        call: Callback. A checkable action passes its new state.
-        keys: Shortcuts; the menu shows the first.
+        call: Callback. A checkable action passes its new checked state to the callback.
+        keys: Shortcuts of the action; the menu shows the first.
         tip: Description in a sentence.
         checkable: Whether the action can be on or off.
-        local: Whether the shortcut works only while the viewport has the focus. Single keys need
-            this, because they would otherwise interfere with typing.
+        local: Whether the shortcut works only while the viewport has the focus. Shortcuts of a
+            single key are local, because they would otherwise interfere with typing.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Entry:
 
 
 def make_action(entry: Entry, window: QWidget, viewport: QWidget) -> QAction:
-    """Creates the action, owned by the window or, if it is local, by the viewport."""
+    """Creates the QAction, owned by the window or, if the shortcut is local, by the viewport."""
     home = viewport if entry.local else window
     action = QAction(entry.text, home)
     action.setObjectName(f"action.{entry.name}")
@@ -99,7 +99,7 @@ class HistoryActions(QObject):
         self._tell(self._redo, what)
 
     def _tell(self, action: QAction, what: str) -> None:
-        if shiboken6.isValid(action):  # a stack clears itself while it is destroyed
+        if shiboken6.isValid(action):  # An undo stack emits signals even while Qt destroys it.
             action.setText(f"{self._texts[action]} {what.replace('&', '&&')}".rstrip())
 
 

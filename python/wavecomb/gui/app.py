@@ -86,8 +86,8 @@ def run(
     # Python handles signals only while its interpreter runs, so a timer wakes it regularly.
     beat = QTimer(window)
     beat.start(200)
-    # USD also reports problems during edits and when panels read the stage. Add these messages to
-    # the notes.
+    # USD also reports problems during edits and when panels read the stage. Adds the messages of
+    # USD to the notes.
     listening = DiagnosticListener()
     beat.timeout.connect(lambda: window.session.note_words(listening.take()))
     window.show()
@@ -106,7 +106,7 @@ def run(
 def destroy(window: QWidget) -> None:
     """Destroys a closed window immediately, instead of leaving it to Python's garbage collector.
 
-    Python objects of the window's parts remain, but their Qt objects no longer exist.
+    The Python objects of the window's panels remain, but their Qt objects no longer exist.
     """
     window.deleteLater()
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)

@@ -24,7 +24,7 @@ Receive = Callable[[Any], None]
 
 
 class Mailbox:
-    """Queue of messages from any thread to one thread. Independent of Qt."""
+    """Queue of messages from any thread to one thread. The queue is independent of Qt."""
 
     def __init__(self) -> None:
         self._letters: deque[tuple[int, Any]] = deque()
@@ -37,24 +37,25 @@ class Mailbox:
         return self._reader.fileno()
 
     def put(self, address: int, letter: Any) -> None:
-        """Adds a message, from any thread, without blocking."""
+        """Adds a message; any thread may call this, and it does not block."""
         self._letters.append((address, letter))
         self.wake()
 
     def wake(self) -> None:
-        """Wakes the reader."""
-        # A full socket buffer already wakes the reader.
+        """Wakes the thread that reads the queue."""
+        # A full socket buffer already wakes the reading thread.
         with contextlib.suppress(OSError):
             self._writer.send(b"\0")
 
     def hush(self) -> None:
-        """Clears all wake-ups so far. Later messages wake the reader again."""
+        """Removes all bytes that have woken the reading thread so far. Later messages wake the
+        reading thread again."""
         with contextlib.suppress(OSError):
             while self._reader.recv(4096):
                 pass
 
     def take(self) -> tuple[int, Any] | None:
-        """Removes and returns the oldest message and its address, or returns None."""
+        """Removes the oldest message and returns it with its address, or returns None."""
         return self._letters.popleft() if self._letters else None
 
 
@@ -67,12 +68,13 @@ class Port:
         self._mailbox, self._address = mailbox, address
 
     def send(self, letter: Any) -> None:
-        """Sends a message. The receiver gets messages in order, on the window's thread."""
+        """Sends a message to the receiver. The receiver gets messages in order, on the window's
+        thread."""
         self._mailbox.put(self._address, letter)
 
 
 class Bridge(QObject):
-    """Dispatcher of messages to receivers, one for the application, on its thread."""
+    """Dispatcher of messages to receivers; the application has one, on the thread of the window."""
 
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
@@ -99,7 +101,7 @@ class Bridge(QObject):
             try:
                 receive(letter[1])
             except BaseException:
-                self._mailbox.wake()  # delivers the remaining messages later
+                self._mailbox.wake()  # Delivers the remaining messages later.
                 raise
 
 
@@ -108,7 +110,7 @@ def _forget(receivers: dict[int, Any], address: int, reference: object) -> None:
 
 
 def _is_there(receiver: object) -> bool:
-    """Returns whether Qt has not destroyed the receiver."""
+    """Returns whether the Qt object of the receiver still exists."""
     return not isinstance(receiver, QObject) or shiboken6.isValid(receiver)
 
 
@@ -118,10 +120,11 @@ _bridge: Bridge | None = None
 def port(receive: Receive) -> Port:
     """Creates a port through which other threads send messages to the window's thread.
 
-    Must be called on the window's thread.
+    ``port`` must be called on the window's thread.
 
     Args:
-        receive: A bound method. Messages are dropped once its object is gone.
+        receive: A bound method that gets the messages. Messages are dropped after the object of the
+            method is deleted.
     """
     global _bridge
     application = QCoreApplication.instance()

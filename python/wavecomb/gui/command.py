@@ -17,13 +17,13 @@ KILL_MS = 8000
 
 
 class Command(QObject):
-    """A process that runs a command, one at a time.
+    """Process that runs one command at a time.
 
     Signals:
         event(dict): The process printed a line with a JSON object on stdout.
-        said(str): The process printed another line, on stdout or stderr.
+        said(str): The process printed a line that is not JSON, on stdout or stderr.
         finished(code, text, error): The process ended: exit code, all of stdout, and the last line
-            of stderr if it failed, else "". A stopped process has the code 130.
+            of stderr if it failed, else "". A process that was stopped has the exit code 130.
     """
 
     event = Signal(dict)
@@ -48,8 +48,8 @@ class Command(QObject):
 
         Args:
             arguments: Command-line arguments.
-            module: The module; the default is the command-line program.
-            text: Standard input.
+            module: Name of the Python module; the default is the command-line program.
+            text: Text for the standard input of the process.
         """
         assert self._process is None, "one at a time"
         process = QProcess(self)

@@ -29,7 +29,7 @@ from wavecomb.gui.command import Command
 from wavecomb.gui.widgets import named
 
 Describe = Callable[[str], dict[str, Any]]
-"""Function that describes a job for ``farm.from_json``, given its output file. Raises
+"""Function that describes a farm job for ``farm.from_json``, given the job's output file. Raises
 WavecombError."""
 
 
@@ -37,16 +37,16 @@ class FarmDialog(QDialog):
     """Dialog that asks for output and workers, submits the job and shows its progress.
 
     Attributes:
-        folder: Folder of the job; None before it is submitted.
+        folder: Folder of the job; None until the job is submitted.
     """
 
     def __init__(self, describe: Describe, output: str, parent: QWidget | None = None) -> None:
-        """Creates the dialog without submitting anything.
+        """Creates the dialog without submitting a job.
 
         Args:
-            describe: Describes the job.
-            output: Initial output file.
-            parent: The window.
+            describe: Function that describes the job.
+            output: Initial path of the output file.
+            parent: Parent window of the dialog.
         """
         super().__init__(parent)
         self.setObjectName("farm")
@@ -116,7 +116,7 @@ class FarmDialog(QDialog):
             options["frames"] = self.frames.text().strip()
             options.pop("frame", None)
         self.folder = None
-        self.bar.setMaximum(0)  # busy until the first tile arrives
+        self.bar.setMaximum(0)  # The progress bar shows "busy" until the first tile arrives.
         self.say("reading the stage \u2026")
         self._start([], module="wavecomb.farm.json_submission", text=json.dumps(wanted))
 
@@ -127,7 +127,7 @@ class FarmDialog(QDialog):
         self.stop.setEnabled(True)
 
     def _take(self, found: dict[str, Any]) -> None:
-        """Handles a JSON line: the job that was written, an error, or progress."""
+        """Handles a JSON line of the farm process: the submitted job, an error, or progress."""
         if "error" in found:
             self.say(found["error"])
         elif "job" in found and not self._is_resuming:
@@ -156,15 +156,16 @@ class FarmDialog(QDialog):
             self._start(["farm", "resume", str(self.folder), "--on", engine, "--json"])
 
     def end(self) -> None:
-        """Stops the job; `wavecomb farm resume` continues it."""
+        """Stops the farm job; `wavecomb farm resume` continues it."""
         self._command.stop()
 
     def say(self, line: str) -> None:
-        """Shows a line of text as the state."""
+        """Shows a line of text about the state of the job."""
         self.state.setText(html.escape(line))
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Stops a running job, and hides until it has ended. Finished tiles are kept."""
+        """Stops a running farm job, and hides the dialog until the job has ended. Finished tiles
+        are kept."""
         if not self._command.running:
             super().closeEvent(event)
             return

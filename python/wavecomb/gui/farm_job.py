@@ -20,7 +20,7 @@ _NOT_FOR_A_FARM = ("time_limit",)
 
 
 def changed_settings(setup: Setup) -> dict[str, Any]:
-    """Returns the settings that differ from their defaults, except size and samples."""
+    """Returns the settings that differ from their defaults, except image size and sample counts."""
     rows = settings()
     return {
         one.name: getattr(setup, one.name)
@@ -32,14 +32,14 @@ def changed_settings(setup: Setup) -> dict[str, Any]:
 
 
 def describe(session: Session, edits: StageEdits | None, output: str) -> dict[str, Any]:
-    """Describes a farm job for the displayed image.
+    """Describes a farm job that renders the displayed image.
 
-    Edits are saved as a layer over the stage, beside the image.
+    Edits of the stage are saved as a layer over it, beside the output image.
 
     Args:
-        session: Session of the window.
-        edits: Edits of its stage.
-        output: File of the image.
+        session: Session of the viewport.
+        edits: Edits of the session's stage.
+        output: Path of the output image.
 
     Raises:
         WavecombError: There is no stage, the view is not through a camera, or edits cannot be

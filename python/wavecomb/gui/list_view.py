@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""List views that select whole rows and paint the roles of ``table_model``."""
+"""List views that select whole rows and paint the data roles of ``table_model``."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ Index = QModelIndex | QPersistentModelIndex
 
 
 def tone(name: str) -> QColor:
-    """Returns the colour of a ``ToneRole``."""
+    """Returns the colour of a value of ``ToneRole``."""
     return {"dim": theme.dim, "warning": theme.warning, "error": theme.error}[name]()
 
 
 class RowDelegate(QStyledItemDelegate):
-    """Delegate that paints ``ColourRole`` and ``ToneRole``."""
+    """Delegate that paints the data roles ``ColourRole`` and ``ToneRole`` of a cell."""
 
     def initStyleOption(self, option: QStyleOptionViewItem, index: Index) -> None:
-        """Initialises the style option with colour and tone."""
+        """Initialises the style option of a cell with its colour and tone."""
         super().initStyleOption(option, index)
         colour = index.data(ColourRole)
         if colour is not None:
@@ -47,7 +47,7 @@ class RowDelegate(QStyledItemDelegate):
 
 
 def show_rows(view: QTableView, name: str, title: str, tip: str) -> None:
-    """Sets up a list without grid lines that selects whole rows."""
+    """Sets up a list view without grid lines that selects whole rows."""
     named(view, name, title, tip)
     view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
     view.setTabKeyNavigation(False)
@@ -66,13 +66,13 @@ def lay_out_rows(
     stretch: int,
     widths: Mapping[int, float],
 ) -> None:
-    """Sets up a list that selects whole rows, one at a time.
+    """Sets up a list view that selects whole rows, one at a time.
 
     Args:
-        view: View that already has its model.
-        name: Object name.
-        title: Accessible name.
-        tip: Tooltip.
+        view: List view that already has its model.
+        name: Object name of the view.
+        title: Accessible name of the view.
+        tip: Tooltip of the view.
         stretch: Column that takes the remaining width.
         widths: Widths of the fixed columns, in font heights.
     """
@@ -86,7 +86,7 @@ def lay_out_rows(
 
 
 def compact(view: QTableView, name: str, title: str, tip: str) -> None:
-    """Sets up rows of one line; long texts such as paths are shortened in the middle."""
+    """Sets up table rows of one line; long texts such as paths are shortened in the middle."""
     show_rows(view, name, title, tip)
     view.setWordWrap(False)
     view.setTextElideMode(Qt.TextElideMode.ElideMiddle)

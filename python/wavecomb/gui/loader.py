@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reading of a stage for the window. Independent of Qt, because it runs on another thread."""
+"""Loads a stage for the window. Independent of Qt, because it runs on another thread."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from wavecomb.usd.materials.texture import TextureCache
 
 @dataclass(frozen=True)
 class Source:
-    """A stage to read, with its loading options.
+    """A stage to load, with its loading options.
 
     Attributes:
         path: File of the stage.
-        camera: Prim path or unique name, or None.
-        time: Time code; None means the start of the stage.
-        variants: Selections as for ``wavecomb.load``, authored in the session layer.
-        purposes: Purposes of the geometry; None means default and render.
+        camera: Prim path or unique name of the camera, or None.
+        time: Time code; None means the start time code of the stage.
+        variants: Variant selections as for ``wavecomb.load``, authored in the session layer.
+        purposes: Purposes of the geometry; None means "default" and "render".
     """
 
     path: Path
@@ -35,16 +35,16 @@ class Source:
 
 @dataclass(frozen=True)
 class Request:
-    """Request of a session to read a stage.
+    """Request of a session to load a stage.
 
     Attributes:
-        source: Stage and loading options.
-        usd: A stage that is already open, or None.
-        overrides: Private copy of its session layer, or None.
+        source: The stage and its loading options.
+        usd: The USD stage, if it is already open; else None.
+        overrides: Private copy of the stage's session layer, or None.
         fresh: Whether to reload the layers of ``usd`` from disk first.
         threads: Number of threads for textures; 0 uses all cores.
         textures: Textures of the previous scene, to share.
-        size: Width and height of the image, in pixels.
+        size: Width and height of the rendered image, in pixels.
     """
 
     source: Source
@@ -65,7 +65,7 @@ def copied(layer: Sdf.Layer) -> Sdf.Layer:
 
 @dataclass(frozen=True)
 class Read:
-    """A stage that was read for the window.
+    """A stage that was loaded for the window.
 
     Attributes:
         stage: The loaded stage with its scene.
@@ -77,7 +77,7 @@ class Read:
 
 
 def read(request: Request) -> Read:
-    """Opens a stage for the window's editors, and loads a scene from a second stage of its files.
+    """Opens a stage for the window's editors, and loads a scene from a second copy of it.
 
     Raises:
         WavecombError: The stage cannot be rendered.
@@ -95,7 +95,7 @@ def read(request: Request) -> Read:
 
 
 def _overrides(request: Request, usd: Usd.Stage) -> Sdf.Layer:
-    """Returns the requested session layer, by default the one of the open stage."""
+    """Returns the requested session layer, by default the session layer of the open stage."""
     return usd.GetSessionLayer() if request.overrides is None else request.overrides
 
 
@@ -109,7 +109,7 @@ def _options(request: Request) -> dict[str, Any]:
 
 
 def _load(request: Request, overrides: Sdf.Layer | None) -> LoadedStage:
-    """Loads the scene from a second stage, so that the window's stage stays usable meanwhile."""
+    """Loads the scene from a second copy of the stage, so that the window's stage stays usable."""
     from wavecomb.usd import LoadReport, load_stage, open_stage
     from wavecomb.usd.stage.report import capture_diagnostics
 

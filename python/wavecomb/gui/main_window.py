@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The main window, which contains viewport, bars and panels."""
+"""The main window, which contains the viewport, bars and panels."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ class MainWindow(TakesFiles, QMainWindow):
         self._sizing.timeout.connect(self._share_width)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Leaves half of the width to the image."""
+        """Gives half of the window's width to the image."""
         super().resizeEvent(event)
         self._sizing.start()
 
@@ -153,7 +153,7 @@ class MainWindow(TakesFiles, QMainWindow):
         return dock
 
     def _size_bottom(self, visible: bool) -> None:
-        """Limits the height of a panel below the image when it is first shown."""
+        """Limits the height of a panel below the image the first time it is shown."""
         if visible and not self._bottom_sized:
             self._bottom_sized = True
             shown = [dock for dock in self.docks.values() if dock is self.sender()]
@@ -219,12 +219,12 @@ class MainWindow(TakesFiles, QMainWindow):
         ask_file(self, "Open a stage", f"USD ({kinds})", self.open, start=folder)
 
     def reload(self) -> None:
-        """Reads the stage from disk again."""
+        """Reloads the stage from disk."""
         self.message.hide()
         self.session.reload()
 
     def recent(self) -> list[str]:
-        """Returns the recently opened files, the last one first."""
+        """Returns the recently opened files, the latest first."""
         return self._recent.names()
 
     def _opened(self) -> None:
@@ -248,17 +248,17 @@ class MainWindow(TakesFiles, QMainWindow):
                 self.viewport.set_message()
 
     def takes(self, path: str) -> bool:
-        """Returns whether a file is a stage."""
+        """Returns whether a file is a USD stage, by its extension."""
         return path.lower().endswith(ENDINGS)
 
     def take_files(self, paths: list[str], at: QPointF) -> None:
-        """Opens the first of the dropped stages."""
+        """Opens the first stage among the dropped files."""
         self.open(paths[0])
 
     # ---- the picture -----------------------------------------------------------------------------
 
     def save_as(self) -> None:
-        """Opens a dialog to choose an image file."""
+        """Opens a dialog to choose an image file for saving the render."""
         path = self.session.path
         start = str(path.with_suffix(".exr")) if path is not None else "picture.exr"
         name, chosen = QFileDialog.getSaveFileName(
@@ -270,7 +270,7 @@ class MainWindow(TakesFiles, QMainWindow):
             self.save_to(name)
 
     def save_to(self, path: str) -> None:
-        """Writes .exr (all layers) or .png (the displayed image)."""
+        """The dialog saves .exr files (all layers) or .png files (the displayed image)."""
         self.session.save(path, self.viewport.look)
 
     def toggle_pause(self) -> None:
@@ -288,7 +288,7 @@ class MainWindow(TakesFiles, QMainWindow):
         self.viewport.set_zoom(None)
 
     def look_through_camera(self) -> None:
-        """Views the stage through its camera."""
+        """Views the stage through its default camera."""
         stage = self.session.stage
         if stage is not None and (stage.camera_path or stage.cameras):
             self.session.use_camera(stage.camera_path or stage.cameras[0])
@@ -306,7 +306,7 @@ class MainWindow(TakesFiles, QMainWindow):
     # ---- help, colours, state --------------------------------------------------------------------
 
     def set_theme(self, choice: str) -> None:
-        """Sets a dark or a light theme, or the one of the system."""
+        """Sets a dark theme, a light theme, or the theme of the system."""
         theme.apply(choice)
         self.settings.setValue("theme", choice)
 
@@ -315,11 +315,11 @@ class MainWindow(TakesFiles, QMainWindow):
         self._open_dialog(ShortcutsDialog(self))
 
     def show_about(self) -> None:
-        """Shows the versions."""
+        """Shows the versions of Wavecomb and its libraries."""
         self._open_dialog(make_about(self))
 
     def send_to_farm(self) -> None:
-        """Opens the farm dialog."""
+        """Opens the dialog for render farm jobs."""
         from wavecomb.gui.farm_dialog import FarmDialog
 
         path = self.session.path
@@ -353,7 +353,7 @@ class MainWindow(TakesFiles, QMainWindow):
         self._dialog = None
 
     def show_compare(self) -> None:
-        """Shows the compare window."""
+        """Shows the window that compares two images."""
         dock = self.docks["compare"]
         if not self._bottom_sized and dock.isHidden():
             dock.setFloating(True)
@@ -364,7 +364,7 @@ class MainWindow(TakesFiles, QMainWindow):
         dock.activateWindow()
 
     def toggle_full_screen(self) -> None:
-        """Toggles full screen."""
+        """Toggles full screen mode."""
         self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
 
     def reset_layout(self) -> None:
@@ -384,7 +384,7 @@ class MainWindow(TakesFiles, QMainWindow):
             self.actions_by_name[name].setChecked(False)
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Saves the state and ends the threads."""
+        """Saves the window's state and ends its threads."""
         self.autosave.close()
         self.settings.setValue("geometry", self.saveGeometry())
         self.settings.setValue("state", self.saveState(_STATE_VERSION))

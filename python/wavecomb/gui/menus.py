@@ -13,7 +13,7 @@ from wavecomb.gui.actions import Entry, keypad, make_action
 from wavecomb.gui.recent_stages import RecentStages
 
 Window = Any
-"""A ``main_window.MainWindow``, whose module imports this one."""
+"""A ``main_window.MainWindow``; its module imports this one, so the type is not imported here."""
 
 MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
     (
@@ -48,12 +48,12 @@ MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ),
     ("&Help", ("shortcuts", "about")),
 )  # fmt: skip
-"""Titles of menus and names of their actions; "-" is a separator."""
+"""Titles of menus with the names of their actions; "-" is a separator."""
 CHECKED = ("region",)
 
 
 def entries(window: Window) -> list[Entry]:
-    """Returns all actions."""
+    """Returns all actions of the window."""
     viewport, display, session = window.viewport, window.display, window.session
     scene = window.scene
 

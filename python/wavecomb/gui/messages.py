@@ -25,7 +25,7 @@ class MessageBar(QFrame):
     """Message bar over the image. Errors and findings stay until closed, warnings for some time.
 
     Signals:
-        details(): The user wants to know more about findings.
+        details(): Emitted when the user asks for details of the findings.
     """
 
     details = Signal()
@@ -63,23 +63,23 @@ class MessageBar(QFrame):
         self.hide()
 
     def text(self) -> str:
-        """The current text, or "" while the bar is hidden."""
+        """The current message, or "" while the bar is hidden."""
         return self._label.text() if not self.isHidden() else ""
 
     def show_error(self, message: str) -> None:
-        """Shows an error until it is closed or replaced."""
+        """Shows an error until the user closes it or another message replaces it."""
         self._timer.stop()
         self._show("Error: " + message, True)
 
     def show_warning(self, message: str) -> None:
-        """Shows a warning for some time, unless an error is shown."""
+        """Shows a warning for a limited time, unless an error is shown."""
         if self._is_error and not self.isHidden():
             return
         self._show(message, False)
         self._timer.start(WARNING_MS)
 
     def show_findings(self, lines: Sequence[str]) -> None:
-        """Shows the first line and the number of the others until it is closed or replaced."""
+        """Shows the first of several lines and the number of the rest, until closed or replaced."""
         more = f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""
         text = lines[0] + more if lines else ""
         if text and text != self._label.text():
@@ -114,7 +114,7 @@ class _Reporter(QObject):
             self._tell(line)
 
     def end(self) -> None:
-        """Stops reporting."""
+        """Stops reporting errors."""
         self._tell = None
         self.deleteLater()
 
@@ -129,13 +129,13 @@ def install_hooks(tell: Callable[[str], None]) -> Callable[[], None]:
     """Installs hooks that turn internal errors on any thread into one line and a report file.
 
     Args:
-        tell: Called with the line, on the window's thread.
+        tell: Function called on the window's thread with the line that reports an error.
 
     Returns:
-        A function that removes the hooks.
+        Returns a function that removes the hooks.
     """
     reporter = _Reporter(tell)
-    caught = reporter.caught  # the hooks must not hold a Qt object
+    caught = reporter.caught  # The hooks must not hold a Qt object.
     before, before_threads = sys.excepthook, threading.excepthook
 
     def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:

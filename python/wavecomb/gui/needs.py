@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks for the requirements of a window, without importing Qt."""
+"""Checks whether the system can show a window, without importing Qt."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NO_DISPLAY = (
 
 
 def has_display() -> bool:
-    """Returns whether there is a display for a window."""
+    """Returns whether the environment has a display for a window."""
     if not sys.platform.startswith("linux"):
         return True
     return any(os.environ.get(n) for n in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"))
@@ -30,7 +30,7 @@ _PACKAGES = {
     "libgthread-2.0.so.0": "libglib2.0-0",
     "libz.so.1": "zlib1g",
 }
-"""Packages of Debian and Ubuntu whose names do not follow from the library."""
+"""Debian and Ubuntu packages whose names do not follow from the name of their library."""
 
 
 def package_of(library: str) -> str:
@@ -46,10 +46,10 @@ def package_of(library: str) -> str:
 
 
 def missing_libraries(plugin: str | None = None) -> list[str]:
-    """Returns the system libraries that Qt's X11 plug-in lacks; none where that is unknown.
+    """Returns the system libraries that Qt's X11 plug-in lacks; empty where that is unknown.
 
     Args:
-        plugin: File of the plug-in, by default that of PySide6.
+        plugin: File of the plug-in; the default is the plug-in of PySide6.
     """
     import importlib.util
     import subprocess
@@ -73,7 +73,7 @@ def missing_libraries(plugin: str | None = None) -> list[str]:
 
 
 def libraries_message(libraries: Sequence[str]) -> str:
-    """Returns a message that names missing libraries and the command that installs them.
+    """Returns a message that names missing system libraries and the command that installs them.
 
     >>> libraries_message(["libxcb-icccm.so.4"])
     'Qt needs system libraries that are missing: apt install libxcb-icccm4'
@@ -89,13 +89,13 @@ print("platform:", QApplication(["wavecomb"]).platformName())
 
 
 def start_qt(timeout: float = 60.0) -> tuple[str, str]:
-    """Starts Qt in another process, which a missing library would end.
+    """Starts Qt in a separate process, because a missing library would end this one.
 
     Args:
-        timeout: Time limit in seconds.
+        timeout: Time limit of the process in seconds.
 
     Returns:
-        The name of Qt's platform, such as "xcb", and "" for the problem; or "" and the problem.
+        Returns the name of Qt's platform, such as "xcb", and ""; or "" and the problem.
     """
     import subprocess
 
@@ -119,7 +119,7 @@ def start_qt(timeout: float = 60.0) -> tuple[str, str]:
 
 
 def check_window() -> None:
-    """Raises WavecombError with one line unless a window can be opened."""
+    """Raises WavecombError with a line of explanation if a window cannot be opened."""
     check_installed("gui", "the window")
     if not has_display():
         raise WavecombError(NO_DISPLAY)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The panels of the window and their places."""
+"""The panels of the window and their initial positions."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ class Panel:
     """A panel of the window.
 
     Attributes:
-        name: Name in the saved state.
-        title: Title for people.
-        widget: The widget.
-        area: Initial area of its dock.
+        name: Name of the panel in the saved window state.
+        title: Displayed title of the panel.
+        widget: Widget inside the panel.
+        area: Initial dock area of the panel.
         hidden: Whether the panel is hidden initially.
     """
 
@@ -44,7 +44,7 @@ class Panel:
 
 
 def make_panels(session: Session) -> list[Panel]:
-    """Creates all panels."""
+    """Creates all panels of the window."""
     return [
         Panel("scene", "Scene", ScenePanel(session), _LEFT),
         Panel("render", "Render", RenderPanel(session), _RIGHT),
@@ -57,7 +57,7 @@ def make_panels(session: Session) -> list[Panel]:
 
 
 def keep_half(window: QMainWindow, centre: QWidget, docks: Iterable[QDockWidget]) -> None:
-    """Narrows the panels beside the centre of a window until it has half of the width."""
+    """Narrows the panels on both sides until the centre has half of the window's width."""
     sides = [
         dock
         for dock in docks

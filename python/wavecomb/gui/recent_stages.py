@@ -14,14 +14,14 @@ MOST = 10
 
 
 class RecentStages(QMenu):
-    """Menu of the recently opened files, the last one first.
+    """Menu of the recently opened files, the latest first.
 
     Args:
-        settings: Storage of the files.
-        parent: The window.
+        settings: Storage of the list of files.
+        parent: Parent window of the menu.
 
     Signals:
-        chosen(str): The user chose a file.
+        chosen(str): Emitted with the path of the file that the user chose.
     """
 
     chosen = Signal(str)
@@ -32,12 +32,12 @@ class RecentStages(QMenu):
         self._fill()
 
     def names(self) -> list[str]:
-        """Returns all files."""
+        """Returns all recently opened files."""
         value: Any = self._settings.value("recent", [])
         return [value] if isinstance(value, str) else [str(path) for path in value or []]
 
     def add(self, path: Path) -> None:
-        """Adds a file as the first entry."""
+        """Adds a file as the first entry of the list."""
         name = str(path.resolve())
         others = [other for other in self.names() if other != name]
         self._settings.setValue("recent", [name, *others][:MOST])

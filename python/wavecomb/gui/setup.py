@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of a live render: those of the core, and those that only a window has."""
+"""Settings of a live render: the core's settings, and settings that only a window has."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NOT_IN_PREVIEWS = (
     "adaptive", "noise", "time_limit", "guiding", "transport", "merge_radius", "firefly",
     "integrator", "allocate",
 )  # fmt: skip
-"""Settings that have their defaults in reduced images."""
+"""Settings that keep their defaults in reduced images."""
 PREVIEW_DEPTH = 3
 
 
@@ -45,10 +45,10 @@ else:
 
 @dataclass(frozen=True)
 class Setup(_Rows):
-    """Settings of a live render: those of the core's table, and those that only a window has.
+    """Settings of a live render: the fields of the core's table, and fields that only a window has.
 
     Attributes:
-        aovs: Layers to keep beside the beauty, by the names of docs/aovs.md.
+        aovs: Layers to render beside the beauty, by the names of docs/aovs.md.
         denoise: Whether frames are also denoised.
         region: Rectangle x0, y0, x1, y1 of pixels to render, without x1 and y1; None renders all.
         own_policy: A policy object that replaces ``policy``, or None.

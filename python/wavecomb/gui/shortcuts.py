@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Help > Keyboard shortcuts, built from the actions, so that it is always up to date."""
+"""The list of keyboard shortcuts, built from the actions, so that it is always up to date."""
 
 from __future__ import annotations
 

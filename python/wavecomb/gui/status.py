@@ -31,7 +31,7 @@ def frame_text(frame: Frame, state: str) -> str:
 
 
 class StatusLine(QStatusBar):
-    """Status bar with progress, state and background work."""
+    """Status bar with render progress, render state and background work."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)

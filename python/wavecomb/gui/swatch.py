@@ -31,7 +31,7 @@ def from_display(colour: QColor) -> Colour:
 def swatch(colour: Colour, size: int, wide: int = 1) -> QIcon:
     """Makes an icon filled with a colour, ``wide`` times as wide as high.
 
-    The frame makes the swatch visible on any background.
+    The frame makes the colour visible on any background.
     """
     ratio = 2.0
     pixmap = QPixmap(round(size * wide * ratio), round(size * ratio))
@@ -43,7 +43,7 @@ def swatch(colour: Colour, size: int, wide: int = 1) -> QIcon:
         painter.setPen(theme.dim())
         painter.drawRect(0, 0, wide * size - 1, size - 1)
     icon = QIcon(pixmap)
-    # Otherwise Qt tints the icon of a selected row.
+    # Without this second mode, Qt tints the icon of a selected row.
     icon.addPixmap(pixmap, QIcon.Mode.Selected)
     return icon
 

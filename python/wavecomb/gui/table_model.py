@@ -62,11 +62,13 @@ class HeadedModel(QAbstractTableModel):
 
 
 Cell = tuple[str, Any]
-"""Text and sort key (``Qt.ItemDataRole.UserRole``) of a cell. The tooltip has the whole text."""
+"""A table cell that holds a text and a sort key (``Qt.ItemDataRole.UserRole``). The tooltip has the
+whole text."""
 
 
 class Table(HeadedModel):
-    """Rows of cells under a header. The columns ``left`` hold text, all others align right."""
+    """Table model of rows of cells under a header. The columns ``left`` hold text, all others align
+    right."""
 
     def __init__(
         self, header: Mapping[str, str], left: Collection[int], parent: QObject | None = None

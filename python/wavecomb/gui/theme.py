@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QApplication, QToolTip
 SYSTEM, DARK, LIGHT = "system", "dark", "light"
 CHOICES = (SYSTEM, DARK, LIGHT)
 
-# Window, base, alternate base, button, text, dimmed text, lines, highlight, link.
+# Colours of window, base, alternate base, button, text, dimmed text, lines, highlight, link.
 _COLOURS = {
     DARK: (
         "#333333", "#202020", "#262626", "#454545", "#e2e2e2", "#939393", "#181818", "#3f74b5",
@@ -31,7 +31,7 @@ _SERIES = {
 
 
 class _Theme(QObject):
-    """Emitter of the signal that colours changed."""
+    """Emitter of the signal that the colours of the theme changed."""
 
     changed = Signal()
 
@@ -67,14 +67,14 @@ def choice() -> str:
 
 
 def is_dark() -> bool:
-    """Returns whether colours are dark now."""
+    """Returns whether the current theme is dark."""
     if _the().choice != SYSTEM:
         return _the().choice == DARK
     return QGuiApplication.styleHints().colorScheme() == Qt.ColorScheme.Dark
 
 
 def apply(chosen: str) -> None:
-    """Applies a theme to the application; "system" follows the desktop."""
+    """Applies a theme to the application; "system" follows the theme of the desktop."""
     application = QApplication.instance()
     assert isinstance(application, QApplication)
     theme = _the()

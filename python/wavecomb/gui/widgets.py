@@ -104,9 +104,9 @@ def ask_file(
         parent: Parent of the dialog.
         title: Title of the dialog.
         kinds: Filter, such as "USD (*.usda *.usdc)".
-        take: Called with the chosen name.
-        start: Initial folder or file.
-        mode: An existing file, or a folder.
+        take: Function that is called with the chosen name.
+        start: Initial folder or file of the dialog.
+        mode: Whether to choose an existing file or a folder.
         ending: Ending of a file to write, without the dot; "" means that the file is read.
     """
     dialog = QFileDialog(parent, title, start, kinds)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Background threads: workers for only the newest job, or for all jobs in order.
+"""Background workers, which run only the newest job or all jobs in order.
 
 The classes live on the window's thread and block only in ``close``. A job must not hold or create
 Qt objects, and its result must be plain data.
@@ -22,13 +22,13 @@ from wavecomb.run.error_messages import describe
 
 Job = Callable[[], Any]
 Outcome = tuple[Any, str | None]
-"""(result, None), or (None, error line)."""
+"""Outcome of a job: (result, None), or (None, error line)."""
 
 
 def refuse_qt(job: Job) -> None:
     """Raises TypeError if a job holds a Qt object.
 
-    Otherwise its thread might release the last reference to that object.
+    Otherwise the thread of the job might release the last reference to that object.
     """
     for held in _held(job):
         if isinstance(held, (shiboken6.Object, SignalInstance)):
@@ -49,7 +49,7 @@ def _held(job: Any) -> Iterator[Any]:
 
 
 def _run(number: int, job: Job, told: Port) -> None:
-    """Runs a job on its thread. No variable here may be a Qt object."""
+    """Runs a job on its worker thread. No variable in this function may be a Qt object."""
     try:
         outcome: Outcome = (job(), None)
     except Exception as error:
@@ -93,7 +93,7 @@ class _OneThread(QObject):
     def close(self, seconds: float = 5.0) -> bool:
         """Rejects further jobs and waits for the running one; returns whether it has ended.
 
-        A job that has not ended continues harmlessly, because it holds nothing of the window.
+        A job that has not ended continues harmlessly, because it holds no object of the window.
         """
         self._closed = True
         thread, self._thread = self._thread, None
@@ -127,7 +127,8 @@ class Worker(_OneThread):
 
         Args:
             job: The job, preferably a partial of a function.
-            key: Returned with the result. Nothing happens if a job with this key is running.
+            key: Value that is returned with the result. Nothing happens if a job with this key is
+                running.
 
         Raises:
             TypeError: The job holds a Qt object.
@@ -170,7 +171,7 @@ class Worker(_OneThread):
 
 
 class Errands(_OneThread):
-    """Worker for all jobs, one after the other, with separate callbacks for each."""
+    """Worker for all jobs, one after the other, with separate callbacks for each job."""
 
     def __init__(self, name: str, parent: QObject | None = None) -> None:
         super().__init__(name, parent)
@@ -210,7 +211,7 @@ class Errands(_OneThread):
 
 
 class Tasks(QObject):
-    """Background tasks, of which the newest is reported.
+    """Background tasks, the newest of which is reported.
 
     Signals:
         busy(str): Description such as "writing a.exr", or "" if there is no task.
@@ -235,7 +236,7 @@ class Tasks(QObject):
         self.busy.emit(what)
 
     def end(self, key: str) -> None:
-        """Reports the end of a task."""
+        """Reports that a task has ended."""
         self.jobs = [job for job in self.jobs if job[0] != key]
         self.busy.emit(self.jobs[-1][1] if self.jobs else "")
 

@@ -33,9 +33,9 @@ class SuiteInfo:
     """Facts about a suite.
 
     Attributes:
-        name: A name of `wavecomb bench list`, or the path of a TOML file.
-        title: Title in one line.
-        stages: Names of its stages.
+        name: Suite name from `wavecomb bench list`, or the path of a TOML file.
+        title: Title of the suite in one line.
+        stages: Names of the stages of the suite.
         repetitions: Default number of repetitions.
         configurations: Number of configurations on this machine.
         seconds: Rough time of one repetition of all configurations, at 0.4 million samples per
@@ -61,7 +61,7 @@ def suite_infos() -> list[SuiteInfo]:
         try:
             found.append(suite_info(name))
         except WavecombError:
-            continue  # the suite needs a property of the machine that is unknown here
+            continue  # The suite needs a property of the machine that is unknown here.
     return sorted(found, key=lambda info: info.seconds * info.repetitions)
 
 
@@ -69,7 +69,7 @@ def suite_info(name: str, stages: tuple[str, ...] = ()) -> SuiteInfo:
     """Reads a suite by name or TOML file, restricted to some stages.
 
     Raises:
-        WavecombError: The suite is invalid. The message is one line.
+        WavecombError: The suite is invalid. The message of the error is one line.
     """
     from wavecomb.bench.machine import limits
     from wavecomb.bench.plan import Estimator, configurations
@@ -98,8 +98,8 @@ class Choice:
     Attributes:
         suite: Name or TOML file.
         folder: Results folder.
-        stages: Stages to run; empty means all.
-        repetitions: None means the suite's default.
+        stages: Stages to run; an empty list means all stages.
+        repetitions: Number of repetitions; None means the suite's default.
     """
 
     suite: str
@@ -113,7 +113,7 @@ class Choice:
         return (self.folder / "runs.csv").is_file()
 
     def arguments(self, *, dry: bool = False) -> list[str]:
-        """Returns the arguments of the `wavecomb` command."""
+        """Returns the benchmark's arguments for the `wavecomb` command."""
         words = ["bench", "run", self.suite, "-o", str(self.folder)]
         for stage in self.stages:
             words += ["--stage", stage]
@@ -128,8 +128,8 @@ class SuiteChoice(QWidget):
     """Form for the arguments of a benchmark.
 
     Signals:
-        changed(): The choice changed.
-        failed(str): One line that says what to do.
+        changed(): Emitted when the user changes a field of the form.
+        failed(str): Emitted on an error, with one line that says how to fix it.
     """
 
     changed = Signal()
@@ -191,22 +191,22 @@ class SuiteChoice(QWidget):
     # ---- the choice ----------------------------------------------------------------------------
 
     def info(self) -> SuiteInfo | None:
-        """Returns the chosen suite, or None."""
+        """Returns the chosen benchmark suite, or None."""
         return self._infos.get(str(self.suite.currentData()))
 
     def chosen_stages(self) -> list[str]:
-        """Returns the names of the checked stages."""
+        """Returns the names of the checked stages of the suite."""
         items = [self.stages.item(k) for k in range(self.stages.count())]
         return [i.text() for i in items if i.checkState() == Qt.CheckState.Checked]
 
     def results_folder(self) -> Path:
-        """Returns the results folder."""
+        """Returns the folder for the results of the benchmark."""
         return Path(self.folder.text().strip()).expanduser()
 
     def choice(self, *, quiet: bool = False) -> Choice | None:
-        """Returns the choice.
+        """Returns the arguments that the form describes.
 
-        Returns None if the choice is incomplete, and emits ``failed`` unless ``quiet``.
+        Returns None if the form is incomplete, and emits ``failed`` unless ``quiet`` is set.
         """
         info = self.info()
         stages = self.chosen_stages()
@@ -230,7 +230,7 @@ class SuiteChoice(QWidget):
         )
 
     def set_choice(self, suite: str, folder: Path) -> None:
-        """Chooses a suite of the list or a TOML file, and a results folder."""
+        """Selects a suite of the list or a TOML file, and a results folder."""
         self.folder.setText(str(folder))
         self._choose_suite(suite)
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The benchmark panel: starts ``wavecomb bench run``, shows its progress and opens the report.
 
-The report is a page for a browser (docs/bench-report.md); the window opens it there.
+The report is a web page (docs/bench-report.md), which the window opens in the browser.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ class BenchPanel(TakesFiles, QWidget):
     The viewport pauses while a suite runs, since its renders would disturb the measurement.
 
     Signals:
-        done(Path): The page of a report was opened.
-        failed(str): One line that says what to do; also shown in the panel.
+        done(Path): Emitted after the report page was opened in a browser.
+        failed(str): Emitted on an error, with one line on how to fix it; the panel shows it too.
     """
 
     done = Signal(object)
@@ -66,7 +66,7 @@ class BenchPanel(TakesFiles, QWidget):
         self.suite.event.connect(self._take)
         self.suite.said.connect(self._log_line)
         self.suite.finished.connect(self._end_suite)
-        self.helper = Command(self)  # makes the estimate and the report
+        self.helper = Command(self)  # Process that makes the estimate and the report.
         self.helper.finished.connect(self._end_helper)
         self.choice = SuiteChoice(self)
         self.choice.failed.connect(self._fail)
@@ -114,7 +114,7 @@ class BenchPanel(TakesFiles, QWidget):
         column.addWidget(self.log, 1)
 
     def sizeHint(self) -> QSize:
-        """Returns a size for the form and some lines of the log."""
+        """Returns a size that fits the form and a few lines of the log."""
         return QSize(theme.em(64), theme.em(36))
 
     # ---- actions -------------------------------------------------------------------------------
@@ -125,7 +125,7 @@ class BenchPanel(TakesFiles, QWidget):
         return self.suite.running or self.helper.running
 
     def start(self) -> None:
-        """Starts the chosen suite, or resumes it if the folder holds results."""
+        """Starts the chosen benchmark suite, or resumes it if the folder holds results."""
         choice = self.choice.choice()
         if choice is None or self.suite.running:
             return
@@ -144,7 +144,7 @@ class BenchPanel(TakesFiles, QWidget):
         self.suite.start(words)
 
     def cancel(self) -> None:
-        """Stops the suite; Start resumes it."""
+        """Stops the benchmark suite; the Start button resumes it."""
         if self.suite.running:
             self._say("Stopping ...")
             self.suite.stop()
@@ -161,7 +161,7 @@ class BenchPanel(TakesFiles, QWidget):
         """Opens the report of a results folder in the browser; makes it first if necessary.
 
         Args:
-            folder: None means the folder of the form.
+            folder: Results folder; None means the folder in the form.
         """
         if self.busy:
             return
@@ -177,7 +177,7 @@ class BenchPanel(TakesFiles, QWidget):
             self.helper.start(["bench", "report", str(self._folder)])
 
     def shutdown(self) -> None:
-        """Stops all processes. A stopped suite can be resumed."""
+        """Stops all processes of the panel. A stopped suite can be resumed."""
         self._measuring = False
         self.choice.shutdown()
         self.suite.shutdown()
@@ -211,7 +211,7 @@ class BenchPanel(TakesFiles, QWidget):
 
     def _end_suite(self, code: int, text: str, error: str) -> None:
         self._measuring = False
-        if self._session.state != "stopped":  # in this state the user stopped the viewport
+        if self._session.state != "stopped":  # In this state the user stopped the viewport.
             self._session.resume()
         self._enable(True)
         self.bar.setRange(0, max(self._runs, 1))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Differences of two images, as numbers and as maps. Independent of Qt.
+"""Differences of two images, as numbers and as maps. The module is independent of Qt.
 
-The numbers equal those of `wavecomb compare`.
+The computed numbers equal the output of `wavecomb compare`.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ MAPS = {
     "flip-hdr": "FLIP, high range",
     "z": "z-test",
 }
-"""Names of the kinds of maps."""
+"""Kinds of difference maps with their names."""
 
 
 @dataclass(frozen=True)
 class Numbers:
-    """Differences of A from B, the reference, in one layer.
+    """Differences between image A and the reference image B in one layer.
 
     Attributes:
         layer: Name of the layer.
-        comparison: Differences of linear values.
+        comparison: Differences of the linear pixel values.
         psnr: PSNR of the displayed values, in dB.
         flip: Mean FLIP of the displayed values; None if not known (yet).
         flip_note: Reason for a missing FLIP value.
         test: Result of the z-test; None if no variance is known.
-        test_note: Reason for a missing z-test.
+        test_note: Reason for a missing z-test result.
         others_differ: Layers of both images whose bits differ; None if only one layer was compared.
     """
 
@@ -53,12 +53,12 @@ class Numbers:
     others_differ: tuple[str, ...] | None = None
 
     def with_flip(self, mean: float | None, note: str = "") -> Numbers:
-        """Returns a copy with the result of FLIP."""
+        """Returns a copy with the FLIP value filled in."""
         return replace(self, flip=mean, flip_note=note)
 
 
 def numbers(a: Side, b: Side, layer: str, exposure: float) -> Numbers:
-    """Computes all numbers but FLIP, which takes longer.
+    """Computes all numbers except FLIP, which takes longer.
 
     Raises:
         ValueError: The sizes or channels differ (``picture_sides.problem`` has a clearer message).
@@ -101,7 +101,7 @@ def _test(
 
 
 def rows(found: Numbers) -> list[tuple[str, str, str]]:
-    """Returns name, value and explanation of each number, for a table."""
+    """Returns the name, value and explanation of each number as rows of a table."""
     c = found.comparison
     pixels = c.width * c.height
     at = c.luminance_max_at
@@ -148,7 +148,7 @@ def rows(found: Numbers) -> list[tuple[str, str, str]]:
 
 
 def verdict(found: Numbers) -> str:
-    """Returns a summary in one line."""
+    """Returns a one-line summary of the comparison."""
     c = found.comparison
     if c.pixels_different == 0:
         return "bit for bit the same"
@@ -173,7 +173,7 @@ def _test_rows(found: Numbers) -> list[tuple[str, str, str]]:
 
 
 def decibels(value: float) -> str:
-    """Formats a value in dB."""
+    """Formats a value in decibels."""
     return f"{value:.2f} dB" if math.isfinite(value) else "infinite: looks equal"
 
 

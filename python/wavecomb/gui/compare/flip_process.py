@@ -33,7 +33,8 @@ class FlipProcess:
         """Computes ``perceptual.flip`` of two images (height, width, channels).
 
         Raises:
-            WavecombError: The library is missing, or the process failed. The message is one line.
+            WavecombError: The library is missing, or the process failed. The message of the error
+                is one line.
         """
         job = io.BytesIO()
         np.savez(job, a=a, b=b, high_range=high_range, exposure=exposure)
@@ -55,7 +56,7 @@ class FlipProcess:
         return values
 
     def stop(self) -> None:
-        """Ends the current process and rejects further jobs."""
+        """Ends the running FLIP process and rejects further jobs."""
         with self._lock:
             self._closed = True
             if self._process is not None and self._process.poll() is None:
@@ -63,7 +64,7 @@ class FlipProcess:
 
 
 def main() -> int:
-    """Runs the job in the separate process."""
+    """Runs the FLIP job in the separate process."""
     from wavecomb.image.compare.perceptual import flip
 
     job = np.load(io.BytesIO(sys.stdin.buffer.read()), allow_pickle=False)

@@ -30,7 +30,7 @@ class Ask:
         a: Image A, or None.
         b: Image B, the reference, or None.
         look: Layer, exposure and tone mapping of both images.
-        kind: Kind of the map, a key of ``differences.MAPS``.
+        kind: Kind of the difference map, a key of ``differences.MAPS``.
     """
 
     a: Side | None
@@ -40,7 +40,7 @@ class Ask:
 
     @property
     def problem(self) -> str:
-        """Reason why there is no difference, or ""."""
+        """Reason why the images have no difference, or "" if they have one."""
         return problem(self.a, self.b, self.look.layer)
 
     def pictures(self) -> tuple[Any, ...]:
@@ -56,15 +56,15 @@ class Ask:
 
 
 class Jobs(QObject):
-    """Four workers for images, numbers, FLIP and the map.
+    """Four background workers, for displayed images, numbers, FLIP and the difference map.
 
-    Each kind of job computes only the newest request.
+    Each worker computes only the newest request.
 
     Signals:
         images(A, B): Displayed images, QImage or None.
         numbers(Numbers): Numbers, first without and then with FLIP; None if there is no comparison.
         map(QImage, Scale): Difference map; None, None if there is no map.
-        failed(str): Error in one line.
+        failed(str): Emitted on an error, with a message of one line.
     """
 
     images = Signal(object, object)
@@ -92,11 +92,11 @@ class Jobs(QObject):
 
     @property
     def busy(self) -> bool:
-        """Whether anything is being computed."""
+        """Whether any worker is computing."""
         return any(w.busy for w in (self._pictures, self._figures, self._looks, self._map))
 
     def want(self, ask: Ask) -> None:
-        """Computes the parts of a request that are not shown already."""
+        """Computes the parts of a request that are not displayed already."""
         self._ask = ask
         if self._shown.get("pictures") != ask.pictures():
             self._shown["pictures"] = ask.pictures()
@@ -116,7 +116,7 @@ class Jobs(QObject):
         self._want_map()
 
     def close(self) -> None:
-        """Stops all workers."""
+        """Stops all four workers."""
         self._process.stop()
         for worker in (self._pictures, self._figures, self._looks, self._map):
             worker.close()
@@ -131,7 +131,7 @@ class Jobs(QObject):
         if ask.figures() in self._flip:
             found = self._with_flip(ask, found)
         elif before is not None and before.flip is not None and (ask.a.live or ask.b.live):  # type: ignore[union-attr]
-            # FLIP of the previous frame, until the new value is known
+            # FLIP of the previous frame, until the new value is known.
             found = found.with_flip(before.flip)
         self._numbers = found
         self.numbers.emit(found)
@@ -154,7 +154,7 @@ class Jobs(QObject):
             self.numbers.emit(self._numbers)
         self._want_map()
         if self._ask is not None and self._ask.figures() not in self._flip:
-            self._want_flip(self._ask, high_range=False)  # the images have changed in the meantime
+            self._want_flip(self._ask, high_range=False)  # The images have changed meanwhile.
 
     def _with_flip(self, ask: Ask, found: Numbers) -> Numbers:
         values = self._flip[ask.figures()]
@@ -234,7 +234,7 @@ def _map(
 
 
 def _images(ask: Ask) -> tuple[DisplayLayer | None, DisplayLayer | None]:
-    """Returns both displayed images; false colours use a common scale."""
+    """Returns both displayed images; if they use false colours, the scale is common."""
     layers = [
         _drawable(side.layer(ask.look.layer)) if side is not None else None
         for side in (ask.a, ask.b)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Layout of a comparison: panes, and the zoom and pan that all panes share."""
+"""Layout of the compare view: panes, and the zoom and pan that all panes share."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ class Layout:
     """Geometry of the panes, in device-independent points of the widget.
 
     Attributes:
-        mode: One of ``MODES``.
-        shown: The image that the flip view shows, A or B.
-        area: Area of the widget.
-        size: Size of an image in pixels, that of A if they differ; None without images.
+        mode: View mode, one of ``MODES``.
+        shown: Image that the flip view shows, "A" or "B".
+        area: Area of the widget that the panes fill.
+        size: Size of image A in pixels, or of B without A; None without images.
         gap: Gap between panes.
-        bar: Height of the free area below the difference.
+        bar: Height of the area below the difference that is kept free for the colour bar.
         zoom: Points per pixel; None fits the whole image.
         centre: Point of the image in the middle of a pane, as a fraction of the image size.
     """
@@ -51,7 +51,7 @@ class Layout:
         return [(k, QRectF(i * (width + gap), 0, width, height)) for i, k in enumerate(kinds)]
 
     def pane_at(self, at: QPointF) -> QRectF:
-        """Returns the pane under a point, or the first one."""
+        """Returns the pane under a point, or the first pane if the point is in none."""
         panes = [rect for _, rect in self.panes()]
         return next((rect for rect in panes if rect.contains(at)), panes[0])
 
@@ -63,7 +63,8 @@ class Layout:
         return min(pane.width() / self.size.width(), pane.height() / self.size.height())
 
     def target(self, pane: QRectF, size: QSizeF | None = None) -> QRectF:
-        """Returns the rectangle of a whole image. Images of other sizes share the corner of A."""
+        """Returns the rectangle that a whole image covers. Images of other sizes share the corner
+        of A."""
         reference = self.size or size or QSizeF(1, 1)
         scale = self.points_per_pixel()
         width, height = reference.width() * scale, reference.height() * scale
@@ -72,13 +73,13 @@ class Layout:
         return QRectF(corner, QSizeF(own.width() * scale, own.height() * scale))
 
     def share(self, at: QPointF, pane: QRectF) -> QPointF:
-        """Returns a point as a fraction of the image in its pane."""
+        """Converts a point of the widget to a fraction of the image in its pane."""
         target = self.target(pane)
         offset = at - target.topLeft()
         return QPointF(offset.x() / target.width(), offset.y() / target.height())
 
     def pixel_at(self, at: QPointF) -> tuple[int, int] | None:
-        """Returns the column and row under a point, or None."""
+        """Returns the column and row of the pixel under a point, or None."""
         if self.size is None:
             return None
         share = self.share(at, self.pane_at(at))
@@ -87,7 +88,7 @@ class Layout:
         return int(share.x() * self.size.width()), int(share.y() * self.size.height())
 
     def fit(self) -> None:
-        """Fits the whole image into the pane."""
+        """Sets the zoom so that the whole image fits into the pane."""
         self.zoom, self.centre = None, QPointF(0.5, 0.5)
 
     def set_zoom(self, zoom: float, at: QPointF | None = None) -> None:
@@ -99,7 +100,7 @@ class Layout:
             self._centre(self.centre + before - self.share(at, pane))
 
     def pan(self, dx: float, dy: float) -> None:
-        """Moves the image by points of the screen."""
+        """Pans the image by a distance in points of the screen."""
         if self.size is not None:
             scale = self.zoom = self.points_per_pixel()
             step = QPointF(dx / (self.size.width() * scale), dy / (self.size.height() * scale))

@@ -44,14 +44,15 @@ SAME = "Does not change the image."
 
 
 def _row(name: str) -> Choice | Number:
-    """Returns a setting as a form row; its tip says whether the setting affects the image."""
+    """Returns a form row for a setting; its tooltip says whether the setting affects the image."""
     setting = settings()[name]
     row = choice(name) if name in _CHOSEN else replace(number(name), **_SHOWN.get(name, {}))
     return row if setting.changes_picture else replace(row, tip=f"{row.tip} {SAME}")
 
 
 class LiveSettings(QWidget):
-    """Grid of settings. Each change restarts only the render of that side."""
+    """Grid with the settings of both live renders of a comparison. A change of a setting restarts
+    only the render of its side."""
 
     def __init__(self, source: SideSource, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -76,7 +77,7 @@ class LiveSettings(QWidget):
         control.setObjectName(f"{row.field}{self._source.name}")
         control.setAccessibleName(f"{row.label} of {self._source.name}")
         if isinstance(control, ChoiceBox):
-            control.setMinimumContentsLength(7)  # three columns must fit side by side
+            control.setMinimumContentsLength(7)  # Three columns must fit side by side.
         else:
             control.setGroupSeparatorShown(False)
         self._widgets[row.field] = control
@@ -87,7 +88,7 @@ class LiveSettings(QWidget):
         self.show_setup()
 
     def show_setup(self) -> None:
-        """Shows the settings that the render uses."""
+        """Shows the current settings of the render."""
         live = self._source.live
         if live is None:
             return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables with the numbers of a comparison, and the values at a pixel."""
+"""Tables with the difference values of a comparison, and the pixel values under the mouse."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from wavecomb.gui.compare.picture_sides import Side
 
 
 class _Table(QTableWidget):
-    """Table of two columns. Ctrl+C copies its whole text."""
+    """Table of two columns, for names and values. Ctrl+C copies the whole table as text."""
 
     def __init__(self, name: str, accessible: str, parent: QWidget) -> None:
         super().__init__(0, 2, parent)
@@ -40,7 +40,7 @@ class _Table(QTableWidget):
         self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
 
     def set_rows(self, found: list[tuple[str, str, str]]) -> None:
-        """Fills the table with (name, value, tooltip)."""
+        """Fills the table with rows of (name, value, tooltip)."""
         self.setRowCount(len(found))
         for row, (name, value, tip) in enumerate(found):
             for column, text in enumerate((name, value)):
@@ -68,7 +68,7 @@ class _Table(QTableWidget):
 
 
 class NumbersPanel(QWidget):
-    """Panel with two tables, one above the other."""
+    """Panel with the tables of differences and of pixel values, one above the other."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -90,7 +90,7 @@ class NumbersPanel(QWidget):
         self.set_pixel(None, None, "beauty", -1, -1)
 
     def set_numbers(self, found: Numbers | None, message: str) -> None:
-        """Shows the numbers, or ``message`` as the reason for missing ones."""
+        """Shows the numbers of a comparison, or ``message`` as the reason why there are none."""
         listed = rows(found) if found is not None else []
         self._verdict.setText(f"{found.layer}: {listed[0][1]}" if found is not None else message)
         font = self._verdict.font()
@@ -100,7 +100,7 @@ class NumbersPanel(QWidget):
         self._table.set_rows(listed[1:])
 
     def set_pixel(self, a: Side | None, b: Side | None, layer: str, x: int, y: int) -> None:
-        """Shows the values at a pixel; x < 0 means no pixel."""
+        """Shows the values of both images at a pixel; x < 0 means no pixel."""
         if x < 0:
             self._pixel.set_rows([("Pixel", "move the mouse over a picture", "")])
             return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bar of one side of a comparison, which shows and chooses the source of its image."""
+"""Bar of one side of a comparison that shows and selects the source of its image."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class SidePicker(TakesFiles, QWidget):
     """Bar with the name of side A or B and a menu of sources.
 
     Signals:
-        dropped(list): Files with these paths were dropped on the bar.
+        dropped(list): Emitted when files are dropped on the bar, with their paths.
     """
 
     dropped = Signal(list)

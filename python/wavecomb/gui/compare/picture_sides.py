@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The two images of a comparison, from files or frames. Independent of Qt."""
+"""The two images of a comparison, from files or frames. The module is independent of Qt."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[Any]
 SUFFIXES = (".exr", ".png", ".npy", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr", ".pfm")
-"""File endings that are accepted as images when dropped."""
+"""File name extensions that are accepted as images when dropped."""
 
 _numbers = itertools.count(1)
 
@@ -31,13 +31,13 @@ class Side:
     """An image to compare.
 
     Attributes:
-        name: Name for people, such as a file name or "viewport".
+        name: Displayed name, such as a file name or "viewport".
         layers: Layers by name, float32 (height, width, channels), linear; at least one.
-        note: Description of the origin or progress.
-        path: Path of the file, or None.
-        variance: Variance of each pixel's mean, with the shape of the beauty; None if unknown.
-        live: Whether it is a frame of a render that continues.
-        number: Unique number of this image.
+        note: Text about the origin of the image or the progress of its render.
+        path: Path of the image file, or None.
+        variance: Variance of each pixel's mean, shaped like the beauty layer; None if unknown.
+        live: Whether the image is a frame of a render that is still running.
+        number: Unique number of the image.
     """
 
     name: str
@@ -50,14 +50,14 @@ class Side:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height in pixels."""
+        """Width and height of the image in pixels."""
         first = next(iter(self.layers.values()))
         return int(first.shape[1]), int(first.shape[0])
 
     def layer(self, name: str) -> Array | None:
-        """Returns a layer by name.
+        """Returns a layer of the image by name.
 
-        The only layer of an image, as in a PNG, counts as the beauty.
+        If the image has a single layer, as in a PNG file, that layer counts as the beauty.
         """
         if name == "beauty" and name not in self.layers and len(self.layers) == 1:
             return next(iter(self.layers.values()))
@@ -67,10 +67,11 @@ class Side:
 def read_side(path: Path) -> Side:
     """Reads an image file: EXR with all layers, PNG and others, .npy of a results folder.
 
-    A file NAME_var.exr beside NAME.exr, as golden images have it, is read as its variance.
+    A file NAME_var.exr beside NAME.exr, as golden images have it, is read as the variance.
 
     Raises:
-        WavecombError: The file cannot be read. The message is one line that names the file.
+        WavecombError: The file cannot be read. The message of the error is one line that names the
+            file.
     """
     try:
         layers = _read_npy(path) if path.suffix.lower() == ".npy" else layers_of(path)
@@ -125,7 +126,7 @@ def common_layers(a: Side | None, b: Side | None) -> list[str]:
 
 
 def problem(a: Side | None, b: Side | None, layer: str) -> str:
-    """Returns why the two cannot be compared and what to do, or "" if they can."""
+    """Returns why the two images cannot be compared and how to fix it, or "" if they can."""
     if a is None or b is None:
         missing = "A and B" if a is None and b is None else "A" if a is None else "B"
         return f"Choose {missing}: open or drop a picture, or take the viewport's."
@@ -146,7 +147,7 @@ def problem(a: Side | None, b: Side | None, layer: str) -> str:
 
 
 def pair(a: Side, b: Side, layer: str) -> tuple[Array, Array]:
-    """Returns the layer of both with the same number of channels, dropping an alpha of only one."""
+    """Returns a layer of both images; drops an alpha channel that only one of them has."""
     one, two = a.layer(layer), b.layer(layer)
     assert one is not None and two is not None
     channels = min(one.shape[2], two.shape[2])

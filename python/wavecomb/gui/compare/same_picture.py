@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Verification that scheduling settings do not change the bits of an image. Independent of Qt."""
+"""Verifies that scheduling settings do not change the bits of an image. Independent of Qt."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MAX_PICTURES = 32
 
 @dataclass(frozen=True)
 class Verdict:
-    """Verdict of the bit comparison.
+    """Result of a bitwise comparison of two images.
 
     ``kind`` is "same", "different", "first" (nothing to compare with yet) or "none" (no comparison
     is possible).
@@ -49,7 +49,7 @@ def even_samples(samples: NDArray[Any] | None) -> int:
 
 
 def picture_key(setup: Mapping[str, Any], revision: Hashable) -> tuple[Hashable, ...] | None:
-    """Returns a key of everything that determines the bits at equal sample counts.
+    """Returns a key of everything that determines an image's bits at equal sample counts.
 
     ``revision`` identifies scene and camera. Returns None if the image depends on the speed of the
     machine, as with a time limit or with roulette by measured costs.
@@ -59,7 +59,7 @@ def picture_key(setup: Mapping[str, Any], revision: Hashable) -> tuple[Hashable,
     if setup.get("roulette") == "cost-aware":
         if setup.get("costs") == "measured":
             return None
-        # Costs decide which paths are terminated.
+        # With this roulette, measured costs decide which paths are terminated.
         costs = (setup.get("costs"), repr(setup.get("profile")))
         return (revision, costs, *(_plain(setup.get(name)) for name in BITS))
     return (revision, *(_plain(setup.get(name)) for name in BITS))
@@ -102,7 +102,7 @@ class PictureBook:
         return Verdict("different", f"DIFFERENT picture with {changes}: please report this")
 
     def clear(self) -> None:
-        """Forgets all images."""
+        """Forgets all images and their fingerprints."""
         self._pictures.clear()
         self.checked = 0
 
@@ -116,7 +116,7 @@ def _plain(value: Any) -> Hashable:
 
 
 class PictureRevision(QObject):
-    """Identifier of scene and camera, which returns to its old value when an edit is undone."""
+    """Identifier of the scene and camera, which returns to its old value when an edit is undone."""
 
     def __init__(self, session: Session, parent: QObject | None = None) -> None:
         super().__init__(parent)

@@ -25,15 +25,16 @@ SHORT = {
     **{"lanes": "lanes", "wave_size": "waves", "ray_order": "rays", "shadow_order": "shadow rays"},
     **{"adaptive": "adaptive", "denoise": "denoise", "clamp_indirect": "clamp"},
 }
-"""Short names of the settings by which live renders are distinguished."""
+"""Short names of the settings that distinguish two live renders."""
 
 
 class SideSource(QObject):
-    """Source of one side of a comparison. All methods are for the UI thread; none blocks.
+    """Source of the image on one side of a comparison. All methods are for the UI thread; none
+    blocks.
 
     Signals:
-        changed(): ``side`` or ``kind`` changed.
-        failed(str): One line that says what to do.
+        changed(): Emitted when ``side`` or ``kind`` changes.
+        failed(str): Emitted on an error, with one line that says how to fix it.
     """
 
     changed = Signal()
@@ -53,15 +54,15 @@ class SideSource(QObject):
 
     @property
     def loading(self) -> bool:
-        """Whether a file is being read."""
+        """Whether an image file is being read."""
         return self._reader.busy
 
     def open(self, path: Path) -> None:
-        """Reads an image file. The current image stays until the new one is read."""
+        """Reads an image file. The current image stays visible until the new image is read."""
         self._reader.submit(partial(read_side, path), path)
 
     def set_side(self, side: Side, kind: str = FILE) -> None:
-        """Shows a given image."""
+        """Shows the given image."""
         self._release()
         self.kind, self.side = kind, side
         self.changed.emit()
@@ -76,7 +77,7 @@ class SideSource(QObject):
         self.set_side(side, KEPT)
 
     def follow(self) -> None:
-        """Shows the viewport and follows its changes."""
+        """Shows the viewport's image and follows its changes."""
         self._release()
         self.kind, self.side = VIEWPORT, None
         frame = self._session.last_frame
@@ -85,7 +86,7 @@ class SideSource(QObject):
         self.changed.emit()
 
     def render(self, setup: Setup) -> None:
-        """Starts a separate render of the open stage with these settings."""
+        """Starts a separate render of the open stage with the given settings."""
         if self._session.stage is None:
             self.failed.emit(f"{self.name}: there is no stage to render: open one first")
             return
@@ -104,7 +105,7 @@ class SideSource(QObject):
             self.changed.emit()
 
     def exchange(self, other: SideSource) -> None:
-        """Exchanges the images of two sides."""
+        """Exchanges the images of two sources."""
         for mine, theirs in ((self, other), (other, self)):
             if mine.live is not None:
                 mine.live.frame.disconnect(mine._on_live)
@@ -118,7 +119,7 @@ class SideSource(QObject):
         other.changed.emit()
 
     def close(self) -> None:
-        """Stops reading and rendering."""
+        """Stops reading files and rendering."""
         self._reader.close()
         self._release()
         self.side = None
@@ -144,9 +145,9 @@ class SideSource(QObject):
 
 
 def setup_text(setup: Setup, beside: Setup | None = None) -> str:
-    """Describes a setup in short by its differences from another.
+    """Describes a setup in short, by its differences from another setup.
 
-    If nothing differs, it names policy and samples.
+    If the two setups are equal, the text names the policy and the sample count.
     """
     names = list(SHORT)
     if beside is not None:

@@ -53,7 +53,7 @@ def paint_label(
 
 
 def paint_bar(painter: QPainter, area: QRectF, scale: Scale) -> None:
-    """Paints the title, the colour ramp and its numbers, leaving out those that would overlap."""
+    """Paints the title, colour ramp and tick labels, leaving out labels that would overlap."""
     metrics = painter.fontMetrics()
     pad = theme.em(0.4)
     left, width = area.left() + pad, max(area.width() - 2 * pad, 1.0)
@@ -79,17 +79,17 @@ def paint_bar(painter: QPainter, area: QRectF, scale: Scale) -> None:
 
 ZOOM_STEP = 1.25
 _PAN_STEP = 0.1
-"""Distance that an arrow key pans, as a fraction of the visible area."""
+"""Distance that one press of an arrow key pans, as a fraction of the visible area."""
 
 
 class CompareView(TakesFiles, QWidget):
-    """Widget that draws the images, independent of their sources.
+    """Widget that draws the compared images, independent of their sources.
 
     Signals:
         hovered(x, y): The pixel under the mouse, or -1, -1.
-        flipped(which): The flip view now shows "A" or "B".
-        wiped(fraction): The wipe line moved to this fraction of the width, 0 at the left.
-        dropped(which, paths): Files were dropped on the half of A or of B.
+        flipped(which): The flip view changed to image "A" or "B".
+        wiped(fraction): The wipe line moved to this fraction of the width; 0 is the left edge.
+        dropped(which, paths): Files were dropped on the half of image "A" or "B".
     """
 
     hovered = Signal(int, int)
@@ -123,43 +123,43 @@ class CompareView(TakesFiles, QWidget):
     # ---- what is shown -------------------------------------------------------------------------
 
     def set_image(self, which: str, image: QImage | None) -> None:
-        """Sets the image of A, B or D (the difference)."""
+        """Sets image "A", image "B" or the difference "D"."""
         self._images[which] = image
         self.update()
 
     def image(self, which: str) -> QImage | None:
-        """Returns the image set by ``set_image``."""
+        """Returns an image that was set by ``set_image``."""
         return self._images[which]
 
     def set_scale(self, scale: Scale | None) -> None:
-        """Sets the colour scale of the difference."""
+        """Sets the colour scale of the difference map."""
         self._scale = scale
         self.update()
 
     def set_mode(self, mode: str) -> None:
-        """Sets the view, one of ``layout.MODES``."""
+        """Sets the view mode, one of ``layout.MODES``."""
         self._layout.mode = mode
         self.update()
 
     def set_message(self, message: str) -> None:
-        """Shows a message in place of the difference; "" removes it."""
+        """Shows a message in place of the difference map; "" removes the message."""
         self.message = message
         self.update()
 
     def flip(self) -> None:
-        """Switches between A and B in the flip view."""
+        """Switches between image A and image B in the flip view."""
         self._layout.shown = B if self.shown == A else A
         self.flipped.emit(self.shown)
         self.update()
 
     def set_wipe(self, fraction: float) -> None:
-        """Moves the wipe line."""
+        """Moves the wipe line to a fraction of the width."""
         self.wipe = min(max(fraction, 0.0), 1.0)
         self.wiped.emit(self.wipe)
         self.update()
 
     def fit(self) -> None:
-        """Fits the whole image."""
+        """Sets the zoom so that the whole image is visible."""
         self._arranged().fit()
         self.update()
 
@@ -170,12 +170,12 @@ class CompareView(TakesFiles, QWidget):
 
     @property
     def mode(self) -> str:
-        """The current view, one of ``layout.MODES``."""
+        """The current view mode, one of ``layout.MODES``."""
         return self._layout.mode
 
     @property
     def shown(self) -> str:
-        """The image that the flip view shows, A or B."""
+        """The image that the flip view shows, "A" or "B"."""
         return self._layout.shown
 
     @property
@@ -188,7 +188,7 @@ class CompareView(TakesFiles, QWidget):
         return self._arranged().points_per_pixel()
 
     def pixel_at(self, at: QPointF) -> tuple[int, int] | None:
-        """Returns the column and row under a point of the widget."""
+        """Returns the column and row of the pixel under a point of the widget."""
         return self._arranged().pixel_at(at)
 
     def target(self, number: int) -> QRectF:
@@ -197,7 +197,7 @@ class CompareView(TakesFiles, QWidget):
         return layout.target(layout.panes()[number][1])
 
     def _arranged(self) -> Layout:
-        """Returns the layout for the current sizes of widget and images."""
+        """Returns the layout of the panes for the current sizes of widget and images."""
         layout = self._layout
         layout.area = QRectF(self.rect())
         there = [image for image in (self._images[A], self._images[B]) if image is not None]
@@ -215,7 +215,7 @@ class CompareView(TakesFiles, QWidget):
     # ---- painting ------------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Paints panes, the wipe line, labels and the colour bar."""
+        """Paints the panes, the wipe line, labels and the colour bar."""
         painter = QPainter(self)
         painter.fillRect(self.rect(), theme.surround())
         for which, pane in self._panes():
@@ -310,11 +310,11 @@ class CompareView(TakesFiles, QWidget):
         self._hover(self.pixel_at(at))
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        """Ends dragging."""
+        """Ends dragging the wipe line or the image."""
         self._drag, self._wiping = None, False
 
     def leaveEvent(self, event: object) -> None:
-        """Reports that the mouse is over no pixel."""
+        """Reports that the mouse is over no pixel of an image."""
         self._hover(None)
 
     def _hover(self, pixel: tuple[int, int] | None) -> None:
@@ -324,7 +324,7 @@ class CompareView(TakesFiles, QWidget):
             self.update()
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Zooms about the pixel under the mouse."""
+        """Zooms the image about the pixel under the mouse."""
         steps = event.angleDelta().y() / 120.0
         if steps:
             self.set_zoom(self.points_per_pixel() * ZOOM_STEP**steps, event.position())
@@ -362,7 +362,7 @@ class CompareView(TakesFiles, QWidget):
             self._pan(-dx * _PAN_STEP * pane.width(), -dy * _PAN_STEP * pane.height())
 
     def focusInEvent(self, event: object) -> None:
-        """Repaints to show the focus frame."""
+        """Repaints the widget to show or hide the focus frame."""
         self.update()
 
     focusOutEvent = focusInEvent

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare window: two images or two live settings, displayed and in numbers."""
+"""Compare window: shows two images or two live renders and the numbers of their differences."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ _KEYS = {"side": "1", "wipe": "2", "flip": "3", "difference": "4", "three": "5"}
 
 
 class CompareWindow(QWidget):
-    """Window that compares A and B, in one view and with numbers.
+    """Window that compares images A and B, in one view and with numbers.
 
     Signals:
-        failed(str): One line that says what to do; also shown in the window.
+        failed(str): Emitted on an error, with one line on how to fix it; the window shows it too.
     """
 
     failed = Signal(str)
@@ -127,7 +127,7 @@ class CompareWindow(QWidget):
         return bar
 
     def _mark_mode(self) -> None:
-        """Gives the button of the chosen view the colours of a selection."""
+        """Gives the button of the chosen view mode the colours of a selection."""
         colours = QApplication.palette()
         for button in self._modes.values():
             own = QPalette()
@@ -165,18 +165,18 @@ class CompareWindow(QWidget):
         return combo
 
     def sizeHint(self) -> QSize:
-        """Returns a size for two images and the numbers."""
+        """Returns a window size that fits two images and the numbers."""
         return QSize(theme.em(70), theme.em(42))
 
     # ---- public methods
     # ----------------------------------------------------------------------------
 
     def keep(self, which: str) -> None:
-        """Keeps the viewport's current image as "A" or "B"."""
+        """Keeps the viewport's current image as image "A" or "B"."""
         self.sources[which].keep()
 
     def open(self, which: str, paths: list[str | Path]) -> None:
-        """Opens a file as "A" or "B"; two files at once become A and B."""
+        """Opens a file as image "A" or "B"; two files at once become A and B."""
         if len(paths) > 2:
             self._fail(f"{len(paths)} files were dropped: drop one, or two for A and B")
         elif len(paths) == 2:
@@ -200,14 +200,14 @@ class CompareWindow(QWidget):
             dock.raise_()
 
     def set_mode(self, mode: str) -> None:
-        """Sets the view, one of ``layout.MODES``."""
+        """Sets the view mode, one of ``layout.MODES``."""
         self._modes[mode].setChecked(True)
         self.view.set_mode(mode)
         self.view.setFocus()
 
     @property
     def busy(self) -> bool:
-        """Whether something is being read or computed."""
+        """Whether an image is being read or a difference is being computed."""
         return self._jobs.busy or self.a.loading or self.b.loading
 
     def shutdown(self) -> None:
@@ -222,12 +222,12 @@ class CompareWindow(QWidget):
         self.view.set_zoom(1.0 / self.view.devicePixelRatioF())
 
     def look(self) -> Look:
-        """Returns the layer, exposure and tone mapping of both images."""
+        """Returns the layer, exposure and tone mapping for both images."""
         layer = self._layer.currentText() or "beauty"
         return Look(layer, self._exposure.value(), self._tone.currentText())
 
     def refresh(self) -> None:
-        """Computes everything that the window shows."""
+        """Computes everything that the compare window shows."""
         self._show_layers()
         for name, source in self.sources.items():
             title = source.side.name if source.side is not None else ""
@@ -260,7 +260,7 @@ class CompareWindow(QWidget):
         self.numbers.set_numbers(found, self.view.message)
 
     def _take_map(self, image: QImage | None, scale: Scale | str | None) -> None:
-        """Shows the map, or a text that says why there is none."""
+        """Shows the difference map, or a text that says why there is none."""
         self.view.set_image("D", image)
         self.view.set_scale(scale if isinstance(scale, Scale) else None)
         if isinstance(scale, str):

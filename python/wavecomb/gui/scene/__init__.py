@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Panels for the stage: its tree, materials and lights, and their edits."""
+"""Scene panels: the stage's prim tree, materials and lights, and the edits of them."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Saves a copy of unsaved edits, so that a crash of the window loses none."""
+"""Saves a copy of unsaved edits, so that they survive a crash of the window."""
 
 from __future__ import annotations
 
@@ -21,28 +21,28 @@ if TYPE_CHECKING:
     from wavecomb.gui.scene.scene_edits import SceneEdits
 
 DELAY_MS = 2000
-"""Delay between an edit and saving its copy, in milliseconds."""
+"""Delay between an edit and the autosave, in milliseconds."""
 
 
 class Autosave(QObject):
-    """Automatic writer of the edits of the open stage to a file, until they are saved or undone.
+    """Automatic writer of unsaved edits to a file, which exists until they are saved or undone.
 
-    Each stage has one autosave file. The window with the stage holds a lock beside the file. A
-    second window with the same stage writes no copy.
+    Each stage has one autosave file. A window holds a lock beside the autosave file while its stage
+    is open. A second window with the same stage writes no autosave file.
 
     Signals:
-        found(): There are edits of an earlier window that ended without saving them.
+        found(): Emitted if an earlier window ended without saving its edits.
     """
 
     found = Signal()
 
     def __init__(self, edits: SceneEdits, folder: Path, parent: QObject | None = None) -> None:
-        """Follows the edits of a window.
+        """Follows the edits of a stage.
 
         Args:
-            edits: The edits.
-            folder: Folder of the files, created when needed.
-            parent: Qt parent.
+            edits: The edits to save.
+            folder: Folder of the autosave files, created when needed.
+            parent: Qt parent of the writer.
         """
         super().__init__(parent)
         self._edits, self._folder = edits, folder
@@ -63,7 +63,8 @@ class Autosave(QObject):
         return self._file
 
     def close(self) -> None:
-        """Writes pending edits and releases the lock. Unsaved edits stay in the file."""
+        """Writes pending edits and releases the lock of the autosave file. Unsaved edits stay in
+        the autosave file."""
         if self._timer.isActive():
             self.write()
         self._release()
@@ -75,19 +76,19 @@ class Autosave(QObject):
         self._file = self._lock = None
 
     def write(self) -> None:
-        """Writes the edits now, or removes the file if there are none."""
+        """Writes the edits to the autosave file now, or removes the file if there are none."""
         if self._file is None or self._edits.edits is None:
             return
         if self._edits.history.stack.isClean():
             if not self._waits:
                 self.discard()
             return
-        self._waits = False  # new edits replace those that were not restored
+        self._waits = False  # New edits replace the edits not restored.
         with contextlib.suppress(WavecombError, OSError):
             save_edits(self._edits.edits.stage, self._file)
 
     def restore(self) -> None:
-        """Loads the edits of the file into the stage."""
+        """Loads the edits of the autosave file into the stage."""
         self._waits = False
         usd, layer = self._edits.usd, None
         if self._file is not None and usd is not None:
@@ -103,7 +104,7 @@ class Autosave(QObject):
         self._edits.session.rebuild("restored edits")
 
     def discard(self) -> None:
-        """Removes the file."""
+        """Removes the autosave file."""
         self._waits = False
         if self._file is not None:
             with contextlib.suppress(OSError):
@@ -140,7 +141,7 @@ class Autosave(QObject):
 
     def _on_clean(self, clean: bool) -> None:
         if clean and not self._waits:
-            # a stage that is being closed stops the timer, so its edits stay in the file
+            # Closing a stage stops the timer, so its unsaved edits stay in the file.
             self._timer.start(0)
 
 

@@ -22,7 +22,7 @@ def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:
 
     Args:
         stage: Stage with edits in its session layer.
-        folder: Folder of the layer, from which the path of the stage is relative.
+        folder: Folder of the new layer; the path of the stage is relative to it.
     """
     root = stage.GetRootLayer()
     layer = Sdf.Layer.CreateAnonymous("edits.usda")
@@ -30,7 +30,7 @@ def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:
     base = Path(root.realPath)
     try:
         name = os.path.relpath(base, folder)
-    except ValueError:  # on Windows, the stage may be on another drive
+    except ValueError:  # On Windows, the drives may differ.
         name = str(base)
     name = Path(name).as_posix()
     layer.subLayerPaths = [name if name.startswith(("../", "/")) else f"./{name}"]
@@ -42,7 +42,7 @@ def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:
 
 
 def save_edits(stage: Usd.Stage, path: str | os.PathLike[str]) -> Path:
-    """Writes the edits as a .usda file, never partially, and returns its path.
+    """Writes the edits of a stage as a .usda file, never partially, and returns its path.
 
     Raises:
         WavecombError: The file cannot be written, or would replace a file of the stage.

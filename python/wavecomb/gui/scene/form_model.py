@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Form as data: rows of fields with editable values. Independent of widgets."""
+"""Form as data: rows of fields with editable values. The form is independent of widgets."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ class Range:
     """Range of a parameter.
 
     Attributes:
-        low: Smallest value.
-        high: Largest value.
-        soft_low: Left end of the slider.
-        soft_high: Right end of the slider.
-        decimals: Number of decimals.
-        logarithmic: Whether the slider is logarithmic. If ``low`` is 0, its left end means 0.
+        low: Smallest allowed value.
+        high: Largest allowed value.
+        soft_low: Value at the left end of the slider.
+        soft_high: Value at the right end of the slider.
+        decimals: Number of displayed decimals.
+        logarithmic: Whether the slider is logarithmic. If ``low`` is 0, the left end of a
+            logarithmic slider means 0.
     """
 
     low: float
@@ -58,9 +59,9 @@ UNIT = Range(0.0, 1.0, 0.0, 1.0)
 
 
 def differs(shown: Any, value: Any) -> bool:
-    """Returns whether a field must be updated.
+    """Returns whether a field must be updated to show a new value.
 
-    Ignores rounding differences, because an update would move the text cursor.
+    Ignores rounding differences of values, because an update would move the text cursor.
     """
     if isinstance(shown, tuple) != isinstance(value, tuple):
         return True
@@ -77,16 +78,16 @@ class FieldRow:
     """A field of a form.
 
     Attributes:
-        name: Name of the parameter.
-        label: Label before the field.
+        name: Name of the edited parameter.
+        label: Label in front of the field.
         kind: "number", "colour", "switch", or "driven" for a value from a texture or primvar.
         value: Value when the form was made: a number, a colour of three numbers, or a bool; None
             for a driven field.
         title: Full name for people, such as "coat weight".
-        bounds: Range of a number, or of each component of a colour.
-        default: Value if nothing is authored; None if unknown.
+        bounds: Range of the number, or of each component of the colour.
+        default: Value of the parameter if nothing is authored; None if unknown.
         driver: Source of the value of a driven field, such as "texture wood.png".
-        group: Heading above the field, or "".
+        group: Heading above the field, or "" for none.
         tip: Tooltip with the effect and the edited attribute.
     """
 
@@ -103,16 +104,16 @@ class FieldRow:
 
 
 class FormModel(QObject):
-    """Form of one object at a time. Subclasses provide the values and receive the edits.
+    """Form that edits one object at a time. Subclasses provide the values and receive the edits.
 
     Signals:
-        remade(): The rows changed, because another object or none is shown.
-        changed(): The values of the same rows changed.
+        remade(): The rows changed, because the form shows another object or none.
+        changed(): Values of the form changed, but its rows are the same.
 
     Attributes:
-        rows: Fields, in order.
-        title: Name of the object, or "".
-        note: Text in place of fields or below them.
+        rows: Fields of the form, in order.
+        title: Name of the edited object, or "".
+        note: Text in place of the fields or below them.
         set_typing: Called at the start and end of typing a value, which becomes one undo step.
     """
 
@@ -139,13 +140,14 @@ class FormModel(QObject):
         raise NotImplementedError
 
     def groups(self) -> list[str]:
-        """Returns the headings in order. "" comes first if some fields have none."""
+        """Returns the headings in order; "" comes first if some fields have no heading."""
         return list(dict.fromkeys(row.group for row in self.rows))
 
     def is_open(self, group: str) -> bool:
         """Returns whether a heading is open.
 
-        This is the user's choice, or else whether a field below it differs from its default.
+        The user's choice decides, or else whether a field below the heading differs from its
+        default.
         """
         used = any(
             row.kind == DRIVEN or row.value != row.default
@@ -155,5 +157,5 @@ class FormModel(QObject):
         return self._folds.get(group, used)
 
     def fold(self, group: str, opened: bool) -> None:
-        """Stores whether the user opened or closed a heading."""
+        """Stores whether the user opened or closed a heading of the form."""
         self._folds[group] = opened

@@ -29,11 +29,11 @@ from wavecomb.gui.scene.value_fields import (
 from wavecomb.gui.widgets import named
 
 LABEL_EM = 6.2
-"""Width of the labels, equal in all groups."""
+"""Width of the field labels, equal in all groups."""
 
 
 def field_of(row: FieldRow) -> Field | DrivenField:
-    """Creates the field of a row; a driven row gets a field that only shows its source."""
+    """Creates the field of a form row; a driven row gets a field that only shows its source."""
     if row.kind == DRIVEN:
         return DrivenField(row.title, row.driver)
     if row.kind == SWITCH:
@@ -48,11 +48,11 @@ def field_of(row: FieldRow) -> Field | DrivenField:
 
 
 class FormView(QScrollArea):
-    """View of the fields of a model, rebuilt when its rows change.
+    """View of the fields of a form model, rebuilt when the rows change.
 
     Attributes:
-        fields: Editable fields by name.
-        groups: Groups by title.
+        fields: Editable fields of the form by name.
+        groups: Groups of fields by title.
     """
 
     def __init__(self, model: FormModel, name: str, title: str) -> None:
@@ -107,7 +107,7 @@ class FormView(QScrollArea):
         return field
 
     def _show(self) -> None:
-        """Updates the fields with the values of the model."""
+        """Updates the fields with the values of the form model."""
         for name, field in self.fields.items():
             value = self._model.value(name)
             if value is None:
@@ -118,7 +118,7 @@ class FormView(QScrollArea):
 
 
 class Rows(QWidget):
-    """Labels and fields, one below the other."""
+    """Form rows with labels and fields, one below the other."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -130,7 +130,7 @@ class Rows(QWidget):
         self._form.setVerticalSpacing(theme.em(0.25))
 
     def add(self, row: FieldRow, field: QWidget) -> None:
-        """Adds a row."""
+        """Adds a row to the form."""
         label = QLabel(row.label)
         label.setWordWrap(True)
         label.setFixedWidth(theme.em(LABEL_EM))
@@ -142,10 +142,10 @@ class Rows(QWidget):
 
 
 class Group(QWidget):
-    """Rows under a heading that collapses them.
+    """Form rows under a heading that collapses them.
 
     Signals:
-        toggled(str, bool): The user opened (True) or closed the group.
+        toggled(str, bool): The user opened (True) or closed the group of that title.
     """
 
     toggled = Signal(str, bool)

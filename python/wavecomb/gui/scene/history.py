@@ -22,11 +22,11 @@ class EditCommand(QUndoCommand):
     """An undo command.
 
     Args:
-        step: The step.
-        history: The history it belongs to.
-        stretch: Number that is equal for steps that may merge.
-        typing: Whether the step is part of typing a value.
-        moment: Time of the step in seconds.
+        step: The undo step that the command applies.
+        history: The history that the command belongs to.
+        stretch: Number that is equal for undo steps that may merge.
+        typing: Whether the undo step is part of typing a value.
+        moment: Time of the undo step in seconds.
     """
 
     def __init__(
@@ -34,17 +34,17 @@ class EditCommand(QUndoCommand):
     ) -> None:
         super().__init__(step.label)
         self.step, self.stretch, self.typing, self.moment = step, stretch, typing, moment
-        # Qt owns the commands. A strong reference would keep the history, and thus its stack,
-        # alive.
+        # Qt owns the undo commands. A strong reference in a command would keep the history, and
+        # thus its undo stack, alive.
         self._history = weakref.ref(history)
 
     def redo(self) -> None:
-        """Applies the step. Qt also calls this when the command is pushed."""
+        """Applies the undo step. Qt also calls this when the command is pushed."""
         if (history := self._history()) is not None:
             history.step.emit(self.step)
 
     def undo(self) -> None:
-        """Reverts the step."""
+        """Reverts the undo step."""
         if (history := self._history()) is not None:
             history.step.emit(self.step.inverse())
 
@@ -67,11 +67,11 @@ class History(QObject):
     """Undo history of one stage.
 
     Signals:
-        step(Step): Apply this step: a new one, a redone one, or the inverse of one.
+        step(Step): Requests to apply a step: a new one, a redone one, or the inverse of one.
 
     Attributes:
-        stack: Qt's undo stack; clean while the edits equal the saved ones.
-        now: Clock in seconds, which distinguishes drags from single changes.
+        stack: Qt's undo stack; it is clean while the edits equal the saved ones.
+        now: Clock in seconds, used to distinguish drags from single changes.
     """
 
     step = Signal(object)
@@ -88,7 +88,7 @@ class History(QObject):
     def push(self, step: Step) -> None:
         """Applies a step and adds it to the history.
 
-        Merges it with the previous one of the same drag.
+        Merges the step with the previous step of the same drag.
         """
         command = EditCommand(step, self, self._stretch, self._typing, self.now())
         self.stack.push(command)
@@ -109,6 +109,6 @@ class History(QObject):
         self.stack.redo()
 
     def clear(self) -> None:
-        """Removes all steps."""
+        """Removes all undo steps."""
         self._stretch += 1
         self.stack.clear()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Editable inputs of lights: those of the core's table of lights, and brightness."""
+"""Editable inputs of lights: the inputs in the core's table of lights, and brightness."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ class LightInput:
         label: Label in the form.
         kind: Kind of field, see ``form_model``.
         default: Value if nothing is authored.
-        bounds: Range of a number, or of each component of a colour.
-        tip: Tooltip with the effect.
-        group: Heading above the field, or "".
+        bounds: Range of the number, or of each component of the colour.
+        tip: Tooltip that describes the effect of the input.
+        group: Heading above the field, or "" for none.
     """
 
     name: str
@@ -48,7 +48,7 @@ class LightInput:
 
     @property
     def attribute(self) -> str:
-        """Name of the attribute of the prim."""
+        """Name of the attribute on the light prim."""
         return f"inputs:{self.input}"
 
     @property
@@ -57,7 +57,7 @@ class LightInput:
         return _TYPES[self.kind]
 
     def read(self, prim: Usd.Prim, time: Usd.TimeCode) -> Any:
-        """Returns the value on a prim: a number, a colour of three numbers, or a bool."""
+        """Returns the input's value on a prim: a number, a colour of three numbers, or a bool."""
         attribute = prim.GetAttribute(self.attribute)
         value = attribute.Get(time) if attribute else None
         if value is None:
@@ -83,14 +83,14 @@ BRIGHTNESS = (
 
 
 def light_inputs() -> dict[str, LightInput]:
-    """Returns all inputs by name."""
+    """Returns all light inputs by name."""
     return {one.name: one for one in (*map(_of, _edited(light_parameters().values())), *BRIGHTNESS)}
 
 
 def inputs_of(prim: Usd.Prim) -> list[LightInput]:
     """Returns the inputs of a prim in the order of a form.
 
-    Brightness comes first, then inputs of the light type, then those under headings.
+    Brightness comes first, then the inputs of the light type, then the inputs under headings.
     """
     kind = KINDS.get(str(prim.GetTypeName()), "")
     brightness = {one.name for one in BRIGHTNESS}

@@ -21,7 +21,7 @@ SOFT_DOME = "soft dome"
 
 
 class LightsModel(HeadedModel):
-    """List of lights by path, including those that are off."""
+    """List of the stage's lights by path, including lights that are switched off."""
 
     def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
         super().__init__(HEADERS, parent)
@@ -39,7 +39,7 @@ class LightsModel(HeadedModel):
         self.fill(list(paths))
 
     def refresh(self) -> None:
-        """Updates the cells of all rows."""
+        """Updates the cells of all lights."""
         self.tell(0, len(HEADERS) - 1)
 
     def flags(self, index: Any) -> Qt.ItemFlag:
@@ -53,7 +53,7 @@ class LightsModel(HeadedModel):
         return bool(path) and not uneditable(self._edits.prim(path))
 
     def data(self, index: Any, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """Returns a cell's data, also for ``ColourRole`` and ``ToneRole``."""
+        """Returns the data of a cell, also for ``ColourRole`` and ``ToneRole``."""
         path, column = self.rows[index.row()], index.column()
         if role == Qt.ItemDataRole.DisplayRole:
             if column == NAME:
@@ -82,7 +82,7 @@ class LightsModel(HeadedModel):
         return "Shows only this light, or all lights again" if column == SOLO else path
 
     def setData(self, index: Any, value: Any, role: int = Qt.ItemDataRole.EditRole) -> bool:
-        """Switches a light by its check box."""
+        """Switches a light on or off by its check box."""
         if role != Qt.ItemDataRole.CheckStateRole:
             return False
         path = self.rows[index.row()]
@@ -95,10 +95,10 @@ class LightsModel(HeadedModel):
 
 
 class LightForm(FormModel):
-    """Form of one light.
+    """Form that edits one light.
 
     Attributes:
-        path: Path of its prim, "" for the soft dome, None if no light is shown.
+        path: Path of the light's prim; "" for the default dome light; None if no light is shown.
     """
 
     def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:

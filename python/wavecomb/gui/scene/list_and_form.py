@@ -30,16 +30,16 @@ if TYPE_CHECKING:
 
 
 class ListAndForm(QWidget):
-    """A list, and the form of its selected row. The selection survives rereading the list.
+    """A list of prims, and the form of its selected row. The selection survives rereading the list.
 
     Args:
-        model: Rows of the list.
-        form: Fields of one row.
-        show: Shows the fields of a row, or no fields for None.
+        model: Model with the rows of the list.
+        form: Model with the fields of one row.
+        show: Function that shows the fields of a row, or no fields for None.
         name: Object name in the singular, such as "light".
         title: Accessible name in the singular, such as "Light".
         tip: Tooltip of the list.
-        widths: Widths of columns after the first, in font heights.
+        widths: Widths of the columns after the first, in font heights.
     """
 
     def __init__(
@@ -76,11 +76,11 @@ class ListAndForm(QWidget):
 
     @property
     def fields(self) -> dict[str, Field]:
-        """Editable fields by name."""
+        """Editable fields of the form by name."""
         return self.form.fields
 
     def choose_first(self, is_wanted: Callable[[Any], bool]) -> bool:
-        """Selects the first row that satisfies a predicate; returns whether there is one."""
+        """Selects the first row that satisfies a predicate; returns whether there is such a row."""
         for number, row in enumerate(self.model.rows):
             if is_wanted(row):
                 self.view.selectRow(number)
@@ -104,7 +104,7 @@ class ListAndForm(QWidget):
 
 
 class LightsPanel(ListAndForm):
-    """Panel of the lights of the stage by path; "" stands for the soft dome."""
+    """Panel of the lights of the stage by path; "" stands for the default dome light."""
 
     def __init__(self, edits: SceneEdits) -> None:
         form = LightForm(edits)
@@ -113,12 +113,12 @@ class LightsPanel(ListAndForm):
         super().__init__(LightsModel(edits), form, form.show_light, "light", "Light", tip, widths)
 
     def choose(self, path: str) -> bool:
-        """Selects a light by its prim; returns whether there is one."""
+        """Selects a light by its prim; returns whether the list contains it."""
         return self.choose_first(lambda light: light == path)
 
 
 class MaterialsPanel(ListAndForm):
-    """Panel of the materials in use."""
+    """Panel of the materials that the scene uses."""
 
     chosen: Row | None
 
@@ -128,5 +128,5 @@ class MaterialsPanel(ListAndForm):
         super().__init__(model, form, form.show_material, "material", "Material", tip, widths)
 
     def choose(self, path: str) -> bool:
-        """Selects the material of a prim; returns whether it is in use."""
+        """Selects the material of a prim; returns whether the list contains it."""
         return self.choose_first(lambda row: row.path == path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plots and a table of the materials in a run: cost per record and number of records."""
+"""Plots and a table of the materials in a render: cost per shading record, number of records."""
 
 from __future__ import annotations
 
@@ -39,31 +39,31 @@ ORDERS = {
 
 @dataclass(frozen=True)
 class MaterialCost:
-    """Costs of one material in a run."""
+    """Shading costs of one material in a render."""
 
     name: str
     short: str
     program: str
     records: int
     measured_ns: float
-    """Measured ns per record over timed batches; 0 if none was timed."""
+    """Measured ns per shading record over the timed batches; 0 if no batch was timed."""
     predicted_ns: float
-    """Predicted ns per record, used to schedule the next pass."""
+    """Predicted ns per shading record, used to schedule the next pass."""
     calibrated_ns: float
-    """Calibrated ns per record, before the first pass."""
+    """Calibrated ns per shading record, measured before the first pass."""
     share: float
     """Fraction of the shading time of all materials, 0 to 1."""
 
     @property
     def ns(self) -> float:
-        """Measured ns per record, or the predicted value if nothing was measured."""
+        """Measured ns per shading record, or the predicted value if nothing was measured."""
         return self.measured_ns or self.predicted_ns
 
 
 def material_costs(stats: Mapping[str, Any], order: str = "time") -> list[MaterialCost]:
-    """Returns the materials that were shaded, the largest first.
+    """Returns the materials that were shaded, sorted in descending order.
 
-    ``order`` is one of ``ORDERS``.
+    ``order`` is the sort key, one of ``ORDERS``.
     """
     used = [one for one in stats.get("materials", ()) if one.get("records")]
     times = [one["records"] * (one["ns_per_record"] or one["predicted_ns"]) for one in used]
@@ -92,7 +92,7 @@ def material_costs(stats: Mapping[str, Any], order: str = "time") -> list[Materi
 
 
 def short_names(paths: Sequence[str]) -> list[str]:
-    """Returns the last part of each path, with as many parts as needed to be unique.
+    """Returns the last part of each prim path, with as many parts as needed to be unique.
 
     >>> short_names(["/A/Looks/Gold", "/A/Looks/Wood", "/B/Looks/Gold", ""])
     ['A/Looks/Gold', 'Wood', 'B/Looks/Gold', '(no name)']
@@ -123,17 +123,17 @@ _HEADER = {
 
 
 def measured_colour() -> QColor:
-    """Returns the colour of measured values."""
+    """Returns the colour of measured values in plots."""
     return theme.series(1)
 
 
 def predicted_colour() -> QColor:
-    """Returns the colour of predicted values."""
+    """Returns the colour of predicted values in plots."""
     return theme.series(0)
 
 
 class MaterialsTab(QWidget):
-    """Tab with bars of the first few materials, and a sortable table of all."""
+    """Tab with bars of the most costly materials, and a sortable table of all materials."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -231,7 +231,7 @@ class MaterialsTab(QWidget):
     def show_series(
         self, series: Sequence[Series], labels: Sequence[str], current: Series | None
     ) -> None:
-        """Draws the chosen series, or the current one if none was chosen."""
+        """Draws the chosen series, or the current series if none was chosen."""
         chosen = self.of.currentData()
         follow = self.of.currentIndex() <= 0 or chosen not in series
         blocked = self.of.blockSignals(True)

@@ -43,7 +43,7 @@ RANGES = {
     "conductor_eta": Range(0.0, 100.0, 0.0, 5.0),
     "conductor_k": Range(0.0, 100.0, 0.0, 10.0),
 }
-"""Ranges of UsdPreviewSurface parameters that are not limited to 0 to 1."""
+"""Ranges of UsdPreviewSurface parameters whose range is not 0 to 1."""
 
 LABELS = {"conductor_eta": "eta", "conductor_k": "k"}
 
@@ -53,10 +53,10 @@ class Row:
     """A row of the list: a material prim, or a material that the loader made.
 
     Attributes:
-        path: Path of the prim, or "" if there is none.
-        name: Name for people.
-        program: Shading program.
-        ids: Indices of its materials in the scene.
+        path: Path of the material prim, or "" if there is none.
+        name: Displayed name of the material.
+        program: Shading program of the material.
+        ids: Indices of the scene's materials that come from this prim.
     """
 
     path: str
@@ -66,7 +66,7 @@ class Row:
 
 
 def rows_of(scene: Scene, paths: tuple[str, ...]) -> list[Row]:
-    """Returns one row for each prim, and for each material without a prim."""
+    """Returns one row for each material prim, and for each material without a prim."""
     by_path: dict[str, list[int]] = {}
     for number, path in enumerate(paths):
         by_path.setdefault(path or f"#{number}", []).append(number)
@@ -108,7 +108,7 @@ class MaterialsModel(HeadedModel):
             self.tell(NAME, NAME)
 
     def count(self, statistics: dict[str, Any]) -> None:
-        """Updates records and costs from the ``materials`` of the statistics."""
+        """Updates record counts and costs from ``materials`` in the render statistics."""
         self._figures = statistics["materials"]
         self.tell(RECORDS, COST)
 
@@ -150,10 +150,10 @@ class MaterialsModel(HeadedModel):
 
 
 class MaterialForm(FormModel):
-    """Form of one material, with the headings of its MaterialX definition.
+    """Form that edits one material, with the headings of its MaterialX definition.
 
     Attributes:
-        row: The material; None if none is shown.
+        row: The material's row of the list; None if no material is shown.
     """
 
     def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
@@ -207,7 +207,7 @@ class MaterialForm(FormModel):
             self._edits.set_parameter(self.row.path, name, value)
 
     def is_open(self, group: str) -> bool:
-        """Returns whether a heading is open. The base is open initially."""
+        """Returns whether a heading is open. The heading "base" is open initially."""
         return self._folds.get(group, group == "Base" or super().is_open(group))
 
 

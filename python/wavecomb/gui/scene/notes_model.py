@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Findings of the loader as rows that can be filtered. No widgets."""
+"""Findings of the loader as rows that can be filtered. The models are independent of widgets."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ KINDS = (UNSUPPORTED, WARNING, NOTE)
 
 @dataclass(frozen=True)
 class Row:
-    """One finding at one place, which is a prim path, a file, or "" for the whole stage."""
+    """One finding of the loader at a place: a prim path, a file, or "" for the whole stage."""
 
     kind: str
     what: str
     place: str
 
     def line(self) -> str:
-        """Returns the row as text."""
+        """Returns the finding as a line of text."""
         return f"{self.kind}: {self.what}" + (f": {self.place}" if self.place else "")
 
 
 def rows_of(stage: LoadedStage) -> list[Row]:
-    """Returns a row for each reported place, and one row for the places that were only counted."""
+    """Returns a row for each reported place, and one row for places that were only counted."""
     out: list[Row] = []
     report = stage.report
 
@@ -60,7 +60,7 @@ class NotesModel(HeadedModel):
         super().__init__(HEADERS, parent)
 
     def data(self, index: Any, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """Returns a cell's data, also for ``ToneRole``."""
+        """Returns the data of a cell, also for ``ToneRole``."""
         row = self.rows[index.row()]
         if role == Qt.ItemDataRole.DisplayRole:
             return (row.kind, row.what, row.place)[index.column()]
@@ -72,7 +72,7 @@ class NotesModel(HeadedModel):
 
 
 class NotesFilter(QSortFilterProxyModel):
-    """Filter for rows of one kind that contain a text in any column."""
+    """Filter for findings of one kind that contain a text in any column."""
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)

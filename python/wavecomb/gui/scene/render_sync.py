@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Updates the rendered scene after edits of a stage, without loading the stage again if possible.
 
-Edits of visibility and variants change the contents of the scene, so the stage is loaded again. The
-same holds for constants inside a material graph or in the reading of a texture.
+Edits of visibility and variants change the contents of the scene, so the stage is loaded again.
+Edits of constants inside a material graph or a texture reader also load the stage again.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class RenderSync:
 
     Attributes:
         session: The session whose scene follows the edits.
-        stage_edits: Edits of its open stage.
+        stage_edits: Edits of the session's open stage.
     """
 
     session: Session
@@ -48,7 +48,7 @@ class RenderSync:
         return self.stage_edits.time
 
     def prim(self, path: str) -> Usd.Prim:
-        """Returns a prim by path, an invalid one if there is none."""
+        """Returns a prim by path, or an invalid prim if there is none."""
         if not path or not Sdf.Path.IsValidPathString(path):
             return Usd.Prim()
         return self.stage_edits.stage.GetPrimAtPath(path)
@@ -72,7 +72,7 @@ class RenderSync:
         return self.stage_edits.opinion((attribute.GetPrimPath(), f".{attribute.name}")) is not None
 
     def material_ids(self, path: str) -> list[int]:
-        """Returns the indices of a prim's materials in the scene.
+        """Returns the indices of the scene's materials that come from a material prim.
 
         A prim has several materials if primvars of meshes provide different values.
         """
@@ -92,8 +92,7 @@ class RenderSync:
     def light_value(self, path: str, name: str) -> Any:
         """Returns the current value of one of ``light_inputs()``.
 
-        For a light whose edits cannot be saved, it is the factor on the light's colour on the
-        stage.
+        For a light whose edits cannot be saved, the value is a factor on its authored colour.
         """
         known = light_inputs()[name]
         if self.light_reason(path):
@@ -105,7 +104,7 @@ class RenderSync:
         return list(BRIGHTNESS) if self.light_reason(path) else inputs_of(self.prim(path))
 
     def light_key(self, path: str, name: str) -> Key:
-        """Returns the key under which an input of a light is edited."""
+        """Returns the edit key of a light's input."""
         if self.light_reason(path):
             return light_prim(path), f"!{name}"
         return Sdf.Path(path), f".{light_inputs()[name].attribute}"
@@ -129,7 +128,7 @@ class RenderSync:
             self.show_step(step)
 
     def _materials_of(self, prim: Sdf.Path) -> set[str]:
-        """Returns the materials in use that a prim is or belongs to."""
+        """Returns the materials in use that a prim is, or that contain the prim."""
         path, stage = str(prim), self.session.stage
         known = {one for one in stage.material_paths if one} if stage is not None else set()
         return {one for one in known if path == one or path.startswith(one + "/")}
@@ -148,7 +147,7 @@ class RenderSync:
         return before is None or after is None or before.structure == after.structure
 
     def structures(self, prims: Iterable[Sdf.Path]) -> dict[str, str]:
-        """Returns the structure of materials, which the existing scene cannot change, by path."""
+        """Returns, by path, the material properties that an existing scene cannot change."""
         out = {}
         for path in {one for prim in prims for one in self._materials_of(prim)}:
             found = surface_values(self.prim(path), self.time)
@@ -157,14 +156,13 @@ class RenderSync:
         return out
 
     def show_step(self, step: Step) -> None:
-        """Updates the rendered scene after a step."""
+        """Updates the rendered scene after an undo step."""
         stage = self.session.stage
         if stage is None:
             return
         emission = any("emissi" in what for _, what in step.after)
         if emission and not stage.lights:
-            # Whether the loader adds the soft dome to a stage without lights depends on the
-            # emission of its materials.
+            # The emission of materials decides if the loader adds a default dome to an unlit stage.
             self.session.rebuild(step.label)
         for prim in step.prims:
             for light in {one for one in stage.light_paths if light_prim(one) == prim}:
@@ -199,7 +197,7 @@ class RenderSync:
             }
             if values:
                 self.session.edit_material(number, **values)
-            # The stage holds the edit, so the next loading includes it.
+            # The stage holds the edit, so the next loading of the stage includes it.
             self.session.material_edits.pop(have["name"], None)
 
     def _sync_light(self, path: str) -> None:
@@ -236,5 +234,5 @@ class RenderSync:
 
 
 def light_prim(path: str) -> Sdf.Path:
-    """Returns the key of a light; the soft dome has a path that no prim has."""
+    """Returns the key of a light; the default dome has a path that no prim has."""
     return Sdf.Path(path) if path else Sdf.Path("/soft_dome_of_wavecomb")

@@ -33,13 +33,13 @@ class SceneEdits(QObject, RenderSync):
     existing scene immediately.
 
     Signals:
-        reset(): Another stage is open, or none; earlier prims are invalid.
+        reset(): Another stage or none is open; prims of the earlier stage are invalid.
         structure_changed(): Prims may have been added or removed.
-        scene_changed(): The stage was loaded (again); indices of materials and lights changed.
-        changed(): Something was edited, undone or redone.
+        scene_changed(): The stage was loaded (again), which changes indices of materials and
+        lights. changed(): Something was edited, undone or redone.
 
     Attributes:
-        history: Undo history.
+        history: Undo history of the edits.
         edits: Edits of the open stage; None without a stage.
         solo: The light that is shown alone, or None.
     """
@@ -94,7 +94,7 @@ class SceneEdits(QObject, RenderSync):
         return self.history.stack.undoText()
 
     def lines(self) -> list[str]:
-        """Returns all edits, one line each."""
+        """Returns descriptions of all edits, one line each."""
         return self.stage_edits.lines()
 
     # ---- visibility and variants ---------------------------------------------------------------
@@ -118,8 +118,8 @@ class SceneEdits(QObject, RenderSync):
         """Shows one light and hides all others, as one undo step.
 
         Args:
-            path: Path of the light; None restores the state before.
-            lights: Paths of all lights.
+            path: Path of the light; None restores the visibility of all lights.
+            lights: Paths of all lights of the stage.
         """
         if self.edits is None:
             return
@@ -268,7 +268,7 @@ class SceneEdits(QObject, RenderSync):
         self.changed.emit()
 
     def _forget(self, edits: StageEdits | None = None) -> None:
-        """Drops all steps, because another stage or none is open."""
+        """Drops all undo steps, because another stage or none is open."""
         self.stage_edits, self._is_open = edits or _no_edits(), edits is not None
         self._solo, self._touched = Solo(), set()
         self.history.clear()
@@ -282,5 +282,5 @@ def _no_edits() -> StageEdits:
 
 
 def _word(word: str) -> Opinion:
-    """Returns a value for an attribute ``visibility``."""
+    """Returns a value for the attribute ``visibility``."""
     return Opinion(word, Sdf.ValueTypeNames.Token)

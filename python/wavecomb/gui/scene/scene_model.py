@@ -26,12 +26,13 @@ PREDICATE = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
 ROOT = QModelIndex()
 
 CHUNK = 500
-"""Number of children that a view gets at once. The view requests more when it scrolls to the
-end."""
+"""Number of children that the model passes to a view at once. The view requests more when it
+scrolls to the end."""
 
 
 class _Node:
-    """A row. Names of children are None until requested; child nodes are created on demand."""
+    """A row of the tree, which stands for one prim. The list of child names is None until
+    requested; child nodes are created on demand."""
 
     __slots__ = ("made", "names", "parent", "path", "row", "shown")
 
@@ -45,7 +46,7 @@ class _Node:
 
 
 class SceneModel(QAbstractItemModel):
-    """Tree model with the columns name, type, visibility, variants.
+    """Tree model of prims with the columns name, type, visibility and variants.
 
     Shows the prims inside instances.
     """
@@ -58,7 +59,7 @@ class SceneModel(QAbstractItemModel):
         self._root = _Node(Sdf.Path.absoluteRootPath, None, 0)
 
     def reset(self, matches: Collection[Sdf.Path] | None = None) -> None:
-        """Reads everything again; with matches, shows only those and their ancestors."""
+        """Reads all prims again; given search matches, shows only those and their ancestors."""
         self.beginResetModel()
         self._matches = matches or ()
         self._filter = None
@@ -117,12 +118,12 @@ class SceneModel(QAbstractItemModel):
         self.endInsertRows()
 
     def canFetchMore(self, parent: QModelIndex = ROOT) -> bool:
-        """Returns whether a row has children that the view does not have yet."""
+        """Returns whether a row has children that the view has not requested yet."""
         node = self._node(parent)
         return node.shown < len(self._names(node))
 
     def fetchMore(self, parent: QModelIndex = ROOT) -> None:
-        """Gives the view more children of a row."""
+        """Passes more children of a row to the view."""
         node = self._node(parent)
         count = min(len(self._names(node)), node.shown + CHUNK)
         if count > node.shown:
@@ -246,7 +247,7 @@ def search(usd: Usd.Stage, text: str, step: int = 500) -> Iterator[list[Sdf.Path
 
     Args:
         usd: The stage.
-        text: The text; case is ignored.
+        text: The text to find; case is ignored.
         step: Number of prims searched per yielded list, so that the caller can do other work
             between.
     """

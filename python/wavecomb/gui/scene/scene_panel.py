@@ -52,7 +52,7 @@ class ScenePanel(QWidget):
         self.materials = MaterialsPanel(self.edits)
         self.lights = LightsPanel(self.edits)
         self.notes = NotesPanel(session)
-        self._layer: tuple[Path | None, str] | None = None  # stage and file of the last save
+        self._layer: tuple[Path | None, str] | None = None  # Stage and file of the last save.
         self.tabs = QTabWidget()
         self.tabs.setObjectName("scene-tabs")
         self.tabs.setDocumentMode(True)
@@ -113,7 +113,7 @@ class ScenePanel(QWidget):
     # ---- edits ---------------------------------------------------------------------------------
 
     def save(self) -> None:
-        """Writes the edits to the layer of the previous save, or asks for one."""
+        """Writes the edits to the layer of the previous save, or asks for a file."""
         if self._layer and self._layer[0] == self.session.path:
             self.edits.save(self._layer[1])
         else:
@@ -124,7 +124,7 @@ class ScenePanel(QWidget):
             self._layer = self.session.path, path
 
     def ask_save(self) -> None:
-        """Asks for a file and writes the edits to it."""
+        """Asks for a file and writes the edits to this file."""
         stage = self.session.stage
         start = ""
         if stage is not None:

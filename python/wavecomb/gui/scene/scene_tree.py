@@ -110,10 +110,11 @@ MAX_EXPANDED = 300
 
 
 class _View(QTreeView):
-    """Tree view. Space and a click on the eye toggle visibility.
+    """Tree view of the prims of a stage. The space bar and a click on the eye icon toggle
+    visibility.
 
     Signals:
-        frame_wanted(): F was pressed.
+        frame_wanted(): The user pressed F to frame the selected prims.
     """
 
     frame_wanted = Signal()
@@ -125,7 +126,7 @@ class _View(QTreeView):
         self.setModel(model)
 
     def chosen(self) -> list[str]:
-        """Returns the paths of the selected rows."""
+        """Returns the prim paths of the selected rows."""
         return [index.data(PathRole) for index in self.selectionModel().selectedRows(NAME)]
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -225,7 +226,7 @@ class SceneTree(QWidget):
         header.setMinimumSectionSize(theme.em(2))
         for column, wide in ((NAME, 11), (TYPE, 8), (VISIBILITY, 3.6)):
             header.resizeSection(column, theme.em(wide))
-        # The eye is next to the name, so that it is visible in a narrow panel.
+        # The eye icon is next to the name, so that it is visible in a narrow panel.
         header.moveSection(VISIBILITY, 1)
         header.setSectionResizeMode(VISIBILITY, QHeaderView.ResizeMode.Fixed)
         assert view.model().columnCount() == len(HEADERS)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Edits of a stage in its session layer: planning, applying and listing them. Independent of Qt.
 
-Must be used on the thread that owns the stage. Never writes to the files of the stage.
+Edits must be used on the thread that owns the stage. Edits never write to the files of the stage.
 """
 
 from __future__ import annotations
@@ -55,10 +55,10 @@ class Step:
     """One undo step.
 
     Attributes:
-        label: Description for people, such as "intensity of /Key".
-        before: Opinions before the step by key, None for no opinion.
-        after: Opinions after the step, with the same keys.
-        solo: Solo state before and after; None if unchanged.
+        label: Displayed description, such as "intensity of /Key".
+        before: Opinions before the step by edit key, None for no opinion.
+        after: Opinions after the step, with the same edit keys.
+        solo: Solo state before and after the step; None if unchanged.
     """
 
     label: str
@@ -72,12 +72,12 @@ class Step:
         return Step(f"undo {self.label}", self.after, self.before, solo)
 
     def then(self, later: Step) -> Step:
-        """Returns this step and a later one, which has no further keys, as a single step."""
+        """Merges this step with a later step that has no additional keys."""
         return Step(later.label, self.before, {**self.after, **later.after}, self.solo)
 
     @property
     def drags(self) -> bool:
-        """Whether it may be part of a drag. Resetting a value is always a separate step."""
+        """Whether the step may be part of a drag. Resetting a value is always a separate step."""
         return not self.structural and self.solo is None and None not in self.after.values()
 
     @property
@@ -87,19 +87,19 @@ class Step:
 
     @property
     def prims(self) -> tuple[Sdf.Path, ...]:
-        """Prims of the changed keys."""
+        """Prims that the edit keys of the step belong to."""
         return tuple(dict.fromkeys(path for path, _ in self.after))
 
 
 @dataclass
 class StageEdits:
-    """The edits of one stage.
+    """The edits of one USD stage.
 
     Attributes:
         stage: The stage, whose session layer holds the edits.
         time: Time code at which attributes are read.
-        values: Edited values that no attribute can hold, by prim and parameter. These affect the
-            image but cannot be saved.
+        values: Edited values that no attribute can hold, by prim and parameter name. Values that no
+            attribute can hold affect the image but cannot be saved.
     """
 
     stage: Usd.Stage
@@ -174,7 +174,7 @@ class StageEdits:
     def visible(self, paths: Iterable[Sdf.Path], visible: bool) -> Step | None:
         """Plans to show or hide prims.
 
-        The opinions are those of ``UsdGeom.Imageable.MakeVisible`` and ``MakeInvisible``.
+        The opinions equal the result of ``UsdGeom.Imageable.MakeVisible`` and ``MakeInvisible``.
 
         Raises:
             WavecombError: A prim is inside an instance.
@@ -209,7 +209,7 @@ class StageEdits:
         return self.plan(f"{name} of {path}", {(path, f"{{{name}}}"): opinion})
 
     def plan(self, label: str, opinions: Mapping[Key, Opinion | None]) -> Step | None:
-        """Plans to set or remove (None) opinions."""
+        """Plans a step that sets opinions or, for None, removes them."""
         before = {key: self.opinion(key) for key in opinions}
         step = Step(
             label,
@@ -219,7 +219,7 @@ class StageEdits:
         return step if step.after else None
 
     def apply(self, step: Step) -> None:
-        """Applies a step."""
+        """Applies an undo step."""
         layer = self.stage.GetSessionLayer()
         with Sdf.ChangeBlock():
             for (path, what), opinion in step.after.items():

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Edits of the transform of a prim, as an operation over those of the stage. Independent of Qt."""
+"""Edits of a prim's transform, as an additional transform operation over the authored ones.
+Independent of Qt."""
 
 from __future__ import annotations
 
@@ -11,7 +12,8 @@ from wavecomb.gui.scene.stage_edits import Key, Opinion
 from wavecomb.usd.lights.light import KINDS
 
 OP = "xformOp:transform:edit"
-"""The operation that holds all edits. It is applied after all others of the prim."""
+"""Name of the transform operation that holds all edits. It is applied after all others of the
+prim."""
 _RESET = "!resetXformStack!"
 
 
@@ -20,10 +22,10 @@ class Placement:
     """The transform of a prim before an edit.
 
     Attributes:
-        path: The prim.
-        edit: Value of ``OP``.
-        parent: Transform from the parent to the world, which applies after ``OP``.
-        order: Names of the operations.
+        path: Path of the prim.
+        edit: Value of the operation ``OP``.
+        parent: Transform from the parent to the world, applied after ``OP``.
+        order: Names of the prim's transform operations.
     """
 
     path: Sdf.Path
@@ -57,7 +59,7 @@ def placement(prim: Usd.Prim, time: Usd.TimeCode) -> Placement | None:
 
 
 def moves_alone(prim: Usd.Prim, time: Usd.TimeCode) -> bool:
-    """Returns whether only one light follows the transform of a prim, and nothing else does."""
+    """Returns whether a single light, and nothing else, follows the transform of a prim."""
     if not prim or str(prim.GetTypeName()) not in KINDS or prim.GetAllChildren():
         return False
     others = (prim.GetRelationship(name) for name in ("light:filters", "portals"))

@@ -47,7 +47,7 @@ class _Spin(QDoubleSpinBox):
     The field leaves undo and redo to the window and has no undo history.
 
     Signals:
-        typing(bool): The user began (True) or finished typing a value.
+        typing(bool): The user began (True) or finished typing a value into the field.
     """
 
     typing = Signal(bool)
@@ -105,7 +105,7 @@ class Field(QWidget):
 
     Signals:
         changed(value): The user changed the value: a number, a colour or a bool.
-        reset(): The user wants the value of the stage.
+        reset(): The user asks for the authored value of the stage.
         typing(bool): The user began (True) or finished typing a value.
     """
 
@@ -145,7 +145,7 @@ class Field(QWidget):
 
 
 class NumberField(Field):
-    """A slider and a number."""
+    """Field of a slider and a number box."""
 
     def __init__(self, name: str, bounds: Range = UNIT) -> None:
         super().__init__(name)
@@ -160,7 +160,7 @@ class NumberField(Field):
         self.row.addWidget(self.spin)
         self.finish()
         self._place(self.spin.value())
-        # The range alone would make the field wider.
+        # The range of the values alone would make the field wider.
         widest = max(f"{bounds.soft_high:.{bounds.decimals}f}", "-0.000", key=len)
         text = self.spin.fontMetrics().horizontalAdvance(widest)
         self.spin.setFixedWidth(max(text + theme.em(2.2), theme.em(5)))
@@ -193,7 +193,7 @@ class NumberField(Field):
 
 
 class SwitchField(Field):
-    """A check box."""
+    """Field of a check box."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
@@ -214,7 +214,7 @@ class SwitchField(Field):
 
 
 class ColourField(Field):
-    """A button that shows the colour and opens a dialog; below it three linear numbers."""
+    """Field of a button that opens a colour dialog, and of three linear numbers below."""
 
     def __init__(self, name: str, bounds: Range = UNIT) -> None:
         super().__init__(name)
@@ -230,7 +230,8 @@ class ColourField(Field):
         numbers = QHBoxLayout()
         numbers.setSpacing(theme.em(0.2))
         self.spins = [_Spin(bounds, f"{name}, {part}") for part in ("red", "green", "blue")]
-        # Exact values. The fields show rounded ones, and only typed values replace exact ones.
+        # Exact values of the three components. The boxes show rounded values; only typed values
+        # replace the exact ones.
         self._parts = [0.0, 0.0, 0.0]
         for part, spin in enumerate(self.spins):
             spin.setButtonSymbols(QDoubleSpinBox.ButtonSymbols.NoButtons)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The variants of the selected prim. No widgets."""
+"""Model of the variants of the selected prim. The model is independent of widgets."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class VariantsModel(QObject):
 
     Attributes:
         path: Path of the prim, or None.
-        sets: Its variant sets.
+        sets: Variant sets of the prim.
         editable: Whether variants can be selected, which is not possible inside an instance.
     """
 

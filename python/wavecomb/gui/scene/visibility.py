@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Visibility on a stage, and the opinions needed to change it. Authors nothing."""
+"""Visibility on a stage, and the opinions needed to change it. The functions author nothing."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from pxr import Sdf, Usd, UsdGeom
 
 Words = dict[Sdf.Path, str]
-"""Value "invisible" or "inherited" by prim."""
+"""Visibility opinions: "invisible" or "inherited" by prim."""
 
 VISIBLE, HIDDEN, HIDDEN_ABOVE, NOT_DRAWN = "visible", "hidden", "hidden above", ""
-"""Values of ``state``: drawn; hidden itself; hidden by an ancestor; not drawable."""
+"""Values of ``state``: drawn, hidden by an opinion of the prim or of an ancestor, not drawable."""
 
 
 def uneditable(prim: Usd.Prim) -> str:
@@ -64,9 +64,9 @@ def show(
 ) -> Words:
     """Returns the opinions that ``UsdGeom.Imageable.MakeVisible`` would author.
 
-    The opinions show the given prim and nothing else. An invisible ancestor becomes visible.
-    Siblings along the path to the prim become invisible, so that everything else below the ancestor
-    stays hidden.
+    The opinions show the given prim and no other hidden prim. An invisible ancestor of the prim
+    becomes visible. Siblings along the path to the prim become invisible, so that everything else
+    below the ancestor stays hidden.
     """
     chain = [prim]
     while chain[-1].GetParent() and not chain[-1].GetParent().IsPseudoRoot():

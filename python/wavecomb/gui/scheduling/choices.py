@@ -20,12 +20,12 @@ class Choice:
     label: str
     tip: str
     values: Mapping[Any, str]
-    """Description of each value."""
+    """Description of each value of the setting."""
 
 
 @dataclass(frozen=True)
 class Number:
-    """A numeric setting. The value 0 has the meaning ``zero``."""
+    """A numeric setting. If the number is 0, the field shows the text ``zero``."""
 
     field: str
     label: str
@@ -112,7 +112,7 @@ WORK_FIELDS = names("work")
 
 
 def scheduling_of(setup: Setup) -> dict[str, Any]:
-    """Returns the settings that distinguish series, with names of loaded policies and profiles."""
+    """Returns the settings that distinguish series, including the names of loaded policies."""
     values = {name: getattr(setup, name) for name in FIELDS}
     if setup.own_policy is not None:
         values["policy"] = setup.own_policy.name
@@ -122,9 +122,9 @@ def scheduling_of(setup: Setup) -> dict[str, Any]:
 
 
 def promise(setup: Setup) -> str:
-    """Returns a text that says how the settings of order affect the image.
+    """Returns a text that says how the settings for the order of work affect the image.
 
-    Such settings do not change the image, except with a time limit or with cost-aware roulette.
+    Settings of order do not change the image, except with a time limit or cost-aware roulette.
     """
     if setup.time_limit:
         return (
@@ -153,7 +153,7 @@ def defaults(names: tuple[str, ...]) -> dict[str, Any]:
 def presets() -> dict[str, tuple[str, dict[str, Any]]]:
     """Returns presets as (description, settings) by name.
 
-    All presets but the first set only the order of work.
+    All presets except the first set only the order of work.
     """
     order = defaults((*ORDER_FIELDS, "own_policy", "profile"))
     return {

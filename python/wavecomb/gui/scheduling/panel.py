@@ -44,7 +44,7 @@ _PROFILE_FILTER = "Cost profile (*.json);;All files (*)"
 class SchedulingPanel(QScrollArea):
     """Panel of the session's scheduling settings.
 
-    The only state of the panel are loaded policies.
+    The only state of the panel is the list of loaded policies.
     """
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
@@ -76,7 +76,7 @@ class SchedulingPanel(QScrollArea):
         self._show(session.setup)
 
     def shutdown(self) -> None:
-        """Ends the thread of the picture light."""
+        """Ends the thread of the bit-comparison indicator."""
         self.light.shutdown()
 
     # ---- construction
@@ -216,7 +216,7 @@ class SchedulingPanel(QScrollArea):
         box = self._box("policy")
         for policy in policies:
             count = self._loads[policy.name] = self._loads.get(policy.name, 0) + 1
-            # An edited policy counts as another one, so its runs form a separate series.
+            # An edited policy counts as a different policy, so its runs form a separate series.
             name = policy.name if count == 1 else f"{policy.name} {count}"
             own = OwnPolicy(policy, path, name)
             box.add(own, name, f"{first_line(policy)} ({Path(path).name})")

@@ -32,7 +32,7 @@ pg.setConfigOptions(antialias=True)
 
 @dataclass(frozen=True)
 class Bar:
-    """A rectangle of a horizontal bar chart, from ``start`` to ``end`` in row ``y``."""
+    """Bar of a horizontal bar chart, from ``start`` to ``end`` in row ``y``."""
 
     y: float
     height: float
@@ -43,10 +43,10 @@ class Bar:
 
 
 class AmountAxis(pg.AxisItem):
-    """Axis with tick labels such as 20 k and 1.5 M."""
+    """Plot axis with tick labels such as 20 k and 1.5 M."""
 
     def tickStrings(self, values: list[float], scale: float, spacing: float) -> list[str]:
-        """Returns the labels of ticks."""
+        """Returns the labels of the axis ticks."""
         return [count_text(value * scale) for value in values]
 
 
@@ -68,19 +68,19 @@ class Plot(pg.PlotWidget):
         self.retheme()
 
     def retheme(self) -> None:
-        """Applies the colours of the theme."""
+        """Applies the colours of the theme to the plot."""
         self.setBackground(theme.surface())
         for name in ("left", "bottom"):
             axis = self.getAxis(name)
             axis.setPen(theme.dim())
             axis.setTextPen(theme.text())
             axis.setTickPen(theme.grid())
-            axis.setZValue(-1000)  # draws grid lines behind bars and curves
+            axis.setZValue(-1000)  # Draws grid lines behind bars and curves.
         colour = theme.text().name()
         self.getPlotItem().setTitle(html.escape(self._title), color=colour, size=_points())
 
     def name_it(self, title: str) -> None:
-        """Changes the title."""
+        """Changes the title of the plot."""
         if title != self._title:
             self._title = title
             self.setAccessibleName(title)
@@ -135,11 +135,12 @@ class Bars(Plot):
 
     @property
     def bars(self) -> list[Bar]:
-        """The bars that are drawn."""
+        """The bars that the plot draws."""
         return self._bars
 
     def show_bars(self, rows: Sequence[str], bars: Sequence[Bar], most: float = 0.0) -> None:
-        """Draws bars. The axis ends at ``most`` or, if that is 0, at the longest bar."""
+        """Draws bars into the plot. The axis ends at ``most`` or, if that is 0, at the longest
+        bar."""
         self._bars = list(bars)
         self.clear()
         by_colour: dict[str, list[Bar]] = {}
@@ -189,7 +190,7 @@ class Bars(Plot):
 
 
 class Legend(QLabel):
-    """Names with their colours, in wrapped text below a plot, where they cover no bars."""
+    """Legend with names and colours, in wrapped text below a plot, where it covers no bars."""
 
     def __init__(self, name: str) -> None:
         super().__init__()
@@ -201,7 +202,8 @@ class Legend(QLabel):
         theme.on_change(self.retheme)
 
     def show_entries(self, entries: Callable[[], Sequence[tuple[str, QColor]]]) -> None:
-        """Shows (name, colour) pairs. The function is called again when the theme changes."""
+        """Shows (name, colour) pairs in the legend. The function is called again when the theme
+        changes."""
         self._entries = entries
         self.retheme()
 
@@ -236,7 +238,7 @@ _TITLES = {
     TIME: "Phases of this run, from its start (top) to now: % of thread time",
 }
 _MOST_STRETCHES = 12
-# Base colour and brightness of each phase. Related phases share a base colour.
+# Base colour and brightness of each render phase. Related phases share a base colour.
 _COLOURS = {
     "generate": (2, 100),
     "order_rays": (3, 100),
@@ -252,7 +254,7 @@ _COLOURS = {
 
 
 def phase_colour(name: str) -> QColor:
-    """Returns the colour of a phase."""
+    """Returns the plot colour of a render phase."""
     number, lighter = _COLOURS[name]
     return theme.series(number).lighter(lighter)
 
@@ -263,7 +265,8 @@ def phases_between(a: Look, b: Look) -> dict[str, float]:
 
 
 def stacked(row: int, label: str, seconds: dict[str, float], scale: float, mode: str) -> list[Bar]:
-    """Returns the bars of one row, end to end. ``scale`` converts seconds to the shown unit."""
+    """Returns the bars of one row of a phase plot, placed end to end. ``scale`` converts seconds to
+    the shown unit."""
     bars = []
     start = 0.0
     total = sum(seconds.values())
@@ -279,13 +282,13 @@ def stacked(row: int, label: str, seconds: dict[str, float], scale: float, mode:
 
 
 def rows_over_time(run: Run) -> list[tuple[Look, Look]]:
-    """Returns at most a dozen intervals of a run, of similar length."""
+    """Splits a run into at most a dozen intervals of similar length."""
     least = run.last.seconds / _MOST_STRETCHES
     return stretches(run, least_s=0.999 * least) or stretches(run)
 
 
 class PhasePlot(QWidget):
-    """Plot of phases with its legend and a choice of units."""
+    """Plot of the time in each render phase, with its legend and a choice of units."""
 
     def __init__(self) -> None:
         super().__init__()

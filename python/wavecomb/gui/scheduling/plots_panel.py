@@ -149,7 +149,7 @@ class PlotsPanel(QWidget):
     # -------------------------------------------------------------------------------------
 
     def shown(self) -> list[Series]:
-        """Returns the newest series of the current picture, and their reference series."""
+        """Returns the newest series of the current image and the reference series."""
         current = self.log.current
         if current is None:
             return []

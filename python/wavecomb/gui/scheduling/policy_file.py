@@ -57,7 +57,7 @@ class OwnPolicy(SchedulingPolicy):
         self.columns = policy.columns  # type: ignore[misc]
 
     def order(self, queue: Any, costs: Any, keys: Any) -> bool | None:
-        """Calls the loaded policy."""
+        """Calls the function of the loaded policy."""
         try:
             return self.policy.order(queue, costs, keys)
         except Exception as error:
@@ -82,7 +82,7 @@ def describe_failure(error: BaseException, path: str | os.PathLike[str]) -> str:
 
 
 def first_line(policy: SchedulingPolicy) -> str:
-    """Returns the first line of a policy's docstring, or its name."""
+    """Returns the first line of a policy's docstring, or the policy's name."""
     text = vars(type(policy)).get("__doc__") or ""
     return text.strip().splitlines()[0] if text.strip() else policy.name
 
@@ -98,7 +98,7 @@ def _run(path: Path) -> types.ModuleType:
         raise WavecombError(f"{path}: is not UTF-8 text; choose a Python file") from None
     module = types.ModuleType(f"wavecomb_policy_{path.stem}")
     module.__file__ = str(path)
-    sys.modules[module.__name__] = module  # dataclasses and pickle look there
+    sys.modules[module.__name__] = module  # dataclasses and pickle look up modules in sys.modules.
     try:
         exec(compile(source, str(path), "exec"), module.__dict__)
     except (Exception, SystemExit) as error:

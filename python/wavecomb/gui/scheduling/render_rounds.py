@@ -17,11 +17,11 @@ LIMIT_MS = 20_000
 class Rounds(QObject):
     """Sequence of steps, each of which renders with some settings to the end or for ``LIMIT_MS``.
 
-    Any change from outside ends the sequence, without restoring the original settings.
+    A change of settings from outside ends the sequence without restoring the original settings.
 
     Signals:
-        moved(int, int): Number of finished steps, and of all steps.
-        ended(bool): Whether all steps were done.
+        moved(int, int): Number of finished steps, and total number of steps.
+        ended(bool): Whether all steps were done when the sequence ended.
     """
 
     moved = Signal(int, int)
@@ -58,25 +58,25 @@ class Rounds(QObject):
         self._begin()
 
     def stop(self) -> None:
-        """Stops, and restores the original settings."""
+        """Stops the sequence and restores the original settings."""
         if self.running:
             self._end(False, put_back=True)
 
     def _begin(self) -> None:
         session = self._session
-        self._version = -1  # marks the following change as one of this object
+        self._version = -1  # Marks the following change of settings as made by this object.
         version = session.version
         if not session.change(**self._steps[self._done]):
-            return  # the failed signal ends the sequence
+            return  # The failed signal ends the sequence.
         if session.version == version:
-            session.restart()  # the settings are the current ones
+            session.restart()  # The settings are already the current ones.
         self._version = session.version
         self._timer.start(LIMIT_MS)
 
     def _look(self, frame: Frame) -> None:
         ours = self.running and frame.version == self._version
         if ours and frame.final and frame.scale == 1 and not frame.status.get("cancelled"):
-            self._version = -1  # ignores denoised versions of this frame
+            self._version = -1  # Ignores denoised versions of the same frame.
             self._timer.start(0)
 
     def _next(self) -> None:

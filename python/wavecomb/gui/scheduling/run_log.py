@@ -44,8 +44,8 @@ class Look:
     phases: Mapping[str, float] = field(default_factory=dict)
     """Thread seconds by phase."""
     coherence: Mapping[str, float] = field(default_factory=dict)
-    """Run length and homogeneity, as means over the run so far. The core reports ratios instead of
-    counters for them."""
+    """Run length and homogeneity of material queues, as means over the run so far. The core reports
+    ratios instead of counters for them."""
 
 
 def take_look(stats: Mapping[str, Any]) -> Look:
@@ -80,11 +80,11 @@ class Run:
         return self.looks[-1]
 
     def add(self, stats: Mapping[str, Any]) -> None:
-        """Adds a look."""
+        """Adds a look to the run."""
         look = take_look(stats)
         self.stats = stats
         if look.seconds <= self.last.seconds:
-            return  # no time has passed since the previous look
+            return  # No time has passed since the previous look.
         self.looks.append(look)
         if len(self.looks) > MAX_LOOKS:
             self.looks = [*self.looks[:-1:2], look]
@@ -162,9 +162,9 @@ class RunLog:
         Args:
             stats: Statistics of the render.
             settings: Values of the fields in ``FIELDS``, as far as known.
-            picture: Everything else that determines the amount of work.
+            picture: Everything else that determines the amount of work, such as scene and size.
             finished: Whether the render has ended.
-            recipe: Fields of a setup that restore the settings.
+            recipe: Fields of a setup that restore the settings of the run.
         """
         known = {name: settings[name] for name in FIELDS if name in settings}
         look = take_look(stats)
@@ -176,7 +176,7 @@ class RunLog:
             series.runs.append(Run())
         elif not series.run.continues(look):
             if series.run.finished and look.samples == series.run.last.samples:
-                return series  # repeated statistics of a finished run
+                return series  # These are repeated statistics of a finished run.
             self._end_run()
             if series not in self.series:
                 self.series.append(series)
@@ -304,7 +304,7 @@ def describe(settings: Mapping[str, Any]) -> str:
 
 
 def labels(series: Sequence[Series]) -> list[str]:
-    """Returns a label for each series: the values of those settings that are not equal in all.
+    """Returns a label for each series: the values of the settings that differ between series.
 
     The policy comes first, because policies are compared most often. Equal labels get numbers.
     """

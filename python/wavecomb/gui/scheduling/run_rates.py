@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Speed of runs, its uncertainty, and comparison of runs. Independent of Qt.
 
-A rate is measured over a whole run with constant settings, never over a moment. Its spread is the
-one between the intervals of consecutive looks. Two runs of one picture are compared interval by
-interval at equal samples. Both have then done the same work, since paths do not depend on the order
-of shading, and expensive parts of the image have equal weights. No single pair of runs can reveal
-effects on a whole run, above all a machine whose speed drifts. A difference therefore *holds* only
-if repeated pairs agree.
+A rate is measured over a whole run with constant settings, never over a moment. The spread of a
+rate is computed over the intervals between consecutive looks. Two runs of one picture are compared
+interval by interval at equal samples. Two such runs have done the same work, since paths do not
+depend on the order of shading, and expensive parts of the image have equal weights. A single pair
+of runs cannot reveal effects on whole runs, such as a machine whose speed drifts. A difference
+therefore *holds* only if repeated pairs agree.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ MIN_SECONDS = 1.0
 MIN_REPEATS = 3
 _MAX_STRETCHES = 20
 
-# 97.5 % quantiles of Student's t for 1 ... 30 degrees of freedom. Above, the normal quantile is
-# used.
+# 97.5 % quantiles of Student's t for 1 ... 30 degrees of freedom. With more degrees of freedom, the
+# normal quantile is used.
 _T975 = (
     12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228,
     2.201, 2.179, 2.160, 2.145, 2.131, 2.120, 2.110, 2.101, 2.093, 2.086,
@@ -35,7 +35,7 @@ _T975 = (
 
 @dataclass(frozen=True)
 class Rate:
-    """A number of events per second."""
+    """A rate: the number of events per second."""
 
     value: float
     spread: float
@@ -48,7 +48,7 @@ class Rate:
 
     @property
     def is_short(self) -> bool:
-        """Whether the measurement is too short to have meaning."""
+        """Whether the measurement is too short to be meaningful."""
         return self.stretches < self.least or self.seconds < MIN_SECONDS
 
 
@@ -76,7 +76,7 @@ class Ratio:
         return self.differs and self.repeats >= MIN_REPEATS
 
     def verdict(self) -> str:
-        """Returns the verdict in words, for a table."""
+        """Returns the verdict of the comparison in words, for a table."""
         if self.short:
             return "too short"
         if self.repeats < MIN_REPEATS:
@@ -106,7 +106,7 @@ def rate(run: Run, counter: str) -> Rate:
     if n < 2 or value <= 0.0:
         return Rate(value, 0.0, n, last.seconds)
     total = sum(b.seconds - a.seconds for a, b in pairs)
-    # Weights are proportional to time.
+    # Intervals have weights proportional to their duration.
     squares = sum(
         (getattr(b, counter) - getattr(a, counter) - value * (b.seconds - a.seconds)) ** 2
         / (b.seconds - a.seconds)
@@ -168,9 +168,9 @@ def compare_runs(run: Run, base: Run) -> Ratio:
 
 
 def compare(series: Series, base: Series) -> Ratio | None:
-    """Returns the speed of ``series`` as a multiple of the base's, or None if their work differs.
+    """Returns the speed of ``series`` divided by the base's, or None if their work differs.
 
-    The i-th runs of both form a pair, so that alternating repeats pair runs that are close in time.
+    The i-th runs of both series form a pair, so that alternating runs are compared close in time.
     """
     if not series.does_the_work_of(base):
         return None

@@ -45,7 +45,7 @@ _TIPS = {
 }
 TIPS = {name: _TIPS[name] for name in COLUMNS}
 LEFT = tuple(COLUMNS.index(name) for name in ("settings", "verdict", "changed"))
-"""Columns of text."""
+"""Columns of the run table that hold text."""
 
 
 @dataclass(frozen=True)
@@ -55,13 +55,13 @@ class Row:
     series: Series
     label: str
     texts: tuple[str, ...]
-    """Texts for ``COLUMNS``."""
+    """Texts of the row, one for each of ``COLUMNS``."""
     ratio: Ratio | None
     is_base: bool
 
 
 def rows(log: RunLog, count: int = 20) -> list[Row]:
-    """Returns rows of the newest series, the oldest first, compared with the base."""
+    """Returns rows of the newest series, from old to new, compared with the base series."""
     base = log.base
     shown = [one for one in last_of(log.series, count, log.pinned) if one.runs]
     names = labels(shown)

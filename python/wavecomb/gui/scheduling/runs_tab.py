@@ -135,13 +135,13 @@ class RunsTab(QWidget):
     # -------------------------------------------------------------------------------------
 
     def pin(self) -> None:
-        """Pins the selected row, or unpins it."""
+        """Pins the series of the selected row, or unpins it."""
         chosen = self.chosen()
         self._log.pin(None if chosen is self._log.pinned else chosen)
         self.changed.emit()
 
     def repeat(self) -> None:
-        """Renders the base and the selected series in turn, or stops doing so."""
+        """Renders the base and the selected series in turn, or stops a running sequence."""
         if self.rounds.running:
             self.rounds.stop()
             return

@@ -85,7 +85,7 @@ class ChoiceBox(QComboBox):
         self._retell()
 
     def find(self, value: Any) -> int:
-        """Returns the index of a value, or -1 if it is not offered."""
+        """Returns the index of a value among the offered ones, or -1 if it is not offered."""
         for index in range(self.count()):
             data = self.itemData(index)
             if data is value or (type(data) is type(value) and data == value):
@@ -134,10 +134,10 @@ def add_row(form: QFormLayout, label: str, control: QWidget, field: QWidget | No
     """Adds a control with its label, which shares the control's tooltip.
 
     Args:
-        form: The form.
+        form: The form that gets the control.
         label: Text of the label.
         control: The control.
-        field: Widget with the control and its buttons, if it has any.
+        field: Widget that contains the control and its buttons, if it has buttons.
     """
     text = QLabel(label)
     text.setBuddy(control)

@@ -80,5 +80,5 @@ class WorkGroup(QGroupBox):
 
 
 def mode_of(setup: Setup) -> str:
-    """Returns the adaptive mode of a setup, which has at most one of the two targets."""
+    """Returns the adaptive mode of a setup, which has at most one of the two error targets."""
     return "pixel" if setup.adaptive else "noise" if setup.noise else "off"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cameras of the view: a free one, then those of the stage. No widgets."""
+"""Cameras of the view: a free camera, then the cameras of the stage. No widgets."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class CamerasModel(QAbstractListModel):
     """List of camera names, with paths as ``Qt.ItemDataRole.UserRole`` (None for the free camera).
 
     Signals:
-        moved(): ``row``, the current camera, changed.
+        moved(): The current camera, and with it ``row``, changed.
     """
 
     moved = Signal()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A map of all directions in false colours, with a mark."""
+"""View of a map of all directions in false colours, with a mark."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class DirectionsView(QWidget):
 
     @property
     def image(self) -> QImage | None:
-        """The shown image, or None."""
+        """The shown map as an image, or None."""
         return self._image
 
     def sizeHint(self) -> QSize:

@@ -30,8 +30,8 @@ class Look:
         layer: Name of the layer.
         exposure: Exposure of colours, in stops.
         view: "Linear", "Neutral" or an OCIO view.
-        low: Lower end of the false colours; None takes it from the image.
-        high: Upper end of the false colours; None takes it from the image.
+        low: Lower end of the false colours; None means the minimum of the image.
+        high: Upper end of the false colours; None means the maximum of the image.
     """
 
     layer: str = "beauty"

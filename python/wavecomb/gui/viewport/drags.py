@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 
 
 class Drag(Enum):
-    """Action of a pressed button."""
+    """Action that a mouse button starts."""
 
     NONE = auto()
     ORBIT = auto()

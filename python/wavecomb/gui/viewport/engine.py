@@ -60,9 +60,9 @@ class Task:
 
     Attributes:
         setup: Checked settings.
-        version: Version number of its frames.
-        edit: Changes to apply first.
-        moving: Whether only a reduced image is wanted.
+        version: Version number of the frames of this task.
+        edit: Changes of the scene to apply first.
+        moving: Whether the task asks only for a reduced image.
         loaded: The loaded stage, for statistics.
         renderer: Renderer to use from now on; None keeps the current one.
     """
@@ -79,24 +79,24 @@ class Listener(Protocol):
     """Receiver of results, called on the render thread."""
 
     def on_frame(self, frame: Frame) -> None:
-        """Takes a frame."""
+        """Accepts a frame."""
 
     def on_statistics(self, statistics: dict[str, Any], version: int) -> None:
-        """Takes the statistics so far (docs/statistics.md) of the task with that version."""
+        """Accepts the statistics so far (docs/statistics.md) of the task with that version."""
 
     def on_failed(self, message: str) -> None:
-        """Takes an error in one line. The task has ended."""
+        """Accepts an error message of one line. Reports that the task has ended."""
 
     def on_ready(self, renderer: Renderer) -> None:
-        """Takes a new renderer."""
+        """Accepts a new renderer."""
 
 
 class Engine:
     """Owner of the render thread and the renderer.
 
     Attributes:
-        listener: Receiver of results.
-        superseded: Whether the running render shall stop.
+        listener: Receiver of the engine's results.
+        superseded: Whether a newer task replaces the running render.
     """
 
     def __init__(self, listener: Listener) -> None:
@@ -120,7 +120,7 @@ class Engine:
     def submit(self, task: Task) -> None:
         """Stops the current task and starts this one.
 
-        Keeps the edits of a task that had not started.
+        Keeps the edits of a task that had not started when a newer task replaced it.
         """
         with self._condition:
             before = self._task
@@ -133,7 +133,7 @@ class Engine:
             self._condition.notify_all()
 
     def stop(self) -> None:
-        """Stops the current task and keeps its image."""
+        """Stops the current task; its image stays visible."""
         with self._condition:
             if self._task is not None:
                 self._task.moving = True  # applies its edits, for which a reduced image is enough
@@ -167,7 +167,7 @@ class Engine:
         return not self._going.is_set()
 
     def close(self) -> None:
-        """Ends the thread."""
+        """Ends the render thread."""
         with self._condition:
             self._closing = True
             self._task = None

@@ -26,10 +26,11 @@ class Frame:
     """An image of a live render. The arrays of a frame must not be modified.
 
     Attributes:
-        beauty: (height, width, 3), linear Rec.709. A reduced image has no noise, nor does one in
-            which not all pixels have samples yet.
-        layers: Layers of ``setup.aovs`` by name: (height, width) or (height, width, channels).
-        denoised: (height, width, 3), perhaps of an earlier frame of this version; None if missing.
+        beauty: (height, width, 3), linear Rec.709. A reduced image has no noise, nor has a frame in
+            which some pixels have no samples yet.
+        layers: The ``setup.aovs`` by name, (height, width) or (height, width, channels).
+        denoised: (height, width, 3), possibly from an earlier frame of this version; None if
+            missing.
         status: samples_done, samples_total, passes, seconds, error and so on, as in
             ``Snapshot.status``.
         version: Version of scene and setup. A session never shows an older version again.

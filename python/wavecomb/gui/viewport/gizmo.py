@@ -74,10 +74,10 @@ class Gizmo(QObject):
 
     @property
     def _view(self) -> PictureView:
-        return cast("PictureView", self.parent())  # an attribute would make a cycle of references
+        return cast("PictureView", self.parent())  # An attribute would make a cycle of references.
 
     def set_mode(self, mode: str) -> None:
-        """Shows the handles of a mode, or none if they are shown already."""
+        """Shows the handles of a mode, or hides the handles if that mode is already active."""
         self.mode = "" if mode == self.mode else mode
         self.mode_changed.emit(self.mode)
         self._refresh()
@@ -156,11 +156,11 @@ class Gizmo(QObject):
         self._handle = self._hit(place)
         self._start, self._change = place, np.eye(4)
         if self._handle and self._anchor is not None and self._anchor.live:
-            self._edits.history.set_typing(True)  # the drag becomes one undo step
+            self._edits.history.set_typing(True)  # The whole drag becomes one undo step.
         return bool(self._handle)
 
     def drag(self, place: QPointF) -> None:
-        """Continues a drag. Lights follow at once, objects when it ends."""
+        """Continues a drag. Lights follow a drag at once, other objects only when it ends."""
         anchor = self._anchor
         if anchor is None:
             return
@@ -226,7 +226,7 @@ class Gizmo(QObject):
     # ---- painting ------------------------------------------------------------------------------
 
     def paint(self, painter: QPainter) -> None:
-        """Paints the handles, and the box of an object that is dragged."""
+        """Paints the handles, and the bounding box of an object that is dragged."""
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
         anchor = self._anchor
         if self._handle and anchor is not None and anchor.bounds is not None:

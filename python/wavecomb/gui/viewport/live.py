@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A live render on the UI thread.
 
-It can be edited during the render, and shows only frames of the newest version.
+A live render can be edited while it runs, and shows only frames of the newest version.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class News:
     """An ``engine.Listener`` that keeps the newest item of each kind until it is taken.
 
     Args:
-        told: Port that gets None when the first new item arrives.
+        told: Port that receives None when the first new item arrives.
     """
 
     def __init__(self, told: Port) -> None:
@@ -59,19 +59,20 @@ class News:
     # ---- on the render thread ------------------------------------------------------------------
 
     def on_frame(self, frame: Frame) -> None:
-        """Keeps the newest frame."""
+        """Keeps the frame until it is taken, replacing an older one."""
         self._put("frame", frame)
 
     def on_statistics(self, statistics: dict[str, Any], version: int) -> None:
-        """Keeps the newest statistics and their version."""
+        """Keeps the statistics and their version until they are taken."""
         self._put("statistics", (statistics, version))
 
     def on_failed(self, message: str) -> None:
-        """Keeps an error. Different errors do not replace each other."""
+        """Keeps an error message until it is taken. An error message does not replace a different
+        one."""
         self._put("failed", message, message)
 
     def on_ready(self, renderer: Renderer) -> None:
-        """Keeps the renderer of a new scene."""
+        """Keeps the renderer of a new scene until it is taken."""
         self._put("ready", renderer)
 
 
@@ -85,7 +86,7 @@ seconds."""
 DENOISE_AGAIN = 1.5
 """Factor of the number of samples after which a frame is denoised again."""
 LATE = 4
-"""A denoised image is late if the newest frame has more than this many times its samples."""
+"""A denoised image counts as late if the newest frame has more than this many times its samples."""
 
 IDLE, RENDERING, PAUSED, STOPPED, FINISHED = "idle", "rendering", "paused", "stopped", "finished"
 
@@ -130,7 +131,7 @@ class Live(QObject):
         self._pending = Edit()
         self._moving = False
         self._awaiting = False
-        self._is_reduced = False  # whether the task is only a reduced image
+        self._is_reduced = False  # Whether the current task asks only for a reduced image.
         self._submitted = 0.0
         self._denoised = self._denoising = 0  # samples of the images that were denoised last
         self._settle = QTimer(self)
@@ -155,7 +156,7 @@ class Live(QObject):
         *,
         moving: bool = False,
     ) -> None:
-        """Starts with a new scene. ``make`` creates its renderer on the render thread.
+        """Starts rendering a new scene. ``make`` creates its renderer on the render thread.
 
         ``moving`` says whether a reduced image is enough.
         """
@@ -168,7 +169,7 @@ class Live(QObject):
         """Changes fields of the setup and restarts. Emits ``failed`` if a value is invalid.
 
         Returns:
-            Whether the setup was changed.
+            Returns whether the setup was changed.
         """
         try:
             new = self.setup.changed(**values)
@@ -193,9 +194,9 @@ class Live(QObject):
         """Changes the scene and restarts.
 
         Args:
-            edit: The changes.
-            moving: Whether similar edits follow. Images are reduced until ``settle``, or until no
-                edit came for some time.
+            edit: The changes of the scene.
+            moving: Whether similar edits follow. Images are reduced until ``settle`` is called, or
+                until no edit came for some time.
         """
         self._pending.add(edit)
         now = time.perf_counter()
@@ -203,7 +204,7 @@ class Live(QObject):
         if self._moving:
             self._settle.start()
             if self._awaiting and now - self._submitted < WAIT_S:
-                # shows the current image first, so that frequent edits do not suppress all images
+                # Shows the current image first, so that frequent edits do not suppress all images.
                 return
         self._flush()
 
@@ -243,7 +244,7 @@ class Live(QObject):
             self._engine.resume()
 
     def shutdown(self) -> None:
-        """Ends the threads, which takes about 10 ms."""
+        """Ends the threads of the render, which takes about 10 ms."""
         self._settle.stop()
         self._engine.close()
         self._denoiser.close()
@@ -276,7 +277,7 @@ class Live(QObject):
             self.state_changed.emit(state)
 
     def _receive(self, letter: None) -> None:
-        """Handles the newest item of each kind."""
+        """Handles the newest item of each kind of the render thread's news."""
         takes: dict[str, Callable[[Any], None]] = {
             "frame": self._take,
             "statistics": self._take_statistics,

@@ -29,8 +29,8 @@ class Pose:
         to_world: (4, 4) for row vectors; the camera looks along -z.
         window: x0, x1, y0, y1 on the plane z = -1, for an orthographic camera across its axis, for
             a latlong camera in radians.
-        others: Other values of ``camera_parameters()`` that differ from their defaults.
-        path: Path of the camera prim with this pose; None for a free camera.
+        others: Values of further ``camera_parameters()`` that differ from their defaults.
+        path: Path of the camera prim that the pose comes from; None for a free camera.
     """
 
     to_world: Matrix
@@ -61,7 +61,7 @@ class Pose:
         return camera_window(self.options(), width, height)
 
     def around(self, before: Sequence[float], now: Sequence[float]) -> Pose:
-        """Returns the pose for a scene with another origin, at the same place in the world."""
+        """Converts the pose to a scene with another origin, at the same position in the world."""
         if tuple(before) == tuple(now):
             return self
         to_world = self.to_world.copy()
@@ -70,17 +70,17 @@ class Pose:
 
     @property
     def position(self) -> Vector:
-        """Position in scene space."""
+        """Position of the camera in scene space."""
         return self.to_world[3, :3]
 
     @property
     def right(self) -> Vector:
-        """Unit vector to the right."""
+        """Unit vector to the right of the camera."""
         return self.to_world[0, :3]
 
     @property
     def up(self) -> Vector:
-        """Unit vector upwards."""
+        """Unit vector upwards in the camera's image."""
         return self.to_world[1, :3]
 
     @property
@@ -89,7 +89,7 @@ class Pose:
         return self.to_world[2, :3]
 
     def depth_of(self, point: Vector) -> float:
-        """Returns the distance of a point along the axis, negative behind the camera."""
+        """Returns the distance of a point along the camera axis, negative behind the camera."""
         return float((self.position - point) @ self.back)
 
 
@@ -100,7 +100,7 @@ def pose_of(to_world: Matrix, values: Mapping[str, Any], path: str | None) -> Po
 
 
 def pose_of_scene(camera: dict[str, Any], path: str | None) -> Pose:
-    """Returns the pose of ``Scene.camera``."""
+    """Returns the pose of ``Scene.camera``, the camera of a scene."""
     return pose_of(np.array(camera["to_world"], np.float64), camera, path)
 
 
@@ -121,7 +121,7 @@ def orbit(pose: Pose, pivot: Vector, yaw: float, pitch: float, up_axis: str) -> 
     """
     up = np.array(UPS[up_axis])
     elevation = math.asin(float(np.clip(pose.back @ up, -1.0, 1.0)))
-    # A camera that is already steeper may only rotate back.
+    # A camera that is already steeper may only rotate towards the horizon.
     low, high = min(-STEEPEST, elevation), max(STEEPEST, elevation)
     pitch = min(max(elevation + pitch, low), high) - elevation
     turn = rotation(pose.right, -pitch) @ rotation(up, yaw)
@@ -149,7 +149,7 @@ def pan(pose: Pose, depth: float, across: float, upwards: float, size: tuple[flo
 def dolly(pose: Pose, pivot: Vector, factor: float) -> Pose:
     """Moves towards a point by multiplying the distance by ``factor``, which is positive.
 
-    For an orthographic camera, scales the window instead.
+    An orthographic camera does not move; instead its window is scaled.
     """
     if pose.projection == "orthographic":
         return replace(_scaled(pose, factor), path=None)
@@ -216,7 +216,7 @@ def _framed(pose: Pose, axes: Matrix, points: Matrix, aspect: float) -> Pose:
 
 
 def _scaled(pose: Pose, factor: float) -> Pose:
-    """Returns the pose with its window scaled about (0, 0)."""
+    """Returns the pose with its image window scaled about (0, 0)."""
     x0, x1, y0, y1 = (factor * edge for edge in pose.window)
     return replace(pose, window=(x0, x1, y0, y1))
 

@@ -30,8 +30,8 @@ def object_mask(renderer: Renderer, path: str, width: int, height: int) -> NDArr
     Args:
         renderer: Renderer of the current scene, which may be rendering.
         path: Path of the prim.
-        width: Width of the mask.
-        height: Height of the mask.
+        width: Width of the mask in pixels.
+        height: Height of the mask in pixels.
     """
     from wavecomb import _core
     from wavecomb.run.settings import make_settings
@@ -74,10 +74,10 @@ class Outline(QObject):
 
     @property
     def _view(self) -> PictureView:
-        return cast("PictureView", self.parent())  # an attribute would make a cycle of references
+        return cast("PictureView", self.parent())  # An attribute would make a cycle of references.
 
     def close(self) -> None:
-        """Ends the thread."""
+        """Ends the thread of the outline."""
         self._worker.close()
 
     @property

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Indicator light for whether the image has stayed bit-identical."""
+"""Indicator light that shows whether the image has stayed bit-identical."""
 
 from __future__ import annotations
 
@@ -96,14 +96,14 @@ class PictureLight(QWidget):
             self._marks.submit(partial(_mark, beauty, samples), tell, self._session.failed.emit)
 
     def shutdown(self) -> None:
-        """Ends the thread."""
+        """Ends the hashing thread."""
         self._marks.close()
 
     def _tell(
         self, key: Any, place: Any, settings: dict[str, Any], version: int, mark: str
     ) -> None:
         verdict = self.book.add(key, place, mark, settings)
-        # A first image with more samples does not invalidate a verdict with fewer samples.
+        # A first image with more samples does not invalidate a verdict for fewer samples.
         weaker = verdict.kind == "first" and self.verdict.kind in ("same", "different")
         if verdict.kind == "different" or (version == self._session.version and not weaker):
             self._show(verdict)

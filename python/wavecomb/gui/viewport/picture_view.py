@@ -156,7 +156,7 @@ class PictureView(QWidget):
         middle = QPointF(self.width() / 2, self.height() / 2) + self._shift
         corner = middle - QPointF(wide / 2, high / 2)
         ratio = self.devicePixelRatioF()
-        # Align with device pixels, so that 100 % is exact.
+        # Aligns the image with device pixels, so that a zoom of 100 % is exact.
         x, y = round(corner.x() * ratio) / ratio, round(corner.y() * ratio) / ratio
         return QRectF(x, y, wide, high)
 
@@ -169,7 +169,7 @@ class PictureView(QWidget):
         )
 
     def from_picture(self, place: QPointF) -> QPointF:
-        """Converts a point of the image to the widget."""
+        """Converts a point of the image to a point of the widget."""
         rect = self.picture_rect()
         return QPointF(
             rect.x() + place.x() / self._size.width() * rect.width(),
@@ -220,7 +220,7 @@ class PictureView(QWidget):
         painter.end()
 
     def paint_over(self, painter: QPainter) -> None:
-        """Paints an overlay; for subclasses."""
+        """Paints an overlay over the image; subclasses override this method."""
 
     def _paint_grid(self, painter: QPainter, dirty: QRect) -> None:
         area = self.picture_rect().intersected(QRectF(dirty))

@@ -12,7 +12,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.gui.viewport.frames import Array, Frame
 
 _DARK = np.float32(0.05)
-"""Added to albedos before a division."""
+"""Small value added to albedos before a division."""
 SCALES = (1, 2, 3, 4, 6, 8, 12)
 
 
@@ -37,13 +37,13 @@ def reduced_scale(pixels: int, rate: float, overhead: float, limit: float) -> in
 
 
 class Pace:
-    """Model of the time of reduced images: constant time + pixels / rate, from recent images."""
+    """Time model of reduced images: constant time + pixels / rate, fitted to recent images."""
 
     def __init__(self) -> None:
         self._sums = np.zeros(5)
 
     def learn(self, pixels: int, seconds: float) -> None:
-        """Adds the time of an image; it counts 1.25 times as much as the one before."""
+        """Adds the measured time of an image, weighted 1.25 times as much as the previous image."""
         self._sums *= 0.8
         self._sums += (1.0, pixels, seconds, pixels * pixels, pixels * seconds)
 
@@ -55,8 +55,8 @@ class Pace:
     def _fit(self) -> tuple[float, float]:
         """Returns pixels per second (0 if unknown) and constant seconds, by least squares.
 
-        An assumed empty image, of half the mean time and little weight, makes the solution unique.
-        It is optimistic, so that finer images are tried.
+        An assumed empty image with half the mean time and a small weight makes the solution unique.
+        The assumed image makes the model optimistic, so that finer images are tried.
         """
         n, x, t, xx, xt = self._sums
         if n == 0.0:
@@ -71,10 +71,10 @@ class Pace:
 def smooth(frame: Frame, back: NDArray[np.float64]) -> NDArray[np.float32]:
     """Returns the beauty of a reduced image without noise.
 
-    It is denoised or, without Open Image Denoise, shaded by the first hits.
+    The image is denoised or, without Open Image Denoise, shaded by its first hits.
 
     Args:
-        frame: A frame with guide layers.
+        frame: A reduced frame with guide layers.
         back: Unit vector opposite to the view direction.
     """
     from wavecomb.image.denoise import denoise
@@ -113,11 +113,11 @@ def enlarged(image: Array, width: int, height: int) -> Array:
 class Filler:
     """Fills frames of the first pass, in which few pixels have samples, without noise.
 
-    They have the light of a reduced image and the albedo of first hits at full size.
+    The filled pixels have the light of a reduced image and the albedo of first hits at full size.
 
     Args:
         preview: The reduced image; None leaves frames as they are.
-        albedo: (height, width, 3) albedo at full size; None: the reduced image is enlarged.
+        albedo: (height, width, 3) albedo at full size; None means: enlarge the reduced image.
     """
 
     def __init__(self, preview: Frame | None, albedo: Array | None = None) -> None:
@@ -125,7 +125,7 @@ class Filler:
         self._whole: Array | None = None
 
     def fill(self, frame: Frame) -> Frame:
-        """Returns the frame, or if it lacks samples, one that looks complete."""
+        """Returns the frame, or a frame that looks complete if some pixels have no samples."""
         preview = self._preview
         if preview is None or (frame.is_complete and frame.samples_done):
             return frame

@@ -65,14 +65,14 @@ def save_frame(
         options: Arguments of ``Picture.save``.
 
     Raises:
-        OSError, ValueError: The file cannot be written, or an option is invalid. The message is one
-            line.
-        WavecombError: There is only a preview so far.
+        OSError, ValueError: The file cannot be written, or an option is invalid. The message of the
+        error is one line.
+        WavecombError: The render has produced only a preview so far.
     """
     if frame.scale != 1:
         raise WavecombError("there is only a preview so far: save again a little later")
     if frame.setup.denoise:
-        # The shown denoised image may be of an earlier pass.
+        # The shown denoised image may belong to an earlier pass.
         frame = replace(frame, denoised=denoised_frame(frame)[1])
     picture = picture_of_frame(frame, scene, loaded)
     as_rendered = look.layer in ("beauty", "denoised") and look.view in (LINEAR, NEUTRAL)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lookups of a session on the stage and in the scene. Independent of Qt."""
+"""Lookups of a session on its stage and in its scene. Independent of Qt."""
 
 from __future__ import annotations
 
@@ -53,12 +53,12 @@ def edits_again(
     materials: Mapping[str, Mapping[str, Any]],
     lights: Mapping[tuple[str, int], Mapping[str, Any]],
 ) -> Edit:
-    """Converts earlier edits to the indices of a scene that was loaded again.
+    """Converts edits to the indices of a scene that was loaded again.
 
     Args:
         scene: The new scene.
-        materials: Edited values by name of the material.
-        lights: Edited values by ``light_key``.
+        materials: Edited values by material name.
+        lights: Edited values by ``light_key`` of the light.
     """
     numbers = {name: i for i, (name, _) in enumerate(scene.materials)}
     edit = Edit()

@@ -50,13 +50,12 @@ class Session(Live):
 
     Signals:
         opened(LoadedStage): A stage was loaded, or loaded again after a change of its contents.
-        closing(): The USD stage is about to be reloaded from disk; receivers must release its
-            prims.
+        closing(): The stage will be reloaded from disk; receivers must release its prims.
         busy(str): Description of background work, or "".
         camera_changed(Pose): The camera moved, or another was chosen.
         selected(str | None): Path of the prim that was selected, in the image or elsewhere.
         saved(str): A file was written.
-        noted(LoadedStage): Its report has new findings.
+        noted(LoadedStage): The report of the stage has new findings.
 
     Attributes:
         stage: The loaded stage, or None.
@@ -130,7 +129,7 @@ class Session(Live):
     ) -> None:
         """Loads a stage; ``opened`` or ``failed`` follows.
 
-        The current stage stays open until then.
+        The current stage stays open until the new stage is loaded.
         """
         source = Source(Path(path), camera, time, variants, purposes)
         self._read(Request(source, threads=self.setup.threads), f"reading {source.path.name}")
@@ -142,7 +141,7 @@ class Session(Live):
             return
         usd = self.usd
         if usd is None:
-            return  # the stage is already being loaded
+            return  # The stage is already being loaded.
         usd.GetSessionLayer().Clear()
         self.usd = None
         self.closing.emit()
@@ -167,7 +166,8 @@ class Session(Live):
 
         Args:
             time: The time code.
-            moving: Whether others follow, so that a reduced image is enough until ``restart``.
+            moving: Whether other time codes follow, so that a reduced image is enough until
+                ``restart``.
         """
         if self._request is not None and self.usd is not None:
             source = replace(self._request.source, time=time)
@@ -191,7 +191,7 @@ class Session(Live):
     def _take_stage(self, number: int, found: Read) -> None:
         request, usd, loaded = self._request_wanted, found.usd, found.stage
         if self._closed or request is None or number != self._reading:
-            return  # a newer request is being loaded
+            return  # A newer request is being loaded.
         again = request.usd is not None
         if not again or request.fresh:
             self.material_edits.clear()
@@ -358,7 +358,7 @@ class Session(Live):
     def twin(self, setup: Setup) -> Live:
         """Starts another live render of the same scene and camera, with separate settings.
 
-        The twin follows all edits. ``drop_twin`` ends it.
+        The twin follows all edits of the scene and the camera. ``drop_twin`` ends the twin.
         """
         live = Live(setup, self)
         self.twins.append(live)
@@ -388,7 +388,7 @@ class Session(Live):
         return self._tasks.jobs
 
     def shutdown(self) -> None:
-        """Ends all threads."""
+        """Ends all threads of the session."""
         if self._closed:
             return
         self._closed = True

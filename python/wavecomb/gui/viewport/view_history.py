@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Undo history of camera movements, separate from the history of edits.
 
-Moving the camera does not change the stage, so it is not part of the undo history of edits.
+Camera movements do not change the stage, so they are not in the undo history of edits.
 Otherwise undoing an edit would first revert all later camera movements, and a stage that was only
 viewed would count as unsaved.
 """
@@ -18,12 +18,12 @@ from wavecomb.gui.viewport.navigate import Pose
 from wavecomb.gui.viewport.session import Session
 
 MERGE_S = 0.7
-"""Movements at shorter intervals, in seconds, merge into one step."""
+"""Camera movements at shorter intervals, in seconds, merge into one undo step."""
 _MOVE = 2
 
 
 class MoveCommand(QUndoCommand):
-    """Movement from one pose to another.
+    """Undo command of a camera movement from one pose to another.
 
     The camera has already moved when the command is created.
     """
@@ -42,7 +42,7 @@ class MoveCommand(QUndoCommand):
         self._there = False
 
     def undo(self) -> None:
-        """Moves the camera to the earlier pose."""
+        """Moves the camera back to the earlier pose."""
         if (history := self._history()) is not None:
             history.go(self.before)
 
@@ -62,7 +62,7 @@ class MoveCommand(QUndoCommand):
 
 
 class ViewHistory(QObject):
-    """History of the poses of a session's camera.
+    """Undo history of the poses of a session's camera.
 
     Attributes:
         stack: Undo stack of movements.
@@ -80,7 +80,7 @@ class ViewHistory(QObject):
         session.camera_changed.connect(self._on_moved)
 
     def go(self, pose: Pose) -> None:
-        """Moves the camera without adding a step."""
+        """Moves the camera without adding an undo step."""
         self._pose = pose
         self._session.set_camera(pose)
 

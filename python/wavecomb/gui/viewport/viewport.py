@@ -34,7 +34,7 @@ from wavecomb.usd.cameras.framing import corners
 ORBIT_RADIANS = 0.008
 """Rotation per device-independent pixel; 400 pixels are about half a turn."""
 DOLLY_STEP = 0.88
-"""Factor of the distance for one notch of the wheel."""
+"""Factor on the distance to the pivot for one notch of the mouse wheel."""
 ZOOM_STEP = 1.25
 KEY_RADIANS = np.radians(15.0)
 CLICK_PIXELS = 4
@@ -51,7 +51,7 @@ class Viewport(PictureView):
     Attributes:
         look: Display settings.
         frame_shown: The frame on the screen, or None.
-        marked: Outline of the selection.
+        marked: Outline of the selected prims.
         gizmo: Handles that edit the selection, or None without a scene panel.
 
     Signals:
@@ -154,7 +154,7 @@ class Viewport(PictureView):
     def outline(self) -> np.ndarray:
         """Returns points (n, 3) that enclose the scene.
 
-        These are its outline or, without one, the corners of its bounds.
+        The points are the scene's outline or, without an outline, the corners of its bounds.
         """
         stage = self.session.stage
         if stage is not None and stage.outline is not None:
@@ -166,7 +166,7 @@ class Viewport(PictureView):
         return self.session.setup.width / self.session.setup.height
 
     def _aim(self, place: QPointF) -> None:
-        """Makes the point under the cursor the pivot."""
+        """Makes the scene point under the cursor the pivot of the camera."""
         at = self.to_picture(place)
         hit = self.session.pick(at.x(), at.y())
         if hit is not None and hit.get("position") is not None:
@@ -183,7 +183,7 @@ class Viewport(PictureView):
             self.session.set_camera(moved, moving=moving)
 
     def pan(self, across: float, upwards: float, *, moving: bool = False) -> None:
-        """Pans by device-independent pixels."""
+        """Pans the camera by device-independent pixels."""
         if (pose := self._pose()) is not None:
             depth = pose.depth_of(self.pivot())
             if depth <= 0.0:
@@ -293,7 +293,7 @@ class Viewport(PictureView):
         self.hovered.emit(self._pixel(place))
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        """Ends a drag."""
+        """Ends a mouse drag."""
         drag, self._drag = self._drag, Drag.NONE
         place = event.position()
         if drag in (Drag.ORBIT, Drag.PAN, Drag.DOLLY):
@@ -317,7 +317,7 @@ class Viewport(PictureView):
             self.picked.emit(pixel)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Dollies towards the point under the cursor; with Ctrl zooms the image."""
+        """Dollies towards the point under the cursor; with Ctrl, zooms the image."""
         notches = event.angleDelta().y() / 120.0
         if notches:
             if event.modifiers() & Control:

@@ -19,7 +19,7 @@ STATISTICS_S = 0.5
 
 
 Host = Any
-"""An ``engine.Engine``, whose module imports this one."""
+"""An ``engine.Engine``; its module imports this one, so the type is not imported here."""
 
 
 class Watch:
@@ -51,11 +51,11 @@ class Watch:
         start = time.perf_counter()
         said = self._send(snapshot)
         now = time.perf_counter()
-        # Snapshots take at most a tenth of the time, but there is at least one per second.
+        # Snapshots take at most a tenth of the time, but are made at least once per second.
         pause = max(10.0 * (now - start), 0.1 if now - self._begun < 5.0 else 0.4)
         self._next = now + min(pause, 1.0)
         if self._engine.paused:
-            if not said:  # the pause began while the frame was made
+            if not said:  # The pause began while the frame was made.
                 self._send(snapshot)
             self._stand_still()
 

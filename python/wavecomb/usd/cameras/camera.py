@@ -33,7 +33,7 @@ _MAX_WINDOW = 1e30
 """Largest coordinate of a camera's window on the plane z = -1."""
 
 _MIN_WINDOW = 2.0**-16
-"""Smallest size of a camera's window relative to its largest coordinate: 128 float32 steps."""
+"""Smallest size of a camera's window, relative to its largest coordinate: 128 float32 steps."""
 
 ALL_ROUND = (-math.pi, math.pi, -0.5 * math.pi, 0.5 * math.pi)
 """Window of a latlong camera in radians of longitude and latitude: all directions."""
@@ -62,7 +62,7 @@ class Lens:
 
     Attributes:
         projection: One of ``PROJECTIONS``; None uses the camera's projection.
-        exposure: Whether the camera's exposure scales the radiance.
+        exposure: Whether the camera's exposure scales the image radiance.
         depth_of_field: Whether the lens blurs objects that are out of focus.
         conform: How the window is fitted if the aspect ratios of aperture and image differ.
         pixel_aspect: Width of a pixel divided by its height.
@@ -100,7 +100,7 @@ class Lens:
 
 
 def find_camera(stage: Usd.Stage, wanted: str | None) -> Usd.Prim | None:
-    """Returns the camera ``wanted``, else that of the render settings, else the first of the stage.
+    """Returns camera ``wanted``, else that of the render settings, else the stage's first camera.
 
     Raises:
         WavecombError: ``wanted`` names no camera.
@@ -289,8 +289,8 @@ def _rigid(to_world: Matrix) -> Matrix | None:
 def _frame_axes(up_axis: str) -> Matrix:
     """Returns the right, up and back axes of the default camera.
 
-    The camera looks at the front from slightly to the right and above. The front is +Z, or -Y if Z
-    is up.
+    The camera looks at the front from slightly to the right and above. The front of the stage is
+    +Z, or -Y if Z is up.
     """
     up = np.array({"X": (1.0, 0, 0), "Z": (0, 0, 1.0)}.get(up_axis, (0, 1.0, 0)))
     front = {"X": (0, 0, 1.0), "Z": (0, -1.0, 0)}.get(up_axis, (0, 0, 1.0))

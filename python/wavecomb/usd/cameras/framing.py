@@ -17,10 +17,10 @@ FILLED = 0.9
 """Fraction of the image that the geometry spans in the dimension that it fills first."""
 
 _DIRECTIONS = 162
-"""Number of directions; they find the silhouette of a sphere to within 1.5 %."""
+"""Number of outline directions; they find the silhouette of a sphere to within 1.5 %."""
 
 _BLOCK = 1 << 15
-"""Points that are processed together, which bounds the memory used."""
+"""Number of points that are processed together, which bounds the memory used."""
 
 _RUN = 256
 _SAMPLE = 4096
@@ -29,10 +29,10 @@ _FEW_POINTS = 200
 """Point sets up to this size are their own outline."""
 
 MANY_POINTS = 1 << 16
-"""Larger collections of points are reduced to their outline before more points are added."""
+"""Larger point sets are reduced to their outline before more points are added."""
 
 _FEW_PLACES = 512
-"""Instance counts up to this are processed completely; of more, only the extreme instances."""
+"""Up to this number of instances, all are processed; of more, only the extreme instances."""
 
 
 def _spread(count: int) -> Points:
@@ -53,7 +53,7 @@ def with_directions(more: Points | None) -> Points:
 
 
 def outline(points: NDArray[Any], more: Points | None = None) -> Points:
-    """Returns those of the points (n, 3) that are extreme in at least one direction."""
+    """Returns the points, of n given as (n, 3), that are extreme in at least one direction."""
     if len(points) <= _FEW_POINTS:
         return np.asarray(points, np.float64)
     directions = with_directions(more).astype(np.float32)

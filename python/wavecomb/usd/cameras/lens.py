@@ -31,7 +31,7 @@ ATTRIBUTES = {
 """Camera parameter of the core -> USD attributes; the first one that is authored is used."""
 
 MAP_NODES = 256
-"""Nodes of an ST map along each edge of the image."""
+"""Number of nodes of an ST map along each edge of the image."""
 
 
 def lens_values(
@@ -42,7 +42,7 @@ def lens_values(
     Args:
         prim: The camera prim, or None.
         time: Time code at which attributes are evaluated.
-        chosen: Values by parameter name, as text.
+        chosen: Lens settings by parameter name, as text.
         report: Collects warnings about invalid attributes.
 
     Raises:
@@ -105,12 +105,12 @@ def _value(name: str, given: Any) -> Any:
 def read_map(path: str) -> list[list[float]]:
     """Reads an ST map as the ``lens_map`` argument of ``set_camera``.
 
-    The red channel is s (rightwards) and the green channel is t (upwards). They give the position
-    in the undistorted image that each pixel of the distorted image shows, from (0, 0) at the lower
-    left corner to (1, 1) at the upper right corner.
+    The red channel is s (rightwards) and the green channel is t (upwards). The two channels give
+    the position in the undistorted image that each pixel of the distorted image shows, from (0, 0)
+    at the lower left corner to (1, 1) at the upper right corner.
 
     Raises:
-        WavecombError: The file lacks these channels, or values are not finite.
+        WavecombError: The file lacks the red or green channel, or values are not finite.
         OSError: The file cannot be read.
     """
     layers = read_layers(path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Converts primvars that materials read to mesh attributes of the core."""
+"""Converts the primvars that materials read to mesh attributes of the core."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from wavecomb.usd.geometry.mesh_arrays import MeshArrays
 from wavecomb.usd.geometry.primvar import Primvar, PrimvarError, fitting, spread
 
 MAX_WIDTH = 4
-"""Maximum number of components of an attribute."""
+"""Maximum number of components of a mesh attribute."""
 
 Attributes = dict[str, tuple[str, NDArray[np.float32]]]
-"""Name -> (rate, values (k, c)), in the form that ``SceneBuilder.add_mesh`` takes."""
+"""Mesh attributes by name: (rate, values (k, c)), as ``SceneBuilder.add_mesh`` takes them."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class PrimvarRequest:
 
     Attributes:
         primvar: The primvar; its values are finite.
-        width: Number of components that are read.
+        width: Number of components that the material reads.
     """
 
     primvar: Primvar
@@ -35,23 +35,23 @@ class PrimvarRequest:
 
     @property
     def is_constant(self) -> bool:
-        """Whether all values are equal."""
+        """Whether all values of the primvar are equal."""
         values = self.primvar.values[:, : self.width]
         return len(values) == 1 or bool((values == values[0]).all())
 
     @property
     def first(self) -> NDArray[np.float32]:
-        """(width,) first value, which is every value if the primvar is constant."""
+        """(width,) first value of the primvar, which is every value if it is constant."""
         return self.primvar.values[0, : self.width]
 
     @property
     def mean(self) -> NDArray[np.float64]:
-        """(width,) mean of all values."""
+        """(width,) mean of all values of the primvar."""
         return np.asarray(self.primvar.values[:, : self.width].mean(axis=0, dtype=np.float64))
 
     @property
     def highest(self) -> float:
-        """Largest component of all values."""
+        """Largest component of all values of the primvar."""
         return float(self.primvar.values[:, : self.width].max())
 
 
@@ -125,7 +125,7 @@ class RefinedAttributes:
         return out
 
     def of(self, refined: Mapping[str, Any]) -> Attributes:
-        """Returns all attributes for a result of ``SceneBuilder.make_surfaces``."""
+        """Returns all mesh attributes for a result of ``SceneBuilder.make_surfaces``."""
         out: Attributes = dict(zip(self._refined, refined["primvars"], strict=True))
         for name, one in self._wanted.items():
             if name in out:

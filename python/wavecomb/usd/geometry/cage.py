@@ -23,7 +23,7 @@ _BOUNDARIES = ("none", "edgeOnly", "edgeAndCorner")
 _FACE_VARYING = ("none", "cornersOnly", "cornersPlus1", "cornersPlus2", "boundaries", "all")
 _TRIANGLES = ("catmullClark", "smooth")
 _INFINITE = 10.0
-"""UsdGeomMesh::SHARPNESS_INFINITE."""
+"""Value of UsdGeomMesh::SHARPNESS_INFINITE."""
 
 Ints = NDArray[np.int32]
 Floats = NDArray[np.float32]
@@ -42,8 +42,8 @@ class Cage:
         scheme: One of ``SCHEMES``, or "none" for polygons that are only displaced.
         rules: Boundary, crease, corner and hole arguments of ``SceneBuilder.make_surfaces``.
         uvs: Primvar of the texture coordinates.
-        topology: The cage as triangles.
-        smooth: Whether the polygons have normals.
+        topology: Triangulation of the cage.
+        smooth: Whether the polygons have smooth normals.
         steps: Points and matrices at equal steps over the shutter; empty if the mesh is static.
     """
 
@@ -87,8 +87,8 @@ class Cage:
             kind = "faceVarying"
             corners = np.repeat(np.arange(len(self.counts), dtype=np.int32), self.counts)
         elif kind == "faceVarying" and index is not None:
-            # Keep authored indices: corners with different indices are separate even if values are
-            # equal.
+            # Keep authored indices: corners with different indices are separate even if their
+            # values are equal.
             corners, table = index, np.zeros((int(index.max()) + 1, values.shape[1]), np.float32)
             table[index] = values
             values = table
@@ -192,15 +192,15 @@ def crease_pairs(
 Matrices = NDArray[np.float64]
 
 NEAREST = 16
-"""Instances of a mesh that are measured edge by edge; the remaining ones appear smaller."""
+"""Number of instances of a mesh that are measured edge by edge; the rest appear smaller."""
 
 
 class ViewSize:
-    """Conversion of lengths to pixels of one view.
+    """Conversion of lengths to pixels for one camera view.
 
     Attributes:
         pixels: Pixels per unit of the camera's window.
-        per_length: Pixels per unit of length where ``distances`` is 1.
+        per_length: Pixels per unit of length for points whose ``distances`` value is 1.
     """
 
     def __init__(self, view: View, size: tuple[int, int]) -> None:
@@ -209,7 +209,7 @@ class ViewSize:
         half = 0.5 * (x1 - x0), 0.5 * (y1 - y0)
         self.centre = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
         self.half = half
-        # For pixels that are not square, use the finer direction, so that more is refined, not
+        # For pixels that are not square, use the finer direction, which refines more rather than
         # less.
         shape = pixel_aspect(view.options, *size)
         self.pixels = size[0] / (2.0 * half[0]) * (shape if shape > 1.0 + 1e-5 else 1.0)
@@ -219,10 +219,10 @@ class ViewSize:
         self.to_camera = np.linalg.inv(np.asarray(view.transform, np.float64))
 
     def distances(self, points: NDArray[Any], to_world: Matrices) -> NDArray[np.float64]:
-        """Returns the distances (n,) by which lengths at points (n, 3) of a prim appear reduced.
+        """Returns the factors (n,) by which lengths at points (n, 3) of a prim appear reduced.
 
-        For a perspective camera this is the depth in front of it, or the distance behind it. For a
-        latlong camera it is the distance, and for an orthographic camera 1.
+        For a perspective camera this factor is the depth in front of it, or the distance behind it.
+        For a latlong camera the factor is the distance, and for an orthographic camera 1.
         """
         if self.projection == "orthographic":
             return np.ones(len(points))
@@ -238,8 +238,8 @@ class ViewSize:
 
         Args:
             cage: The cage.
-            bounds: (2, 3) bounds in the space of its group.
-            placed: (k, 4, 4) transforms from its group to the world.
+            bounds: (2, 3) bounds of the cage in the space of its group.
+            placed: (k, 4, 4) transforms from the cage's group to the world.
         """
         from wavecomb import _core
 

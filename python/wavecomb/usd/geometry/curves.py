@@ -57,7 +57,7 @@ class CurveArrays:
         kind: linear-tube, cubic-tube, linear-ribbon or cubic-ribbon; sphere for points.
         positions: (n, 3) control points or points, or (s, n, 3) at s steps over the shutter.
         segments: (m,) segment words of ``SceneBuilder.add_curves``; None for points.
-        radii: (n,).
+        radii: (n,) radii of control points or points.
         normals: (n, 3) or (s, n, 3) normals of ribbons; None for tubes and points.
         uvs: (m, 2, 2) at both ends of segments, or (n, 2) for points; None if not needed.
         bounds: (2, 3) lowest and highest coordinates.
@@ -108,9 +108,9 @@ class CurveReader:
             matrix: Transform from the prim to its group; it has a ``uniform_scale``.
             uv_names: Primvars for texture coordinates, of which the first existing one is used;
                 empty if no texture coordinates are needed.
-            inherited: Constant primvars of its ancestors.
-            detail: Simplification that removes thin strands and widens others; the group is the
-                world then.
+            inherited: Constant primvars of the prim's ancestors.
+            detail: Simplification that removes thin strands and widens the rest; the group must be
+                the world.
 
         Raises:
             MeshError: The curves are invalid.
@@ -203,7 +203,7 @@ class CurveReader:
             return None
         normals = strands.controls(values, kind)
         length = np.einsum("ij,ij->i", normals, normals)
-        # The comparisons are false for NaN, so NaN fails as well.
+        # Comparisons with NaN are false, so NaN counts as invalid.
         if not (float(length.min(initial=1.0)) > 0 and float(length.max(initial=0.0)) < 1e30):
             what = "normals of length zero or not finite: curves drawn as tubes"
             self.report.warn(what, prim.GetPath())
@@ -238,7 +238,7 @@ def over_shutter(
 
     Args:
         prim: Prim whose points are animated.
-        shape: Its arrays at the frame.
+        shape: Arrays of the prim at the frame.
         matrix: Transform from the prim to its group.
         motion: The shutter.
         report: Collects warnings.

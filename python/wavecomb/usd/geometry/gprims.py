@@ -38,9 +38,9 @@ _SHARE = 8
 
 
 class MemoryCheck:
-    """Memory check for the meshes of one stage.
+    """Check that the meshes of one stage fit into memory.
 
-    Points of a .usdc file stay in it until they are read.
+    Points of a .usdc file are not in memory until they are read.
     """
 
     def __init__(self, stage: Usd.Stage, time: Usd.TimeCode) -> None:
@@ -124,7 +124,7 @@ class GprimReader:
         Args:
             draw: The gprim.
             names: Primvars for texture coordinates; the first existing one is used.
-            in_world: Whether the group is the world.
+            in_world: Whether the group of the gprim is the world.
             detail: Simplification of curves; it depends on the view, so its result is not cached.
 
         Raises:
@@ -202,7 +202,7 @@ _OPTIONS: dict[str, Any] = {
 def add_shape(
     builder: _core.SceneBuilder, shape: MeshArrays | CurveArrays, options: dict[str, Any]
 ) -> int:
-    """Adds arrays to the scene and returns their id.
+    """Adds the arrays of a gprim to the scene and returns the id of the new object.
 
     ``options`` are keyword arguments common to ``add_mesh``, ``add_curves`` and ``add_points``, or
     for splats those of ``add_splats``.

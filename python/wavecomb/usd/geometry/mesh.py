@@ -100,7 +100,7 @@ class MeshReader:
     def shape(self, prim: Usd.Prim, matrix: Gf.Matrix4d, names: frozenset[str]) -> MeshArrays:
         """Reads an implicit shape in the space of its group.
 
-        ``names`` are its authored properties.
+        ``names`` are the authored properties of the shape.
         """
         mirrored = check_matrix(matrix)
         shape = read_shape(prim, self.time, names)
@@ -127,8 +127,8 @@ class MeshReader:
             uv_names: Primvars for texture coordinates, of which the first existing one is used;
                 empty if no texture coordinates are needed.
             names: Names of properties with authored opinions (``authored_names``).
-            inherited: Constant primvars of its ancestors.
-            displaced: Whether its points will be displaced.
+            inherited: Constant primvars of the mesh's ancestors.
+            displaced: Whether the points of the mesh will be displaced.
 
         Raises:
             MeshError: The mesh is invalid.
@@ -288,7 +288,7 @@ class MeshReader:
     def _authored_normals(
         self, prim: Usd.Prim, points: Array, topology: Topology, names: frozenset[str]
     ) -> Array | None:
-        """Returns primvars:normals, else normals; None if there are no valid ones."""
+        """Returns primvars:normals of the mesh, else normals; None if neither is valid."""
         if names.isdisjoint(_NORMALS):
             return None
         try:
@@ -304,7 +304,7 @@ class MeshReader:
             return None
         flat = normals.reshape(-1, 3)
         lengths = np.einsum("ij,ij->i", flat, flat)
-        # The comparison is false for NaN, so NaN fails as well.
+        # Comparisons with NaN are false, so NaN counts as invalid.
         if not float(np.maximum.reduce(lengths, axis=None, initial=0.0)) < 1e30:
             self.report.warn("normals that are not finite: ignored", prim.GetPath())
             return None

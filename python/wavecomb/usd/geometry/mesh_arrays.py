@@ -20,7 +20,7 @@ Array = NDArray[np.float32]
 IDENTITY = Gf.Matrix4d(1.0)
 
 LIMIT = 1e18
-"""Largest valid coordinate; Embree's own limit is 1.8e18."""
+"""Largest valid coordinate of a point; Embree's own limit is 1.8e18."""
 
 UV_NAMES = ("st", "UVMap", "st0", "st1", "uv", "map1")
 """Names of texture coordinates that are tried if no material names a primvar."""
@@ -36,14 +36,13 @@ class MeshArrays:
     """A mesh in the space of its group.
 
     Attributes:
-        positions: (n, 3), or (s, n, 3) at s steps over the shutter.
+        positions: (n, 3) points, or (s, n, 3) at s steps over the shutter.
         triangles: (m, 3) point indices, counter-clockwise when seen from outside.
-        normals: (n, 3), (m, 3, 3) or None, with a leading axis of steps if positions have one.
+        normals: None or (n, 3), (m, 3, 3), with a leading axis of steps if positions have one.
         uvs: (n, 2), (m, 3, 2) or None.
         bounds: (2, 3) lowest and highest coordinates.
-        topology: Origin of the triangles; None for implicit shapes.
-        cage: Cage that may be subdivided or displaced once the view is known; None if there is
-            none.
+        topology: Triangulation of the mesh's polygons; None for implicit shapes.
+        cage: Cage to subdivide or displace once the view is known; None if there is no such cage.
     """
 
     positions: Array
@@ -61,7 +60,7 @@ def is_translation(matrix: Gf.Matrix4d) -> bool:
 
 
 def check_matrix(matrix: Gf.Matrix4d) -> bool:
-    """Returns whether a transform mirrors.
+    """Returns whether a transform reverses the orientation.
 
     Raises:
         MeshError: The transform is singular or not finite.
@@ -149,7 +148,7 @@ def extent(positions: Array) -> Array:
     np.minimum.reduce(positions, axis=0, out=bounds[0])
     np.maximum.reduce(positions, axis=0, out=bounds[1])
     (a, b, c), (x, y, z) = bounds.tolist()
-    # The comparisons are false for NaN, so NaN fails as well.
+    # Comparisons with NaN are false, so NaN counts as invalid.
     if not (a > -LIMIT and b > -LIMIT and c > -LIMIT and x < LIMIT and y < LIMIT and z < LIMIT):
         raise MeshError(_NOWHERE)
     return bounds
@@ -210,15 +209,15 @@ def remove_invalid_points(
     """Removes the faces of a mesh that use invalid points.
 
     Args:
-        points: (n, 3); some are invalid under ``matrix``.
+        points: (n, 3), some of which are invalid under ``matrix``.
         matrix: Transform from the mesh to its group.
         counts: (faces,) number of corners of each face.
         indices: (corners,) point indices.
         holes: Indices of faces that are not drawn.
 
     Returns:
-        Points with invalid ones replaced, faces that are not drawn, and a message about the faces
-        left out, which is "" if no face uses an invalid point.
+        Returns points with invalid ones replaced, the faces that are drawn, and a message about
+        faces left out, which is "" if no face uses an invalid point.
 
     Raises:
         MeshError: No face remains, or counts and indices are inconsistent.
@@ -234,7 +233,7 @@ def faces_with(bad: Mask, counts: Ints, indices: Ints) -> Ints:
     """Returns the faces with at least 3 corners that use an invalid point.
 
     Raises:
-        MeshError: All faces use one, or counts and indices are inconsistent.
+        MeshError: All faces use an invalid point, or counts and indices are inconsistent.
     """
     if len(counts) and counts.min() < 0:
         raise MeshError("a face has a negative number of corners")
@@ -256,7 +255,7 @@ def faces_with(bad: Mask, counts: Ints, indices: Ints) -> Ints:
 def fill_invalid(points: Array, bad: Mask, counts: Ints, indices: Ints) -> Array:
     """Replaces each invalid point by the mean of the valid points of its faces.
 
-    There it distorts adjacent faces least when they are subdivided.
+    This mean distorts adjacent faces least when they are subdivided.
     """
     out = points.copy()
     good = np.flatnonzero(~bad)
@@ -282,7 +281,8 @@ def fill_invalid(points: Array, bad: Mask, counts: Ints, indices: Ints) -> Array
 def replace_invalid_steps(shapes: Sequence[Array]) -> list[Array]:
     """Replaces invalid points at shutter steps by their value at the nearest valid step.
 
-    Points that are never valid become the first valid point. Equal arrays remain the same objects.
+    Points that are never valid become the first valid point. Arrays without invalid points remain
+    the same objects.
     """
     masks = [invalid_point_mask(shape) for shape in shapes]
     if not any(mask.any() for mask in masks):

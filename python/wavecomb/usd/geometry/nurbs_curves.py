@@ -22,7 +22,7 @@ from wavecomb.usd.geometry.triangulate import MeshError
 from wavecomb.usd.stage.report import LoadReport
 
 PARTS = 8
-"""Cubics per knot span that is not a cubic itself."""
+"""Number of cubics per knot span that is not a cubic itself."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class _BezierConversion:
 
     Attributes:
         shares: (segments, 4, order) weights of control points in each Bezier point.
-        columns: (segments, order) indices of these control points.
+        columns: (segments, order) indices of the control points that ``shares`` weights.
     """
 
     shares: Floats
@@ -76,7 +76,7 @@ class HermiteStrands(Strands):
     tangents: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     def fit(self, primvar: Primvar, width: int) -> tuple[NDArray[Any], str]:
-        """Returns values that fit these curves; vertex primvars are treated as varying."""
+        """Returns primvar values that fit these curves; vertex primvars are treated as varying."""
         values, kind = super().fit(primvar, width)
         return values, "varying" if kind == "vertex" else kind
 
@@ -148,7 +148,7 @@ def nurbs_strands(
 
     orders = numbers("order", 1)[:, 0].astype(np.intp)
     if len(orders) == 1:
-        # Many exporters write one order for all curves.
+        # Many exporters write a single order for all curves.
         orders = np.repeat(orders, len(counts))
     if len(orders) != len(counts):
         raise MeshError(f"{len(counts)} curves have {len(orders)} orders")
@@ -178,7 +178,7 @@ def nurbs_strands(
     if not good.all():
         whys = list(dict.fromkeys(one for one in found if isinstance(one, str)))
         _report_invalid(prim, report, good, "; ".join(whys[:3]))
-    # Curves that are left out are counted, so that primvar arrays for all curves still fit.
+    # Excluded curves are still counted, so that primvar arrays for all curves fit.
     segments = np.array(
         [max(counts[i] - orders[i] + 1, 0) if isinstance(one, str) else len(one.shares)
          for i, one in enumerate(found)], np.intp,
@@ -253,7 +253,7 @@ class Spline:
             raise MeshError(f"order {order} with {count} control points")
         if len(knots) != count + order:
             raise MeshError(f"{len(knots)} knots where {count + order} are needed")
-        # The comparison is false for NaN, so NaN fails as well.
+        # Comparisons with NaN are false, so NaN counts as invalid.
         if not (np.isfinite(knots).all() and bool((np.diff(knots) >= 0).all())):
             raise MeshError("its knots are not in order")
         low, high = float(knots[order - 1]), float(knots[count])
@@ -305,7 +305,7 @@ def rational(values: Floats, slopes: Floats, weights: Floats | None) -> tuple[Fl
         return values, slopes
     values, slopes = values * weights, slopes * weights
     total = values.sum(axis=1, keepdims=True)
-    # The comparison is false for NaN, so NaN fails as well.
+    # Comparisons with NaN are false, so NaN counts as invalid.
     if not bool((np.abs(total) > 1e-30).all()):
         raise MeshError("its pointWeights add up to 0")
     values = values / total

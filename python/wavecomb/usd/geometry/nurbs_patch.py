@@ -29,7 +29,7 @@ from wavecomb.usd.materials.network import number, word
 from wavecomb.usd.stage.report import LoadReport
 
 PARTS = 8
-"""Quads along each knot span."""
+"""Number of quads along each knot span of a patch."""
 
 MAX_QUADS = 1 << 24
 """Maximum number of quads of a patch; spans of larger patches get fewer quads."""
@@ -40,10 +40,10 @@ class _Axis:
     """Parametric direction of a patch, sampled at rows of points.
 
     Attributes:
-        spline: Its basis.
-        closed: Whether both ends coincide.
-        span: (m,) knot span of each row.
-        at: (m,) parameter of each row.
+        spline: B-spline basis of the direction.
+        closed: Whether both ends of the direction coincide.
+        span: (m,) knot span of each row of points.
+        at: (m,) parameter of each row of points.
         joined: (m,) whether quads connect a row to the next one.
     """
 
@@ -61,7 +61,7 @@ class _Axis:
 
 
 def _axis(spline: Spline, closed: bool, parts: int) -> _Axis:
-    """Samples a direction.
+    """Samples a parametric direction of a patch.
 
     Adjacent spans share a row unless the surface may have a hard edge there.
     """
@@ -140,7 +140,7 @@ class PatchReader:
         return arrays
 
     def _axes(self, prim: Usd.Prim, points: int) -> tuple[_Axis, _Axis]:
-        """Returns both directions, u and v."""
+        """Returns both parametric directions of a patch, u and v."""
         time, get = self.time, prim.GetAttribute
         splines = []
         counts = [int(number(get(f"{c}VertexCount").Get(time), 0)) for c in "uv"]
@@ -251,7 +251,7 @@ def _surface(
     """
     at, by_u, by_v = _blend(axes, np.concatenate([points * heavy, heavy], axis=1))
     total = at[:, 3:]
-    # The comparison is false for NaN, so NaN fails as well.
+    # Comparisons with NaN are false, so NaN counts as invalid.
     if not bool((np.abs(total) > 1e-30).all()):
         raise MeshError("its pointWeights add up to 0")
     place = at[:, :3] / total

@@ -44,7 +44,7 @@ def as_array(value: Any) -> NDArray[Any] | None:
     """Returns a VtArray, vector or number as (k, c), without a copy if possible."""
     if value is None:
         return None
-    # Points of nearly all meshes have this type.
+    # The points of nearly all meshes have this array type.
     if type(value) is Vt.Vec3fArray:
         return np.asarray(value)
     try:

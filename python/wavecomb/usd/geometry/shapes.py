@@ -23,10 +23,10 @@ from wavecomb.usd.materials.network import word
 Array = NDArray[np.float32]
 
 AROUND = 64
-"""Segments around the axis."""
+"""Number of segments around the axis of a shape."""
 
 RINGS = 32
-"""Segments from pole to pole of a sphere."""
+"""Number of segments from pole to pole of a sphere."""
 
 
 @dataclass(frozen=True)
@@ -202,7 +202,7 @@ def _side(bottom: float, top: float, height: float) -> tuple[NDArray[Any], NDArr
     """Returns the profile of the side of a cylinder or truncated cone, and its normals."""
     half = 0.5 * height
     slope = np.array([height, bottom - top]) / (math.hypot(height, bottom - top) or 1.0)
-    # A side that ends in a tip needs more rows, so that interpolated normals stay smooth.
+    # The side of a cone needs more rows, so that interpolated normals stay smooth at the tip.
     s = np.linspace(0.0, 1.0, 2 if bottom and top else 9)[:, None]
     return (1 - s) * (bottom, -half) + s * (top, half), np.tile(slope, (len(s), 1))
 

@@ -95,7 +95,7 @@ class Motion:
     Attributes:
         frame: Time code at which static values are read.
         open, close: Time codes of the shutter.
-        middle: Time code halfway between them, at which lights are read.
+        middle: Time code halfway between ``open`` and ``close``, at which lights are read.
     """
 
     def __init__(self, frame: float, interval: tuple[float, float], steps: int | None) -> None:
@@ -190,7 +190,7 @@ def find_motion(
     Args:
         camera: Camera whose shutter:open and shutter:close are used, relative to the frame.
         time: Time code of the frame.
-        blur: Options that may override the shutter.
+        blur: Options of the user that may override the shutter.
         report: Collects warnings.
     """
     shutter = blur.shutter

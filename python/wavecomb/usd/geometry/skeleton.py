@@ -90,8 +90,9 @@ class Skin:
     ) -> Array:
         """Returns deformed normals (n, 3).
 
-        They belong to ``count`` points, or to corners whose points are ``corners``. All skinning
-        methods use linear blending for normals; after normalisation the difference is small.
+        The normals belong to ``count`` points, or to corners whose points are ``corners``. All
+        skinning methods use linear blending for normals; after normalisation the difference is
+        small.
 
         Raises:
             SkinError: The skinning data does not fit the mesh.
@@ -158,7 +159,7 @@ them."""
 
 
 class SkinError(ValueError):
-    """Skinning data does not fit; the message gives the reason in a few words."""
+    """Skinning data does not fit its mesh; the message gives the reason in a few words."""
 
 
 class Skeletons:
@@ -196,7 +197,7 @@ class Skeletons:
 
     def needs_own_prototype(self, instance: Usd.Prim, prototype: Usd.Prim) -> bool:
         """Returns whether an instance needs a separate prototype because of its animation."""
-        # The prototype's root prim has no type; the instance has it.
+        # The root prim of a prototype has no type; the instance has it.
         apart = (
             instance.GetTypeName() == "SkelRoot"
             or prototype.GetPath() in self._holders(prototype.GetStage())

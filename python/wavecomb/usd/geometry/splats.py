@@ -30,7 +30,7 @@ SPLATS = "ParticleField3DGaussianSplat"
 """Type name of Gaussian splat prims."""
 
 MIN_SCALE, MAX_SCALE = 1e-9, 1e9
-"""Range of scales that the core accepts."""
+"""Range of splat scales that the core accepts."""
 
 _MAX_DEGREE = 3
 _REACH = 3.0
@@ -115,7 +115,7 @@ class SplatReader:
     def _values(self, prim: Usd.Prim, name: str, width: int) -> NDArray[Any] | None:
         """Returns the float values (n, width) of an attribute, else its half values.
 
-        Returns None if neither exists.
+        Returns None if neither attribute exists.
         """
         for full in (name, f"{name}h"):
             values = as_array(prim.GetAttribute(full).Get(self.time))

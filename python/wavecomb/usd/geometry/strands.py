@@ -30,14 +30,14 @@ _TO_BEZIER: dict[str, NDArray[np.float64]] = {
     "bspline": np.array([[1, 4, 1, 0], [0, 4, 2, 0], [0, 2, 4, 0], [0, 1, 4, 1]]) / 6.0,
     "catmullRom": np.array([[0, 6, 0, 0], [-1, 6, 1, 0], [0, 1, 6, -1], [0, 0, 6, 0]]) / 6.0,
 }
-"""Rows: Bezier control points of a segment from its four authored points."""
+"""Matrix whose rows compute Bezier control points of a segment from its four authored points."""
 
 
 PER_CURVE = ("kept", "counts", "starts", "segments", "varying_starts")
 """Attributes of ``Strands`` with one value per curve."""
 
 _AT_ONCE = 1 << 16
-"""Segments that are computed together, which bounds the memory used."""
+"""Number of segments that are computed together, which bounds the memory used."""
 
 
 def runs(counts: Index) -> tuple[Index, Index]:
@@ -51,17 +51,17 @@ def runs(counts: Index) -> tuple[Index, Index]:
 class Strands:
     """The layout of a prim's curves, as authored and as Bezier segments.
 
-    Excludes curves without segments from the k curves.
+    The k curves of the layout exclude curves without segments.
 
     Attributes:
         basis: linear, bezier, bspline or catmullRom.
         wrap: nonperiodic, periodic or pinned.
         kept: (k,) index of each curve in the prim.
         counts: (k,) number of authored points of each curve.
-        starts: (k,) index of its first point.
+        starts: (k,) index of the first authored point of each curve.
         segments: (k,) number of segments of each curve.
         varying_starts: (k,) index of the first varying value of each curve.
-        sizes: Number of values of each interpolation.
+        sizes: Number of values of each primvar interpolation.
     """
 
     basis: str
@@ -269,7 +269,7 @@ class Strands:
         end = base + step * self.segments
         out[end] = points[step][last]
         if lead:
-            # Both strands get the same point with the same bits.
+            # Both strands get the same point, bit for bit.
             out[end] = points[0][first]
             out[base - 1] = points[step - 1][last]
             out[end + 1] = points[1][first]
@@ -327,8 +327,8 @@ MIN_SHARE = 1.0 / 256.0
 class StrandDetail:
     """Simplification of thin strands for one view.
 
-    Strands narrower than ``pixels`` are kept with a probability equal to width / ``pixels`` and
-    widened by its inverse, which preserves coverage (stochastic simplification, Cook, Halstead,
+    Strands narrower than ``pixels`` are kept with probability width / ``pixels`` and widened by the
+    inverse of the probability, which preserves coverage (stochastic simplification, Cook, Halstead,
     Planck and Ryu 2007). The choice depends on the strand's index in the prim, so that with
     distance the kept strands form a shrinking subset.
     """

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from wavecomb.usd.stage.frame_cache import RefinedCache
 
 TARGET_PIXELS = 2.0
-"""Longest edge of refined faces in pixels; edges are longer than half of it."""
+"""Target of the longest edge of refined faces, in pixels; edges are longer than half of it."""
 
 AUTO_LEVEL = 8
 """Highest level that is chosen automatically; a requested level may be up to ``MAX_LEVEL``."""
@@ -55,7 +55,7 @@ def parse_level(text: str | int) -> str | int:
     """Parses ``off``, ``auto`` or a level from 0 to ``MAX_LEVEL``.
 
     Raises:
-        WavecombError: The text is none of these.
+        WavecombError: The text is not a valid subdivision setting.
     """
     if text in ("off", "auto"):
         return str(text)
@@ -75,15 +75,15 @@ class SubdivisionSurface:
     """A mesh to be refined.
 
     Attributes:
-        number: Id of the polygon mesh that represents it in the scene until then.
-        draw: Its prim and bindings.
-        cage: Its polygons.
-        bounds: (2, 3) bounds in the space of its group.
+        number: Id of the polygon mesh that represents this mesh in the scene before refinement.
+        draw: Prim of the mesh with its bindings.
+        cage: Polygons of the mesh.
+        bounds: (2, 3) bounds of the mesh in the space of its group.
         materials: Material ids and the primvars that the materials read.
-        group: Its group.
-        moves: Displacements: lengths or texture uses.
+        group: Group that contains the mesh.
+        moves: Displacements of the mesh: lengths or texture uses.
         face_moves: (faces,) index into ``moves`` of each face; -1 means no displacement.
-        level: Subdivision level.
+        level: Subdivision level of the mesh.
     """
 
     number: int
@@ -98,7 +98,7 @@ class SubdivisionSurface:
 
     @property
     def is_plain(self) -> bool:
-        """Whether the result depends only on cage and level, not on materials."""
+        """Whether the refined mesh depends only on cage and level, not on materials."""
         return not self.moves and not self.materials.reads
 
     @property
@@ -125,7 +125,7 @@ class SubdivisionSurfaces:
 
     def is_displaced(self, draw: DrawItem) -> bool:
         """Returns whether a material that is bound to a mesh displaces its points."""
-        # Nearly all meshes have no subsets.
+        # Nearly all meshes have no GeomSubsets.
         if not draw.subsets:
             material = draw.material
             return material is not None and bool(self.materials.surface(material).displacement)
@@ -155,7 +155,7 @@ class SubdivisionSurfaces:
     def limit_points(self, cage: Cage) -> NDArray[np.float32] | None:
         """Returns points near the limit surface of a cage that will be subdivided, or None.
 
-        Returns None for a fine cage as well, since its own points are close to that surface.
+        Returns None for a fine cage as well, since its own points are close to the limit surface.
         """
         if cage.scheme == "none" or not self.subdivide or self.choice == 0:
             return None
@@ -172,7 +172,7 @@ class SubdivisionSurfaces:
         return np.concatenate(points) if points else None
 
     def _displacements(self, surface: SubdivisionSurface) -> None:
-        """Finds the displacement of each face."""
+        """Finds the displacement of each face of a mesh."""
         draw, count = surface.draw, len(surface.cage.counts)
         which = np.full(count, -1, np.int32)
         moves: list[Any] = []
@@ -207,7 +207,7 @@ class SubdivisionSurfaces:
         levels = Counter(surface.level for surface in self._all if surface.cage.scheme != "none")
         waiting = deque(surface for surface in self._all if surface.level or surface.moves)
         if self.cache is None:
-            # Releases unrefined cages now and refined ones after refinement.
+            # Releases unrefined cages now and the rest after refinement.
             self._all = []
         while waiting:
             self._refine(self._next_batch(waiting))
@@ -351,7 +351,7 @@ class SubdivisionSurfaces:
         """Describes polygons that are displaced without subdivision."""
         topology = cage.topology
         out: dict[str, Any] = {
-            # These triangles already have the correct winding.
+            # The refined triangles already have the correct winding.
             "left_handed": False,
             "triangles": topology.triangles,
             "triangle_faces": np.ascontiguousarray(topology.face_ids(), np.uint32),

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from wavecomb import _core
 
 _CHUNK = 1 << 17
-"""Polygons that are split together, which bounds the memory used."""
+"""Number of polygons that are split together, which bounds the memory used."""
 
 _EAR_STEPS = 1 << 26
-"""Limit of steps for one polygon, about one second of work.
+"""Limit of ear clipping steps for one polygon, about one second of work.
 
-The worst known polygon of 100,000 corners takes two thirds of it.
+The worst known polygon of 100,000 corners takes two thirds of this limit.
 """
 
 
@@ -29,7 +29,7 @@ class MeshError(ValueError):
 class Topology:
     """Triangles with their source corners and faces.
 
-    Contract: it is not modified.
+    Contract: the topology is not modified after creation.
 
     Attributes:
         triangles: (m, 3) point indices, uint32.
@@ -37,8 +37,8 @@ class Topology:
         faces: (m,) face of each triangle; None if every face has ``per_face`` triangles.
         indices: (corner_count,) faceVertexIndices.
         point_count: Number of points.
-        face_count: Number of faces, including holes.
-        per_face: Triangles of each face if ``faces`` is None.
+        face_count: Number of faces of the mesh, including holes.
+        per_face: Number of triangles of each face if ``faces`` is None.
         hurried: Number of faces that cross themselves so often that their split is only
             approximate.
     """
@@ -77,7 +77,8 @@ def triangulate(
 ) -> Topology:
     """Triangulates polygons.
 
-    Splits quads along the better diagonal, convex polygons as fans, and others by clipping ears.
+    Splits quads along the better diagonal, convex polygons as fans, and other polygons by clipping
+    ears.
 
     Args:
         points: (n, 3).
@@ -217,8 +218,8 @@ def clip_ears(
 ) -> tuple[NDArray[np.intp], int]:
     """Splits one simple polygon (k, 3) into triangles (k - 2, 3) by clipping ears.
 
-    A polygon that crosses itself is split as well, with overlaps. The second result is the number
-    of corners that were cut without a check after ``_EAR_STEPS`` steps.
+    A polygon that crosses itself is split as well, into overlapping triangles. The second result is
+    the number of corners that were cut without a check after ``_EAR_STEPS`` steps.
     """
     drop = int(np.argmax(np.abs(normal)))
     axes = [(drop + 1) % 3, (drop + 2) % 3]
@@ -230,7 +231,7 @@ Ints = NDArray[np.int32]
 
 
 _TRIANGLES = 1 << 16
-"""Triangles whose normals are added together, which bounds the memory used."""
+"""Number of triangles whose normals are added together, which bounds the memory used."""
 
 
 def _unit(total: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -270,7 +271,7 @@ def smooth_normals(
         face = cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
         where = index[3 * first : 3 * (first + _TRIANGLES)]
         for axis in range(3):
-            # The order of additions is that of the triangles, independent of the block size.
+            # Normals are added in the order of the triangles, independent of the block size.
             np.add.at(total[axis], where, np.repeat(face[:, axis], 3))
     normals = _unit(np.ascontiguousarray(total.T))
     return normals[index].reshape(-1, 3, 3) if sharp else normals
@@ -280,7 +281,7 @@ def _smoothing_groups(
     triangles: NDArray[np.int64], creases: NDArray[np.int64], point_count: int
 ) -> NDArray[np.int64]:
     """Returns corner labels (3 m,), equal for corners of a point that meet across smooth edges."""
-    # Corners at both ends of every half-edge: at the lower and at the higher point index.
+    # Corners at the two ends of every half-edge: at the lower and at the higher point index.
     corner = np.arange(triangles.size).reshape(-1, 3)
     a, b = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     ca, cb = corner.ravel(), np.roll(corner, -1, axis=1).ravel()

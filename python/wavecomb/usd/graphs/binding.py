@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Specialises value graphs for one mesh: inserts its primvars and its transform."""
+"""Specialises value graphs for one mesh: inserts the mesh's primvars and transform."""
 
 from __future__ import annotations
 
@@ -90,12 +90,12 @@ def bound(
 
 
 def with_uv_sets(surface: Surface, sets: Mapping[str, str], own: str) -> Surface:
-    """Returns the surface for a mesh whose own texture coordinates are not those that it reads.
+    """Returns the surface for a mesh whose own texture coordinates are not the set that it reads.
 
     Args:
         surface: Result of ``bound`` if its graph reads primvars.
         sets: UV primvar of each textured parameter.
-        own: UV primvar of its graph; "" means the mesh's texture coordinates.
+        own: UV primvar of the surface's graph; "" means the mesh's texture coordinates.
     """
     make = Expressions()
     mesh = make.input("uv")
@@ -118,7 +118,7 @@ def with_uv_sets(surface: Surface, sets: Mapping[str, str], own: str) -> Surface
 
 
 def _texel(make: Expressions, use: Mapping[str, Any], uv: Value, width: int) -> Value:
-    """Returns the value of a texture use at other coordinates."""
+    """Returns the value of a texture use at different texture coordinates."""
     m = use["uv"]
     at = tuple(
         make.op("add", make.op("dot", uv, numbers(*row[:2])), numbers(row[2]))[0]
@@ -135,7 +135,7 @@ def _texel(make: Expressions, use: Mapping[str, Any], uv: Value, width: int) -> 
 
 
 def _in_object_space(make: Expressions, matrix: NDArray[np.float64]) -> dict[str, Value]:
-    """Expresses object-space position, normal and normal axes by those of the group."""
+    """Expresses object-space position, normal and normal axes by the values in group space."""
     inverse = np.linalg.pinv(matrix)
 
     def mapped(vector: Value, rows: NDArray[Any]) -> Value:

@@ -37,7 +37,7 @@ from wavecomb.usd.materials.texture import TextureTable
 from wavecomb.usd.stage.report import LoadReport
 
 BASE, COLOUR, NUMBER, NORMAL = "base", "colour", "number", "normal"
-"""Uses of a value: base colour, another colour, a number, or a tangent-space normal."""
+"""Ways to use a value: base colour, another colour, a number, or a tangent-space normal."""
 COLOURS = (BASE, COLOUR)
 
 _SAMPLES = 8
@@ -71,7 +71,7 @@ Replaced = Callable[[Node, tuple[Value, ...]], Value | None]
 def substituted(make: Expressions, value: Value, replaced: Replaced) -> Value:
     """Rebuilds a value with some nodes replaced.
 
-    Primvar placeholders always become their default.
+    Primvar placeholders are always replaced by their default.
     """
     done: dict[Node, Value] = {}
 
@@ -90,7 +90,7 @@ def substituted(make: Expressions, value: Value, replaced: Replaced) -> Value:
 def in_working_space(make: Expressions, value: Value, working: str) -> Value:
     """Converts a colour from linear Rec.709 to the working space.
 
-    Keeps components after r, g, b.
+    Components after r, g and b are unchanged.
     """
     if working == "rec709":
         return value
@@ -167,7 +167,7 @@ def plain_use(value: Value, wide: bool) -> dict[str, Any] | None:
 
 
 class Drivers:
-    """The values that drive the parameters of one surface."""
+    """The values that drive the parameters of one surface shader."""
 
     def __init__(self, networks: Networks) -> None:
         self.networks = networks
@@ -203,7 +203,7 @@ class Drivers:
         return read(self._converted, kind)
 
     def scaled(self, value: Value, by: Value) -> Value:
-        """Multiplies two values; constants in double precision."""
+        """Multiplies two values; multiplies constants in double precision."""
         if is_constant(value) and is_constant(by):
             factors = by * len(value) if len(by) == 1 else by
             return tuple(
@@ -213,7 +213,7 @@ class Drivers:
         return self.networks.make.op("multiply", value, by)
 
     def put(self, parameter: str, value: Value) -> tuple[float, ...] | None:
-        """Assigns a value to a parameter; returns it if it is constant."""
+        """Assigns a value to a parameter; returns the value if it is constant."""
         width = PARAMETERS[parameter][1]
         value = fit(value, width)
         if is_constant(value):
@@ -239,7 +239,8 @@ class Drivers:
     def graph(self) -> SurfaceGraph | None:
         """Returns the graph of parameters without constants or textures; None if there are none.
 
-        If the graph is too large, reports and leaves out parameters, the last one first.
+        If the graph is too large, reports this and leaves out parameters, starting with the last
+        one.
         """
         left = dict(self._outputs)
         while left:
@@ -280,7 +281,7 @@ def _as_it_is(_node: Node, _operands: tuple[Value, ...]) -> Value | None:
 
 
 def kind_of(parameter: str) -> str:
-    """Returns the use of a parameter's values."""
+    """Returns the kind of use of a parameter's values."""
     if parameter == "base_color":
         return BASE
     if parameter == "normal":
@@ -300,9 +301,9 @@ Linear = tuple[dict[tuple[Node, int], float], float]
 
 
 def linear(part: Part, is_leaf: Callable[[Node], bool]) -> Linear | None:
-    """Returns a part as a linear combination of leaf components plus a constant.
+    """Returns a component as a linear combination of leaf components plus a constant.
 
-    Returns None if it is not.
+    Returns None if the component is not linear.
     """
     known: dict[tuple[Node, int], Linear | None] = {}
 

@@ -18,7 +18,7 @@ from wavecomb import _core
 CODES = {name: number for number, name in enumerate(_core.GRAPH_CODES)}
 INPUTS = {name: number for number, name in enumerate(_core.GRAPH_INPUTS)}
 PARAMETERS: dict[str, tuple[int, int]] = dict(_core.GRAPH_PARAMETERS)
-"""Parameter -> (index of its first component, number of components)."""
+"""Graph input -> (index of its first component, number of components)."""
 
 POINT_SIZE = 3 * len(INPUTS) - 3
 """Floats per evaluation point: uv and its filter width, then three each for position, local
@@ -32,7 +32,7 @@ PRIMVAR = "primvar"
 
 
 class GraphTooLarge(Exception):
-    """A graph needs more registers or operations than available."""
+    """Raised if a graph needs more registers or operations than available."""
 
 
 @dataclass(eq=False, slots=True)
@@ -48,17 +48,17 @@ class Node:
 
     @property
     def name(self) -> str:
-        """Name of the input; "" for other operations."""
+        """Name of the graph input; "" for other operations."""
         return str(_core.GRAPH_INPUTS[self.number]) if self.code == "input" else ""
 
     @property
     def reads(self) -> list[Node]:
-        """Nodes of the operands, in their order."""
+        """Nodes of the operands, in operand order."""
         return [node for value in self.operands for node in _nodes(value)]
 
     @property
     def results(self) -> int:
-        """Number of registers that it writes."""
+        """Number of registers that the operation writes."""
         return 1 if self.code == "dot" else self.width
 
 
@@ -68,7 +68,7 @@ Operand = Value | float
 
 
 def is_constant(value: Value) -> bool:
-    """Returns whether all components are numbers."""
+    """Returns whether all components of a value are numbers."""
     return all(isinstance(part, float) for part in value)
 
 
@@ -131,12 +131,12 @@ class Graph:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of its attributes."""
+        """Names of the program's attributes."""
         return tuple(name for name, _ in self.attributes)
 
     @property
     def count(self) -> int:
-        """Number of operations."""
+        """Number of operations of the program."""
         return len(self.ops) // _OP.itemsize
 
     def run(self, points: Any, lanes: int = 1) -> Any:
@@ -154,7 +154,7 @@ def assemble(outputs: dict[int, Part]) -> Graph:
     """Compiles parts, by component number, to a program.
 
     Raises:
-        GraphTooLarge: It needs more registers or operations than available.
+        GraphTooLarge: The program needs more registers or operations than available.
     """
     return _Assembler(outputs).graph()
 
@@ -301,7 +301,7 @@ class Expressions:
         return self._all(self._node(PRIMVAR, len(otherwise), (otherwise,), number))
 
     def with_operands(self, node: Node, operands: tuple[Value, ...]) -> Value:
-        """Returns a copy of a node with other operands."""
+        """Returns a copy of a node with different operands."""
         if node.code == "input":
             return self.input(node.name)
         if node.code == "image" and node.image is not None:

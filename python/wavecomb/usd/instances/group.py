@@ -22,13 +22,13 @@ Matrices = NDArray[np.float64]
 T = TypeVar("T")
 
 MAX_STEPS = 64
-"""Maximum number of motion steps of an animated transform inside another animated one."""
+"""Maximum number of motion steps of an animated transform nested in another animated transform."""
 
 _MANY_BOXES = 1024
-"""Number of boxes above which they are merged."""
+"""Number of bounding boxes of a group above which they are merged."""
 
 _MAX_SHOWN = 2048
-"""Number of boxes that are kept separately."""
+"""Number of bounding boxes of a group that are never merged."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Emitter:
     """An emissive mesh in the space of its group.
 
     Attributes:
-        centre: (3,) centre of its bounds.
+        centre: (3,) centre of the mesh's bounds.
         areas: Total area of faces by material id.
     """
 
@@ -77,18 +77,19 @@ class Group:
     """Meshes, lights, volumes and instances that are instanced together.
 
     Attributes:
-        number: Id in the scene, assigned when the first object is added.
-        boxes: Bounds (2, 3) of its contents in group space.
-        outlines: Extreme points of its contents in group space; see ``framing``.
-        root: Prim path with which the names of its contents begin.
+        number: Id of the group in the scene, assigned when the first object is added.
+        boxes: Bounds (2, 3) of the group's contents in group space.
+        outlines: Extreme points of the group's contents in group space; see ``framing``.
+        root: Prim path with which the names of the group's contents begin.
         lights: Lights with their transforms in group space.
         volumes: Volumes with their transforms (4, 4) in group space.
         children: Instanced groups that contain lights, volumes or emitters, with their transforms.
         surfaced: Instanced groups that contain meshes to be refined, with their transforms.
-        has_lights_or_volumes: Whether it or its child groups contain lights, volumes or emitters.
-        sampled_light: Path of a mesh light in it that must not move.
-        emitters: Emissive meshes in it; only collected for stages without lights.
-        shown: The first boxes, which are never merged.
+        has_lights_or_volumes: Whether the group or its child groups have lights, volumes or
+            emitters.
+        sampled_light: Path of a mesh light in the group that must not move.
+        emitters: Emissive meshes in the group; only collected for stages without lights.
+        shown: The first bounding boxes, which are never merged.
     """
 
     name: str
@@ -113,7 +114,7 @@ class Group:
         return self.number is None
 
     def grow(self, bounds: NDArray[Any]) -> None:
-        """Extends the bounds by a box (2, 3)."""
+        """Extends the bounds of the group by a box (2, 3)."""
         self.boxes.append(bounds)
         if len(self.shown) < _MAX_SHOWN:
             self.shown.append(bounds)
@@ -123,14 +124,14 @@ class Group:
 
     @property
     def bounds(self) -> NDArray[np.float64] | None:
-        """(2, 3) bounds of its contents in group space."""
+        """(2, 3) bounds of the group's contents in group space."""
         if not self.boxes:
             return None
         boxes = np.array(self.boxes, np.float64)
         return np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
     def reach(self, points: NDArray[np.float64], more: NDArray[np.float64] | None) -> None:
-        """Adds points to the outline, which is exact in the directions ``more``."""
+        """Adds points to the group's outline, which is exact in the directions ``more``."""
         self.outlines.append(points)
         self.outlined += len(points)
         if self.outlined > framing.MANY_POINTS:
@@ -143,9 +144,9 @@ class Scope:
     """State that a group inherits from its instances.
 
     Attributes:
-        inside: Whether it is instanced, so that a mesh may take the material of its instance.
+        inside: Whether the group is instanced, so that meshes may take their instance's material.
         bound: Whether the instance has a bound material, which precedes display colours.
-        override: Whether a binding above is stronger than all bindings in the group.
+        override: Whether a binding of an ancestor is stronger than all bindings in the group.
         alias: (prototype, instance) paths if bindings are resolved on the instance's proxies.
         root: Path of the native prototype that the group comes from.
         material: Material for prims without a binding, if it reads primvars of these prims.
@@ -215,16 +216,16 @@ def _placed(
 
 
 MIN_IRRADIANCE = 0.02
-"""Irradiance from which an object counts as lit: a hundredth of that from the default dome."""
+"""Irradiance from which an object counts as lit: a hundredth of the default dome's irradiance."""
 
 MAX_SAMPLED_EMITTERS = 2048
-"""Maximum number of objects and most emitters that are considered."""
+"""Maximum number of objects, and of emitters, that are considered."""
 
 
 def emitter_of(shape: MeshArrays, material: int, faces: NDArray[np.uint32] | None) -> Emitter:
     """Returns the emitter of a mesh.
 
-    ``faces`` holds the material of each triangle if they differ.
+    ``faces`` holds the material of each triangle if the materials differ.
     """
     positions = shape.positions.reshape(-1, *shape.positions.shape[-2:])[0].astype(np.float64)
     a, b, c = (positions[shape.triangles[:, corner]] for corner in range(3))
@@ -237,12 +238,12 @@ def emitter_of(shape: MeshArrays, material: int, faces: NDArray[np.uint32] | Non
 
 
 def is_lit_by_emitters(world: Group, materials: MaterialTable) -> bool:
-    """Returns whether emitters light at least half of the objects with ``MIN_IRRADIANCE``.
+    """Returns whether the emitters light at least half of the objects with ``MIN_IRRADIANCE``.
 
     Treats an emitter as a point light at its centre, at the distance of the object's centre but no
-    closer than the object's radius. Ignores shadows and indirect light. The result does not depend
-    on the camera or on the frame's samples, so that all frames of a shot and all tasks of a farm
-    agree.
+    closer than the object's radius. The estimate ignores shadows and indirect light. The result
+    does not depend on the camera or on the frame's samples, so that all frames of a shot and all
+    tasks of a farm agree.
     """
     boxes = np.array(world.shown[:MAX_SAMPLED_EMITTERS], np.float64)
     powers, centres = _emitter_powers(world, materials)

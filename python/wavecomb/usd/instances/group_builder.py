@@ -41,7 +41,7 @@ from wavecomb.usd.stage.traversal import STRANDS, CollectedPrims, InstancePrim, 
 LoadProgress = Callable[[int, int], None]
 """Progress callback: progress(prims drawn, prims found so far)."""
 STEP = 512
-"""Prims between two calls of the progress callback."""
+"""Number of prims between two calls of the progress callback."""
 
 _ANY = Usd.PrimIsActive & Usd.PrimIsLoaded
 """Predicate for prototypes of point instancers, which may be overs or classes."""
@@ -144,7 +144,7 @@ class GroupBuilder:
         prims = found.binding_prims()
         if scope.alias is not None:
             prims = [self._proxy(prim, scope.alias) for prim in prims]
-        # Use one object per material, since tables find it faster by identity than by path.
+        # Uses one object per material, since tables find it faster by identity than by path.
         known = self._known
         bound = found.bind(
             None if material is None else known.setdefault(material.GetPath(), material)
@@ -276,9 +276,9 @@ class GroupBuilder:
         purpose: str,
         predicate: Any = None,
     ) -> Group | None:
-        """Returns the group of some prims, built once.
+        """Returns the group of some prims, which is built only once.
 
-        Warns and returns None if it contains itself.
+        Warns and returns None if the group contains itself.
         """
         known = self._groups.get(key)
         if known is not None:

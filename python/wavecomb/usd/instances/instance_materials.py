@@ -34,7 +34,7 @@ MAX_COLOURS = 256
 
 
 def quantise(colours: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Quantises colours (m, 3) to a palette (k, 3), k <= ``MAX_COLOURS``, and an index (m,).
+    """Quantises colours (m, 3) to a palette (k, 3), k <= ``MAX_COLOURS``, and indices (m,) into it.
 
     Quantisation steps are even in the square root, which is close to perceptually uniform.
     """
@@ -119,7 +119,7 @@ class InstanceMaterials:
 
 
 MAX_VARIATIONS = 256
-"""Maximum number of variations of a prototype; primvars of further instances are ignored."""
+"""Maximum number of variants of a prototype; primvars of further instances are ignored."""
 
 _ARRAYS = {
     1: (Sdf.ValueTypeNames.FloatArray, Vt.FloatArray),
@@ -135,8 +135,8 @@ class InstanceBinding:
     """Material and primvars that instances pass to their prototype.
 
     Attributes:
-        key: Equal for equal appearance; None if there are none.
-        inherited: Constant primvars.
+        key: Equal for equal appearance; None if the instance passes nothing.
+        inherited: Constant primvars of the instance.
         material: Material for prims without a binding, which reads primvars of the meshes.
     """
 
@@ -145,7 +145,7 @@ class InstanceBinding:
     material: UsdShade.Material | None = None
 
     def on(self, scope: Scope) -> Scope:
-        """Returns the scope of the prototype with these values."""
+        """Returns the scope of the prototype with the material and primvars of the instance."""
         if self.key is None:
             return scope
         return replace(scope, material=self.material or scope.material, inherited=self.inherited)
@@ -277,7 +277,7 @@ class InstanceBindings:
     def _each(self, primvar: Any, name: str, count: int) -> NDArray[np.float32] | None:
         """Returns a primvar's values (count, c) per instance.
 
-        Warns and returns None if they do not fit.
+        Warns and returns None if the values do not fit.
         """
         path = primvar.GetAttr().GetPrim().GetPath()
         try:
@@ -293,7 +293,7 @@ class InstanceBindings:
         return np.asarray(in_linear(found, self._report, path).values, np.float32)
 
     def _constant(self, name: str, value: NDArray[np.float32]) -> Any:
-        """Creates a constant primvar, as if an ancestor prim had it."""
+        """Creates a constant primvar, as if an ancestor of the prims had it."""
         key = (name, value.tobytes())
         if key not in self._made:
             prim = self._values.DefinePrim(f"/V{len(self._made)}")

@@ -97,7 +97,7 @@ def add_volumes(world: Group, context: LoadContext) -> tuple[VolumeFacts, ...]:
 def report_grid_memory(
     volumes: tuple[VolumeFacts, ...], limit: float | None, report: LoadReport
 ) -> None:
-    """Reports if grids alone exceed ``--texture-limit`` (in MB)."""
+    """Reports if the volumes' grids alone exceed ``--texture-limit`` (in MB)."""
     taken = sum(grid.bytes for grid in {grid for volume in volumes for grid in volume.grids})
     if limit is not None and taken > limit * MEGABYTE:
         report.warn(

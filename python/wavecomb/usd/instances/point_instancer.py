@@ -26,7 +26,7 @@ class Instances:
     Attributes:
         transforms: (k, 4, 4) for row vectors, in the instancer's space.
         prototypes: (k,) index of each instance's prototype.
-        kept: (k,) indices in the authored arrays.
+        kept: (k,) index of each instance in the authored arrays.
         authored: Length of the authored arrays.
     """
 
@@ -114,7 +114,7 @@ def moved_instances(
         motion: The shutter.
         track: Animated transform of the instancer; None if it is static.
         outer: (4, 4) static transform from the instancer to its group; None is the identity.
-        instances: Its instances at the frame.
+        instances: Instances of the point instancer at the frame.
         report: Collects warnings.
     """
     instancer = UsdGeom.PointInstancer(prim)

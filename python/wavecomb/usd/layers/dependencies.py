@@ -59,7 +59,7 @@ def dependencies(
 
 
 def _prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
-    """Yields all active and defined prims, and those of prototypes once."""
+    """Yields all active and defined prims of the stage, and the prims of each prototype once."""
     predicate = Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract
     yield from Usd.PrimRange(stage.GetPseudoRoot(), predicate)
     for prototype in stage.GetPrototypes():
@@ -85,7 +85,7 @@ def _add(
     value: Sdf.AssetPath,
     attribute: Usd.Attribute,
 ) -> None:
-    """Adds a file of an attribute to the found or to the missing files."""
+    """Adds a file of an attribute to the existing or to the missing files."""
     if UDIM in value.path:
         tiles = [path for _, path in tile_files(asset_file(value, attribute))]
         found.update(dict.fromkeys(tiles))
@@ -122,5 +122,5 @@ def _all(file: str) -> Iterator[str]:
 
 
 def _outer(path: str) -> str:
-    """Returns the file itself, or the package that contains it."""
+    """Returns the file itself, or the package (.usdz) that contains it."""
     return Ar.SplitPackageRelativePathOuter(path)[0] if Ar.IsPackageRelativePath(path) else path

@@ -34,8 +34,8 @@ def abort_on_fifo() -> Iterator[None]:
     """Aborts a block that opens layers if USD waits for a FIFO.
 
     While the process is idle, a thread checks the files that loaded layers name. An expendable
-    process ends with one message. In other processes the thread opens the FIFO for writing and
-    closes it, so that USD reads an empty layer; the block then raises.
+    process is ended with a message of one line. In other processes the thread opens the FIFO for
+    writing and closes it, so that USD reads an empty layer; the block then raises.
 
     Raises:
         WavecombError: A layer names a FIFO that USD waited for.
@@ -60,7 +60,7 @@ class _BlockingFifo:
     """The first FIFO that USD waited for.
 
     Attributes:
-        line: Message that names it.
+        line: Message that names the FIFO.
     """
 
     line: str | None = None
@@ -79,12 +79,12 @@ def _watch(done: threading.Event, found: _BlockingFifo) -> None:
 
 
 def _fifos() -> Iterator[tuple[str, str]]:
-    """Yields FIFOs that loaded layers name as layers, with the layer that names each."""
+    """Yields FIFOs that loaded layers name as layers, each with the layer that names it."""
     for layer in Sdf.Layer.GetLoadedLayers():
         try:
             named = [layer.ComputeAbsolutePath(n) for n in layer.GetCompositionAssetDependencies()]
             name = layer.realPath or layer.identifier
-        # The composing thread has released the layer.
+        # The thread that composes the stage has released the layer.
         except Exception:
             continue
         for path in named:
@@ -276,7 +276,7 @@ def open_editable(
     """Opens a stage that can be inspected and edited while another copy of it is loaded.
 
     Opens the stage like ``open_stage``, but also resolves MaterialX files in unselected variants.
-    So selecting them later changes no layer while another stage reads it on another thread.
+    Selecting these variants later then changes no layer while another thread reads it.
 
     Args:
         file: .usd, .usda, .usdc or .usdz.
@@ -342,7 +342,8 @@ def select_variants(stage: Usd.Stage, variants: Mapping[str, str]) -> None:
 
 
 _changed: dict[str, Sdf.Layer] = {}
-"""Changed layers by identifier. They are never released, since USD would read them again."""
+"""Layers that this process has changed, by identifier. They are never released, since USD would
+read them again."""
 
 
 def change_layers(layers: Iterable[Sdf.Layer]) -> None:
@@ -364,7 +365,7 @@ def change_layers(layers: Iterable[Sdf.Layer]) -> None:
             UsdUtils.ModifyAssetPaths(layer, lambda path: mapped(path, pairs))
         for name in layer.GetCompositionAssetDependencies():
             if name and not name.lower().endswith(".mtlx"):
-                # USD reports unreadable layers when it composes them.
+                # USD reports unreadable layers when it composes the stage.
                 with suppress(Tf.ErrorException):
                     other = Sdf.Layer.FindOrOpenRelativeToLayer(layer, name)
                     if other:

@@ -26,8 +26,9 @@ _PROXIES = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
 def populate(stage: Usd.Stage, paths: Sequence[str]) -> None:
     """Restricts a stage to the prims at and below some paths, their ancestors, and what they need.
 
-    They need materials, prototypes of point instancers and sources of shader connections. All
-    cameras, lights and render settings are kept, except those inside instances that are left out.
+    Prims need their materials, prototypes of point instancers and sources of shader connections.
+    All cameras, lights and render settings are kept, except those inside instances that are left
+    out.
 
     ``paths`` may be patterns for prims that are not inside instances.
 
@@ -109,7 +110,7 @@ def _targets(prim: Usd.Prim) -> Iterator[Sdf.Path]:
     for relation in prim.GetAuthoredRelationships():
         if relation.GetName().startswith(_FOLLOWED):
             for target in relation.GetTargets():
-                # Collections are skipped: being a member does not make a prim necessary.
+                # Collections are skipped: being a member of one does not make a prim necessary.
                 if target.IsPrimPath():
                     yield target
     for attribute in prim.GetAuthoredAttributes():
@@ -226,7 +227,7 @@ def _of_name(pattern: str) -> str:
 def _letters(text: str) -> str:
     """Converts literal characters or ``[...]`` to a regular expression.
 
-    Invalid ranges match nothing.
+    Invalid character ranges match nothing.
     """
     if not (text.startswith("[") and text.endswith("]")):
         return re.escape(text)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Orientation, image formats and portals of dome lights.
 
-UsdLux names image formats but does not define their orientation. Here the image centre of every
-format maps to the dome's +z with +y up, as for latlong images. Angular maps and cube crosses are
-seen from inside, so that image right is -x. A mirrored ball is a photograph, so that image right is
-+x.
+UsdLux names image formats but does not define their orientation. In Wavecomb, the image centre of
+every format maps to the dome's +z with +y up, as for latlong images. Angular maps and cube crosses
+are seen from inside, so that image right is -x. A mirrored ball is a photograph, so that image
+right is +x.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ Floats = NDArray[np.float64]
 def format_of(name: str, size: tuple[int, int]) -> str:
     """Returns ``name``, or the format of an image (height, width) if the name is "automatic".
 
-    An image four faces high and three wide is a cross; any other image is latlong.
+    An image whose height to width ratio is 4 to 3 is a cross; any other image is latlong.
     """
     if name != "automatic":
         return name
@@ -165,7 +165,8 @@ def _image_coordinates(
     Also returns the lowest and highest (u, v) that bilinear samples may read.
     """
     if form == "mirroredBall":
-        # The ball's normal is halfway between the direction and the viewing direction +z.
+        # The normal of the mirrored ball is halfway between the direction and the viewing direction
+        # +z.
         length = np.sqrt(np.maximum(2.0 + 2.0 * z, 1e-30))
         return 0.5 + 0.5 * x / length, 0.5 - 0.5 * y / length, (0.0, 0.0), (1.0, 1.0)
     if form == "angular":
@@ -181,7 +182,7 @@ def _cross(x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats, Any, Any]:
     along_y = ~along_x & (ay > az)
     along_z = ~along_x & ~along_y
     faces = (
-        # mask, column, row, right, up
+        # Columns: mask, column, row, right, up.
         (along_z & (z > 0), 1, 1, -x, y),
         (along_y & (y > 0), 1, 0, -x, -z),
         (along_y & (y <= 0), 1, 2, -x, z),

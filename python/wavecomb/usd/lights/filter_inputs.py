@@ -22,7 +22,7 @@ _PREFIXES = (
     "inputs:", "inputs:ri:light:", "inputs:ri:lightFilter:", "inputs:arnold:", "arnold:",
     "primvars:arnold:", "ri:light:", "ri:lightFilter:", "",
 )  # fmt: skip
-"""Prefixes of filter input names."""
+"""Prefixes of filter input names in different renderers."""
 OF_LIGHTS = ("inputs:", "")
 """Prefixes of barn door inputs that are authored on the light itself."""
 
@@ -85,12 +85,12 @@ def kind_of(prim: Usd.Prim) -> str:
 
 
 def plain_kind(prim: Usd.Prim) -> str:
-    """Returns ``kind_of`` in lower case, without namespace and underscores."""
+    """Returns the kind of a filter in lower case, without namespace and underscores."""
     return kind_of(prim).lower().replace("_", "").rsplit(":", 1)[-1]
 
 
 GELS = frozenset({"kmalfiltergel", "pxrintmultlightfilter", "pxrintmult"})
-"""Kinds of filters that are only gels."""
+"""Kinds of light filters that are only gels."""
 
 _WITH_GEL = GELS | {"kmalfilterbarndoor", "kmalfiltergobo"}
 

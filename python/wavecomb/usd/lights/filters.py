@@ -39,9 +39,9 @@ Line = tuple[float, float, float]
 
 _OPEN: Line = (0.0, 0.0, 1.0)
 _FLAPS = {"left": (1.0, 0.0), "right": (-1.0, 0.0), "bottom": (0.0, 1.0), "top": (0.0, -1.0)}
-"""Karma's barn doors, with the direction in (x, y) that points away from each."""
+"""Karma's barn doors, each with the direction in (x, y) in which it lies."""
 _SHARP = 1e5
-"""Slope of a hard edge in window sizes."""
+"""Slope of a hard edge, in units of the filter window's size."""
 
 
 @dataclass(frozen=True)
@@ -50,9 +50,9 @@ class Filter:
 
     Attributes:
         matrix: (4, 4) transform from filter space to light space.
-        distance: Distance of the window along -z; 0 means that there is no window.
-        sides: Four lines; light passes where all of them are positive.
-        picture: Two lines that compute u and v of the texture.
+        distance: Distance of the filter's window along -z; 0 means that there is no window.
+        sides: Four linear functions; light passes where all of them are positive.
+        picture: Two linear functions that compute u and v of the texture.
         texture: Texture id.
         decay: Near start, near end, far start and far end.
         density: Strength of the filter.
@@ -99,7 +99,7 @@ class FilterReader:
     def of(self, light: Usd.Prim, kind: str) -> tuple[Filter, ...]:
         """Returns a light's filters and its own barn doors; reports unsupported ones.
 
-        Gels are read by ``gel_of`` instead.
+        Gels of a light are read by ``gel_of`` instead.
         """
         prims = [(path, prim) for path, prim in filter_prims(light) if not _gel(prim)]
         doors = FilterInputs(light, self._time, OF_LIGHTS)
@@ -213,7 +213,7 @@ class FilterReader:
     def _flaps(self, inputs: FilterInputs, light: Usd.Prim, before: str = "") -> Filter:
         """Reads Karma barn doors: 0 is open and 1 covers the whole cone.
 
-        Edges use the same scale.
+        The softness of door edges uses the same scale.
         """
         if inputs.value("invert", "invertblockers", "invert_blockers"):
             self._report.missing("inverted light doors (not inverted)", inputs.prim.GetPath())
@@ -253,7 +253,7 @@ class FilterReader:
     # ---- inputs ----------------------------------------------------------------------------
 
     def _cone(self, inputs: FilterInputs, light: Usd.Prim) -> tuple[float, float]:
-        """Returns a distance that is large for the light, and half the cone's width there."""
+        """Returns a distance that is large for the light, and half the width of its cone there."""
         angle = number(light.GetAttribute("inputs:shaping:cone:angle").Get(self._time), 90.0)
         if not angle < 89.0:
             self._report.missing(
@@ -300,7 +300,7 @@ def _before(prim: Usd.Prim, light: Usd.Prim, time: Usd.TimeCode) -> NDArray[np.f
     local = UsdGeom.Xformable(prim).GetLocalTransformation(time)
     own = np.array(local, np.float64) @ np.array(cache.GetParentToWorldTransform(prim), np.float64)
     forward = np.eye(4)
-    # The core's windows are at z = -1.
+    # The core places filter windows at z = -1.
     forward[3, 2] = 1.0
     return np.asarray(forward @ own @ np.linalg.pinv(there), np.float64)
 

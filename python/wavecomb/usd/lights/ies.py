@@ -24,7 +24,7 @@ _TYPES = {1: "C", 2: "B", 3: "A"}
 
 
 class IesError(ValueError):
-    """A file is invalid; the message gives the reason in a few words."""
+    """An IES file is invalid; the message gives the reason in a few words."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,8 @@ def parse_ies(text: str) -> IesProfile:
     """Parses an LM-63 file (1986 to 2019) with photometry of type C, B or A.
 
     Multiplies candela by the file's multiplier, its ballast factor and its ballast-lamp factor.
-    Skips ``TILT=INCLUDE`` data, which describes tilted lamps. Raises IesError.
+    Skips ``TILT=INCLUDE`` data, which describes tilted lamps. Raises IesError if the file is
+    invalid.
     """
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     at = next((i for i, line in enumerate(lines) if line.strip().upper().startswith("TILT")), None)
@@ -86,7 +87,7 @@ def parse_ies(text: str) -> IesProfile:
 
 
 def _numbers(text: str) -> Iterator[float]:
-    # Converts one number at a time, since a list of all would take 20 times the memory of the text.
+    # Converts one number at a time, since a list of all numbers takes 20 times the text's memory.
     for match in _WORDS.finditer(text):
         word = match[0]
         try:
@@ -116,14 +117,14 @@ def _ascending(angles: Floats, what: str) -> Floats:
 
 
 def _expand_c(vertical: Floats, horizontal: Floats, candela: Floats) -> IesProfile:
-    """Expands type C by the symmetry that the range of horizontal angles implies."""
+    """Expands a profile of type C by the symmetry that its range of horizontal angles implies."""
     first, last = horizontal[0], horizontal[-1]
     if len(horizontal) == 1:
         return IesProfile(vertical, np.zeros(1), candela)
 
     def mirrored(about: float) -> None:
         nonlocal horizontal, candela
-        # This mirrors all planes except the plane of symmetry itself.
+        # This mirrors all vertical planes except the plane of symmetry itself.
         inner = slice(-2, None, -1)
         horizontal = np.append(horizontal, 2 * about - horizontal[inner])
         candela = np.append(candela, candela[inner], axis=0)
@@ -156,13 +157,14 @@ def _expand_c(vertical: Floats, horizontal: Floats, candela: Floats) -> IesProfi
 
 
 def _resample(vertical: Floats, horizontal: Floats, candela: Floats, kind: str) -> IesProfile:
-    """Resamples types A and B to type C at every degree.
+    """Resamples profiles of types A and B to type C at every degree.
 
-    The polar axis of type A is vertical, that of type B is horizontal. With x to the side, y up and
-    z along the luminaire's axis, the horizontal angle H and the vertical angle V of a direction are
+    The polar axis of type A is vertical, the polar axis of type B is horizontal. With x to the
+    side, y up and z along the luminaire's axis, the horizontal angle H and the vertical angle V of
+    a direction are
         A: tan H = x / z, sin V = y        B: sin H = x, tan V = y / z.
     """
-    # The file holds one half; the other is its mirror image.
+    # The file holds one half of the angles; the other half is its mirror image.
     if horizontal[0] == 0 and horizontal[-1] > 0:
         horizontal = np.append(-horizontal[:0:-1], horizontal)
         candela = np.append(candela[:0:-1], candela, axis=0)

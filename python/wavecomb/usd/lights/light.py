@@ -60,9 +60,9 @@ class Light:
     """A light in the form that ``SceneBuilder.add_light`` takes, without its world transform.
 
     Attributes:
-        kind: rect, disk, sphere, cylinder, distant or dome.
+        options: Keyword arguments of ``SceneBuilder.add_light``.
         options: Keyword arguments.
-        local: (4, 4) transform that is applied before the prim's transform.
+        local: (4, 4) transform that is applied before the prim's transform to the world.
         filters: Light filters in light space.
     """
 
@@ -112,7 +112,7 @@ class LightReader:
     def read(self, prim: Usd.Prim, scale: float = 1.0) -> Light:
         """Reads a light whose prim type is in ``KINDS``.
 
-        ``scale`` is the scale of its transform.
+        ``scale`` is the scale of the light's transform.
         """
         kind = KINDS[str(prim.GetTypeName())]
         options = self._common(prim, kind)
@@ -172,7 +172,7 @@ class LightReader:
     def _plain(self, prim: Usd.Prim, kind: str) -> dict[str, Any]:
         """Reads parameters that map directly to inputs.
 
-        Except for shape, only non-default values.
+        Except for the light's shape, returns only values that differ from their defaults.
         """
         options = {}
         for row in of_kind(kind):
@@ -205,7 +205,7 @@ class LightReader:
 
     def _colour(self, prim: Usd.Prim, gel: Gel) -> tuple[float, float, float]:
         """Returns colour * intensity * 2^exposure * colour temperature, filtered by gels."""
-        # NaN marks invalid values, for which the caller warns.
+        # NaN marks invalid values, about which the caller warns.
         bad = math.nan
         authored = base = colour(self._get(prim, "color", (1.0, 1.0, 1.0)), (bad, bad, bad))
         base = self._linear(prim, "color", base)
@@ -254,7 +254,7 @@ class LightReader:
         return normalize
 
     def _shaping(self, prim: Usd.Prim, kind: str, options: dict[str, Any]) -> None:
-        """Reads UsdLuxShapingAPI; its attributes do not exist unless it is applied."""
+        """Reads UsdLuxShapingAPI, whose attributes do not exist unless the schema is applied."""
 
         def read(name: str, default: float) -> float:
             return number(self._get(prim, f"shaping:{name}", default), default)

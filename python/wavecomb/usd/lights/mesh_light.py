@@ -27,8 +27,8 @@ class MeshLight:
     Attributes:
         number: Light id for ``add_mesh``.
         material: Material id that replaces the binding; None keeps the bound material.
-        is_sampled_only: Whether only light sampling finds it, so that BSDF sampling contributes
-            none.
+        is_sampled_only: Whether only light sampling finds the light, so that BSDF sampling must not
+            count it.
     """
 
     number: int

@@ -34,8 +34,8 @@ class BoundMaterials:
 
     Attributes:
         material: Material id of all faces that ``by_face`` does not cover.
-        by_face: (face count,) material ids, if they differ between faces.
-        reads: Primvars that the materials read, by name.
+        by_face: (face count,) material ids, if the faces have different materials.
+        reads: Primvars of the gprim that the materials read, by name.
     """
 
     material: int
@@ -71,7 +71,7 @@ class Assigner:
 
         Args:
             draw: The gprim with its bindings.
-            mesh: Its geometry arrays.
+            mesh: Geometry arrays of the gprim.
             otherwise: Material id if there is neither a binding nor a display colour; None means
                 grey.
         """
@@ -83,7 +83,7 @@ class Assigner:
             return BoundMaterials(self.table.add(surface))
         primvars = _Primvars(draw, mesh, self.time, self.report)
         sets = self.uv_names(draw)
-        # The mesh's texture coordinates are the first set that exists.
+        # The mesh's texture coordinates are the first UV set that exists.
         if len(sets) > 1:
             primvars.own_uv = next((n for n in sets if primvars.find(n, 2) is not None), "")
         if surface is None or surface.stand_in:
@@ -111,7 +111,7 @@ class Assigner:
         self, draw: DrawItem, material: UsdShade.Material, surface: Surface
     ) -> Surface:
         values: dict[str, Any] = {}
-        # A primvar may name another primvar; two rounds resolve one such level.
+        # A primvar may name another primvar; reading twice resolves one such level.
         for _ in range(2):
             new = [name for name in surface.object_reads if name not in values]
             if not new:
@@ -280,7 +280,7 @@ class _Primvars:
         self, draw: DrawItem, mesh: MeshArrays | CurveArrays, time: Usd.TimeCode, report: LoadReport
     ) -> None:
         self.read: dict[str, PrimvarRequest] = {}
-        # The primvar that the mesh has as its texture coordinates, if materials read several sets.
+        # Primvar of the mesh's texture coordinates, if materials read several UV sets.
         self.own_uv = ""
         self._draw = draw
         self._mesh = mesh
@@ -316,7 +316,7 @@ class _Primvars:
         return self._found[key]
 
     def highest(self, names: Iterable[str]) -> float:
-        """Returns the largest component of those named primvars that are read at hits, else 0."""
+        """Returns the largest component of the named primvars that are read at hits, else 0."""
         return max((self.read[name].highest for name in names if name in self.read), default=0.0)
 
     def keep(self, wanted: PrimvarRequest) -> None:
@@ -331,7 +331,7 @@ class _Primvars:
         if primvar is None or len(primvar.values) == 0:
             return None
         primvar = in_linear(primvar, self._report, self.path)
-        # Implicit shapes have no topology and take one value.
+        # Implicit shapes have no topology and take a single value.
         if self._mesh.topology is None:
             primvar = replace(primvar, values=primvar.values[:1], interpolation="constant")
         check_fit(primvar, self._mesh, width)
@@ -344,7 +344,7 @@ class _Primvars:
 
 
 def _text_of(draw: DrawItem, name: str, time: Usd.TimeCode) -> str | None:
-    """Returns the value of a constant string or token primvar; None for other primvars."""
+    """Returns the value of a constant string or token primvar; None for any other primvar."""
     attribute = draw.prim.GetAttribute(f"primvars:{name}")
     if not attribute.HasAuthoredValue():
         inherited = [p.GetAttr() for p in draw.inherited if p.GetPrimvarName() == name]

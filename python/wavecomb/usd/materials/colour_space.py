@@ -18,7 +18,7 @@ LINEAR = OCIO_NAMES["rec709"]
 SRGB = "sRGB Encoded Rec.709 (sRGB)"
 RAW = "Raw"
 
-# Names that are resolved without loading OpenColorIO, which takes 30 MB.
+# Names of colour spaces that are resolved without loading OpenColorIO, which takes 30 MB.
 _COMMON = {
     "raw": RAW,
     "data": RAW,
@@ -35,7 +35,7 @@ _COMMON = {
     "lin_rec709_scene": LINEAR,
 }
 _ROWS = 256
-"""Rows of pixels that are converted together, which bounds the memory used."""
+"""Number of pixel rows that are converted together, which bounds the memory used."""
 
 
 @functools.cache
@@ -145,7 +145,7 @@ def halve(pixels: NDArray[Any], srgb: bool) -> NDArray[Any]:
 
 
 def _halve_axis(values: NDArray[np.float32], axis: int) -> NDArray[np.float32]:
-    """Averages boxes along an axis; for an odd size n, boxes are n / (n // 2) values wide."""
+    """Averages boxes along an axis; for an odd size n, each box is n / (n // 2) values wide."""
     size = values.shape[axis]
     if size == 1:
         return values

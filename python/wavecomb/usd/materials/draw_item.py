@@ -20,8 +20,8 @@ class Parent:
 
     Attributes:
         prim: The parent prim.
-        above: Its parent, if the traversal visited it.
-        asset: Length of the path of its asset, once ``identity.Assets`` computed it.
+        above: Parent of the prim, if the traversal visited it.
+        asset: Length of the path of the prim's asset, once ``Assets`` has computed it.
     """
 
     prim: Usd.Prim
@@ -36,11 +36,12 @@ class DrawItem:
     Attributes:
         prim: Mesh, implicit shape, curves, points or splats.
         matrix: Transform from the gprim to its group.
-        inherited: Constant primvars of its ancestors.
+        inherited: Constant primvars of the gprim's ancestors.
         subsets: GeomSubset prims that bind materials.
         material: Material bound to the gprim.
         subset_materials: Material bound to each subset.
-        track: Animated transform; replaces ``matrix`` if it changes while the shutter is open.
+        track: Animated transform of the gprim; replaces ``matrix`` if it moves while the shutter is
+            open.
         names: Names of properties with authored opinions (``authored_names``).
         kind: Kind of geometry: mesh, patch, shape, curves, points or splats.
         parent: The parent prim, if the traversal visited it.

@@ -101,7 +101,7 @@ class BindingScan:
     def above(self, prim: Usd.Prim) -> tuple[bool, bool]:
         """Returns (has a stronger-than-descendants binding, has a collection binding).
 
-        Both include the prim and its ancestors.
+        Both results cover the prim and its ancestors.
         """
         above: list[Usd.Prim] = []
         while prim and not prim.IsPseudoRoot() and prim.GetPath() not in self._cache:
@@ -188,7 +188,7 @@ class MaterialTable:
         if surface is None:
             surface = self.surface(material)
             shader = surface_source(material)[1]
-            # The first reading of the material has reported most problems already.
+            # The first reading of the material has already reported most problems.
             again = LoadReport()
             prim = material.GetPrim()
             reader = PreviewReader(prim, self.time, self._textures, again, primvars)
@@ -200,7 +200,7 @@ class MaterialTable:
     def add(self, surface: Surface, brightest: float = 0.0) -> int:
         """Returns the material id of a surface.
 
-        ``brightest`` is the highest emission that primvars give it.
+        ``brightest`` is the highest emission that primvars give the surface.
         """
         number = self._add(surface)
         if brightest > 0:
@@ -288,7 +288,7 @@ class MaterialTable:
         return parameters
 
     def paths(self) -> tuple[str, ...]:
-        """Returns the prim path of each material by id; "" for display colours."""
+        """Returns the prim path of each material by id; "" for materials from display colours."""
         return tuple(name if name.startswith("/") else "" for name in self._names)
 
     def any_emits(self, material: int, faces: NDArray[np.uint32] | None) -> bool:
@@ -298,7 +298,7 @@ class MaterialTable:
         return bool(np.isin(faces, list(self._emitting)).any())
 
     def mean_emission(self, material: int) -> float:
-        """Returns the mean luminance that a material emits; 0 if it does not count as a light.
+        """Returns the mean luminance that a material emits; 0 if it is too low to count as a light.
 
         Textures contribute the mean of their files, primvars their highest value.
         """

@@ -16,7 +16,7 @@ from wavecomb.usd.stage.report import LoadReport
 Colour = tuple[float, float, float]
 
 MAX_DEPTH = 32
-"""Longest chain of shaders; longer ones are treated as cycles."""
+"""Longest chain of connected shaders; longer chains are treated as cycles."""
 
 UDIM = "<UDIM>"
 _SMALL_UDIM = "<udim>"
@@ -41,7 +41,7 @@ class Source:
 
     @property
     def is_value(self) -> bool:
-        """Whether the source is a plain value."""
+        """Whether the source is a plain value without a shader."""
         return self.value is not None
 
 
@@ -136,13 +136,13 @@ def colour(value: Any, default: tuple[float, float, float]) -> tuple[float, floa
 def space_of(attribute: Usd.Attribute | None) -> str:
     """Returns the colour space authored for an attribute or inherited from an ancestor prim, or "".
 
-    The colour space of an ancestor applies to values only, not to files.
+    The colour space of an ancestor applies to colour values only, not to files.
     """
     if not attribute:
         return ""
     if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset or attribute.HasColorSpace():
         return str(attribute.GetColorSpace())
-    # USD's own search ignores names that it does not know, such as srgb_texture.
+    # USD's own search ignores colour space names that it does not know, such as srgb_texture.
     prim = attribute.GetPrim()
     while prim and not prim.IsPseudoRoot():
         if prim.HasAPI(Usd.ColorSpaceAPI):
@@ -296,7 +296,7 @@ def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
     """
     if not isinstance(value, Sdf.AssetPath):
         return _file_of_text(str(value or ""), attribute)
-    # Arnold writes the token in lower case.
+    # Arnold writes the wrap mode token in lower case.
     if _SMALL_UDIM in value.path:
         return _file_of_text(value.path, attribute)
     path = value.resolvedPath or value.path
@@ -307,7 +307,7 @@ def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
     layer = layer_of_value(attribute)
     found = UsdShade.UdimUtils.ResolveUdimPath(value.path, layer)
     if not found and layer is not None and value.path.startswith("."):
-        # No tile exists; the absolute pattern is used in messages.
+        # No tile of the UDIM pattern exists; the absolute pattern is used in messages.
         return str(layer.ComputeAbsolutePath(value.path))
     return found or value.path
 
@@ -315,7 +315,7 @@ def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
 def _file_of_text(name: str, attribute: Usd.Attribute | None) -> str:
     """Returns the file that a string names.
 
-    Relative names are anchored at the layer that has it.
+    Relative names are anchored at the layer that holds the string.
     """
     name = name.replace(_SMALL_UDIM, UDIM)
     layer = layer_of_value(attribute)

@@ -60,11 +60,11 @@ class Parameter:
     Attributes:
         name: Keyword argument of ``SceneBuilder.add_material``, or input of the MaterialX shader.
         value: Value that the loader reads: a number, a colour or a bool; None if it is driven.
-        attribute: Path of the attribute to author, which need not exist yet; None if there is none.
-        type_name: Type of that attribute.
+        attribute: Path of the attribute to author, which need not exist yet; None for no attribute.
+        type_name: Type of the attribute.
         driven_by: Driver of the value, such as "texture marble.png" or "primvar displayColor"; ""
             for a constant.
-        reason: Why there is no attribute to author; "" if there is one.
+        reason: Why no attribute can be authored; "" if one can be.
         definition: MaterialX definition of the input; None for UsdPreviewSurface.
     """
 
@@ -294,7 +294,7 @@ def _other_space(attribute: Usd.Attribute | None) -> str | None:
 
 
 class _NoTextures:
-    """Substitute for the scene's textures: every file exists and none is opened."""
+    """Substitute for the scene's textures: accepts every file name and opens no file."""
 
     working = "rec709"
 

@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 
 MAX_SIDE = 65536
 MAX_BYTES = 8 << 30
-"""Memory limit of decoding one image."""
+"""Memory limit of decoding one image, in bytes."""
 
 
 Stamp = tuple[int, int]
-"""Modification time of a file in ns, and its size in bytes."""
+"""Stamp of a file: modification time in ns, and size in bytes."""
 
 
 class Image:
@@ -86,7 +86,7 @@ class Image:
 
 
 class TextureError(ValueError):
-    """An image cannot be used; the message gives the reason in a few words."""
+    """An image file cannot be used; the message gives the reason in a few words."""
 
 
 def stamp_of(path: str) -> Stamp | None:
@@ -110,7 +110,7 @@ def read_image(path: str) -> Image:
 
 
 def read_header(path: str) -> Image:
-    """Reads like ``read_image`` but without pixels: they are all 0 and take no memory.
+    """Reads an image like ``read_image``, but with pixels that are all 0 and take no memory.
 
     Raises:
         TextureError: The image is missing, unreadable or too large.
@@ -311,8 +311,8 @@ def is_finite(pixels: NDArray[Any]) -> bool:
 class ReadAhead:
     """Queue that reads images before they are needed.
 
-    Contract: used by one thread. At most ``threads`` + 1 images are ready or being read, which
-    bounds memory. An image that is requested but not being read yet is read at once.
+    Contract: the queue is used by one thread. At most ``threads`` + 1 images are ready or being
+    read, which bounds memory. An image that is requested but not being read yet is read at once.
     """
 
     def __init__(self, threads: int = 0, limit_bytes: int | None = None) -> None:
@@ -349,7 +349,8 @@ class ReadAhead:
         try:
             return future.result()
         finally:
-            # The future's exception refers to this frame; the cycle would keep the stage open.
+            # The future's exception refers to this stack frame; the cycle would keep the stage
+            # open.
             del future
             self._start()
 
@@ -367,7 +368,7 @@ class ReadAhead:
         return sum(self._sizes[path] for path in self._ready) if self._sizes else 0
 
     def _fits(self, path: str) -> bool:
-        """Returns whether reading an image keeps the memory within the limit."""
+        """Returns whether reading another image keeps the memory within the limit."""
         if self._limit_bytes is None:
             return True
         if path not in self._sizes:
@@ -375,7 +376,7 @@ class ReadAhead:
                 header = read_header(path)
                 bytes_ = header.size[0] * header.size[1] * header.channels * header.dtype.itemsize
             except (TextureError, OSError, ValueError):
-                # Reading the image will report the error.
+                # Reading the image later will report the error.
                 bytes_ = 0
             self._sizes[path] = bytes_
         return self._sizes[path] + self.bytes <= self._limit_bytes

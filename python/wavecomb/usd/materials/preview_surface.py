@@ -219,7 +219,7 @@ class PreviewReader:
     def _network(self, parameter: str, shader: UsdShade.Shader, output: str, default: Any) -> Any:
         """Evaluates a MaterialX node network.
 
-        Returns a constant, or None if it drives the parameter.
+        Returns a constant, or None if a texture or graph drives the parameter.
         """
         value = self.drivers.output(shader, output, parameter)
         if value is None:
@@ -263,7 +263,7 @@ class PreviewReader:
         wraps = [self._wrap(shader, name, image.wraps[i]) for i, name in enumerate(_WRAP_INPUTS)]
         matrix = self._coordinates(shader, parameter)
         if not any((*matrix[:2], *matrix[3:5])):
-            # All lookups read one texel, into which the border colour must not be blended.
+            # All lookups read a single texel, into which the border colour must not be blended.
             wraps = ["clamp", "clamp"]
         texture = self.textures.add(path, image, space, *wraps, is_colour=wide, missing=missing)
         self.textured[parameter] = _texture_use(texture, matrix, channel, scale, bias)

@@ -18,7 +18,7 @@ class InputDefinition:
     """An input of a surface shader.
 
     Attributes:
-        name: Authored name without ``inputs:``.
+        name: Authored name of the input without ``inputs:``.
         group: Heading in the user interface, such as "Base" or "Coat".
         label: Label under that heading.
         kind: "number", "colour" or "switch".
@@ -44,7 +44,7 @@ class InputDefinition:
 
 @dataclass(frozen=True)
 class SurfaceGraph:
-    """The graphs of a surface.
+    """The compiled graphs of a surface.
 
     Attributes:
             whole: Graph of all parameters that are neither constants nor plain textures.
@@ -66,7 +66,7 @@ class SurfaceGraph:
 
     @property
     def depends_on_mesh(self) -> bool:
-        """Whether the graph differs between meshes."""
+        """Whether the graph gives different results for different meshes."""
         return bool(self.primvars) or self.in_object_space
 
 
@@ -122,12 +122,12 @@ class Surface:
             primvars: Primvar of the mesh by parameter; it overrides the constant if the mesh has
                 it.
             displacement: Displacement along normals: a length or a texture use; None for no
-                displacement. It changes the mesh's geometry, not the material.
-            graph: Graph of parameters that are neither constants nor plain textures.
-            stand_in: Whether this surface replaces a material that cannot be rendered. A display
-                colour of the bound prim then takes precedence.
+                displacement. Displacement changes the mesh's geometry, not the material. graph:
+                Graph of parameters that are neither constants nor plain textures. stand_in: Whether
+                this surface replaces a material that cannot be rendered. A display colour of the
+                bound prim then takes precedence.
             object_reads: Primvars whose value on an object changes how textures are read. The
-                material is read again for each value.
+                material is read again for each value of these primvars.
     """
 
     name: str
@@ -148,7 +148,7 @@ class Surface:
         return repr((self.program, parameters, textures, self.graph))
 
     def texture_uses(self) -> list[dict[str, Any]]:
-        """Returns all texture uses; those of graphs have approximate UV matrices."""
+        """Returns all texture uses; texture uses of graphs have approximate UV matrices."""
         images = self.graph.whole.images if self.graph is not None else ()
         within = [{"texture": texture, "uv": (k, 0, 0, 0, k, 0)} for texture, k in images]
         return [*self.textures.values(), *within]

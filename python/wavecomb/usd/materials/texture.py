@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Adds image files to the scene as textures, each file once."""
+"""Adds image files to the scene as textures; each file is added once."""
 
 from __future__ import annotations
 
@@ -85,10 +85,10 @@ class TextureCache:
     """The textures of a scene, which later scenes can share.
 
     Attributes:
-        scene: The scene that holds them.
-        images: Source images by file, without pixels.
-        ids: Texture ids by file and options.
-        store: The store that limits their memory.
+        scene: The scene that holds the textures.
+        images: Source images by file name, without pixels.
+        ids: Texture ids by file name and options.
+        store: The texture store that limits the textures' memory.
     """
 
     scene: _core.Scene
@@ -187,7 +187,7 @@ class TextureTable:
                     if found is path:
                         others.append(path)
             except (OSError, ValueError):
-                # Reading the file will report the error.
+                # Reading the file later will report the error.
                 pass
             self._twins[path] = found
         return found
@@ -246,9 +246,9 @@ class TextureTable:
             image: Result of ``image``.
             colour_space: auto, or a name in OpenColorIO's built-in config.
             wrap_s: repeat, clamp, mirror or black; any other value means black, as in UsdUVTexture.
-            wrap_t: The same for t.
+            wrap_t: Wrap mode along t, with the same values as ``wrap_s``.
             is_colour: Whether the texture holds colours, which are converted to the working space.
-                For other data only an sRGB curve is decoded.
+                For data other than colours, only an sRGB curve is decoded.
             missing: Linear colour and alpha of UDIM tiles that do not exist.
         """
         if isinstance(image, TiledImage):
@@ -277,7 +277,7 @@ class TextureTable:
     ) -> int:
         """Adds a texture of all readable tiles.
 
-        With auto, each tile uses its file's colour space.
+        If ``colour_space`` is auto, each tile uses the colour space of its file.
         """
         tiles = []
         for number, file in image.tiles:
@@ -338,12 +338,12 @@ class TextureTable:
             return self._builder.add_texture(
                 pixels, srgb=space == CURVE, wrap_s=wrap_s, wrap_t=wrap_t, name=path
             )
-        # The texture store has no room for it.
+        # The texture store has no room for the texture.
         except ValueError as error:
             raise WavecombError(str(error)) from None
         finally:
             if self.store is not None:
-                # Without this the allocator would keep the memory of decoded images.
+                # Without this call, the allocator would keep the memory of decoded images.
                 del pixels
                 give_back_memory()
 
@@ -389,7 +389,7 @@ class TextureTable:
         return TextureCache(scene, self._taken, self._ids, self.store)
 
     def release(self) -> None:
-        """Releases the pixels that were read."""
+        """Releases the pixels of images that were read."""
         images = {path: image for path, image in self._images.items() if isinstance(image, Image)}
         self._taken = {path: image for path, image in images.items() if not image.is_here}
         self._images.clear()

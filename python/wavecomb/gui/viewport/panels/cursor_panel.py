@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Base of panels about one pixel, which is under the cursor or was clicked."""
+"""Base class of panels about one pixel, which is under the cursor or was clicked."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class CursorPanel(QWidget):
     """Panel that is refilled with a short delay when the pixel or the image changes.
 
     Attributes:
-        follow: Check box for following the cursor.
+        follow: Check box that makes the panel follow the cursor.
     """
 
     def __init__(

@@ -157,7 +157,7 @@ class DisplayBar(QToolBar):
     def _fill_layers(self) -> None:
         """Fills the box of layers.
 
-        It offers layers with titles, light groups if there are several, and rendered expressions.
+        The box offers AOVs, light groups if there are several, and rendered expressions.
         """
         scene, names = self._session.scene, list(_titles())
         groups = () if scene is None else scene.light_groups
@@ -183,7 +183,7 @@ class DisplayBar(QToolBar):
         return self._dialog
 
     def choose_layer(self, name: str) -> None:
-        """Shows a layer. Restarts the render with the layer if it is missing."""
+        """Shows a layer. Restarts the render with this layer if the current render lacks it."""
         setup = self._session.setup
         if name == EXPRESSION:
             self._show_current()

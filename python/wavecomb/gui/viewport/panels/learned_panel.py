@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Panel with the learned distributions at the surface under the cursor."""
+"""Panel with the learned guiding and light distributions at the surface under the cursor."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ from wavecomb.image.directions import density_map, map_point
 _LATER_MS = 40
 _HEIGHT = 128
 MOST_LIGHTS = 12
-"""Largest number of lights with separate bars. All further lights share one bar."""
+"""Largest number of lights that the panel shows as separate bars. All further lights share one
+bar."""
 
 
 def field_text(setup: Setup, learned: dict[str, Any] | None) -> str:
@@ -49,7 +50,7 @@ def field_text(setup: Setup, learned: dict[str, Any] | None) -> str:
 
 
 def light_rows(shares: list[tuple[str, float]], most: int = MOST_LIGHTS) -> list[tuple[str, float]]:
-    """Returns the largest shares, and the sum of the remaining ones as the last row.
+    """Returns the largest shares of lights, and the sum of the remaining ones as the last row.
 
     >>> light_rows([("a", 0.5), ("b", 0.3), ("c", 0.2)], 2)
     [('a', 0.5), ('2 others', 0.5)]

@@ -31,11 +31,11 @@ _ROWS: dict[str, tuple[str, dict[str, Any]]] = {
     "firefly": ("&Fireflies", {}),
     "clamp_indirect": ("C&lamp", {}),
 }
-"""Label of each setting, and display options that differ from those of the Scheduling panel."""
+"""Label of each setting, with display options where they differ from the Scheduling panel."""
 _CHOICES = ("guiding", "transport", "firefly")
 _TEXTS = {"path": "camera paths", "light": "light paths", "bdpt": "both, connected"}
 _NAMES = {"max_depth": "depth"}
-"""Names of controls that differ from those of their settings."""
+"""Names of controls, where they differ from the names of their settings."""
 
 
 class RenderPanel(QWidget):
@@ -73,7 +73,7 @@ class RenderPanel(QWidget):
         values = {name: value}
         setup = self._session.setup
         if name == "noise" and value:
-            # There is one target at a time, and the core requires spp to be at least min_spp.
+            # The render has one error target at a time, and the core requires spp >= min_spp.
             values |= {"adaptive": 0.0, "min_spp": min(setup.min_spp, setup.spp)}
         if name == "spp" and (setup.noise or setup.adaptive):
             values["min_spp"] = min(setup.min_spp, value)

@@ -15,10 +15,10 @@ _PLAY, _STOP = "\u25b6", "\u25a0"
 
 
 class Timeline(QWidget):
-    """Bar that is shown for stages with a range of frames.
+    """Timeline bar, shown for stages with a range of frames.
 
     Playing shows each frame as a reduced image, at most at the frame rate of the stage, and repeats
-    the range. Stopping renders the frame.
+    the range. When playing stops, the current frame is rendered in full.
     """
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
@@ -50,7 +50,7 @@ class Timeline(QWidget):
 
     @property
     def is_playing(self) -> bool:
-        """Whether frames are played."""
+        """Whether the timeline is playing."""
         return self._beat.isActive()
 
     def _opened(self) -> None:
@@ -76,13 +76,13 @@ class Timeline(QWidget):
         set_quietly(self.frame, frame)
 
     def _choose(self, frame: int) -> None:
-        """Shows a frame; reduced while it is one of many."""
+        """Shows a frame; uses a reduced image if it is one of many."""
         self._waiting = True
         self._session.show_time(frame, moving=self.is_playing or self.slider.isSliderDown())
         self._show(frame)
 
     def toggle(self) -> None:
-        """Starts or stops playing."""
+        """Starts or stops playing the timeline."""
         if self.is_playing:
             self._stop()
             self._session.restart()
