@@ -93,8 +93,8 @@ def warn_deprecated(**given: object) -> None:
 def import_usd() -> None:
     """Imports USD's modules.
 
-    Defers a Ctrl-C until they are loaded, since USD's loader swallows an exception that is raised
-    inside it and leaves a partially loaded library.
+    Defers a Ctrl-C until the modules are loaded, since USD's loader swallows an exception that is
+    raised inside it and leaves a partially loaded library.
     """
     from wavecomb.run.progress import Interrupt
 
@@ -250,7 +250,7 @@ def _asked_for(
     region = choice.region(*chosen)
     if region is not None and "region" not in settings:
         settings["region"] = region
-        # Use the stage's data window as that of the files.
+        # Write files with the data window that the stage defines.
         settings.setdefault("crop", True)
     return chosen, choice.aovs if aovs is None else aovs
 

@@ -38,7 +38,7 @@ SYNONYMS = {word: name for name, words in _OTHER_NAMES.items() for word in words
 """Name of another renderer -> option of Wavecomb, with underscores in place of hyphens."""
 
 _KEYWORDS = {"aov": "aovs"}
-"""Options whose keyword has another name."""
+"""Command-line options whose Python keyword has another name."""
 
 _EXAMPLES = {
     "size": "size=(640, 360)", "spp": "spp=64", "aovs": 'aovs=["depth", "normal"]',

@@ -28,7 +28,7 @@ def extension() -> Path:
     """Returns the folder of the Blender extension.
 
     Raises:
-        WavecombError: It was not found.
+        WavecombError: The extension was not found.
     """
     named = os.environ.get("WAVECOMB_BLENDER_EXTENSION")
     places = [Path(named)] if named else []
@@ -45,11 +45,11 @@ def extension() -> Path:
 def program() -> list[str]:
     """Returns the command that runs a script in Blender with scripts of files disabled.
 
-    It is ``$WAVECOMB_BLENDER``, a Blender or a Python with bpy; else ``blender`` on PATH; else this
-    Python if it has bpy.
+    The program is ``$WAVECOMB_BLENDER``, a Blender or a Python with bpy; else ``blender`` on PATH;
+    else this Python if it has bpy.
 
     Raises:
-        WavecombError: There is none of them.
+        WavecombError: No Blender and no Python with bpy was found.
     """
     named = os.environ.get("WAVECOMB_BLENDER")
     found = shutil.which(named or "blender")

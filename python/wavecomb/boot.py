@@ -28,8 +28,8 @@ def end_with_parent(parent: int) -> None:
     More precisely, the kernel watches the parent's thread that started this process.
 
     Args:
-        parent: Process that started this one. If it has already ended, this process ends as well. 0
-            means the current parent, whichever it is.
+        parent: Process that started this one. If the parent has already ended, this process ends as
+            well. 0 means the current parent, whichever it is.
     """
     if not sys.platform.startswith("linux"):
         return
@@ -46,8 +46,8 @@ def extended(path: Iterable[str], first: Iterable[str], last: Iterable[str]) -> 
 
     Args:
         path: An isolated ``sys.path``: the standard library and site-packages.
-        first: Folders that precede site-packages but follow the standard library.
-        last: Folders that follow all others.
+        first: Folders inserted into the path before site-packages and after the standard library.
+        last: Folders appended at the end of the path.
     """
     here = None
     with contextlib.suppress(OSError):

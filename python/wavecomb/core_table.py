@@ -23,8 +23,8 @@ def rows_by_name(row: type[R], given: Iterable[Mapping[str, Any]]) -> Mapping[st
 
     Args:
         row: Class of a row.
-        given: Result of ``_core.setting_table()`` or a similar function. Its float32 values become
-            the shortest decimal numbers that represent them, such as 0.53.
+        given: Result of ``_core.setting_table()`` or a similar function. Float32 values of the
+            table become the shortest decimal numbers that represent them, such as 0.53.
     """
 
     def plain(value: Any) -> Any:
@@ -43,7 +43,7 @@ class MaterialParameter:
         kind: "number", "colour" or "flag".
         default: Default, as in UsdPreviewSurface.
         program: The only program with this parameter; "" if all materials accept it.
-        least: Smallest number of such a parameter; None means no limit.
+        least: Smallest value of the parameter; None means no limit.
         most: Largest number; None means no limit.
     """
 
@@ -82,8 +82,8 @@ class Program:
     Attributes:
         name: Name for ``add_material``.
         inputs: Parameters that textures can drive, by their names in ``add_material``.
-        reads_ior: Whether it uses the index of refraction.
-        has_more: Whether it has further parameters, as openpbr has.
+        reads_ior: Whether the program uses the index of refraction.
+        has_more: Whether the program has parameters that UsdPreviewSurface lacks, as openpbr has.
     """
 
     name: str
@@ -93,7 +93,7 @@ class Program:
 
     @property
     def reads(self) -> frozenset[str]:
-        """Parameters that it shares with UsdPreviewSurface.
+        """Parameters that the program shares with UsdPreviewSurface.
 
         >>> sorted(programs()["plastic"].reads)
         ['base_color', 'ior', 'normal', 'roughness']
@@ -117,7 +117,7 @@ def material_parameters() -> Mapping[str, MaterialParameter]:
 
 
 def own_parameters(program: str) -> tuple[MaterialParameter, ...]:
-    """Returns the parameters that only this program has, in the table's order."""
+    """Returns the parameters that only a given program has, in the table's order."""
     return tuple(row for row in material_parameters().values() if row.program == program)
 
 

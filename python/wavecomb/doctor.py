@@ -26,7 +26,7 @@ class Check:
         state: "ok", "missing" or "broken".
         text: A version or an error, one line.
         needed: Whether renders need it.
-        do: Command or instruction that fixes the problem; "" if there is none.
+        do: Command or instruction that fixes the problem; "" for a part that works.
     """
 
     name: str
@@ -86,7 +86,7 @@ def lines(found: dict[str, list[Check]]) -> list[str]:
 def _try(name: str, look: Callable[[], str]) -> Check:
     """Checks a native part whose description ``look`` returns.
 
-    An exception means that it is broken.
+    A part whose check raises an exception is broken.
     """
     try:
         return Check(name, OK, look(), True)

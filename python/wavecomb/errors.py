@@ -19,7 +19,7 @@ class Error(Exception):
 class WavecombError(Error):
     """Invalid input; the one-line message names the prim, file or option and says what to do.
 
-    The command line prints it without a traceback and exits with ``EXIT_CODE``.
+    The command line prints the message without a traceback and exits with ``EXIT_CODE``.
     """
 
     EXIT_CODE = 2
@@ -41,8 +41,8 @@ def join_core(core: Any) -> None:
     """Makes the errors of a native module subclasses of ``Error``.
 
     Args:
-        core: The module ``wavecomb._core``. Its class ``Error`` is a ValueError, which the core
-            creates without knowing this package.
+        core: The module ``wavecomb._core``. The native class ``Error`` is a ValueError, which the
+            core creates without knowing this package.
     """
     if not issubclass(core.Error, Error):
         core.Error.__bases__ = (ValueError, Error)

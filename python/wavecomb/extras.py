@@ -16,11 +16,11 @@ from wavecomb.errors import WavecombError
 
 @dataclass(frozen=True)
 class Extra:
-    """An extra of pyproject.toml.
+    """A group of optional packages: an extra of pyproject.toml.
 
     Attributes:
-        brings: Features that it enables, for users.
-        modules: Import names of the modules that it installs.
+        brings: Features that the extra enables, as shown to users.
+        modules: Import names of the modules that the extra installs.
     """
 
     brings: str
@@ -45,8 +45,8 @@ EXTRAS = {
 def install_command(extra: str) -> str:
     """Returns the command that installs the packages of an extra.
 
-    It names the packages instead of ``wavecomb[extra]``, since Wavecomb is not in a package index
-    and anybody could register its name.
+    The command names the packages instead of ``wavecomb[extra]``, since Wavecomb is not in a
+    package index and anybody could register its name.
 
     >>> install_command("denoise")
     "pip install 'pyoidn>=2.5'"
@@ -80,7 +80,7 @@ def needed(module: str, what: str, extra: str = "bench") -> Any:
 
     Args:
         module: Import name.
-        what: Feature that needs it, as the subject of the message, such as "SSIM".
+        what: Feature that needs the library, as the subject of the message, such as "SSIM".
         extra: Extra of pyproject.toml that contains it.
 
     Raises:
@@ -110,7 +110,7 @@ def check_installed(extra: str, what: str) -> None:
 
     Args:
         extra: Extra of pyproject.toml.
-        what: Feature that needs it, as the subject of the message.
+        what: Feature that needs the extra, as the subject of the message.
     """
     missing = missing_modules(extra)
     if missing:

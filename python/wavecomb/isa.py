@@ -3,7 +3,7 @@
 
 A portable build (docs/building.md) has ``wavecomb/lib/<isa>/_core`` for each instruction set, and
 ``wavecomb/_cpu``, which detects the CPU's instruction sets. The first import of ``wavecomb._core``
-loads the best library. The environment variable ``WAVECOMB_ISA`` selects another one.
+loads the best library. The environment variable ``WAVECOMB_ISA`` selects another library.
 """
 
 from __future__ import annotations

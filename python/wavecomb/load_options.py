@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Load options of a stage: one table whose rows are the fields of ``LoadOptions``.
 
-They determine the keywords of ``load``, ``render``, ``render_frames`` and ``load_stage``, the
+The rows determine the keywords of ``load``, ``render``, ``render_frames`` and ``load_stage``, the
 options of commands, and values in checkpoints.
 """
 
@@ -145,9 +145,9 @@ class LoadOptions:
         st_map: ST map image of the lens distortion, in place of coefficients.
         render_settings: Path or name of a RenderSettings prim; None uses those that the stage
             names, else the only ones under /Render (docs/cameras.md).
-        product: Path or name of one of their products; None uses the first.
+        product: Path or name of a product of the render settings; None uses the first product.
         texture_limit: Memory limit of textures and volume grids in MB (10^6 bytes); None means no
-            limit. Textures beyond it are swapped to a temporary file (docs/textures.md).
+            limit. Textures beyond the limit are swapped to a temporary file (docs/textures.md).
         working_space: Working colour space: "rec709" or "acescg" (docs/textures.md).
         lights: "visible", or "hidden" to make the shapes of lights invisible to all rays while they
             still emit (docs/decisions/light-shapes.md).

@@ -30,7 +30,7 @@ def memory_bytes() -> int | None:
 def without_collection() -> Iterator[None]:
     """Disables Python's cyclic garbage collector in a block that creates many objects.
 
-    The collector would visit all of them again and again, a tenth to a fifth of the block's time.
+    The collector would visit all objects again and again, a tenth to a fifth of the block's time.
     """
     was_enabled = gc.isenabled()
     gc.disable()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Settings of a render, from the core's table (core/settings_table.h).
 
-They determine the keywords of ``wavecomb.render``, the options of commands, the window's fields and
-the keys of benchmark suites.
+The settings determine the keywords of ``wavecomb.render``, the options of commands, the window's
+fields and the keys of benchmark suites.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ class Setting:
         help: Description, one sentence.
         kind: "integer", "number", "flag", "choice" or "text".
         default: Default value; None if it depends on other settings.
-        least: Smallest number; None means no limit.
-        most: Largest number; None means no limit.
-        zero: Meaning of 0, if it is special.
+        least: Smallest valid number; None means no limit.
+        most: Largest valid number; None means no limit.
+        zero: Meaning of the value 0, if 0 has a special meaning.
         steps: Valid numbers besides 0; empty means all.
         choices: Value -> its effect, for a choice.
         group: "picture" (content of the image), "work" (amount of computation), or "order"
             (execution).
         changes_picture: Whether the image depends on it.
         changes_bits: Whether the bits of the beauty image depend on it at equal sample counts.
-            Costs do with cost-aware roulette.
+            The bits depend on costs if roulette is cost-aware.
         changes_expectation: Whether the expectation of the image depends on it.
     """
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from wavecomb.errors import WavecombError
 
 Pair = tuple[str, str]
-"""A folder as the job and its stage name it, and on this machine; both absolute."""
+"""A pair of absolute folders: the name in the job and its stage, and the name on this machine."""
 
 VARIABLE = "WAVECOMB_PATH_MAPS"
 """Environment variable with folder pairs as JSON, which is set only for workers of a farm."""

@@ -5,8 +5,8 @@ A Python that is started with ``-c`` or ``-m`` has the working folder on its ``s
 file ``json.py`` next to a shot would be executed. The processes started here are isolated (``python
 -I``):
 ``wavecomb.boot`` builds their ``sys.path`` from the standard library, site-packages, and the
-folders of ``folders``. They inherit only the given descriptors, have a separate process group, and
-end with the process that started them.
+folders of ``folders``. Processes started here inherit only the given descriptors, have a separate
+process group, and end with the process that started them.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def interpreter() -> str:
     """Returns the program of this Python, also if another program embeds Python.
 
     Raises:
-        WavecombError: It was not found.
+        WavecombError: No Python program was found.
     """
     version = f"python{sys.version_info[0]}.{sys.version_info[1]}"
     for name in (sys.executable, str(Path(sys.base_exec_prefix, "bin", version))):
@@ -101,7 +101,7 @@ def command(
         arguments: Arguments of the module.
         parent: Process with which the new one ends, and whose process group it leaves. 0 means the
             process that starts it; None makes it independent, for example on another machine.
-        keep: Descriptors that it inherits besides the standard streams.
+        keep: Descriptors that the process inherits besides the standard streams.
         path: Absolute folders of Wavecomb that are added to its ``sys.path``.
         python: Program to run; None uses this Python.
         flags: Additional flags of Python.
@@ -134,7 +134,7 @@ def start(
     Args:
         target: Module, as for ``command``.
         arguments: Arguments of the module.
-        keep: Descriptors that it inherits, as for ``command``.
+        keep: Descriptors that the process inherits, as for ``command``.
         flags: Additional flags of Python.
         **options: Arguments of ``subprocess.Popen``.
 

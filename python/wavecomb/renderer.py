@@ -85,7 +85,7 @@ class Renderer:
     def materials(self) -> dict[str, list[int]]:
         """Ids of materials by name: the paths of their prims, or the names in a ``SceneBuilder``.
 
-        A prim has several ids if meshes provide different primvars.
+        A material prim has several ids if its meshes provide different primvars.
         """
         paths = () if self._loaded is None else self._loaded.material_paths
         return _ids(paths or (name for name, _ in self.scene.materials))

@@ -44,8 +44,9 @@ class SchedulingPolicy:
     ) -> bool | None:
         """Fills ``keys`` in place.
 
-        Called once per queue, from any thread of the render (one at a time), so it must not depend
-        on previous calls. An exception ends the render and is raised by the render function.
+        The render calls this method once per queue, from any thread (one at a time), so the result
+        must not depend on previous calls. An exception ends the render and is raised by the render
+        function.
 
         Args:
             queue: Arrays with one entry per record, in order of arrival: "program", "material" and
@@ -58,7 +59,7 @@ class SchedulingPolicy:
             keys: (records,) zeros to be overwritten.
 
         Returns:
-            False to keep the order of arrival without sorting; None or True otherwise.
+            False keeps the order of arrival without sorting; None or True sorts by the keys.
         """
         raise NotImplementedError
 

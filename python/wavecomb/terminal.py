@@ -2,8 +2,9 @@
 """Standard streams of commands: all text for a terminal passes through ``Stream``.
 
 Names of prims and files and messages of libraries may contain control characters, which would move
-the cursor, hide text or change the window's title. ``Stream`` writes them as escapes. A stream that
-is closed, whose reader has ended, or whose disk is full loses text but never ends a render.
+the cursor, hide text or change the window's title. ``Stream`` writes control characters as escapes.
+A stream that is closed, whose reader has ended, or whose disk is full loses text but never ends a
+render.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 _CONTROL = re.compile(
-    "[\x00-\x08\x0b-\x1f\x7f-\x9f"  # C0 without tab and newline, delete, C1
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f"  # control characters: C0 without tab and newline, delete, C1
     "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff"  # text direction and separators
     "\ud800-\udfff]"  # bytes of file names that are not UTF-8
 )
@@ -38,14 +39,14 @@ def clean(text: str) -> str:
 
 def _escape(match: re.Match[str]) -> str:
     code = ord(match[0])
-    # This is how Python represents undecodable bytes of file names.
+    # Python represents undecodable bytes of file names by surrogates.
     if 0xDC80 <= code <= 0xDCFF:
         code -= 0xDC00
     return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
 
 
 class _Raw(io.FileIO):
-    """A descriptor whose writes never fail.
+    """A file descriptor wrapped so that writing never raises an exception.
 
     Attributes:
         error: The first error of a write.
@@ -88,7 +89,7 @@ class Stream(io.TextIOWrapper):
 
     @property
     def error(self) -> OSError | None:
-        """Reason why text was lost; None if none was, or if the reader closed the pipe."""
+        """Reason why text was lost; None if no text was lost, or if the reader closed the pipe."""
         error = self._raw.error
         return None if error is None or error.errno == errno.EPIPE else error
 

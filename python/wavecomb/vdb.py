@@ -46,8 +46,8 @@ class GridHead:
     """A grid in the table of a file.
 
     Attributes:
-        number: Position in the file.
-        name: Name, which several grids may share.
+        number: Position of the grid in the file.
+        name: Name of the grid, which several grids may share.
         index: Index among grids with this name.
         type_name: OpenVDB's type name such as "Tree_float_5_4_3"; in .nvdb files also
             "Tree_fp8_5_4_3".
@@ -79,13 +79,13 @@ class GridHead:
 
 @dataclass(frozen=True)
 class GridInfo(GridHead):
-    """A grid without its values.
+    """Description of a grid without its values.
 
     Attributes:
         is_read: Whether the grid can be read as bricks.
-        kind: "fog volume", "level set", "staggered" or "unknown".
+        kind: Class of the grid: "fog volume", "level set", "staggered" or "unknown".
         voxels: Number of active voxels.
-        box: (2, 3) first and last index of active voxels; None if there are none.
+        box: (2, 3) first and last index of active voxels; None without active voxels.
         index_to_object: (4, 4), p' = p M; None if it is not affine.
         background: Background value of 1 or 3 numbers.
         metadata: Metadata as text.
@@ -143,7 +143,7 @@ def version() -> str | None:
 
 
 def nano_version() -> int | None:
-    """Returns the major version of supported .nvdb files; None if they are not supported."""
+    """Returns the major version of supported .nvdb files; None if no .nvdb file is supported."""
     return int(_plugin().nano_version) or None if is_there() else None
 
 

@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 LOADING = ("camera", "frame", "variants", "purposes")
 SETTINGS = ("max_depth", "seed", "threads", "policy", "ray_order", "roulette")
-"""Settings that the window accepts when it is opened; further ones are chosen in it."""
+"""Settings that the window accepts when it is opened; all others are chosen in the window."""
 
 
 class Window:
     """A viewer window, which may have been closed.
 
     Attributes:
-        pid: Id of its process.
+        pid: Process id of the window.
     """
 
     def __init__(self, process: subprocess.Popen[bytes], said: IO[str]) -> None:

@@ -66,7 +66,7 @@ Job = dict[str, Any]
 
 
 class Jobs:
-    """Builder of a sitting's jobs."""
+    """Builder of the jobs of a sitting, that is, of one execution of a suite."""
 
     def __init__(self, suite: Suite, folder: ResultFolder, cpus: list[int]) -> None:
         self._suite = suite
@@ -218,8 +218,7 @@ _KINDS: dict[str, tuple[str, dict[str, Any]]] = {
     "cycles": ("cycles", {"light_tree": True}),
 }
 _COMPILES = ("mitsuba-llvm",)
-"""Renderers that compile code for each sample count. Such renderers render twice, and the
-second render is timed."""
+"""Renderers that compile code for each sample count; only their second render is timed."""
 
 
 def check_peers(renderers: set[str]) -> None:

@@ -63,7 +63,8 @@ def limits() -> Limits:
 def cache_bytes() -> dict[str, int]:
     """Returns the sizes of the data caches in bytes.
 
-    L1D and L2 are those of one core, L3 is the sum over all. Unknown caches are missing.
+    The sizes of L1D and L2 are per core, and L3 is the sum over all cores. Caches of unknown size
+    are left out of the result.
     """
     sizes: dict[str, int] = {}
     for index in sorted(_SYS_CPU.glob("cpu0/cache/index*")):
@@ -152,7 +153,7 @@ def busy_seconds() -> float | None:
 def spin(threads: int) -> float:
     """Measures the seconds of a fixed piece of work on ``threads`` threads at once.
 
-    Returns the lesser of two times.
+    Returns the smaller of two measured times.
     """
     block = bytes(SPIN_BYTES)
 
@@ -207,7 +208,7 @@ MAX_VARIATION = 0.10
 def spin_reference(spins: Sequence[float]) -> float:
     """Returns the spin time of the quiet machine.
 
-    The usual time is the lower quartile, since noise only adds time.
+    The spin time of a quiet machine is estimated by the lower quartile, since noise only adds time.
     """
     ordered = sorted(spins)
     return ordered[len(ordered) // 4] if ordered else 0.0
@@ -232,7 +233,7 @@ class Noise:
         runs: Number of runs.
         noisy_runs: Number of disturbed runs.
         variation: Median over configurations of the coefficient of variation of render_s, over
-            those with at least three runs; None if there are none.
+            configurations with at least three runs; None without such configurations.
         noisy: Whether the timings need a warning.
         lines: Reasons for the warning.
     """

@@ -24,8 +24,8 @@ ORACLES = (COSTS, *ORDERS)
 """Policies that exist only in suites."""
 
 EXACT = 10
-"""Largest number of materials of one program for which the best path is found exactly. Larger
-programs use a greedy search."""
+"""Largest number of materials of one program for which the best path is found exactly. Programs
+with more materials use a greedy search."""
 
 Costs = dict[str, dict[str, float]]
 Recording = dict[str, Any]

@@ -42,7 +42,7 @@ class Config:
         factor: Name of the factor of a scaling curve, or "".
         factor_value: Value of the factor, or None.
         images: As in ``Experiment``.
-        golden: Whether the image is compared with a converged one.
+        golden: Whether the image is compared with a converged image.
     """
 
     name: str
@@ -104,7 +104,8 @@ def configurations(suite: Suite, limits: Limits, threads: int | None = None) -> 
     Args:
         suite: The suite.
         limits: Limits of the machine.
-        threads: Number of threads of all runs that do not vary it; None uses the suite's.
+        threads: Number of threads of all runs that do not vary it; None means the number in the
+            suite.
     """
     found: list[Config] = []
     for experiment in suite.experiments:
@@ -305,7 +306,7 @@ class Estimator:
 
 
 def _load_s(config: Config) -> float:
-    """Estimates the seconds for loading a generated stage, beyond those of a small one."""
+    """Estimates how many seconds a generated stage takes to load, minus those of a small stage."""
     if not config.source.scene:
         return 0.0
     from wavecomb.scenes import SceneOptions

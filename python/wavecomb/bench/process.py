@@ -150,7 +150,7 @@ class Outcome:
     """Answer and measurements of a process.
 
     Attributes:
-        answer: Its JSON object, or {"status": "failed", "error": line} if there is none.
+        answer: JSON object that the process printed, or {"status": "failed", "error": line}.
         wall_s: Wall time in seconds.
         others_share: Fraction of all cores' time that other processes took; None if unknown.
         load_average: Load average of one minute, at the start.

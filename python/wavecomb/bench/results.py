@@ -50,7 +50,7 @@ PHASE_COLUMNS = (
     *("generate_s", "order_rays_s", "trace_s", "collect_s", "keys_s", "sort_s", "materialize_s"),
     *("shade_s", "shadow_s", "resolve_s", "metrics_s", "other_s"),
 )
-"""Columns of mutually exclusive phases. Together with ``other_s`` they add up to threads x
+"""Columns of mutually exclusive phases. Phases together with ``other_s`` add up to threads x
 render_s."""
 
 COUNTER_COLUMNS = (
@@ -304,7 +304,7 @@ def read_objects(path: Path) -> list[dict[str, Any]]:
     """Reads the objects of runs.jsonl, skipping an incomplete last line.
 
     Raises:
-        WavecombError: Another line is not a JSON object.
+        WavecombError: A line before the last one is not a JSON object.
     """
     if not path.is_file():
         return []

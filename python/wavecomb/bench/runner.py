@@ -108,7 +108,7 @@ class Sitting:
         return [run for run in self.plan if run.run_id not in done]
 
     def run(self) -> bool:
-        """Executes the remaining runs. Returns False if the time limit stopped them."""
+        """Executes the remaining runs. Returns False if the time limit stopped the runs."""
         check_files(self.configs)
         check_peers({config.renderer for config in self.configs} - {WAVECOMB})
         if self.options.resume:

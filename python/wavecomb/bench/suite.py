@@ -63,18 +63,18 @@ class Table:
         return value
 
     def choice(self, key: str, default: str, allowed: tuple[str, ...]) -> str:
-        """Takes one of several words."""
+        """Takes the value of a key that must be one of several words."""
         value = str(self.take(key, str, default))
         if value not in allowed:
             raise self.error(key, f"must be one of {', '.join(allowed)}, not {value!r}")
         return value
 
     def tables(self, key: str) -> list[tuple[str, Any]]:
-        """Takes a table of tables; returns names and tables."""
+        """Takes the value of a key that is a table of tables; returns names and tables."""
         return list(self.take(key, dict, {}).items())
 
     def list_of_tables(self, key: str) -> list[Any]:
-        """Takes a list of tables."""
+        """Takes the value of a key that is a list of tables."""
         entries = list(self.take(key, list, []))
         for entry in entries:
             if not isinstance(entry, Mapping):

@@ -45,12 +45,12 @@ class Experiment:
         vary: Values by setting; all combinations are run.
         stage_vary: Values by option of the stage; all combinations are run.
         cases: Settings that change together; each is combined with all of ``vary``.
-        case_names: Names of the cases, in their order, or "". Named cases are compared with the
-            case named "off".
+        case_names: Name of each case, or "" for a case without a name. Named cases are compared
+            with the case named "off".
         skip: Combinations to leave out: those that agree with all keys of one entry.
         factor: Key of ``vary`` or ``stage_vary`` over which a scaling curve is drawn, or "".
         images: Repetitions that keep their image: "none", "first" or "all".
-        golden: Whether images are compared with a converged one.
+        golden: Whether images are compared with a converged image.
     """
 
     name: str

@@ -59,7 +59,7 @@ def run(job: Job) -> dict[str, Any]:
     if profile is not None:
         settings["costs"] = profile
     for _ in range(int(job.get("warm", 0))):
-        # does not keep data for the timed render
+        # The warm-up keeps no data for the timed render.
         api.render(stage.scene, size=size, spp=1, **settings)
     switch = Switch(job.get("perf"))
     switch.start()
@@ -85,10 +85,10 @@ def _mean_spp(stats: Mapping[str, Any]) -> float:
 def judge_picture(beauty: Any, spp: float, golden: dict[str, Any] | None) -> dict[str, Any]:
     """Returns a hash of the image, and its error against the golden (converged) image.
 
-    The variance of the golden image is that of one sample divided by the golden spp. It increases
-    the measured squared error by the factor 1 + spp / golden spp, so the error is divided by this
-    factor. The correction is too small if learning made the samples better than those of the golden
-    image, which is rendered without learning.
+    The variance of the golden image is that of one sample divided by the golden spp. The variance
+    of the golden image increases the measured squared error by the factor 1 + spp / golden spp, so
+    the error is divided by this factor. The correction is too small if learning made the samples
+    better than those of the golden image, which is rendered without learning.
     """
     import hashlib
 

@@ -19,7 +19,7 @@ WIDEST = 100
 """Maximum width of a help text in columns."""
 
 MOST_EXAMPLES = 3
-"""Examples in the short help."""
+"""Number of examples in the short help."""
 
 GROUPS: dict[str, tuple[str, str]] = {
     "Most used": (
@@ -144,7 +144,7 @@ SIZE = re.compile(r"-?\d+")
 
 
 def joined_sizes(words: Sequence[str]) -> list[str]:
-    """Joins the two numbers of a size in a command line, so that both spellings are one word.
+    """Joins the two words of a size such as "640 480" in a command line into one word.
 
     >>> joined_sizes(["--size", "640", "360", "a.usd"])
     ['--size', '640x360', 'a.usd']

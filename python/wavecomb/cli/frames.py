@@ -23,7 +23,8 @@ def render_sequence(job: Job) -> tuple[Done | None, list[str]]:
         The result of the last frame, and all files that were written.
 
     Raises:
-        WavecombError: A frame failed. The message names the frame; earlier frames are written.
+        WavecombError: A frame failed. A frame cannot be rendered. The message names the frame;
+            earlier frames are written.
         click.exceptions.Exit: The user stopped the render; completed frames are written.
     """
     frames = wanted = job.frames or ()

@@ -38,7 +38,7 @@ class Still:
     """A stage at one frame, as the source of one image."""
 
     def __init__(self, job: Job, kept: Any = None) -> None:
-        """Creates the source. Holds ``kept`` until the stage is loaded."""
+        """Creates the source. The object holds ``kept`` until the stage is loaded."""
         self._renderer: Any = None
         self._kept = kept
         self._job = job
@@ -59,7 +59,7 @@ class Still:
     def render(self, *arguments: Any, **named: Any) -> Any:
         """Renders the scene, and frees the renderer's data afterwards.
 
-        Takes the arguments of ``_core.render`` after the scene.
+        The arguments are those of ``_core.render`` after the scene.
         """
         from wavecomb import _core
 
@@ -204,7 +204,7 @@ class Job:
     def _run_bands(self, shot: Shot, loaded: LoadedStage, rows: int, keeps_stopped: bool) -> Done:
         """Renders an image in bands and writes each one.
 
-        If stopped, fills the rest with empty bands.
+        After a stop, the remaining bands of the image are written empty.
         """
         options = self.options
         settings, height = self.settings.to_dict(), image_size(self.settings)[1]
@@ -348,7 +348,7 @@ def _any_samples(parts: list[dict[str, Any]]) -> bool:
 def how_far(done: Done) -> str:
     """Returns a phrase for the progress of a render.
 
-    This is a percentage, or the samples per pixel if the number of samples is not fixed.
+    The phrase is a percentage, or the samples per pixel if the number of samples is not fixed.
     """
     settings = done.stats["settings"]
     mean = done.samples / rendered_pixels(settings)

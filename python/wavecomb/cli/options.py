@@ -150,7 +150,7 @@ class StageOptions:
 
     @classmethod
     def take(cls, options: dict[str, Any]) -> StageOptions:
-        """Removes these options from a command's arguments."""
+        """Removes the options of ``stage_options`` from a command's arguments."""
         return cls({row.key: options.pop(row.key) for row in rows().values()})
 
     def __getitem__(self, key: str) -> Any:
@@ -161,7 +161,7 @@ class StageOptions:
         return dict(self.values)
 
     def completed(self, before: dict[str, Any]) -> StageOptions:
-        """Takes options that were not given from an earlier render."""
+        """Sets options that the user did not give to their values in an earlier render."""
         values: dict[str, Any] = {}
         for row in rows().values():
             key, mine, other = row.key, self.values[row.key], before.get(row.key)

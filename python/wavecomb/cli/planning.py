@@ -38,7 +38,8 @@ class Prepared:
         options: Options, with the frame of a single image filled into the file names.
         resumed: Checkpoint that the render continues, or None.
         jobs: A job for each render product.
-        opened: Held until the stage is loaded, so that USD reads its layers only once.
+        opened: The open stage, held until the stage is loaded, so that USD reads its layers only
+            once.
     """
 
     options: RenderOptions
@@ -103,7 +104,7 @@ def prepare(options: RenderOptions) -> Prepared:
 def _with_frame(options: RenderOptions) -> RenderOptions:
     """Fills the frame into the file names of a single image.
 
-    The frame is the one of --frame, else of the resumed checkpoint, else the first of the stage.
+    The frame comes from --frame, else from the resumed checkpoint, else it is the stage's first.
     """
     names = [name for name in (getattr(options, field) for field in NAMED) if name is not None]
     if options.frames is not None or not any(map(has_place, names)):

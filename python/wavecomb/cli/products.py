@@ -37,7 +37,7 @@ class Product:
         options: Options of the command, with the image's file names and render product.
         frames: Frames of a sequence; None for a single image.
         folder: Folder that the image must stay in if the stage chose its name; None if the user
-            did.
+            chose the name.
     """
 
     choice: ProductSettings
@@ -74,7 +74,7 @@ class Product:
         size = asked.of((width, height)) if isinstance(asked, Percent) else asked
         if "region" not in chosen and not resumed and (region := self.choice.region(*size)):
             chosen["region"] = region
-            chosen["crop"] = True  # the data window of the files is the one that the stage defines
+            chosen["crop"] = True  # the files keep the data window that the stage defines
 
         options = self.options
         fits = partial(
@@ -204,7 +204,7 @@ def checked_frames(
 
     Args:
         options: Options with the file names.
-        product: The render product that names the image; None if the user does.
+        product: The render product that names the image; None if the user names the image.
 
     Raises:
         WavecombError: Options contradict each other, or a file cannot be written.

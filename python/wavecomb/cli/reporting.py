@@ -65,7 +65,7 @@ class Summary(Reporter):
         self._frame = self._place = ""
 
     def loading(self, stage: str) -> contextlib.AbstractContextManager[LoadProgress | None]:
-        """Shows the file name, with a bar for large stages."""
+        """Shows the name of the stage that is loading, with a bar for large stages."""
         if self._console is None:
             return super().loading(stage)
         return loading_bar(self._console, f"{self._place}loading {os.path.basename(stage)}")

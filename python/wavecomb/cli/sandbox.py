@@ -22,7 +22,7 @@ def enter_to_render(
     Args:
         options: Options of the command.
         further: More files to write, with placeholders for the frame.
-        gpu: Whether denoising may use GPU devices; None means by the options.
+        gpu: Whether denoising may use GPU devices; None means: if the options ask for denoising.
     """
     from wavecomb.run.isolation.outputs import Outputs
     from wavecomb.run.isolation.supervisor import enter
@@ -77,7 +77,7 @@ def enter_to_read(outputs: Iterable[str | None], *, split: str | None = None) ->
 
     Args:
         outputs: Files to write.
-        split: One of these that may become a file for each layer.
+        split: Output file that may become a file for each layer.
     """
     from wavecomb.run.isolation.outputs import Outputs
     from wavecomb.run.isolation.supervisor import enter

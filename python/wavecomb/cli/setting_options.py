@@ -60,7 +60,7 @@ def setting_options(only: Iterable[str] | None = None) -> Callable[[F], F]:
 
 def _option(row: Setting) -> click.Option:
     """Returns the option of a setting."""
-    # The core checks ranges. The command line only rejects negative numbers, and 0 if it is
+    # The core checks ranges. The command line only rejects negative numbers, and 0 where 0 is
     # invalid.
     return row_option(
         [row.option, row.name],
@@ -113,7 +113,7 @@ class Real(click.ParamType):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> float:
-        """Converts text to a float. Fails with a message that states the bound."""
+        """Converts text to a float. The message of an invalid value states the bound."""
         try:
             number = float(value)
         except ValueError:
@@ -128,7 +128,7 @@ class Real(click.ParamType):
 
 @dataclass(frozen=True)
 class Percent:
-    """Size relative to another one."""
+    """Image size relative to another size, such as 50%."""
 
     value: float
 
@@ -177,7 +177,7 @@ class SizeType(click.ParamType):
 
 
 def _first_integer(least: float, above: bool) -> int | None:
-    """Returns the smallest valid integer, None without a limit."""
+    """Returns the smallest integer that a setting accepts, or None without a limit."""
     bound = _bound(least)
     return bound + 1 if above and bound is not None else bound
 
@@ -201,7 +201,7 @@ def row_option(
 ) -> click.Option:
     """Returns the option of a table row.
 
-    Its value is None, or () with ``many``, if it is not given.
+    An option that is not given has the value None, or () with ``many``.
 
     Args:
         names: "--option", and the name of the argument.
@@ -273,7 +273,7 @@ def option(usage: str, kind: str | click.ParamType, text: str, **more: Any) -> C
 def declared(usage: str, kind: str | click.ParamType, text: str, **more: Any) -> Any:
     """Returns a field of a dataclass of options; the arguments are those of ``option``.
 
-    The field's name is that of the command's argument.
+    The field and the argument of the command have the same name.
     """
     return field(metadata={"option": (usage, kind, text, more)})
 

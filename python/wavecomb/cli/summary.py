@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from wavecomb.usd import LoadReport
 
 MOST_MATERIALS = 6
-"""Rows of the table of materials. The statistics file has all materials."""
+"""Number of rows of the table of materials. The statistics file has all materials."""
 
 MOST_DEPTHS = 8
 MOST_LIGHTS = 5

@@ -36,7 +36,7 @@ class NarrowBorder(WavecombError):
     """Error that adaptive tiles had too narrow borders and must be rendered again.
 
     Attributes:
-        passes: Largest number of passes that a tile took.
+        passes: Largest number of render passes that any tile took.
     """
 
     def __init__(self, message: str, passes: int) -> None:
@@ -192,7 +192,7 @@ def is_finished(folder: Folder, image: int, *, quick: bool = False) -> bool:
     Args:
         folder: Folder of the job.
         image: Index of the image.
-        quick: Checks only that the files exist, not their hashes.
+        quick: Whether to check only that the files exist, without their hashes.
     """
     job = folder.job
     try:
@@ -260,7 +260,7 @@ def finish_image(folder: Folder, image: int, machine: str, threads: int = 0) -> 
         return {"again": again, "checks": error.passes + _MORE_CHECKS}
     except InvalidTile:
         if is_finished(folder, image):
-            return {"files": []}  # another client finished it and removed the tiles
+            return {"files": []}  # another client finished the image and removed its tiles
         again = [
             task.tile
             for task, tile in tasks

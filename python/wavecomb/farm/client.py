@@ -52,7 +52,7 @@ class Run:
         warn: Callable[[str], None],
         is_stopped: Callable[[], bool],
     ) -> None:
-        """Takes the arguments of ``run``."""
+        """Creates a run; the arguments are those of ``run``."""
         self._folder, self._job, self._cluster = folder, folder.job, cluster
         self._out = outcome
         self._show, self._warn, self._is_stopped = show, warn, is_stopped
@@ -126,7 +126,7 @@ class Run:
 
     def _choose_machine(self, images: list[int]) -> str:
         """Chooses the machine class of this run: most finished tiles first, then most workers."""
-        # lets workers that start together all register
+        # waits until workers that start together have all registered
         time.sleep(_TURN_S if self._cluster.wait_s else 0.0)
         self._workers.query(0.0)
         found = self._workers.classes()
@@ -181,8 +181,8 @@ class Run:
     def _retry_waiting(self) -> None:
         """Makes the scheduler look again for workers for tasks that had none.
 
-        Dask does this when a worker joins. At that moment the worker has no resource yet, because
-        it announces its machine class a little later.
+        Dask does this when a worker joins. A new worker has no resource at that moment, because it
+        announces its machine class a little later.
         """
         from wavecomb.farm.tasks import retry_unrunnable
 
@@ -254,7 +254,7 @@ class Run:
         """
         result = None
         if future.status == "finished":
-            with contextlib.suppress(Exception):  # _take handles the error by the status
+            with contextlib.suppress(Exception):  # _take reads the error from the status
                 result = future.result()
         self._ended.put((future, result))
 
@@ -304,7 +304,7 @@ class Run:
             line = f"its worker ended {self._job.tries} times: a crash, or too little memory"
         else:
             line = " ".join(str(error).split()) or type(error).__name__
-        if len(batch.tiles) > 1:  # other tiles of the batch may succeed
+        if len(batch.tiles) > 1:  # the other tiles of the batch may still succeed
             self._again(batch.tiles)
         elif batch.tiles:
             one = batch.tiles[0]
@@ -386,7 +386,7 @@ def run(
         try:
             at_work.work(left)
         except (OSError, RuntimeError, TimeoutError) as error:
-            cluster.check(False)  # raises a clearer error if the scheduler is gone
+            cluster.check(False)  # check raises a clearer error if the scheduler is gone
             raise WavecombError(f"{cluster.what}: {' '.join(str(error).split())}") from error
         outcome.stopped = outcome.stopped or is_stopped()
     return outcome

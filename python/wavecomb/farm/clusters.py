@@ -119,7 +119,7 @@ class Cluster:
     """Time to wait for the first worker, in seconds; None means no limit."""
 
     def __init__(self, client: Any, what: str) -> None:
-        """Creates the connection. ``what`` names the cluster in messages."""
+        """Creates the connection. The argument ``what`` is the name of the cluster in messages."""
         self.client = client
         self.what = what
 
@@ -214,7 +214,7 @@ class _LocalWorkers(Cluster):
 
 
 class _SlurmWorkers(Cluster):
-    """Array of Slurm jobs, one for each worker. Replaces workers that end."""
+    """Array of Slurm jobs, one for each worker. Workers that end are replaced."""
 
     wait_s = None
 
@@ -250,7 +250,7 @@ class _SlurmWorkers(Cluster):
             there = len(_ask("squeue", "--noheader", "--array", "--jobs", ids).split("\n")) - 1
         except WavecombError as error:
             if "Invalid job id" not in str(error):
-                return  # the next call of check asks again
+                return  # the next call of check queries Slurm again
             there = 0
         if there >= self._count:
             return

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Folder of a farm job.
 
-It holds ``job.json``, ``parts/IMAGE/TILE.exr`` for each rendered tile of an unfinished image, and
-``images/IMAGE.json`` for each finished image. The files of the job's folder are the only record of
-progress.
+The folder holds ``job.json``, ``parts/IMAGE/TILE.exr`` for each rendered tile of an unfinished
+image, and ``images/IMAGE.json`` for each finished image. The files of the job's folder are the only
+record of progress.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Folder:
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        """Reads the job. Raises WavecombError if the folder holds none."""
+        """Reads the job. Raises WavecombError if the folder holds no job."""
         self.path = Path(os.path.abspath(path))
         file = self.path / JOB_FILE
         try:
@@ -83,7 +83,7 @@ class Folder:
     def learned(self) -> bytes | None:
         """Returns the guiding field for all images, or None.
 
-        Raises WavecombError if it is damaged.
+        Raises WavecombError if the file of the field is damaged.
         """
         if self.job.learned is None:
             return None

@@ -106,7 +106,8 @@ class Job:
         tries: Number of attempts for each task.
         hang_s: Time in seconds without progress after which a worker is restarted.
         strict: Whether a missing file is an error.
-        maps: Pairs of folders. Machines without the first look for its files in the second.
+        maps: Pairs of folders. Machines without the first folder of a pair look for its files in
+            the second.
         isa: Instruction set that all workers must use; None allows any, but the same for all.
         version: Version of Wavecomb.
     """
@@ -249,8 +250,8 @@ class Job:
         """Reads a job from parsed JSON.
 
         Raises:
-            WavecombError: It is not a job, has another format, or is damaged. The message begins
-                with ``name``.
+            WavecombError: The JSON is not a job, has another format, or is damaged. The message
+                begins with ``name``.
         """
         if not isinstance(value, Mapping) or value.get("kind") != KIND:
             raise WavecombError(f"{name}: is not a job of `wavecomb farm submit`")

@@ -28,8 +28,8 @@ _OTHERS = re.compile(r"/(?!wavecomb\.)[^/]+\.libs/[^/]*$")
 def machine_class() -> str:
     """Returns the class of this machine.
 
-    It consists of the instruction set and a hash of everything that affects results, and is also
-    the name of a Dask resource.
+    The class consists of the instruction set and a hash of everything that affects results, and is
+    also the name of a Dask resource.
     """
     from wavecomb import _core
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Export of jobs as templates of Open Job Description, built with its data model.
 
-File names of the job become values of template parameters. The scheduler never expands them, so
-braces and line breaks in file names are safe.
+File names of the job become values of template parameters. The scheduler never expands braces in
+parameter values, so braces and line breaks in file names are safe.
 """
 
 from __future__ import annotations

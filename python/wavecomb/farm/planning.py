@@ -22,7 +22,7 @@ from wavecomb.farm.tiling import (
 )
 
 _UNKNOWN_WORKERS = 4
-"""Number of workers assumed if it is unknown."""
+"""Number of workers assumed if the real number is unknown."""
 
 
 def default_folder(output: str | None, stage: str, output_dir: str | None = None) -> str:
@@ -46,7 +46,7 @@ def complete(
 
     Args:
         job: The job.
-        tiles: Columns and rows; None chooses them here.
+        tiles: Columns and rows; None means that this function chooses them.
         workers: Expected number of workers; 0 means unknown.
         learned: Guiding field for all images, or None.
 

@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from wavecomb.usd import LoadedStage
 
 _ABSENT = re.compile(r"(texture|MaterialX file|IES profile) .* cannot be read|cannot open layer")
-"""Warnings about missing files of the stage."""
+"""Pattern of warnings about missing files of the stage."""
 _MAX_NAMED = 3
 
 
 class Stopped(Exception):
-    """Exception that the render was cancelled."""
+    """Exception raised when a render was cancelled."""
 
 
 class Renderer:
@@ -182,7 +182,8 @@ class Renderer:
     def _empty(self, task: Task, shot: Shot, frames: Frames, picture: Picture) -> Picture | None:
         """Renders an image whose last pixel has no samples.
 
-        Returns None if the whole image has no such pixels, or for all tiles but the first.
+        The result is None if no pixel of the whole image lacks samples, and for all tiles but the
+        first.
         """
         cropped = shot.settings.get("region") is None or shot.settings.get("crop")
         if cropped or task.tile != 0:
@@ -198,7 +199,8 @@ class Renderer:
 def error_checks_for(shot: Shot, checks: int = 0) -> int:
     """Returns the number of error checks that borders allow for.
 
-    This is ``checks`` or, if that is 0, a likely number. Renders that are not adaptive need 0.
+    The number is ``checks`` or, if ``checks`` is 0, a likely number. Renders that are not adaptive
+    need no error checks.
     """
     if not shot.is_adaptive:
         return 0
@@ -211,7 +213,7 @@ def list_files(
     """Lists all files that a stage needs, with hashes.
 
     Returns:
-        The files, and a line for each missing one.
+        The files, and a line for each missing file.
 
     Raises:
         WavecombError: The stage cannot be opened.

@@ -32,7 +32,7 @@ _own_maps = os.environ.get(VARIABLE)
 _kept: Any = None
 """Id, ``Renderer`` and folder of the job that this process worked on last."""
 _current: Any = None
-"""Dask's worker and the key of the current task. Other threads than the task's read them."""
+"""Dask's worker and the key of the current task. Threads other than the task's read this value."""
 _read: dict[str, str] = {}
 """SHA-256 of each stage file that this process has read and USD may have cached."""
 
@@ -112,7 +112,7 @@ def retry_unrunnable(dask_scheduler: Any) -> None:
     """Makes a scheduler look again for workers for tasks that had none.
 
     Args:
-        dask_scheduler: The scheduler. This function runs in its process.
+        dask_scheduler: The scheduler. The function runs in the process of the scheduler.
     """
     waiting = {task.key: "waiting" for task in dask_scheduler.unrunnable}
     if waiting:
@@ -211,7 +211,7 @@ def restart_stale(client: Any, cluster: str, job: Any) -> None:
         job: The job.
 
     Raises:
-        WavecombError: Such a worker cannot be restarted.
+        WavecombError: A worker that has read other versions cannot be restarted.
     """
     files = [(one.path, one.sha256) for one in job.files]
     maps = [list(pair) for pair in job.maps]
@@ -269,7 +269,7 @@ def _folder(folder: str, maps: list[Pair], job: str) -> Any:
 
 
 def _renderer(folder: str, maps: list[Pair], job: str) -> Any:
-    """Returns the renderer and folder of a job. Reuses the last ones for the same job."""
+    """Returns the renderer and folder of a job. The last renderer is reused for the same job."""
     global _kept
     if _kept is not None and _kept[0] == job:
         return _kept[1:]

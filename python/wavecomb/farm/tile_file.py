@@ -36,7 +36,7 @@ AOV = "aov."
 _KEY, _FACTS, _CHECKSUM = (f"wavecomb:part_{name}" for name in ("key", "facts", "checksum"))
 _EXACT = 1 << 24
 """Largest integer up to which all integers are exact as 32-bit floats. ``MAX_SPP`` does not exceed
-it."""
+this number."""
 
 
 class InvalidTile(WavecombError):
@@ -95,9 +95,9 @@ def layers_of(picture: Picture) -> dict[str, NDArray[Any]]:
 def replacing_quickly(path: Path) -> Iterator[Path]:
     """Yields a temporary name beside ``path``, and renames it to ``path`` at the end.
 
-    Unlike ``output_file.replacing`` it does not search the folder for leftovers of killed
-    processes, which is slow in folders with many files. The whole folder is removed when its image
-    is finished.
+    Unlike ``output_file.replacing``, this function does not search the folder for leftovers of
+    killed processes, which is slow in folders with many files. The whole folder is removed when its
+    image is finished.
     """
     if not path.parent.is_dir():
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -48,7 +48,7 @@ def parse_tiles(text: str) -> tuple[int, int] | None:
     """Parses columns and rows such as "4x3"; returns None for "auto".
 
     Raises:
-        WavecombError: The text is neither.
+        WavecombError: The text is neither columns and rows nor "auto".
     """
     if text == "auto":
         return None
@@ -100,7 +100,7 @@ def choose_tiles(
 ) -> tuple[int, int]:
     """Returns columns and rows for ``--tiles auto``.
 
-    Images stay whole if there are at least two for each worker.
+    Images stay whole if there are at least two images for each worker.
 
     Args:
         regions: Regions of the images, each size once.
@@ -138,7 +138,7 @@ def error_checks(settings: Mapping[str, Any]) -> int:
 def max_error_checks(settings: Mapping[str, Any]) -> int:
     """Returns the number of error checks that the border of an adaptive tile allows for.
 
-    It is 4 more than ``error_checks``, because pixels that resume late take further checks.
+    The number is 4 more than ``error_checks``, because pixels that resume late take further checks.
     """
     return error_checks(settings) + 4
 
@@ -196,7 +196,7 @@ def needs_whole(settings: Mapping[str, Any]) -> str:
 def is_better_whole(settings: Mapping[str, Any], has_guiding_field: bool = False) -> bool:
     """Returns whether each tile has a high cost in addition to its pixels.
 
-    This is the case for a border, for training a guiding field, and for tracing all light paths.
+    A border, training of a guiding field, and tracing of all light paths have such a cost.
     ``has_guiding_field`` says that the guiding field is already trained.
     """
     learns = settings.get("guiding", "off") != "off" or settings.get("roulette") == "efficient"

@@ -34,8 +34,8 @@ def map_directions(
     Args:
         up: Unit vector of the map's top row.
         ahead: Direction of the map's centre column; any direction.
-        height: Number of rows. There are twice as many columns; image right is to the right of
-            ``ahead``.
+        height: Number of rows. The map has 2 height columns; its right half shows directions to the
+            right of ``ahead``.
 
     Returns:
         (height, 2 height, 3) vectors, and a (3, 3) matrix with the rows ahead, right and up.

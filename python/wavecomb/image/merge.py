@@ -22,13 +22,13 @@ from wavecomb.run.aovs import of_kind
 SQUARED = ("variance",)
 """Layers with variances of means, which are combined with squared weights."""
 SPREAD = ("error",)
-"""Layers with standard errors, the square roots of such variances."""
+"""Layers with standard errors, the square roots of the variances of means."""
 _HITS = "_hits "
 """Prefix of internal layers that count the samples with a hit, for means over hits."""
 
 
 def _sums() -> tuple[str, ...]:
-    """Returns the layers that are summed."""
+    """Returns the layers whose pixels are summed over all images."""
     return ("samples", *of_kind("sum"))
 
 

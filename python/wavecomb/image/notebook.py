@@ -123,7 +123,7 @@ def _layer(name: str, array: NDArray[Any]) -> str:
 def facts(picture: Rendered) -> str:
     """Returns a one-line summary of the image.
 
-    It lists the size, samples, render time, and whether the render was stopped.
+    The summary lists the size, samples, render time, and whether the render was stopped.
     """
     height, width = picture.beauty.shape[:2]
     parts = [f"{width} x {height}", samples_text(picture.samples)]

@@ -54,7 +54,7 @@ def sequence_page(
 ) -> str:  # fmt: skip
     """Returns a page that plays images, with a contact sheet of all images below.
 
-    Without JavaScript it shows only the sheet.
+    Without JavaScript the page shows only the contact sheet.
 
     Args:
         pictures: Name -> file, in order.

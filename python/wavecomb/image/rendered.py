@@ -113,7 +113,7 @@ class Picture:
         """Returns the image with the layer ``denoised`` (Open Image Denoise); beauty is unchanged.
 
         The AOVs guide_albedo and guide_normal guide the denoiser, or albedo and normal if the image
-        lacks them. The former describe the surfaces that mirrors and clear glass show.
+        lacks them. The guide AOVs describe the surfaces that mirrors and clear glass show.
 
         Raises:
             WavecombError: The extra ``denoise`` or an AOV is missing.
@@ -253,7 +253,7 @@ class Picture:
     def window(self) -> tuple[int, int, int, int] | None:
         """Returns the position of the pixels for ``write_exr``.
 
-        Returns None if they are the displayed image.
+        The result is None if the pixels are exactly the displayed image.
         """
         return window_of(self.stats.get("settings", {}))
 
@@ -326,7 +326,7 @@ def in_world(
 def window_of(settings: Mapping[str, Any]) -> tuple[int, int, int, int] | None:
     """Returns column and row of the first pixel in the displayed image, and the size of that image.
 
-    Returns None without crop and overscan, since the pixels then are the displayed image.
+    The result is None without crop and overscan, since the pixels then are the displayed image.
     """
     is_cropped = settings.get("crop") and settings.get("region") is not None
     beyond = int(settings.get("overscan", 0))

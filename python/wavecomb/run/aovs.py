@@ -30,10 +30,11 @@ class Aov:
 
     Attributes:
         name: Name for ``--aov`` and of the layer.
-        channels: Number of channels of its layer; 0 if it has no numeric layer or several layers.
-        letters: Names of its channels in files, such as "XYZ"; "" for numbers or a single channel.
-        content: Meaning of its numbers: "light", "colour", "direction", "id", "exact" (data that
-            lossy compression would make useless) or "value".
+        channels: Number of channels of the AOV's layer; 0 for no numeric layer or several layers.
+        letters: Names of the AOV's channels in files, such as "XYZ"; "" for numbers or a single
+            channel.
+        content: Meaning of the AOV's numbers: "light", "colour", "direction", "id", "exact" (data
+            that lossy compression would make useless) or "value".
         kind: How samples are combined per pixel: "mean", "mean_of_hits", "nearest", "coverage",
             "groups", "sum" or "median".
         title: Title in the window; "" if the window does not offer the layer.
@@ -103,7 +104,7 @@ def layer_order() -> tuple[str, ...]:
 
 @cache
 def of_kind(kind: str) -> tuple[str, ...]:
-    """Returns names of AOVs whose samples are combined in this way.
+    """Returns names of AOVs whose samples are combined in a given way (``Aov.kind``).
 
     >>> of_kind("coverage")
     ('crypto_object', 'crypto_material', 'crypto_asset')

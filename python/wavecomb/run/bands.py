@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from wavecomb.run.callbacks import Reporter, Status
 
 STEP = 64
-"""Band heights are multiples of this, or of the tile height."""
+"""Band heights are multiples of this number of rows, or of the tile height."""
 _ADDED = ("samples_done", "rays", "seconds")
 """Status entries to which the values of earlier bands are added."""
 _SECONDS = ("render", "build", "denoise")
@@ -215,7 +215,7 @@ def sum_stats(bands: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -
 def _mean(parts: Sequence[Any], weights: Sequence[float]) -> Any:
     """Averages floats with weights, also inside mappings.
 
-    Takes other values from the first band.
+    Values other than floats come from the first band.
     """
     first = parts[0]
     if isinstance(first, Mapping):

@@ -39,7 +39,7 @@ def load_costs(path: str | os.PathLike[str]) -> Profile:
 
 
 def check_costs(profile: Mapping[str, Any], name: str = "costs") -> Profile:
-    """Returns the profile with plain floats.
+    """Returns a cost profile whose numbers are plain floats.
 
     Raises:
         WavecombError: The structure or a number is invalid.

@@ -12,7 +12,7 @@ from types import MappingProxyType
 PREFIX = "lpe:"
 """Prefix of light path expressions among AOVs."""
 LAYER = "lpe_"
-"""Prefix of their layer names."""
+"""Prefix of the layer names of light path expressions."""
 
 _ANY_LIGHT = "[LO]"
 NAMED = MappingProxyType(

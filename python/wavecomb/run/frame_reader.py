@@ -122,7 +122,7 @@ class FrameReader:
             return CameraUpdate(None, before.camera_path, before.shutter, before.render, number)
         origin = find_origin(self._stage, when, settings.camera, settings.purposes)
         if origin != before.origin:
-            # The scene would be built around another point.
+            # With another origin, the scene would have to be built anew.
             return None
         to_world = np.array(UsdGeom.XformCache(when).GetLocalToWorldTransform(settings.camera))
         to_world = to_scene_space(to_world, origin)

@@ -68,7 +68,7 @@ class View(Protocol):
     """Interface of a live view in a notebook."""
 
     def bar(self, share: float, text: str) -> None:
-        """Shows the completed fraction, from 0 to 1, and figures."""
+        """Shows the completed fraction of the render, from 0 to 1, and figures such as rates."""
 
     def picture(self, png: bytes) -> None:
         """Shows the current image."""

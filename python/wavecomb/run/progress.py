@@ -87,7 +87,8 @@ def keep_interrupts() -> None:
     """Records Ctrl-C signals, so that the next ``Interrupt`` handles those that were lost.
 
     ``KeyboardInterrupt`` is lost if it is raised in a callback of a library that prints exceptions
-    and continues. Use this in commands, which such an exception ends, but not in a window.
+    and continues. Use this function in commands, which a ``KeyboardInterrupt`` ends, but not in a
+    window.
     """
 
     def note(number: int, frame: FrameType | None) -> None:
@@ -149,7 +150,7 @@ class Interrupt:
 def progress_console(*, quiet: bool = False) -> Console | None:
     """Returns the console for progress (standard error), or None if it is not visible.
 
-    Rich decides whether it is a terminal. It is loaded only if standard error is a terminal or an
+    Rich decides whether it is a terminal. Rich is loaded only if standard error is a terminal or an
     environment variable that Rich respects claims so.
     """
     is_terminal = sys.stderr is not None and sys.stderr.isatty()
@@ -180,7 +181,7 @@ def figures(status: Mapping[str, Any], columns: int = 200) -> list[str]:
 
     Args:
         status: Values of ``Snapshot.status`` in _core.pyi.
-        columns: Space for them; those that do not fit are left out.
+        columns: Width available for the figures; figures that do not fit are left out.
     """
     rates = speed(status)
     said = []
@@ -214,14 +215,14 @@ def bar_width(columns: int) -> int:
 class ProgressBar(Silent):
     """Progress bar with passes, samples and rays per second, error and time left.
 
-    Use as a context manager.
+    The bar is a context manager.
     """
 
     def __init__(self, console: Console, title: str = "rendering") -> None:
         from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
         width = bar_width(console.width)
-        # The title, the bar and the percentage, each with a space.
+        # The fixed width is that of the title, the bar and the percentage, each with a space.
         self._space = console.width - (len(title) + 1) - (width + 1) - 5
         self._bar = Progress(
             TextColumn(title, markup=False),

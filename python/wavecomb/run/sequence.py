@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 class Frames:
     """Frames of an open stage; each image is bit-identical to that of a separate render.
 
-    If only views change, keeps the scene with its acceleration structures and reads the camera.
-    Otherwise traverses the stage again, but reuses unchanged meshes and textures of the previous
-    frame.
+    If only views change, this class keeps the scene with its acceleration structures and reads the
+    camera. Otherwise it traverses the stage again, but reuses unchanged meshes and textures of the
+    previous frame.
 
     Contract: files of the stage must not change, except images.
     """
@@ -82,8 +82,8 @@ class Frames:
         self._caught = options.catch
         loaded = self._with_camera(options) if is_same else None
         if loaded is None:
-            # Release these first, since two sets of acceleration structures would double the
-            # memory.
+            # Release the old structures first, since two sets of acceleration structures would
+            # double the memory.
             self._renderer, self._loaded = None, None
             loaded = self._reader.read(options, progress=progress)
         seconds = time.perf_counter() - started + self._opening_s
@@ -94,7 +94,7 @@ class Frames:
     def _with_camera(self, options: LoadOptions) -> LoadedStage | None:
         """Returns the current scene with its camera at a frame.
 
-        Returns None if more than the camera changes.
+        The result is None if more than the camera changes.
         """
         before, renderer = self._loaded, self._renderer
         assert before is not None and renderer is not None

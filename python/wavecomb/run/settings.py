@@ -64,8 +64,8 @@ def prepare(
 def check_options(size: tuple[int, int] | None, spp: int, settings: Mapping[str, Any]) -> None:
     """Raises an error for settings that are invalid for every stage.
 
-    Call this before a stage is opened. ``make_settings`` checks regions and memory once the image
-    size is known.
+    This function is called before a stage is opened. ``make_settings`` checks regions and memory
+    once the image size is known.
 
     Args:
         size: Width and height; None if the stage defines them.

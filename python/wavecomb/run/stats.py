@@ -54,8 +54,8 @@ def make_stats(
     ``resumed_s`` is the render time before this run continued from a checkpoint. Without
     ``is_built`` the acceleration structures already existed, so that their build time is 0.
 
-    Every key of the schema exists; figures that the core does not provide are 0. Additional values
-    of the core are included.
+    Every key of the schema exists; figures that the core does not provide are 0. Values of the core
+    that the schema lacks are included.
     """
     core = dict(result.stats)
     seconds = dict(core.pop("seconds", {}))
@@ -140,8 +140,8 @@ def rendered_pixels(settings: Mapping[str, Any]) -> int:
 def sort_overhead(phases: Mapping[str, float]) -> float:
     """Returns the fraction of ordered shading time that was spent on sorting.
 
-    This is (keys + sort + materialize) / (keys + sort + materialize + shade); 0 if nothing was
-    shaded.
+    The fraction is (keys + sort + materialize) / (keys + sort + materialize + shade); 0 if nothing
+    was shaded.
 
     >>> sort_overhead({"keys": 1.0, "sort": 2.0, "materialize": 0.0, "shade": 27.0})
     0.1
@@ -182,7 +182,7 @@ def image_metadata(stats: Mapping[str, Any]) -> dict[str, Any]:
     if stats.get("settings"):
         metadata["wavecomb:settings"] = json.dumps(plain(stats["settings"]), sort_keys=True)
     if "seconds" in stats:
-        # This is the time of all runs of a resumed render.
+        # The render time is that of all runs of a resumed render.
         seconds = stats["seconds"]
         rendered = seconds.get("render", 0.0) + seconds.get("resumed", 0.0)
         metadata["wavecomb:render_seconds"] = float(rendered)

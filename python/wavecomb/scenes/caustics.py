@@ -86,7 +86,7 @@ LENS_FOCUS, _LENS_RADIUS = 2.0, 0.9
 so its image is equally far on the other side, and of equal size."""
 
 _LAND = 100.0
-"""Half extent of the landscape along x and z. The ring in it has radius 1."""
+"""Half extent of the landscape along x and z; the ring in the landscape has radius 1."""
 _HILL = 6.0
 
 
@@ -154,8 +154,8 @@ def build_pool(writer: StageWriter, options: SceneOptions) -> None:
     """Builds a pool with waves in the sun, seen from under water.
 
     Seen from above, light on the floor would refract at the water twice, once on its way from the
-    sun and once towards the camera. Neither camera paths nor light paths can sample such a
-    connection.
+    sun and once towards the camera. Neither camera paths nor light paths can sample a connection
+    through two refractions.
     """
     writer.material("Stone", materials.diffuse((0.55, 0.53, 0.50)))
     writer.material("Tiles", materials.diffuse((0.35, 0.62, 0.68)))

@@ -69,8 +69,8 @@ _KINDS: tuple[dict[str, float | tuple[float, float]], ...] = (
     },
 )
 """Inputs of OpenPBR surfaces: paint, metal, lacquer, cloth, thin film, glass, and all lobes. The
-materials use these kinds in turn, after a diffuse UsdPreviewSurface. A pair is a range for a random
-value."""
+materials use these kinds of surface in turn, after a diffuse UsdPreviewSurface. A pair is a range
+for a random value."""
 
 
 def _inputs(kind: dict[str, float | tuple[float, float]], rng: np.random.Generator) -> Inputs:

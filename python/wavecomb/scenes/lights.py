@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stages for measuring light selection: a street at night, and a studio.
 
-The street has a chosen number of lights. Its length and total power do not depend on that number;
-with more lights, each is smaller. The lights are of five kinds in turn, and their powers differ by
-a factor of up to 100:
+The street has a chosen number of lights. The length and total power of the street do not depend on
+the number of lights; with more lights, each is smaller. The lights are of five kinds in turn, and
+their powers differ by a factor of up to 100:
 
 - windows: rectangles on the facades, facing the street;
 - lamps: disks that emit downwards;

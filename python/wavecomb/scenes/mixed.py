@@ -56,7 +56,7 @@ _DRAGON_LOOKS: dict[str, MaterialInfo] = {
 
 
 def _dealt(names: list[str], count: int, rng: np.random.Generator) -> list[str]:
-    """Returns ``count`` names in random order, each equally often."""
+    """Returns ``count`` of the given names in random order, each name equally often."""
     dealt: list[str] = []
     while len(dealt) < count:
         dealt += [names[k] for k in rng.permutation(len(names))]

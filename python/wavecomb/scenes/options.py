@@ -13,7 +13,7 @@ from wavecomb.scenes.models.mesh import Mesh
 
 @dataclass(frozen=True)
 class SceneOptions:
-    """Options of ``write_scene``. A scene ignores options that it has no use for.
+    """Options of ``write_scene``. A scene ignores options that do not apply to it.
 
     Attributes:
         dragon: OBJ, PLY or USD file that replaces the built-in dragon, or None.
@@ -35,8 +35,8 @@ class SceneOptions:
         strands: Number of strands in ``fur`` and ``head``.
         splats: Number of splats in ``splats``.
         capture: PLY file of 3D Gaussian splats that replaces the contents of ``splats``, or None.
-        capture_linear: Whether the capture's colours are linear. By default they are sRGB, in which
-            most captures are trained.
+        capture_linear: Whether the colours of the capture are linear. By default the colours of a
+            capture are sRGB, in which most captures are trained.
         voxels: Voxels along the longest edge of the grids of ``smoke`` and ``clouds``, at least 16.
         plain: Whether materials are written as by third-party exporters: UsdPreviewSurface in the
             metallic workflow, without a program. Plain materials are not available for ``heavy``,

@@ -57,7 +57,7 @@ def read_capture(path: Path) -> Splats:
     channel).
 
     Raises:
-        SceneError: The file is not such a capture.
+        SceneError: The file is not a capture of 3D Gaussian splatting.
     """
     try:
         columns = ply_vertices(path.read_bytes())

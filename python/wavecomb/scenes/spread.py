@@ -2,10 +2,10 @@
 """A field of stones whose materials, textures, triangles and shading cost can be set separately.
 
 The stage measures how a renderer scales. Each stone is a separate mesh, not an instance, so that
-triangles need memory. Materials are assigned at random, so that neighbours differ. Each material
-has a separate texture, over which the triangles of a stone are scattered like the charts of an
-atlas. Adjacent triangles thus read distant texels, and more visible triangles read more of the
-texture. Expensive materials multiply the texture by octaves of noise, in a network of MaterialX
+triangles need memory. Materials are assigned to stones at random, so that neighbours differ. Each
+material has a separate texture, over which the triangles of a stone are scattered like the charts
+of an atlas. Adjacent triangles thus read distant texels, and more visible triangles read more of
+the texture. Expensive materials multiply the texture by octaves of noise, in a network of MaterialX
 nodes.
 """
 
@@ -61,8 +61,8 @@ def _edge(options: SceneOptions) -> int:
 def octaves(options: SceneOptions, index: int) -> int:
     """Returns the octaves of noise on material ``index``.
 
-    They grow geometrically from 1 for the first material, which means no noise, to ``shader_cost``
-    for the last.
+    The octaves grow geometrically from 1 for the first material, which means no noise, to
+    ``shader_cost`` for the last.
     """
     share = index / (options.materials - 1) if options.materials > 1 else 1.0
     return round(options.shader_cost**share)

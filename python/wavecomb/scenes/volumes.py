@@ -105,7 +105,7 @@ def sampled(
 
 
 def _where(mask: NDArray[np.bool_], points: Points, of: Density) -> NDArray[np.float32]:
-    """Evaluates a function at the points of a mask; all other values are 0."""
+    """Evaluates a function at the points of a mask; the result is 0 at all other points."""
     found = np.zeros(len(points), np.float32)
     if mask.any():
         found[mask] = of(points[mask])
@@ -133,7 +133,7 @@ class _Volumes:
         net = Network(self._stage, f"/World/Looks/{name}")
 
         def coefficient(kind: str, value: Colour, field: str) -> Any:
-            """Returns an input: a value, times a field if one is named."""
+            """Returns a material input: a value, multiplied by a field if one is named."""
             if not field:
                 return kind, value
             reader = net.node("geompropvalue", "float", geomprop=("string", field))

@@ -27,7 +27,7 @@ SETTINGS = (
     *("wave_size", "policy", "roulette", "ray_order", "shadow_order", "max_depth"),
     *("factor", "factor_value"),
 )
-"""Settings of a run. Runs that agree in all of them are repetitions."""
+"""Settings of a run. Runs that agree in all of these columns are repetitions."""
 
 BASELINES = {
     "policy": "none",
@@ -47,7 +47,7 @@ POLICIES = (
 
 PLACEBO = "random-runs"
 BEST_FIRST = (BEST, COSTS)
-"""Oracles that the share of the possible gain refers to. The first one that was run is used."""
+"""Oracles that define the possible gain of an order; the first one that was run is used."""
 BOUNDS = (PLACEBO, *ORACLES)
 """Policies that are only bounds: they show how much an order can gain, but are of no practical
 use."""
@@ -100,8 +100,8 @@ def load(folder: Path) -> Results:
     """Reads a result folder.
 
     Raises:
-        WavecombError: It is not a result folder, or holds no successful run. The message names the
-            file.
+        WavecombError: The path is not a result folder, or the folder holds no successful run. The
+            message names the file.
     """
     pandas = needed("pandas", "the analysis")
     path = folder / "runs.csv"
@@ -157,7 +157,7 @@ def rounds(group: pd.DataFrame, by: str, metric: str) -> tuple[list[Any], NDArra
 
 
 def baseline_of(factor: str, levels: Sequence[Any]) -> Any:
-    """Returns the level that others are compared with, or None if it was not run."""
+    """Returns the baseline level of a factor, or None if the baseline was not run."""
     wanted = BASELINES.get(factor)
     if wanted is not None:
         return wanted if wanted in levels else None
@@ -203,7 +203,7 @@ def varying(cells: Sequence[dict[str, Any]]) -> list[str]:
     The value of a factor is included if nothing else distinguishes cells. A renderer may have used
     less than the suite requested, for example if a wave is larger than the image.
     """
-    # shown in the heading, or implied by another setting
+    # settings shown in the heading, or implied by another setting
     redundant = ("experiment", "height", "factor", "factor_value")
     names = [name for name in (*SETTINGS, "variant") if name not in redundant]
     differ = [n for n in names if len({str(cell.get(n, "")) for cell in cells}) > 1]
@@ -254,7 +254,8 @@ def short_count(value: float) -> str:
 def _without(config: str, varied: set[str], across: bool) -> str:
     """Returns the name of a configuration without the parts that name varied settings.
 
-    Also drops the first part, the experiment, if ``across`` groups runs of all experiments.
+    With ``across``, which groups runs of all experiments, the name of the experiment is dropped
+    too.
     """
     parts = config.split(".")[1 if across else 0 :]
     return ".".join(part for part in parts if not any(part.startswith(f"{v}-") for v in varied))

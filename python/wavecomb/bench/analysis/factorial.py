@@ -41,8 +41,8 @@ def effects(runs: pd.DataFrame, metric: str) -> pd.DataFrame:
 
         effect(F = l, G = m) = effect(F = l | G = m) / effect(F = l | G = its baseline)
 
-    over those combinations of the rest in which all four were run. If the suite is not a full
-    factorial, other differences must not count as interaction.
+    over those combinations of the remaining factors in which all four pairs of levels were run. If
+    the suite is not a full factorial, other differences must not count as interaction.
 
     T is the mean over rounds. Intervals resample rounds; p-values test the effects of single
     rounds, with Holm's correction over all effects of the table.

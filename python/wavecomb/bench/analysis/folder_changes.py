@@ -70,7 +70,7 @@ class FolderComparison:
         only_after: Configurations that are missing in BEFORE.
         pictures: Number of pairs of runs with equal configuration, seed and size that have an image
             in both folders.
-        pictures_different: Number of these whose images are not bit-identical.
+        pictures_different: Number of pairs of runs whose images are not bit-identical.
         warnings: Reasons to read the ratios with care.
     """
 
@@ -182,7 +182,7 @@ def _welch(a: NDArray[np.float64], b: NDArray[np.float64]) -> tuple[Estimate, fl
     n = min(len(a), len(b))
     if n < 2:
         return Estimate(value, math.nan, math.nan, n), 1.0
-    if max(np.ptp(log_a), np.ptp(log_b)) == 0.0:  # without spread the ratio is exact
+    if max(np.ptp(log_a), np.ptp(log_b)) == 0.0:  # runs without spread give an exact ratio
         return Estimate(value, value, value, n), 1.0 if value == 1.0 else 0.0
     test = stats.ttest_ind(log_b, log_a, equal_var=False)
     interval = test.confidence_interval(LEVEL)

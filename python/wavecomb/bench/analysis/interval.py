@@ -36,8 +36,8 @@ class Estimate:
 
     Attributes:
         value: Statistic of the means over all rounds.
-        low: Lower end; NaN if there are fewer than two rounds.
-        high: Upper end; NaN if there are fewer than two rounds.
+        low: Lower end of the interval; NaN if there are fewer than two rounds.
+        high: Upper end of the interval; NaN if there are fewer than two rounds.
         n: Number of rounds.
     """
 
@@ -60,10 +60,10 @@ def bootstrap(rounds: Array, statistic: Statistic, *, positive: bool = False) ->
     """Computes statistics of the columns' means with intervals, by resampling rows.
 
     Below ``MIN_ROUNDS_FOR_BOOTSTRAP`` rows the interval is value +- t(n - 1) times the jackknife's
-    standard error (Tukey 1958), of the logarithm if ``positive``. From there on it is SciPy's BCa
-    bootstrap (Efron 1987) whose level is widened for small n: t(n - 1) sqrt(n / (n - 1)) replaces
-    the normal quantile (Hesterberg 2015), because resampling alone is too narrow by sqrt((n - 1) /
-    n). The bootstrap uses a fixed seed.
+    standard error (Tukey 1958), of the logarithm if ``positive``. With more rows, the interval is
+    SciPy's BCa bootstrap (Efron 1987) whose level is widened for small n: t(n - 1) sqrt(n / (n -
+    1)) replaces the normal quantile (Hesterberg 2015), because resampling alone is too narrow by
+    sqrt((n - 1) / n). The bootstrap uses a fixed seed.
 
     Args:
         rounds: (n, k): one row per round, one column per configuration; NaN marks a missing run,
@@ -111,7 +111,7 @@ def bca(of_rows: Callable[..., Array], n: int, *, widened: bool) -> tuple[Array,
     options = {"vectorized": True, "axis": -1, "confidence_level": level}
     rows = (np.arange(n),)
     with warnings.catch_warnings(), np.errstate(invalid="ignore", divide="ignore"):
-        warnings.simplefilter("ignore")  # some statistics do not vary
+        warnings.simplefilter("ignore")  # some statistics do not vary over the resamples
         rng = np.random.default_rng(SEED)
         found = stats.bootstrap(rows, of_rows, n_resamples=RESAMPLES, rng=rng, **options)
         plain = stats.bootstrap(
@@ -156,14 +156,14 @@ def paired_p(a: Array, b: Array) -> float:
     """
     stats = needed("scipy.stats", "the analysis")
     with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the differences may all be equal
+        warnings.simplefilter("ignore")  # the test divides by zero if all differences are equal
         difference = np.round(np.log(a) - np.log(b), 12)
         found = stats.ttest_1samp(difference[np.isfinite(difference)], 0.0)
     return float(np.nan_to_num(found.pvalue, nan=1.0))
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
-    """Corrects p-values for their number (Holm 1979), which SciPy lacks.
+    """Corrects p-values for the number of tests (Holm 1979), since SciPy has no such function.
 
     >>> holm([0.01, 0.04, 0.03])
     [0.03, 0.06, 0.06]

@@ -107,13 +107,14 @@ def order_effects(runs: pd.DataFrame, metric: str = "shade_and_order_s") -> pd.D
         ratio(p) = exp(mean over cells of log(T_p / T_none))
         share(p) = log(T_placebo / T_p) / log(T_placebo / T_oracle), of the same means
 
-    The share is 0 for the placebo and 1 for the oracle. It is given only if the interval of the gap
-    T_placebo / T_oracle excludes 1, because otherwise there is no gain to share.
+    The share is 0 for the placebo and 1 for the oracle. The share is given only if the interval of
+    the gap T_placebo / T_oracle excludes 1, because otherwise there is no gain to share.
 
     Returns:
         One row per stratum and policy: ``stratum``, ``policy``, ``cells``, ``n``; ``ratio``,
         ``low``, ``high``, ``p`` (Holm's over the table), ``verdict``; ``placebo_ratio`` and
-        ``share`` with ``_low`` and ``_high``; ``gap_shown``. The rows of the bounds come last.
+        ``share`` with ``_low`` and ``_high``; ``gap_shown``. The rows of policies that are only
+        bounds come last.
     """
     strata: dict[tuple[Any, ...], list[pd.DataFrame]] = {}
     for cell, group in cells(runs.dropna(subset=[metric]), "policy"):
@@ -130,7 +131,7 @@ def order_effects(runs: pd.DataFrame, metric: str = "shade_and_order_s") -> pd.D
 
 
 def _stratum(key: dict[str, Any], groups: list[pd.DataFrame], metric: str) -> list[dict[str, Any]]:
-    """Returns the rows of one stratum, with the bounds last."""
+    """Returns the rows of one stratum, with policies that are only bounds last."""
     shared = set.intersection(*(set(group["policy"]) for group in groups))
     policies = in_order("policy", sorted(shared))
     wide = needed("pandas", "the analysis").concat(

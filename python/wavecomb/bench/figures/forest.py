@@ -47,8 +47,8 @@ class Row:
     Attributes:
         name: Label at the left.
         value: Position of the point.
-        low: Lower end of the interval; NaN if there is none.
-        high: Upper end of the interval; NaN if there is none.
+        low: Lower end of the interval; NaN without an interval.
+        high: Upper end of the interval; NaN without an interval.
         colour: Colour of the point and its whiskers.
         hollow: Whether the row is a bound or a baseline, drawn with a hollow point.
     """
@@ -63,7 +63,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Panel:
-    """Rows under one title."""
+    """A panel of a forest plot: rows under one title."""
 
     title: str
     rows: Sequence[Row]

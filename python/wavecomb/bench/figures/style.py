@@ -31,7 +31,7 @@ WHISKERS = 4.0
 """Largest extent of a logarithmic axis beyond the points, as a factor."""
 INTERVALS = "Whiskers: 95 % intervals"
 MAX_PANELS = 12
-"""Largest number of panels. Figures with more are left out."""
+"""Largest number of panels of a figure; figures with more panels are left out."""
 WIDTH = 7.4
 """Width of a figure in inches, equal to a column of text in print."""
 
@@ -159,8 +159,8 @@ def fixed(value: float, digits: int) -> str:
 def clipped(low: float, high: float, values: Sequence[float]) -> tuple[float, float]:
     """Returns limits of a logarithmic axis that cut off very long whiskers.
 
-    Intervals of two or three disturbed runs can span decades. Longer intervals then extend beyond
-    the axes, and the points remain distinguishable.
+    Intervals of two or three disturbed runs can span decades. Long intervals then extend beyond the
+    axes, and the points remain distinguishable.
 
     >>> clipped(1e-9, 1e6, [0.5, 2.0])
     (0.125, 8.0)

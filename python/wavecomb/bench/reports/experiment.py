@@ -83,7 +83,7 @@ def compared(
 def _ratio_figure(
     out: Writer, metrics: Mapping[str, pd.DataFrame], words: str, factor: str, name: str, title: str
 ) -> None:
-    """Draws the ratios of one metric, if there are any."""
+    """Draws the ratios of one metric, if the experiment has any."""
     if words in metrics:
         x_label = _LABELS.get(words, words)
         out.draw(run_figures.ratio_figure(metrics[words], name, title, x_label, factor))
@@ -181,7 +181,7 @@ def _policies(out: Writer, name: str, runs: pd.DataFrame) -> None:
     title = "Times by policy, ratio of means to none"
     out.add(ratio_table(title, metrics, "policy", note))
     if (runs["factor"] != "").any():
-        return  # the curves over the factor show the same
+        return  # a scaling experiment already shows these values as curves
     key = key_of(name)
     for words, end in (("shade", "shade"), ("shade + order", "policies")):
         title = f"{words.capitalize()} time by policy"

@@ -43,7 +43,7 @@ class RunImage:
 
 @dataclass(frozen=True)
 class Shot:
-    """All images of one stage and frame, with the golden one. Titles are unique in a report."""
+    """All images of one stage and frame, with the golden image. Titles are unique in a report."""
 
     stage: str
     golden: NDArray[Any] | None

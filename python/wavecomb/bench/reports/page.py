@@ -49,8 +49,9 @@ def build(folder: Path, markdown: Path | None = None) -> Path:
 
     Args:
         folder: DIR.
-        markdown: Also write this .md file, with a folder of figures beside it. It has the same
-            text, tables and figures, without viewers and folded parts.
+        markdown: Also write this .md file, with a folder of figures beside it. The Markdown page
+            has the same text, tables and figures as the HTML page, without viewers and folded
+            parts.
 
     Raises:
         WavecombError: The folder holds no results, a file in it is damaged, or a library of the

@@ -86,7 +86,7 @@ class Table(Part):
         caption: Title.
         head: Titles of the columns.
         rows: Cells.
-        note: Small text below.
+        note: Small text below the table.
     """
 
     kind = "table"
@@ -177,11 +177,11 @@ class Writer:
         self.sections.append(Section(title))
 
     def add(self, *parts: Part | None) -> None:
-        """Adds parts to the section, skipping None."""
+        """Adds parts to the current section of the report, skipping None."""
         self.sections[-1].parts += [part for part in parts if part is not None]
 
     def draw(self, drawn: CaptionedFigure | None) -> None:
-        """Adds a figure to the section, if there is one."""
+        """Adds a figure to the current section, unless it is None."""
         if drawn is not None:
             lay_out(drawn)
             drawing = svg(drawn)

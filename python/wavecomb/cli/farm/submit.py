@@ -77,8 +77,8 @@ def submit_command(
 ) -> None:
     """Render STAGE on a Dask cluster, or on several processes of this machine.
 
-    Takes the options of `wavecomb render`. Images equal those of one process bit for bit. Ctrl-C
-    keeps finished tiles, and `wavecomb farm resume` continues. See docs/farm.md.
+    The command takes the options of `wavecomb render`. Images equal those of one process bit for
+    bit. Ctrl-C keeps finished tiles, and `wavecomb farm resume` continues. See docs/farm.md.
     """
     from wavecomb.farm.clusters import parse_cluster
     from wavecomb.farm.folder import Folder
@@ -117,8 +117,8 @@ def ask_plan(request: dict[str, Any]) -> dict[str, Any]:
     """Reads the stage in a child process, so that a crash in a library becomes a one-line error.
 
     Args:
-        request: Options of ``farm submit``, or {"again": a job as JSON}. It is passed to the child
-            as a command-line argument, which a sandbox passes on once more, so it has to be short.
+        request: Options of ``farm submit``, or {"again": a job as JSON}. The request must be short,
+            since it becomes a command-line argument of the child and of its sandbox.
 
     Returns:
         A dictionary with ``job``, as JSON, and ``learned``, the guiding data in base64 or None.
@@ -188,7 +188,7 @@ def plan_command(text: str) -> None:
 def _tuples(value: Any) -> Any:
     """Turns lists into tuples, as click gives them.
 
-    Leaves jobs as they are, because they stay JSON.
+    Jobs remain unchanged, because they stay JSON.
     """
     if isinstance(value, dict):
         return {key: v if key == "again" else _tuples(v) for key, v in value.items()}

@@ -51,7 +51,7 @@ def check_options(options: Mapping[str, Any], what: str = "a farm") -> None:
 
     Args:
         options: Values of the options.
-        what: Name of the feature that lacks them, for the message.
+        what: Name of the feature that does not support the options, for the message.
     """
     learn_from = options["learn_from"] if options["learn_from"] == BEFORE else None
     for option, given, instead in (

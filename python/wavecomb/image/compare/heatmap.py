@@ -40,8 +40,8 @@ class Scale:
         colours: (count, 3) colours of the scale.
         ticks: Position along the bar, from 0 to 1, and label.
         position: (height, width) position of every pixel along the bar; NaN means black.
-        finite: (height, width) mask; False (a value of A or B is not finite) means cyan. The mask
-        is None if all values are finite.
+        finite: (height, width) mask; False (a value of A or B is not finite) means cyan. The
+            mask is None if all values are finite.
     """
 
     title: str
@@ -67,8 +67,8 @@ def heat_map(
 ) -> NDArray[np.float32]:
     """Shows differences of image A to the reference B as colours, with title and colour bar.
 
-    - "absolute" shows differences of luminance on a logarithmic scale. It covers four decades
-      below the largest difference; smaller differences have the darkest colour.
+    - "absolute" shows differences of luminance on a logarithmic scale. This scale covers four
+      decades below the largest difference; smaller differences have the darkest colour.
     - "signed" applies this scale to both signs: A is brighter in orange pixels and darker in blue
       ones. Differences below the four decades are black.
     - "flip-ldr" and "flip-hdr" show FLIP from 0 to 1; see ``perceptual.flip``.

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Perceptual differences of two images: PSNR, SSIM and FLIP.
 
-SSIM and FLIP need the extra "bench". Values that are not finite count as 0 here; ``compare``
-reports their number.
+SSIM and FLIP need the extra "bench". Values that are not finite count as 0 in these metrics;
+``compare`` reports how many there are.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def ssim(a: Source, b: Source, exposure: float = 0.0) -> float:
     SSIM = (2 m_a m_b + C1) (2 s_ab + C2) / ((m_a^2 + m_b^2 + C1) (s_a^2 + s_b^2 + C2)), C1 =
     0.01^2, C2 = 0.03^2, with means m and (co)variances s under a Gaussian window of 11 x 11 pixels,
     sigma 1.5 (Wang et al., "Image quality assessment: from error visibility to structural
-    similarity", 2004, equation 13 and section III.C). It is computed on Rec.709 luma of the image
+    similarity", 2004, equation 13 and section III.C). SSIM is computed on Rec.709 luma of the image
     times 2^exposure, clamped to [0, 1] and sRGB encoded; only windows inside the image count.
 
     Raises:
@@ -130,7 +130,7 @@ def shown(pixels: NDArray[Any], exposure: float = 0.0) -> NDArray[np.float32]:
 def _colours(pixels: NDArray[Any]) -> NDArray[np.float32]:
     """Returns three channels, repeating the first if there are fewer.
 
-    Replaces non-finite values by 0.
+    Non-finite values are replaced by 0.
     """
     colours = pixels[:, :, :3] if pixels.shape[2] >= 3 else pixels[:, :, :1].repeat(3, axis=2)
     return np.where(np.isfinite(colours), colours, np.float32(0)).astype(np.float32)

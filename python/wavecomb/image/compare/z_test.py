@@ -36,9 +36,10 @@ class ZTest:
         worst_tile: Column and row in pixels of the tile with the smallest p-value; None if the
             image mean has a smaller one.
         mean_z: Deviate of the image mean per channel.
-        pixels_accepted: Fraction of pixel values with p above the Sidak level for their number.
+        pixels_accepted: Fraction of pixel values with p above the Sidak level for the number of
+            pixel values.
         p_pixels: (height, width, channels) p-values of pixels.
-        z_pixels: Their deviates, A - B in standard errors; 0 for pixels without variance.
+        z_pixels: Deviates of pixels, A - B in standard errors; 0 for pixels without variance.
     """
 
     agrees: bool

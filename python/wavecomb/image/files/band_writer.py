@@ -28,8 +28,8 @@ class BandFiles:
     A context manager: the files are renamed on success and removed on an exception.
 
     Attributes:
-        written: Names of the files, once there was a band.
-        rows: Number of rows so far.
+        written: Names of the files, from the first band on.
+        rows: Number of rows written so far.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class BandFiles:
         self._display: RowFile | None = None
 
     def __enter__(self) -> BandFiles:
-        """Returns itself; files are opened with the first band."""
+        """Returns this writer; files are opened with the first band."""
         return self
 
     def add(self, band: Picture) -> None:

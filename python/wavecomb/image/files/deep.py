@@ -24,7 +24,7 @@ _HALF_MAX = 65504.0
 
 @dataclass(frozen=True, repr=False)
 class DeepPicture:
-    """Samples of each pixel by depth. Row 0 is the top.
+    """A deep image: samples of each pixel by depth, with row 0 at the top.
 
     Attributes:
         counts: (height, width) number of samples of each pixel.

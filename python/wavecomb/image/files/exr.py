@@ -30,7 +30,7 @@ Window = tuple[int, int, int, int]
 
 _HALF_MAX = 65504.0
 ALPHA = "A"
-"""Name of the alpha channel of R, G and B."""
+"""Name of the alpha channel that belongs to R, G and B."""
 BAND = 64
 """Rows that are converted and written together: four blocks of an EXR file."""
 
@@ -57,8 +57,8 @@ def channel_names(layer: str, channels: int) -> list[str]:
 def is_exact(layer: str) -> bool:
     """Returns whether lossy compression would invalidate a layer.
 
-    Lossy compression would change ids. Positions far from 0 exceed its range, since dwaa treats
-    every channel named Y as luminance.
+    Lossy compression would change ids. Positions far from 0 exceed the range of lossy compression,
+    since dwaa treats every channel named Y as luminance.
     """
     return is_crypto(layer) or aovs.content(layer) in ("exact", "id")
 
@@ -81,8 +81,8 @@ def write_exr(
         layers: Name -> (height, width) or (height, width, channels); "beauty" becomes R, G, B.
         half: Whether to store colours as 16-bit floats; other layers are always 32-bit. Finite
             values outside of the range of half floats are clamped.
-        compression: OpenEXR compression. Lossy ones (pxr24, b44, dwaa ...) are rejected for layers
-            with ids or positions.
+        compression: OpenEXR compression. Lossy compressions (pxr24, b44, dwaa ...) are rejected for
+            layers with ids or positions.
         tile: Edge of square tiles in pixels, a multiple of 16; 0 means scanlines.
         metadata: File attributes: str, int, float, or (4, 4) arrays. "Software" has a default.
         window: Position of the pixels in a larger image; None means that they are the whole image.

@@ -87,7 +87,7 @@ def png_spec(height: int, width: int, *, has_alpha: bool = False) -> Any:
     import OpenImageIO as oiio
 
     spec = oiio.ImageSpec(width, height, 4 if has_alpha else 3, "uint8")
-    # PNG stores unpremultiplied colours, to which the caller has converted.
+    # PNG stores unpremultiplied colours; the caller has already divided by alpha.
     if has_alpha:
         spec.attribute("oiio:UnassociatedAlpha", 1)
     spec.attribute("oiio:ColorSpace", "sRGB")

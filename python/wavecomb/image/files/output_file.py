@@ -122,7 +122,7 @@ class Publisher(Protocol):
         """Returns a temporary name for a file."""
 
     def check(self, target: Path) -> None:
-        """Raises OSError unless the file can be written now."""
+        """Raises OSError unless the output file can be written now."""
 
     def publish(self, part: Path, target: Path, *, durable: bool) -> None:
         """Renames the temporary file."""
@@ -258,8 +258,8 @@ def problem_of(library: Any) -> str:
 def check_writable(path: str | os.PathLike[str]) -> None:
     """Raises OSError with a one-line message unless the file can be written now.
 
-    Call this before long work. It creates missing folders, and creates and removes a private folder
-    next to the file.
+    Call this before long work. The function creates missing folders, and creates and removes a
+    private folder next to the file.
     """
     check_name(path)
     target = Path(os.path.realpath(path))
@@ -313,9 +313,9 @@ def publish(part: Path, target: Path, *, durable: bool = False) -> None:
 def replacing(path: str | os.PathLike[str], *, durable: bool = False) -> Iterator[Path]:
     """Yields a temporary file name; renames that file to ``path`` on success.
 
-    The temporary file is in a private folder next to ``path``. On an exception it is removed and
-    ``path`` remains unchanged. After a crash ``path`` is unchanged as well, and the next call for a
-    file in that folder removes the private folder.
+    The temporary file is in a private folder next to ``path``. On an exception the temporary file
+    is removed and ``path`` remains unchanged. After a crash ``path`` is unchanged as well, and the
+    next call for a file in that folder removes the private folder.
 
     Args:
         path: The file.

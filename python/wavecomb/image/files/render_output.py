@@ -78,7 +78,7 @@ def _parallel(
 def scene_digest(scene: Scene) -> str:
     """Returns a hash of counts, bounds, camera, lights, materials and names of a scene.
 
-    It excludes points and texels, since hashing them would take as long as reading them.
+    The hash excludes points and texels, since hashing them would take as long as reading them.
     """
     facts: list[Any] = [
         getattr(scene, name)
@@ -192,7 +192,7 @@ def by_aov(layers: Mapping[str, NDArray[Any]]) -> dict[str, dict[str, NDArray[An
 def compression_for(layers: Iterable[str], compression: Compression) -> Compression:
     """Returns the compression for a file with these layers.
 
-    Zip if the given one would invalidate any.
+    The result is zip if the given compression would invalidate a layer.
     """
     return "zip" if any(map(is_exact, layers)) else compression
 

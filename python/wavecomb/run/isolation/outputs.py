@@ -55,7 +55,7 @@ class Outputs:
         return list(dict.fromkeys(named))
 
     def allow(self, target: str) -> bool:
-        """Returns whether a path with resolved links is one of these files."""
+        """Returns whether a path with resolved links is one of the permitted output files."""
         folder, name = os.path.split(target)
         return (
             target in self.names

@@ -53,10 +53,10 @@ def command(
     Args:
         words: Command to run, with absolute paths.
         private: The only writable folder, which also holds temporary files.
-        inputs: Paths that the command line names. These remain readable even if a hidden folder
-            (/tmp, /run) or ``reads`` would hide them.
-        reads: Folders of ``--sandbox-read``. If any are given, only these, the inputs and libraries
-            can be read; otherwise everything that the user may read.
+        inputs: Paths that the command line names. The inputs remain readable even if a hidden
+            folder (/tmp, /run) or ``reads`` would hide them.
+        reads: Folders of ``--sandbox-read``. With ``reads``, only these paths, the inputs and
+            libraries can be read; otherwise everything that the user may read.
         gpu: Whether GPU devices can be used.
     """
     line = [_PROGRAM, "--unshare-all", "--die-with-parent", "--new-session", "--cap-drop", "ALL"]
@@ -114,8 +114,8 @@ def library_places() -> list[str]:
 def inputs_of(words: Iterable[str]) -> list[str]:
     """Returns paths in hidden folders that must stay readable for a command line.
 
-    For a file in /tmp/shot/usd this is /tmp/shot, with all assets next to the stage. For a file
-    directly in /tmp it is all regular files there.
+    For a file in /tmp/shot/usd the result is /tmp/shot, with all assets next to the stage. For a
+    file directly in /tmp the result is all regular files there.
     """
     found: dict[str, None] = {}
     for word in words:

@@ -2,9 +2,10 @@
 """Runs a command in a child process, so that a crash gives one message and exit code 2.
 
 The parent only waits; it forwards signals to the child and returns its exit code. With a sandbox
-the child is a new Python process that parses the same command line. Otherwise it is a fork that is
-made before large modules are loaded. In both cases the child has a separate process group, so that
-a signal from the terminal, which goes to a whole group, reaches it once.
+the child is a new Python process that parses the same command line. Without a sandbox the child is
+a fork that is made before large modules are loaded. With or without a sandbox, the child has a
+separate process group, so that a signal from the terminal, which goes to a whole group, reaches it
+once.
 """
 
 from __future__ import annotations
@@ -100,7 +101,7 @@ def enter(outputs: Outputs, *, gpu: bool = False) -> None:
     """Continues the command in a child process, before it reads any untrusted file.
 
     In the parent this function ends the process when the child has ended. In the child, or without
-    a child, it returns.
+    a child, the function returns.
 
     Args:
         outputs: Files that the command may write.

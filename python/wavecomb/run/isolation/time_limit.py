@@ -50,7 +50,7 @@ end_process: Callable[[str], None] = _end_with_message
 def limit_composition(file: Path) -> Iterator[None]:
     """Ends the process if the block, which composes a stage, takes too long.
 
-    Counts only CPU time of this process, not waiting for a slow disk or a busy machine.
+    The limit counts only CPU time of this process, not waiting for a slow disk or a busy machine.
 
     Args:
         file: File of the stage.

@@ -2,7 +2,7 @@
 """Materials of the generated stages: UsdPreviewSurface, with the name of a Wavecomb program.
 
 ``wavecomb:program`` on the Material selects the shading program. The UsdPreviewSurface inputs are
-its parameters, with values that look similar in other renderers:
+the parameters of the program, with values that look similar in other renderers:
 
 - diffuse: ``diffuseColor``.
 - metal: ``diffuseColor`` is the reflectance at normal incidence, ``roughness``, optional
@@ -78,7 +78,7 @@ def metal(
 
 
 def dielectric(colour: Colour, roughness: float, ior: float = 1.5) -> MaterialInfo:
-    """Makes glass. The low opacity makes it look like glass in other renderers."""
+    """Makes glass. The low opacity makes the material look like glass in other renderers."""
     return MaterialInfo(
         "dielectric",
         {"diffuseColor": colour, "roughness": roughness, "ior": ior, "opacity": 0.1},
@@ -139,8 +139,8 @@ def plain(info: MaterialInfo) -> MaterialInfo:
 
     Matt surfaces get the specular reflection that UsdPreviewSurface gives all dielectrics. Metals
     lose the tint of their edges. Glass becomes specular reflection with straight transmission,
-    because UsdPreviewSurface has no refraction. The only tint of such glass is its opacity, so
-    coloured glass is partly covered by its colour.
+    because UsdPreviewSurface has no refraction. The only tint of glass without refraction is its
+    opacity, so coloured glass is partly covered by its colour.
     """
     inputs = {key: value for key, value in info.inputs.items() if key not in _SPECULAR_WORKFLOW}
     if info.program == "dielectric":

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Image = NDArray[np.float32]
-"""float32 (height, width, channels)."""
+"""An image: float32 array (height, width, channels)."""
 
 
 def grid(size: int) -> tuple[Image, Image]:
@@ -38,7 +38,7 @@ def value_noise(
         y: Vertical positions.
         cells: Lattice cells per unit.
         rng: Source of the lattice values.
-        rows: Vertical lattice cells, if different.
+        rows: Vertical lattice cells per unit; None means as many as ``cells``.
     """
     rows = rows or cells
     lattice = rng.random((rows, cells)).astype(np.float32)

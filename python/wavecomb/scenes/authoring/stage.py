@@ -234,7 +234,7 @@ class StageWriter:
     def define_texture(self, name: str, info: TextureInfo) -> None:
         """Registers a texture of the scene by name.
 
-        ``info.size`` is its edge, which is not scaled.
+        ``info.size`` is the edge of the texture, which ``texture_size`` does not scale.
         """
         self._own[name] = info
 
@@ -327,7 +327,7 @@ class StageWriter:
 
         Args:
             name: Name of the prim.
-            way: Direction in which its light travels, (3,).
+            way: Direction in which the light travels, (3,).
             angle: Angular diameter, in degrees.
             radiant: Irradiance of a surface that faces the light, RGB.
         """
@@ -372,7 +372,8 @@ class StageWriter:
             focal_mm: Focal length in mm; the aperture follows from it and the angle of view.
         """
         camera = UsdGeom.Camera.Define(self.stage, "/World/Camera")
-        # USD's camera units are tenths of a scene unit. Only the ratio to the aperture matters.
+        # USD's camera units are tenths of a scene unit. Only the ratio of focal length to aperture
+        # matters.
         aperture = 2.0 * focal_mm * math.tan(math.radians(0.5 * fov_degrees))
         camera.CreateFocalLengthAttr(focal_mm)
         camera.CreateHorizontalApertureAttr(aperture)

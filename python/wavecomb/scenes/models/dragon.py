@@ -2,10 +2,10 @@
 """A procedural dragon with any number of triangles.
 
 An eastern dragon without wings, its scaly body in an S above the ground, head raised. This dragon
-replaces the Stanford XYZRGB dragon, whose licence forbids shipping it. It is a union of closed,
-overlapping tubes (see ``sweep``): body, head, jaw, limbs, claws, horns, fins. Relief is evaluated
-at the resolution of the mesh, so more triangles show finer detail: scales first, then their keels
-and growth rings, then grain.
+replaces the Stanford XYZRGB dragon, whose licence forbids shipping it. The dragon is a union of
+closed, overlapping tubes (see ``sweep``): body, head, jaw, limbs, claws, horns, fins. Relief is
+evaluated at the resolution of the mesh, so more triangles show finer detail: scales first, then
+their keels and growth rings, then grain.
 
 Size in scene units: about 2.4 long, 1.6 high; Y up, standing on y = 0, facing +x.
 """

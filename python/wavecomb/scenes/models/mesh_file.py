@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads a triangle mesh from OBJ, PLY (ASCII or binary, also .gz) or USD, to replace the dragon.
 
-This allows using the Stanford XYZRGB dragon, which Wavecomb may not ship.
+The reader allows using the Stanford XYZRGB dragon, which Wavecomb may not ship.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from wavecomb.scenes.models.ply import RawMesh, fans, read_ply
 
 TARGET_DIAGONAL = 3.05
 """Diagonal of the built-in dragon's bounding box, in scene units. Imported meshes are scaled to
-it."""
+this diagonal."""
 
 _TEXTURE_LENGTH = 0.5
 _USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")

@@ -225,7 +225,7 @@ def add_object(
     position: Sequence[float] = (0.0, 0.0, 0.0),
     turn_degrees: float = 0.0,
 ) -> None:
-    """Adds an Xform, rotated about Y, with one mesh for each material of its parts."""
+    """Adds an Xform, rotated about Y, with one mesh for each material of the given parts."""
     _place(UsdGeom.Xform.Define(writer.stage, path), position, turn_degrees)
     _fill(writer, path, parts)
 

@@ -38,7 +38,7 @@ def stones_for(materials: int) -> int:
 def check_field(scene: str, options: SceneOptions, **ranges: tuple[float, float]) -> None:
     """Raises SceneError for an option outside of its range.
 
-    Also checks ``triangles``, whose range is the same for all fields.
+    The function also checks ``triangles``, whose range is the same for all fields.
     """
     least = stones_for(options.materials) * MIN_TRIANGLES
     for name, (low, high) in {**ranges, "triangles": (least, MAX_TRIANGLES)}.items():

@@ -3,7 +3,7 @@
 
 A tube has a centre line, an elliptic section that changes along it, an "up" direction that keeps
 the section from twisting, and an optional relief, a displacement along the section's radius.
-Everything is evaluated on a grid of rings x columns in NumPy.
+Tubes and reliefs are evaluated on a grid of rings x columns in NumPy.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ class Surface:
         turns: Arc length in units of local circumferences, (rings, 1).
         around: Angle / 2 pi from the underside, 0 to 1; 0.5 is the ridge, (1, columns).
         radius: Mean radius of the section, in scene units, (rings, 1).
-        cell: Grid spacing as a fraction of the local circumference. Finer relief would alias.
+        cell: Grid spacing as a fraction of the local circumference. Relief finer than the grid
+            would alias.
     """
 
     along: FloatArray

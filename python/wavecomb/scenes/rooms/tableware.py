@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Objects on the room's table, such as cups and glasses, and of the kitchen, such as pots.
+"""Objects on the room's table, such as cups and glasses, and in the kitchen, such as pots.
 
 Each function returns parts that stand on y = 0 about the origin, except where it says otherwise.
 """

@@ -23,7 +23,7 @@ PLASTER_METRES, PLANKS_METRES, WALNUT_METRES = 1.6, 2.4, 0.5
 LINEN_METRES, LEATHER_METRES = 0.16, 0.18
 """Edge of the area that an image covers, in metres."""
 RUG_METRES = (2.7, 1.9)
-"""Size of the rug's image, in metres. The area is not square."""
+"""Width and height of the rug's image, which is not square, in metres."""
 _BOARDS = 16
 _THREADS = 64
 _LAYOUT_SEED = 78
@@ -123,7 +123,7 @@ def _threads(size: int, rng: np.random.Generator) -> tuple[Image, Image]:
 
 
 def linen(size: int, rng: np.random.Generator) -> Image:
-    """Undyed linen, near white. Materials tint it by the scale of the texture."""
+    """Undyed linen, near white. Materials tint the linen by the scale of the texture."""
     height, strength = _threads(size, rng)
     shade = (0.55 + 0.45 * height) * (0.93 + 0.07 * strength)
     return np.clip(flat((0.80, 0.79, 0.76)) * shade[..., None], 0, 1).astype(np.float32)
@@ -231,7 +231,7 @@ def hills(size: int, rng: np.random.Generator) -> Image:
 
 
 def fields(size: int, rng: np.random.Generator) -> Image:
-    """Two soft fields of colour on a third."""
+    """An abstract painting: two soft fields of colour on a third."""
     x, y = grid(size)
     wobble = 0.03 * (fractal(x, y, 8, 5, rng) - 0.5)
     cloud = fractal(x, y, 6, 6, rng, 0.6)
