@@ -26,7 +26,8 @@
 ///   void attenuate_shadow_rays(Wave&, uint32_t depth, SamplerKind) const;  for free shadow rays
 ///   Color<F> shadow_transmittance(const Wave&, size_t ray) const;
 ///
-/// A separate shading program shades events in volumes (BsdfTraits::kOnSurface is false).
+/// A shading program separate from those of surfaces shades events in volumes
+/// (BsdfTraits::kOnSurface is false).
 ///
 /// Contract: the result of a lane depends only on its own segment, and random numbers come only
 /// from VertexSet::kFlight and kShadow, so that the schedule has no effect.
