@@ -59,7 +59,7 @@ struct Flight {
   /// Factor of the throughput. Without an event, it is transmittance over the probability of
   /// passing; with an event, transmittance times extinction over the density of t.
   Color<F> weight;
-  Mask<F> has_scattered{false};  ///< whether the path has moved by collisions that are no vertices
+  Mask<F> has_scattered{false};  ///< whether collisions without a vertex have moved the path
 };
 
 /// Scene without volumes and media.
