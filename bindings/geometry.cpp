@@ -279,7 +279,7 @@ nb::object transform_shape(const Array<float>& points, const Array<float>& norma
                         box_of(*bounds));
 }
 
-/// Returns which points are used by triangles, or None if all are.
+/// Returns which points are used by triangles, or None if all points are used.
 nb::object used_points(const Array<uint32_t>& triangles, size_t point_count) {
   std::vector<uint8_t> used(point_count, 0);
   size_t found = 0;

@@ -24,7 +24,7 @@ struct Result {
   std::vector<std::byte> learned;  ///< wavecomb::packed_training(); empty without training
 };
 
-/// Arguments of render(); None for those that were not given.
+/// Arguments of render(); an argument that was not given is None.
 struct RenderArguments {
   nanobind::handle settings;
   nanobind::object progress, policy, costs;

@@ -33,10 +33,10 @@ namespace vio = openvdb::io;
 /// Location of a grid in a file.
 struct Entry {
   vio::GridDescriptor descriptor;
-  /// Position among the grids of this name.
+  /// Position of the grid among the grids of the same name.
   uint32_t index = 0;
 
-  /// The name without the suffix that makes it unique.
+  /// Name of the grid without the suffix that makes it unique.
   const std::string& name() const { return descriptor.gridName(); }
 };
 

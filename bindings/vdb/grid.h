@@ -26,7 +26,7 @@ struct TooLarge : std::runtime_error {
 /// Row of a file's table of grids.
 struct Head {
   std::string name;
-  /// Position among the grids of this name, in the order of the file.
+  /// Position of the grid among the grids of the same name, in the order of the file.
   uint32_t index = 0;
   /// OpenVDB's name of the type, "Tree_float_5_4_3"; "Tree_fp8_5_4_3" for quantised grids.
   std::string type;

@@ -76,7 +76,7 @@ void check_head(const SegmentHead& head) {
 /// Location of a grid in a file.
 struct NanoEntry {
   std::string name;
-  /// Position among the grids of this name.
+  /// Position of the grid among the grids of the same name.
   uint32_t index = 0;
   /// Type of the grid, a nanovdb::GridType.
   uint32_t type = 0;

@@ -10,7 +10,7 @@
 
 namespace vdb {
 
-/// Box of voxels with one value.
+/// Box of voxels that all have the same value.
 struct FilledBox {
   std::array<int32_t, 3> first;
   std::array<int32_t, 3> last;

@@ -39,11 +39,12 @@ struct LightPathBuffers {
   static constexpr size_t kSplats = 4096;  ///< size of the buffer of light splats
 
   LightSplatList splats;
-  LightVertices vertices;       ///< of light paths, and their connections
+  LightVertices vertices;       ///< stored vertices of light paths
   MergePointRows merge_points;  ///< of camera paths
   LightPathAovs aovs;
   LightVertexUse use = LightVertexUse::kToCamera;
-  /// By slot of a camera path: its ratio R (PathState::ratio), or -1 if it awaits a merge.
+  /// By slot of a camera path: the ratio R of the path (PathState::ratio), or -1 if the path awaits
+  /// a merge.
   float* ratios = nullptr;
 
   /// Starts the ratio R of the camera paths in `slot` at their first hits: N / G (join.h).

@@ -105,7 +105,7 @@ class LightPathCoupling {
   /// Lanes whose bounces so far were all deltas, and that wait for a vertex to merge at.
   Mask<F> awaits_merge_;
   ConnectionOffer<F> offer_;        ///< if vertices connect
-  MergePointOffer<F> merge_point_;  ///< if light paths merge
+  MergePointOffer<F> merge_point_;  ///< merge point of the vertices, if light paths merge
 };
 
 /// Light paths as a joint transport.

@@ -26,7 +26,8 @@
 ///   void attenuate_shadow_rays(Wave&, uint32_t depth, SamplerKind) const;  for free shadow rays
 ///   Color<F> shadow_transmittance(const Wave&, size_t ray) const;
 ///
-/// A separate shading program shades events in volumes (BsdfTraits::kOnSurface is false).
+/// A shading program separate from those of surfaces shades events in volumes
+/// (BsdfTraits::kOnSurface is false).
 ///
 /// Contract: the result of a lane depends only on its own segment, and random numbers come only
 /// from VertexSet::kFlight and kShadow, so that the schedule has no effect.
@@ -58,7 +59,7 @@ struct Flight {
   /// Factor of the throughput. Without an event, it is transmittance over the probability of
   /// passing; with an event, transmittance times extinction over the density of t.
   Color<F> weight;
-  Mask<F> has_scattered{false};  ///< whether the path has moved by collisions that are no vertices
+  Mask<F> has_scattered{false};  ///< whether collisions without a vertex have moved the path
 };
 
 /// Scene without volumes and media.

@@ -29,7 +29,7 @@ struct HistoryRow {
   F pdf;                ///< solid angle density of wi; 0 for a delta bounce
   Color<F> radiance;    ///< R_j, including the light sample of this vertex
   UInt<F> material;
-  // Only with a guiding field, or one in training (Vertex::guide):
+  // The following fields are set only if a guiding field is used or in training (Vertex::guide).
   UInt<F> axis;  ///< guiding_axis of the surface
   F bsdf_pdf;    ///< solid angle density of wi by the BSDF alone
   WAVECOMB_FIELDS(p, wi, throughput, pdf, radiance, material, axis, bsdf_pdf)

@@ -66,7 +66,7 @@ struct PathState {
   F ratio{0.f};
   Mask<F> enters_body{false};  ///< whether the bounce enters a subsurface body
   BodyEntry<F> entry{};        ///< that body
-  // Only for scenes with nested dielectrics (MediumStackRow):
+  // The following fields are set only in scenes with nested dielectrics (MediumStackRow).
   F outer{1.f};        ///< index of refraction on the other side of the surface
   UInt<F> medium{0u};  ///< material whose medium scatters here
   F time{0.5f};        ///< shutter time, if lights move

@@ -42,7 +42,7 @@ struct LightProbes {
       : most(most_), probes(paths * most_), counts(paths, 0), luminance(paths, 0.f) {}
 
   uint32_t most;
-  std::vector<LightProbe> probes;  ///< those of path i start at i * most
+  std::vector<LightProbe> probes;  ///< the samples of path i start at i * most
   std::vector<uint32_t> counts;
   std::vector<float> luminance;  ///< luminance of each path's radiance
 };

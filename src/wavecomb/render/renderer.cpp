@@ -40,14 +40,15 @@ struct WavefrontRenderer::Impl {
                        const std::optional<TransportChoice>& choice = {});
   /// Decides the transport for `settings`, which leave it open.
   TransportChoice choose(const Settings& settings, const RenderOptions& options, Watch& watch);
-  /// Renders a small image for choose_transport(). Stops if `outer` is stopped.
+  /// Renders a small image for choose_transport(). The pilot stops if the render watched by `outer`
+  /// is stopped.
   TransportPilot render_pilot(const Settings& settings, LightPathShare share, bool wants_squares,
                               const PilotShared& shared, const Watch& outer);
 };
 
 namespace {
 
-/// Decides what can be decided without pilot renders.
+/// Decides those settings that need no pilot render.
 Settings without_open_choices(Settings used) {
   if (used.quality == Quality::kPlain) {
     if (used.guiding == Guiding::kAuto) used.guiding = Guiding::kOff;
@@ -213,7 +214,7 @@ TransportChoice WavefrontRenderer::Impl::choose(const Settings& settings,
                                                 const RenderOptions& options, Watch& watch) {
   if (!options.learned.empty()) {
     TransportChoice earlier = unpacked_transport(options.learned);
-    // The scene or the settings may have changed since.
+    // The scene or the settings may have changed since the earlier render.
     if (earlier.transport == Transport::kPath ||
         (light_path_conflict(settings).what.empty() && light_path_conflict(*scene).what.empty()))
       return earlier;

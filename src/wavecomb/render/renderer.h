@@ -46,7 +46,7 @@ struct RenderedImage {
   std::vector<float> normal;  ///< xyz, world space, mean of unit vectors
   std::vector<float> depth;   ///< along the camera's axis; infinite where rays leave the scene
   std::vector<uint32_t> samples;
-  // Empty unless Settings::needs_error() is true:
+  // The following layers are empty unless Settings::needs_error() is true.
   std::vector<float> error{};     ///< ErrorMap::error
   std::vector<float> variance{};  ///< rgb, Film::variance
   std::vector<AovLayer> aovs{};   ///< other layers of Settings::aovs
@@ -65,16 +65,16 @@ struct RenderOptions {
   /// Restores the empty film and the pass state from a snapshot of a render with these settings.
   /// Returns the packed_training() of that render, or nothing to train again.
   std::function<std::vector<std::byte>(Film&, PassState&)> resume{};
-  /// packed_training() of an earlier render of such a scene, or of the render that is resumed. Used
-  /// instead of training and of choosing the transport. Empty: the render does both itself. The
-  /// result of resume() takes precedence for the training.
+  /// packed_training() of an earlier render of the same scene, or of the render that is resumed.
+  /// Used instead of training and of choosing the transport. If empty, the render trains and
+  /// chooses the transport itself. The result of resume() takes precedence for the training.
   std::vector<std::byte> learned{};
   /// Replaces the policy of the settings.
   const SchedulingPolicy* policy = nullptr;
-  /// Initial costs for shading order and roulette. Costs that it lacks are measured on synthetic
-  /// hits, or modelled.
+  /// Initial costs for shading order and roulette. Costs that the profile lacks are measured on
+  /// synthetic hits, or modelled.
   const CostProfile* profile = nullptr;
-  /// Records the rays of the wavefront integrator. An exception from it ends the render.
+  /// Records the rays of the wavefront integrator. An exception from the recorder ends the render.
   RayRecorder* recorder = nullptr;
   double interval_s = 0.1;  ///< seconds between calls of `progress`
   /// For pilot renders with light paths. Light splats then hold, instead of light, the variance
@@ -110,7 +110,7 @@ class WavefrontRenderer {
   /// Error for invalid values (see Scene::edited) and during a render, and then changes nothing.
   void edit(const SceneEdit& change);
   /// Returns another renderer of the same scene, which can be edited and run independently. Both
-  /// share the acceleration structure and the geometry.
+  /// renderers share the acceleration structure and the geometry.
   std::unique_ptr<WavefrontRenderer> clone() const;
   [[deprecated("use clone()")]] std::unique_ptr<WavefrontRenderer> twin() const { return clone(); }
   std::shared_ptr<const Scene> scene() const;

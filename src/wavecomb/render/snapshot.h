@@ -23,7 +23,7 @@ struct Snapshot {
   const GuidingTraining& training;                  ///< from before the first pass; may be empty
   const std::optional<TransportChoice>& transport;  ///< if the settings left it open
   RenderStatus status;
-  bool finished;  ///< done, cancelled or out of time: no more samples follow
+  bool finished;  ///< whether no more samples follow: done, cancelled or out of time
   const std::vector<std::string>& light_groups;  ///< light groups that the film keeps
   /// Returns the statistics of the render so far.
   std::function<RenderStatistics()> statistics;

@@ -10,7 +10,7 @@
 
 namespace wavecomb {
 
-/// Answers of the supervising thread.
+/// Requests that the supervising thread returns from poll().
 enum class Request : uint8_t {
   kContinue,
   kSnapshot,  ///< pause the work to take a snapshot
@@ -19,7 +19,7 @@ enum class Request : uint8_t {
 
 /// Runs work on a separate thread and supervises it.
 ///
-/// Contract: run() once. It calls poll() and snapshot() on its own thread.
+/// Contract: run() once. The supervisor calls poll() and snapshot() on the calling thread.
 class Watch {
  public:
   /// `interval_s` is the time between calls of poll() in seconds.

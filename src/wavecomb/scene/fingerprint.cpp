@@ -138,8 +138,8 @@ uint64_t hash_materials(const Scene& scene) {
       WAVECOMB_OPENPBR_INPUTS(WAVECOMB_ADD)
 #undef WAVECOMB_ADD
       h.add(o.transmission_color, o.transmission_depth, o.subsurface_radius, o.thin_walled);
-      // Hash inputs that were added later only if they are set, so that older scenes keep their
-      // fingerprints.
+      // Material inputs that were added to Wavecomb later are hashed only if they are set, so that
+      // older scenes keep their fingerprints.
       if (o.nested_priority != 0) add_named(h, "nested_priority", o.nested_priority);
       const Vec3<float>& scatter = o.transmission_scatter;
       if (scatter.x != 0 || scatter.y != 0 || scatter.z != 0)
@@ -196,8 +196,8 @@ void add_value(Hash& h, const LightParameter& p, const LightValue& value) {
       value);
 }
 
-/// Hashes the rows of the table for a light, including those that its kind does not use, but not
-/// parameters specific to another kind.
+/// Hashes all parameters of a light that light_table() lists, including shared ones that its kind
+/// does not use, but without those specific to another kind.
 void add_light(Hash& h, const Light& l) {
   h.add(l.kind, l.to_world);
   for (const LightParameter& p : light_table())
@@ -258,8 +258,8 @@ uint64_t hash_names(const Scene& scene) {
   return h.value();
 }
 
-/// Hashes later parameters only if they are not the default, so that cameras keep their
-/// fingerprints when parameters are added.
+/// Hashes the camera. Parameters that were added later are hashed only if they differ from their
+/// default, so that older scenes keep their fingerprints.
 uint64_t hash_camera(const Scene& scene) {
   Hash h;
   const Camera& c = scene.camera();

@@ -12,7 +12,7 @@
 namespace wavecomb {
 namespace {
 
-/// Moves that apply to an object, by position in Moves.
+/// Moves that apply to an object, as indices into Moves.
 using Matches = std::vector<uint32_t>;
 
 /// Finds the moves of objects by name.
@@ -62,8 +62,8 @@ class MoveFinder {
   std::vector<bool> found_;
 };
 
-/// Puts the meshes of the world into groups, one for each set of moves that applies to them, and
-/// instances these. Meshes that stay are a group as well.
+/// Puts the meshes of the world into groups, one for each set of moves that applies to a mesh, and
+/// instances the groups. The meshes of the world that do not move form a group as well.
 void instance_world(SceneGeometry& geometry, const ObjectNames& names, MoveFinder& finder) {
   std::map<Matches, std::vector<uint32_t>> by_moves;
   uint32_t object = 0;

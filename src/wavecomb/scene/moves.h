@@ -16,14 +16,15 @@ namespace wavecomb {
 using Moves = std::map<std::string, Affine>;
 
 /// Returns the transform of an object: the product of the moves of the prims that it is at or
-/// below, the outermost prim last. Identity if there are none.
+/// below, the outermost prim last. Returns the identity if no move applies to the object.
 Affine move_of(const Moves& moves, std::string_view object);
 
 /// Returns the geometry of a scene with its objects moved.
 ///
-/// Moved meshes of the world become instances, and so do the others, together, so that the next
-/// move does not build their hierarchy again. Meshes keep their ids and arrays. Throws Error for a
-/// singular transform, a path without objects or lights, a part of an instance, and volumes.
+/// Moved meshes of the world become instances. All other meshes of the world become one instance
+/// together, so that the next move does not rebuild their acceleration structure. Meshes keep their
+/// ids and arrays. Throws Error for a singular transform, a path without objects or lights, a part
+/// of an instance, and volumes.
 std::shared_ptr<const SceneGeometry> moved_geometry(const Scene& unmoved, const Moves& moves);
 
 }  // namespace wavecomb

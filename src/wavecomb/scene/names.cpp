@@ -9,7 +9,7 @@
 namespace wavecomb {
 namespace {
 
-/// Returns the rest of a path that begins with the root of a group.
+/// Returns the part of `path` after the root path of a group.
 std::string_view below(std::string_view path, std::string_view root) {
   const size_t n = root.size();
   if (n > 0 && path.starts_with(root) && (path.size() == n || path[n] == '/'))
@@ -69,7 +69,8 @@ ObjectNames::ObjectNames(const Scene& scene) : scene_(scene) {
 }
 
 ObjectNames::Found ObjectNames::find(uint32_t index) const {
-  // Instances without meshes have the same first object as the next one, so take the last.
+  // An instance without meshes has the same first object as the next instance, so take the last of
+  // them.
   const auto next = std::upper_bound(first_object_.begin(), first_object_.end(), index);
   const auto instance = static_cast<uint32_t>(next - first_object_.begin() - 1);
   const uint32_t group = instance == 0 ? 0 : scene_.instances()[instance - 1].group;
@@ -120,7 +121,8 @@ std::string ObjectNames::asset(uint32_t index) const {
     if (placement.name == kNoName) continue;
     const PlacementName name = scene_.names()[placement.name];
     if (name.asset_length == 0) continue;
-    // If the name of one of several instances names the asset, the asset is that instance.
+    // If the asset is named by a placement with several instances, the asset is the single
+    // instance.
     if (name.asset_length == name.text.size()) return placement_name(p);
     return path_through(placement_name(placement.parent), parent_root(placement),
                         name.text.substr(0, name.asset_length));

@@ -58,14 +58,14 @@ class ObjectNames {
  public:
   explicit ObjectNames(const Scene& scene);
 
-  /// Returns the number of objects. Objects are numbered by instance and by mesh of the instanced
-  /// group, the world first; light records follow, then volumes.
+  /// Returns the number of objects. Objects are numbered by instance, the world first, and within
+  /// an instance by mesh; light records follow, then volumes.
   uint32_t count() const { return first_volume() + volume_count_; }
-  /// Returns the first object of each instance of SceneView::instances.
+  /// Returns the index of the first object of each instance in SceneView::instances.
   const std::vector<uint32_t>& first_object() const { return first_object_; }
-  /// Returns the object of light record 0.
+  /// Returns the index of the object that belongs to the first light record.
   uint32_t first_light() const { return first_light_; }
-  /// Returns the object of volume 0.
+  /// Returns the index of the object that belongs to the first volume.
   uint32_t first_volume() const { return first_light_ + light_count_; }
 
   std::string object(uint32_t index) const;

@@ -22,8 +22,8 @@ void add_instance_bounds(Bounds& out, const Bounds& box, const Instance& instanc
                          std::span<const MatrixStep> steps);
 
 /// Returns the world bounds, over the whole shutter interval, of all meshes at or below a prim
-/// (named as by ObjectNames). The bounds are empty if there are no such meshes. Visits every object
-/// of the scene, so call it rarely.
+/// (named as by ObjectNames). Returns empty bounds if no mesh is at or below the prim. Visits every
+/// object of the scene, so call it rarely.
 Bounds object_bounds(const Scene& scene, std::string_view prim);
 
 }  // namespace wavecomb

@@ -130,7 +130,7 @@ bool Scene::needs_in_glass(const SceneGeometry& geometry, std::span<const Materi
   if (!volumes().empty()) return true;
   const auto test = [&](const Material& m) { return is_absorbing_solid(m, *materials_->graphs); };
   const Glasses before = glasses_of(materials(), test), after = glasses_of(all_materials, test);
-  // The material of collisions inside of meshes may follow those of `after`.
+  // The materials of `after` may be followed by the one for collisions inside meshes.
   const bool same_glass =
       &geometry == geometry_.get() && std::equal(after.begin(), after.end(), before.begin());
   const bool same_lights =

@@ -54,7 +54,7 @@ struct SceneView {
 struct SceneBytes {
   /// Points, indices, radii, normals, tangents, texture coordinates, attributes and face materials.
   uint64_t meshes = 0;
-  uint64_t textures = 0;  ///< all mip levels, or the tiles that a store holds in memory
+  uint64_t textures = 0;  ///< all mip levels, or the tiles that a texture store holds
   uint64_t records = 0;   ///< instances, materials, lights
   uint64_t volumes = 0;   ///< grids
 };
@@ -63,7 +63,7 @@ struct SceneBytes {
 struct SceneEdit {
   std::optional<Camera> camera{};
   std::map<uint32_t, Material> materials{};  ///< by id
-  std::map<uint32_t, Light> lights{};        ///< by index into Scene::lights
+  std::map<uint32_t, Light> lights{};        ///< new lights, by index into Scene::lights
   /// By prim path (ObjectNames): transform in world space that everything at or below the prim has,
   /// after its transform in the scene as it was built; the identity puts it back. Lights in
   /// `lights` do not follow these moves. Paths that are not listed keep their last move.
@@ -99,20 +99,21 @@ class Scene : public std::enable_shared_from_this<Scene> {
   const std::vector<std::string>& light_groups() const { return geometry_->light_groups; }
   /// Returns, for every light of the light set, its index into light_groups(); triangles come last.
   std::vector<uint32_t> groups_of_lights() const;
-  /// Returns, for the same lights, 1 if the light is the emission of an object's material and not a
-  /// light of the stage.
+  /// Returns, for every light of the light set, 1 if the light is the emission of an object's
+  /// material and 0 if it is a light of the stage.
   std::vector<uint8_t> lights_of_objects() const;
-  /// Returns the nesting of groups from the world to the instances, and its names.
+  /// Returns the nesting of groups from the world to the instances, with the names of its
+  /// placements.
   const std::vector<Placement>& placements() const { return geometry_->placements; }
   const NameTable& names() const { return geometry_->names; }
   const LightSet& light_set() const { return lights_->set; }
-  /// Returns the light tree with its nodes, of which light_set() may have only an outline. If
-  /// necessary, it is built with `threads` threads (0: all). Thread-safe.
+  /// Returns the complete light tree; light_set() may contain only an outline of it. If the tree
+  /// has not been built yet, builds it with `threads` threads (0 means all). Thread-safe.
   const LightTree& light_tree(uint32_t threads) const { return lights_->tree(threads); }
   const Camera& camera() const { return camera_; }
   const Bounds& bounds() const { return geometry_->bounds; }
-  /// Returns the number of triangles of all meshes, counting each mesh once, or counting each
-  /// instance.
+  /// Return the number of triangles of all meshes: the first function counts each mesh once, the
+  /// second counts it for each instance.
   uint64_t unique_triangles() const;
   uint64_t instanced_triangles() const;
   /// Returns the number of curve segments, points or splats, counting each mesh once.
@@ -124,9 +125,9 @@ class Scene : public std::enable_shared_from_this<Scene> {
   /// without area or NaN points.
   const std::vector<std::string>& warnings() const { return geometry_->warnings; }
 
-  /// Returns a scene with other values that shares all unchanged data with this one, and equals a
-  /// scene built from scratch with these values, where meshes of the world are instances once an
-  /// object was moved. `threads`: 0 uses all.
+  /// Returns a scene with the values of an edit, which shares all unchanged data with this scene.
+  /// The result equals a scene built from scratch with the new values, except that meshes of the
+  /// world are instances once an object was moved. `threads`: 0 uses all.
   ///
   /// A camera edit takes microseconds. A material edit copies the materials. An edit of lights or
   /// of emission rebuilds the light set. If a new material needs tangents, they are computed. A
@@ -136,7 +137,8 @@ class Scene : public std::enable_shared_from_this<Scene> {
   /// the object for invalid values, as SceneBuilder does, and for unknown ids.
   std::shared_ptr<const Scene> edited(const SceneEdit& edit, uint32_t threads = 0) const;
 
-  /// Returns the parts of the scene, to be compared with those of scenes derived by edits.
+  /// Return the parts of the scene, so that callers can tell which parts an edited scene shares
+  /// with it.
   const std::shared_ptr<const SceneGeometry>& geometry() const { return geometry_; }
   const std::shared_ptr<const SceneMaterials>& material_part() const { return materials_; }
   const std::shared_ptr<const SceneLights>& light_part() const { return lights_; }
@@ -147,9 +149,9 @@ class Scene : public std::enable_shared_from_this<Scene> {
         std::shared_ptr<const SceneMaterials> materials, std::shared_ptr<const SceneLights> lights,
         std::shared_ptr<const SceneTangents> tangents, std::shared_ptr<const SceneLinks> links,
         const Camera& camera);
-  /// Computes the sets that each object belongs to, and the rays that see it.
+  /// Computes for each object the link sets that it belongs to and the kinds of rays that see it.
   void link();
-  /// Returns SceneMaterials::in_glass of a scene with other geometry, materials and lights.
+  /// Returns SceneMaterials::in_glass for this scene with the given geometry, materials and lights.
   bool needs_in_glass(const SceneGeometry& geometry, std::span<const Material> materials,
                       std::span<const Light> lights) const;
   /// Throws Error for values of an edit that are invalid.
@@ -157,8 +159,8 @@ class Scene : public std::enable_shared_from_this<Scene> {
   /// Returns the lights of the scene after an edit that moves objects by `moves`.
   std::vector<Light> edited_lights(const SceneEdit& edit,
                                    const std::map<std::string, Affine>& moves) const;
-  /// Returns a value for every light of the light set: of_input(light) for lights of the stage,
-  /// of_run(triangles) for the triangle lights of meshes.
+  /// Returns a value for every light of the light set: of_input(light) for a light of the stage,
+  /// and of_run(triangles) for the triangle lights of a mesh.
   template <typename T, typename OfInput, typename OfRun>
   std::vector<T> for_all_lights(const OfInput& of_input, const OfRun& of_run) const;
 
@@ -166,13 +168,13 @@ class Scene : public std::enable_shared_from_this<Scene> {
   std::shared_ptr<const SceneMaterials> materials_;
   std::shared_ptr<const SceneLights> lights_;
   std::shared_ptr<const SceneTangents> tangents_;
-  std::shared_ptr<const SceneLinks> links_;  ///< null if there are no sets
+  std::shared_ptr<const SceneLinks> links_;  ///< null if the scene has no link sets
   /// SceneView::visibility; null if all rays see everything.
   std::shared_ptr<const std::vector<uint32_t>> visibility_;
   Camera camera_;
   SceneView view_;
-  std::shared_ptr<const Scene> unmoved_;  ///< before any object was moved; null if none was
-  std::map<std::string, Affine> moves_;   ///< since then
+  std::shared_ptr<const Scene> unmoved_;  ///< the scene before its objects were moved, or null
+  std::map<std::string, Affine> moves_;   ///< moves since `unmoved_`
 };
 
 /// Collects the contents of a scene. Ids count from 0 in order of addition.
@@ -183,7 +185,8 @@ class Scene : public std::enable_shared_from_this<Scene> {
 class SceneBuilder {
  public:
   /// Makes an empty builder. `threads` are used for textures and for build() (0: all). `store`
-  /// holds the textures added here, together with those of other scenes; null keeps them in memory.
+  /// holds the textures that are added, and may hold textures of other scenes; if it is null,
+  /// textures stay in memory.
   explicit SceneBuilder(uint32_t threads = 0, std::shared_ptr<TileStore> store = nullptr);
   SceneBuilder(SceneBuilder&&) = default;
   SceneBuilder& operator=(SceneBuilder&&) = default;
@@ -199,7 +202,7 @@ class SceneBuilder {
   /// Returns a texture that was added; valid until the builder is destroyed or build() is called.
   const Texture& texture(uint32_t id) const;
   /// Adds a value graph for Material::graph and its parts. Outputs are numbered as in
-  /// graph/parameters/parameters.h; texture ids in it must exist.
+  /// graph/parameters/parameters.h. The texture ids in the graph must exist.
   uint32_t add_graph(const Graph& graph);
   /// Adds a material. The texture and graph ids of the material must exist.
   uint32_t add_material(Material material);
@@ -224,8 +227,8 @@ class SceneBuilder {
   void add_instance(uint32_t parent, uint32_t child, const Affine& transform,
                     uint32_t material = kInheritMaterial, uint32_t name = kNoName,
                     uint32_t number = kNoName, std::span<const Affine> steps = {});
-  /// Adds a name for instances. Its first `asset_length` characters name the asset, 0 if that is
-  /// unknown.
+  /// Adds a name for instances. The first `asset_length` characters of the name are the name of the
+  /// asset; 0 means that the asset is unknown.
   uint32_t add_placement_name(std::string_view name, uint32_t asset_length);
   /// Adds a set for Light::light_link and shadow_link.
   uint32_t add_geometry_set(GeometrySet set);
@@ -240,16 +243,16 @@ class SceneBuilder {
   /// Adds a light for Mesh::mesh_light, of kind kMeshLight. If it is not `visible`, the opacity of
   /// the mesh does not affect its emission.
   uint32_t add_mesh_light(Light light);
-  /// Returns the number of a light group for Light::group and Mesh::light_group; "" is
-  /// kOtherLights.
+  /// Returns the number of the light group called `name`, for Light::group and Mesh::light_group;
+  /// "" is kOtherLights.
   uint32_t light_group(const std::string& name);
   /// Adds a volume in world space, independent of surfaces. Volumes may overlap.
   uint32_t add_volume(Volume volume);
   void set_camera(const Camera& camera);
 
   /// Checks everything that involves several objects (cycles of groups, singular transforms,
-  /// materials) and makes the scene. The builder is empty afterwards. Meshes without any material
-  /// get a grey diffuse one.
+  /// materials) and makes the scene. The builder is empty afterwards. Meshes without a material get
+  /// a grey diffuse material.
   std::shared_ptr<const Scene> build();
 
  private:
@@ -263,8 +266,8 @@ class SceneBuilder {
   /// Counts the instances of groups with meshes in one placement of `group`; throws Error for
   /// cycles.
   uint64_t count_placements(uint32_t group, uint32_t depth, std::vector<uint64_t>& of_group) const;
-  /// Appends the instances of `group` and everything nested in it. `steps`: motion of `here`, if
-  /// any.
+  /// Appends the instances of `group` and of everything nested in it. `steps` are the transforms of
+  /// `here` over the shutter interval, if it moves.
   void flatten(uint32_t group, const Instance& here, std::span<const Affine> steps,
                const std::vector<uint64_t>& counts, std::vector<Instance>& out,
                SceneGeometry& geometry) const;
@@ -275,7 +278,8 @@ class SceneBuilder {
   /// Flattens all groups to instances, without those of singular transforms, and checks counts.
   void flatten_groups(SceneGeometry& geometry);
   /// Adds the materials that no caller adds: for meshes without one, for collisions in volumes and
-  /// media, and for exit points of random walks. Returns the index of the first, which is grey.
+  /// media, and for exit points of random walks. Returns the index of the first added material,
+  /// which is grey.
   uint32_t add_implicit_materials(SceneGeometry& geometry);
   /// Returns SceneMaterials::in_glass, and warns of glass whose absorption comes from a value
   /// graph.

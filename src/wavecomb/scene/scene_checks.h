@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Checks of scene values, for SceneBuilder and for edits. All throw Error with one line that names
-/// the object. For lights see light/description/light_table.h.
+/// Checks of scene values, for SceneBuilder and for edits. All checks throw Error with one line
+/// that names the object. For lights see light/description/light_table.h.
 #pragma once
 
 #include <cmath>
@@ -24,7 +24,8 @@ std::string quoted(const std::string& kind, const std::string& name);
 /// Checks a material. `texture_count`, `graph_count`: number of textures and graphs in the scene.
 void check_material(const Material& material, size_t texture_count, size_t graph_count);
 void check_profile(const IesProfile& profile);
-/// Checks a light filter. `textures`, `filters`: number of those added so far.
+/// Checks a light filter. `textures` and `filters` are the numbers of textures and light filters
+/// added so far.
 void check_filter(const LightFilter& filter, size_t textures, size_t filters);
 
 }  // namespace wavecomb

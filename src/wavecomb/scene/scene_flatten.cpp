@@ -83,7 +83,7 @@ void SceneBuilder::flatten(uint32_t group, const Instance& here, std::span<const
     if (!steps.empty()) {
       out.back().motion = {static_cast<uint32_t>(geometry.steps.size()),
                            static_cast<uint32_t>(steps.size() - 1)};
-      // Uses of a single transform take that of mid-shutter.
+      // Code that uses a single transform of a moving instance takes the one at mid-shutter.
       out.back().to_world = at_step(steps, 1, 2);
       for (const Affine& m : steps) geometry.steps.emplace_back(m);
     }
@@ -124,7 +124,8 @@ void SceneBuilder::warn_of_absorbing_graphs(const PlacedObjects& objects, bool i
 }
 
 void SceneBuilder::flatten_groups(SceneGeometry& geometry) {
-  // Count first, because nested groups can have 2^n placements, most of which may contain nothing.
+  // Count instances first, because n nested groups can have 2^n placements, most of which may
+  // contain nothing.
   std::vector<uint64_t> placements(groups_.size(), kUncounted);
   std::vector<Instance> flat;
   flat.reserve(count_placements(0, 0, placements));
@@ -211,7 +212,7 @@ void SceneBuilder::bind_materials(SceneGeometry& geometry, uint32_t grey) const 
 }
 
 void SceneBuilder::move_parts(SceneGeometry& geometry) {
-  // The nesting is no longer needed.
+  // Frees the nesting of groups, which is no longer needed.
   children_ = {};
   node_steps_ = {};
   geometry.meshes = std::move(meshes_);

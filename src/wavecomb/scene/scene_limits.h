@@ -21,12 +21,11 @@ struct SceneCounts {
   uint64_t grouped = 0;           ///< sum over all groups of their meshes
   uint64_t instanced_meshes = 0;  ///< sum over all instances, including the world, of their meshes
   uint64_t placements = 0;        ///< nested instances, including those that contain only groups
-  uint64_t steps = 0;             ///< transforms of moving instances
-  uint64_t lights = 0;            ///< including instances of mesh lights and portals
-  uint64_t profile_values = 0;    ///< angles and candela of IES profiles
-  /// geometry sets for light linking (one bit each) times classes, in 32-bit words
-  uint64_t link_words =
-      0;  ///< sets of geometry that lights are linked to, a bit each, times classes
+  uint64_t steps = 0;             ///< number of transforms of all moving instances
+  uint64_t lights = 0;  ///< number of lights, including instances of mesh lights and portals
+  uint64_t profile_values = 0;  ///< number of angles and candela values of all IES profiles
+  /// geometry sets for light linking (one bit each) times link classes, in 32-bit words
+  uint64_t link_words = 0;
 };
 
 /// Throws Error for the first count that exceeds its limit. The message says in one line which

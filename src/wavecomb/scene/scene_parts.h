@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Parts of a scene. Each is immutable, and is shared by all scenes that were derived from one
-/// another by edits without changing it.
+/// Parts of a scene. Each part is immutable. Scenes derived from one another by edits share the
+/// parts that no edit has changed.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +31,7 @@ namespace wavecomb {
 struct alignas(64) InstanceRecord {
   float to_world[12];  ///< rows of A, each followed by its translation
   uint32_t geometry;   ///< index of its group's first entry in SceneView::geometry_mesh
-  uint32_t material;   ///< used by meshes whose material is kInheritMaterial
+  uint32_t material;   ///< material of the group's meshes whose material is kInheritMaterial
   uint32_t emissive;   ///< index of its first entry in SceneView::emissive_lights, if there are any
   float side;          ///< sign of det A: -1 for a transform that mirrors
 };
@@ -63,12 +63,13 @@ struct Instance {
   uint32_t group = 0;
   Affine to_world;
   uint32_t material = kInheritMaterial;
-  /// Index into Scene::placements; kNoName for meshes of the world that edits made an instance.
+  /// Index into Scene::placements; kNoName for meshes of the world that an edit has made an
+  /// instance.
   uint32_t placement = kNoName;
   StepRange motion;  ///< range of SceneGeometry::steps
 };
 
-/// Maximum number of light groups of a stage, including kOtherLights.
+/// Maximum number of light groups of a USD stage, including kOtherLights.
 inline constexpr uint32_t kMaxLightGroups = 64;
 /// Name of group 0, for lights without a group.
 inline constexpr const char* kOtherLights = "other";
@@ -95,7 +96,7 @@ struct SceneGeometry {
   float radius = 1;  ///< radius of the bounding sphere
   std::vector<std::string> warnings;
 
-  std::vector<Bounds> mesh_boxes;  ///< mesh_bounds() of each mesh
+  std::vector<Bounds> mesh_boxes;  ///< bounds of each mesh, by mesh_bounds()
   std::vector<MeshRecord> mesh_records;
   std::vector<InstanceRecord> instance_records;
   std::vector<uint32_t> geometry_mesh;
@@ -111,7 +112,7 @@ struct SceneGeometry {
   /// SubsurfaceView::exit_material; kInheritMaterial if no material has a subsurface radius, so
   /// that the scene has no subsurface random walks.
   uint32_t exit_material = kInheritMaterial;
-  std::vector<StepRange> instance_motions;  ///< by instance record; empty if no instance moves
+  std::vector<StepRange> instance_motions;  ///< by record; empty if no instance moves
   bool moves() const {
     return mesh_motions.size() > 1 || !steps.empty() ||
            std::ranges::any_of(volumes, &Volume::moves);
@@ -146,7 +147,7 @@ struct SceneMaterials {
   /// to `materials` if it is needed, which `in_glass` helps to decide (see the member).
   SceneMaterials(std::vector<Material> materials, std::shared_ptr<const GraphSet> graphs,
                  std::span<const TexturePtr> textures, uint32_t exit_material, bool in_glass);
-  /// All materials but the one of collisions inside of meshes.
+  /// Number of materials without the one for collisions inside meshes.
   std::vector<Material> given() const;
 
   std::vector<Material> materials;  ///< materials as the caller described them
@@ -159,16 +160,16 @@ struct SceneMaterials {
   /// By material: whether smooth tangents affect its shading (tangents.h).
   std::vector<uint8_t> wants_tangents;
   std::vector<OpenPbrRecord> openpbr;  ///< records of materials of the program openpbr
-  /// By material; empty if no program has specific parameters.
+  /// Program-specific parameters by material; empty if no material's program has any.
   std::vector<ProgramParameterRecord> own;
-  /// By material; empty if there are no subsurface random walks.
+  /// Subsurface media by material; empty if there are no subsurface random walks.
   std::vector<SubsurfaceMedium<float>> walks;
-  /// By material; empty if paths need no medium stack.
+  /// Media inside meshes by material; empty if paths need no medium stack.
   std::vector<MeshMedium<float>> nested_media;
   /// MeshMediaView::event_material, the last material; kInheritMaterial if `nested_media` is empty.
   uint32_t event_material = kInheritMaterial;
-  /// Whether paths need to know which absorbing glass they are inside of: it holds objects or
-  /// lights (medium/description/glass_contents.h), or the scene has volumes.
+  /// Whether paths must track which absorbing glass they are inside, because the glass contains
+  /// objects or lights (medium/description/glass_contents.h) or the scene has volumes.
   bool in_glass = false;
   /// Whether the absorption of some glass comes from a value graph (absorbs_by_graph).
   bool has_absorbing_graphs = false;
@@ -178,12 +179,13 @@ struct SceneMaterials {
 /// Lights of the stage and emissive triangles.
 struct SceneLights {
   /// Packs the lights, and makes lights of the triangles of all meshes whose materials emit.
-  /// `before`, or null, belongs to a scene with the same geometry; unchanged data is reused from
-  /// it.
+  /// Reuses unchanged data of `before`, the lights of a scene with the same geometry; `before` may
+  /// be null.
   SceneLights(std::vector<Light> lights, const SceneGeometry& geometry,
               const SceneMaterials& materials, const SceneLights* before);
 
-  /// Returns the light tree. If `set` has only its outline, the first call builds it. Thread-safe.
+  /// Returns the light tree. The first call builds the tree if `set` has only its outline.
+  /// Thread-safe.
   const LightTree& tree(uint32_t threads) const;
   /// Returns the size in bytes of the nodes and trails of the tree.
   uint64_t tree_bytes() const;
@@ -192,10 +194,11 @@ struct SceneLights {
   LightSet set;
   std::vector<uint32_t> emissive;     ///< SceneView::emissive_lights; empty if nothing emits
   std::vector<uint32_t> mesh_lights;  ///< SceneView::mesh_lights; empty if there are none
-  /// Group of the triangle lights from `first` up to the `first` of the next entry.
+  /// Light group of a range of triangle lights, which begins at `first` and ends at the `first` of
+  /// the next entry.
   struct TriangleGroup {
     uint32_t first, group;
-    bool is_light;  ///< triangles of a mesh light, not of a material's emission
+    bool is_light;  ///< whether the triangles belong to a mesh light, not to an emissive material
   };
   std::vector<TriangleGroup> triangle_groups;
 

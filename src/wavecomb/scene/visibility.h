@@ -26,15 +26,15 @@ enum RayVisibility : uint32_t {
 struct VisibilityRule {
   std::string path;
   uint32_t specified = 0;  ///< mask of the RayVisibility bits that the rule sets
-  uint32_t bits = 0;       ///< values of these bits
+  uint32_t bits = 0;       ///< values of the bits in the mask
 };
 
 /// Returns the RayVisibility of all objects, for the meshes of each instance in order as in
 /// InstanceRecord::emissive; empty if all rays see everything.
 std::vector<uint32_t> object_visibility(const Scene& scene, const ObjectNames& names);
 
-/// Returns the kind of the ray that a path traces after `depth` vertices, or of its shadow ray
-/// there.
+/// Returns the RayVisibility of the ray that a path traces after `depth` vertices, or of the shadow
+/// ray from its last vertex.
 constexpr uint32_t ray_kind(uint32_t depth, bool shadow) {
   if (shadow) return kVisibleToShadowRays;
   return depth == 0 ? kVisibleToCamera : kVisibleToBounces;

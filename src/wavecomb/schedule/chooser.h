@@ -15,12 +15,13 @@ struct Work {
   double records = 0;
 };
 
-/// Chooser among several ways ("arms") to process a queue. It predicts the time of each arm as
+/// Chooser among several ways ("arms") to process a queue. The chooser predicts the time of each
+/// arm as
 ///   packets * (ns per packet) + records * (ns per record to prepare)
 /// and chooses the smallest. Both costs are exponential averages per depth and arm. Untried arms
-/// come first; later an arm that is not far behind is retried now and then, since costs vary over
-/// the image, and any other arm rarely. Measurements are clamped to twice the average, since slow
-/// ones may be caused by the machine.
+/// come first. Later the chooser occasionally retries an arm whose predicted time is nearly the
+/// best, since costs vary over the image, and rarely any other arm. Measurements are clamped to
+/// twice the average, since other work on the machine may slow some of them down.
 ///
 /// Contract: owned by one worker. The choice affects time only, never the image.
 class Chooser {

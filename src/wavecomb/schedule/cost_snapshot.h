@@ -10,11 +10,11 @@ namespace wavecomb {
 /// Estimated cost of shading one record, in nanoseconds, frozen while a pass runs.
 struct CostSnapshot {
   std::vector<float> material_ns;  ///< by material
-  std::vector<float> texture_ns;   ///< by texture: mean over the records that read it
-  float mean_ns = 1;               ///< mean over measured records; initially over materials
+  std::vector<float> texture_ns;   ///< by texture: mean cost of the records that read the texture
+  float mean_ns = 1;  ///< mean cost over measured records; before any measurement, over materials
 
   float material(uint32_t id) const { return material_ns[id]; }
-  /// Returns the cost of a texture, or 0 if there is none.
+  /// Returns the cost of a texture, or 0 for no texture.
   float texture(uint32_t id) const { return id < texture_ns.size() ? texture_ns[id] : 0.f; }
 };
 

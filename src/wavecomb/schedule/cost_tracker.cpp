@@ -30,7 +30,7 @@ CostPrediction merge_costs(const CostTracker& measured, std::span<const Material
                            float weight, CostSnapshot& costs) {
   CostPrediction prediction;
   double sum_w = 0, sum_measured = 0;
-  double compared_w = 0, compared = 0;  // over materials that had an estimate before
+  double compared_w = 0, compared = 0;  // sums over the materials that had an estimate before
   for (size_t m = 0; m < materials.size(); ++m) {
     const auto w = static_cast<double>(measured.timed()[m]);
     sum_w += w;

@@ -44,7 +44,8 @@ class CostTracker {
   /// Number of records, timed or not, by material.
   std::span<const uint64_t> record_counts() const { return record_counts_; }
   /// Adds the measurements of `other` and clears them, except for `record_counts`. The time charged
-  /// beside batches is averaged over all records of a material and added to its timed records.
+  /// outside timed batches is averaged over all records of a material and added to its timed
+  /// records.
   void take(CostTracker& other);
 
  private:
@@ -58,7 +59,7 @@ class CostTracker {
 struct CostPrediction {
   double r2 = 0;           ///< 1 - sum w (measured - predicted)^2 / sum w (measured - mean)^2
   double mean_error = 0;   ///< sum w |measured - predicted| / sum w measured
-  uint64_t materials = 0;  ///< number of materials compared
+  uint64_t materials = 0;  ///< number of materials that had both an estimate and a measurement
 };
 
 /// Updates the snapshot with the measurements of the last pass:

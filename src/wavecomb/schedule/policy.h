@@ -18,8 +18,8 @@ struct MaterialTraits {
   static constexpr uint32_t kNone = 0xffffffffu;  ///< id of no texture or no graph
   uint32_t program = 0;                           ///< shading program
   uint32_t texture = kNone;                       ///< largest texture
-  uint64_t texture_bytes = 0;                     ///< memory of that texture, 0 without one
-  uint32_t graph = kNone;                         ///< value graph that drives its inputs
+  uint64_t texture_bytes = 0;  ///< memory of the largest texture in bytes; 0 without textures
+  uint32_t graph = kNone;      ///< value graph that drives inputs of the material
 };
 
 /// Columns of a ShadingQueueView that are computed only for policies that request them.
@@ -44,8 +44,8 @@ struct ShadingQueueView {
   size_t size() const { return material.size(); }
 };
 
-/// Order of a shading queue. Implementations are pure functions of ids, keys and frozen costs, and
-/// cannot affect the image.
+/// Scheduling policy: computes the order of a shading queue. Implementations are pure functions of
+/// ids, keys and frozen costs, and cannot affect the image.
 class SchedulingPolicy {
  public:
   virtual ~SchedulingPolicy() = default;

@@ -18,7 +18,7 @@ struct OrderGrid {
 /// Number of distinct direction keys.
 inline constexpr uint32_t kDirectionKeys = 64;
 
-/// Counting sort: writes the n slots in ascending key order; ties keep their input order.
+/// Writes the n slots in ascending key order by counting sort; equal keys keep their input order.
 void sort_by_direction(const uint32_t* key, const uint32_t* slot, size_t n, uint32_t* sorted);
 
 }  // namespace wavecomb

@@ -10,8 +10,8 @@ namespace wavecomb {
 /// pool. The order depends on the rays alone (slot order as generated; survivors keep their
 /// positions), so it is the same under every shading policy.
 ///
-/// Contract: owned by one wave; `size` entries are valid; arrays are padded by one packet past the
-/// end.
+/// Contract: owned by one wave; the first `size` entries of each array are valid; arrays are padded
+/// by one packet past the end.
 class RayQueue {
  public:
   RayQueue() = default;

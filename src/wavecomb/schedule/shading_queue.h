@@ -14,7 +14,7 @@ namespace wavecomb {
 /// Hits in arrival order, which is ray order, plus a shading order. Ids are stored in columns,
 /// which policies read; the rest of each record is a contiguous row, which shading loads at once
 /// (docs/decisions/path-rows.md). `sorted_indices` is the shading order; `materialize()` moves the
-/// records into it.
+/// records into that order.
 ///
 /// Contract: owned by one wave; `size` records are valid. Shading writes its results at the
 /// record's arrival index, so that the shading order does not affect the ray order.
@@ -54,7 +54,7 @@ class ShadingQueue {
   static constexpr uint32_t kRayKeyShift = 8, kShadowKeyShift = 16;
 
   uint32_t* uints(Column c) const { return block_.uints(c); }
-  /// Returns the row of record `i`; the rows of later records follow it.
+  /// Returns the row of record `i`, which the rows of later records follow in memory.
   float* row(size_t i) const { return rows_.floats(0) + i * row_words_; }
 
   /// Moves all records into shading order.

@@ -19,8 +19,8 @@ enum class AttributeRate : uint32_t {
   kEnd,        ///< two values per curve segment
 };
 
-/// Attribute of a mesh. The records of a mesh are contiguous and end with one whose id is
-/// kNoAttribute.
+/// Attribute of a mesh. The attribute records of a mesh are contiguous and end with a record whose
+/// id is kNoAttribute.
 struct AttributeRecord {
   uint64_t values;   ///< address of floats, `width` per value
   uint64_t indices;  ///< address of three vertex indices per triangle, for kVertex

@@ -20,9 +20,9 @@ struct Footprint {
   bool one_texel = false;  ///< whether to read one random texel instead of all under the filter
   UInt<F> bits{0u};        ///< random bits, used if one_texel is set
 
-  /// Footprint for full filtering.
+  /// Makes a footprint for full filtering.
   Footprint(const F& w) : width(w) {}  // NOLINT(google-explicit-constructor)
-  /// Footprint for stochastic filtering with the bits of `random`.
+  /// Makes a footprint for stochastic filtering with the bits of `random`.
   Footprint(const F& w, const UInt<F>& random) : width(w), one_texel(true), bits(random) {}
 
   /// Returns the footprint for texture coordinates that are scaled by `factor`.
@@ -50,7 +50,7 @@ template <typename F>
 inline Texel<F> select_texel(const Mask<F>& m, const Texel<F>& a, const Texel<F>& b) {
   return {select(m, a.r, b.r), select(m, a.g, b.g), select(m, a.b, b.b), select(m, a.a, b.a)};
 }
-/// Returns the value of the first active lane.
+/// Returns the value of `a` in the first active lane.
 template <typename F>
 inline uint32_t first_of(const UInt<F>& value, const Mask<F>& active) {
   if constexpr (kIsScalar<F>)

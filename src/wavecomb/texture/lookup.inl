@@ -25,7 +25,7 @@ struct LevelLanes {
   UInt<F> width, height, tiles_x, offset;
 };
 
-/// Returns the same level in all lanes.
+/// Returns the given mip level in all lanes.
 template <typename F>
 inline LevelLanes<F> broadcast_level(const TextureLevel& level) {
   using U = UInt<F>;
@@ -78,7 +78,8 @@ inline Taps<F> make_taps(Wrap wrap, const F& x, const UInt<F>& size) {
   const Mask<F> a_low = Mask<F>(a < zero), b_high = Mask<F>(b > last);
   Taps<F> taps{UInt<F>(0u), UInt<F>(0u), F(x - base), Mask<F>(true), Mask<F>(true)};
   if (wrap == Wrap::kRepeat) {
-    // a lies in [-1, size - 1], or is `size` after rounding; b = a + 1.
+    // The lower tap a lies in [-1, size - 1], or is `size` after rounding; the upper tap is b = a
+    // + 1.
     const Int<F> a_in = select(Mask<F>(a > last), zero, a);
     taps.i0 = UInt<F>(select(a_low, last, a_in));
     taps.i1 = UInt<F>(select(
@@ -188,7 +189,8 @@ inline Texel<F> bilinear(const TextureView& texture, const LevelLanes<F>& level,
   return lerp_texel<F>(top, low, y.weight);
 }
 
-/// Reads one texel of one level, chosen with its weight in `bilinear` as probability.
+/// Reads one texel of one level, chosen with a probability equal to its weight in bilinear
+/// filtering.
 template <typename F>
 inline Texel<F> one_texel(const TextureView& texture, const LevelLanes<F>& level, const F& s,
                           const F& t, const Footprint<F>& footprint, const Mask<F>& active) {
@@ -199,7 +201,7 @@ inline Texel<F> one_texel(const TextureView& texture, const LevelLanes<F>& level
   return tap<F>(texture, level, x.i0, y.i0, x.in0 & y.in0, active);
 }
 
-/// `lookup` in a texture without UDIM tiles.
+/// Implements `lookup` for a texture without UDIM tiles.
 template <typename F>
 inline Texel<F> lookup_plain(const TextureView& texture, const F& s, const F& t,
                              const Footprint<F>& footprint, const Mask<F>& active) {
@@ -216,7 +218,7 @@ inline Texel<F> lookup_plain(const TextureView& texture, const F& s, const F& t,
                                : bilinear<F>(texture, level, s_in, t_in, active);
   }
   const uint32_t last = texture.level_count - 1;
-  // Lanes that are not coarse have lod 0, which gives level 0 as above.
+  // Lanes that read the finest level have lod 0, which gives level 0 as in the branch above.
   const F lod = min(log2(clamp(texels_wide, F(1.f), F(1e9f))), F(static_cast<float>(last)));
   if (footprint.one_texel) {
     const F nearest = max(floor(F(lod + footprint.number(22, 10))), F(0.f));
@@ -237,9 +239,9 @@ inline Texel<F> lookup_plain(const TextureView& texture, const F& s, const F& t,
   return select_texel<F>(mixed, lerp_texel<F>(fine, rough, weight), fine);
 }
 
-/// `lookup` in a UDIM texture: calls `lookup_plain` once for each tile that active lanes read. A
-/// point on the border of two tiles belongs to the upper or right one. Filters do not cross
-/// borders.
+/// Implements `lookup` for a UDIM texture: calls `lookup_plain` once for each tile that active
+/// lanes read. A point on the border of two tiles belongs to the upper or right one. Filters do not
+/// cross borders.
 template <typename F>
 [[gnu::noinline]] Texel<F> lookup_tiles(const TextureView& texture, const F& s, const F& t,
                                         const Footprint<F>& footprint, const Mask<F>& active) {

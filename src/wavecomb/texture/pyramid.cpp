@@ -13,7 +13,7 @@ namespace wavecomb {
 namespace {
 
 constexpr uint32_t kTile = TextureView::kTile;
-/// Number of halvings that one task applies to its rows while they are in the cache.
+/// Number of mip levels that one task computes from its rows while they are in the cache.
 constexpr uint32_t kBandLevels = 6;
 
 /// Source texels under destination texel i of n when `size` texels are reduced to n: index of the
@@ -36,7 +36,7 @@ std::vector<Box> make_boxes(uint32_t size, uint32_t n) {
   return boxes;
 }
 
-/// Filters a row with `columns` and adds it, times `weight`, to `to`.
+/// Filters a row of texels with `columns`, multiplies the result by `weight`, and adds it to `to`.
 void add_row(const std::vector<Box>& columns, uint32_t channels, float weight, const float* from,
              float* to) {
   for (size_t x = 0; x < columns.size(); ++x) {
@@ -57,7 +57,7 @@ void average_rows(const float* a, const float* b, size_t n, float* to) {
     for (uint32_t c = 0; c < C; ++c) {
       const float upper = 0.5f * a[2 * x * C + c] + 0.5f * a[2 * x * C + C + c];
       const float lower = 0.5f * b[2 * x * C + c] + 0.5f * b[2 * x * C + C + c];
-      // Adding 0 prevents -0, as in add_row, whose sums start from 0.
+      // Adding 0 turns -0 into 0, as in add_row, whose sums start from 0.
       to[x * C + c] = 0.5f * upper + 0.5f * lower + 0.f;
     }
 }
@@ -294,7 +294,7 @@ class Pyramid {
   const TextureView& view_;
   std::byte* storage_;
   uint32_t channels_;
-  uint32_t band_top_ = 0;  ///< level of which one row makes a band
+  uint32_t band_top_ = 0;  ///< mip level of which one row makes a band
   std::vector<std::vector<Box>> columns_;
 };
 

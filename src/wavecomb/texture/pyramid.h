@@ -15,7 +15,7 @@ namespace wavecomb {
 /// Statistics of a mip pyramid, by stored channel.
 struct PyramidTotals {
   double sum[4] = {0, 0, 0, 0};  ///< sum of the values of the finest level
-  uint64_t nonfinite = 0;        ///< number of its values that were infinite or NaN and became 0
+  uint64_t nonfinite = 0;        ///< number of infinite or NaN values, which became 0
   /// Range of the linear values of all levels, as stored.
   std::array<float, 4> low{kNothing, kNothing, kNothing, kNothing};
   std::array<float, 4> high{-kNothing, -kNothing, -kNothing, -kNothing};
@@ -23,7 +23,7 @@ struct PyramidTotals {
   static constexpr float kNothing = std::numeric_limits<float>::infinity();
 };
 
-/// Returns the size of one value in bytes.
+/// Returns the size of one stored value of a texture format in bytes.
 size_t value_bytes(TexelFormat format);
 
 /// Decodes one stored value to linear; `srgb`: the value is sRGB-encoded.
@@ -33,8 +33,8 @@ float decode_value(const std::byte* p, TexelFormat format, bool srgb);
 size_t texel_index(const TextureLevel& level, uint32_t x, uint32_t y);
 
 /// Lays out the mip levels of a texture one after another and writes them to `view`, whose format
-/// and channels must be set. Returns their size in bytes. Throws Error naming desc.name if texel or
-/// word indices would exceed 32-bit lanes: more than 2^32 texels, 8 GiB or more.
+/// and channels must be set. Returns the size of all levels in bytes. Throws Error naming desc.name
+/// if texel or word indices would exceed 32-bit lanes: more than 2^32 texels, 8 GiB or more.
 uint64_t lay_out(const TextureDesc& desc, TextureView& view);
 
 /// Fills the storage of `view`, whose levels must be laid out, from the caller's pixels. Levels are

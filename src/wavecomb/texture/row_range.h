@@ -16,7 +16,7 @@ namespace wavecomb {
 /// added `kRow` at a time with a separate range per position, so that the comparisons vectorise.
 ///
 /// Bytes are compared as stored codes, which sort like their values and are smaller. Codes of halfs
-/// do not sort like their values, so those are compared before encoding.
+/// do not sort like their values, so halfs are compared before encoding.
 template <typename T, size_t C, size_t kRow>
 class RowRange {
   static constexpr bool kByCode = std::is_same_v<T, uint8_t>;
@@ -35,8 +35,8 @@ class RowRange {
       row_values = codes;
     else
       row_values = values;
-    // Local copies do not alias and have a fixed length, so that the loops become a few
-    // comparisons.
+    // Local copies of the ranges do not alias and have a fixed length, so that the loops compile to
+    // a few comparisons.
     Value all[kRow];
     if (n == kRow) {
       std::copy_n(row_values, kRow, all);

@@ -40,7 +40,7 @@ namespace detail {
 /// Linear value half a code above each 8-bit sRGB code: the rounding boundaries.
 inline constexpr std::array<float, 256> kSrgbSteps = make_srgb_table(0.5);
 
-/// Buckets of floats from 2^-13 to 1 by exponent and 8 mantissa bits. Each holds at most one
+/// Buckets of floats from 2^-13 to 1 by exponent and 8 mantissa bits. Each bucket holds at most one
 /// rounding boundary.
 inline constexpr int kSrgbBucketShift = 23 - 8;
 inline constexpr uint32_t kSrgbFirstBits = (127u - 13u) << 23;

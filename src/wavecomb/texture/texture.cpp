@@ -39,8 +39,8 @@ void check(const TextureDesc& desc) {
 /// Returns a bound of lookup results for texels in [low, high].
 ///
 /// A filter interpolates a + (b - a) t up to three times with t in [0, 1]. If all texels are equal,
-/// this is exact; otherwise each step adds at most two rounding errors. No step crosses 0: for a
-/// and b >= 0, the rounded b - a is at least -a, and so is its product with t.
+/// the interpolation is exact; otherwise each step adds at most two rounding errors. No step
+/// crosses 0: for a and b >= 0, the rounded b - a is at least -a, and so is its product with t.
 TexelRange filtered(const TexelRange& texels) {
   constexpr float kRoundings = 1e-6f;
   TexelRange range = texels;
@@ -87,7 +87,7 @@ uint64_t lay_out(const TextureDesc& desc, TextureView& view) {
   uint32_t width = desc.width, height = desc.height;
   for (uint32_t& n = view.level_count; n < TextureView::kMaxLevels;) {
     const uint32_t tiles_x = (width + kTile - 1) / kTile, tiles_y = (height + kTile - 1) / kTile;
-    // The offset may overflow for images that are rejected below.
+    // The offset may overflow for images that are too large, which the check below rejects.
     view.levels[n++] = {width, height, tiles_x, static_cast<uint32_t>(texels)};
     texels += uint64_t{tiles_x} * tiles_y * kTile * kTile;
     if (width == 1 && height == 1) break;

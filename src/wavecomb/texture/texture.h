@@ -56,12 +56,12 @@ struct TextureView {
   TexelFormat format = TexelFormat::kU8;
   uint8_t channels = 4;  ///< as stored: 1 or 4
   bool srgb = false;
-  bool has_alpha = false;  ///< if false, alpha reads as 1
+  bool has_alpha = false;  ///< whether the texture has alpha; if not, alpha reads as 1
   Wrap wrap_s = Wrap::kRepeat, wrap_t = Wrap::kRepeat;
   uint32_t level_count = 0;
   TextureLevel levels[kMaxLevels] = {};
-  /// Tiles of a UDIM texture, which are looked up instead. The texture's own single texel is the
-  /// value of missing tiles.
+  /// Tiles of a UDIM texture, which lookups read instead of the texture itself. The single texel of
+  /// the UDIM texture is the value of missing tiles.
   const TileSet* tiles = nullptr;
 };
 
@@ -86,7 +86,7 @@ std::array<float, 4> texel_at(const TextureView& view, uint32_t level, uint32_t 
 
 /// Function that runs body(0) .. body(n - 1) in any order, possibly concurrently.
 using ForEach = std::function<void(size_t n, const std::function<void(size_t)>& body)>;
-/// ForEach that runs the bodies in order on the calling thread.
+/// Implements ForEach by running the bodies in order on the calling thread.
 void in_order(size_t n, const std::function<void(size_t)>& body);
 
 /// Immutable texture with a mip pyramid. Each level halves the size of the previous one, rounded
@@ -99,10 +99,11 @@ class Texture {
   /// Float values are clamped to +-kMaxTexel, so that no filter overflows.
   static constexpr float kMaxTexel = 1e30f;
 
-  /// Builds the pyramid. Values that are not finite become 0 and are counted. Throws Error naming
-  /// desc.name if a side is 0 or above kMaxSize, channels or data are invalid, or the levels need 8
-  /// GiB or more or have more than 2^32 texels. `for_each` may run rows on several threads; the
-  /// result is the same. `store`: if given, keeps the levels within its memory limit.
+  /// Builds the pyramid. Builds a texture from an image. Values that are not finite become 0 and
+  /// are counted. Throws Error naming desc.name if a side is 0 or above kMaxSize, channels or data
+  /// are invalid, or the levels need 8 GiB or more or have more than 2^32 texels. `for_each` may
+  /// process rows on several threads without changing the result. `store`: if given, keeps the
+  /// levels within its memory limit.
   explicit Texture(const TextureDesc& desc, const ForEach& for_each = in_order,
                    std::shared_ptr<TileStore> store = nullptr);
   /// Creates a UDIM texture that shares `tiles`, pairs of tile number (1001 to 1100) and texture.
@@ -114,7 +115,7 @@ class Texture {
 
   const TextureView& view() const { return view_; }
   const std::string& name() const { return name_; }
-  /// Memory of all levels in bytes, without tiles.
+  /// Memory of all levels in bytes, without the tiles of a UDIM texture.
   size_t bytes() const { return bytes_; }
   /// Textures of a UDIM texture, with their tile numbers.
   const std::vector<std::pair<uint32_t, std::shared_ptr<const Texture>>>& tiles() const {
@@ -126,7 +127,8 @@ class Texture {
   const float* mean() const { return mean_; }
   /// Bounds of all lookups with any coordinates, footprint and filter. Covers the stored texels of
   /// all levels, and black if it is returned outside the image. The range is slightly wider than
-  /// the texels because filters round, unless they are all equal, but it never crosses 0.
+  /// the range of the texels because filters round, unless all texels are equal, but the extension
+  /// never crosses 0.
   const TexelRange& range() const { return range_; }
   /// Number of values of the finest level that were infinite or NaN and became 0.
   uint64_t nonfinite_count() const { return nonfinite_count_; }

@@ -9,7 +9,8 @@
 
 namespace wavecomb {
 
-/// Temporary file without a name. It disappears when it is closed or the process ends in any way.
+/// Temporary file without a name. The file disappears when it is closed or when the process ends in
+/// any way.
 ///
 /// Contract: all members may be called concurrently.
 class TileFile {

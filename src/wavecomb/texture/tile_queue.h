@@ -8,16 +8,16 @@
 
 namespace wavecomb {
 
-/// Resident tiles in two queues, which decide which tile is evicted next. Reads of resident tiles
-/// cannot be observed, only misses. A tile that is missed soon after its eviction, before as many
-/// others were evicted as fit in memory, is considered hot and goes to the second queue. Tiles of
-/// the first queue are evicted first. After 2Q (Johnson and Shasha, VLDB 1994) and the refault
-/// distance of the Linux kernel.
+/// Resident tiles in two queues, which decide which tile is evicted next. The queue sees only
+/// misses, because reads of resident tiles cannot be observed. A tile goes to the second queue, for
+/// frequently read tiles, if it is missed again before as many other tiles were evicted as fit in
+/// memory. Tiles of the first queue are evicted first. After 2Q (Johnson and Shasha, VLDB 1994) and
+/// the refault distance of the Linux kernel.
 class TileQueue {
  public:
   enum class State : uint8_t { kAbsent, kLoading, kFirst, kSecond };
 
-  /// Extends the set of tiles to `count`; new ones are absent.
+  /// Extends the set of tiles to `count` tiles; new tiles are absent.
   void resize(size_t count) { tiles_.resize(count); }
   size_t size() const { return tiles_.size(); }
   size_t bytes() const { return tiles_.capacity() * sizeof(Tile); }
@@ -31,7 +31,7 @@ class TileQueue {
   void end(uint32_t tile, size_t tile_limit);
   /// Forgets a tile whose contents will be replaced.
   void drop(uint32_t tile);
-  /// Removes the next tile to evict and writes it to `tile`; returns false if none is resident.
+  /// Removes the next tile to evict and writes it to `tile`; returns false if no tile is resident.
   bool release(uint32_t& tile);
 
  private:
@@ -40,7 +40,7 @@ class TileQueue {
   static constexpr size_t kSecondEighths = 6;
   struct Tile {
     uint32_t older = kNone, newer = kNone;
-    uint32_t left_at = 0;  ///< value of releases_ at its last eviction; 0 if never evicted
+    uint32_t left_at = 0;  ///< value of releases_ when the tile was last evicted; 0 if never
     State state = State::kAbsent;
   };
   struct Queue {

@@ -18,7 +18,8 @@ using Clock = std::chrono::steady_clock;
 
 /// Tiles per chunk of address space, unless a texture needs more.
 constexpr uint32_t kChunkTiles = 4096;
-/// Number of reader threads served by one keeper thread, which also waits for the file.
+/// Number of reader threads that one keeper thread (a thread that loads tiles from the file)
+/// serves.
 constexpr unsigned kReadersPerLoader = 8;
 constexpr unsigned kMaxLoaders = 8;
 
@@ -64,7 +65,8 @@ uint64_t TileStore::resident_bytes() const {
 }
 
 size_t TileStore::tile_limit() const {
-  // Enough tiles that concurrent readers do not evict each other's tiles for ever.
+  // Minimum number of tiles in memory, so that concurrent readers do not evict each other's tiles
+  // for ever.
   constexpr size_t kLeast = 32;
   const uint64_t own = std::min(queue_.bytes() + counts_.grid_bytes, limit_bytes_);
   return std::max<size_t>(kLeast, (limit_bytes_ - own) / tile_bytes_);
@@ -193,7 +195,8 @@ uint32_t TileStore::allocate(uint32_t count) {
 }
 
 void TileStore::free(uint32_t first, uint32_t count) {
-  // Merge with free neighbours, but not across chunks, which may not be contiguous in memory.
+  // Merge the freed range with free neighbouring ranges, but not across chunks, which may not be
+  // contiguous in memory.
   const auto joins = [&](uint32_t tile) {
     return std::none_of(chunks_.begin(), chunks_.end(),
                         [&](const Chunk& chunk) { return chunk.first == tile; });
@@ -263,7 +266,7 @@ void TileStore::start_loaders() {
     reason = error.code().value();
   }
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
-  // A few threads suffice if not all could be started.
+  // Continue with fewer threads if not all could be started.
   if (loaders_.empty()) throw Error(no_memory(reason));
 }
 
@@ -274,7 +277,7 @@ void TileStore::put(const std::byte* at, const std::byte* from, size_t bytes) {
 void TileStore::evict_tiles() {
   uint32_t tile;
   while (queue_.resident() > tile_limit() && queue_.release(tile)) {
-    // The lock is held, so that the state of a tile always matches its memory.
+    // Keep the lock during the call, so that the state of a tile always matches its memory.
     faults_.release(address(tile), tile_bytes_);
     ++counts_.releases;
   }
@@ -292,15 +295,15 @@ void TileStore::serve(const std::byte* at, std::byte* buffer) {
   const uint32_t tile = tile_at(at);
   const std::byte* tile_address = address(tile);
   if (queue_.state(tile) == TileQueue::State::kLoading)
-    return;  // The loading thread wakes the
-             // readers.
+    return;  // The loading thread wakes the readers.
   if (queue_.state(tile) != TileQueue::State::kAbsent)
     return faults_.wake(tile_address, tile_bytes_);
   queue_.begin(tile);
   evict_tiles();
   counts_.peak_bytes = std::max(counts_.peak_bytes, resident_bytes());
   lock.unlock();
-  // Readers must be resumed in any case; check() reports the failure to the render later.
+  // Resume the readers even if the tile could not be read; check() reports the failure to the
+  // render later.
   Failure failure = Failure::kNone;
   if (!file_->read(buffer, tile_bytes_, uint64_t{tile} * tile_bytes_)) {
     std::fill_n(buffer, tile_bytes_, std::byte{0});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Storage of textures within a memory limit, which is shared with volume grids; the rest is in a
-/// temporary file.
+/// Storage of textures within a memory limit, which is shared with volume grids; textures that do
+/// not fit are in a temporary file.
 #pragma once
 
 #include <atomic>
@@ -46,10 +46,10 @@ struct StoreStatistics {
 /// faults, so never pass them to a system call.
 class TileStore {
  public:
-  /// Unit of transfer between memory and file: 64 texel tiles of a TextureView with four 8-bit
-  /// channels.
+  /// Size of a store tile, the unit of transfer between memory and file: 64 texel tiles of a
+  /// TextureView with four 8-bit channels.
   static constexpr size_t kTileBytes = 16384;
-  /// Smallest limit, which allows some tiles for each reader.
+  /// Smallest memory limit, which leaves room for a few tiles of each reader.
   static constexpr uint64_t kMinBytes = 1'000'000;
 
   /// `folder`: for the temporary file, which may grow to the size of all textures. Throws Error if
@@ -59,7 +59,8 @@ class TileStore {
   TileStore(const TileStore&) = delete;
   TileStore& operator=(const TileStore&) = delete;
 
-  /// Sets the size of images in memory outside the store that textures will be built from.
+  /// Sets the size of the images from which textures will be built, which are in memory outside the
+  /// store.
   void set_waiting(uint64_t bytes);
   /// Announces that a texture is being built, which uses `bytes` and `scratch_bytes` outside the
   /// store, in addition to set_waiting(). Throws Error if textures must move to the file and
@@ -93,7 +94,7 @@ class TileStore {
     size_t bytes;
   };
 
-  // The caller holds the lock.
+  // The functions below require that the caller holds the lock.
   uint32_t allocate(uint32_t count);
   void free(uint32_t first, uint32_t count);
   const std::byte* address(uint32_t tile) const;
@@ -110,7 +111,8 @@ class TileStore {
   void start_loaders();
   void put(const std::byte* at, const std::byte* from, size_t bytes);
 
-  // On threads of the store, where exceptions would not be caught.
+  // The functions below run on threads of the store and must not throw, because nothing would catch
+  // the exception.
   /// Serves page faults until stopped.
   void keep(std::byte* buffer) noexcept;
   /// Loads the tile of address `at` and wakes its readers.
@@ -122,10 +124,10 @@ class TileStore {
   UserFaults faults_;
   mutable std::mutex mutex_;
   std::unique_ptr<TileFile> file_;             ///< null while everything fits in memory
-  std::vector<Chunk> chunks_;                  ///< sorted by first tile
+  std::vector<Chunk> chunks_;                  ///< stored textures, sorted by first tile
   std::map<const std::byte*, size_t> places_;  ///< index into chunks_ by base address
-  std::map<uint32_t, Range> ranges_;           ///< ranges in use, by first tile
-  std::map<uint32_t, uint32_t> free_;          ///< free ranges: first tile and count
+  std::map<uint32_t, Range> ranges_;           ///< tile ranges in use, by first tile
+  std::map<uint32_t, uint32_t> free_;          ///< free tile ranges: first tile and count
   TileQueue queue_;
   uint64_t held_bytes_ = 0;  ///< size of textures in memory while there is no file
   uint64_t waiting_bytes_ = 0;
@@ -139,8 +141,8 @@ class TileStore {
   /// Cause of the first failure to load a tile.
   enum class Failure : uint8_t { kNone, kFile, kMemory };
   std::atomic<Failure> failure_{Failure::kNone};
-  int reason_ = 0;                  ///< errno of a kMemory failure
-  std::vector<std::byte> buffers_;  ///< one tile per keeper
+  int reason_ = 0;                  ///< errno of a failure to get memory
+  std::vector<std::byte> buffers_;  ///< buffer of one tile per keeper thread
   std::vector<std::thread> loaders_;
 };
 

@@ -79,7 +79,7 @@ const std::byte* UserFaults::map(size_t bytes) {
   if (at == MAP_FAILED)
     throw Error(std::string("no address space for textures (") + std::strerror(errno) + ")");
   maps_.emplace_back(static_cast<std::byte*>(at), bytes);
-  // After a fork, the child would read zeros in unfilled pages.
+  // Exclude the range from forks, since the child would read zeros in unfilled pages.
   ::madvise(at, bytes, MADV_DONTFORK);
   ::madvise(at, bytes, MADV_NOHUGEPAGE);
   uffdio_register range{};
@@ -98,7 +98,8 @@ int UserFaults::fill(const std::byte* at, const std::byte* from, size_t bytes) n
     copy.len = bytes - done;
     if (::ioctl(faults_, UFFDIO_COPY, &copy) == 0) return 0;
     if (errno != EAGAIN) return errno;
-    // Mappings changed concurrently; the part that was copied counts.
+    // The kernel stopped because mappings changed concurrently; continue after the part that was
+    // copied.
     if (copy.copy > 0) done += static_cast<size_t>(copy.copy);
   }
   return 0;
@@ -136,7 +137,7 @@ size_t UserFaults::wait(const std::byte** addresses) noexcept {
       if (messages[i].event == UFFD_EVENT_PAGEFAULT)
         addresses[count++] =
             reinterpret_cast<const std::byte*>(uintptr_t{messages[i].arg.pagefault.address});
-    if (count > 0) return count;  // Otherwise, another thread took the events.
+    if (count > 0) return count;  // If nothing was read, another thread took the events.
   }
 }
 

@@ -15,33 +15,33 @@ namespace wavecomb {
 /// cannot read unfilled pages, so never pass them to a system call.
 class UserFaults {
  public:
-  /// Returns a short reason why the system lacks support, or "" if it has it.
+  /// Returns a short reason why the system does not support demand-filled memory, or "" if it does.
   static std::string unsupported_reason();
 
   /// Throws Error with the text of unsupported_reason() if unsupported.
   UserFaults();
-  /// Unmaps all memory. No thread may be waiting or reading.
+  /// Unmaps all memory. Contract of the destructor: no thread waits in wait() or reads the memory.
   ~UserFaults();
   UserFaults(const UserFaults&) = delete;
   UserFaults& operator=(const UserFaults&) = delete;
 
-  /// Maps more read-only address space, which is valid until destruction. Throws Error if there is
-  /// none left.
+  /// Maps more read-only address space, which is valid until destruction. Throws Error if no
+  /// address space is left.
   const std::byte* map(size_t bytes);
   /// Copies `from` to an unfilled range and wakes the threads that wait for it. Returns 0, or errno
-  /// on failure, when part of the range may be filled.
+  /// on failure; then part of the range may have been filled.
   [[nodiscard]] int fill(const std::byte* at, const std::byte* from, size_t bytes) noexcept;
   /// Resumes threads that wait for a range that cannot be filled. Unfilled pages read as zero.
   /// Needs no memory.
   void abandon(const std::byte* at, size_t bytes) noexcept;
-  /// Frees the memory of a range; reading it blocks again.
+  /// Frees the memory of a range; a thread that reads the range blocks again.
   void release(const std::byte* at, size_t bytes) noexcept;
   /// Wakes threads that wait for a range that is already filled.
   void wake(const std::byte* at, size_t bytes) noexcept;
   /// Maximum number of addresses returned by one wait().
   static constexpr size_t kMaxAddresses = 16;
-  /// Blocks until a thread reads an unfilled page. Writes the addresses of up to kMaxAddresses such
-  /// reads to `addresses` and returns their number, or 0 after stop().
+  /// Blocks until a thread reads an unfilled page. Writes up to kMaxAddresses addresses that
+  /// threads wait for to `addresses` and returns their number, or 0 after stop().
   size_t wait(const std::byte** addresses) noexcept;
   /// Ends all current and future wait() calls.
   void stop();

@@ -40,7 +40,8 @@ struct WaveContext {
   const EmbreeAccelerator* accel;
   const Settings* settings;
   const CameraSetup* camera;
-  /// Scheduling policies. With several policies, each worker chooses one for each queue.
+  /// Scheduling policies. If there are several policies, each worker chooses one for each shading
+  /// queue.
   std::span<const SchedulingPolicy* const> policies;
   std::span<const MaterialTraits> traits;
   const CostSnapshot* costs;           ///< for scheduling policies

@@ -22,7 +22,7 @@ void collect_connections(Wave& wave, const WaveContext& context, uint32_t depth)
   const size_t shaded = queue.size;
   queue.clear();
   size_t n = 0;
-  // The queue is overwritten in place: writes stay behind reads.
+  // Overwrite the queue in place, which is safe because writes stay behind reads.
   for (size_t i = 0; i < shaded; i += kWidth<F>) {
     Mask<F> active = first_lanes<F>(shaded - i);
     const U slot = load<U>(queue.slot + i);

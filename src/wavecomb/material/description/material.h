@@ -69,7 +69,7 @@ struct Material {
   bool specular_workflow = false;  ///< principled: F0 comes from specular_color instead of metallic
   bool presence = false;  ///< principled: opacity is presence (cut-out) instead of transparency
   std::array<TextureUse, kInputCount> textures;
-  OpenPbr openpbr;  ///< used only by the program openpbr
+  OpenPbr openpbr;  ///< inputs that only the program openpbr uses
   /// Values of the parameters specific to the program (ProgramInfo::own), if given.
   std::array<std::optional<float>, kMaxProgramParameters> own;
   /// Value graphs that compute parameters at hits, instead of constants and textures: ids of

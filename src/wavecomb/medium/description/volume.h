@@ -96,16 +96,15 @@ class VolumeMotion;
 struct Volume {
   std::string name;
   VolumeField density;  ///< field of one component; 1 everywhere if not given
-  VolumeField color;    ///< if not given, 1
+  VolumeField color;    ///< field of three components; 1 everywhere if not given
   VolumeField glow;     ///< emission field; if not given, the density
   /// Three signed components in the volume's local space per second; if not given, the volume does
   /// not move.
   VolumeField velocity;
   std::array<float, 2> seconds{0, 0};          ///< times t of shutter open and close
   std::shared_ptr<const VolumeMotion> motion;  ///< made by SceneBuilder::add_volume
-  /// Corners in local space, used if there is no density field.
-  std::array<Vec3<float>, 2> box{Vec3<float>(0.f),
-                                 Vec3<float>(0.f)};  ///< own space; where there is no density field
+  /// Corners of a homogeneous volume in local space, used if there is no density field.
+  std::array<Vec3<float>, 2> box{Vec3<float>(0.f), Vec3<float>(0.f)};
   Affine to_world;
   Vec3<float> extinction{1, 1, 1}, albedo{0.5f, 0.5f, 0.5f}, emission{0, 0, 0};
   float anisotropy = 0;  ///< mean cosine of the scattering angle, in (-1, 1)

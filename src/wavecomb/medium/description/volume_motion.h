@@ -38,7 +38,7 @@ class VolumeMotion {
   MovedCells density_, emission_;
 };
 
-/// Returns whether the motion bounds of `a` are valid for `b` as well.
+/// Returns whether the motion bounds of volume `a` are valid for volume `b` as well.
 bool has_same_motion(const Volume& a, const Volume& b);
 
 /// Maps bricks of a field to the volume's local space.

@@ -20,7 +20,7 @@ inline constexpr uint32_t kNoMaterial = 0xffffffffu;
 template <typename F>
 struct MediumBoundary {
   UInt<F> object;    ///< instance_geometry() of the mesh
-  UInt<F> material;  ///< kNoMaterial if there is no bound
+  UInt<F> material;  ///< kNoMaterial if there is no boundary
 };
 
 template <typename F>

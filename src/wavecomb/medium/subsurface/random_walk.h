@@ -57,7 +57,7 @@ struct SubsurfaceWalk {
   F choice, flight;   ///< random numbers for the technique and the first distance
   UInt<F> technique;  ///< hero channel, plus kGuided if the walk is guided
   Color<F> free;      ///< q_k p_k of free walks by channel, relative to the sum over all techniques
-  Color<F> guided;    ///< the same product for guided walks
+  Color<F> guided;    ///< q_k p_k of guided walks, as for free walks
 
   static constexpr uint32_t kGuided = 4;
 

@@ -31,7 +31,7 @@ inline bool has_finite_lights(const LightView& lights) {
 /// Equiangular distribution of distances along a ray segment, for one light.
 template <typename F>
 struct EquiangularDistribution {
-  F share{0.f};  ///< q, or 0 without equiangular sampling
+  F share{0.f};  ///< probability q of equiangular sampling
   F nearest{0.f}, height{1.f}, from{0.f}, span{1.f};
 
   /// Samples a distance with a random number in [0, 1).

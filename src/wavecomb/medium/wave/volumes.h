@@ -71,7 +71,7 @@ class Volumes : public SubsurfaceScattering {
     return sum;
   }
 
-  // Versions for all rays of a wave, and for all its unblocked shadow rays.
+  // Process all rays of a wave together, and all its unblocked shadow rays.
 
   template <typename F>
   void sample_wave_flights(Wave& wave, uint32_t depth, SamplerKind sampler) const {

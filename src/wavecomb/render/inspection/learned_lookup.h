@@ -23,7 +23,7 @@ struct Learned {
   std::shared_ptr<const Scene> scene;               ///< the rendered scene
   bool by_tree = false;                             ///< LightView::by_tree
   std::shared_ptr<const LightCalibration> lights;   ///< null if lights are selected by power
-  std::shared_ptr<const GuidingTraining> training;  ///< may have no field
+  std::shared_ptr<const GuidingTraining> training;  ///< guiding training; may have no field
   std::optional<TransportChoice> transport;         ///< if the settings left it open
 };
 
@@ -54,7 +54,7 @@ struct LearnedData {
 /// Number of light selections from which the probabilities are counted.
 inline constexpr uint32_t kCountedChoices = 4096;
 
-/// Looks up the learned data at `place`.
+/// Looks up the learned data at the surface point `place`.
 LearnedData look_up(const Learned& learned, const LearnedQuery& place);
 
 }  // namespace wavecomb

@@ -18,12 +18,12 @@ struct Pick {
   std::string object;            ///< ObjectNames::object
   std::string asset;             ///< ObjectNames::asset
   uint32_t light = kNoLight;     ///< index into Scene::lights; kNoLight for a surface
-  uint32_t material = 0;         ///< surfaces only, as are instance, normal and uv
+  uint32_t material = 0;         ///< for surfaces only, like instance, normal and uv
   uint32_t instance = 0;         ///< index into SceneView::instances
   Vec3<float> position, normal;  ///< world space; unit shading normal
   Vec2<float> uv;
   Vec3<float> dir;     ///< unit direction of the ray
-  float depth = 0;     ///< along the camera's axis
+  float depth = 0;     ///< depth along the camera's axis
   float distance = 0;  ///< from the camera
 };
 
@@ -32,8 +32,7 @@ struct Pick {
 std::optional<Pick> pick(const Scene& scene, const EmbreeAccelerator& accel, float x, float y,
                          uint32_t width, uint32_t height);
 
-/// Returns the surface points hit by rays through the centres of side x side cells of such an
-/// image.
+/// Returns the surface points hit by rays through the centres of side x side cells of the image.
 std::vector<Vec3<float>> visible_surface_points(const Scene& scene, const EmbreeAccelerator& accel,
                                                 uint32_t width, uint32_t height, uint32_t side);
 

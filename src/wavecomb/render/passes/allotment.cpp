@@ -127,7 +127,8 @@ std::vector<uint32_t> round_parts(const std::vector<double>& parts, uint64_t tot
         std::ldexp(static_cast<double>(hash_u32<uint32_t>(static_cast<uint32_t>(i), seed)), -32);
     given += out[i] = static_cast<uint32_t>(std::floor(parts[i] + u));
   }
-  // The sum may be off by a little: change pixels at even distances by one.
+  // The sum of the rounded parts may differ slightly from `total`: change pixels at even distances
+  // by one.
   while (given != total) {
     const uint64_t wrong = std::min<uint64_t>(given < total ? total - given : given - total, count);
     const uint64_t before = given;
@@ -141,7 +142,7 @@ std::vector<uint32_t> round_parts(const std::vector<double>& parts, uint64_t tot
         --given;
       }
     }
-    if (given == before) {  // all of those are 0, so take one from the first that is not
+    if (given == before) {  // all visited pixels are 0: use another one
       --*std::find_if(out.begin(), out.end(), [](uint32_t n) { return n > 0; });
       --given;
     }

@@ -22,7 +22,7 @@
 
 namespace wavecomb {
 
-/// Pixels to each side in the window of these means.
+/// Half width in pixels of the window over which s / I and c are averaged.
 inline constexpr uint32_t kAllocationWindow = 2;
 /// Limits of a pixel's weight, relative to the mean weight. These limits keep a pixel that was dark
 /// by chance from getting too few samples, and a firefly from taking all of them.

@@ -57,8 +57,8 @@ PassLoop::PassLoop(const RenderPlan& plan, PassState pass, Film& film, PassRunne
     all_started &= samples[i] > 0;
   }
   may_be_cut_ = all_started;
-  // An interrupted pass of a render without a time limit may be long. One sample for each pixel
-  // comes first.
+  // A pass that was interrupted in a render without a time limit may be long. If a timed render
+  // continues it, each pixel gets one sample first.
   if (rules_.timed && !all_started) pass_.target = std::min(pass_.target, 1u);
   if (!rules_.adaptive || pass_.light_target == 0)
     pass_.light_target = joint_.samples(pass_.target);

@@ -34,7 +34,7 @@ class PassLoop {
 
   void run();
   RenderStatus status() const;
-  /// State of the pass. Contract: while no worker runs.
+  /// State of the pass. Contract: called while no worker runs.
   const PassState& pass() const { return pass_; }
   const AllocationStatistics& allocation() const { return allocation_; }
 

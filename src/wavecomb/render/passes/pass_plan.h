@@ -30,7 +30,7 @@ struct SampleAllocation {
   }
 };
 
-/// State of a pass. A checkpoint keeps it with the film.
+/// State of a pass. A checkpoint stores this state with the film.
 struct PassState {
   uint32_t target = 0;            ///< samples of each active pixel after the pass, or their mean
   uint32_t light_target = 0;      ///< samples of each light path after the pass

@@ -33,8 +33,8 @@ class PassRunner {
   PassRunner(Integrator& integrator, uint32_t threads, uint32_t wave_size);
 
   /// Runs a plan until it is done or `halted` returns true. All workers call `halted` before each
-  /// wave. Every pixel then has whole waves of samples, without gaps. `joint` means that the
-  /// plan consists of light paths (WaveTask::joint), which do not count as samples.
+  /// wave. After run(), the samples of every pixel form complete waves, without gaps. `joint` means
+  /// that the plan consists of light paths (WaveTask::joint), which do not count as samples.
   void run(const PassPlan& plan, const std::function<bool()>& halted, bool joint = false);
 
   const Integrator& integrator() const { return integrator_; }

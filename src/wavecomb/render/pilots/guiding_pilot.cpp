@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::array<uint32_t, 2> kPilotSeeds = {0x6c078965u, 0x9908b0dfu};
 /// Fraction of pixels with the largest differences that are left out. A pilot render has a few
-/// hundred pixels, of which a few would decide otherwise.
+/// hundred pixels, of which a few noisy ones would otherwise determine the result.
 constexpr double kUncounted = 0.02;
 /// Paths whose vertices are held at once: about 30 MB.
 constexpr size_t kPathsAtOnce = 65'536;

@@ -42,15 +42,15 @@ constexpr uint64_t kPilotShare = 320, kMinPilotPaths = 2048, kMaxPilotPaths = 65
 constexpr uint32_t kMinPilotSamples = 16, kMaxPilotSamples = 32;
 /// Samples per pixel from which the variance is estimated for learned roulette.
 constexpr uint32_t kSpreadSamples = 16;
-/// One such sample for every kSpreadShare training paths.
+/// Learned roulette takes one variance sample for every kSpreadShare training paths.
 constexpr uint64_t kSpreadShare = 8;
 /// Fraction of paths with the largest differences that are left out of the variance.
 constexpr double kTrimmedPaths = 0.001;
 /// Least measured gains in efficiency for which training continues after the first and the second
-/// round. The second is the one for which the render is guided.
+/// round. The render is guided if the gain after the second round reaches the second value.
 constexpr std::array<double, 2> kMinGains = {1.1, 1.25};
-/// Gain from which the third round takes the share of a render with Guiding::kOn; below, it takes a
-/// half of that.
+/// Gain from which the third round takes the share of a render with Guiding::kOn; with a lower gain
+/// it takes half of that share.
 constexpr double kFullTrainingGain = 1.5;
 constexpr uint32_t kTrainingRounds = 3;
 

@@ -138,7 +138,7 @@ LightCalibration calibrate_lights(const Scene& scene, const EmbreeAccelerator& a
   const bool has_nodes = parts.by_tree && tree.nodes.size() > 1 && set.size() <= kMaxTilted;
   if (parts.size() < 2 && !has_nodes) return out;
 
-  // Mix with even probabilities, so that lights of little power are sampled too.
+  // Mix the probabilities with uniform ones, so that lights of little power are sampled as well.
   std::vector<double> even(parts.size());
   for (size_t i = 0; i < parts.size(); ++i)
     even[i] = 0.5 * parts.power[i] + 0.5 / static_cast<double>(parts.size());

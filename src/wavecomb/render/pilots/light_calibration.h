@@ -2,8 +2,8 @@
 /// Estimates the contribution of each light to the image before the first pass, and sets the
 /// selection probabilities of lights accordingly.
 ///
-/// Camera paths over the whole image select lights with probabilities between those of power and
-/// even ones. The contributions of the light samples with their MIS weights, relative to the
+/// Camera paths over the whole image select lights with probabilities between proportional to power
+/// and uniform. The contributions of the light samples with their MIS weights, relative to the
 /// brightness of the image around, give the new probabilities (light/calibration/balance.h). The
 /// result does not depend on seed, sampler, samples, region, threads, waves or lanes, so that
 /// crops, resumed renders and merged renders use the same probabilities.

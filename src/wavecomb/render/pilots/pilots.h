@@ -38,9 +38,9 @@ struct PilotCache {
 /// Results of the pilots of one render.
 struct PilotResults {
   std::shared_ptr<const LightCalibration> lights;  ///< null if not calibrated yet
-  /// Of the joint transport; may be null.
+  /// Result of the joint transport's pilot; may be null.
   std::shared_ptr<const JointPilot::Result> joint;
-  /// Never null; without a field before and unless it is trained.
+  /// Training of the guiding field. Never null, but has no field unless training has succeeded.
   std::shared_ptr<const GuidingTraining> training = std::make_shared<const GuidingTraining>();
   LightView light_view;      ///< lights with calibrated weights, and aimed if they send paths
   GuidingView guiding_view;  ///< view of the guiding field of `training`, if any
@@ -55,11 +55,11 @@ struct PilotInput {
   std::shared_ptr<const Scene> scene;
   const RenderPlan& plan;
   const WaveContext& context;  ///< of the render
-  RenderCosts& costs;          ///< gets what is measured
+  RenderCosts& costs;          ///< receives the measured costs
   /// Costs of an earlier render, or null.
   const CostProfile* profile = nullptr;
-  /// The image that lights are calibrated for: that of the plan, or of the render that this pilot
-  /// render is for.
+  /// Settings of the image that lights are calibrated for: the plan's, or in a pilot render those
+  /// of the actual render.
   const Settings& light_settings;
   /// Packed training of an earlier render (packed_training()), which replaces training; or empty.
   std::span<const std::byte> learned;

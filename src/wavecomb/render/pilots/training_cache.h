@@ -17,8 +17,8 @@
 namespace wavecomb {
 
 /// Serializes a training and the choice of the transport, if there is one: the size of the field
-/// and a few hundred bytes. Returns nothing if nothing was chosen or learned, because the settings
-/// decide, or because the render is too short or was stopped.
+/// and a few hundred bytes. Returns no bytes if nothing was chosen or learned: the settings decide,
+/// or the render is too short or was stopped.
 std::vector<std::byte> packed_training(const GuidingTraining& training,
                                        const std::optional<TransportChoice>& transport);
 
@@ -28,7 +28,7 @@ GuidingTraining unpacked_training(std::span<const std::byte> bytes, const Scene&
                                   const Settings& settings);
 
 /// Returns the choice of the transport that packed_training() wrote; Transport::kPath if there is
-/// none. Throws the same errors.
+/// none. Throws Error if `bytes` are damaged or of another version or build.
 TransportChoice unpacked_transport(std::span<const std::byte> bytes);
 
 /// Cache of the last choice of the transport, reused by renders of the same scene whose settings
@@ -37,7 +37,7 @@ TransportChoice unpacked_transport(std::span<const std::byte> bytes);
 /// Contract: one thread at a time.
 class TransportChoiceCache {
  public:
-  /// Returns the cached choice, or nothing.
+  /// Returns the cached choice of the transport, or nothing.
   std::optional<TransportChoice> find(const std::shared_ptr<const Scene>& scene,
                                       const Settings& settings) const;
   void keep(const std::shared_ptr<const Scene>& scene, const Settings& settings,

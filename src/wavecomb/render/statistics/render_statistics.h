@@ -72,12 +72,12 @@ struct RenderStatistics {
   SceneBytes scene_bytes;
   uint64_t accelerator_bytes = 0, wave_bytes = 0, film_bytes = 0, peak_rss_bytes = 0;
   bool cancelled = false;  ///< stopped by the caller; false if a time limit ended the render
-  // By path depth; the last entry holds all deeper ones.
+  // Counts by path depth; the last entry includes all deeper vertices.
   std::vector<uint64_t> rays_at, shadow_rays_at, records_at;
   double run_length = 0, material_homogeneity = 0, texture_homogeneity = 0;
   std::vector<MaterialStatistics> materials;
   double cost_r2 = 0, cost_mean_error = 0;  ///< of predictions for the last pass that had any
-  uint64_t cost_materials = 0;  ///< number of materials compared; 0 without a prediction
+  uint64_t cost_materials = 0;              ///< materials with a prediction and a measurement
   std::vector<std::pair<std::string, uint64_t>> policy_uses;  ///< queues ordered by each policy
   double calibration_s = 0;
   LightShares light_calibration;

@@ -34,7 +34,7 @@ enum class RollingShutter : uint32_t { kOff, kTop, kBottom, kLeft, kRight };
 struct Camera {
   Affine to_world;
   /// Camera transforms at equally spaced shutter times, interpolated linearly: two or more if the
-  /// camera moves. Empty if it stands still at `to_world`.
+  /// camera moves. The list is empty if the camera stands still at `to_world`.
   std::vector<Affine> steps{};
   Projection projection = Projection::kPerspective;
   /// Visible region: x from window[0] to window[1], y from window[2] to window[3]. A perspective
@@ -45,8 +45,8 @@ struct Camera {
   Conform conform = Conform::kExpandAperture;
   float pixel_aspect = 1;    ///< width / height of a pixel
   float lens_radius = 0;     ///< 0 gives a pinhole camera; ignored by latlong cameras
-  float focus_distance = 1;  ///< along -z; must be > 0 if lens_radius > 0
-  float near_clip = 0;       ///< along -z; radial distance for latlong cameras
+  float focus_distance = 1;  ///< distance along -z; must be > 0 if lens_radius > 0
+  float near_clip = 0;       ///< distances along -z; radial distances for latlong cameras
   float far_clip = 1e30f;
   /// Clipping planes (a, b, c, d) in camera space. Camera rays ignore points with a x + b y + c z +
   /// d < 0; all other rays see them.
@@ -64,7 +64,7 @@ struct Camera {
   /// and height.
   std::vector<std::array<float, 4>> lens_map{};
   RollingShutter rolling_shutter = RollingShutter::kOff;
-  /// Fraction of the shutter interval for which each pixel row is exposed.
+  /// Fraction of the shutter interval for which a rolling shutter exposes each pixel row.
   float rolling_duration = 0;
 };
 

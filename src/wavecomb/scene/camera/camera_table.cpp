@@ -150,7 +150,7 @@ bool is_valid_transform(const Affine& m) {
   return finite(m) && std::abs(m.determinant()) >= 1e-30f;
 }
 
-constexpr float kHalfTurn = 1.5708f;  ///< pi / 2, with tolerance for rounding
+constexpr float kHalfTurn = 1.5708f;  ///< upper bound pi / 2, with tolerance for rounding
 
 }  // namespace
 

@@ -33,8 +33,8 @@ struct CameraParameter {
   bool may_be_infinite = false;
   std::vector<const char*> choices;
   bool is_needed = false;  ///< set_camera requires the parameter
-  /// The fingerprint includes the value even if it is the default, as it did before the table had
-  /// optional rows.
+  /// Whether the fingerprint includes the value even if it is the default, as for the first
+  /// parameters of the table.
   bool counts_always = false;
 
   CameraValue (*read)(const Camera&) = nullptr;

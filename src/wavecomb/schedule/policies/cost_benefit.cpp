@@ -23,8 +23,8 @@ class CostBenefitPolicy final : public SchedulingPolicy {
       score[m] /= std::max(cost, 1e-3f);
     }
     for (size_t i = 0; i < queue.size(); ++i) {
-      // 26 bits of the score suffice to separate materials. They are inverted to sort the highest
-      // score first.
+      // 26 bits of the score suffice to separate materials. The bits of the score are inverted to
+      // sort the highest score first.
       const uint64_t rank = (~ascending_bits(score[queue.material[i]]) & 0xffffffffu) >> 6;
       keys[i] = (uint64_t{queue.program[i]} << 56) | (rank << 30) | queue.position_key[i];
     }

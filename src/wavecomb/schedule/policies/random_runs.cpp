@@ -4,8 +4,8 @@
 namespace wavecomb {
 namespace {
 
-/// Placebo: the same runs as "material", but in a pseudo-random order. Any benefit of another order
-/// of runs must be measured against it.
+/// Placebo: the same runs as "material", but in a pseudo-random order. Any benefit of ordering runs
+/// must be measured against this policy.
 class RandomRunsPolicy final : public SchedulingPolicy {
  public:
   std::string_view name() const override { return "random-runs"; }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Functions that the kernels of all programs call without inlining: light sampling, guiding,
-/// textures, curves, motion and value graphs. They are compiled once for each width in
-/// shared.lanes.cpp, which includes their bodies from the *.inl files.
+/// textures, curves, motion and value graphs. shared.lanes.cpp compiles these functions once for
+/// each lane width and includes their bodies from the *.inl files.
 #pragma once
 
 #include "wavecomb/geometry/hit/surface.h"
@@ -13,7 +13,7 @@
 #include "wavecomb/path/steps/emit.h"
 #include "wavecomb/texture/lookup.h"
 
-/// Instantiates or declares all of them. `KEYWORD` is empty or `extern`.
+/// Instantiates or declares all shared functions. `KEYWORD` is empty or `extern`.
 #define WAVECOMB_SHARED_KERNELS(KEYWORD, F)                                                        \
   KEYWORD template LightSample<F> sample_light<F>(const LightView&, const LightReceiver<F>&,       \
                                                   const F&, const F&, const F&, const Mask<F>&);   \

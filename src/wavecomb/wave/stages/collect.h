@@ -60,7 +60,7 @@ struct RayPacket {
   F t;  ///< distance of the hit or volume event
   // Lanes that leave the scene, hit the shape of a light, and hit a surface.
   Mask<F> missed, shape, surface;
-  // Of the lanes that need them:
+  // Row and state of the paths, in the lanes that need them.
   PathRow<F> path;
   PathState<F> state;
 
