@@ -48,8 +48,10 @@ class Mailbox:
             self._writer.send(b"\0")
 
     def hush(self) -> None:
-        """Removes all bytes that have woken the reading thread so far. Later messages wake the
-        reading thread again."""
+        """Removes all bytes that have woken the reading thread so far.
+
+        Later messages wake the reading thread again.
+        """
         with contextlib.suppress(OSError):
             while self._reader.recv(4096):
                 pass
@@ -68,8 +70,10 @@ class Port:
         self._mailbox, self._address = mailbox, address
 
     def send(self, letter: Any) -> None:
-        """Sends a message to the receiver. The receiver gets messages in order, on the window's
-        thread."""
+        """Sends a message to the receiver.
+
+        The receiver gets messages in order, on the window's thread.
+        """
         self._mailbox.put(self._address, letter)
 
 

@@ -164,8 +164,10 @@ class FarmDialog(QDialog):
         self.state.setText(html.escape(line))
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Stops a running farm job, and hides the dialog until the job has ended. Finished tiles
-        are kept."""
+        """Stops a running farm job, and hides the dialog until the job has ended.
+
+        Finished tiles are kept.
+        """
         if not self._command.running:
             super().closeEvent(event)
             return

@@ -67,8 +67,10 @@ whole text."""
 
 
 class Table(HeadedModel):
-    """Table model of rows of cells under a header. The columns ``left`` hold text, all others align
-    right."""
+    """Table model of rows of cells under a header.
+
+    The columns ``left`` hold text, all others align right.
+    """
 
     def __init__(
         self, header: Mapping[str, str], left: Collection[int], parent: QObject | None = None

@@ -63,8 +63,10 @@ class Layout:
         return min(pane.width() / self.size.width(), pane.height() / self.size.height())
 
     def target(self, pane: QRectF, size: QSizeF | None = None) -> QRectF:
-        """Returns the rectangle that a whole image covers. Images of other sizes share the corner
-        of A."""
+        """Returns the rectangle that a whole image covers.
+
+        Images of other sizes share the corner of A.
+        """
         reference = self.size or size or QSizeF(1, 1)
         scale = self.points_per_pixel()
         width, height = reference.width() * scale, reference.height() * scale

@@ -51,8 +51,10 @@ def _row(name: str) -> Choice | Number:
 
 
 class LiveSettings(QWidget):
-    """Grid with the settings of both live renders of a comparison. A change of a setting restarts
-    only the render of its side."""
+    """Grid with the settings of both live renders of a comparison.
+
+    A change of a setting restarts only the render of its side.
+    """
 
     def __init__(self, source: SideSource, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -29,8 +29,9 @@ SHORT = {
 
 
 class SideSource(QObject):
-    """Source of the image on one side of a comparison. All methods are for the UI thread; none
-    blocks.
+    """Source of the image on one side of a comparison.
+
+    All methods are for the UI thread; none blocks.
 
     Signals:
         changed(): Emitted when ``side`` or ``kind`` changes.

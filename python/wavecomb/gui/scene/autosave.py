@@ -63,8 +63,10 @@ class Autosave(QObject):
         return self._file
 
     def close(self) -> None:
-        """Writes pending edits and releases the lock of the autosave file. Unsaved edits stay in
-        the autosave file."""
+        """Writes pending edits and releases the lock of the autosave file.
+
+        Unsaved edits stay in the autosave file.
+        """
         if self._timer.isActive():
             self.write()
         self._release()

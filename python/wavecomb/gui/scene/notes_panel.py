@@ -28,8 +28,10 @@ if TYPE_CHECKING:
 
 
 class NotesPanel(QWidget):
-    """List of the loader's findings with a filter. A double click selects the prim of a finding;
-    Ctrl+C copies lines."""
+    """List of the loader's findings with a filter.
+
+    A double click selects the prim of a finding; Ctrl+C copies lines.
+    """
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -31,8 +31,10 @@ scrolls to the end."""
 
 
 class _Node:
-    """A row of the tree, which stands for one prim. The list of child names is None until
-    requested; child nodes are created on demand."""
+    """A row of the tree, which stands for one prim.
+
+    The list of child names is None until requested; child nodes are created on demand.
+    """
 
     __slots__ = ("made", "names", "parent", "path", "row", "shown")
 

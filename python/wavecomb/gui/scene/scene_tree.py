@@ -110,8 +110,9 @@ MAX_EXPANDED = 300
 
 
 class _View(QTreeView):
-    """Tree view of the prims of a stage. The space bar and a click on the eye icon toggle
-    visibility.
+    """Tree view of the prims of a stage.
+
+    The space bar and a click on the eye icon toggle visibility.
 
     Signals:
         frame_wanted(): The user pressed F to frame the selected prims.

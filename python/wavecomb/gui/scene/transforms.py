@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Edits of a prim's transform, as an additional transform operation over the authored ones.
-Independent of Qt."""
+
+Independent of Qt.
+"""
 
 from __future__ import annotations
 

@@ -139,8 +139,10 @@ class Bars(Plot):
         return self._bars
 
     def show_bars(self, rows: Sequence[str], bars: Sequence[Bar], most: float = 0.0) -> None:
-        """Draws bars into the plot. The axis ends at ``most`` or, if that is 0, at the longest
-        bar."""
+        """Draws bars into the plot.
+
+        The axis ends at ``most`` or, if that is 0, at the longest bar.
+        """
         self._bars = list(bars)
         self.clear()
         by_colour: dict[str, list[Bar]] = {}
@@ -202,8 +204,10 @@ class Legend(QLabel):
         theme.on_change(self.retheme)
 
     def show_entries(self, entries: Callable[[], Sequence[tuple[str, QColor]]]) -> None:
-        """Shows (name, colour) pairs in the legend. The function is called again when the theme
-        changes."""
+        """Shows (name, colour) pairs in the legend.
+
+        The function is called again when the theme changes.
+        """
         self._entries = entries
         self.retheme()
 
@@ -265,8 +269,10 @@ def phases_between(a: Look, b: Look) -> dict[str, float]:
 
 
 def stacked(row: int, label: str, seconds: dict[str, float], scale: float, mode: str) -> list[Bar]:
-    """Returns the bars of one row of a phase plot, placed end to end. ``scale`` converts seconds to
-    the shown unit."""
+    """Returns the bars of one row of a phase plot, placed end to end.
+
+    ``scale`` converts seconds to the shown unit.
+    """
     bars = []
     start = 0.0
     total = sum(seconds.values())

@@ -67,8 +67,10 @@ class News:
         self._put("statistics", (statistics, version))
 
     def on_failed(self, message: str) -> None:
-        """Keeps an error message until it is taken. An error message does not replace a different
-        one."""
+        """Keeps an error message until it is taken.
+
+        An error message does not replace a different one.
+        """
         self._put("failed", message, message)
 
     def on_ready(self, renderer: Renderer) -> None:
