@@ -59,7 +59,7 @@ def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
     Args:
         stage: The stage.
         everywhere: Whether to include unselected variants, which takes a pass over all layers.
-            Selecting them later, on any thread, then changes no layer.
+            Selecting these variants later, on any thread, then changes no layer.
     """
     if (everywhere or any(True for _ in unopened_materialx(stage))) and is_there():
         from wavecomb.usd.materialx import references
@@ -103,7 +103,7 @@ def translated_files(stage: Usd.Stage) -> list[str]:
 def model_of(identifier: str) -> str:
     """Returns the shading model of an id such as ``ND_standard_surface_surfaceshader``, or "".
 
-    MaterialX has its standard_surface from Arnold, whose shader has the same inputs.
+    MaterialX took standard_surface from Arnold, whose shader has the same inputs.
     """
     if identifier == "arnold:standard_surface":
         return "standard_surface"
@@ -111,7 +111,7 @@ def model_of(identifier: str) -> str:
 
 
 def hair_bsdf(shader: UsdShade.Shader) -> UsdShade.Shader | None:
-    """Returns a shader that is a ``chiang_hair_bsdf``, or that of a ``surface`` node; else None."""
+    """Returns a ``chiang_hair_bsdf`` shader, or the one that a ``surface`` node uses; else None."""
     identifier = shader_id(shader)
     if identifier == "ND_surface":
         source = source_of(shader, "bsdf", Usd.TimeCode.Default())
@@ -200,5 +200,5 @@ class _NoNodes:
         return None
 
     def in_working_space(self) -> Networks:
-        """Returns itself."""
+        """Returns itself, since there are no constants to convert."""
         return self

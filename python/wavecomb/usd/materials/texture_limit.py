@@ -55,7 +55,8 @@ class _Entry:
     """A texture that would be created.
 
     Attributes:
-        wanted: Texels across that the image can resolve; None if unknown, which keeps all levels.
+        wanted: Texels across that the image can resolve; None if unknown, which keeps all mip
+            levels.
         drop: Number of finest mip levels that are not loaded.
     """
 
@@ -76,7 +77,7 @@ class _Entry:
         return pyramid_bytes(*self.size, self.channels, self.dtype)
 
     def surplus(self) -> float:
-        """Returns the ratio of texels to those that the image can resolve."""
+        """Returns the ratio of texels to the texels that the image can resolve."""
         return 0.0 if self.wanted is None else max(self.size) / max(self.wanted, 1e-3)
 
 
@@ -114,7 +115,7 @@ class _Plan(TextureTable):
 
 
 class _NoBuilder:
-    """Substitute for the scene builder that assigns ids but creates no textures."""
+    """Substitute for the scene builder that assigns texture ids but creates no textures."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -250,7 +251,7 @@ def _pixels_across(prim: Usd.Prim, bounds: UsdGeom.BBoxCache, view: ViewSize) ->
 
 
 def _uv_extent(prim: Usd.Prim, time: Usd.TimeCode) -> float:
-    """Returns the extent of texture coordinates over a prim, 1 if it is unknown."""
+    """Returns the extent of texture coordinates over a prim, or 1 if it is unknown."""
     reader = UsdGeom.PrimvarsAPI(prim)
     for name in UV_NAMES:
         primvar = reader.FindPrimvarWithInheritance(name)

@@ -32,7 +32,7 @@ _INCLUDE = "http://www.w3.org/2001/XInclude include"
 
 
 class MtlxError(Exception):
-    """A file cannot be read; the message gives the reason in a few words."""
+    """A MaterialX file cannot be read; the message gives the reason in a few words."""
 
 
 @dataclass(frozen=True)
@@ -40,10 +40,11 @@ class Document:
     """A document that refers to MaterialX's standard library.
 
     Attributes:
-        root: MaterialX's document object. Its definitions include those of the library.
-        file: File that was requested.
-        graphs: Node graphs of the document, without those of the library.
-        definitions: Names of the node definitions of the document, without those of the library.
+        root: MaterialX's document object. The definitions of the document include the library's
+            definitions.
+        file: The file that was requested.
+        graphs: Node graphs of the document, without the library's node graphs.
+        definitions: Names of the document's node definitions, without the library's definitions.
     """
 
     root: Any
@@ -56,7 +57,7 @@ def read_document(path: str) -> Document:
     """Reads a file with its includes and upgrades it to the current MaterialX version.
 
     Args:
-        path: Path as resolved by Ar; may be inside a .usdz.
+        path: Path as resolved by Ar; the file may be inside a .usdz package.
 
     Raises:
         MtlxError: The file cannot be read.
@@ -133,7 +134,7 @@ def _check(data: bytes) -> list[str]:
     """Validates the XML of a document and returns the files that it includes.
 
     Raises:
-        MtlxError: It is not XML, not MaterialX, or nested too deeply.
+        MtlxError: The file is not XML, not MaterialX, or nested too deeply.
     """
     includes: list[str] = []
     open_elements: list[str] = []
@@ -183,11 +184,11 @@ def beside(name: str, anchor: str) -> str:
 def image_file(value: Any, document: str) -> tuple[str, bool]:
     """Returns the file of a filename element, and whether ``fileprefix`` was ignored.
 
-    Names are relative to the document, else to the file that contains them. A prefix is ignored if
-    the file exists only without it.
+    Names are relative to the document, else to the file that contains the element. The attribute
+    ``fileprefix`` is ignored if the file exists only without it.
 
     Args:
-        value: The element.
+        value: The filename element.
         document: The requested file; ``value`` may come from a file that it includes.
     """
     full, plain = value.getResolvedValueString(), value.getValueString()

@@ -11,7 +11,7 @@ from wavecomb.usd.materialx.files import Document
 from wavecomb.usd.materialx.prims import TERMINALS, Prims, child, connect, valid
 
 GRAPHS = Sdf.Path("/MaterialX/NodeGraphs")
-"""Parent of node graphs, and of nodes of the document that are not in a graph."""
+"""Parent prim of node graphs, and of nodes of the document that are not in a graph."""
 
 MAX_EXPANDED = 4096
 """Number of expanded nodes of a graph above which nested graphs become USD instances.
@@ -20,7 +20,7 @@ A short document may nest graphs into billions of nodes.
 """
 
 _SMALL = 32
-"""Graphs with at most this many nodes are never instanced."""
+"""Node graphs with at most this many nodes are never instanced."""
 
 
 def definition(node: Any) -> Any:
@@ -61,7 +61,7 @@ def is_closed(graph: Any) -> bool:
 
 
 class Graphs:
-    """Writer of node graphs; each is written once."""
+    """Writer of node graphs; each graph is written once."""
 
     def __init__(self, document: Document, prims: Prims) -> None:
         self._document = document
@@ -70,14 +70,14 @@ class Graphs:
         self._sizes: dict[str, int] = {}
 
     def all(self) -> None:
-        """Writes all node graphs of the document, and its nodes outside of graphs."""
+        """Writes all node graphs of the document, and the nodes outside of graphs."""
         for graph in self._document.graphs:
             self.graph(graph)
         if self._loose():
             self.loose()
 
     def graph(self, graph: Any) -> Sdf.Path:
-        """Writes a node graph, named after the definition that it implements if there is one."""
+        """Writes a node graph, named after the definition that it implements, if any."""
         nodedef = graph.getNodeDef()
         path = child(GRAPHS, (graph if nodedef is None else nodedef).getName())
         if path in self._written:
@@ -87,7 +87,7 @@ class Graphs:
         for owner in (nodedef, graph):
             for item in [] if owner is None else owner.getActiveInputs():
                 self._give(self._prims.port(prim, "inputs", item.getName(), item.getType()), item)
-                # Sources of a graph's inputs are its siblings.
+                # The sources of a graph's inputs are siblings of the graph.
                 self._join(prim, item, GRAPHS, self._document.root)
         for node in graph.getNodes():
             self._node(node, path, graph)
@@ -157,7 +157,7 @@ class Graphs:
         """Returns the number of nodes of a graph, including nested graphs."""
         name = graph.getName()
         if name not in self._sizes:
-            # This ends the recursion for a graph that contains itself.
+            # This check ends the recursion for a graph that contains itself.
             self._sizes[name] = 0
             total = 0
             for node in graph.getNodes():

@@ -41,14 +41,14 @@ class PortSource:
     """Source of a node input or graph output: a value, an interface input or a node output.
 
     Attributes:
-        type: Name of its MaterialX type.
+        type: Name of the MaterialX type of the value.
         value: Text of the value; "" if there is none.
         interface: Name of an input of the graph.
         node: Name of a node of the graph.
-        output: Output of that node; "" if it has only one.
+        output: Name of the node's output; "" if the node has only one.
         place: Default geometric property: position, normal, tangent, bitangent, viewdirection or
             texcoord.
-        space: Space of that property: object or world.
+        space: Space of the geometric property: object or world.
     """
 
     type: str
@@ -65,10 +65,10 @@ class FlatNode:
     """A node of a flat graph.
 
     Attributes:
-        category: Category without types.
-        identifier: Name of its definition.
+        category: Category of the node without types.
+        identifier: Name of the node's definition.
         inputs: Sources of the inputs that the graph sets.
-        outputs: Types of outputs by name.
+        outputs: Types of the node's outputs by name.
     """
 
     category: str
@@ -82,10 +82,10 @@ class Definition:
     """A node definition of the library.
 
     Attributes:
-        identifier: Name, such as ``ND_mix_color3``.
-        category: Category of its nodes, without types.
-        inputs: Default sources of inputs.
-        outputs: Types of outputs by name.
+        identifier: Name of the definition, such as ``ND_mix_color3``.
+        category: Category of the definition's nodes, without types.
+        inputs: Default sources of the inputs by name.
+        outputs: Types of the outputs by name.
     """
 
     identifier: str
@@ -99,9 +99,9 @@ class FlatGraph:
     """A node graph without nested graphs.
 
     Attributes:
-        definition: Definition that it implements.
+        definition: Definition that the graph implements.
         nodes: Nodes by name in evaluation order.
-        results: Sources of the outputs by name.
+        results: Sources of the graph's outputs by name.
     """
 
     definition: Definition
@@ -129,7 +129,7 @@ def flat_graph(identifier: str, primitives: Collection[str]) -> FlatGraph | None
         primitives: Frozen set of node categories that are not expanded.
 
     Returns:
-        The graph; None if the library implements the node in code or does not know it.
+        Returns the graph; None if the library implements the node in code or does not know it.
     """
     import MaterialX as mx
 
@@ -141,7 +141,7 @@ def flat_graph(identifier: str, primitives: Collection[str]) -> FlatGraph | None
         found = nodedef.getImplementation()
         if found is None or not found.isA(mx.NodeGraph):
             return None
-        # Copy the graph to a document that may be modified. Nested graphs that do not implement a
+        # Copies the graph to a document that may be modified. Nested graphs that do not implement a
         # definition keep their references to interface inputs.
         document = mx.createDocument()
         document.setDataLibrary(library())
@@ -155,7 +155,7 @@ def flat_graph(identifier: str, primitives: Collection[str]) -> FlatGraph | None
 
 
 def _ordered(nodes: dict[str, FlatNode]) -> dict[str, FlatNode]:
-    """Returns the nodes in evaluation order."""
+    """Returns the nodes of a graph in evaluation order."""
     done: dict[str, FlatNode] = {}
     stack = [(name, False) for name in reversed(nodes)]
     while stack:

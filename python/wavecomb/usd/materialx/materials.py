@@ -43,7 +43,7 @@ def write_looks(document: Document, layer: Sdf.Layer, report_skipped: ReportSkip
 
 
 class _LooksWriter:
-    """Writer of collections and looks; each is written once."""
+    """Writer of collections and looks; each of them is written once."""
 
     def __init__(self, root: Any, stage: Usd.Stage, report_skipped: ReportSkipped) -> None:
         self._root = root
@@ -214,7 +214,8 @@ class Materials:
     """Writer of materials.
 
     Shader inputs become inputs of the material, so that stronger layers can change them. Sources of
-    a shader are referenced below the material. Shaders are in ``SHADERS``.
+    a shader are referenced below the material. Shaders of all materials are written below
+    ``SHADERS``.
     """
 
     def __init__(self, document: Document, prims: Prims, graphs: Graphs) -> None:
@@ -277,7 +278,7 @@ class Materials:
     def _interface(
         self, material: Sdf.PrimSpec, shader: Sdf.PrimSpec, item: Any
     ) -> Sdf.AttributeSpec:
-        """Connects a shader input to an input of the material and returns the latter."""
+        """Connects a shader input to an input of the material and returns the material's input."""
         port = self._prims.port(material, "inputs", item.getName(), item.getType())
         connect(self._prims.port(shader, "inputs", item.getName(), item.getType()), port.path)
         return port

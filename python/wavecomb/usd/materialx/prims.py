@@ -24,7 +24,7 @@ TERMINALS = {
 """Material outputs by MaterialX shader type."""
 
 _PLAIN_SPACES = ("", "none", "lin_rec709", "lin_rec709_scene")
-"""Colour spaces that are not written, since they are the default."""
+"""Colour spaces that are not written to the layer, since they are the default."""
 
 
 def valid(name: str) -> str:
@@ -41,10 +41,10 @@ class Prims:
     """Writer of prims into a layer.
 
     Attributes:
-        layer: The layer.
-        file: File of the document, to which image names are relative.
-        tell: Receives elements that cannot be translated.
-        report: Receives notes.
+        layer: The layer to write to.
+        file: File of the MaterialX document, to which image names are relative.
+        tell: Callback that receives elements that cannot be translated.
+        report: Report that receives notes.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class Prims:
         self.report_skipped = tell
 
     def define(self, path: Sdf.Path, kind: str = "") -> Sdf.PrimSpec:
-        """Defines a prim with a type, and its ancestors; returns it if it exists."""
+        """Defines a prim with a type, and its ancestors; returns the prim if it exists already."""
         spec = Sdf.CreatePrimInLayer(self.layer, path)
         for prefix in path.GetPrefixes():
             self.layer.GetPrimAtPath(prefix).specifier = Sdf.SpecifierDef
@@ -73,13 +73,13 @@ class Prims:
         return spec
 
     def port(self, prim: Sdf.PrimSpec, kind: str, name: str, type_name: str) -> Sdf.AttributeSpec:
-        """Returns an input or output of a prim; creates it if it does not exist.
+        """Returns an input or output of a prim; creates the attribute if it does not exist.
 
         Args:
-            prim: The prim.
+            prim: The prim that has the input or output.
             kind: "inputs" or "outputs".
-            name: MaterialX name.
-            type_name: MaterialX type.
+            name: MaterialX name of the input or output.
+            type_name: MaterialX type of the input or output.
         """
         full = f"{kind}:{valid(name)}"
         known = prim.attributes.get(full)
@@ -92,7 +92,7 @@ class Prims:
         return spec
 
     def identify(self, prim: Sdf.PrimSpec, identifier: str) -> None:
-        """Writes ``info:id`` unless it exists."""
+        """Writes ``info:id`` of a shader unless it exists."""
         if "info:id" not in prim.attributes:
             Sdf.AttributeSpec(
                 prim, "info:id", Sdf.ValueTypeNames.Token, Sdf.VariabilityUniform
@@ -102,8 +102,8 @@ class Prims:
         """Copies the value of an element to an input, with its colour space.
 
         Args:
-            port: The input.
-            element: The MaterialX input.
+            port: The USD input to write.
+            element: The MaterialX input to copy.
             makes_colour: For filenames, whether colours are read from the file.
         """
         kind, text = element.getType(), element.getValueString()
@@ -119,7 +119,7 @@ class Prims:
             text, is_bare = image_file(element, self.file)
             if is_bare:
                 self.report.note("MaterialX fileprefix is not a folder (left out)", self.file)
-            # Like OpenUSD, do not apply a document-wide linear Rec. 709 to images.
+            # Like OpenUSD, does not apply a document-wide linear Rec. 709 colour space to images.
             is_said = space not in _PLAIN_SPACES or element.hasColorSpace()
             if makes_colour and is_said:
                 port.SetInfo("colorSpace", "raw" if space == "none" else space)

@@ -30,12 +30,12 @@ MAX_ROUNDS = 16
 
 @dataclass
 class _Translation:
-    """Result of translating a file.
+    """Result of translating a MaterialX file to a layer.
 
     Attributes:
         stamp: Stamp of the file when it was read.
         layer: The translated layer; None if the file is unreadable.
-        error: Reason why it is unreadable.
+        error: Reason why the file is unreadable.
         report: Warnings and notes of the translation.
     """
 
@@ -46,8 +46,8 @@ class _Translation:
 
 
 _translations: dict[str, _Translation] = {}
-"""Translations by file. Translated layers are never released, since layers of open stages refer to
-them."""
+"""Translations of MaterialX files by file name. Translated layers are never released, since layers
+of open stages refer to them."""
 
 _lock = threading.Lock()
 
@@ -74,7 +74,7 @@ def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
     Args:
         stage: The stage.
         everywhere: Whether to include unselected variants, which takes a pass over all layers.
-            Selecting them later, on any thread, then changes no layer.
+            Selecting these variants later, on any thread, then changes no layer.
     """
     tried: set[tuple[str, str]] = set()
     for turn in range(MAX_ROUNDS):
@@ -184,7 +184,7 @@ ROOT = Sdf.Path("/MaterialX")
 def translate(file: str) -> tuple[Sdf.Layer, LoadReport]:
     """Translates a file to a layer; returns it with a report of what was not translated.
 
-    File names in the layer are absolute, so that it can be used anywhere.
+    File names in the translated layer are absolute, so that it can be used anywhere.
 
     Args:
         file: Path as resolved by Ar.

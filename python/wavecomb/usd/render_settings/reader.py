@@ -34,12 +34,12 @@ CONFORMS = (
 
 @dataclass(frozen=True)
 class ProductSettings:
-    """Values of render settings and one of their products; None means that nothing is authored.
+    """Values of render settings and one of their products; None means that a value is not authored.
 
     Attributes:
-        settings: Path of the RenderSettings.
-        product: Path of the RenderProduct.
-        camera: Path of the camera.
+        settings: Path of the RenderSettings prim.
+        product: Path of the RenderProduct prim.
+        camera: Path of the camera prim.
         resolution: Width and height in pixels.
         pixel_aspect: Width of a pixel divided by its height.
         conform: One of ``CONFORMS``.
@@ -76,7 +76,8 @@ class ProductSettings:
     def region(self, width: int, height: int) -> tuple[int, int, int, int] | None:
         """Returns the pixels whose centres are in the data window as x0, y0, x1, y1.
 
-        The y axis points down, and the end is excluded. Returns None if these are all pixels.
+        The y axis points down, and the end is excluded. Returns None if the data window contains
+        all pixels.
 
         Raises:
             WavecombError: The window contains no pixel.
@@ -105,7 +106,7 @@ def find_settings(
     """Returns the settings ``wanted``, else those the stage names, else the only ones in /Render.
 
     Raises:
-        WavecombError: There are none of that path or name.
+        WavecombError: There are no render settings of that path or name.
     """
     found = _all_settings(stage)
     if wanted is not None:
@@ -318,7 +319,7 @@ _EVENTS = {
     "indirect": ("..+", "...*", ".{2,}", "<..><..>+"),
 }
 _PARTS = {events: name for name, all_events in _EVENTS.items() for events in all_events}
-"""Light path events between the camera and the light -> AOV."""
+"""AOV by the light path events between the camera and the light."""
 
 _LIGHT = r"(?:\[<L\.>O\]|\[LO\]|\[OL\]|\(L\|O\)|<L\.>|L)"
 _EXPRESSION = re.compile(rf"C(?P<events>.*?){_LIGHT}")

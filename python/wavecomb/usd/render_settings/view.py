@@ -75,7 +75,7 @@ def view_settings(stage: Usd.Stage, options: LoadOptions, report: LoadReport) ->
 def _blur(options: LoadOptions, wanted: bool) -> Blur:
     """Returns the motion blur options; a given shutter enables blur.
 
-    ``wanted`` says whether the render settings enable it.
+    ``wanted`` says whether the render settings enable motion blur.
     """
     blurs = options.motion_blur
     if blurs is None:
@@ -92,7 +92,7 @@ def peek_products(
     """Reads the render settings of a stage; returns one choice per product, at least one.
 
     Composes nothing else and reports nothing, since loading the stage repeats all messages. Keeping
-    the returned stage alive until then avoids reading its layers twice.
+    the returned stage alive until the stage is loaded avoids reading its layers twice.
 
     Args:
         source: .usd, .usda, .usdc or .usdz, or an open stage.

@@ -13,7 +13,7 @@ from wavecomb.usd.materials.draw_item import Parent
 from wavecomb.usd.stage.report import LoadReport, first_message
 
 Rules = dict[str, str]
-"""Rule for each path: exclude, explicit (only that path) or expand (the path and all below it)."""
+"""Rule for a path: exclude, explicit (only that path) or expand (the path and all below it)."""
 
 MAX_PRIMS = 1 << 20
 """Maximum number of prims at which an expression is evaluated; nested instancing may create
@@ -47,7 +47,7 @@ class Collections:
         collection = Usd.CollectionAPI(prim, name)
         try:
             query = collection.ComputeMembershipQuery()
-            # The map is empty for an expression and complete for relationships.
+            # The rule map is empty for an expression and complete for relationships.
             if _has_expression(collection) and not query.GetAsPathExpansionRuleMap():
                 return self._of_expression(collection, query)
         except Tf.ErrorException as error:
@@ -124,7 +124,7 @@ def _evaluated(
     for count, prim in enumerate(walk):
         if count >= MAX_PRIMS:
             return rules, False
-        # Materials are never members.
+        # Materials are never members of a light's collection.
         if prim.IsA(UsdShade.NodeGraph):
             walk.PruneChildren()
             continue
@@ -142,7 +142,7 @@ def _evaluated(
 OTHER = "other"
 """Name of the group of lights without an authored group."""
 MAX_LIGHT_GROUPS = 63
-"""Maximum number of further light groups that the core supports."""
+"""Maximum number of named light groups that the core supports."""
 PRIMVAR = "wavecomb:lightGroup"
 _LIGHT_GROUPS = (
     "wavecomb:lightGroup",
@@ -153,18 +153,18 @@ _LIGHT_GROUPS = (
     "primvars:karma:object:lpetag",
     "primvars:arnold:aov",
 )
-"""Light group attributes of Wavecomb, RenderMan, Karma and Arnold, tried after the primvar."""
+"""Light group attributes of Wavecomb, RenderMan, Karma and Arnold, read if there is no primvar."""
 
 
 def light_group(prim: Usd.Prim, inherited: Sequence[Any] | None = None) -> str:
     """Returns the light group of a light or emissive mesh; "" if it has none.
 
-    ``primvars:wavecomb:lightGroup`` is inherited from ancestors like all primvars. Attributes of
-    other renderers are read on the prim itself only.
+    ``primvars:wavecomb:lightGroup`` is inherited from ancestors like all primvars. Light group
+    attributes of other renderers are read on the prim itself only.
 
     Args:
         prim: The light or mesh.
-        inherited: Primvars of its ancestors, if they are known.
+        inherited: Primvars of the prim's ancestors, if they are known.
     """
     if inherited is None:
         primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(PRIMVAR)
@@ -218,7 +218,7 @@ class Assets:
         self._known: dict[Sdf.Path, int] = {Sdf.Path.absoluteRootPath: 0}
 
     def length_below(self, prim: Usd.Prim, path: str, parent: Parent | None) -> int:
-        """Returns ``length`` of a prim with this path, using its parent's cached result."""
+        """Returns ``length`` of the prim at a path, using the cached result of its parent."""
         if parent is None:
             return self.length(prim)
         if _is_asset(prim):

@@ -23,16 +23,16 @@ if TYPE_CHECKING:
 Origin = tuple[float, float, float]
 
 NEAR = 2.0**14
-"""Largest coordinate whose float32 step is at most 1/1024 unit."""
+"""Largest coordinate whose spacing of float32 numbers is at most 1/1024 unit."""
 
 CELL = 2.0**12
-"""Origins are multiples of this, so that most frames of a moving camera share an origin."""
+"""Scene origins are multiples of this length, so that most frames of a moving camera share one."""
 
 MANY = 4096
 """Maximum number of prims that determine the centre of a stage without a camera."""
 
 DEEP = 256
-"""Deepest prims that are considered, since USD computes their transforms recursively."""
+"""Depth of the deepest prims that are considered, since USD computes transforms recursively."""
 
 WORLD: Origin = (0.0, 0.0, 0.0)
 """The world's origin, which is used if the camera is close to it."""
@@ -43,13 +43,13 @@ def find_origin(
 ) -> Origin:
     """Returns the origin of a scene: near the camera, or at the centre of drawn prims without one.
 
-    It depends only on the stage, frame and camera, so that all regions, tiles and machines that
+    The origin depends only on stage, frame and camera, so that all regions, tiles and machines that
     render one image agree.
 
     Args:
         stage: The stage.
         time: Time code of the frame.
-        camera: Camera prim; None if the bounds are framed.
+        camera: Camera prim; None if the default camera frames the bounds.
         purposes: Purposes of the geometry that is rendered.
     """
     if camera is not None:
@@ -88,7 +88,7 @@ def _is_drawn(prim: Usd.Prim) -> bool:
 
 
 def _snapped(place: NDArray[np.float64]) -> Origin:
-    """Rounds a position to an origin; returns ``WORLD`` if it is near or not finite."""
+    """Rounds a position to a scene origin; returns ``WORLD`` if it is near 0 or not finite."""
     if not np.isfinite(place).all() or np.abs(place).max() < NEAR:
         return WORLD
     x, y, z = np.round(place / CELL) * CELL + 0.0
@@ -115,7 +115,7 @@ _STEP = 2.0**-23
 """Relative spacing of float32 numbers."""
 
 _COARSE = 1e-3
-"""Rounding steps above this fraction of a shape's size are visible."""
+"""Fraction of a shape's size above which the spacing of float32 coordinates is visible."""
 
 STORED = (
     "points are stored too far from the prim's own origin: their single precision is coarser than "
@@ -135,9 +135,9 @@ def problem_of(bounds: NDArray[Any], matrix: Gf.Matrix4d, *, in_world: bool) -> 
     """Returns a message if single precision is too coarse for a shape, else None.
 
     Args:
-        bounds: (2, 3) in the space of its group.
+        bounds: (2, 3) bounds of the shape in the space of its group.
         matrix: Transform from the prim to its group.
-        in_world: Whether the group is the world, which is built around the camera.
+        in_world: Whether the shape's group is the world, which is built around the camera.
     """
     (a, b, c), (x, y, z) = bounds.tolist()
     size = max(x - a, y - b, z - c)

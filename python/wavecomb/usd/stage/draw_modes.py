@@ -17,10 +17,10 @@ from wavecomb.usd.stage.report import LoadReport
 MODES = ("origin", "bounds", "cards")
 
 THICK = 0.004
-"""Width of lines as a fraction of the box diagonal; axes of unit length are 5 times as wide."""
+"""Line width as a fraction of the box diagonal; lines of unit-length axes are 5 times as wide."""
 
 _GAP = 1e-5
-"""Distance between back-to-back cards of a cross, as a fraction of the box diagonal."""
+"""Distance between the back-to-back cards of a cross, as a fraction of the box diagonal."""
 
 _CARDS = ("XPos", "YPos", "ZPos", "XNeg", "YNeg", "ZNeg")
 _RIGHT = ((1, 1.0), (0, -1.0), (0, 1.0), (1, -1.0), (0, 1.0), (0, -1.0))
@@ -39,8 +39,8 @@ class StandIn:
     Attributes:
         prim: Prim at the model's path on a separate stage, in the model's space.
         kind: mesh or curves.
-        subsets: Subsets of its faces.
-        materials: Materials of the subsets.
+        subsets: Subsets of the geometry's faces.
+        materials: Materials of the face subsets.
     """
 
     prim: Usd.Prim
@@ -61,7 +61,7 @@ class DrawModes:
     def mode(self, prim: Usd.Prim, above: str) -> str:
         """Returns the draw mode that a prim passes to its children.
 
-        ``above`` is its parent's mode.
+        ``above`` is the draw mode of the prim's parent.
         """
         mode = word(prim.GetAttribute("model:drawMode").Get(), "inherited")
         if mode in ("default", *MODES):
@@ -85,7 +85,7 @@ class DrawModes:
             self._stage = Usd.Stage.CreateInMemory()
         made = self._made(prim, mode)
         if made is not None:
-            # The kind is needed to find the asset of the prim.
+            # The kind of the model is needed to find the asset of the prim.
             Usd.ModelAPI(made.prim).SetKind(Usd.ModelAPI(prim).GetKind())
         return made
 

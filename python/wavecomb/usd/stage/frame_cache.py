@@ -38,14 +38,14 @@ class MeshCache:
         inherited: Sequence[Any],
         report: LoadReport,
     ) -> MeshArrays | CurveArrays | None:
-        """Returns the arrays of a gprim, from the previous frame if they are the same.
+        """Returns the arrays of a gprim, reused from the previous frame if nothing changed.
 
         Args:
-            read: Reads the arrays and adds messages to a report.
+            read: Function that reads the arrays and adds messages to a report.
             prim: The gprim.
             matrix: Transform from the gprim to its group.
             options: Further values that the arrays depend on; hashable.
-            inherited: Constant primvars of its ancestors.
+            inherited: Constant primvars of the gprim's ancestors.
             report: Receives the same messages in every frame.
         """
         if self._varying.of(prim, inherited):
@@ -60,14 +60,15 @@ class MeshCache:
         return known[0]
 
     def end_frame(self) -> None:
-        """Removes entries that the frame did not use."""
+        """Removes gprim arrays that the frame did not use."""
         self._kept, self._used = self._used, {}
 
 
 class RefinedCache:
-    """Refined meshes whose cages and levels are not animated.
+    """Refined meshes whose cages and subdivision levels are not animated.
 
-    Excludes displaced meshes and meshes with per-face values, since materials affect them.
+    The cache excludes displaced meshes and meshes with per-face values, since materials affect
+    them.
     """
 
     def __init__(self) -> None:
@@ -87,7 +88,7 @@ class RefinedCache:
         self._used[id(cage)] = cage, level, refined
 
     def end_frame(self) -> None:
-        """Removes entries that the frame did not use."""
+        """Removes refined meshes that the frame did not use."""
         self._kept, self._used = self._used, {}
 
 
@@ -97,7 +98,7 @@ class FrameCache:
     ``has_same_levels`` returns whether another view, with another image size or None for the same
     size, needs the same subdivision levels.
 
-    Contract: serves one open stage, of which only the time changes.
+    Contract: the cache serves one open stage, of which only the time changes.
     """
 
     def __init__(self, stage: Usd.Stage, opening: LoadReport) -> None:
@@ -112,7 +113,7 @@ class FrameCache:
         self.opening = opening
 
     def end_frame(self) -> None:
-        """Removes entries that the frame did not use."""
+        """Removes cached data that the frame did not use."""
         self.meshes.end_frame()
         self.refined.end_frame()
 
@@ -125,20 +126,20 @@ _FRAMES = ("", "Xform", "Scope", "Camera")
 """Types of prims that neither render nor affect rendered prims."""
 
 _UNREAD = ("RenderSettings", "RenderProduct", "RenderVar", "RenderPass")
-"""Types whose time-varying values are never read."""
+"""Prim types whose time-varying values are never read."""
 
 
 class AnimatedAttributes:
-    """Attributes of a stage whose values may change over time, found once.
+    """The attributes of a stage whose values may change over time, searched once.
 
-    Includes time samples, splines and value clips, as USD reports them. The stage must not be
-    edited.
+    The search covers time samples, splines and value clips, as USD reports them. The stage must not
+    be edited afterwards.
     """
 
     def __init__(self, stage: Usd.Stage) -> None:
         self._prims: dict[Sdf.Path, list[str]] = {}
         sources: set[Sdf.Path] = set()
-        # Clips may provide values for attributes that are not authored otherwise.
+        # Value clips may provide values for attributes that are not authored otherwise.
         clipped = any(prim.HasAuthoredMetadata("clips") for prim in _everything(stage))
         for prim in _everything(stage):
             names = []
@@ -191,12 +192,12 @@ class AnimatedAttributes:
 
 
 def _everything(stage: Usd.Stage) -> Iterator[Usd.Prim]:
-    """Yields every prim that may be read, those of prototypes once."""
+    """Yields every prim that may be read; prims of prototypes are included once."""
     yield from Usd.PrimRange.Stage(stage, _ANY)
     for prototype in stage.GetPrototypes():
         yield from Usd.PrimRange(prototype, _ANY)
 
 
 def _carries(attribute: Usd.Attribute) -> bool:
-    """Returns whether one sample of an attribute moves points at other times, as velocities do."""
+    """Returns whether one sample of an attribute moves points over time, as velocities do."""
     return attribute.GetName() == "velocities" and attribute.GetNumTimeSamples() > 0

@@ -79,10 +79,10 @@ def load_stage(
             changed only if ``variants`` are given, and must not change during the call.
         options: Options of the load. Mask, payloads and session layer require a file.
         editable: Whether to keep equal materials separate and to keep ``textures``, for programs
-            that edit the scene. Does not change the image.
+            that edit the scene. This option does not change the image.
         reuse: ``textures`` of an earlier load; textures of unchanged files are shared.
-        cache: Cache of an open stage that was read at another frame; unchanged data is shared. Does
-            not change the image.
+        cache: Cache of an open stage that was read at another frame; unchanged data is shared. The
+            cache does not change the image.
         progress: Called with the number of prims read and the number found so far.
         builder_factory: Creates a scene builder without a texture store, for tests.
         **changes: Fields of ``LoadOptions`` that replace those of ``options``.
@@ -113,7 +113,7 @@ def load_stage(
             load = _Load(source, builder, chosen, report, reuse, store, editable)
             facts = load.run(cache, progress)
             textures = load.textures
-            # This closes a stage that was opened here.
+            # This closes the stage if this call opened it.
             del load
         except UnicodeDecodeError:
             raise WavecombError(f"{file}: {NOT_TEXT}") from None
@@ -191,7 +191,7 @@ class _Load:
         self._surfaces = SubdivisionSurfaces(self._context, self._materials)
 
     def run(self, cache: FrameCache | None, progress: LoadProgress | None) -> dict[str, Any]:
-        """Fills the builder; returns fields of ``LoadedStage``."""
+        """Fills the scene builder; returns fields of ``LoadedStage``."""
         try:
             return self._run(cache, progress)
         finally:
@@ -256,7 +256,7 @@ class _Load:
     ) -> View | None:
         """Returns the view of the camera prim relative to an origin.
 
-        Returns None if there is no valid camera.
+        Returns None if there is no valid camera prim.
         """
         if settings.camera is None:
             return None
@@ -303,7 +303,7 @@ class _Load:
             bounds, points = box.ComputeAlignedRange(), None
             if not bounds.IsEmpty():
                 ends = np.array([bounds.GetMin(), bounds.GetMax()])
-                # Frame the ball inside the box, since the final view is never closer than that.
+                # Frames the ball inside the box, since the final view is never closer than that.
                 points = ends.mean(axis=0) + (corners(ends) - ends.mean(axis=0)) / np.sqrt(3.0)
             view = frame_points(points, c.up_axis, settings.lens, c.options.size)
         limit = float(c.options.texture_limit or 0) * MEGABYTE

@@ -27,17 +27,17 @@ class LoadedStage:
 
     Attributes:
         scene: The scene, ready to render.
-        report: Notes and warnings.
-        camera_path: Prim of the camera; None if the bounds were framed.
-        seconds: Time taken by the load.
-        stage_path: The file.
+        report: Notes and warnings of the load.
+        camera_path: Prim of the camera; None if the default camera framed the bounds.
+        seconds: Time that the load took, in seconds.
+        stage_path: The file of the stage.
         cameras: Prims of all selectable cameras.
         lights: Prims of all supported lights, including invisible ones.
         material_paths: Prim of each material of the scene by id; "" if the loader created it, for
-            example from a display colour. A prim has several ids if meshes provide different
-            primvars.
-        light_paths: Prim of each light of the scene by index; "" for the soft dome. Materials and
-            lights in instances are named after the first instance.
+            example from a display colour. A material prim has several ids if meshes provide
+            different primvars.
+        light_paths: Prim of each light of the scene by index; "" for the default dome light.
+            Materials and lights in instances are named after the first instance.
         frame: Time code that was read; None for default values.
         shutter: Opening and closing time relative to the frame, in time codes; None without motion
             blur.
@@ -46,10 +46,10 @@ class LoadedStage:
         textures: Textures for the next load to share; None unless the load was ``editable``.
         leaves_out_levels: Whether textures have only the mip levels that this view needs.
         outline: Extreme points (n, 3) of the scene; None unless a view was framed from them.
-        volumes: Description of each volume.
-        catchers: Prims that are shadow catchers.
-        origin: World position of the scene's origin, which is subtracted from world coordinates. It
-            is 0 unless the camera is far from the world's origin (docs/stages.md).
+        volumes: Description of each volume in the scene.
+        catchers: Paths of prims that are shadow catchers.
+        origin: World position of the scene's origin, which is subtracted from world coordinates.
+            The origin is 0 unless the camera is far from the world's origin (docs/stages.md).
     """
 
     scene: _core.Scene
@@ -94,7 +94,7 @@ class LoadedStage:
         from wavecomb import _core
 
         kept = None
-        # Other threads may be using the result.
+        # Another thread may be using the result of the previous render.
         with contextlib.suppress(IndexError):
             kept = self._kept.pop()
         # The scene may have been edited.

@@ -54,7 +54,7 @@ class RayVisibility:
     """
 
     def __init__(self, context: LoadContext, ignored: frozenset[str] = frozenset()) -> None:
-        """``ignored`` lists kinds of visibility whose attributes are ignored."""
+        """``ignored`` lists kinds of visibility whose attributes are not read."""
         self._builder, self._report = context.builder, context.report
         self._ignored = ignored
         self.catchers: list[str] = []

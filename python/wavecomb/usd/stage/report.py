@@ -14,7 +14,7 @@ from typing import Any
 from pxr import Tf
 
 MAX_PLACES = 3
-"""Locations in the text of a message; further ones are counted."""
+"""Maximum number of locations in the text of a message; further locations are counted."""
 
 LEVELS = ("warning", "not supported", "note")
 """Kinds of messages, in the order of a log."""
@@ -28,9 +28,9 @@ class Finding:
     """A message with its locations.
 
     Attributes:
-        what: One line in lower case, without a full stop.
-        count: Number of occurrences.
-        all_places: Prims or files that it concerns, up to ``MAX_KEPT``.
+        what: Text of the message: one line in lower case, without a full stop.
+        count: Number of occurrences of the message.
+        all_places: Prims or files that the message concerns, up to ``MAX_KEPT``.
     """
 
     what: str
@@ -39,7 +39,7 @@ class Finding:
     _known: set[str] = field(default_factory=set, repr=False, compare=False)
 
     def add(self, place: str, count: int = 1) -> None:
-        """Adds an occurrence."""
+        """Adds an occurrence of the message."""
         self.count += count
         if place and len(self._known) < MAX_KEPT and place not in self._known:
             self._known.add(place)
@@ -47,7 +47,7 @@ class Finding:
 
     @property
     def places(self) -> list[str]:
-        """The first ``MAX_PLACES`` locations."""
+        """The first ``MAX_PLACES`` locations of the message."""
         return self.all_places[:MAX_PLACES]
 
     def line(self) -> str:
@@ -59,7 +59,7 @@ class Finding:
         return f"{self.what}: {', '.join(places)}" + (f" and {more} more" if more > 0 else "")
 
     def as_dict(self) -> dict[str, Any]:
-        """Returns plain data for JSON."""
+        """Returns the message as plain data for JSON."""
         return {"what": self.what, "count": self.count, "places": self.places}
 
 
@@ -102,7 +102,7 @@ class LoadReport:
         self._add("warning", what, place, count)
 
     def missing(self, what: str, place: object = "", count: int = 1) -> None:
-        """Adds an unsupported feature."""
+        """Adds a message about an unsupported feature."""
         self._add("not supported", what, place, count)
 
     def absorb(self, other: LoadReport) -> None:
@@ -117,7 +117,7 @@ class LoadReport:
             self.tally(kind, count)
 
     def absorb_new(self, other: LoadReport) -> None:
-        """Adds messages of another report for locations that do not have the same message yet."""
+        """Adds messages of another report, except where a location already has the same message."""
         for level, findings in other._found.items():
             for what, finding in findings.items():
                 known = self._found[level].get(what)
@@ -133,17 +133,17 @@ class LoadReport:
 
     @property
     def notes(self) -> list[Finding]:
-        """Choices and approximations."""
+        """Notes about choices and approximations."""
         return list(self._found["note"].values())
 
     @property
     def warnings(self) -> list[Finding]:
-        """Errors in the stage."""
+        """Warnings about errors in the stage."""
         return list(self._found["warning"].values())
 
     @property
     def unsupported(self) -> list[Finding]:
-        """Unsupported features."""
+        """Messages about unsupported features."""
         return list(self._found["not supported"].values())
 
     def lines(self) -> list[str]:
@@ -155,7 +155,7 @@ class LoadReport:
         ]
 
     def as_dict(self) -> dict[str, Any]:
-        """Returns plain data for JSON."""
+        """Returns the report as plain data for JSON."""
         return {
             "notes": [finding.as_dict() for finding in self.notes],
             "warnings": [finding.as_dict() for finding in self.warnings],
@@ -167,7 +167,7 @@ class LoadReport:
 NOT_TEXT = "it holds text that is not UTF-8; the file is damaged"
 
 MAX_LINES = 12
-"""Diagnostics that are reported individually; further ones are only counted."""
+"""Maximum number of USD diagnostics that are reported individually; the rest are only counted."""
 
 
 def plain(text: str) -> str:
@@ -185,15 +185,15 @@ _FORMS = (
     (re.compile(r"Could not open asset @([^@]*)@"), "cannot open layer"),
     (re.compile(r"^In <([^>]*)>: (.*)$"), ""),
 )
-"""Diagnostics that are reworded; the first group of the pattern is the prim or file."""
+"""USD diagnostics that are reworded; the first group of each pattern is the prim or file."""
 
 
 _SAID = re.compile(r"Could not (open asset|load sublayer) @[^@]*\.mtlx\]*@", re.IGNORECASE)
-"""Diagnostics that are dropped because ``usd.mtlx`` reports the same problem in more detail."""
+"""USD diagnostics that are dropped because ``usd.mtlx`` reports the same problem in more detail."""
 
 
 def _add_to_report(report: LoadReport, text: str) -> None:
-    """Adds one diagnostic to a report."""
+    """Adds one USD diagnostic to a report."""
     for form, words in _FORMS:
         match = form.search(text)
         if match:
@@ -216,7 +216,7 @@ def first_message(error: BaseException) -> str:
 
 
 def _text(diagnostic: Any) -> str:
-    """Returns the text of a diagnostic."""
+    """Returns the text of a USD diagnostic."""
     try:
         return str(diagnostic.commentary)
     except UnicodeDecodeError:
@@ -272,7 +272,7 @@ def _hooked(report: LoadReport) -> Iterator[None]:
 
 
 def _pass_on(trap: Any, report: LoadReport) -> None:
-    """Moves the messages of a trap to a report."""
+    """Moves the messages of a diagnostic trap to a report."""
     texts = [_text(item) for item in (*trap.GetErrors(), *trap.GetWarnings())]
     lines = sorted({plain(text) for text in texts if not _SAID.search(text)})
     # Reworded messages are grouped in the report, so they do not count towards the limit.
@@ -299,7 +299,7 @@ class DiagnosticListener:
         self._trap = None if kind is None else self._open.enter_context(kind())
 
     def take(self) -> LoadReport | None:
-        """Returns messages since the last call; None if there are none."""
+        """Returns USD's messages since the last call; None if there are none."""
         if self._trap is None or self._trap.IsClean():
             return None
         report = LoadReport()

@@ -34,7 +34,7 @@ STRANDS = {
     "BasisCurves": "curves", "NurbsCurves": "curves", "HermiteCurves": "curves", "Points": "points",
 }  # fmt: skip
 DRAWN = frozenset(("mesh", "patch", "shape", "splats", *STRANDS.values()))
-"""Kinds of prims that become geometry."""
+"""Kinds of prims that become geometry in the scene."""
 
 
 @dataclass
@@ -119,7 +119,7 @@ class Traversal:
             elif prim.IsA(UsdGeom.PointInstancer):
                 kind = "instancer"
             elif name == "PortalLight":
-                # The dome light that refers to a portal reads it.
+                # The dome light that refers to a portal reads the portal.
                 kind = "xform"
             elif prim.IsA(UsdLux.BoundableLightBase) or prim.IsA(UsdLux.NonboundableLightBase):
                 kind = "unsupported light"
@@ -143,20 +143,19 @@ class Traversal:
         """Collects the prims at and below some roots, in stage order.
 
         Args:
-            roots: Prims to start from; their transforms are included, those of their parents are
-                not.
-            purpose: Purpose of their parents.
+            roots: Prims to start from; their own transforms are included, their parents' are not.
+            purpose: Purpose of the roots' parents.
             predicate: Predicate of the children to visit; None is USD's default.
             inherited: Constant primvars that the roots inherit.
-            base: Transform of their parents and of prims that reset the transform stack.
+            base: Transform of the roots' parents and of prims that reset the transform stack.
         """
         found = CollectedPrims()
         time, local = self.time, self.xforms.GetLocalTransformation
         proxies = Usd.TraverseInstanceProxies(
             Usd.PrimDefaultPredicate if predicate is None else predicate
         )
-        # Prim, transform and animated transform of its parent, purpose, inherited primvars,
-        # predicate for its children, its parent, draw mode.
+        # One prim to visit: prim, transform and animated transform of its parent, purpose,
+        # inherited primvars, predicate for its children, its parent, draw mode.
         stack: list[
             tuple[Usd.Prim, Gf.Matrix4d, Track | None, str, Sequence[Any], Any, Parent | None, str]
         ]
@@ -176,7 +175,7 @@ class Traversal:
             if kind != "other":
                 listed = tuple(prim.GetAuthoredPropertyNames())
                 known = self._names.get(listed)
-                if known is None:  # most prims share a set of names
+                if known is None:  # Most prims share a set of property names.
                     has_primvars = any(name.startswith("primvars:") for name in listed)
                     known = self._names[listed] = frozenset(listed), has_primvars
                 names, has_primvars = known
@@ -283,7 +282,7 @@ class Traversal:
     def _shared(self, prototype: Usd.Prim) -> bool:
         """Returns whether a prototype has several instances.
 
-        A single one is read without instancing.
+        A prototype with a single instance is read without instancing.
         """
         path = prototype.GetPath()
         known = self._counts.get(path)

@@ -26,16 +26,16 @@ from wavecomb.usd.stage.report import LoadReport
 
 @dataclass(frozen=True)
 class GridFacts:
-    """Description of a grid.
+    """Description of a volume grid.
 
     Attributes:
-        use: "density", "colour", "emission", "temperature" or "velocity".
+        use: Use of the grid: "density", "colour", "emission", "temperature" or "velocity".
         field: Name of the volume's field.
         file: File that holds the grid.
         grid: Name of the grid in the file.
         value: OpenVDB's name of the value type, such as "float", "half" or "vec3s".
-        voxels: Number of active voxels.
-        bytes: Memory of its bricks with their borders.
+        voxels: Number of active voxels of the grid.
+        bytes: Memory of the grid's bricks with their borders.
     """
 
     use: str
@@ -52,11 +52,11 @@ class VolumeFacts:
     """Description of a volume.
 
     Attributes:
-        name: Prim path.
-        count: Number of instances.
+        name: Prim path of the volume.
+        count: Number of instances of the volume.
         low: Lowest corner of the bounds of all instances in world space.
-        high: Highest corner.
-        grids: Its grids; empty for a homogeneous volume.
+        high: Highest corner of the same bounds.
+        grids: Grids of the volume; empty for a homogeneous volume.
     """
 
     name: str
@@ -66,7 +66,7 @@ class VolumeFacts:
     grids: tuple[GridFacts, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """Returns plain data for JSON."""
+        """Returns the description as plain data for JSON."""
         return {
             "name": self.name,
             "count": self.count,
@@ -76,13 +76,13 @@ class VolumeFacts:
 
 
 _SLIGHTLY = 1e-3
-"""Tolerated negative values relative to a grid's maximum; resampling filters produce them."""
+"""Tolerated negative values, relative to a grid's maximum; resampling filters produce them."""
 
 _WARM = ("temperature", "heat", "flame", "flames", "fire", "fuel")
-"""Names of fields that are not used as density if there is another field."""
+"""Names of fields that are not used as density if the volume has another field."""
 
 _CHUNK = 4096
-"""Bricks that are processed together."""
+"""Number of bricks that are processed together."""
 
 
 @dataclass(frozen=True)
@@ -91,8 +91,8 @@ class Grid:
 
     Attributes:
         handle: Grid object for ``SceneBuilder.add_volume``.
-        corners: (8, 3) corners of the bounds of its active voxels in object space.
-        facts: Description for users.
+        corners: (8, 3) corners of the bounds of the grid's active voxels in object space.
+        facts: Description of the grid for users.
     """
 
     handle: Any
@@ -120,7 +120,7 @@ class GridTable:
         return None
 
     def first_vector(self, fields: Mapping[str, Field], names: Sequence[str]) -> Field | None:
-        """Returns the first vector field that has, or whose grid has, one of the names."""
+        """Returns the first vector field that has one of the names, or whose grid has one."""
         for name in names:
             for field in fields.values():
                 head = self._head(field)
@@ -331,7 +331,7 @@ def radiance(kelvin: NDArray[Any]) -> NDArray[np.float32]:
 
 @functools.cache
 def _colours() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Returns temperatures and the corresponding colours of luminance 1."""
+    """Returns temperatures and the corresponding black-body colours of luminance 1."""
     at = np.linspace(_FIRST, _LAST, _COUNT)
     return at, np.array([blackbody(float(kelvin)) for kelvin in at])
 
@@ -344,7 +344,7 @@ class Field:
         name: Name of the relationship without ``field:``.
         file: Path of a .vdb file.
         grid: Name of the grid in the file; "" means the field's name, or the only grid.
-        index: Index among grids with the same name.
+        index: Index of the grid among grids with the same name.
         prim: Path of the field asset.
         changes: Whether the file path changes over time.
     """

@@ -39,7 +39,7 @@ def volume_shader(material: UsdShade.Material) -> UsdShade.Shader | None:
 
 
 class VolumeMaterials:
-    """The volume looks of materials; each is read once."""
+    """The volume properties of materials; each material is read once."""
 
     def __init__(self, time: Usd.TimeCode, metres_per_unit: float, report: LoadReport) -> None:
         """``metres_per_unit`` is the stage's scale; MaterialX's coefficients are per metre."""

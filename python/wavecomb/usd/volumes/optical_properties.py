@@ -18,8 +18,8 @@ class FieldColour:
     """A colour that is multiplied by a field.
 
     Attributes:
-        colour: Linear Rec.709.
-        field: Name of the field, or "".
+        colour: The colour in linear Rec.709.
+        field: Name of the field that multiplies the colour, or "".
     """
 
     colour: Colour = BLACK
@@ -31,7 +31,7 @@ class FieldColour:
         return not any(self.colour)
 
     def scaled(self, by: Colour) -> FieldColour:
-        """Returns this value multiplied by a colour."""
+        """Returns this colour and field multiplied by another colour."""
         return replace(self, colour=product(self.colour, by))
 
 
@@ -45,10 +45,10 @@ class OpticalProperties:
         anisotropy: Mean cosine of the phase function, in (-1, 1).
         emission: Emitted radiance per stage unit, multiplied by the field ``emission_field``.
         density: Name of a field; "" means the field named density, or the first scalar field.
-        colour: Name of a field, or "".
+        colour: Name of the field that multiplies the albedo, or "".
         emission_field: Name of a field; "" means the density field.
         kelvin: Temperature of value 1 in ``emission_field``; 0 if it does not hold temperatures.
-        name: Name for messages.
+        name: Name of the material for messages.
     """
 
     extinction: Colour = WHITE
@@ -63,7 +63,7 @@ class OpticalProperties:
 
 
 DEFAULT_PROPERTIES = OpticalProperties()
-"""Properties of a volume without a material: white smoke, extinction 1 per unit at density 1."""
+"""Properties of a volume without material: white smoke with extinction 1 per unit at density 1."""
 
 
 def product(a: Colour, b: Colour) -> Colour:

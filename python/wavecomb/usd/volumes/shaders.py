@@ -82,9 +82,9 @@ class ClosureReader:
         )
 
     def _sum(self, one: FieldColour, two: FieldColour) -> FieldColour:
-        """Adds two values of the same field.
+        """Adds two values that are multiplied by the same field.
 
-        If the fields differ, reports it and uses the second.
+        If the fields differ, reports this and uses the second value.
         """
         if one.is_black:
             return two
@@ -181,11 +181,11 @@ def _scaled(medium: Medium, by: float) -> Medium:
 
 
 STANDARD = ("arnold:standard_volume", "standard_volume")
-"""Identifiers of Arnold's shader."""
+"""Identifiers of Arnold's volume shader."""
 
 _HALF = (0.5, 0.5, 0.5)
 _OPAQUE = 1e-4
-"""Smallest transparency; it gives an extinction coefficient of 9.2 per ``transparent_depth``."""
+"""Smallest transparency; it gives an extinction coefficient of 9.2 / ``transparent_depth``."""
 
 
 def read_standard(shader: UsdShade.Shader, inputs: Inputs) -> OpticalProperties:

@@ -21,7 +21,7 @@ from wavecomb.usd.volumes.material import VolumeMaterials
 from wavecomb.usd.volumes.optical_properties import BLACK, Colour, OpticalProperties
 
 GLOW = 1e-4
-"""Emission times size from which a volume counts as a light."""
+"""Product of emission and size from which a volume counts as a light."""
 
 _MAX_ANISOTROPY = 0.999
 
@@ -32,8 +32,8 @@ class Volume:
 
     Attributes:
         options: Arguments of ``SceneBuilder.add_volume`` except ``to_world``.
-        corners: (8, 3) corners of its bounds in object space.
-        grids: Descriptions of its grids.
+        corners: (8, 3) corners of the volume's bounds in object space.
+        grids: Descriptions of the volume's grids.
         may_light: Whether it may light a scene by its emission.
     """
 
@@ -68,7 +68,7 @@ class VolumeReader:
         prim = draw.prim
         fields = read_fields(prim, self._time, self._report)
         if not fields and UsdVol.Volume(prim).GetFieldPaths():
-            # All of its fields are invalid, which has been reported.
+            # All fields of the volume are invalid, which has been reported.
             return None
         properties = self._materials.of(draw.material, prim)
         if fields and not vdb.is_there():
@@ -168,7 +168,7 @@ _SCALES = ("primvars:arnold:velocity_scale", "arnold:velocity_scale")
 
 @dataclass(frozen=True)
 class Velocity:
-    """Velocities of a volume.
+    """Velocities of a moving volume.
 
     Attributes:
         grid: Grid of vectors in object-space units per second.

@@ -86,7 +86,7 @@ NODES |= {
 
 @_node("atan2")
 def _atan2(n: NodeCall) -> Value:
-    # Version 1.38 names the inputs in1 and in2.
+    # MaterialX 1.38 names the inputs in1 and in2.
     y, x = n.given("iny") or n.given("in1"), n.given("inx") or n.given("in2")
     return n.make.op("atan2", y or 0.0, x or 1.0)
 
@@ -102,7 +102,7 @@ def _remap(n: NodeCall) -> Value:
 
 @_node("rotate2d")
 def _rotate2d(n: NodeCall) -> Value:
-    """Rotates clockwise, as MaterialX does."""
+    """Rotates a vector clockwise, as MaterialX does."""
     m, x, degrees = n.make, n.value("in", width=2), n.value("amount", width=1)
     angle = m.mul(degrees, math.pi / 180)
     c, s = m.op("cos", angle), m.op("sin", angle)
@@ -126,7 +126,7 @@ def _rotate3d(n: NodeCall) -> Value:
 @_node("ifgreater", "ifgreatereq", "ifequal")
 def _if(n: NodeCall) -> Value:
     m = n.make
-    # The default is 1 for integer variants and 0 for booleans.
+    # The default of the compared value is 1 for integer variants and 0 for booleans.
     first = 0.0 if n.category == "ifequal" and n.identifier.endswith("B") else 1.0
     a, b = n.value("value1", (first,)), n.value("value2", (0.0,))
     if n.category == "ifequal":
@@ -135,7 +135,7 @@ def _if(n: NodeCall) -> Value:
         condition = m.op("less", b, a)
     else:
         condition = m.sub(1.0, m.op("less", a, b))
-    # In this variant the result is the condition itself.
+    # In this variant of the node, the result is the condition itself.
     if "_boolean" in n.identifier:
         return condition
     return m.op("select", condition, n.value("in1"), n.value("in2"))
@@ -153,12 +153,12 @@ def _same(n: NodeCall) -> Value:
 @_node("convert")
 def _convert(n: NodeCall) -> Value:
     """Converts between types: new components are 0 (the fourth is 1), and a number is repeated."""
-    words = n.identifier.split("_")  # ND_convert_color3_color4
+    words = n.identifier.split("_")  # such as ND_convert_color3_color4
     return n.value("in", 0.0, WIDTHS.get(words[2], 0) if len(words) > 3 else 0)
 
 
 _PARTS = {"CF": (3, 1), "VF": (3, 1), "CC": (2, 2), "VV": (2, 2)}
-"""Numbers of components of the inputs of combine nodes with vector inputs."""
+"""Numbers of components of the inputs of "combine" nodes with vector inputs."""
 
 
 @_node("combine2", "combine3", "combine4")
@@ -205,7 +205,7 @@ def identity(size: int) -> tuple[float, ...]:
 def _transform(n: NodeCall) -> Value:
     """Multiplies a row vector by a matrix; appends a 1 to a vector that is one component short.
 
-    Cuts a longer result without dividing it by its last component.
+    A result that is too long is cut without dividing it by its last component.
     """
     size = 4 if n.identifier.endswith(("M4", "vector4")) else 3
     matrix = n.value("mat", identity(size), size * size)
@@ -231,7 +231,6 @@ def _create(n: NodeCall) -> Value:
     result: Value = ()
     for i in range(size):
         row = n.value(f"in{i + 1}", rows[i * size : (i + 1) * size])
-        # In a 4 x 4 matrix, rows with three components are directions, except the last, which is a
-        # point.
+        # In a 4 x 4 matrix, rows with three components are directions; the last row is a point.
         result += row if len(row) == size else (*row[: size - 1], float(i == size - 1))
     return result

@@ -58,7 +58,7 @@ def _image(n: NodeCall) -> Value:
 
 
 def _of_output(n: NodeCall, texel: Value) -> Value:
-    """Returns the component that the output names, else all components."""
+    """Returns the component that the node's output names, else all components."""
     if n.output in ("r", "g", "b", "a"):
         n.width = 1
         return (texel["rgba".index(n.output)],)

@@ -13,7 +13,7 @@ NODES: dict[str, Handler] = {}
 _node = adder(NODES)
 
 LUMA = (0.2722287, 0.6740818, 0.0536895)
-"""MaterialX's default of ``lumacoeffs``, which are the weights of AP1."""
+"""MaterialX's default of the input ``lumacoeffs``: the luminance weights of AP1."""
 
 
 @_node("rgbtohsv", "hsvtorgb")
@@ -30,7 +30,7 @@ def _luminance(n: NodeCall) -> Value:
 
 
 _KELVIN = (800.0, 25000.0)
-"""Temperature range of the fits below, in kelvin."""
+"""Temperature range of the black-body fits, in kelvin."""
 
 _CHROMATICITY = ((2222.0, (-1.1063814, -1.34811020, 2.18555832, -0.20219683)),
         (4000.0, (-0.9549476, -1.37418593, 2.09137015, -0.16748867)),
@@ -77,7 +77,7 @@ def _blackbody(n: NodeCall) -> Value:
 # ---- compositing ---------------------------------------------------------------------------------
 
 Formula = Callable[[Expressions, Value, Value], Value]
-"""Combines a foreground and a background."""
+"""Function of a foreground and a background that combines their colours."""
 
 
 def _blend(formula: Formula, width: int = 0) -> Handler:

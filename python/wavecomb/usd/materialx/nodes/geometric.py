@@ -95,7 +95,7 @@ def _primvar(n: NodeCall, name: str, fallback: str) -> Value:
 
 @_node("normalmap")
 def _normal_map(n: NodeCall) -> Value:
-    """Returns a normal in tangent space; without a map, the unperturbed normal."""
+    """Returns a normal in tangent space; without a normal map, the unperturbed normal."""
     m, n.width = n.make, 3
     texel = n.inputs.find("in", NORMAL)
     if texel is None:
@@ -107,12 +107,12 @@ def _normal_map(n: NodeCall) -> Value:
 
 
 def _rows(m: Expressions) -> list[Value]:
-    """Returns the rows of the inverse of M in world space."""
+    """Returns the rows of the inverse of the object-to-world matrix in world space."""
     return [m.input(f"normal_{axis}") for axis in "xyz"]
 
 
 def _columns(m: Expressions) -> list[Value]:
-    """Returns the columns of M in world space."""
+    """Returns the columns of the object-to-world matrix in world space."""
     a, b, c = _rows(m)
     across = m.op("cross", b, c)
     size = m.op("dot", a, across)
@@ -126,7 +126,7 @@ def _dots(m: Expressions, vectors: list[Value], v: Value) -> Value:
 def _tangent_of_object(m: Expressions, normal: Value) -> Value:
     """Converts an object-space normal to tangent space.
 
-    The shading normal faces the viewer, so the map's normal is flipped together with it.
+    The shading normal faces the viewer, so the normal of the map is flipped together with it.
     """
     there = unit(m, weighted_sum(m, _rows(m), fit(normal, 3)))
     frame = [m.input(name) for name in ("tangent", "bitangent", "normal")]
@@ -154,7 +154,7 @@ def _transform(n: NodeCall) -> Value:
         return n.value("in", (0.0, 0.0, 1.0), 3)
     v = _transformed(n, (0.0, 0.0, 1.0 if is_normal else 0.0))
     if n.kind == NORMAL:
-        # Find the normal that the transform maps to this vector.
+        # Computes the normal that the transform maps to this vector.
         if not is_normal:
             v = _dots(m, _columns(m), weighted_sum(m, _columns(m), v))
         return _tangent_of_object(m, v)
@@ -225,7 +225,7 @@ def _worley(n: NodeCall) -> Value:
 
 @_node("ramplr", "ramptb", "splitlr", "splittb")
 def _ramp(n: NodeCall) -> Value:
-    """Interpolates or splits along u, or along v with the top at v = 1."""
+    """Interpolates or splits values along u, or along v with the top at v = 1."""
     m, (u, v) = n.make, n.coordinates()
     names, at = (("valuel", "valuer"), (u,)) if n.category[-2:] == "lr" else (
         ("valueb", "valuet"), (v,)

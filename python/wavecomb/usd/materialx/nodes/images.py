@@ -48,13 +48,13 @@ def read_image(
     """Returns r, g, b and alpha of the node's image file, or the fallback if it is unreadable.
 
     Args:
-        n: The node.
+        n: The MaterialX node.
         uv: Texture coordinates.
         wraps: Wrap modes in u and v.
-        fallback: Input with the value for a missing file.
+        fallback: Name of the input with the value that replaces a missing file.
         is_raw: Whether the file holds data rather than colours.
         stretch: Scale from mesh coordinates to ``uv``; None computes it from ``uv``.
-        name: Input that names the file.
+        name: Name of the input that holds the file.
         space: Colour space that the node itself specifies, or "".
     """
     networks = n.networks
@@ -87,7 +87,7 @@ def _image(n: NodeCall) -> Value:
 
 @_node("UsdUVTexture")
 def _uv_texture(n: NodeCall) -> Value:
-    """Reads sourceColorSpace as in MaterialX 1.38; MaterialX's graph of this node lacks it."""
+    """Reads sourceColorSpace as in MaterialX 1.38; MaterialX's own graph for this node lacks it."""
     m = n.make
     uv = n.coordinates("st")
     wraps = [n.text(name, "periodic").replace("periodic", "repeat") for name in ("wrapS", "wrapT")]
@@ -102,7 +102,7 @@ def _uv_texture(n: NodeCall) -> Value:
 
 
 _GRID = 2.0 * math.sqrt(3.0)
-"""Scale of the grid; a copy then fits its hexagon."""
+"""Scale of the hexagonal grid, at which an image copy fits its hexagon."""
 _SKEW = (-0.57735027, 1.15470054)
 """Contributions of v to the skewed coordinates: -tan 30 degrees, and -2 times that."""
 _SEED = 0.12345
@@ -160,7 +160,7 @@ class _Grid:
         base = m.op("floor", skewed)
         x, y = ((part,) for part in m.sub(skewed, base))
         z = m.sub(m.sub(1.0, x), y)
-        # 1 in the upper triangle of a cell, where z is 0 or less.
+        # The value is 1 in the upper triangle of a cell, where z is 0 or less.
         upper = m.op("select", m.op("less", 0.0, z), 0.0, 1.0)
         lower = m.sub(1.0, upper)
         sign = m.sub(m.mul(upper, 2.0), 1.0)
@@ -190,7 +190,7 @@ class _Grid:
         return _Copy(uv, turn, weight)
 
     def shares(self, copies: list[_Copy], bright: list[Value] | None = None) -> Value:
-        """Returns the blend weights of the copies; ``bright`` adds luminance weights."""
+        """Returns the blend weights of the three copies; ``bright`` adds luminance weights."""
         m = self.make
         grid = tuple(copy.weight[0] for copy in copies)
         w = m.op("power", m.op("max", grid, 0.0), 7.0)
@@ -227,7 +227,7 @@ def _hextiled_image(n: NodeCall) -> Value:
     m, grid = n.make, _Grid(n)
     copies = grid.copies()
     texels = _texels(n, grid, copies, is_raw=False)
-    # This value is the fallback of a missing file.
+    # This input holds the value that replaces a missing file.
     if is_constant(texels[0]):
         return texels[0]
     luma, contrast = n.value("lumacoeffs", LUMA, 3), n.value("falloffcontrast", 0.5, 1)
@@ -254,7 +254,7 @@ def _hextiled_normal_map(n: NodeCall) -> Value:
         v = m.sub(m.mul(fit(texel, 3), 2.0), 1.0)
         if flips:
             v = v[:1] + m.sub(0.0, v[1:2]) + v[2:]
-        # The frame is rotated by -turn, so that its vectors stay fixed to the copy.
+        # The tangent frame is rotated by -turn, so that its vectors stay fixed to the copy.
         back = m.sub(0.0, copy.turn)
         across = _turned(m, m.mul(v[:2], strength), m.op("sin", back), m.op("cos", back))
         steep = m.op("max", m.op("abs", v[2:]), 1e-3)

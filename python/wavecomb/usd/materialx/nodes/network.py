@@ -28,7 +28,7 @@ MAX_DEPTH = 100
 MAX_NODES = 10_000
 """Maximum number of nodes in the networks of a material.
 
-The limit is a tenth of this in instanced node graphs, whose paths are long.
+In instanced node graphs, whose paths are long, the limit is a tenth of this.
 """
 
 PER_COMPONENT = {"overlay": "ND_overlay_float"}
@@ -82,7 +82,7 @@ def primitive(category: str, identifier: str) -> Handler | None:
 
 
 def support_of(identifier: str) -> str:
-    """Returns how a library node is compiled: "primitive", "graph", or "" if it is not."""
+    """Returns how a library node is compiled: "primitive", "graph", or "" if it cannot be."""
     definition = definition_of(identifier)
     if definition is None:
         return ""
@@ -96,7 +96,7 @@ def support_of(identifier: str) -> str:
 
 
 class _TooManyNodes(Exception):
-    """A material has more than the supported number of nodes."""
+    """Raised if a material has more than the supported number of nodes."""
 
 
 class Networks:
@@ -118,9 +118,9 @@ class Networks:
         self._instances = InstancedGraphs(material, self.node)
 
     def in_working_space(self) -> Networks:
-        """Returns these networks with constants in the working space.
+        """Returns a copy of the networks with constants in the working space.
 
-        The result reports nothing.
+        The copy reports nothing.
         """
         other = Networks(self.material, self.time, self.textures, LoadReport())
         other.make, other.converts, other.uv_names = self.make, True, self.uv_names
@@ -139,7 +139,7 @@ class Networks:
     def source(self, shader: UsdShade.Shader, name: str) -> Source | None:
         """Returns the source of an input like ``source_of``.
 
-        Its shader may be an instanced node graph.
+        The source's shader may be an instanced node graph.
         """
         if self._instances.are_there:
             return self._instances.source(shader.GetInput(name), self.time)
@@ -191,7 +191,7 @@ class Networks:
         return NodeCall(self, _StageInputs(self, shader), category, identifier, output, width, kind)
 
     def compiled(self, call: NodeCall) -> Value | None:
-        """Compiles a node's output, of the stage or of a library graph."""
+        """Compiles the output of a node in the stage or in a library graph."""
         handler = primitive(call.category, call.identifier)
         if handler is not None:
             value = handler(call)
@@ -203,7 +203,7 @@ class Networks:
         return None if value is None else fit(value, call.width or len(value))
 
     def _nearest(self, call: NodeCall) -> Value | None:
-        """Returns a substitute for an unknown node: the first of its inputs with a value."""
+        """Returns a substitute for an unknown node: the first of the node's inputs with a value."""
         given = call.inputs.names()
         first = [name for name in _FIRST_CHOICES if name in given]
         for name in (*first, *(name for name in given if name not in first)):
@@ -261,7 +261,7 @@ def _graph_of(call: NodeCall) -> FlatGraph | None:
 
 
 class _StageInputs:
-    """Inputs of a shader of a stage; implements ``call.Inputs``."""
+    """Inputs of a shader in a stage; implements ``node.Inputs``."""
 
     def __init__(self, networks: Networks, shader: UsdShade.Shader) -> None:
         self._networks = networks
@@ -273,11 +273,11 @@ class _StageInputs:
         return self._shader.GetPath()
 
     def find(self, name: str, kind: str) -> Value | None:
-        """Returns the value of an input; None if it is not set."""
+        """Returns the value of a shader input; None if it is not set."""
         return self._networks.input(self._shader, name, kind)
 
     def source(self, name: str) -> Source | None:
-        """Returns the source of a text input."""
+        """Returns the source of a shader input that holds text."""
         return self._networks.source(self._shader, name)
 
     def has(self, name: str) -> bool:
@@ -313,7 +313,7 @@ class InstancedGraphs:
     def source(self, shader_input: UsdShade.Input, time: Usd.TimeCode) -> Source | None:
         """Returns the source of an input like ``source_of``.
 
-        Its shader may be an instanced graph.
+        The source's shader may be an instanced node graph.
         """
         if not shader_input:
             return None
@@ -370,5 +370,5 @@ class InstancedGraphs:
         prim = end.GetPrim()
         if UsdShade.Output.IsOutput(end) or not prim.IsInstanceProxy():
             return str(end.GetPath())
-        # A value in the prototype is the same for all instances.
+        # A value inside the prototype is the same for all instances.
         return str(prim.GetPrimInPrototype().GetPath().AppendProperty(end.GetName()))

@@ -25,7 +25,7 @@ class Inputs(Protocol):
         """Path of the prim for messages."""
 
     def find(self, name: str, kind: str) -> Value | None:
-        """Returns the value of an input; None if it is not set."""
+        """Returns the value of a node input; None if it is not set."""
 
     def source(self, name: str) -> Source | None:
         """Returns the source of an input that holds a string or a file."""
@@ -56,15 +56,15 @@ class NodeHost(Protocol):
 
 
 class NodeCall:
-    """One node during compilation.
+    """One MaterialX node during compilation.
 
     Attributes:
         networks: Network that contains the node.
         inputs: Inputs of the node.
-        category: Category without types.
-        identifier: Name of its definition.
+        category: Category of the node without types.
+        identifier: Name of the node's definition.
         output: Name of the requested output.
-        width: Number of components of that output; 0 accepts any number.
+        width: Number of components of the requested output; 0 accepts any number.
         kind: Use of the value: ``BASE``, ``COLOUR``, ``NUMBER`` or ``NORMAL`` of
             ``graphs.surface``.
     """
@@ -93,9 +93,9 @@ class NodeCall:
         return self.networks.make
 
     def given(self, name: str) -> Value | None:
-        """Returns an input or None.
+        """Returns the value of an input, or None.
 
-        Cuts matrices to four components unless the node accepts them.
+        Matrices are cut to four components unless the node accepts matrices.
         """
         found = self.inputs.find(name, self.kind)
         is_cut = found is not None and len(found) > 4 and self.category not in OF_MATRICES
@@ -104,7 +104,7 @@ class NodeCall:
     def value(
         self, name: str, default: float | Sequence[float] | None = 0.0, width: int = 0
     ) -> Value:
-        """Returns an input, or its default; ``width`` 0 keeps the input's number of components."""
+        """Returns an input's value, or its default; ``width`` 0 keeps the number of components."""
         found = self.given(name)
         if found is None:
             if isinstance(default, (int, float)):
@@ -114,7 +114,7 @@ class NodeCall:
         return fit(found, width) if width else found
 
     def number(self, name: str, default: float) -> float:
-        """Returns an input that must be a constant number; reports it otherwise."""
+        """Returns an input that must be a constant number; reports any other value."""
         found = self.inputs.find(name, NUMBER)
         if found is None:
             return default

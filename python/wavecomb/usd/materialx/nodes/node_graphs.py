@@ -27,7 +27,7 @@ CATEGORIES = frozenset(PRIMITIVES)
 """Node categories that are not expanded when library graphs are flattened."""
 
 NOT_NUMBERS = ("string", "filename", "geomname")
-"""Types of inputs that hold text."""
+"""MaterialX types of inputs that hold text."""
 
 
 _PLACES = ("texcoord", "st", "position", "normal", "index", "octaves", "style")
@@ -52,10 +52,10 @@ class ExpandedGraph:
         self._done: dict[tuple[str, str, str], Value | None] = {}
 
     def output(self, name: str) -> Value | None:
-        """Returns the value of an output."""
+        """Returns the value of an output of the graph."""
         result = self._graph.results.get(name) or next(iter(self._graph.results.values()))
         nodes, interfaces = self._needed(result)
-        # Evaluate interface inputs and nodes in order, so that long graphs do not recurse deeply.
+        # Evaluates interface inputs and nodes in order, so that long graphs need no deep recursion.
         for interface, kind in interfaces:
             self.call.inputs.find(interface, kind)
         for node, output, kind in nodes:
@@ -120,12 +120,12 @@ class ExpandedGraph:
         return None if value is None else Source(value=value)
 
     def is_given(self, feed: PortSource) -> bool:
-        """Returns whether a source is not a default."""
+        """Returns whether a source is set rather than a default."""
         return self.call.inputs.has(feed.interface) if feed.interface else True
 
 
 class _LibraryInputs:
-    """Inputs of a node inside a library graph; implements ``call.Inputs``."""
+    """Inputs of a node inside a library graph; implements ``node.Inputs``."""
 
     def __init__(self, body: ExpandedGraph, node: FlatNode) -> None:
         self._body = body
@@ -137,12 +137,12 @@ class _LibraryInputs:
         return self._body.call.inputs.path
 
     def find(self, name: str, kind: str) -> Value | None:
-        """Returns the value of an input; None if it is not set."""
+        """Returns the value of a node input; None if it is not set."""
         feed = self._node.inputs.get(name)
         return None if feed is None else self._body.source_value(feed, kind)
 
     def source(self, name: str) -> Source | None:
-        """Returns the source of a text input."""
+        """Returns the source of a node input that holds text."""
         feed = self._node.inputs.get(name)
         return None if feed is None else self._body.source(feed)
 

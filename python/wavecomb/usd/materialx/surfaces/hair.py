@@ -20,7 +20,7 @@ from wavecomb.usd.materialx.nodes.colours import color_divisor
 from wavecomb.usd.materialx.surfaces.openpbr import SurfaceReader
 
 _LOBES = {"R": (0.1, 0.1), "TT": (0.05, 0.05), "TRT": (0.2, 0.2)}
-"""Lobes and their default roughnesses."""
+"""Lobes of the hair model and their default roughnesses."""
 
 
 def variance(roughness: float) -> float:
@@ -56,7 +56,7 @@ class HairReader(SurfaceReader):
             parameters["ior"] = 1.55
         self._roughness(shader)
         self._colour(shader)
-        # MaterialX's angle has the opposite sign, and 0.5 means no tilt.
+        # MaterialX's cuticle angle has the opposite sign, and 0.5 means no tilt.
         angle = self._number(shader, "cuticle_angle", 0.5)
         parameters["cuticle_tilt"] = min(max(90.0 - 180.0 * angle, -90.0), 90.0)
         for lobe in _LOBES:
@@ -98,7 +98,7 @@ class HairReader(SurfaceReader):
     def _helper(self, shader: UsdShade.Shader) -> UsdShade.Shader | None:
         """Returns the ``chiang_hair_roughness`` node that feeds all lobes.
 
-        Returns None if there is none.
+        Returns None if no such node feeds all lobes.
         """
         found = []
         for lobe in _LOBES:

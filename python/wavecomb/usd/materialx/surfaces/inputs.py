@@ -15,7 +15,7 @@ from wavecomb.usd.materialx.surfaces.openpbr import MODELS, LayerInputs, layers_
 
 _KINDS = {"float": NUMBER, "color3": COLOUR, "boolean": SWITCH}
 _MAX_VALUE = 1e6
-"""Maximum of an input if MaterialX does not specify one."""
+"""Maximum of an input's value if MaterialX does not specify one."""
 
 _SHORT = (("index of refraction", "ior"), ("diffuse roughness", "roughness"))
 _SLIDERS = {"emissive_strength": 10.0, "attenuation_distance": 10.0, "thickness": 1.0}
@@ -23,7 +23,7 @@ _SLIDERS = {"emissive_strength": 10.0, "attenuation_distance": 10.0, "thickness"
 
 
 class _ReadInputs(LayerInputs):
-    """Record of the inputs that are read; the value 1 makes ``layers_of`` read all of them."""
+    """Recorder of the inputs that are read; the value 1 makes ``layers_of`` read all of them."""
 
     def __init__(self) -> None:
         self.read: set[str] = set()

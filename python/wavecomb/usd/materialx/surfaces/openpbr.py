@@ -31,12 +31,12 @@ WHITE, PALE, BLACK = (1.0, 1.0, 1.0), (0.8, 0.8, 0.8), (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Row:
-    """Source of a parameter.
+    """Source of an OpenPBR parameter in a shader.
 
     Attributes:
-        input: Input of the shader.
+        input: Name of the shader's input.
         default: Default of the input: a number, a colour, or a bool for a switch.
-        factor: Factor of a number.
+        factor: Factor on a number.
         divisor: Divisor of a number.
         driven: Whether a node may drive the parameter. Otherwise the mean of the node's value is
             used everywhere, unless ``drive_layers`` handles the input.
@@ -53,12 +53,12 @@ class Row:
 
 @dataclass(frozen=True)
 class Model:
-    """A shading model.
+    """Description of a MaterialX shading model.
 
     Attributes:
-        textured: Parameters that plain textures may drive.
+        textured: Parameters that plain textures may drive, with their sources.
         normal: Input with the shading normal.
-        layers: Other parameters, by the names of ``add_material(openpbr=...)``.
+        layers: All other parameters, by the names of ``add_material(openpbr=...)``.
         ignored: Inputs without effect, which are reported where they are authored.
     """
 
@@ -351,10 +351,10 @@ class MaterialXReader(SurfaceReader):
 
 
 class LayerInputs:
-    """Constants of a shader's inputs, and means of driven ones.
+    """Constants of a shader's inputs, and means of inputs that nodes drive.
 
     Attributes:
-        driven: Varying values by input; those that drive a parameter are removed.
+        driven: Varying values by input; values that drive a parameter are removed.
     """
 
     def __init__(self, reader: MaterialXReader, shader: UsdShade.Shader, model: str) -> None:
@@ -372,14 +372,14 @@ class LayerInputs:
         return colour(self.constant(name, "any_color"), default)
 
     def ignored(self, *names: str) -> None:
-        """Reports authored inputs without effect."""
+        """Reports authored inputs that have no effect in Wavecomb."""
         for name in names:
-            # Interfaces of materials connect all inputs, also to inputs without a value.
+            # Material interfaces connect all inputs, including inputs without a value.
             if source_of(self._shader, name, self._reader.time) is not None:
                 self._reader.missing(f"MaterialX {self._model} input {name} (ignored)")
 
     def approximated(self, what: str) -> None:
-        """Reports an approximation."""
+        """Reports that an input is only approximated."""
         self._reader.missing(f"{what}: approximated")
 
     def constant(self, name: str, parameter: str) -> Any:
