@@ -6,7 +6,7 @@
 
 namespace wavecomb {
 
-/// Affine transform x -> A x + t for column vectors: rows of A, then t.
+/// Affine transform x -> A x + t for column vectors. Stores the rows of A, then t.
 struct Affine {
   Vec3<float> row[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   Vec3<float> t{0, 0, 0};
@@ -20,7 +20,7 @@ struct Affine {
             row[1].x * v.x + row[1].y * v.y + row[1].z * v.z,
             row[2].x * v.x + row[2].y * v.y + row[2].z * v.z};
   }
-  /// Returns column j of A, the image of axis j.
+  /// Returns column j of the matrix A, which is the image of unit vector j.
   Vec3<float> axis(int j) const {
     const auto component = [j](const Vec3<float>& r) {
       return j == 0 ? r.x : (j == 1 ? r.y : r.z);

@@ -17,43 +17,44 @@ namespace wavecomb {
 
 /// Reduction of a pixel's samples to its value.
 enum class AovKind : uint8_t {
-  kMean,         ///< mean over all samples
-  kMeanOfHits,   ///< mean over samples that hit something; infinite if none did
+  kMean,         ///< the mean over all samples of the pixel
+  kMeanOfHits,   ///< the mean over samples that hit something; infinite if no sample did
   kNearest,      ///< value of the sample nearest to the pixel centre, for values without a mean
-  kCoverage,     ///< ids and the fraction of the pixel that each covers (Cryptomatte)
-  kGroups,       ///< one layer of means per light group
-  kExpressions,  ///< one layer of means per light path expression
-  kSum,          ///< sum over all samples
-  kDeep,         ///< samples by depth, written to a separate file (film/deep_film.h)
-  kMedian,       ///< estimated median of the samples (film/median.h); may be infinite
+  kCoverage,     ///< Cryptomatte: ids, and the fraction of the pixel that each id covers
+  kGroups,       ///< one layer for each light group, with the means of samples
+  kExpressions,  ///< one layer for each light path expression, with the means of samples
+  kSum,          ///< the sum over all samples of the pixel
+  kDeep,         ///< deep samples, written to a separate file (film/deep_film.h)
+  kMedian,       ///< the estimated median of the pixel's samples (film/median.h); may be infinite
 };
 
 /// Point in a path's evaluation at which an AOV's value is known.
 enum class AovSource : uint8_t {
-  kHit,     ///< known at the hit of the camera ray, before shading
-  kVertex,  ///< after shading the first vertex
-  kGuide,   ///< after the last vertex that provides denoiser features
-  kLight,   ///< when light contributes to the path
-  kMis,     ///< when light contributes, separated by sampling technique
-  kTime,    ///< measured with the clock
-  kBounce,  ///< over all bounces of the path
+  kHit,     ///< The value is known at the hit of the camera ray, before shading.
+  kVertex,  ///< The value is known after shading the first vertex.
+  kGuide,   ///< The value is known after the last vertex that provides denoiser features.
+  kLight,   ///< The value changes whenever light contributes to the path.
+  kMis,     ///< The value changes whenever light contributes, separated by sampling technique.
+  kTime,    ///< The value is a time measured with the clock.
+  kBounce,  ///< The value accumulates over all bounces of the path.
 };
 
-/// Meaning of a layer's numbers, by which files store it and the window displays it.
+/// Meaning of the numbers in a layer, which determines how files store the layer and how the window
+/// displays it.
 enum class AovContent : uint8_t {
   kLight,      ///< radiance: displayed with exposure and tone mapping
   kColour,     ///< reflectance or transmittance, 0 to 1
   kDirection,  ///< unit vector
   kId,         ///< index of an object or material, or hashes of names
   kExact,      ///< number that lossy compression would make useless
-  kValue,      ///< any other number: displayed in false colours
+  kValue,      ///< any other number, which the window displays in false colours
 };
 
-/// X(enumerator, name, channels, letters, content, kind, source, title): one bit each, in this
-/// order. `channels` is 0 for kinds that are not numeric or have several layers. `letters` name the
-/// channels in files, or is "" for numbers or a single channel. `title` is the label in the window;
-/// "" hides the layer there.
-// clang-format off
+/// Rows X(enumerator, name, channels, letters, content, kind, source, title). The order of the rows
+/// determines the bits of the AOVs. `channels` is 0 for AOVs that are not numeric or have several
+/// layers. `letters` are the names of the channels in files, or "" for a single channel and for
+/// numbered channels. `title` is the label of the layer in the window; "" hides the layer in the
+/// window. clang-format off
 #define WAVECOMB_AOVS(X)                                                                         \
   X(Albedo, "albedo", 3, "RGB", kColour, kMean, kVertex, "Albedo")                               \
   X(Normal, "normal", 3, "XYZ", kDirection, kMean, kVertex, "Normal")                            \
@@ -104,7 +105,7 @@ enum class Aov : uint32_t {
 #undef WAVECOMB_AOV
 };
 
-/// AOV of what other pixels' paths contribute to a pixel, the light splats of the film.
+/// AOV of the light splats: light that the paths of other pixels contribute to a pixel.
 inline constexpr Aov kSplatAov = Aov::kByLightPaths;
 
 /// Row of the AOV table.
@@ -142,7 +143,7 @@ constexpr uint32_t operator|(Aov a, Aov b) {
 constexpr uint32_t operator|(uint32_t a, Aov b) {
   return a | static_cast<uint32_t>(b);
 }
-/// Returns the bits of the rows for which `is_wanted` holds.
+/// Returns the bits of the AOVs for which `is_wanted` is true.
 template <typename IsWanted>
 constexpr uint32_t aov_bits(const IsWanted& is_wanted) {
   uint32_t bits = 0;
@@ -161,7 +162,7 @@ constexpr uint32_t aov_bits(AovSource source) {
 struct AovSet {
   /// AOVs stored by default, which have members in Film::Layers and in images.
   static constexpr uint32_t kStoredByDefault = Aov::kAlbedo | Aov::kNormal | Aov::kDepth;
-  /// Components of the beauty: emission + direct + indirect.
+  /// AOVs that add up to the beauty: emission, direct and indirect light.
   static constexpr uint32_t kParts = Aov::kEmission | Aov::kDirect | Aov::kIndirect;
   /// All AOVs that are requested by name and written as layers of an image.
   static constexpr uint32_t kAll = aov_bits([](const AovRow& row) {
@@ -185,7 +186,7 @@ struct AovSet {
 /// Upper limit of deep samples per pixel.
 inline constexpr uint32_t kMaxDeepSamples = 64;
 
-/// Resolution of deep images in depth.
+/// Limits on the deep samples of a pixel.
 struct DeepLimits {
   uint32_t most = 16;       ///< maximum number of deep samples per pixel
   float tolerance = 0.01f;  ///< samples closer than this fraction of their depth are merged

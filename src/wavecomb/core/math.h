@@ -2,7 +2,8 @@
 /// Elementary functions that give the same bits for floats and packets of floats.
 ///
 /// Range reductions and minimax polynomials follow S. Moshier, Cephes Mathematical Library (single
-/// precision). Errors are a few ulp over the stated ranges, tested against double precision.
+/// precision). Errors are a few ulp over the range of each function, as tests against double
+/// precision show.
 ///
 /// Functions that also exist in Dr.Jit repeat its template parameters plus a constraint (hence
 /// `bool = true`), which makes them the better match.

@@ -26,7 +26,7 @@ inline SampleKey<F> make_sample_key(const UInt<F>& pixel, const UInt<F>& sample,
   return {hash_u32<UInt<F>>(pixel, UInt<F>(seed)), sample};
 }
 
-/// Four random numbers in [0, 1).
+/// Four sample values in [0, 1).
 template <typename F>
 struct Sample4 {
   F x, y, z, w;
@@ -37,8 +37,8 @@ struct Sample4 {
 inline constexpr uint32_t kCameraSet = 0;
 inline constexpr uint32_t kTimeSet = 0xffffffffu;
 
-/// Sets used at each vertex. Each step has a named set, so that adding or removing a step does not
-/// change the random numbers of others.
+/// Sample sets that a path uses at each vertex. Each step of a vertex has a named sample set, so
+/// that adding or removing a step does not change the random numbers of other steps.
 enum class VertexSet : uint32_t {
   kLight,     ///< light sampling (choice, u, v) and Russian roulette
   kBsdf,      ///< BSDF sampling: lobe, u, v
@@ -49,8 +49,8 @@ enum class VertexSet : uint32_t {
 /// Upper limit of depths with distinct sets.
 inline constexpr uint32_t kSetDepths = 1u << 23;
 
-/// Returns the index of a set. The first two sample sets alternate from 1 on; each other set has a
-/// separate block.
+/// Returns the index of a sample set at a depth of the path. The indices of the first two sets of
+/// vertices alternate from 1 on; each other set has a separate block of indices.
 inline constexpr uint32_t vertex_set(VertexSet name, uint32_t depth) {
   const auto i = static_cast<uint32_t>(name);
   return i < 2 ? 1 + i + 2 * depth : (i << 24) + depth;

@@ -63,8 +63,8 @@ SettingInfo number(const char* name, const char* label, double least, double mos
   info.zero = zero;
   return info;
 }
-/// Returns a row for a number whose default depends on other settings; `used` returns the value in
-/// use.
+/// Returns the row of a number whose default depends on other settings; `used` returns the value
+/// that a render uses.
 template <auto kMember>
 SettingInfo number_or_unset(const char* name, const char* label, double least, double most,
                             const char* help, SettingValue (*used)(const Settings&)) {
@@ -95,8 +95,7 @@ std::vector<SettingChoice> ray_orders() {
        "Rays are sorted by the octant of their direction, then by the Morton code of their "
        "origin."},
       {"direction", "Rays are sorted by the octant and the major axes of their direction."},
-      {"auto",
-       "Rays use the fastest of the other four orders, which is measured for each path depth."}};
+      {"auto", "Wavecomb measures the other four orders at each path depth and uses the fastest."}};
 }
 
 // Upper limits of path depth and of samples per pixel.

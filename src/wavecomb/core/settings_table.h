@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Table of settings with one row per member of Settings. Checks, Python attributes and keywords,
-/// command line options, form fields and checkpoint headers follow from it. To add a setting, add a
-/// member to Settings, a row here, and its use.
+/// Table of settings with one row per member of Settings. Wavecomb derives checks, Python
+/// attributes and keywords, command line options, form fields and checkpoint headers from the
+/// table. To add a setting, add a member to Settings, a row here, and its use.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +15,8 @@
 
 namespace wavecomb {
 
-/// Value as callers see it; for settings with choices, the name of a choice. None (monostate)
-/// selects a default that depends on other settings.
+/// Value of a setting as callers pass it; for settings with choices, the name of a choice. The
+/// value None (monostate) selects a default that depends on other settings.
 using SettingValue = std::variant<std::monostate, bool, int64_t, double, std::string>;
 
 /// Value of a setting with choices.
@@ -30,26 +30,30 @@ enum class SettingGroup : uint8_t { kImage, kWork, kOrder };
 
 /// Row of the settings table.
 ///
-/// Contract: lives as long as the program.
+/// Contract: a row lives as long as the program.
 struct SettingInfo {
   const char* name = "";   ///< attribute name; options use - for _
   const char* label = "";  ///< label in a form
   const char* help = "";   ///< one sentence
-  /// Whether the image depends on the setting; otherwise it affects only how it is computed.
+  /// Whether the image depends on the setting; otherwise the setting affects only how the image is
+  /// computed.
   bool changes_image = true;
   /// Whether the bits of the beauty image depend on the setting, at equal samples of each pixel.
   bool changes_bits = true;
   /// Whether the expectation of the image depends on the setting, that is, the limit for many
-  /// samples. Other settings change noise, work, or layers that describe them.
+  /// samples. Settings without this flag change only noise, work, or the layers that describe noise
+  /// and work.
   bool changes_expectation = false;
   SettingGroup group = SettingGroup::kImage;
-  double least = 0, most = -1;         ///< range of numbers; no limits if least > most
-  const char* zero = "";               ///< meaning of the value 0, if it is special
-  std::vector<double> steps;           ///< allowed values besides 0; empty means all
-  std::vector<SettingChoice> choices;  ///< choices in the order of the enum
+  /// Least and greatest allowed number; no limits if least > most.
+  double least = 0, most = -1;
+  const char* zero = "";  ///< meaning of the value 0, if it is special
+  /// Allowed values besides 0; an empty list allows all values.
+  std::vector<double> steps;
+  std::vector<SettingChoice> choices;  ///< names of the choices in the order of the enum
 
-  bool may_be_none = false;  ///< whether None is allowed; the default then depends on other
-                             ///< settings
+  /// Whether None is allowed, which selects a default that depends on other settings.
+  bool may_be_none = false;
 
   SettingValue (*read)(const Settings&) = nullptr;
   void (*write)(Settings&, const SettingValue&) = nullptr;

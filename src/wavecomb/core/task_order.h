@@ -12,8 +12,8 @@
 namespace wavecomb {
 
 /// Annotations of one parallel loop: code before the loop happens before its tasks, and they happen
-/// before join(). Tasks are not ordered among each other. Does nothing in builds without
-/// ThreadSanitizer.
+/// before join(). The tasks of a loop are not ordered among each other. TaskOrder does nothing in
+/// builds without ThreadSanitizer.
 ///
 ///     const TaskOrder order;
 ///     tbb::parallel_for(size_t{0}, n, order.around([&](size_t i) { ... }));
@@ -29,14 +29,14 @@ class TaskOrder {
   /// Contract: this object and `body` outlive the task.
   template <typename Body>
   auto around(const Body& body) const {
-    // Not instrumented by ThreadSanitizer, since the captures are read before the annotation takes
-    // effect.
+    // ThreadSanitizer must not instrument this function, since the captures are read before the
+    // annotation takes effect.
     return [this, &body](const auto&... arguments) WAVECOMB_NO_TSAN {
       const Task task(*this);
       body(arguments...);
     };
   }
-  /// Call after the loop.
+  /// Ends the annotated region; call it after the parallel loop.
   void join() const { acquire(ended_); }
 
  private:
@@ -49,8 +49,12 @@ class TaskOrder {
   };
 
 #if defined(__SANITIZE_THREAD__)
-  static void acquire(const char& address) { __tsan_acquire(const_cast<char*>(&address)); }
-  static void release(const char& address) { __tsan_release(const_cast<char*>(&address)); }
+  static void acquire(const char& address) {
+    __tsan_acquire(const_cast<char*>(&address));
+  }
+  static void release(const char& address) {
+    __tsan_release(const_cast<char*>(&address));
+  }
 #else
   static void acquire(const char&) {}
   static void release(const char&) {}
@@ -63,8 +67,12 @@ class TaskOrder {
 class WorkerOrder {
  public:
 #if defined(__SANITIZE_THREAD__)
-  explicit WorkerOrder(void* worker) : worker_(worker) { __tsan_acquire(worker_); }
-  ~WorkerOrder() { __tsan_release(worker_); }
+  explicit WorkerOrder(void* worker) : worker_(worker) {
+    __tsan_acquire(worker_);
+  }
+  ~WorkerOrder() {
+    __tsan_release(worker_);
+  }
   WorkerOrder(const WorkerOrder&) = delete;
   WorkerOrder& operator=(const WorkerOrder&) = delete;
 

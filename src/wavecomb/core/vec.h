@@ -65,7 +65,7 @@ WAVECOMB_INLINE Mask<F> is_black(const Vec3<F>& c) {
   return (c.x == 0.f) & (c.y == 0.f) & (c.z == 0.f);
 }
 
-/// Gathers three consecutive floats at 3 * index.
+/// Gathers a vector from three consecutive floats at 3 * index in an array.
 template <typename F>
 inline Vec3<F> gather_vec3(const float* base, const UInt<F>& index, const Mask<F>& active) {
   const UInt<F> i = index * 3u;

@@ -15,7 +15,8 @@ inline Vec2<F> square_to_disk(const F& u, const F& v) {
   const Mask<F> wide = abs(a) > abs(b);
   const F r = select(wide, a, b);
   const F ratio = select(wide, b, a) / select(r == 0.f, F(1.f), r);
-  // phi / 2 pi is ratio / 8 in the a sectors and 1/4 - ratio / 8 in the b sectors.
+  // The angle phi / 2 pi is ratio / 8 in the sectors where a dominates, and 1/4 - ratio / 8 in
+  // those where b does.
   const F turn = select(wide, F(ratio * 0.125f), fma(ratio, F(-0.125f), F(0.25f)));
   const auto [s, c] = sincos_2pi(turn);
   return {r * c, r * s};
@@ -46,7 +47,8 @@ inline Vec3<F> square_to_sphere(const F& u, const F& v) {
 /// 1 / (2 pi one_minus_cos).
 template <typename F>
 inline Vec3<F> square_to_cone(const F& u, const F& v, const F& one_minus_cos) {
-  const F h = u * one_minus_cos;  // 1 - cos theta, which stays accurate for small angles
+  // 1 - cos theta, computed so that it stays accurate for small angles.
+  const F h = u * one_minus_cos;
   const F r = safe_sqrt(F(h * (2.f - h)));
   const auto [s, c] = sincos_2pi(v);
   return {r * c, r * s, 1.f - h};

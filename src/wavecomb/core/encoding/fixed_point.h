@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Fixed-point numbers, whose sums do not depend on order.
+/// Fixed-point numbers, whose sums do not depend on the order of addition.
 #pragma once
 
 #include <cmath>
@@ -14,8 +14,8 @@ struct FixedPoint {
   /// Largest magnitude of a value, in units, so that a sum of 2^21 values cannot overflow.
   static constexpr int64_t kMax = int64_t{1} << 41;
 
-  /// Converts to the nearest multiple, ties to even. Magnitudes above kMax are clamped; NaN
-  /// becomes 0.
+  /// Converts a real number to the nearest fixed-point number, ties to even. Magnitudes above kMax
+  /// are clamped; NaN becomes 0.
   int64_t from(float x) const {
     const double units = std::ldexp(double{x}, -exponent);
     constexpr auto most = static_cast<double>(kMax);

@@ -17,14 +17,15 @@ inline U hash_u32(U x) {
   return x;
 }
 
-/// Hashes two words; the second may be the same in all lanes. Bijective in either argument for a
-/// fixed other one, so that no two pixels share random numbers for a given seed.
+/// Hashes two 32-bit words, of which the second may be the same in all lanes. The hash is bijective
+/// in either argument while the other is fixed, so that no two pixels share random numbers for a
+/// given seed.
 template <typename U>
 inline U hash_u32(const U& a, const std::type_identity_t<U>& b) {
   return hash_u32<U>(hash_u32<U>(a) + b * 0x9e3779b9u);
 }
 
-/// Converts the top 24 bits to a float in [0, 1).
+/// Converts the top 24 bits of a hash to a float in [0, 1).
 template <typename F>
 inline F unit_float(const UInt<F>& x) {
   return F(Int<F>(x >> 8)) * 0x1p-24f;

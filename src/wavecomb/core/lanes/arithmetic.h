@@ -168,7 +168,7 @@ template <typename M>
 inline uint32_t mask_bits(const M& m) {
   if constexpr (requires { m.k; }) {
     return static_cast<uint32_t>(m.k) & ((1u << M::Size) - 1u);
-  } else if constexpr (requires { m.a1; }) {  // consists of two halves
+  } else if constexpr (requires { m.a1; }) {  // the packet consists of two halves
     return mask_bits(m.a1) | (mask_bits(m.a2) << M::Size1);
   } else {
 #if defined(__aarch64__)

@@ -46,7 +46,7 @@ struct InMemory {
   explicit InMemory(const T& lanes) { store(value, lanes); }
 };
 
-/// Loads words at base + 4 * index, where the index may have 64 bits.
+/// Loads 32-bit words at the addresses base + 4 * index, where the index may have 64 bits.
 template <typename T, typename Index, typename M>
 inline T gather_words(const void* base, const Index& index, const M& active) {
 #if defined(__AVX2__)
@@ -70,7 +70,7 @@ inline T gather_words(const void* base, const Index& index, const M& active) {
 }  // namespace detail
 
 /// Loads base[index] in each active lane; other lanes get 0. `T` is a float or uint lane type.
-/// Indices of active lanes must be below 2^31.
+/// The indices of active lanes must be below 2^31.
 template <typename T>
 inline T gather(const void* base, const UInt<T>& index, const Mask<T>& active) {
   if constexpr (kIsScalar<T>)
@@ -194,7 +194,7 @@ template <typename U>
 inline U reverse_bits(U x) {
 #if defined(__AVX512BW__) && defined(__GFNI__)
   if constexpr (kWidth<U> == 16) {
-    // Reverses the bits of each byte by a matrix product over GF(2), then the order of bytes.
+    // Reverses the bits of each byte by a matrix product over GF(2), then the order of the bytes.
     const __m512i matrix = _mm512_set1_epi64(static_cast<long long>(0x8040201008040201ull));
     const __m512i order =
         _mm512_broadcast_i32x4(_mm_setr_epi8(3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12));

@@ -11,10 +11,11 @@
 #include <cstring>
 #include <type_traits>
 
-/// For kernels that are called once or twice per packet. Inlining keeps kernel results in registers
-/// and removes unused ones; compilers alone would refuse because the caller is large.
+/// Forces inlining of kernels that are called once or twice per packet. Inlining keeps the results
+/// of kernels in registers and removes unused results. Compilers do not inline them on their own,
+/// because the caller is large.
 #define WAVECOMB_INLINE inline __attribute__((always_inline))
-/// For lambdas that must be inlined.
+/// Forces inlining of a lambda.
 #define WAVECOMB_INLINE_LAMBDA __attribute__((always_inline))
 
 namespace wavecomb {
@@ -66,8 +67,9 @@ inline constexpr bool kIsScalar = kWidth<T> == 1;
 template <typename F>
 using UInt64 = typename detail::Width<F>::U64;
 
-/// Types of lane values. Argument-dependent lookup also finds Dr.Jit's functions of the same name.
-/// Those are unconstrained, so this constraint makes the functions here the better match.
+/// Types of lane values. Argument-dependent lookup finds Dr.Jit's functions of the same name, in
+/// addition to the functions here. Dr.Jit's functions have no constraint, so this constraint makes
+/// the functions here the better match.
 template <typename T>
 concept LaneValue = std::is_arithmetic_v<T> || drjit::is_array_v<T>;
 
@@ -76,10 +78,10 @@ using drjit::select;
 /// Dr.Jit divides a packet by a number by multiplying with its reciprocal, which differs in the
 /// last bit from scalar division. Divide by a packet instead: `x / F(number)`.
 template <template <typename, size_t> typename P, typename T, size_t W, typename Number>
-  requires std::is_floating_point_v<T> && std::is_arithmetic_v<Number>
+requires std::is_floating_point_v<T> && std::is_arithmetic_v<Number>
 void operator/(const P<T, W>&, const Number&) = delete;
 template <template <typename, size_t> typename P, typename T, size_t W, typename Number>
-  requires std::is_floating_point_v<T> && std::is_arithmetic_v<Number>
+requires std::is_floating_point_v<T> && std::is_arithmetic_v<Number>
 void operator/=(P<T, W>&, const Number&) = delete;
 
 #if defined(__AVX512F__)
@@ -94,7 +96,7 @@ using U16Mask = drjit::mask_t<U16>;
     return detail::U16Mask::from_k(_mm512_cmp_epu32_mask(a.m, b.m, predicate));    \
   }                                                                                \
   template <typename T>                                                            \
-    requires std::is_integral_v<T>                                                 \
+  requires std::is_integral_v<T>                                                   \
   inline detail::U16Mask operator op(const detail::U16& a, const T& b) {           \
     return a op detail::U16(static_cast<uint32_t>(b));                             \
   }

@@ -5,9 +5,10 @@
 /// state of a camera path before these events to the set of matched expressions. A light path
 /// carries the index of f. An event x that precedes the others on the camera side changes f to
 ///   f'(q) = f(next(q, x)).
-/// The reachable functions, starting from those of all ends, form the minimal automaton of the
-/// reversed expressions (J. Brzozowski, "Canonical regular expressions and minimal state graphs for
-/// definite events", 1962).
+/// The functions that are reachable from the functions of all ends form the minimal automaton of
+/// the reversed expressions (J. Brzozowski, "Canonical regular expressions and minimal state graphs
+/// for definite events", 1962). Brzozowski, "Canonical regular expressions and minimal state graphs
+/// for definite events", 1962).
 #pragma once
 
 #include <cstdint>
@@ -24,11 +25,11 @@ struct BackwardAutomaton {
   static constexpr uint32_t kMaxStates = PathAutomaton::kMaxStates;
 
   BackwardAutomaton() = default;
-  /// Throws Error if there would be more than kMaxStates states.
+  /// Throws Error if the automaton would have more than kMaxStates states.
   explicit BackwardAutomaton(const PathAutomaton& forward);
 
   uint32_t forward_states = 0;
-  std::vector<uint32_t> begin;    ///< [end]: initial state of a light path that starts there
+  std::vector<uint32_t> begin;    ///< [end]: initial state of a light path that starts at this end
   std::vector<uint32_t> next;     ///< [state][event], PathAutomaton::kNextWords per state
   std::vector<uint32_t> matched;  ///< [state][forward state]: one bit per expression
   uint32_t states() const { return static_cast<uint32_t>(next.size() / PathAutomaton::kNextWords); }

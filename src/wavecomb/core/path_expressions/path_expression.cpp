@@ -34,7 +34,7 @@ class PathNfa {
         if (edge.symbols.test(symbol)) to.push_back(edge.to);
     return closed(std::move(to));
   }
-  /// Returns one bit per expression that ends in one of the states.
+  /// Returns a bit set of the expressions that end in one of the states.
   uint32_t matched(const StateSet& states) const {
     uint32_t bits = 0;
     for (size_t e = 0; e < finals_.size(); ++e)
@@ -56,8 +56,8 @@ class PathNfa {
     free_.emplace_back();
     return static_cast<uint32_t>(edges_.size() - 1);
   }
-  /// Adds a pattern that starts at `from`, which must have no incoming edges from the pattern.
-  /// Returns the end state of the pattern.
+  /// Adds the states of a pattern that starts at state `from`, which must have no incoming edges
+  /// from the pattern. Returns the end state of the pattern.
   uint32_t add(const PathPattern& p, uint32_t from) {
     using Kind = PathPattern::Kind;
     if (p.kind == Kind::kSequence) {
@@ -112,7 +112,8 @@ struct PathStateRow {
   auto operator<=>(const PathStateRow&) const = default;
 };
 
-/// Subset construction: returns the reachable deterministic states; the first is after the camera.
+/// Subset construction: returns the reachable deterministic states; the first one is the state
+/// after the camera event.
 std::vector<PathStateRow> reached_rows(const PathNfa& nfa, uint32_t ends) {
   std::map<StateSet, uint32_t> numbers;
   std::vector<StateSet> sets;

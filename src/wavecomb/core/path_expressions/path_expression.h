@@ -31,7 +31,7 @@ enum class PathEvent : uint32_t {
   kSubsurface = 7
 };
 inline constexpr uint32_t kPathEvents = 8;
-/// Offsets to add to a reflection or transmission.
+/// Offsets that select the lobe when added to PathEvent::kReflection or kTransmission.
 inline constexpr uint32_t kDiffuseEvent = 0, kGlossyEvent = 1, kSingularEvent = 2;
 
 /// Emitter at the end of a path: a light, a dome light, or an emissive object or volume.
@@ -44,7 +44,7 @@ constexpr uint32_t path_end(PathEnd end, uint32_t key) {
 
 /// Minimal deterministic automaton that evaluates all expressions of a render at once.
 ///
-/// Contract: immutable. State 0 is that of a path that has just left the camera.
+/// Contract: immutable. State 0 is the state of a path that has just left the camera.
 struct PathAutomaton {
   static constexpr uint32_t kMaxExpressions = 32;
   static constexpr uint32_t kMaxStates = 1024;
@@ -63,8 +63,8 @@ struct PathAutomaton {
   uint32_t states() const { return static_cast<uint32_t>(next.size() / kNextWords); }
 };
 
-/// Throws Error, one line that gives the position, if a text is not a valid expression, or if a
-/// layer name is invalid or repeated. Light group keys are not checked.
+/// Throws Error with a one-line message that gives the position if a text is not a valid
+/// expression, or if a layer name is invalid or repeated. The check ignores light group keys.
 void check_expressions(std::span<const NamedExpression> expressions);
 
 }  // namespace wavecomb

@@ -12,7 +12,8 @@ namespace {
 constexpr uint32_t kMaxRepeats = 64;
 constexpr uint32_t kMaxNesting = 64;
 
-/// Returns the symbols that a letter matches, alone or at its position in <>.
+/// Returns the symbols that a letter of a light path expression matches, alone or at its position
+/// in <>.
 PathSymbols symbols_of_letter(char letter) {
   PathSymbols s;
   const auto events = [&](std::initializer_list<uint32_t> numbers) {
@@ -203,7 +204,7 @@ class ExpressionParser {
     return is_negated ? ~s : s;
   }
 
-  /// Parses the part after '<': type of event, type of scattering, and light group.
+  /// Parses the part of an event after '<': type of event, type of scattering, and light group.
   PathSymbols event() {
     PathSymbols s = parse_position(".CLOBERTVW");
     // Ends of paths have no scattering type, so <L.> equals L.

@@ -24,11 +24,11 @@ struct PathPattern {
   Kind kind = Kind::kSequence;
   PathSymbols symbols{};
   std::vector<PathPattern> parts{};
-  uint32_t least = 1, most = 1;  ///< repetition counts, for kRepeat
+  uint32_t least = 1, most = 1;  ///< repetition counts of the part, for kRepeat
 };
 
 /// Parses an expression. `keys`: names of the light groups by index; null accepts any name. Throws
-/// Error that gives the position.
+/// Error that gives the position of the mistake in the text.
 PathPattern parse_expression(const NamedExpression& expression,
                              const std::span<const std::string>* keys);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Rows with named fields. A row is a struct template on the float type: Row<float> is the memory
-/// layout, and Row<packet> holds one row per lane. Its fields are listed once; loads, stores and
-/// field offsets follow from the list.
+/// layout, and Row<packet> holds one row per lane. WAVECOMB_FIELDS lists the fields of a row, and
+/// loads, stores and field offsets follow from the list.
 ///
 ///   template <typename F>
 ///   struct Ray {
@@ -38,7 +38,9 @@ namespace wavecomb {
 namespace detail {
 
 template <typename T>
-concept HasFields = requires(T& t) { t.fields(); };
+concept HasFields = requires(T& t) {
+  t.fields();
+};
 
 template <typename T>
 struct WordsOf;
@@ -67,7 +69,7 @@ struct WordsOf<Vec3<F>> {
   static constexpr size_t value = 3;
 };
 
-/// Converts a field to the word type of loads and stores, and back.
+/// Converts a field of a row to the word type of loads and stores, and back.
 template <typename F, typename T>
 WAVECOMB_INLINE F to_word(const T& field) {
   if constexpr (std::is_same_v<T, F>)
@@ -114,14 +116,14 @@ WAVECOMB_INLINE void for_each_word(T& value, const One& one) {
 /// Number of words in the fields of a row.
 template <template <typename> class Row>
 inline constexpr size_t kFieldWords = detail::WordsOf<Row<float>>::value;
-/// Distance between rows in words.
+/// Distance between the starts of two consecutive rows, in 32-bit words.
 template <template <typename> class Row>
 inline constexpr size_t kRowWords = std::bit_ceil(kFieldWords<Row>);
 
 /// Returns the word index of a member in a row or record: word_of(&Row<float>::slot). Compilers
-/// reduce the function to a constant.
+/// reduce word_of() to a constant.
 template <typename Record, typename Member>
-WAVECOMB_INLINE uint32_t word_of(Member Record::* member) {
+WAVECOMB_INLINE uint32_t word_of(Member Record::*member) {
   static_assert(std::is_trivially_copyable_v<Record>);
   static constexpr Record kRecord{};
   const auto address = [](const auto& of) { return reinterpret_cast<const std::byte*>(&of); };
@@ -165,7 +167,8 @@ inline constexpr bool kIsHead =
                    decltype(std::declval<Row<float>&>().fields())>::value;
 
 /// Loads the leading fields Head of row `index` in an array of rows at `base`, for each active
-/// lane; other lanes get 0. Reads only these fields, rounded up to a power of two words.
+/// lane; other lanes get 0. Reads only the words of the fields in Head, rounded up to a power of
+/// two.
 template <template <typename> class Head, template <typename> class Row, typename F>
 WAVECOMB_INLINE Head<F> load_head(const void* base, const UInt<F>& index, const Mask<F>& active) {
   static_assert(sizeof(Head<float>) == 4 * kFieldWords<Head>, "WAVECOMB_FIELDS lists all fields");
@@ -185,7 +188,7 @@ WAVECOMB_INLINE Row<F> load_row(const void* base, const UInt<F>& index, const Ma
   return load_head<Row, Row, F>(base, index, active);
 }
 
-/// Stores rows at the indices of the active lanes, which must be distinct.
+/// Stores one row per active lane at the index of the lane; the indices must be distinct.
 template <template <typename> class Row, typename F>
 WAVECOMB_INLINE void store_row(void* base, const UInt<F>& index, const Row<F>& row,
                                const Mask<F>& active) {
@@ -193,7 +196,7 @@ WAVECOMB_INLINE void store_row(void* base, const UInt<F>& index, const Row<F>& r
   store_rows<kWords, F>(base, index * kWords, words_of_row<Row, F>(row), active);
 }
 
-/// Stores the rows of the active lanes contiguously at `to`; returns their number.
+/// Stores the rows of the active lanes contiguously at `to`, and returns the number of rows.
 template <template <typename> class Row, typename F>
 WAVECOMB_INLINE uint32_t compress_row(float* to, const Row<F>& row, const Mask<F>& active) {
   return compress_rows<kRowWords<Row>, F>(to, words_of_row<Row, F>(row), active);
@@ -202,23 +205,23 @@ WAVECOMB_INLINE uint32_t compress_row(float* to, const Row<F>& row, const Mask<F
 /// Loads one field of row `index` at `base` for each active lane; other lanes get 0. Use load_row()
 /// if most fields are needed, since whole rows are faster.
 template <typename F, template <typename> class Row>
-WAVECOMB_INLINE F gather_field(const void* base, float Row<float>::* field, const UInt<F>& index,
+WAVECOMB_INLINE F gather_field(const void* base, float Row<float>::*field, const UInt<F>& index,
                                const Mask<F>& active) {
   return gather<F>(base, index * static_cast<uint32_t>(kRowWords<Row>) + word_of(field), active);
 }
 template <typename F, template <typename> class Row>
-WAVECOMB_INLINE UInt<F> gather_field(const void* base, uint32_t Row<float>::* field,
+WAVECOMB_INLINE UInt<F> gather_field(const void* base, uint32_t Row<float>::*field,
                                      const UInt<F>& index, const Mask<F>& active) {
   return gather<UInt<F>>(base, index * static_cast<uint32_t>(kRowWords<Row>) + word_of(field),
                          Mask<UInt<F>>(active));
 }
 template <typename F, template <typename> class Row>
-WAVECOMB_INLINE void scatter_field(void* base, float Row<float>::* field, const UInt<F>& index,
+WAVECOMB_INLINE void scatter_field(void* base, float Row<float>::*field, const UInt<F>& index,
                                    const F& value, const Mask<F>& active) {
   scatter<F>(base, value, index * static_cast<uint32_t>(kRowWords<Row>) + word_of(field), active);
 }
 template <typename F, template <typename> class Row>
-WAVECOMB_INLINE void scatter_field(void* base, uint32_t Row<float>::* field, const UInt<F>& index,
+WAVECOMB_INLINE void scatter_field(void* base, uint32_t Row<float>::*field, const UInt<F>& index,
                                    const UInt<F>& value, const Mask<F>& active) {
   scatter<UInt<F>>(base, value, index * static_cast<uint32_t>(kRowWords<Row>) + word_of(field),
                    Mask<UInt<F>>(active));
@@ -226,13 +229,13 @@ WAVECOMB_INLINE void scatter_field(void* base, uint32_t Row<float>::* field, con
 
 /// Loads a member of record `index` at `base` for each active lane; other lanes get 0.
 template <typename F, typename Record>
-WAVECOMB_INLINE UInt<F> gather_member(const Record* base, uint32_t Record::* member,
+WAVECOMB_INLINE UInt<F> gather_member(const Record* base, uint32_t Record::*member,
                                       const UInt<F>& index, const Mask<F>& active) {
   constexpr auto kWords = static_cast<uint32_t>(sizeof(Record) / 4);
   return gather<UInt<F>>(base, index * kWords + word_of(member), Mask<UInt<F>>(active));
 }
 template <typename F, typename Record>
-WAVECOMB_INLINE F gather_member(const Record* base, float Record::* member, const UInt<F>& index,
+WAVECOMB_INLINE F gather_member(const Record* base, float Record::*member, const UInt<F>& index,
                                 const Mask<F>& active) {
   constexpr auto kWords = static_cast<uint32_t>(sizeof(Record) / 4);
   return gather<F>(base, index * kWords + word_of(member), active);
@@ -247,7 +250,7 @@ WAVECOMB_INLINE Vec3<F> gather_member(const Record* base, float (Record::*member
           gather<F>(base, first + 2u, active)};
 }
 
-/// Stores a head in SoA layout: word k of all lanes goes to columns[k] + at.
+/// Stores the leading fields of rows in SoA layout: word k of all lanes goes to columns[k] + at.
 template <template <typename> class Head, typename F, size_t C>
 WAVECOMB_INLINE void store_columns(const Head<F>& head, float* const (&columns)[C], size_t at) {
   static_assert(C == kFieldWords<Head>);

@@ -14,7 +14,7 @@
 
 namespace wavecomb::detail {
 
-/// Accessor for the members of a record in each lane. Inactive lanes get 0 or the values of other
+/// Accessor for the members of a record in each lane. Inactive lanes read 0 or the values of other
 /// lanes.
 template <typename F>
 struct RecordReader {
@@ -25,11 +25,11 @@ struct RecordReader {
 
   /// Reads a member of the record: reader[&MaterialRecord::roughness].
   template <typename Record>
-  F operator[](float Record::* member) const {
+  F operator[](float Record::*member) const {
     return word<F, float>(word_of(member));
   }
   template <typename Record>
-  UInt<F> operator[](uint32_t Record::* member) const {
+  UInt<F> operator[](uint32_t Record::*member) const {
     return word<UInt<F>, uint32_t>(word_of(member));
   }
   template <typename Record>
@@ -37,12 +37,12 @@ struct RecordReader {
     const uint32_t first = word_of(member);
     return {word<F, float>(first), word<F, float>(first + 1), word<F, float>(first + 2)};
   }
-  /// Reads element `i` of an array member.
+  /// Reads element `i` of an array member of the record.
   template <typename Record, size_t N>
   F at(float (Record::*member)[N], size_t i) const {
     return word<F, float>(word_of(member) + static_cast<uint32_t>(i));
   }
-  /// Reads the fields of a row with which the record begins.
+  /// Reads the row that is stored at the start of the record.
   template <template <typename> class Row>
   Row<F> row() const {
     Row<F> row;
@@ -63,14 +63,14 @@ struct RecordReader {
       return T(value);
     }
     if constexpr (kIsScalar<F>)
-      return T(0);  // inactive, since an active scalar always has a shared record
+      return T(0);  // a scalar lane without a shared record is inactive
     else
       return gather<T>(base, first_word + at, Mask<T>(active));
   }
 };
 
-/// Returns a reader of record `index` in the array at `base`. `uniform`: the indices of all active
-/// lanes are known to be equal.
+/// Returns a reader of record `index` in the array at `base`. Pass `uniform` = true if the indices
+/// of all active lanes are known to be equal.
 template <typename Record, typename F>
 inline RecordReader<F> make_reader(const Record* base, const UInt<F>& index, bool uniform,
                                    const Mask<F>& active) {

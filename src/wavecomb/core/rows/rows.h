@@ -2,9 +2,9 @@
 /// Loads and stores of rows: each lane has a row of N consecutive words, and lane i of value k is
 /// word k of lane i's row.
 ///
-/// A gather or scatter accesses memory once per lane and word. These functions access whole rows
-/// and transpose them in registers: 16 rows of 16 words take a fifth of the time of 16 gathers
-/// (docs/decisions/path-rows.md).
+/// A gather or scatter instruction accesses memory once per lane and word. The functions of this
+/// file access whole rows and transpose the rows in registers: loading 16 rows of 16 words this way
+/// takes a fifth of the time of 16 gathers (docs/decisions/path-rows.md).
 #pragma once
 
 #include <array>
@@ -25,13 +25,14 @@ struct VectorOf {
 template <size_t W>
 using Vector = typename VectorOf<W>::type;
 
-/// Calls f(i) for i < N with i as a compile-time constant. Arrays that are indexed only by such
-/// constants become registers and are never stored.
+/// Calls f(i) for i < N with i as a compile-time constant. Arrays that are indexed only by
+/// compile-time constants become registers and are never stored in memory.
 template <size_t N, typename Function>
 WAVECOMB_INLINE void unrolled(const Function& f) {
   [&]<size_t... I>(std::index_sequence<I...>) WAVECOMB_INLINE_LAMBDA {
     (f(std::integral_constant<size_t, I>()), ...);
-  }(std::make_index_sequence<N>());
+  }
+  (std::make_index_sequence<N>());
 }
 
 /// One step of a transposition: swaps blocks of S words between `a` and `b`.
@@ -57,8 +58,8 @@ WAVECOMB_INLINE void transpose_blocks(std::array<Vector<W>, N>& r) {
 template <size_t N>
 inline constexpr size_t kRowBlock = std::bit_ceil(N);
 
-/// Loads N <= B words at p into a register of B words and zeroes the rest. Reads only these N
-/// words.
+/// Loads N <= B words at p into a register of B words and zeroes the rest. Reads only the N words
+/// at p.
 template <size_t N, size_t B>
 WAVECOMB_INLINE Vector<B> load_words(const float* p) {
   if constexpr (N == B) {
@@ -90,7 +91,8 @@ template <size_t B, size_t W>
 WAVECOMB_INLINE Vector<W> join(const Vector<B>* parts) {
   if constexpr (B == W) return parts[0];
 #if defined(__AVX__)
-  else if constexpr (B == 4 && W == 8)  // without this, compilers move both parts needlessly
+  // Without this special case, compilers move both halves of the vector needlessly.
+  else if constexpr (B == 4 && W == 8)
     return std::bit_cast<Vector<8>>(
         _mm256_set_m128(std::bit_cast<__m128>(parts[1]), std::bit_cast<__m128>(parts[0])));
 #endif
@@ -98,7 +100,7 @@ WAVECOMB_INLINE Vector<W> join(const Vector<B>* parts) {
     return join_two<W / 2>(join<B, W / 2>(parts), join<B, W / 2>(parts + W / B / 2),
                            std::make_index_sequence<W>());
 }
-/// Returns words Start .. Returns elements Start to Start + sizeof...(I) - 1 of a vector.
+/// Returns words Start .. Returns sizeof...(I) elements of a vector, from element Start on.
 template <size_t Start, size_t W, size_t... I>
 WAVECOMB_INLINE Vector<sizeof...(I)> part(const Vector<W>& v, std::index_sequence<I...>) {
   return __builtin_shufflevector(v, v, (Start + I)...);
@@ -112,7 +114,9 @@ WAVECOMB_INLINE void store_parts(const Vector<W>& v, float* const* at) {
 }
 
 template <typename F>
-concept InOneRegister = !kIsScalar<F> && !requires(const F& f) { f.a1; };
+concept InOneRegister = !kIsScalar<F> && !requires(const F& f) {
+  f.a1;
+};
 
 /// Loads N words at each lane's address.
 template <size_t N, typename F>
@@ -136,7 +140,7 @@ WAVECOMB_INLINE std::array<F, N> rows_at(const float* const* at) {
     transpose_blocks<B, W>(r);
     unrolled<N>([&](auto k)
                     WAVECOMB_INLINE_LAMBDA { out[k].m = std::bit_cast<decltype(F::m)>(r[k]); });
-  } else {  // rows longer than a register are loaded W columns at a time
+  } else {  // loads rows that are longer than a register W columns at a time
     static_assert(N % W == 0);
     unrolled<N / W>([&](auto block) WAVECOMB_INLINE_LAMBDA {
       constexpr size_t c = block * W;
@@ -183,13 +187,13 @@ WAVECOMB_INLINE void rows_to(float* const* at, const std::array<F, N>& values) {
   }
 }
 
-/// Zeros that inactive lanes read.
+/// Memory of zeros that inactive lanes read.
 alignas(64) inline constexpr float kNoRow[16] = {};
 
 }  // namespace detail
 
 /// Loads words [word, word + N) of the array at `base` for each active lane; other lanes get 0. N
-/// is 2 to 16. Reads only these words.
+/// is 2 to 16. Reads only the words [word, word + N) of each row.
 template <size_t N, typename F>
 WAVECOMB_INLINE std::array<F, N> load_rows(const void* base, const UInt<F>& word,
                                            const Mask<F>& active) {
@@ -236,7 +240,8 @@ WAVECOMB_INLINE std::array<F, N> load_all_rows_of(const Array& array, const UInt
   return detail::rows_at<N, F>(at);
 }
 
-/// Stores the rows of the active lanes, which must be distinct. N is a power of two.
+/// Stores the row of each active lane; the lanes must have distinct rows. The row length N must be
+/// a power of two.
 template <size_t N, typename F>
 WAVECOMB_INLINE void store_rows(void* base, const UInt<F>& word, const std::array<F, N>& values,
                                 const Mask<F>& active) {
@@ -252,7 +257,7 @@ WAVECOMB_INLINE void store_rows(void* base, const UInt<F>& word, const std::arra
   detail::rows_to<N, F>(at, values);
 }
 
-/// Stores the rows of the active lanes contiguously at `to`; returns their number.
+/// Stores the rows of the active lanes contiguously at `to`, and returns the number of rows.
 template <size_t N, typename F>
 WAVECOMB_INLINE uint32_t compress_rows(float* to, const std::array<F, N>& values,
                                        const Mask<F>& active) {

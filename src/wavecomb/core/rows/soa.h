@@ -14,7 +14,8 @@ namespace wavecomb {
 /// bytes and padded, so that a packet may be read or written at any index below the capacity.
 class SoaBlock {
  public:
-  static constexpr size_t kPad = 16;  ///< The padding past the capacity, in values.
+  /// Number of values of padding past the capacity of a column.
+  static constexpr size_t kPad = 16;
 
   SoaBlock() = default;
   SoaBlock(size_t columns, size_t capacity)
@@ -23,7 +24,8 @@ class SoaBlock {
         data_(static_cast<uint32_t*>(std::aligned_alloc(64, columns * stride_ * 4))),
         bytes_(columns * stride_ * 4) {
     if (!data_) throw std::bad_alloc();
-    for (size_t i = 0; i < columns * stride_; ++i) data_.get()[i] = 0;  // first touch by the owner
+    // The owner writes the memory first, so that it lies on the owner's NUMA node.
+    for (size_t i = 0; i < columns * stride_; ++i) data_.get()[i] = 0;
   }
 
   float* floats(size_t column) const {

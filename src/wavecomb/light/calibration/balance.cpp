@@ -8,8 +8,8 @@ namespace wavecomb {
 namespace {
 
 constexpr double kStep = 0x1p-20;  ///< resolution of sums
-/// Lower limit of probabilities in sums. Terms are then at most 2^24, and a sum of 2^19 of them
-/// fits in 64 bits.
+/// Lower limit of probabilities in sums. With this limit, terms are at most 2^24, and a sum of 2^19
+/// terms fits in 64 bits.
 constexpr double kMinShare = 0x1p-8;
 constexpr double kMaxMean = 64;  ///< limit of |N - M|
 constexpr int kIterations = 24;

@@ -31,9 +31,10 @@ struct LightParts {
   uint32_t of(uint32_t light) const;
 };
 
-/// Largest number of lights that are calibrated when selected by power. Each needs 8 bytes in
-/// addition to its 64, and about 30 more during calibration. Each light keeps at least one of the
-/// 2^24 random values, which leaves at least half of the values to distribute.
+/// Largest number of lights that are calibrated when selected by power. Each calibrated light needs
+/// 8 bytes in addition to its 64 bytes, and about 30 bytes more during calibration. Each light
+/// keeps at least one of the 2^24 random values, which leaves at least half of the values to
+/// distribute.
 inline constexpr size_t kMaxCalibratedLights = size_t{1} << 23;
 
 /// Divides the lights of a scene for selection by tree or by power. Returns no parts if there is
@@ -59,7 +60,7 @@ struct CalibratedLights {
   uint32_t tree_numbers = 0;
   std::vector<LightTreeNode> nodes;  ///< empty if the nodes of the tree remain
 
-  /// Replaces the tables of `view`. Contract: the view then points into this object.
+  /// Replaces the tables of `view`. Contract: afterwards the view points into this object.
   void apply(LightView& view) const;
 };
 
@@ -68,7 +69,8 @@ struct CalibratedLights {
 /// Contract: the arguments of the constructor outlive it.
 class LightTableBuilder {
  public:
-  /// `tree` is the tree of the set. It needs nodes only if tilts are passed to build_tables().
+  /// `tree` is the tree of the set. The tree needs nodes only if tilts are passed to
+  /// build_tables().
   LightTableBuilder(const LightSet& set, const LightTree& tree, const LightParts& parts);
 
   /// Builds tables in which part i has the selection probability shares[i] (> 0, sum 1), up to

@@ -140,8 +140,8 @@ Cells cell_means(const TextureView& texture, const Vec3<float>& color, uint32_t 
   return cells;
 }
 
-/// Makes the density of cells times `part(y)`, the measure of a row. The width is 0 if all cells
-/// are black.
+/// Makes the density of cells times `part(y)`, the measure of a row. The width of the density is 0
+/// if all cells are black.
 template <typename Part>
 Distribution2D make_distribution(const Cells& cells, const Part& part) {
   using Line = Distribution2D::Line;

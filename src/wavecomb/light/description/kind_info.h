@@ -47,12 +47,13 @@ struct LightKindInfo {
   std::vector<const char*> parameters;
   /// Rows of parameters specific to this kind, made by specific_parameter.
   std::vector<LightParameter> own;
-  /// Sets position, area, radiance and power. Null if the records are made elsewhere.
+  /// Sets position, area, radiance and power. The function is null if the records of the kind are
+  /// made elsewhere.
   void (*make)(LightBuild&, const Light&, LightBuildContext&) = nullptr;
   /// Sets bounds for the light tree, which are initialized to `light.p` and the intensity power /
-  /// pi. Null if the light tree does not contain the kind.
+  /// pi. The function is null if the light tree does not contain the kind.
   void (*bound)(LightCluster&, const LightRecord& light, double power) = nullptr;
-  /// Returns the shape of a record. Null if rays cannot hit this kind.
+  /// Returns the shape of a record. The function is null if rays cannot hit this kind of light.
   LightShape (*shape)(const LightRecord&) = nullptr;
   /// For LightShape::kCustom: a slightly enlarged bounding box, and the distance to the hit along d
   /// in units of |d|, or 0 if there is none ahead. `o` is relative to light.p. Tests one ray at a

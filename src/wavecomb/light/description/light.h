@@ -31,9 +31,10 @@ inline constexpr uint32_t kNoSet = 0xffffffffu;
 
 /// UsdLuxShapingAPI: dependence of the emission on direction. The axis of the light is its -z.
 struct Shaping {
-  float focus = 0;  ///< exponent of the cosine to the axis; 0 or less: no focus
+  float focus = 0;  ///< exponent of the cosine between emission and axis; 0 or less means no focus
   Vec3<float> focus_tint{0, 0, 0};
-  float cone_angle = 180;     ///< degrees from the axis; 180 or more: no cone
+  /// Half angle of the emission cone in degrees; 180 or more means no cone.
+  float cone_angle = 180;
   float cone_softness = 0;    ///< fraction of the cone over which emission falls to 0
   uint32_t ies = kNoIes;      ///< profile id of SceneBuilder::add_ies
   float ies_angle_scale = 0;  ///< scale of vertical angles as defined by UsdLux; 0 means no scaling

@@ -51,11 +51,12 @@ struct LightSet {
   std::vector<LightRecord> records;
   uint32_t record_count = 0;  ///< number of records without those of mesh lights
   std::vector<TriangleLight> triangles;
-  std::vector<TriangleUvs> triangle_uvs;  ///< of triangles whose emission or opacity varies
-  std::vector<uint32_t> mesh_lights;      ///< LightView::mesh_lights
-  std::vector<uint32_t> power_bins;       ///< empty if only the light tree is used for selection
-  PowerTable power_table;                 ///< without its pointer
-  LightTree tree;                         ///< an outline without nodes if the tree is built later
+  /// Texture coordinates of the triangles whose emission or opacity varies.
+  std::vector<TriangleUvs> triangle_uvs;
+  std::vector<uint32_t> mesh_lights;  ///< LightView::mesh_lights
+  std::vector<uint32_t> power_bins;   ///< empty if only the light tree is used for selection
+  PowerTable power_table;             ///< without its pointer
+  LightTree tree;                     ///< an outline without nodes if the tree is built later
   std::vector<double> powers;  ///< powers of all lights in W, kept if the tree is built later
   std::vector<Distribution2D> distributions;
   std::vector<LightRecord> portals;
@@ -102,7 +103,7 @@ using TriangleSource = std::function<EmissiveTriangle(size_t i)>;
 
 /// Lights of a scene, and how to build their sampling structures.
 struct LightInputs {
-  std::span<const Light> lights = {};  ///< each has passed check_light
+  std::span<const Light> lights = {};  ///< lights, each of which has passed check_light
   size_t triangle_count = 0;
   TriangleSource triangle = {};  ///< may be empty without triangles
   /// Radius of the scene's bounding sphere; 0 or less counts as 1. The power of an infinite light
@@ -113,11 +114,12 @@ struct LightInputs {
   /// match; may be null.
   const LightSet* before = nullptr;
   std::span<const IesProfile> profiles = {};
-  std::span<const MeshLightInstance> mesh_lights = {};  ///< each has passed check_mesh_light
+  /// Mesh lights, each of which has passed check_mesh_light.
+  std::span<const MeshLightInstance> mesh_lights = {};
   /// For more lights, no table for selection by power is built.
   size_t max_power_lights = kMaxPowerLights;
-  /// The light tree takes as much memory as everything else together. With kWhenChosen it is built
-  /// only if LightSelection::kAuto selects by tree.
+  /// The light tree takes as much memory as everything else together. With kWhenChosen the light
+  /// tree is built only if LightSelection::kAuto selects by tree.
   TreeTime tree_time = TreeTime::kNow;
   std::span<const LightFilter> filters = {};
 };

@@ -45,7 +45,7 @@ struct alignas(64) LightRecord {
   /// sampling could have made contribute nothing. Set for lights whose shape rays cannot hit, and
   /// for lights whose shadows differ from those that bounce rays see.
   uint32_t sampled_only;
-  uint32_t hidden;  ///< 1: rays cannot hit its shape
+  uint32_t hidden;  ///< 1 means that rays cannot hit the shape of the light
   uint32_t light_link, shadow_link;
   uint32_t sync;     ///< MaterialSync of a mesh light
   uint32_t portals;  ///< portals of a dome: index into LightView::portal_groups, or kNoPortals
@@ -130,8 +130,8 @@ struct alignas(64) TriangleLight {
   float selection_pdf;  ///< probability of selection by power
   /// The emission and opacity of the material vary.
   static constexpr float kEmission = -1.f;
-  /// Only the opacity of the material varies. It scales the radiance of a mesh light that ignores
-  /// the material's emission.
+  /// Only the opacity of the material varies. The opacity scales the radiance of a mesh light that
+  /// ignores the material's emission.
   static constexpr float kOpacity = -2.f;
   bool varies() const { return radiance[0] < 0; }
 };
@@ -229,8 +229,8 @@ struct LightTreeView {
   float effective_lights = 0;
 };
 
-/// Packed light linking (light/description/linking.h); null if no light is linked. Null if no light
-/// is linked.
+/// Packed light linking (light/description/linking.h); null if no light is linked. The pointer is
+/// null if no light is linked.
 struct LinkView {
   const uint32_t* classes = nullptr;
   const uint32_t* members = nullptr;

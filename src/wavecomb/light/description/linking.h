@@ -38,7 +38,7 @@ struct SceneLinks {
   SceneLinks(const ObjectNames& names, std::span<const GeometrySet> sets);
 
   std::vector<uint32_t> classes;  ///< class of each object in the numbering of ObjectNames, from 1
-  std::vector<uint32_t> members;  ///< by class, one bit for each set
+  std::vector<uint32_t> members;  ///< for each class of objects, one bit for each set
   uint32_t words = 0;             ///< 32-bit words of `members` for each class
 
   LinkView view() const { return {classes.data(), members.data(), words}; }

@@ -42,7 +42,7 @@ bool invert_transposed(const Matrix& m, Matrix& out) {
 
 /// Computes the rotation closest to `to` times the inverse of `from`, by polar decomposition with
 /// Newton steps X <- (X + X^-T) / 2 (N. Higham, "Computing the Polar Decomposition", 1986). Returns
-/// false if there is none.
+/// false if no such rotation exists.
 bool rotation_between(const Affine& from, const Affine& to, Matrix& x) {
   Matrix a, b, inverse;
   set_linear(a, from);

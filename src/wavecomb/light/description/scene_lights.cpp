@@ -111,7 +111,7 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
     for (uint32_t mesh_id : group.meshes) {
       const Mesh& mesh = geometry.meshes[mesh_id];
       // Light sampling cannot aim at moving meshes, whose triangles depend on the time of the path.
-      // Paths that hit them find their emission.
+      // Only paths that hit a moving mesh find its emission.
       const bool moves = mesh.deforms() || (i > 0 && geometry.instances[i - 1].motion.moves());
       const Light* const light =
           mesh.mesh_light == kNoLight ? nullptr : &geometry.mesh_lights[mesh.mesh_light];

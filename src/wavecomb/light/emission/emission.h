@@ -5,7 +5,7 @@
 /// Two kinds of lights emit no light paths, and only camera paths find them: lights with properties
 /// that light paths do not support, such as links, multipliers, decay or motion
 /// (LightRecord::camera_only), and mesh lights, whose visible emission differs from the light they
-/// cast. Bodies are in emission.inl.
+/// cast. The function bodies are in emission.inl.
 #pragma once
 
 #include "wavecomb/light/sampling/light_sample.h"
@@ -48,7 +48,7 @@ Emission<F> sample_emission(const LightView& view, const EmissionNumbers<F>& r,
                             const Mask<F>& wanted);
 
 /// Returns Emission::density of a path from `light` that arrives at `from` along -dir over the
-/// distance t. Returns 0 if the light emits no paths.
+/// distance t. The density is 0 if the light emits no paths.
 template <typename F>
 F emission_density(const LightView& view, const UInt<F>& light, const Vec3<F>& from,
                    const Vec3<F>& dir, const F& t, const Mask<F>& wanted);

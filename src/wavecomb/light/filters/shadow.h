@@ -19,8 +19,8 @@ struct ShadowExtent {
   Color<F> color;
 };
 
-/// Returns the extent of the shadows of shadow record `shadow`. With kPlainShadow it is unlimited,
-/// and shadows are black.
+/// Returns the extent of the shadows of shadow record `shadow`. With kPlainShadow the extent is
+/// unlimited, and shadows are black.
 template <typename F>
 [[gnu::noinline]] ShadowExtent<F> shadow_extent(const LightView& view, const UInt<F>& shadow,
                                                 const F& u, const Mask<F>& active) {

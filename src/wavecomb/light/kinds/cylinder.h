@@ -12,8 +12,8 @@ namespace wavecomb::detail {
 /// hits the near side of the infinite cylinder at the perpendicular distance s(alpha). The visible
 /// part of the finite cylinder at alpha is an interval of sin(gamma). Directions that are uniform
 /// in alpha and, for a given alpha, uniform in sin(gamma) therefore have the density 1 / (2
-/// alpha_max (sin(gamma_1) - sin(gamma_0))). It would be uniform over the visible solid angle if
-/// that interval had the same size for all alpha.
+/// alpha_max (sin(gamma_1) - sin(gamma_0))). The density would be uniform over the visible solid
+/// angle if the interval of sin(gamma) had the same size for all alpha.
 template <typename F>
 struct CylinderFrame {
   Vec3<F> a, e, f;

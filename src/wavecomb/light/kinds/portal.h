@@ -39,8 +39,8 @@ class Portals {
     return select(total_ > 0.f, a, F(0.f));
   }
 
-  /// Samples directions through the portals, uniform in solid angle. Undefined if no portal is
-  /// visible.
+  /// Samples directions through the portals, uniform in solid angle. The result is undefined if no
+  /// portal is visible.
   Vec3<F> sample(const F& u, const F& v) const {
     Vec3<F> wi(F(0.f), F(0.f), F(1.f));
     const F u_scaled = u * total_;
@@ -68,7 +68,8 @@ class Portals {
           r.usable & (dz > 0.f) & (x >= r.x0) & (x <= r.x1) & (y >= r.y0) & (y <= r.y1);
       hits += select(inside, F(1.f), F(0.f));
     });
-    hits = select(through, max(hits, F(1.f)), hits);  // rounding may decide at an edge
+    // Rounding may decide whether a direction at an edge passes the portal.
+    hits = select(through, max(hits, F(1.f)), hits);
     const F share_ = share();
     const F by_portals = hits / select(total_ > 0.f, total_, F(1.f));
     return fma(share_, by_portals, F((1.f - share_) * image_pdf));

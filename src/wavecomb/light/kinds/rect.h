@@ -80,7 +80,7 @@ inline SphericalRect<F> make_spherical_rect(const LightReader<F>& light, const V
   const F right = between(r.x1), left = between(r.x0);
   r.solid_angle = right - left;
   r.begin = kPi + left;
-  const F least(1e-30f);  // This avoids 0 / 0 on the line of an edge.
+  const F least(1e-30f);  // This lower bound avoids 0 / 0 on the line of an edge.
   r.near_y = 1.f / sqrt(max(edge0, least));
   r.b0 = -r.y0 * r.near_y;
   r.b1 = r.y1 / sqrt(max(edge1, least));

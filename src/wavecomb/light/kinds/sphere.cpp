@@ -25,7 +25,8 @@ void make(LightBuild& out, const Light& light, LightBuildContext& /*context*/) {
   }
   const double area = 4 * kPiD * radius * radius;
   finish_area(out, light, area);
-  if (!(area >= kMinArea)) out.record.radius = 1e-18f;  // 0 would make it a point light
+  // A radius of 0 would make the sphere a point light.
+  if (!(area >= kMinArea)) out.record.radius = 1e-18f;
 }
 
 void bound(LightCluster& cluster, const LightRecord& light, double power) {

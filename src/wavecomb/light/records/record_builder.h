@@ -11,7 +11,8 @@ namespace wavecomb::record_builder {
 
 inline constexpr double kPiD = 3.14159265358979323846;
 
-/// Smaller areas are indistinguishable from 0 in float. Lights with smaller areas are dark.
+/// Smaller areas are indistinguishable from 0 in float. Lights with areas below this limit are
+/// dark.
 inline constexpr double kMinArea = 1e-36;
 /// Largest radiance. Products of larger values would overflow.
 inline constexpr double kMaxRadiance = 1e30;
@@ -68,7 +69,8 @@ struct LightColour {
         mean(luminance(rgb.x, rgb.y, rgb.z)) {}
 };
 
-/// Sets radiance and power of a light with the given surface area. A light without area is dark.
+/// Sets radiance and power of a light with the given surface area. Lights without area emit
+/// nothing.
 void finish_area(LightBuild& out, const Light& light, double area);
 
 /// Sets area, emission directions, radiance and power of a planar light with the given edges or

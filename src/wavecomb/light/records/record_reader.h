@@ -74,7 +74,7 @@ struct KindHit {
 template <typename F>
 struct LightQuery {
   const LightView& view;
-  const UInt<F>& index;         ///< index of the light in each lane
+  const UInt<F>& index;         ///< index of the sampled light in each lane
   const LightReader<F>& light;  ///< record of the light
   const Vec3<F>& from;
   const F &u, &v;
@@ -141,7 +141,7 @@ inline F uniform_emission_density(const F& area) {
   return select((area > 0.f) & is_finite(density), density, F(0.f));
 }
 
-/// Returns a path along `d` through the sphere around the scene. It starts on a disk of the
+/// Returns a path along `d` through the sphere around the scene. The path starts on a disk of the
 /// sphere's radius in front of the scene, at a point sampled by (u, v).
 template <typename F>
 inline KindEmission<F> emit_infinite(const LightView& view, const Vec3<F>& d, const F& u,

@@ -87,7 +87,7 @@ struct LightEffect {
   }
 
   /// Returns the factor for emission that a path hits. `share` is the diffuse fraction of its
-  /// bounce. A delta bounce counts as specular.
+  /// bounce. A delta bounce counts as a specular bounce.
   Color<F> of_hit(const Mask<F>& bsdf_is_delta, bool from_camera, const Color<F>& share) const {
     return detail::factor_of_hit<F>(diffuse, specular, sampled_only, bsdf_is_delta, from_camera,
                                     share);

@@ -16,13 +16,13 @@ struct LightReceiver {
   UInt<F> seed;  ///< source of random bits below the precision of the selecting number
   F time;        ///< shutter time if lights move; default mid-shutter
 
-  /// Light may arrive from any side.
+  /// Default: light may arrive from any side.
   LightReceiver(const Vec3<F>& p_) : p(p_), normal(0u), seed(0u), time(0.5f) {}
   explicit LightReceiver(const Vec3<F>& p_, const UInt<F>& normal_)
       : p(p_), normal(normal_), seed(0u), time(0.5f) {}
 };
 
-/// Packs a unit vector with ten bits for each component. The result is never 0.
+/// Packs a unit vector with ten bits for each component. The packed normal is never 0.
 template <typename F>
 inline UInt<F> pack_normal(const Vec3<F>& n) {
   const auto steps = [](const F& x) {

@@ -24,7 +24,7 @@
 
 namespace wavecomb {
 
-/// Selected light and its probability. A pdf of 0 means no light.
+/// Selected light and its probability. A pdf of 0 means that no light was selected.
 template <typename F>
 struct LightChoice {
   UInt<F> light;

@@ -121,7 +121,7 @@ LightCluster bound_light(const LightRecord& light, double power) {
 
 LightCluster bound_light(const TriangleLight& light, double power) {
   LightCluster c = bound_corners(light.p, light.u, light.v, false);
-  c.intensity = power / (2 * std::numbers::pi);  // emitted on each side
+  c.intensity = power / (2 * std::numbers::pi);  // intensity that is emitted on each side
   c.emission = std::numbers::pi / 2;
   c.normals.two_sided = true;
   const double m[3] = {double{light.m[0]}, double{light.m[1]}, double{light.m[2]}};

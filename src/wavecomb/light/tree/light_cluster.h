@@ -20,7 +20,7 @@ struct LightCluster {
   float lo[3], hi[3];
   DirectionCone normals;
   double emission = 0;
-  /// Emitted along the normals, relative to the sum over all lights of the tree.
+  /// Intensity emitted along the normals, relative to the sum over all lights of the tree.
   double intensity = 0;
   uint32_t next = 0;  ///< node, or kTreeLeaf | light
 };

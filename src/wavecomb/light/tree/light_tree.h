@@ -23,7 +23,7 @@ struct LightTree {
   float effective_lights = 0;  ///< LightTreeView::effective_lights
   uint32_t numbers = 0;        ///< how many of the 2^24 random numbers select a light of the tree
 
-  /// Returns the device view. Contract: it points into this tree.
+  /// Returns the device view. Contract: the device view points into this tree.
   LightTreeView view() const;
 };
 
