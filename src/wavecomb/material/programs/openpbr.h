@@ -44,8 +44,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   static constexpr bool kHasSubsurface = kBack;
   static constexpr bool kTextured = (kParts & (kTexturePart | kAnisotropyPart)) != 0;
   using Params = OpenPbrParams<F>;
-  /// The set has all inputs or none, because one textured input suffices to align the frame with
-  /// the texture.
+  /// All inputs or none, because one textured input suffices to align the frame with the texture.
   static constexpr uint32_t kInputs =
       !kTextured ? 0u
                  : input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |
