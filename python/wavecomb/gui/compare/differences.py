@@ -182,7 +182,7 @@ def _row(values: tuple[float, ...]) -> str:
 
 
 def pixel_rows(a: Side | None, b: Side | None, layer: str, x: int, y: int) -> dict[str, str]:
-    """Returns the values of A, B and A - B at a pixel as text; empty without an image."""
+    """Returns the values of A, B and A - B at a pixel as text; "" without an image."""
     found: dict[str, NDArray[Any]] = {}
     for name, side in (("A", a), ("B", b)):
         values = side.layer(layer) if side is not None else None

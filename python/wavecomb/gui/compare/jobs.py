@@ -254,7 +254,7 @@ def _images(ask: Ask) -> tuple[DisplayLayer | None, DisplayLayer | None]:
 
 
 def _drawable(layer: NDArray[Any] | None) -> NDArray[Any] | None:
-    """Adapts the number of channels for ``show``: drops an alpha channel, repeats a grey one."""
+    """Adapts a layer's channels for ``show``: drops alpha, repeats a grey channel."""
     if layer is None:
         return None
     channels = layer.shape[2]

@@ -116,7 +116,7 @@ def _three(layer: Array | None) -> Array:
 
 
 def common_layers(a: Side | None, b: Side | None) -> list[str]:
-    """Returns the layers that all existing sides have, the beauty first."""
+    """Returns the layers of both images, or of the only image, the beauty first."""
     sides = [side for side in (a, b) if side is not None]
     names: list[str] = []
     for name in ("beauty", *(name for side in sides for name in side.layers)):

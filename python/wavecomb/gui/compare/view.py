@@ -294,7 +294,7 @@ class CompareView(TakesFiles, QWidget):
         self._drag = at
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Drags, or reports the pixel under the mouse."""
+        """Moves the wipe line or image in a drag, else reports the pixel under the mouse."""
         at = event.position()
         if self._wiping:
             self.set_wipe(at.x() / max(self._panes()[0][1].width(), 1.0))
@@ -368,5 +368,5 @@ class CompareView(TakesFiles, QWidget):
     focusOutEvent = focusInEvent
 
     def take_files(self, paths: list[str], at: QPointF) -> None:
-        """Emits ``dropped``: files dropped on the left half become A, on the right half B."""
+        """Emits ``dropped``: files on the left half replace image A, on the right half B."""
         self.dropped.emit(A if at.x() < self.width() / 2 else B, paths)

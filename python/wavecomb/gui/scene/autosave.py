@@ -59,7 +59,7 @@ class Autosave(QObject):
 
     @property
     def file(self) -> Path | None:
-        """File of the open stage, or None if there is no stage or another window has the lock."""
+        """Autosave file of the open stage; None without a stage or without the lock."""
         return self._file
 
     def close(self) -> None:

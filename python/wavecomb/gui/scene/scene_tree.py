@@ -60,7 +60,7 @@ if TYPE_CHECKING:
 
 
 class EyeDelegate(QStyledItemDelegate):
-    """Delegate that paints an eye: open, crossed out, or faint if an ancestor hides the prim."""
+    """Delegate that paints an eye: open, crossed out, or faint if an ancestor is hidden."""
 
     def sizeHint(
         self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex

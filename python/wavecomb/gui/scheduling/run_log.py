@@ -200,7 +200,7 @@ class RunLog:
 
     @property
     def base(self) -> Series | None:
-        """Series that others are compared with: the pinned one, else the first of this picture."""
+        """Reference series of comparisons: the pinned one, else the first of this picture."""
         if self.pinned is not None:
             return self.pinned
         if self._current is None:

@@ -245,7 +245,7 @@ class Engine:
         return frame
 
     def _first_hits(self, renderer: Renderer, task: Task) -> Filler:
-        """Sends an image at full size: first hits with the light of the reduced image."""
+        """Sends an image at full size: first hits with the lighting of the reduced image."""
         if self._shown is None or task.setup.region is not None:
             return Filler(self._shown)
         result = renderer.render(

@@ -82,7 +82,7 @@ class Outline(QObject):
 
     @property
     def image(self) -> QImage | None:
-        """The outline, transparent elsewhere; None if nothing visible is selected."""
+        """The outline as an image, transparent elsewhere; None if nothing visible is selected."""
         return self._image
 
     def follow(self, frame: Frame) -> None:

@@ -377,7 +377,7 @@ class Session(Live):
     def run(
         self, what: str, work: Callable[[], object], then: Callable[[], None] | None = None
     ) -> None:
-        """Runs ``work`` on another thread, and then ``then`` on this one.
+        """Runs ``work`` on another thread, then ``then`` with the result on this one.
 
         See ``Tasks.run``.
         """

@@ -386,7 +386,7 @@ class SubdivisionSurfaces:
 
 
 def _joined(steps: list[Any]) -> Any:
-    """Combines the refined meshes of all shutter steps; returns the first error if there is one."""
+    """Combines the refined meshes of all shutter steps; returns the first error, if any."""
     first = next((step for step in steps if isinstance(step, str)), steps[0])
     if len(steps) == 1 or isinstance(first, str):
         return first

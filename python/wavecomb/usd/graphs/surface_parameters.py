@@ -61,7 +61,7 @@ class Networks(Protocol):
         """Returns the value of a node's output."""
 
     def in_working_space(self) -> Networks:
-        """Returns these networks with constants in the working space; it reports nothing."""
+        """Returns a copy with constants in the working space; the copy reports nothing."""
 
 
 Replaced = Callable[[Node, tuple[Value, ...]], Value | None]

@@ -110,7 +110,7 @@ class GroupBuilder:
         predicate: Any = None,
         base: Gf.Matrix4d = IDENTITY,
     ) -> None:
-        """Reads prims and their descendants into a group; ``base`` transforms to its space."""
+        """Reads prims with their descendants into a group; ``base`` transforms to group space."""
         found = self.traversal.walk(roots, purpose, predicate, scope.inherited, base)
         group.lights += found.lights
         self.memory_check.check(found.draws)

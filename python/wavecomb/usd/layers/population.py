@@ -67,7 +67,7 @@ def _matching(stage: Usd.Stage, pattern: PathPattern) -> list[Sdf.Path]:
 
 
 def _outside_instances(stage: Usd.Stage, path: Sdf.Path) -> Sdf.Path:
-    """Returns a path, or that of the enclosing instance, inside which masks cannot name prims."""
+    """Returns a prim's path, or its instance's, since masks cannot name prims in instances."""
     for prefix in path.GetPrefixes():
         if stage.GetPrimAtPath(prefix).IsInstance():
             return prefix

@@ -176,7 +176,7 @@ class Assigner:
         return per_face if bound else None
 
     def _bound(self, primvars: _Primvars, surface: Surface) -> int:
-        """Returns the material id of a surface with this gprim's constant primvars put in."""
+        """Returns the material id of a surface with the gprim's constant primvars inserted."""
         if surface.graph is not None and surface.graph.depends_on_mesh:
             surface = self._with_graph(primvars, surface)
         if primvars.own_uv:

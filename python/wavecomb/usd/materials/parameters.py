@@ -332,7 +332,7 @@ class SurfaceValues:
 def surface_values(
     prim: Usd.Prim, time: Usd.TimeCode, values: Mapping[str, Any] | None = None
 ) -> SurfaceValues | None:
-    """Returns the values that the loader passes to the core; None if it is no MaterialX material.
+    """Returns the values that the loader passes to the core; None without a MaterialX material.
 
     Args:
         prim: A material.

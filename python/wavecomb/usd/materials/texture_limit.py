@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from wavecomb.usd.geometry.cage import ViewSize
 
 MAX_PRIMS = 100_000
-"""Prims whose image size is computed; textures used only by later prims keep their detail."""
+"""Number of prims whose image size is computed; textures of later prims keep their detail."""
 
 _TILE = 8
 _WRAPPED = 2.0
@@ -132,7 +132,7 @@ class _NoBuilder:
 
 
 def plan_levels(context: LoadContext, view: ViewSize, limit_bytes: float) -> dict[Key, int]:
-    """Returns how many finest levels each texture leaves out, by its key in ``TextureTable``."""
+    """Returns how many of the finest mip levels each texture drops, by ``TextureTable`` key."""
     report = context.report
     options = replace(context.options, threads=1)
     builder: Any = _NoBuilder()

@@ -210,7 +210,7 @@ _TYPES: dict[str, tuple[Sdf.ValueTypeName, Callable[[str], Any]]] = {
 
 
 def usd_type(name: str) -> Sdf.ValueTypeName | None:
-    """Returns the USD type of a MaterialX type; None if there is none, which becomes a token."""
+    """Returns the USD type of a MaterialX type; None if there is none (use a token)."""
     known = _TYPES.get(name)
     return None if known is None else known[0]
 

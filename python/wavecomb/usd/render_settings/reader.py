@@ -103,7 +103,7 @@ _PURPOSES = ("default", "render", "proxy", "guide")
 def find_settings(
     stage: Usd.Stage, wanted: str | None, report: LoadReport
 ) -> UsdRender.Settings | None:
-    """Returns the settings ``wanted``, else those the stage names, else the only ones in /Render.
+    """Returns the settings ``wanted``, the stage's default ones, or the only ones in /Render.
 
     Raises:
         WavecombError: There are no render settings of that path or name.

@@ -189,7 +189,7 @@ class LightGroups:
         self._names: dict[str, str] = {}
 
     def of(self, prim: Usd.Prim, inherited: Sequence[Any] | None = None) -> str:
-        """Returns ``light_group`` with invalid characters replaced by "_"; "" if it has none."""
+        """Returns a prim's light group with invalid characters as "_"; "" if it has none."""
         name = light_group(prim, inherited)
         channel = re.sub(r"[^A-Za-z0-9_]", "_", name)
         if channel in ("", OTHER):

@@ -62,7 +62,7 @@ def find_origin(
 
 
 def _places(stage: Usd.Stage, time: Usd.TimeCode, purposes: frozenset[str]) -> NDArray[np.float64]:
-    """Returns world positions (n, 3) of drawn prims: centres of authored extents, else the origins.
+    """Returns world positions (n, 3) of drawn prims: centres of extents, else prim origins.
 
     USD's own bounds need every point, and crash on arrays that do not fit together.
     """
@@ -210,5 +210,5 @@ class LoadContext:
         return self.options.lights == "hidden"
 
     def at(self, time: float) -> LoadContext:
-        """Returns the context at another time code, without motion and with a discarded report."""
+        """Returns the context at another time, without motion and with a separate report."""
         return replace(self, time=Usd.TimeCode(time), report=LoadReport(), motion=None)

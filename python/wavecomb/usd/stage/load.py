@@ -310,7 +310,7 @@ class _Load:
         self.textures.drops = plan_levels(c, ViewSize(view, c.options.size), limit)
 
     def _add_lights(self, world: Group, lit: bool) -> tuple[str, ...]:
-        """Adds all lights, or a soft dome if nothing emits light; returns their paths.
+        """Adds all lights, or a default dome if nothing emits light; returns the lights' paths.
 
         ``lit`` says whether the stage has lights or sufficient emission.
         """

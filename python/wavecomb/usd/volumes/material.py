@@ -49,7 +49,7 @@ class VolumeMaterials:
         self._known: dict[Sdf.Path, OpticalProperties] = {}
 
     def of(self, material: UsdShade.Material | None, volume: Usd.Prim) -> OpticalProperties:
-        """Returns the properties of a volume; default ones if its material is not supported."""
+        """Returns the properties of a volume; default ones if its material is unsupported."""
         if material is None:
             return DEFAULT_PROPERTIES
         path = material.GetPath()

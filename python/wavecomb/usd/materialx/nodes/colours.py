@@ -35,7 +35,7 @@ _KELVIN = (800.0, 25000.0)
 _CHROMATICITY = ((2222.0, (-1.1063814, -1.34811020, 2.18555832, -0.20219683)),
         (4000.0, (-0.9549476, -1.37418593, 2.09137015, -0.16748867)),
         (0.0, (3.0817580, -5.87338670, 3.75112997, -0.37001483)))  # fmt: skip
-"""Cubic fits of black-body chromaticity y(x) up to a temperature; the last covers the rest."""
+"""Cubic fits of black-body chromaticity y(x), each up to a temperature limit."""
 
 _TO_REC709 = ((3.2406, -0.9689, 0.0557), (-1.5372, 1.8758, -0.2040), (-0.4986, 0.0415, 1.0570))
 """Columns of the matrix from XYZ to linear Rec.709, for X, Y and Z."""

@@ -44,7 +44,7 @@ def _texcoord(n: NodeCall) -> Value:
 
 
 def _named(name_input: str, fallback: str, usual: str = "") -> Handler:
-    """Returns a handler that reads the primvar named by an input, or ``usual``."""
+    """Returns a handler that reads the primvar named by an input; its default is ``usual``."""
 
     def compiled(n: NodeCall) -> Value:
         name = n.text(name_input, usual)

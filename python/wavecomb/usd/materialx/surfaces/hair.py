@@ -128,7 +128,7 @@ class HairReader(SurfaceReader):
         return min(max(v, 0.001), 1.0), min(max(s, 0.001), 1.0)
 
     def _colour(self, shader: UsdShade.Shader) -> None:
-        """Sets the colour whose absorption at the hair's roughness equals the requested one."""
+        """Sets the colour that gives the requested absorption at the hair's roughness."""
         about = self.parameters["azimuthal_roughness"]
         name = "absorption_coefficient"
         source = source_of(shader, name, self.time)
