@@ -55,7 +55,7 @@ WAVE_SIZES = tuple(4**k for k in range(4, 11))
 """256 to 2^20."""
 SPP_FACTORS = (0.5, 1, 2, 4)
 EDGE_FACTORS = (0.5, 0.7071, 1, 1.4142)
-"""Factors of the image width: pixels double from one to the next."""
+"""Factors of the image width; each doubles the number of pixels of the one before."""
 
 Choice = dict[str, Any]
 Figures = dict[str, Any]

@@ -9,9 +9,9 @@ several seeds in each way, with one thread; the first way is the baseline. Error
 relative errors (x - r)^2 / (r^2 + 0.01) against a reference, the mean of four renders of
 ``--reference`` samples in the way that suits the stage best, kept in ``out/defaults``. With
 ``--reference 0``, r is the mean of all images of the stage, which needs no further renders but
-understates errors by a few per cent. Percentiles are those of pixels. Cost is user CPU time of the
-whole render, pilots included, so other work on the machine has little effect. Efficiency is 1 /
-(error x cost).
+understates errors by a few per cent. Error percentiles are taken over pixels. Cost is user CPU time
+of the whole render, pilots included, so other work on the machine has little effect. Efficiency is
+1 / (error x cost).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Stage:
 
     Attributes:
         scene: Name of the generator, or path of the file below the asset folder.
-        best: Way that renders the reference.
+        best: Combination of settings that renders the reference.
         options: Options of the generator.
     """
 
@@ -127,7 +127,7 @@ def reference(name: str, scene: Any, options: argparse.Namespace) -> Any:
 
 
 def figures(images: Any, mean: Any, variance: Any) -> dict[str, Any]:
-    """Return the errors of images. Means are corrected for the variance of the reference."""
+    """Return the errors of images. Mean errors are corrected for the variance of the reference."""
     scale = 1 / (mean**2 + 0.01)
     errors = ((images - mean) ** 2 * scale).mean(axis=-1).reshape(len(images), -1)
     noise = (variance * scale).mean(axis=-1).ravel()

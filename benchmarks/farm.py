@@ -122,7 +122,7 @@ def differing(place: Path, frames: int) -> int:
 
 
 def main() -> None:
-    """Print JSON; pairs are wall and CPU seconds."""
+    """Print the results as JSON; each pair is wall and CPU seconds."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("stage", type=Path)
     parser.add_argument("--size", nargs=2, type=int, default=(600, 400))

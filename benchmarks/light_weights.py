@@ -13,7 +13,7 @@ a converged image of Mitsuba.
 Results:
 
 - relMSE: mean of (x - r)^2 / (r^2 + 0.01) at equal samples, minus the noise of the reference;
-- trimmed: the same without the worst 0.1 % of pixels, which a few bright paths dominate;
+- trimmed: relMSE without the worst 0.1 % of pixels, which a few bright paths dominate;
 - ratio: calibrated / power within a round, median with its 95 % interval;
 - calibration: seconds for an image of `--timed-size`, and the fraction of a 10 s render.
 """

@@ -13,8 +13,8 @@ kind. A round then measures, in shuffled order:
 
 - render: the render, without a recorder;
 - alone: Embree alone, wall time, each kind in its fastest way;
-- calls: the same rays through the accelerator's functions, as the render calls them. These
-  functions fill packets, keep hits canonical by a filter, and store hits.
+- calls: the same rays through the accelerator's functions, as the render calls them. The
+  accelerator's functions fill packets, keep hits canonical by a filter, and store hits.
 
 Ratios are taken within a round:
 

@@ -98,7 +98,7 @@ class Entry:
 
     @property
     def is_good(self) -> bool:
-        """Whether it agrees as far as required."""
+        """Whether the image agrees with its reference as far as required."""
         v = self.verdict
         return v.agrees or (bool(self.reason) and v.mean_agrees)
 

@@ -2,9 +2,9 @@
 """Test whether an image equals a reference within their noise.
 
 Our image comes as independent renders (batches). The reference is a single image with an unknown
-number of samples. Its noise is estimated per block from the differences between neighbouring pixels
-of *reference - ours*, minus the part due to our noise. Other differences between neighbouring
-pixels, such as differently filtered outlines, count as noise there.
+number of samples. The noise of the reference is estimated per block from the differences between
+neighbouring pixels of *reference - ours*, minus the part due to our noise. Other differences
+between neighbouring pixels, such as differently filtered outlines, count as noise there.
 
 Noise is assumed to be independent between pixels, so that the variance of a block is the sum over
 its pixels; z is a normal deviate.
@@ -43,7 +43,7 @@ class Verdict:
         blocks: Number of all blocks and channels.
         noise: Relative standard error of the mean, of both images.
         place: Column and row of the worst block, in blocks.
-        excess: Relative difference of that block.
+        excess: Relative difference of the worst block.
     """
 
     difference: float

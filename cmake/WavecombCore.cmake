@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# wavecomb_add_core adds the core as a library. It is called once for this tree, and once more for
-# each instruction set in WAVECOMB_ISAS.
+# wavecomb_add_core adds the core as a library. The function is called once for this tree, and once
+# more for each instruction set in WAVECOMB_ISAS.
 
 file(GLOB_RECURSE core_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/*.cpp")
 # wavecomb_read_rows(VAR FILE PATTERN): sets VAR to the matches in a header of src/wavecomb.

@@ -82,8 +82,8 @@ if(NOT OpenSubdiv_FOUND)
     "package (libosd-dev, opensubdiv-devel, opensubdiv), or pass -DOpenSubdiv_ROOT=.")
 endif()
 
-# OpenVDB, for the plug-in that reads volumes (WavecombVdb.cmake). It must be linked with the oneTBB
-# above, so it comes from the same source as Embree.
+# OpenVDB, for the plug-in that reads volumes (WavecombVdb.cmake). OpenVDB must be linked with the
+# oneTBB above, so it comes from the same source as Embree.
 option(WAVECOMB_VDB "Python: build the plug-in that reads volumes, where OpenVDB is found" ON)
 set(WAVECOMB_STAGED_OPENVDB "${PROJECT_SOURCE_DIR}/.deps/openvdb")
 if(WAVECOMB_PYTHON AND WAVECOMB_VDB)

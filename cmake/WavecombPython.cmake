@@ -2,9 +2,9 @@
 # Adds the Python module wavecomb._core and the libraries that are installed with it. All rules use
 # the install component `python`, relative to site-packages.
 #
-# Without WAVECOMB_ISAS, there is one module, wavecomb/_core. With it, each instruction set has a
-# module wavecomb/lib/<isa>/_core, wavecomb/_cpu reports which of them this CPU supports, and
-# python/wavecomb/isa.py chooses.
+# Without WAVECOMB_ISAS, there is one module, wavecomb/_core. With WAVECOMB_ISAS, each instruction
+# set has a module wavecomb/lib/<isa>/_core, wavecomb/_cpu reports which of them this CPU supports,
+# and python/wavecomb/isa.py chooses.
 
 execute_process(COMMAND "${Python_EXECUTABLE}" -m nanobind --cmake_dir
   OUTPUT_VARIABLE nanobind_ROOT OUTPUT_STRIP_TRAILING_WHITESPACE)

@@ -12,10 +12,11 @@ All renderers use the same arrays, camera, box filter and path depth, without de
 adaptive sampling. Roulette is each renderer's default. mitsuba_bridge.py and cycles_bridge.py
 describe the conversion of materials.
 
-- Speed: in each round every renderer starts in a new process, in shuffled order. It loads the stage
-  (Wavecomb reads USD, the others read the arrays that Wavecomb's loader made), renders one sample
-  (start to first image), then an image with few and one with many samples. The marginal rate is the
-  difference in samples over the difference in time. Peak memory is that of the process.
+- Speed: in each round every renderer starts in a new process, in shuffled order. Each renderer
+  loads the stage (Wavecomb reads USD, the others read the arrays that Wavecomb's loader made),
+  renders one sample (start to first image), then an image with few and one with many samples. The
+  marginal rate is the difference in samples over the difference in time. Peak memory is that of the
+  process.
 - Noise: relMSE = mean of (x - r)^2 / (r^2 + 0.01) at equal samples, minus the error of r; mean over
   seeds. r is each renderer's converged image with other seeds. Noise does not depend on the load of
   the machine; images are cached in --cache by version and settings.

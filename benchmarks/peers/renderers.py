@@ -22,8 +22,8 @@ class Renderer:
     Attributes:
         kind: Renderer of worker.py.
         options: Options of that renderer.
-        spp: Samples of the short and of the long timed render. Slower renderers take fewer, so that
-            turns last equally long. Squares, as Mitsuba's multijitter requires.
+        spp: Samples of the short and of the long timed render. Slower renderers take fewer samples,
+            so that turns last equally long. Squares, as Mitsuba's multijitter requires.
         warm: Whether to render both counts before timing, because Dr.Jit compiles for each.
     """
 

@@ -56,7 +56,7 @@ render_s."""
 COUNTER_COLUMNS = (
     *("cycles", "instructions", "l1d_misses", "l2_misses", "llc_misses", "branch_misses"),
 )
-"""Hardware counters. Empty if the kernel does not provide them; machine.json states the reason."""
+"""Hardware counters. Columns of counters are empty without kernel support; see machine.json."""
 
 with (Path(__file__).parent / "columns.csv").open(encoding="utf-8", newline="") as _file:
     COLUMNS = tuple(Column(**row) for row in csv.DictReader(_file))  # type: ignore[arg-type]

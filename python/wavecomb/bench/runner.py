@@ -143,7 +143,7 @@ class Sitting:
     # ---- before the first run ------------------------------------------------------------------
 
     def _begin(self) -> None:
-        """Records the machine. Raises WavecombError if the results are of another build."""
+        """Records the machine. Raises WavecombError if another build made the folder's results."""
         document = self.folder.machine()
         state = machine.machine_state()
         if document and document.get("native_sha256") != state["native_sha256"]:

@@ -149,7 +149,7 @@ class _PlyBody:
         return {name: (np.array(counts[name]), np.concatenate(values[name])) for name in counts}
 
     def _uniform(self, element: _Element) -> dict[str, tuple[np.ndarray, np.ndarray]] | None:
-        """Does the same in one step if all lists have three entries, else returns None."""
+        """Reads lists in one step if each has three entries, else returns None."""
         if self._words is not None:
             if len(element.properties) != 1:
                 return None
