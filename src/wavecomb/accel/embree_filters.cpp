@@ -58,8 +58,8 @@ inline void keep_closest(const RTCFilterFunctionNArguments* args) {
   }
 }
 
-/// Intersects ray i of a packet with the light in a geometry's user pointer. Returns the distance,
-/// or 0 for a miss.
+/// Intersects ray i of a packet with the light in a geometry's user pointer. Returns the distance
+/// to the light, or 0 for a miss.
 float intersect_light_shape(const void* user, RTCRayN* ray, unsigned n, unsigned i) {
   const float o[3] = {RTCRayN_org_x(ray, n, i), RTCRayN_org_y(ray, n, i), RTCRayN_org_z(ray, n, i)};
   const float d[3] = {RTCRayN_dir_x(ray, n, i), RTCRayN_dir_y(ray, n, i), RTCRayN_dir_z(ray, n, i)};

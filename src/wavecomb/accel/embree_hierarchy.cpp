@@ -185,7 +185,8 @@ void EmbreeHierarchy::attach_light(uint32_t id, const LightGeometry& shape) cons
   } else {
     RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_USER);
     rtcSetGeometryUserPrimitiveCount(g, 1);
-    rtcSetGeometryUserData(g, const_cast<LightGeometry*>(&shape));  // Callbacks only read the data.
+    // Embree's callbacks only read the user data.
+    rtcSetGeometryUserData(g, const_cast<LightGeometry*>(&shape));
     rtcSetGeometryBoundsFunction(g, light_box, nullptr);
     rtcSetGeometryIntersectFunction(
         g, rule_ != HitRule::kEmbree ? intersect_lights : intersect_lights_bare);

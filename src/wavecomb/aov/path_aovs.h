@@ -204,8 +204,8 @@ class PathAovs : public PathFirstHits, public PathCostRows {
         });
   }
 
-  /// Copies the radiance of slots below `slots`. It includes the emission at the vertex at `depth`,
-  /// but not its light sample.
+  /// Copies the radiance of the paths in slots below `slots`. It includes the emission at the
+  /// vertex at `depth`, but not its light sample.
   void end_depth(uint32_t depth, const float* radiance, size_t slots) const {
     if (depth < parts_.size() && parts_[depth])
       std::memcpy(parts_[depth].rows, radiance, slots * kRadianceWords * sizeof(float));

@@ -215,7 +215,7 @@ class PathExpressions {
  private:
   /// Adds the emission that a bounce hits, for lights whose two multipliers differ. Splits `c`
   /// between the diffuse and glossy lobes of the bounce in proportion to their contributions.
-  /// Returns the lanes with such lights.
+  /// Returns the lanes whose lights have two different multipliers.
   template <typename F>
   [[gnu::noinline, gnu::cold]] Mask<F> add_by_parts(const UInt<F>& slot,
                                                     const ExpressionRow<F>& row,

@@ -52,9 +52,9 @@ enum class AovContent : uint8_t {
 
 /// Rows X(enumerator, name, channels, letters, content, kind, source, title). The order of the rows
 /// determines the bits of the AOVs. `channels` is 0 for AOVs that are not numeric or have several
-/// layers. `letters` are the names of the channels in files, or "" for a single channel and for
-/// numbered channels. `title` is the label of the layer in the window; "" hides the layer in the
-/// window. clang-format off
+/// layers. `letters` are the names of the channels in files, or "" if the channels have no names.
+/// `title` is the label of the layer in the window; "" hides the layer in the window.
+// clang-format off
 #define WAVECOMB_AOVS(X)                                                                         \
   X(Albedo, "albedo", 3, "RGB", kColour, kMean, kVertex, "Albedo")                               \
   X(Normal, "normal", 3, "XYZ", kDirection, kMean, kVertex, "Normal")                            \

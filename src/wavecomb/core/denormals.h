@@ -23,12 +23,8 @@ class DenormalsOff {
   // Floating-point control word of the thread, and the bits of it that flush results and operands.
 #if defined(__SSE__)
   static constexpr uint64_t kFlush = 0x8040;
-  static uint64_t control() {
-    return _mm_getcsr();
-  }
-  static void set_control(uint64_t word) {
-    _mm_setcsr(static_cast<unsigned>(word));
-  }
+  static uint64_t control() { return _mm_getcsr(); }
+  static void set_control(uint64_t word) { _mm_setcsr(static_cast<unsigned>(word)); }
 #elif defined(__aarch64__)
   static constexpr uint64_t kFlush = uint64_t{1} << 24;  // FPCR.FZ flushes results and operands.
   static uint64_t control() {
@@ -36,9 +32,7 @@ class DenormalsOff {
     asm volatile("mrs %0, fpcr" : "=r"(word));
     return word;
   }
-  static void set_control(uint64_t word) {
-    asm volatile("msr fpcr, %0" : : "r"(word) : "memory");
-  }
+  static void set_control(uint64_t word) { asm volatile("msr fpcr, %0" : : "r"(word) : "memory"); }
 #else
 #error "DenormalsOff: not implemented for this CPU."
 #endif

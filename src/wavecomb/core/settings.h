@@ -44,8 +44,7 @@ enum class LightWeights : uint8_t { kCalibrated, kPower };
 /// Russian roulette (path/steps/survive.h). kAuto: kEfficient if bounces are guided, else
 /// kThroughput.
 enum class RouletteKind : uint8_t { kAuto, kOff, kThroughput, kCostAware, kEfficient };
-/// Sorting of rays before traversal. kAuto: Wavecomb measures the other four orders at each path
-/// depth and uses the fastest.
+/// Sorting of rays before traversal.
 enum class RayOrder : uint8_t { kSlot, kMorton, kMortonOctant, kDirection, kAuto };
 /// Source of material costs. kAuto: measured for shading order, and the fixed model for roulette,
 /// so that images are reproducible.
@@ -60,7 +59,7 @@ enum class Allocate : uint8_t { kEven, kError, kEfficiency };
 /// Path guiding with a field trained before the first pass (render/pilots/guiding_training.h).
 /// kAuto: if a pilot render predicts a gain, and paths start at the camera only.
 enum class Guiding : uint8_t { kAuto, kOn, kOff };
-/// Whether path records are moved in memory into shading order. kAuto: not moved, which is faster.
+/// Whether records are moved into shading order. kAuto: off, which is faster.
 enum class Materialize : uint8_t { kAuto, kOn, kOff };
 
 /// Largest width or height, and largest number of pixels.
@@ -80,7 +79,7 @@ struct Region {
   size_t index(uint32_t x, uint32_t y) const { return size_t{y - y0} * width() + (x - x0); }
 };
 
-/// Settings of a render. The image depends only on the members of Settings above the line.
+/// Settings of a render. The image depends only on members above the line.
 struct Settings {
   uint32_t width = 600, height = 600;  ///< pixels
   uint32_t spp = 64;                   ///< samples per pixel, 1 to 2^20
@@ -91,8 +90,8 @@ struct Settings {
   std::optional<float> filter_width;  ///< full width in pixels; default_filter_width() if not set
   RouletteKind roulette = RouletteKind::kAuto;
   uint32_t roulette_depth = 2;  ///< first vertex at which roulette may terminate a path
-  /// Material costs affect the image only through cost-aware roulette, where kMeasured makes the
-  /// image vary from run to run.
+  /// Costs affect the image only through cost-aware roulette; kMeasured then makes it vary from run
+  /// to run.
   CostSource costs = CostSource::kAuto;
   float clamp_indirect = 0;  ///< maximum luminance of an indirect contribution; 0 means no limit
   bool schlick_fresnel = false;
@@ -104,7 +103,7 @@ struct Settings {
   /// (medium/volume/equiangular.h).
   bool equiangular = false;
   Quality quality = Quality::kAuto;
-  uint32_t learn_memory_mb = 64;  ///< memory limit of the guiding data
+  uint32_t learn_memory_mb = 64;  ///< memory limit of learned data
   /// Sample every non-delta bounce by cosine.
   bool cosine_sampling = false;
   IntegratorKind integrator = IntegratorKind::kWavefront;
@@ -116,9 +115,8 @@ struct Settings {
   /// specular reflection or refraction (light_paths/merge_grid.h). 0 means no merging.
   float merge_radius = 0;
   Firefly firefly = Firefly::kKeep;
-  AovSet aovs;  ///< AOVs to store; they do not affect the beauty
-  /// Names of the light groups that Aov::kLightGroups stores; empty means all.
-  std::vector<std::string> light_groups;
+  AovSet aovs;                                    ///< AOVs to store; they do not affect the beauty
+  std::vector<std::string> light_groups;          ///< names for Aov::kLightGroups; empty means all
   std::vector<NamedExpression> expressions;       ///< for Aov::kExpressions
   uint32_t deep_samples = DeepLimits{}.most;      ///< maximum samples of a deep pixel
   float deep_tolerance = DeepLimits{}.tolerance;  ///< depth tolerance of deep images
@@ -126,37 +124,34 @@ struct Settings {
   /// value. 0 means off.
   float adaptive = 0;
   /// Adaptive sampling: stop when the image's mean relative error is at most this value. 0 means
-  /// off. This limit cannot be combined with `adaptive`.
+  /// off. Cannot be combined with `adaptive`.
   float noise = 0;
   uint32_t min_spp = 16;  ///< adaptive sampling: samples before the first error estimate
   /// Distribution of samples if spp or a time limit gives their total number.
   Allocate allocate = Allocate::kEven;
-  /// Time limit of rendering in seconds; 0 means none. At the limit, the image has the samples that
-  /// are done.
+  /// Time limit of rendering in seconds; 0 means none. The image then has the samples done so far.
   float time_limit = 0;
   /// Make domes and distant lights transparent to the camera, for compositing.
   bool alpha = false;
   bool error = false;  ///< whether to store error and variance estimates even if no setting needs
                        ///< them
-  /// Pixels to render; all other pixels get no samples. If the region is not set, all pixels are
-  /// rendered. The pixels of a region equal the pixels of the whole image, except in adaptive
-  /// renders, which estimate errors within the region only.
+  /// Pixels to render; others get no samples. If not set, all pixels are rendered. Pixels are the
+  /// same as in the whole image, except in adaptive renders, which estimate errors within the
+  /// region only.
   std::optional<Region> region;
-  /// Overscan: pixels along each edge beyond the camera window; included in width and height.
+  /// Pixels along each edge beyond the camera window; included in width and height.
   uint32_t overscan = 0;
   bool crop = false;  ///< restrict the film and the image to the region
   // ---- below: how the image is computed; never changes it ----
   uint32_t threads = 0;    ///< number of threads; 0 means all that the process may use
   uint32_t wave_size = 0;  ///< paths per wave, 64 to 2^20; 0 means the default
   uint32_t lanes = 0;      ///< lanes of kernels: 1, 4, 8 or 16; 0 means the widest that was built
-  /// Ray packets are faster than single rays, and both find bit-identical hits
-  /// (docs/decisions/canonical-hits.md).
+  /// Packets are faster; both find bit-identical hits (docs/decisions/canonical-hits.md).
   Traversal traversal = Traversal::kPackets;
   std::string policy = "code";
-  /// kAuto: the wavefront integrator gathers records by index, which is faster.
-  Materialize materialize = Materialize::kAuto;
-  RayOrder ray_order = RayOrder::kAuto;     ///< for bounce rays
-  RayOrder shadow_order = RayOrder::kAuto;  ///< for shadow rays
+  Materialize materialize = Materialize::kAuto;  ///< kAuto: gather by index, which is faster
+  RayOrder ray_order = RayOrder::kAuto;          ///< for bounce rays
+  RayOrder shadow_order = RayOrder::kAuto;       ///< for shadow rays
   /// Render passes of 1, 1, 2, 4, ... samples per pixel, so that the whole image appears soon.
   bool progressive = false;
   float cost_weight = 0.3f;  ///< weight of a pass in the moving average of costs, 0 to 1
@@ -182,7 +177,7 @@ struct Settings {
 };
 
 /// Setting that light paths cannot be combined with, and the value to use instead; `what` is empty
-/// if no setting conflicts.
+/// if there is none.
 struct LightPathConflict {
   std::string what, instead;
 };
@@ -193,8 +188,7 @@ LightPathConflict light_path_conflict(const Settings& settings);
     const Settings& settings) {
   return light_path_conflict(settings);
 }
-/// Returns the Error for a setting that light paths cannot be combined with; `settings` must use
-/// light paths.
+/// Returns the Error for such a setting; `settings` must use light paths.
 Error light_path_error(const Settings& settings, const LightPathConflict& conflict);
 
 }  // namespace wavecomb

@@ -49,12 +49,8 @@ class TaskOrder {
   };
 
 #if defined(__SANITIZE_THREAD__)
-  static void acquire(const char& address) {
-    __tsan_acquire(const_cast<char*>(&address));
-  }
-  static void release(const char& address) {
-    __tsan_release(const_cast<char*>(&address));
-  }
+  static void acquire(const char& address) { __tsan_acquire(const_cast<char*>(&address)); }
+  static void release(const char& address) { __tsan_release(const_cast<char*>(&address)); }
 #else
   static void acquire(const char&) {}
   static void release(const char&) {}
@@ -67,12 +63,8 @@ class TaskOrder {
 class WorkerOrder {
  public:
 #if defined(__SANITIZE_THREAD__)
-  explicit WorkerOrder(void* worker) : worker_(worker) {
-    __tsan_acquire(worker_);
-  }
-  ~WorkerOrder() {
-    __tsan_release(worker_);
-  }
+  explicit WorkerOrder(void* worker) : worker_(worker) { __tsan_acquire(worker_); }
+  ~WorkerOrder() { __tsan_release(worker_); }
   WorkerOrder(const WorkerOrder&) = delete;
   WorkerOrder& operator=(const WorkerOrder&) = delete;
 

@@ -101,8 +101,8 @@ class AovFilm {
   void allocate_light_splats(FixedPoint unit) {
     splats_ = LightSplatSums(pixels_ * light_splat_layout_.count, unit);
   }
-  /// Adds a light splat to layer `sum_index` (see LightSplatLayout) of a pixel. The order does not
-  /// matter.
+  /// Adds a light splat to layer `sum_index` (see LightSplatLayout) of a pixel. The order of light
+  /// splats does not matter.
   void add_light_splat(size_t pixel, uint32_t sum_index, float r, float g, float b) {
     splats_.add(pixel * light_splat_layout_.count + sum_index, r, g, b);
   }

@@ -138,8 +138,8 @@ class Film {
   std::vector<Pixel> pixels_;
   AovFilm aovs_;
   std::vector<ErrorSums> errors_;
-  LightSplatLayer splats_;  ///< empty without light splats
-  Cascades cascades_;       ///< empty without firefly reduction
+  LightSplatLayer splats_;  ///< empty if the render has no light splats
+  Cascades cascades_;       ///< empty if the render has no firefly reduction
   std::vector<float> joint_rows_;
 };
 

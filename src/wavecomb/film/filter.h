@@ -19,7 +19,8 @@ class FilterTable {
   /// 4-term window.
   FilterTable(FilterKind kind, float width);
 
-  /// Returns kBins + 2 offsets in pixels; entry i is for u = i / kBins. The last one is repeated.
+  /// Returns kBins + 2 offsets in pixels; entry i is for u = i / kBins. The last offset is
+  /// repeated.
   const float* offsets() const { return offsets_.data(); }
 
   /// Half the filter's full width in pixels.

@@ -78,8 +78,8 @@ class MedianSketch {
   double* s_;
 };
 
-/// Returns the median estimate of a MedianSketch state. Infinite if more than half of the values
-/// were infinite, or without values.
+/// Returns the median estimate of a MedianSketch state. The estimate is infinite if more than half
+/// of the values were infinite, or if there are no values.
 inline double median_of(const double* state) {
   using S = MedianSketch;
   const double infinity = std::numeric_limits<double>::infinity();

@@ -33,7 +33,7 @@ enum class GraphCode : uint8_t {
   kEqual,       ///< 1 if a = b, else 0
   kMix,         ///< a + (b - a) c
   kClamp,       ///< a clamped to [b, c]
-  kSelect,      ///< b if a is not 0, else c
+  kSelect,      ///< the result is b if a is not 0, else c
   kSmoothstep,  ///< smooth step of a from b to c
   kAbs,
   kFloor,

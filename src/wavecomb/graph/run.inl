@@ -276,7 +276,7 @@ WAVECOMB_INLINE bool run_arithmetic(const GraphStep<F>& op) {
   }
 }
 
-/// Runs procedural patterns. Returns false for other operations.
+/// Runs procedural patterns. Returns false for operations that are not procedural patterns.
 template <typename F>
 WAVECOMB_INLINE bool run_pattern(const GraphStep<F>& op) {
   switch (static_cast<GraphCode>(op.code.code)) {

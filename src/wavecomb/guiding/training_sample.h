@@ -18,8 +18,8 @@ struct TrainingRecord {
   float value;
   float pdf;          ///< density with which wi was sampled
   float bsdf_pdf;     ///< density of wi under the BSDF alone
-  float guiding_pdf;  ///< density under the field in use; 0 if there was none
-  float weight;       ///< throughput over image brightness
+  float guiding_pdf;  ///< density of wi under the guiding field in use; 0 if there was no field
+  float weight;       ///< throughput of the path divided by the image brightness
 };
 
 }  // namespace wavecomb

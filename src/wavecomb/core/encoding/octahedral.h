@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Unit vectors in 32 bits by octahedral mapping: a point of the octahedron |x| + |y| + |z| = 1 is
 /// unfolded to a square with 16 bits per axis (Z. Cigolle et al., "A Survey of Efficient
-/// Representations for Independent Unit Vectors", JCGT 3(2), 2014). The maximum error of a decoded
-/// component is 6e-5.
+/// Representations for Independent Unit Vectors", JCGT 3(2), 2014). The maximum error of the
+/// encoding is 6e-5.
 #pragma once
 
 #include <cmath>

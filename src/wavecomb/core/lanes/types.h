@@ -78,10 +78,10 @@ using drjit::select;
 /// Dr.Jit divides a packet by a number by multiplying with its reciprocal, which differs in the
 /// last bit from scalar division. Divide by a packet instead: `x / F(number)`.
 template <template <typename, size_t> typename P, typename T, size_t W, typename Number>
-requires std::is_floating_point_v<T> && std::is_arithmetic_v<Number>
+  requires std::is_floating_point_v<T> && std::is_arithmetic_v<Number>
 void operator/(const P<T, W>&, const Number&) = delete;
 template <template <typename, size_t> typename P, typename T, size_t W, typename Number>
-requires std::is_floating_point_v<T> && std::is_arithmetic_v<Number>
+  requires std::is_floating_point_v<T> && std::is_arithmetic_v<Number>
 void operator/=(P<T, W>&, const Number&) = delete;
 
 #if defined(__AVX512F__)
@@ -96,7 +96,7 @@ using U16Mask = drjit::mask_t<U16>;
     return detail::U16Mask::from_k(_mm512_cmp_epu32_mask(a.m, b.m, predicate));    \
   }                                                                                \
   template <typename T>                                                            \
-  requires std::is_integral_v<T>                                                   \
+    requires std::is_integral_v<T>                                                 \
   inline detail::U16Mask operator op(const detail::U16& a, const T& b) {           \
     return a op detail::U16(static_cast<uint32_t>(b));                             \
   }

@@ -7,7 +7,6 @@
 ///   f'(q) = f(next(q, x)).
 /// The functions that are reachable from the functions of all ends form the minimal automaton of
 /// the reversed expressions (J. Brzozowski, "Canonical regular expressions and minimal state graphs
-/// for definite events", 1962). Brzozowski, "Canonical regular expressions and minimal state graphs
 /// for definite events", 1962).
 #pragma once
 

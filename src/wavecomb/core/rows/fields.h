@@ -38,9 +38,7 @@ namespace wavecomb {
 namespace detail {
 
 template <typename T>
-concept HasFields = requires(T& t) {
-  t.fields();
-};
+concept HasFields = requires(T& t) { t.fields(); };
 
 template <typename T>
 struct WordsOf;
@@ -123,7 +121,7 @@ inline constexpr size_t kRowWords = std::bit_ceil(kFieldWords<Row>);
 /// Returns the word index of a member in a row or record: word_of(&Row<float>::slot). Compilers
 /// reduce word_of() to a constant.
 template <typename Record, typename Member>
-WAVECOMB_INLINE uint32_t word_of(Member Record::*member) {
+WAVECOMB_INLINE uint32_t word_of(Member Record::* member) {
   static_assert(std::is_trivially_copyable_v<Record>);
   static constexpr Record kRecord{};
   const auto address = [](const auto& of) { return reinterpret_cast<const std::byte*>(&of); };
@@ -205,23 +203,23 @@ WAVECOMB_INLINE uint32_t compress_row(float* to, const Row<F>& row, const Mask<F
 /// Loads one field of row `index` at `base` for each active lane; other lanes get 0. Use load_row()
 /// if most fields are needed, since whole rows are faster.
 template <typename F, template <typename> class Row>
-WAVECOMB_INLINE F gather_field(const void* base, float Row<float>::*field, const UInt<F>& index,
+WAVECOMB_INLINE F gather_field(const void* base, float Row<float>::* field, const UInt<F>& index,
                                const Mask<F>& active) {
   return gather<F>(base, index * static_cast<uint32_t>(kRowWords<Row>) + word_of(field), active);
 }
 template <typename F, template <typename> class Row>
-WAVECOMB_INLINE UInt<F> gather_field(const void* base, uint32_t Row<float>::*field,
+WAVECOMB_INLINE UInt<F> gather_field(const void* base, uint32_t Row<float>::* field,
                                      const UInt<F>& index, const Mask<F>& active) {
   return gather<UInt<F>>(base, index * static_cast<uint32_t>(kRowWords<Row>) + word_of(field),
                          Mask<UInt<F>>(active));
 }
 template <typename F, template <typename> class Row>
-WAVECOMB_INLINE void scatter_field(void* base, float Row<float>::*field, const UInt<F>& index,
+WAVECOMB_INLINE void scatter_field(void* base, float Row<float>::* field, const UInt<F>& index,
                                    const F& value, const Mask<F>& active) {
   scatter<F>(base, value, index * static_cast<uint32_t>(kRowWords<Row>) + word_of(field), active);
 }
 template <typename F, template <typename> class Row>
-WAVECOMB_INLINE void scatter_field(void* base, uint32_t Row<float>::*field, const UInt<F>& index,
+WAVECOMB_INLINE void scatter_field(void* base, uint32_t Row<float>::* field, const UInt<F>& index,
                                    const UInt<F>& value, const Mask<F>& active) {
   scatter<UInt<F>>(base, value, index * static_cast<uint32_t>(kRowWords<Row>) + word_of(field),
                    Mask<UInt<F>>(active));
@@ -229,13 +227,13 @@ WAVECOMB_INLINE void scatter_field(void* base, uint32_t Row<float>::*field, cons
 
 /// Loads a member of record `index` at `base` for each active lane; other lanes get 0.
 template <typename F, typename Record>
-WAVECOMB_INLINE UInt<F> gather_member(const Record* base, uint32_t Record::*member,
+WAVECOMB_INLINE UInt<F> gather_member(const Record* base, uint32_t Record::* member,
                                       const UInt<F>& index, const Mask<F>& active) {
   constexpr auto kWords = static_cast<uint32_t>(sizeof(Record) / 4);
   return gather<UInt<F>>(base, index * kWords + word_of(member), Mask<UInt<F>>(active));
 }
 template <typename F, typename Record>
-WAVECOMB_INLINE F gather_member(const Record* base, float Record::*member, const UInt<F>& index,
+WAVECOMB_INLINE F gather_member(const Record* base, float Record::* member, const UInt<F>& index,
                                 const Mask<F>& active) {
   constexpr auto kWords = static_cast<uint32_t>(sizeof(Record) / 4);
   return gather<F>(base, index * kWords + word_of(member), active);

@@ -25,11 +25,11 @@ struct RecordReader {
 
   /// Reads a member of the record: reader[&MaterialRecord::roughness].
   template <typename Record>
-  F operator[](float Record::*member) const {
+  F operator[](float Record::* member) const {
     return word<F, float>(word_of(member));
   }
   template <typename Record>
-  UInt<F> operator[](uint32_t Record::*member) const {
+  UInt<F> operator[](uint32_t Record::* member) const {
     return word<UInt<F>, uint32_t>(word_of(member));
   }
   template <typename Record>

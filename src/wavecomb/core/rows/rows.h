@@ -31,8 +31,7 @@ template <size_t N, typename Function>
 WAVECOMB_INLINE void unrolled(const Function& f) {
   [&]<size_t... I>(std::index_sequence<I...>) WAVECOMB_INLINE_LAMBDA {
     (f(std::integral_constant<size_t, I>()), ...);
-  }
-  (std::make_index_sequence<N>());
+  }(std::make_index_sequence<N>());
 }
 
 /// One step of a transposition: swaps blocks of S words between `a` and `b`.
@@ -100,7 +99,7 @@ WAVECOMB_INLINE Vector<W> join(const Vector<B>* parts) {
     return join_two<W / 2>(join<B, W / 2>(parts), join<B, W / 2>(parts + W / B / 2),
                            std::make_index_sequence<W>());
 }
-/// Returns words Start .. Returns sizeof...(I) elements of a vector, from element Start on.
+/// Returns sizeof...(I) elements of a vector, from element Start on.
 template <size_t Start, size_t W, size_t... I>
 WAVECOMB_INLINE Vector<sizeof...(I)> part(const Vector<W>& v, std::index_sequence<I...>) {
   return __builtin_shufflevector(v, v, (Start + I)...);
@@ -114,9 +113,7 @@ WAVECOMB_INLINE void store_parts(const Vector<W>& v, float* const* at) {
 }
 
 template <typename F>
-concept InOneRegister = !kIsScalar<F> && !requires(const F& f) {
-  f.a1;
-};
+concept InOneRegister = !kIsScalar<F> && !requires(const F& f) { f.a1; };
 
 /// Loads N words at each lane's address.
 template <size_t N, typename F>

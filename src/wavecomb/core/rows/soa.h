@@ -24,7 +24,7 @@ class SoaBlock {
         data_(static_cast<uint32_t*>(std::aligned_alloc(64, columns * stride_ * 4))),
         bytes_(columns * stride_ * 4) {
     if (!data_) throw std::bad_alloc();
-    // The owner writes the memory first, so that it lies on the owner's NUMA node.
+    // The owner touches the memory first.
     for (size_t i = 0; i < columns * stride_; ++i) data_.get()[i] = 0;
   }
 

@@ -22,7 +22,8 @@ PixelError pixel_error(const Film& film, size_t pixel) {
   const Film::Pixel& p = film.pixel(pixel);
   const ErrorSums& e = film.error(pixel);
   const uint32_t n = p.samples, in_half = ErrorSums::half_count(n);
-  if (n < 2 * ErrorSums::kHalfBlock) return {};  // the second half has no full block yet
+  // No estimate, since the second half has no full block of samples yet.
+  if (n < 2 * ErrorSums::kHalfBlock) return {};
   const double sums[3] = {p.r, p.g, p.b};
   // Var(I - A) = var (1 / half - 1 / n). The scale makes it var / n, the variance of the mean.
   const double scale = std::sqrt(static_cast<double>(in_half) / (n - in_half));

@@ -18,8 +18,9 @@ namespace {
 using NodeLanes = FloatP<CurveBvhNodes::kMaxSubSegments>;
 
 constexpr float kCells = 65535.f;
-constexpr float kLargestCell = 65000.f;  ///< leaves room below kCells for rounding
-constexpr float kSlender = 32.f;         ///< segments with a larger length / radius are split
+/// Largest cell coordinate in use, which leaves room below kCells for rounding.
+constexpr float kLargestCell = 65000.f;
+constexpr float kSlender = 32.f;  ///< segments with a larger length / radius are split
 constexpr size_t kManySegments = size_t{1} << 20;
 constexpr float kNodeRounding = 4e-6f;  ///< relative error of float dot products
 

@@ -75,7 +75,7 @@ struct Mesh {
   Attribute normals_at = Attribute::kNone;
   std::span<const float> uvs;  ///< 2 floats per vertex or corner; empty: uv = barycentrics
   Attribute uvs_at = Attribute::kNone;
-  std::span<const uint32_t> face_materials;  ///< one per primitive, or empty
+  std::span<const uint32_t> face_materials;  ///< material of each primitive, or empty
   uint32_t material = kInheritMaterial;      ///< used if face_materials is empty
   uint32_t light_group = 0;                  ///< group of its emission: SceneBuilder::light_group
   uint32_t mesh_light = 0xffffffffu;         ///< SceneBuilder::add_mesh_light, or kNoLight

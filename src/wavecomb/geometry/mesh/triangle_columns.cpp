@@ -10,7 +10,7 @@ namespace {
 /// Lines run along (kSlopeX, kSlopeY, 1); coordinates perpendicular to them are x - kSlopeX z and y
 /// - kSlopeY z.
 constexpr float kSlopeX = 0.2371f, kSlopeY = 0.1549f;
-constexpr uint32_t kMaxCells = 512;  ///< grid cells along one side
+constexpr uint32_t kMaxCells = 512;  ///< number of grid cells along one side
 constexpr size_t kMaxEntries = 16;   ///< mean number of cells that a triangle overlaps
 
 }  // namespace

@@ -74,7 +74,7 @@ class CornerTree {
   }
 
   /// Finds a position inside or on the counter-clockwise triangle a, b, c that still has corners
-  /// and is not a vertex of the triangle. Returns kNone if there is none. Of several, it
+  /// and is not a vertex of the triangle. Returns kNone if no such position exists. Of several, it
   /// returns a pseudo-random one, which is seldom the next to be removed; its removal would require
   /// another search. Adds the number of visited nodes to `steps`.
   uint32_t find(const Corner& a, const Corner& b, const Corner& c, uint64_t& steps) {

@@ -22,7 +22,7 @@ struct ScreenView {
 /// outside the image or behind the camera form a separate mean with weight 1/8, as reflections and
 /// shadows need less detail; the larger mean counts.
 ///
-/// `to_world`: 4 x 4, for row vectors. Points must be finite and corners in range.
+/// `to_world`: 4 x 4, for row vectors. The points must be finite, and the corner indices in range.
 double edge_pixels(std::span<const float> points, std::span<const int32_t> face_sizes,
                    std::span<const int32_t> corners, const double* to_world,
                    const ScreenView& view);

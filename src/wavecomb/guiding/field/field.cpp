@@ -15,7 +15,7 @@
 namespace wavecomb {
 namespace {
 
-/// Cells with more records are divided.
+/// Cells with more records than this are divided.
 constexpr size_t kCellRecords = 2048;
 /// Minimum number of records for a region to get a separate distribution.
 constexpr double kMinRegionRecords = 64;
@@ -103,7 +103,7 @@ class GuidingFieldBuilder {
  private:
   /// Statistics of the records of one cell whose surfaces face one axis.
   struct RegionPart {
-    DirectionBins density{};  ///< sums to 1, or 0 if nothing is known
+    DirectionBins density{};  ///< density by direction, whose sum is 1, or 0 if nothing is known
     double count = 0;
     ParallaxSphere sphere;  ///< centre of the directions of `density`
     ShareMoments moments;

@@ -3,7 +3,7 @@
 ///
 /// Space is divided into cells, and each cell into six regions by the axis direction that a surface
 /// faces. A region holds the distribution of incident light times BSDF by direction, as seen from
-/// the region's centre. The field is constant while waves run.
+/// the region's centre. The guiding field is constant while waves run.
 #pragma once
 
 #include <cstdint>
@@ -39,7 +39,8 @@ struct GuidingView {
   const uint32_t* grid = nullptr;    ///< kGuidingTopCells entries, then bricks
   const uint32_t* cells = nullptr;   ///< region or kNoGuidingRegion by kGuidingAxes * cell + axis
   const uint32_t* tables = nullptr;  ///< kGuidingWords per region
-  const ParallaxSphere* spheres = nullptr;  ///< per region: where its light lies
+  /// Per region: the sphere on which its incident light is assumed to lie.
+  const ParallaxSphere* spheres = nullptr;
   const float* bsdf_share = nullptr;  ///< per region: probability that the BSDF samples a bounce
   /// Per region: survival probability of a path whose throughput equals the brightness of the
   /// image, before it is clamped (guiding/roulette.h).

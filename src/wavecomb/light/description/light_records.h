@@ -229,8 +229,7 @@ struct LightTreeView {
   float effective_lights = 0;
 };
 
-/// Packed light linking (light/description/linking.h); null if no light is linked. The pointer is
-/// null if no light is linked.
+/// Packed light linking (light/description/linking.h). Its pointers are null if no light is linked.
 struct LinkView {
   const uint32_t* classes = nullptr;
   const uint32_t* members = nullptr;
