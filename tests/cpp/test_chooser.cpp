@@ -75,7 +75,7 @@ TEST(Chooser, TriesEachArmThenTakesTheLeast) {
 
 TEST(Chooser, WeighsRunningAgainstPreparing) {
   // Sorting costs 10 ns per record. With 1600 records, sorting halves 100 packets of 200 ns: it
-  // saves 10 us and costs 16 us. With 2000 ns per packet, sorting saves 100 us.
+  // saves 10 us and costs 16 us. Where a packet takes 2000 ns, sorting saves 100 us.
   Game inexpensive(2, fixed({200, 200}), {0, 10});
   inexpensive.work = {{100, 1600}, {50, 1600}};
   Game expensive(2, fixed({2000, 2000}), {0, 10});
