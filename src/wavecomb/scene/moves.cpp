@@ -2,7 +2,6 @@
 #include "wavecomb/scene/moves.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "wavecomb/core/error.h"
 #include "wavecomb/scene/names.h"
@@ -19,12 +18,10 @@ using Matches = std::vector<uint32_t>;
 class MoveFinder {
  public:
   explicit MoveFinder(const Moves& moves) : moves_(moves), found_(moves.size(), false) {
-    for (const auto& [path, m] : moves) {
-      const float det = m.determinant();
-      if (!finite(m) || !(std::abs(det) > 1e-35f) || !std::isfinite(det))
+    for (const auto& [path, m] : moves)
+      if (!is_invertible(m))
         throw Error(quoted("prim", path) +
                     " is moved by a singular transform; give an invertible matrix");
-    }
   }
 
   Matches matches(std::string_view object) {

@@ -17,6 +17,11 @@ inline bool finite(const Vec3<float>& v) {
 inline bool finite(const Affine& m) {
   return finite(m.row[0]) && finite(m.row[1]) && finite(m.row[2]) && finite(m.t);
 }
+/// Returns whether a transform is finite and has an inverse in single precision.
+inline bool is_invertible(const Affine& m) {
+  const float det = m.determinant();
+  return finite(m) && std::isfinite(det) && std::abs(det) > 1e-35f;
+}
 
 /// Returns "mesh '/World/Box'", or "mesh" for an empty name.
 std::string quoted(const std::string& kind, const std::string& name);

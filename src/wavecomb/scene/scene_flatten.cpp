@@ -130,10 +130,6 @@ void SceneBuilder::flatten_groups(SceneGeometry& geometry) {
   std::vector<Instance> flat;
   flat.reserve(count_placements(0, 0, placements));
   flatten(0, {0, Affine{}, kInheritMaterial, kNoName, {}}, {}, placements, flat, geometry);
-  const auto is_invertible = [](const Affine& m) {
-    const float det = m.determinant();
-    return finite(m) && std::isfinite(det) && std::abs(det) > 1e-35f;
-  };
   geometry.placements.shrink_to_fit();
   const size_t singular = std::erase_if(flat, [&](const Instance& i) {
     bool valid = i.motion.moves() || is_invertible(i.to_world);
