@@ -21,7 +21,7 @@ import tiers
 os.environ.setdefault("WAVECOMB_SANDBOX", "off")
 
 # Tests start hundreds of processes, which should not compile the package each time. A process in
-# the sandbox could not save the result.
+# the sandbox cannot write the compiled bytecode.
 if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
     sys.dont_write_bytecode = False
 

@@ -69,12 +69,12 @@ struct Case {
   std::string name;
   std::vector<Chart> charts;
   std::function<double(const Place&)> density;  ///< per dx dy
-  /// Draws a sample; `check` asks for Draw::agrees.
+  /// Draws a sample; sets Draw::agrees if `check` is true.
   std::function<Draw(Random&, bool check)> draw;
   /// Allowed fraction of samples that do not agree, because rounding moves them across an edge.
   double odd = 1e-3;
-  /// Tolerance of the integral of the density, which uses floats. It is larger where samples are so
-  /// few that leaves are large.
+  /// Tolerance of the integral of the density, which uses floats. The test raises the tolerance for
+  /// small sample counts, for which k-d tree leaves are large.
   double slack = 5e-4;
   /// True for smooth densities, whose lobes have wide tails that pilot evaluations find; false for
   /// densities with jumps.

@@ -94,7 +94,7 @@ class LightCharts {
   Ray ray(const chi_square::Place& p) const {
     Ray r = any_ray(p);
     const uint32_t of = seen_[p.chart].light;
-    // The chart of a portal covers this direction.
+    // The direction belongs to the chart of a portal, so it has no solid angle in this chart.
     if (r.solid_angle > 0 && seen_[of].portals > 0 && portal(of, r.dir) != p.chart)
       r.solid_angle = 0;
     if (seen_[p.chart].light != p.chart) r.distance = double{kFarAway};

@@ -257,8 +257,8 @@ TEST(ErrorMap, SeesTheNoiseOfSplats) {
 }
 
 TEST(Adaptive, LightPathsGoOnAsFarAsTheirNoiseDecides) {
-  // With equal noise of splats and samples, n = m = 16 and all pixels active, both get equal
-  // numbers of samples.
+  // If light splats and camera samples have equal noise after 16 samples each and all pixels are
+  // active, both get equal numbers of samples.
   EXPECT_EQ(light_samples_after({1, 1}, 16, 16, 64, 64, 1.0), 64u);
   // With a sixteenth of the pixels active, a sample of light paths costs 16 times as much.
   EXPECT_EQ(light_samples_after({1, 1}, 16, 16, 64, 64, 1.0 / 16), 16u);
@@ -268,7 +268,7 @@ TEST(Adaptive, LightPathsGoOnAsFarAsTheirNoiseDecides) {
   EXPECT_EQ(light_samples_after({100, 1}, 16, 16, 64, 64, 1e-3), 16u);
   EXPECT_EQ(light_samples_after({0, 0}, 16, 16, 64, 64, 1.0), 16u);
   EXPECT_EQ(light_samples_after({0, 1}, 16, 16, 64, 64, 1.0), 64u);
-  // Without half buffers of the splats, their noise is unknown.
+  // Without half buffers, the noise of light splats is unknown.
   EXPECT_EQ(light_samples_after({1, 0}, 1, 4, 16, 4, 1.0), 4u);
 }
 

@@ -58,7 +58,7 @@ TEST(SampleAllocation, GivesOutTheBudgetExactly) {
       EXPECT_EQ(total(a), uint64_t{spp} * size * size) << spp << " " << size;
       EXPECT_GE(facts.least, facts.pilot);
       EXPECT_EQ(facts.most, *std::max_element(a.counts.begin(), a.counts.end()));
-      // Sample counts of intermediate passes never decrease, and end at these values.
+      // Sample counts of intermediate passes never decrease, and end at the allotted counts.
       for (size_t i = 0; i < a.counts.size(); ++i) {
         EXPECT_EQ(a.at(i, a.spp), a.counts[i]);
         EXPECT_EQ(a.at(i, a.pilot), a.pilot);

@@ -276,7 +276,8 @@ TEST(Guide, BouncesAreWeighed) {
   training_samples.insert(training_samples.end(), 10,
                           {bounce_position_key(kUnitGrid, {0.1f, 0.1f, 0.9f}, 3), 9.f, 81.f, 1});
   field.compute_survival(training_samples, {27, 0.5});
-  // X = 16 / 4, c = 12 / 4, with the safety factor of 1.5.
+  // The 4000 bounces have a mean squared contribution of 16 / 4 and a mean cost of 12 / 4; the
+  // survival factor includes a safety factor of 1.5.
   const auto guiding = look_up_guiding<float>(field.view(), {0.5f, 0.5f, 0.5f}, 2, 0, true);
   EXPECT_NEAR(guiding.survival, 1.5 * std::sqrt(4. / 3 * 27 / 0.5), 1e-4);
   EXPECT_EQ(efficient_survival<float>(guiding, 0.f), kMinSurvival);

@@ -11,7 +11,9 @@
 namespace wavecomb {
 namespace {
 
-/// Share of a part, and a = g / q and r = b / q at each vertex where it was selected.
+/// Selection probability (share) of a part of the lights, and two ratios at each vertex that
+/// selected it: contribution g and bounce density b, each divided by the density q of the light
+/// sample.
 struct Samples {
   double share;
   std::vector<std::pair<double, double>> found;
@@ -55,8 +57,8 @@ TEST(LightBalance, IsTheSquareRootOfTheSecondMoment) {
 TEST(LightBalance, WhatBouncesFindHasTheFloor) {
   const std::vector<double> power{0.8, 0.2};
   const double floor = LightBalance::kFloor * (0.25 + 0.4);
-  // Tests uniform domes, dimmer and brighter than the light: g = radiance * b, half of the dome is
-  // below the horizon.
+  // Tests uniform domes, dimmer and brighter than the light. The contribution of a dome sample is
+  // the radiance times the bounce density, and half of the dome is below the horizon.
   for (const double radiance : {0.05, 0.5, 2.0}) {
     const auto shares =
         balanced({{0.6, {{radiance * 2, 2}, {0, 0}}}, {0.4, {{0.5, 0.01}, {0.5, 0.01}}}}, power);

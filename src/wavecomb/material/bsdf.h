@@ -88,15 +88,16 @@ struct BsdfSample {
   F pdf;
   Mask<F> is_delta;
   /// Relative index of refraction across the surface (eta_t / eta_i); 1 for reflection and for
-  /// straight transmission. Throughput includes the radiance scaling of refraction, which Russian
-  /// roulette removes by this factor.
+  /// straight transmission. Russian roulette uses this index to remove the radiance scaling of
+  /// refraction from the throughput.
   F eta;
   /// Perceptual roughness of the chosen lobe (1 for diffuse), for ray cones.
   F roughness;
 };
 
-/// Base class of programs whose view holds more than wo. Adds overloads that take wo and compute
-/// the view; programs import them with using-declarations.
+/// Base class of BSDFs that precompute values for a viewing direction wo (`view(wo)`). Adds
+/// overloads that take wo and compute these values; BSDFs import the overloads with
+/// using-declarations.
 template <typename Bsdf, typename F>
 struct ViewedBsdf : BsdfTraits {
   F delta_probability(const Vec3<F>& wo) const { return self().delta_probability(self().view(wo)); }
@@ -141,7 +142,7 @@ struct ShadingParams {
   UInt<F> flags;
 };
 
-/// Inputs plus the program-specific parameters, in the order of their row
+/// Material inputs plus the program-specific parameters, in the order of the program's table row
 /// (material/description/programs.h).
 template <typename F>
 struct SpecificShadingParams : ShadingParams<F> {

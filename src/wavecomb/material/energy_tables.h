@@ -47,7 +47,7 @@ class EnergyTables {
   std::vector<float> values_;
 };
 
-/// Returns the tables that these materials need, or nullptr: MaterialView::energy.
+/// Returns the energy tables for MaterialView::energy, or nullptr if no material needs them.
 const float* energy_tables(std::span<const Material> materials);
 
 /// Interpolated lookup in lanes; `table` is EnergyTables::data().

@@ -14,11 +14,11 @@ struct PointMass {
   double x, weight;
 };
 
-/// Returns the nodes and weights of Gauss quadrature, which integrates polynomials up to degree 2 n
-/// - 1 over the measure `points` exactly (x in [0, 1], weights >= 0). Nodes are the roots of the
-/// orthogonal polynomial of degree n, built by the Stieltjes procedure (Gautschi, "Orthogonal
-/// Polynomials: Computation and Approximation", 2004, section 2.2.3). If the points nearly
-/// coincide, all n nodes are their mean.
+/// Returns the nodes and weights of Gauss quadrature with n nodes over the measure `points` (x in
+/// [0, 1], weights >= 0), which integrates polynomials of degree below 2 n exactly. Nodes are the
+/// roots of the orthogonal polynomial of degree n, built by the Stieltjes procedure (Gautschi,
+/// "Orthogonal Polynomials: Computation and Approximation", 2004, section 2.2.3). If the points
+/// nearly coincide, all n nodes are their mean.
 template <size_t n>
 inline std::array<PointMass, n> gauss_rule(const std::vector<PointMass>& points) {
   // Recurrence p_(k+1) = (x - a_k) p_k - b_k p_(k-1), with norm_k = sum of weight p_k^2.
@@ -32,8 +32,8 @@ inline std::array<PointMass, n> gauss_rule(const std::vector<PointMass>& points)
       mass += q;
       first += q * points[i].x;
     }
-    // The points spread over less than about 1e-5 of the range; the norm falls with the power 2 k
-    // of it.
+    // Stop if the points span less than about 1e-5 of [0, 1]: the norm of the polynomial of degree
+    // k falls with the power 2 k of the span.
     if (k > 0 && mass < norm[0] * std::pow(1e-10, static_cast<double>(k))) {
       rule.fill({a[0], norm[0] / n});
       return rule;

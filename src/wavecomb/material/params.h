@@ -74,8 +74,8 @@ WAVECOMB_INLINE void complete_params(const MaterialView& view, const UInt<F>& ma
 /// Evaluates the parameters of `material` at `uv` and clamps them to valid ranges. Inputs in
 /// `kInputs` may read textures, others use their constants. `footprint` is the ray's footprint in
 /// uv. `kGraphs` false skips value graphs; otherwise graphs receive the point that `make_point`
-/// returns. `opacity` is 1 if it means presence (cut-outs); fetch_opacity returns that. Values of
-/// inactive lanes are unspecified but finite.
+/// returns. The returned `opacity` is 1 for materials that use opacity as presence (cut-outs),
+/// which fetch_opacity returns. Values of inactive lanes are unspecified but finite.
 template <uint32_t kInputs, typename F, bool kGraphs = true, typename MakePoint>
 WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UInt<F>& material,
                                               const Vec2<F>& uv, const Footprint<F>& footprint,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Features that vertex kernels are compiled with (kernel_matrix.h): all of them, or, for plain
-/// kernels, only those that simple scenes need. A joint transport is not among them, since it is a
-/// type (joint_transport.h).
+/// kernels, only those that simple scenes need. A joint transport is not a feature flag, since
+/// kernels select it by a template type (joint_transport.h).
 #pragma once
 
 #include <cstdint>

@@ -20,14 +20,15 @@ struct WaveTask {
   uint32_t pixel_count;
   uint32_t first_sample;
   uint32_t samples;
-  /// Whether to trace paths of the joint transport (joint_transport.h) instead of camera paths. A
-  /// pixel then only numbers a path, which may contribute to any pixel.
+  /// Whether to trace paths of the joint transport (joint_transport.h) instead of camera paths.
+  /// Pixel and sample are then only the index of a path, which may contribute to any pixel.
   bool joint = false;
   uint32_t path_count() const { return pixel_count * samples; }
 };
 
-/// Statistics and training data of a worker; null if the integrator has none. Read these only while
-/// the worker is idle, except `counts`, which its own thread may read at any time.
+/// Statistics and training data of a worker; null if the integrator has none. All members except
+/// `counts` may be read only while the worker is idle; the worker's thread may read `counts` at any
+/// time.
 struct WorkerView {
   const PhaseClock* clock = nullptr;
   const Counts* counts = nullptr;

@@ -1,18 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Interface to a joint transport: an algorithm that finds light along some of the paths that
-/// camera paths find, in another way, such as light paths (light_paths/coupling.h).
+/// Interface to a joint transport: a second light transport algorithm, such as light paths
+/// (light_paths/coupling.h), that samples some of the same light paths as camera paths do, by
+/// another technique.
 ///
-/// Camera paths know a joint transport by two things:
+/// A joint transport affects camera paths in two ways:
 ///
-/// - An extra MIS weight. With R the density with which the joint transport samples a path,
+/// - It adds a technique to the MIS weights of camera paths. With R the density with which the
+/// joint transport samples a path,
 ///   relative to the density of bounces and up to the density D of the light's emission
 ///   (light/emission/emission.h), the balance heuristic gives the weights
 ///     bounce        1 / (1 + p_light / p_bounce + R D),
-///     light sample  1 / (1 + p_bounce / p_light + R' D / p_light),  R' with p_light for p_bounce.
+///     light sample  1 / (1 + p_bounce / p_light + R' D / p_light), where R' is R with p_light in
+///     place of p_bounce.
 ///   Each vertex multiplies its factors into R (PathState::ratio), which is 0 where the joint
 ///   transport does not reach.
-/// - An offered vertex. The joint transport receives each vertex between its light sample and its
-///   bounce, and may store it, for example to connect it to other vertices.
+/// - It receives each camera path vertex between the vertex's light sample and bounce, and may
+/// store the vertex, for example to connect it to other vertices.
 ///
 /// A joint transport is a class with three member types:
 ///
@@ -23,9 +26,9 @@
 ///                  ratio<F>(slot, active)                                   returns it
 ///   Coupling<F>  couples a packet of vertices to both; has the members of NoCoupling
 ///
-/// Vertex kernels are templates on the class, so that nothing is virtual, and kernels with
-/// NoJointTransport have no code for it. wave/joint_transport.h registers the class that general
-/// kernels use.
+/// Vertex kernels are templates on the class, so that there are no virtual calls, and kernels with
+/// NoJointTransport contain no code for joint transport. wave/joint_transport.h registers the class
+/// that general kernels use.
 #pragma once
 
 #include "wavecomb/path/path_state.h"
@@ -39,8 +42,8 @@ struct FirstHit {
   F time;          ///< shutter time, if the camera moves
 };
 
-/// Coupling of a packet of vertices to no joint transport. The functions are called in the order in
-/// which they are declared.
+/// Coupling without effect, for renders without a joint transport. The functions are called in the
+/// order in which they are declared.
 template <typename F>
 struct NoCoupling {
   template <typename... Data>
@@ -64,7 +67,8 @@ struct NoCoupling {
   void begin(const V& /*v*/, const Interaction& /*at*/, const Frame<F>& /*frame*/) {}
 
   /// Returns the MIS weight of the light sample `to_light` with direction `wi` in the frame of the
-  /// vertex, against bounces with density `p_bounce`. `weight` is that without the joint transport.
+  /// vertex, against bounces with density `p_bounce`. `weight` is the MIS weight without the joint
+  /// transport.
   template <typename Context, typename Light>
   F light_weight(const Context& /*c*/, const Light& /*to_light*/, const Vec3<F>& /*wi*/,
                  const F& /*p_bounce*/, const F& weight) const {
@@ -80,8 +84,9 @@ struct NoCoupling {
   void bounce(const Context& /*c*/, const Vec3<F>& /*world*/, const Bounce& /*b*/,
               PathState<F>& /*next*/) {}
 
-  /// Stores R, and the vertices that were offered. `next` is the state of the paths that continue,
-  /// `alive`. `aovs` are those of the wave, before they record the vertex.
+  /// Stores R, and the vertices that were offered. `next` is the state of the paths in the lanes
+  /// `alive`, which continue. `aovs` are the AOV values of the wave, which do not include this
+  /// vertex yet.
   template <typename Aovs>
   void store(const UInt<F>& /*slot*/, const PathState<F>& /*next*/, const Mask<F>& /*alive*/,
              const Aovs& /*aovs*/, const Mask<F>& /*active*/) const {}

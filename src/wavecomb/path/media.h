@@ -10,7 +10,7 @@
 ///   bool has_emission() const;
 ///   // Radiance of the segment.
 ///   Color<F> emission(const MediumQuery<F>&, const Mask<F>& active) const;
-///   // ProgramList of all programs, with those of surfaces.
+///   // ProgramList of all programs, including surface programs.
 ///   template <typename F> using Programs;
 ///   template <typename F>
 ///   Flight<F> sample_flight(const MediumQuery<F>&, const Color<F>& throughput,
@@ -38,8 +38,8 @@
 
 namespace wavecomb {
 
-/// Ray segment without surfaces: points o + x d with 0 < x < t. It ends at the vertex of `depth`
-/// or, for a shadow ray, leads from that vertex to a light.
+/// Ray segment without surfaces: points o + x d with 0 < x < t. The segment ends at the vertex of
+/// `depth` or, for a shadow ray, leads from that vertex to a light.
 template <typename F>
 struct MediumQuery {
   SamplerKind sampler;

@@ -5,8 +5,8 @@
 /// where R_j is the radiance of the path after the light sample of vertex j, and T_j the throughput
 /// after the bounce.
 ///
-/// Both integrators own a PathHistory and report vertices to it. It is empty and costs nothing if
-/// no HistoryReader is set.
+/// Both integrators own a PathHistory and report vertices to it. The history is empty and costs
+/// nothing if no HistoryReader is set.
 #pragma once
 
 #include <algorithm>
@@ -35,7 +35,8 @@ struct HistoryRow {
   WAVECOMB_FIELDS(p, wi, throughput, pdf, radiance, material, axis, bsdf_pdf)
 };
 
-/// Shaded vertex that a path arrived at and leaves. The object is valid while its references are.
+/// References to the state of a shaded path vertex and to the result of shading it. Contract: the
+/// referenced objects outlive the ShadedVertex.
 template <typename F>
 struct ShadedVertex {
   const PathState<F>& path;  ///< on arrival
@@ -112,8 +113,9 @@ class PathHistory {
 /// Receiver of the vertices of finished paths.
 ///
 /// Contract: all workers call it concurrently, once for each wave (the reference integrator once
-/// for each path). The arguments are valid only during the call. Sums must be integers to be equal
-/// for every schedule (core/encoding/fixed_point.h).
+/// for each path). The arguments are valid only during the call. Since workers call in any order,
+/// implementations must add up values as integers to be deterministic
+/// (core/encoding/fixed_point.h).
 class HistoryReader {
  public:
   virtual ~HistoryReader() = default;

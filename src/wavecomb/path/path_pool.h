@@ -28,8 +28,8 @@ struct BodyEntry {
 /// Camera path between two vertices. Each vertex reads the row and overwrites it with the next ray.
 ///
 /// A ray that enters a subsurface body (enters_body()) uses neither a cone nor a receiver. The row
-/// stores its BodyEntry in their words and marks the layout by the sign bit of `pdf`. Only the
-/// member functions know this encoding.
+/// then stores the BodyEntry in the words of the cone and the receiver, and marks this layout by
+/// the sign bit of `pdf`. Only the member functions use this encoding.
 template <typename F>
 struct PathRow {
   Vec3<F> o, d;  ///< the ray to trace
@@ -42,14 +42,14 @@ struct PathRow {
   WAVECOMB_FIELDS(o, d, throughput, pdf, eta_scale, cone_width, cone_spread, key, receiver)
 
   Mask<F> enters_body() const { return pdf < 0.f; }
-  /// Makes the rays of `lanes` enter a body. Their pdf must be above 0.
+  /// Makes the rays of `lanes` enter a body. The rays' pdf must be above 0.
   void set_entry(const Mask<F>& lanes, const BodyEntry<F>& entry) {
     pdf = select(lanes, F(-pdf), pdf);
     cone_width = select(lanes, bits_float<F>(entry.normal), cone_width);
     receiver = select(Mask<UInt<F>>(lanes), entry.body, receiver);
   }
-  /// Returns the entry, and gives the ray a cone of width 0. The word of `receiver` continues to
-  /// hold the body, which the ray queries of the walk read there.
+  /// Returns the entry, and gives the ray a cone of width 0. `receiver` still holds the body
+  /// afterwards, because the ray queries of the walk read it.
   BodyEntry<F> take_entry() {
     const BodyEntry<F> entry{receiver, float_bits<F>(cone_width)};
     pdf = abs(pdf);

@@ -61,8 +61,8 @@ struct PathState {
   UInt<F> receiver{0u};  ///< LightReceiver::normal of the previous vertex
   UInt<F> link{0u};      ///< link class of the surface that the ray left, if lights are linked
   F importance{0.f};     ///< one over the brightness of the image at the pixel; 0 if unknown
-  /// Density with which a joint transport samples this path, relative to its own density and up to
-  /// the density of the light's emission (joint_transport.h); 0 without.
+  /// Density with which a joint transport samples this path, relative to the path's own density and
+  /// up to the density of the light's emission (joint_transport.h); 0 without a joint transport.
   F ratio{0.f};
   Mask<F> enters_body{false};  ///< whether the bounce enters a subsurface body
   BodyEntry<F> entry{};        ///< that body
@@ -94,7 +94,7 @@ WAVECOMB_INLINE PathState<F> path_state(const PathRow<F>& row, const F& t) {
           .o = row.o,
           .receiver = row.receiver};
 }
-/// Returns the row of a camera path whose next ray is that of `next`. `kMayEnter` is false if no
+/// Returns the row of a camera path that continues in the state `next`. `kMayEnter` is false if no
 /// ray can enter a subsurface body.
 template <bool kMayEnter, typename F>
 WAVECOMB_INLINE PathRow<F> path_row(const PathState<F>& next, const SampleKey<F>& key) {
@@ -140,13 +140,13 @@ struct ScatteringEvent {
   Mask<F> is_delta{false};
 };
 
-/// AOV values of a vertex. The steps write them directly instead of returning them, since most
-/// vertices have none, and values that live until the end of shading would occupy registers.
+/// AOV values of a vertex. The steps of a vertex write AOVs directly instead of returning them:
+/// most renders have no AOVs, and values that live until the end of shading would occupy registers.
 template <typename F>
 struct VertexAovs {
-  /// Requested values. All fields without a flag here are always written.
+  /// Requested values. Flags of optional fields. Fields without a flag are always written.
   bool wants_uv = false, wants_lights = false, wants_bounces = false;
-  bool wants_events = false;  ///< classifies scatterings; implies wants_lights
+  bool wants_events = false;  ///< whether scattering events are classified; implies wants_lights
   Color<F> albedo;
   Vec3<F> normal;
   Mask<F> is_clear;  ///< whether the surface has only delta lobes, such as a mirror or glass
@@ -172,7 +172,7 @@ struct Guides {
 };
 
 /// Returns the denoiser inputs at a vertex: albedo, tinted by the mirrors and glass before it, and
-/// normal. If the vertex is clear, the next vertex replaces both.
+/// normal. At a vertex with `is_clear`, the next vertex replaces both values.
 template <typename F>
 inline Guides<F> guides_of(const VertexAovs<F>& v, const PathState<F>& path) {
   const auto tinted = [&](const F& albedo, const F& throughput) {
@@ -231,7 +231,8 @@ class ContributionLimit {
     const F y = luminance(finite(whole));
     scale_ = select(y > limit, F(limit / max(y, F(1e-30f))), F(1.f));
   }
-  /// Returns the limited contribution of `part`, a summand of the whole or the whole itself.
+  /// Returns the limited contribution of `part`, which is a summand of the contribution given to
+  /// the constructor or all of it.
   Color<F> of(const Color<F>& part) const {
     return limited_ ? finite(part) * scale_ : finite(part);
   }

@@ -18,7 +18,7 @@ enum class Phase : uint8_t {
   kShade,
   kShadow,
   kResolve,
-  kMetrics,  ///< measuring the other phases; not part of rendering
+  kMetrics,  ///< time spent on statistics of other phases, which is not part of rendering
 };
 inline constexpr size_t kPhaseCount = 10;
 inline constexpr const char* kPhaseNames[kPhaseCount] = {

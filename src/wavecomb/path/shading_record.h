@@ -7,14 +7,15 @@
 
 namespace wavecomb {
 
-/// Instance of a record that is not a hit. Differs from kNoHit and kLightShape, which have no
-/// records.
+/// Instance of the records of volume events, which have no surface. Differs from kNoHit and
+/// kLightShape, which have no records.
 inline constexpr uint32_t kNoSurface = 0xfffffffdu;
 static_assert(kNoSurface < kLightShape && kLightShape < kNoHit);
 
-/// Hit or volume event of a path: a row of the ShadingQueue. The program in the queue's program
-/// column determines which one it is. If the program's kOnSurface is false, the record is a volume
-/// event, which has only `t` and `slot`; its instance is kNoSurface and the other words are 0.
+/// Hit or volume event of a path: a row of the ShadingQueue. The shading program in the queue's
+/// program column distinguishes hits from volume events. If the program's kOnSurface is false, the
+/// record is a volume event, which has only `t` and `slot`; its instance is kNoSurface and the
+/// other words are 0.
 template <typename F>
 struct ShadingRecord {
   F t;     ///< length of the ray

@@ -15,7 +15,7 @@ inline constexpr uint32_t kCountedDepths = 32;
 struct VolumeCounts {
   uint64_t steps = 0;       ///< grid cells visited by paths and shadow rays, plus collisions
   uint64_t collisions = 0;  ///< collisions with the majorant among the steps, real or null
-  uint64_t lanes = 0;       ///< lanes of the packets, active or not
+  uint64_t lanes = 0;       ///< lanes of the packets, both active and inactive
 
   void add(const VolumeCounts& o) {
     steps += o.steps;
@@ -31,11 +31,11 @@ struct Counts {
   uint64_t shadow_rays = 0;
   uint64_t records = 0;       ///< hits shaded
   uint64_t packets = 0;       ///< shading packets run
-  uint64_t packet_lanes = 0;  ///< lanes of those packets, full or not
+  uint64_t packet_lanes = 0;  ///< lanes of shading packets, both active and inactive
   VolumeCounts volumes;
   uint64_t walks = 0;       ///< subsurface random walks
-  uint64_t walk_steps = 0;  ///< rays traced in these walks, not included in `rays`
-  uint64_t walk_lanes = 0;  ///< lanes of the packets, active or not
+  uint64_t walk_steps = 0;  ///< rays traced by subsurface random walks, not included in `rays`
+  uint64_t walk_lanes = 0;  ///< lanes of the walks' packets, both active and inactive
   /// Rays, shadow rays and records at each depth. Depth 0 has the camera rays and their hits.
   std::array<uint64_t, kCountedDepths> rays_at{}, shadow_rays_at{}, records_at{};
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Shading of one path vertex as a sequence of steps. The wave and the reference integrator share
-/// it.
+/// Shading of one path vertex as a sequence of steps. The wavefront and reference integrators share
+/// this code.
 #pragma once
 
 #include "wavecomb/core/sampler.h"

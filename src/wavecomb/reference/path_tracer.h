@@ -18,14 +18,14 @@
 
 namespace wavecomb {
 
-/// Part that a joint transport (path/joint_transport.h) has in the camera paths of the reference
-/// integrator; here, of none.
+/// Functions by which a joint transport (path/joint_transport.h) takes part in the camera paths of
+/// the reference integrator. This class, for renders without a joint transport, does nothing.
 struct NoJointTracer {
   NoJointTracer(const WaveContext& /*context*/, ReferenceWorker& /*worker*/) {}
-  /// Begins a camera path. The paths of the joint transport that it needs may be traced here.
+  /// Begins a camera path. An implementation may trace the light paths that the camera path needs.
   void begin(uint32_t /*pixel*/, uint32_t /*sample*/) {}
-  /// Uses the vertex of the path at `depth`, after its shadow ray. `rays` are those of the path.
-  /// Returns a contribution to its radiance.
+  /// Uses the path's vertex at `depth`, after its shadow ray was traced. `rays` traces the rays of
+  /// the path. Returns a contribution to the path's radiance.
   Color<float> use_vertex(uint32_t /*depth*/, SingleRays& /*rays*/) { return Color<float>(0.f); }
   /// Ends a path that was added to pixel `index` of the film.
   void end(size_t /*index*/) {}
@@ -221,7 +221,8 @@ class PathTracer : PathRecorder {
     return true;
   }
 
-  /// Returns the ray segment of a path to `hit`. The query refers to the path and the hit.
+  /// Returns the ray segment of a path to `hit`. The returned query holds references to the path
+  /// and the hit.
   MediumQuery<F> passage_of(const SampleKey<F>& key, uint32_t depth, const PathState<F>& path,
                             const SingleHit& hit) const {
     return {settings_.sampler, key, depth, path.o, path.dir, hit.t, rays_.time()};
@@ -238,9 +239,9 @@ class PathTracer : PathRecorder {
                                             true);
   }
 
-  /// Adds the light sample of `v`, whose light is in `group`. Volumes always attenuate it, and
-  /// media inside meshes do if the shadow ray is free. If an object blocks the ray, only the
-  /// fraction v.shadow_tint (the shadow colour of the light) remains.
+  /// Adds the light sample of `v`, whose light is in `group`. Volumes always attenuate the light
+  /// sample, and media inside meshes do if the shadow ray is free. If an object blocks the ray,
+  /// only the fraction v.shadow_tint (the shadow colour of the light) remains.
   void add_direct(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v, bool is_free,
                   uint32_t group) {
     Color<F> c = v.direct;

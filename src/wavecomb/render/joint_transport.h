@@ -9,9 +9,9 @@
 
 namespace wavecomb {
 
-using JointShare = LightPathShare;    ///< number of its paths per camera path
+using JointShare = LightPathShare;    ///< number of light paths per camera path
 using JointPlan = LightPathPlan;      ///< part of a RenderPlan
-using JointPilot = LightPathPilot;    ///< its pilot, among those of run_pilots()
-using JointPasses = LightPathPasses;  ///< its passes in a PassLoop
+using JointPilot = LightPathPilot;    ///< the joint transport's pilot in run_pilots()
+using JointPasses = LightPathPasses;  ///< the joint transport's passes in a PassLoop
 
 }  // namespace wavecomb

@@ -20,8 +20,8 @@ constexpr uint32_t kPassSamples = 16;
 /// Brightness of the darkest layer of cascades (film/cascades.h), relative to that of the scene.
 constexpr float kDarkestShare = 0x1p-12f;
 
-/// Creates the policy called `name`. For "adaptive", creates all those to choose among, "none"
-/// first.
+/// Creates the policy called `name`. For "adaptive", creates all policies that the chooser selects
+/// from, "none" first.
 std::vector<std::unique_ptr<SchedulingPolicy>> make_policies(const std::string& name) {
   std::vector<std::unique_ptr<SchedulingPolicy>> policies;
   if (name == "adaptive")

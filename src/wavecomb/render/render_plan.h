@@ -23,11 +23,12 @@
 
 namespace wavecomb {
 
-/// Returns the number of threads of a render: that of the settings, or all hardware threads.
+/// Returns the number of threads of a render: Settings::threads, or all hardware threads if that is
+/// 0.
 uint32_t thread_count(const Settings& settings);
 
-/// Returns the number of paths in a wave of a render of `pixels` pixels: that of the settings or
-/// 4096, but small enough that every thread gets several waves.
+/// Returns the number of paths in a wave of a render of `pixels` pixels: the value in the settings
+/// or 4096, reduced so that every thread gets several waves.
 uint32_t wave_size_for(const Settings& settings, uint64_t pixels);
 
 /// Returns the grid over the scene for Morton codes.

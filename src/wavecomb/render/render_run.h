@@ -23,7 +23,8 @@
 
 namespace wavecomb {
 
-/// Data that the pilot renders for one image share. Both pointers are null in other renders.
+/// Data that is shared by all pilot renders for one image. Both pointers are null in renders that
+/// are not pilots.
 struct PilotShared {
   const Settings* image = nullptr;  ///< image whose lights are calibrated
   /// Result of the joint transport's pilot, from the first pilot render.
@@ -43,7 +44,7 @@ class RenderRun {
             std::optional<TransportChoice> transport);
 
   /// Runs the pilots and all passes. Calls `learned` on the worker thread when the pilots are done,
-  /// unless the render was stopped before. Throws what callbacks and workers throw.
+  /// unless the render was stopped before. Rethrows exceptions of callbacks and workers.
   void run(PilotCache& cache, const PilotShared& shared,
            const std::function<void(const PilotResults&)>& learned);
 

@@ -9,7 +9,7 @@ namespace wavecomb {
 
 /// Progress of a render.
 struct RenderStatus {
-  uint64_t samples_done = 0;  ///< including those of a checkpoint
+  uint64_t samples_done = 0;  ///< samples rendered so far, including samples from a checkpoint
   uint64_t resumed_samples = 0;
   uint64_t samples_total = 0;  ///< samples of the whole render; an estimate if adaptive or timed
   uint64_t rays = 0;           ///< rays of all kinds since the render began or was resumed

@@ -20,14 +20,15 @@
 
 namespace wavecomb {
 struct WavefrontRenderer::Impl {
-  // Guarded by the mutex; replaced by edits and renders.
+  // The mutex guards these members, which edits and renders replace.
   std::shared_ptr<const Scene> scene;
   std::shared_ptr<const EmbreeAccelerator> accel;
   uint64_t version = 0;
-  std::shared_ptr<const Learned> learned;  ///< by the last render that was not stopped before
-  Watch* watch = nullptr;                  ///< watch of the running render
-  RenderStatistics statistics;             ///< statistics of the last render
-  CostProfile profile;                     ///< costs after the last render
+  std::shared_ptr<const Learned>
+      learned;  ///< learned data of the last render that was not stopped during its pilots
+  Watch* watch = nullptr;       ///< watch of the running render
+  RenderStatistics statistics;  ///< statistics of the last render
+  CostProfile profile;          ///< costs after the last render
   mutable std::mutex mutex;
 
   uint32_t threads = 0;
@@ -219,7 +220,8 @@ TransportChoice WavefrontRenderer::Impl::choose(const Settings& settings,
         (light_path_conflict(settings).what.empty() && light_path_conflict(*scene).what.empty()))
       return earlier;
   }
-  if (options.resume) {  // from a version that stored no choice, and had no light paths by default
+  if (options.resume) {  // The checkpoint is from a version that stored no choice of transport and
+                         // did not use light paths by default.
     TransportChoice kept;
     kept.why = "as in the render that is resumed";
     return kept;

@@ -77,9 +77,9 @@ struct RenderOptions {
   /// Records the rays of the wavefront integrator. An exception from the recorder ends the render.
   RayRecorder* recorder = nullptr;
   double interval_s = 0.1;  ///< seconds between calls of `progress`
-  /// For pilot renders with light paths. Light splats then hold, instead of light, the variance
-  /// that this light would add to one sample of a pixel if camera paths had to find it, divided by
-  /// scene_brightness() (light_vertex.h).
+  /// If true, as in pilot renders with light paths, light splats hold variance instead of light:
+  /// the variance that the light would add to one sample of a pixel if camera paths had to find it,
+  /// divided by scene_brightness() (light_vertex.h).
   bool wants_camera_squares = false;
   /// If false, render() returns an empty image, for callers that use snapshots. This makes stopping
   /// the render of a large image faster.
@@ -106,8 +106,9 @@ class WavefrontRenderer {
   /// samples so far.
   void stop();
 
-  /// Edits the scene. `scene()` then returns a new scene, which shares all unchanged data. Throws
-  /// Error for invalid values (see Scene::edited) and during a render, and then changes nothing.
+  /// Edits the scene: `scene()` returns a new scene afterwards, which shares all unchanged data
+  /// with the old one. Throws Error, and leaves the scene unchanged, for invalid values (see
+  /// Scene::edited) and during a render.
   void edit(const SceneEdit& change);
   /// Returns another renderer of the same scene, which can be edited and run independently. Both
   /// renderers share the acceleration structure and the geometry.
@@ -116,13 +117,13 @@ class WavefrontRenderer {
   std::shared_ptr<const Scene> scene() const;
   /// Returns the number of edits so far.
   uint64_t version() const;
-  /// Picks in the current scene (wavecomb::pick).
+  /// Finds the surface or light of the current scene at an image point (wavecomb::pick).
   std::optional<Pick> pick(float x, float y, uint32_t width, uint32_t height) const;
   /// Returns the learned data at the surface that pick() finds, from the running or else the last
   /// render. Returns nothing if there is no surface or nothing was learned yet.
   std::optional<LearnedData> learned(float x, float y, uint32_t width, uint32_t height) const;
 
-  /// Returns the packed_training() of the last render, unless it was stopped before it learned.
+  /// Returns the packed_training() of the last render, unless it was stopped during its pilots.
   std::vector<std::byte> packed_learned() const;
 
   /// Returns the costs after the last render: a copy, since the next render replaces them.

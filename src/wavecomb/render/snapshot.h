@@ -16,12 +16,14 @@
 
 namespace wavecomb {
 
-/// State of a paused render. Valid during the callback that receives it.
+/// State of a paused render. A snapshot is valid only during the callback that receives it.
 struct Snapshot {
   Film& film;
   const PassState& pass;
-  const GuidingTraining& training;                  ///< from before the first pass; may be empty
-  const std::optional<TransportChoice>& transport;  ///< if the settings left it open
+  const GuidingTraining&
+      training;  ///< training that took place before the first pass; may be empty
+  const std::optional<TransportChoice>&
+      transport;  ///< chosen transport, if the settings did not specify it
   RenderStatus status;
   bool finished;  ///< whether no more samples follow: done, cancelled or out of time
   const std::vector<std::string>& light_groups;  ///< light groups that the film keeps

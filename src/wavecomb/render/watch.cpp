@@ -27,7 +27,7 @@ void Watch::run(const std::function<void()>& work, const std::function<Request()
     const bool is_called = changed_.wait_for(lock, std::chrono::duration<double>(interval_s_),
                                              [&] { return finished_ || paused_; });
     if (finished_) break;
-    if (!is_called && wanted_) continue;  // a pause was already requested
+    if (!is_called && wanted_) continue;  // a pause of the work was already requested
     const bool takes_snapshot = paused_;
     lock.unlock();
     Request request = Request::kContinue;

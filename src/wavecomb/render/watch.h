@@ -26,8 +26,8 @@ class Watch {
   explicit Watch(double interval_s = 0.1) : interval_s_(interval_s) {}
 
   /// Runs `work` on a separate thread. Calls `poll` every interval, and `snapshot` with the work
-  /// paused if `poll` requested one. An exception from any of them stops the work and is rethrown
-  /// here.
+  /// paused if `poll` requested one. An exception from `work`, `poll` or `snapshot` stops the work
+  /// and is rethrown by this function.
   void run(const std::function<void()>& work, const std::function<Request()>& poll,
            const std::function<void()>& snapshot);
 

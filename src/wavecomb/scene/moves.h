@@ -15,8 +15,9 @@ namespace wavecomb {
 /// Transforms in world space by prim path, as in SceneEdit::moves.
 using Moves = std::map<std::string, Affine>;
 
-/// Returns the transform of an object: the product of the moves of the prims that it is at or
-/// below, the outermost prim last. Returns the identity if no move applies to the object.
+/// Returns the transform that moves apply to an object: the product of the moves of its prim and of
+/// all ancestor prims, with the outermost prim applied last. Returns the identity if no move
+/// applies to the object.
 Affine move_of(const Moves& moves, std::string_view object);
 
 /// Returns the geometry of a scene with its objects moved.

@@ -130,7 +130,8 @@ bool Scene::needs_in_glass(const SceneGeometry& geometry, std::span<const Materi
   if (!volumes().empty()) return true;
   const auto test = [&](const Material& m) { return is_absorbing_solid(m, *materials_->graphs); };
   const Glasses before = glasses_of(materials(), test), after = glasses_of(all_materials, test);
-  // The materials of `after` may be followed by the one for collisions inside meshes.
+  // The scene's materials may end with an additional one for collisions inside meshes, which
+  // `after` lacks.
   const bool same_glass =
       &geometry == geometry_.get() && std::equal(after.begin(), after.end(), before.begin());
   const bool same_lights =

@@ -64,9 +64,10 @@ struct SceneEdit {
   std::optional<Camera> camera{};
   std::map<uint32_t, Material> materials{};  ///< by id
   std::map<uint32_t, Light> lights{};        ///< new lights, by index into Scene::lights
-  /// By prim path (ObjectNames): transform in world space that everything at or below the prim has,
-  /// after its transform in the scene as it was built; the identity puts it back. Lights in
-  /// `lights` do not follow these moves. Paths that are not listed keep their last move.
+  /// Moves by prim path (ObjectNames): a transform in world space, applied to everything at or
+  /// below the prim after the transforms of the original scene. The identity undoes earlier moves
+  /// of the prim. Moves do not apply to lights in `lights`. Prims that are not listed keep their
+  /// last move.
   std::map<std::string, Affine> moves{};
 };
 
@@ -201,12 +202,12 @@ class SceneBuilder {
                      const std::array<float, 4>& missing);
   /// Returns a texture that was added; valid until the builder is destroyed or build() is called.
   const Texture& texture(uint32_t id) const;
-  /// Adds a value graph for Material::graph and its parts. Outputs are numbered as in
-  /// graph/parameters/parameters.h. The texture ids in the graph must exist.
+  /// Adds a value graph for Material::graph, opacity_graph or emission_graph. Outputs are numbered
+  /// as in graph/parameters/parameters.h. The texture ids in the graph must exist.
   uint32_t add_graph(const Graph& graph);
   /// Adds a material. The texture and graph ids of the material must exist.
   uint32_t add_material(Material material);
-  /// Returns the id of the attribute of that name, for MeshAttribute and for graphs.
+  /// Returns the id of the attribute called `name`, for MeshAttribute and for graphs.
   uint32_t attribute(const std::string& name);
   /// Adds a mesh after checking sizes, indices and radii. Throws Error for faces with non-finite
   /// points; faces without area are kept (no ray hits them).
@@ -240,8 +241,8 @@ class SceneBuilder {
   /// Adds a filter for Light::filter.
   uint32_t add_light_filter(LightFilter filter);
   uint32_t add_light(Light light);
-  /// Adds a light for Mesh::mesh_light, of kind kMeshLight. If it is not `visible`, the opacity of
-  /// the mesh does not affect its emission.
+  /// Adds a light for Mesh::mesh_light, of kind kMeshLight. If the light is not `visible`, the
+  /// opacity of the mesh does not affect its emission.
   uint32_t add_mesh_light(Light light);
   /// Returns the number of the light group called `name`, for Light::group and Mesh::light_group;
   /// "" is kOtherLights.
@@ -261,7 +262,7 @@ class SceneBuilder {
     Affine transform;
     uint32_t material;
     uint32_t name, number;
-    StepRange motion;  ///< range of node_steps_
+    StepRange motion;  ///< range of the node's transforms in node_steps_
   };
   /// Counts the instances of groups with meshes in one placement of `group`; throws Error for
   /// cycles.
@@ -271,13 +272,14 @@ class SceneBuilder {
   void flatten(uint32_t group, const Instance& here, std::span<const Affine> steps,
                const std::vector<uint64_t>& counts, std::vector<Instance>& out,
                SceneGeometry& geometry) const;
-  /// Returns the transforms of a node in a group that moves by `outer` or stands still at `still`;
-  /// empty if neither the group nor the node moves.
+  /// Returns the transforms of a node over the shutter interval, within a group with the transforms
+  /// `outer` if it moves, or the transform `still`. Returns nothing if neither the group nor the
+  /// node moves.
   std::vector<Affine> composed(std::span<const Affine> outer, const Affine& still,
                                const Node& node) const;
   /// Flattens all groups to instances, without those of singular transforms, and checks counts.
   void flatten_groups(SceneGeometry& geometry);
-  /// Adds the materials that no caller adds: for meshes without one, for collisions in volumes and
+  /// Adds the internal materials: for meshes without a material, for collisions in volumes and
   /// media, and for exit points of random walks. Returns the index of the first added material,
   /// which is grey.
   uint32_t add_implicit_materials(SceneGeometry& geometry);
@@ -287,8 +289,8 @@ class SceneBuilder {
   /// Warns of glass whose absorption comes from a value graph, if that is visible: with `in_glass`
   /// (SceneMaterials), or with objects or lights inside it.
   void warn_of_absorbing_graphs(const PlacedObjects& objects, bool in_glass);
-  /// Gives instances without a material the grey one. Throws Error for materials that were never
-  /// added.
+  /// Binds the grey material to instances without a material. Throws Error for materials that were
+  /// never added.
   void bind_materials(SceneGeometry& geometry, uint32_t grey) const;
   /// Moves everything but materials, graphs and lights to `geometry`.
   void move_parts(SceneGeometry& geometry);

@@ -29,11 +29,13 @@ namespace wavecomb {
 
 /// Packed instance, one cache line. Instance 0 is the world itself (identity).
 struct alignas(64) InstanceRecord {
-  float to_world[12];  ///< rows of A, each followed by its translation
-  uint32_t geometry;   ///< index of its group's first entry in SceneView::geometry_mesh
-  uint32_t material;   ///< material of the group's meshes whose material is kInheritMaterial
-  uint32_t emissive;   ///< index of its first entry in SceneView::emissive_lights, if there are any
-  float side;          ///< sign of det A: -1 for a transform that mirrors
+  float to_world[12];  ///< 3 x 4 transform, row by row: three columns of A, then the translation
+  uint32_t
+      geometry;  ///< index of the first entry of the instance's group in SceneView::geometry_mesh
+  uint32_t material;  ///< material of the group's meshes whose material is kInheritMaterial
+  uint32_t emissive;  ///< index of the instance's first entry in SceneView::emissive_lights, if any
+                      ///< mesh emits
+  float side;         ///< sign of det A: -1 for a transform that mirrors
 };
 static_assert(sizeof(InstanceRecord) == 64);
 
@@ -112,7 +114,8 @@ struct SceneGeometry {
   /// SubsurfaceView::exit_material; kInheritMaterial if no material has a subsurface radius, so
   /// that the scene has no subsurface random walks.
   uint32_t exit_material = kInheritMaterial;
-  std::vector<StepRange> instance_motions;  ///< by record; empty if no instance moves
+  std::vector<StepRange>
+      instance_motions;  ///< indexed by instance record; empty if no instance moves
   bool moves() const {
     return mesh_motions.size() > 1 || !steps.empty() ||
            std::ranges::any_of(volumes, &Volume::moves);
@@ -142,9 +145,10 @@ void place_instances(SceneGeometry& geometry);
 
 /// Materials and their packed form.
 struct SceneMaterials {
-  /// Packs materials. `textures` are those of the scene, which materials and graphs read, and
-  /// `exit_material` is that of SceneGeometry. Appends the material of collisions inside of meshes
-  /// to `materials` if it is needed, which `in_glass` helps to decide (see the member).
+  /// Packs materials. `textures` are the scene's textures, which materials and graphs read, and
+  /// `exit_material` is SceneGeometry::exit_material. Appends the material of collisions inside
+  /// meshes to `materials` if a material needs a medium stack, which depends on `in_glass` (see the
+  /// member).
   SceneMaterials(std::vector<Material> materials, std::shared_ptr<const GraphSet> graphs,
                  std::span<const TexturePtr> textures, uint32_t exit_material, bool in_glass);
   /// Number of materials without the one for collisions inside meshes.

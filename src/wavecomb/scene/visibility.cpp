@@ -20,9 +20,9 @@ std::string_view above(std::string_view path) {
   return slash == std::string_view::npos ? std::string_view() : path.substr(0, slash);
 }
 
-/// Returns the visibility of the object that is seen as `object_path`, a mesh called `group_path`
-/// in a group of root `root`. For each bit, the rule of the nearest prim among the object and its
-/// ancestors wins.
+/// Returns the visibility of an object with the path `object_path`, which is an instance of the
+/// mesh `group_path` in a group whose root path is `root`. For each bit, the rule of the nearest
+/// prim among the object and its ancestors wins.
 uint32_t visibility_of(const Rules& rules, std::string_view object_path,
                        std::string_view group_path, std::string_view root) {
   uint32_t specified = 0, bits = 0;

@@ -17,7 +17,7 @@ enum RayVisibility : uint32_t {
   kVisibleToShadowRays = 2,
   kVisibleToBounces = 4,
   kVisibleToAll = kVisibleToCamera | kVisibleToShadowRays | kVisibleToBounces,
-  /// Camera rays stop here with black radiance and alpha 0.
+  /// Holdout: camera rays stop at the object, with black radiance and alpha 0.
   kHoldout = 8,
 };
 

@@ -218,7 +218,8 @@ inline Texel<F> lookup_plain(const TextureView& texture, const F& s, const F& t,
                                : bilinear<F>(texture, level, s_in, t_in, active);
   }
   const uint32_t last = texture.level_count - 1;
-  // Lanes that read the finest level have lod 0, which gives level 0 as in the branch above.
+  // Lanes that read the finest level have lod 0, so they get the same result in packets with and
+  // without coarse lanes.
   const F lod = min(log2(clamp(texels_wide, F(1.f), F(1e9f))), F(static_cast<float>(last)));
   if (footprint.one_texel) {
     const F nearest = max(floor(F(lod + footprint.number(22, 10))), F(0.f));

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Registration of the transport algorithm that camera paths may be combined with
-/// (path/joint_transport.h). Waves and the reference integrator know it by these names only:
+/// Registration of the joint transport, an algorithm that may be combined with camera paths
+/// (path/joint_transport.h). Waves and the reference integrator refer to it only by these names:
 ///
-///   WaveContext::joint     its Context
-///   Wave::joint            its Buffers
-///   JointTransport         its class, on which vertex kernels are templates
-///   WaveTask::joint        tasks that trace its paths instead of camera paths
-///   JointStages            its stages in waves (wave/run_wave.h), chosen in wave/wave.lanes.cpp
+///   WaveContext::joint   data of the render (its Context)
+///   Wave::joint          data of a worker (its Buffers)
+///   JointTransport       the class, a template parameter of vertex kernels
+///   WaveTask::joint      marks tasks that trace light paths instead of camera paths
+///   JointStages          additional wave stages (wave/run_wave.h), chosen in wave/wave.lanes.cpp
 ///
-/// Its settings are rows of core/settings_table.cpp, its kernels a row of
-/// wave/kernels/kernel_matrix.h, and its passes and pilots those of render/joint_transport.h.
+/// The settings of the joint transport are rows of core/settings_table.cpp, its kernels are a row
+/// of wave/kernels/kernel_matrix.h, and render/joint_transport.h registers its passes and pilots.
 #pragma once
 
 #include "wavecomb/light_paths/coupling.h"

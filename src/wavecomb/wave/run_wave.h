@@ -12,10 +12,10 @@
 
 namespace wavecomb {
 
-/// Stages that waves of camera paths run for a joint transport (path/joint_transport.h); here, for
-/// none.
+/// Additional stages of camera path waves for a joint transport (path/joint_transport.h). This
+/// class, for renders without a joint transport, does nothing.
 struct NoJointStages {
-  /// Begins a wave. The paths of the joint transport that camera paths need may be traced here.
+  /// Begins a wave. An implementation may trace the light paths that the camera paths need.
   static void begin(Wave& /*wave*/, const WaveContext& /*context*/, const WaveTask& /*task*/) {}
   /// Uses the vertices at `depth`, after their shadow rays.
   static void use_vertices(Wave& /*wave*/, const WaveContext& /*context*/, uint32_t /*depth*/) {}

@@ -56,7 +56,7 @@ struct WaveContext {
   HistoryReader* histories = nullptr;  ///< receives vertices of finished paths; null if unused
   const GuidingView* guide = nullptr;  ///< guiding field that guides bounces, or is in training;
                                        ///< null without guiding
-  bool discards = false;  ///< if true, paths serve only `histories`, and the film gets none
+  bool discards = false;  ///< whether paths only produce `histories` and are not added to the film
   JointTransport::Context joint{};  ///< transport that is combined with camera paths, if any
 
   /// Returns whether the scene has volumes, nested dielectrics or subsurface scattering.

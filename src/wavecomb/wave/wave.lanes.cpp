@@ -28,8 +28,8 @@ double time_material(Wave& wave, const WaveContext& context, const CalibrationHi
   queue.clear();
   queue.size = hits.count;
   for (uint32_t i = 0; i < hits.count; ++i) {
-    // Directions and positions are spread by the golden ratio. The paths look like paths after one
-    // bounce.
+    // Directions and positions are spread by the golden ratio. The path state corresponds to paths
+    // after one bounce.
     const float a = 0.61803399f * static_cast<float>(i), b = 0.75487767f * static_cast<float>(i);
     const float u = a - std::floor(a), v = b - std::floor(b);
     const Vec3<float> d = square_to_sphere(u, v);

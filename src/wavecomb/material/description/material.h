@@ -16,8 +16,7 @@
 
 namespace wavecomb {
 
-/// Material parameters that a texture can drive. Each has a constant that is used without a
-/// texture.
+/// Material parameters that a texture can drive. Inputs without a texture use a constant.
 enum class Input : uint8_t {
   kBaseColor,  ///< RGB; albedo; reflectance at normal incidence (F0) of metal; tint of dielectrics
   /// RGB; tint at 82 degrees (F82) of metal; F0 of principled with specular workflow.
@@ -41,7 +40,7 @@ inline constexpr uint32_t input_bit(Input s) {
 /// A texture connected to an input: value = texel * scale + bias at uv' = transform(uv).
 struct TextureUse {
   uint32_t texture = kNoTexture;
-  /// 0 to 3 reads that channel for r, g and b; 4 reads RGB.
+  /// Channel to read: 0 to 3 use one channel for r, g and b; 4 uses RGB.
   uint32_t channel = 4;
   std::array<float, 4> scale{1, 1, 1, 1}, bias{0, 0, 0, 0};
   /// u' = m[0] u + m[1] v + m[2]; v' = m[3] u + m[4] v + m[5].
@@ -61,8 +60,8 @@ struct Material {
   float clearcoat_roughness = 0.01f;
   float opacity = 1;
   float ior = 1.5f;
-  float opacity_threshold = 0;  ///< If above 0, opacity below it counts as 0 and other opacity as
-                                ///< 1.
+  /// If above 0, opacity below the threshold counts as 0 and other opacity as 1.
+  float opacity_threshold = 0;
   /// Measured complex index of refraction of a conductor (metal only), used instead of F0 and F82
   /// if any component of k is > 0.
   Vec3<float> conductor_eta{0, 0, 0}, conductor_k{0, 0, 0};
@@ -77,7 +76,7 @@ struct Material {
   /// parts of `graph`, so that shadow rays and light samples evaluate nothing else.
   uint32_t graph = kNoGraph, opacity_graph = kNoGraph, emission_graph = kNoGraph;
 
-  /// Returns parameter `i` of those specific to the program.
+  /// Returns program-specific parameter `i`.
   float specific_value(size_t i) const { return own[i].value_or(info_of(program).own[i].standard); }
   [[deprecated("use specific_value()")]] float own_value(size_t i) const {
     return specific_value(i);
@@ -108,12 +107,12 @@ struct alignas(64) MaterialRecord {
   uint32_t textured_inputs;  ///< bit s: input s reads a texture
   uint32_t flags;            ///< MaterialFlags
   uint32_t program;
-  uint32_t openpbr;  ///< index of its OpenPbrRecord
+  uint32_t openpbr;  ///< index of the material's OpenPbrRecord
   uint32_t graph = kNoGraph, opacity_graph = kNoGraph, emission_graph = kNoGraph;
 };
 static_assert(sizeof(MaterialRecord) == 128);
-/// Bit of MaterialRecord::textured_inputs beyond those of the inputs: the program needs a tangent
-/// frame along the texture's u, even if it reads no texture.
+/// Additional bit of MaterialRecord::textured_inputs: the program needs a tangent frame along the
+/// texture's u, even if the material has no texture.
 inline constexpr uint32_t kNeedsTangent = 1u << 31;
 /// Bits of MaterialRecord::textured_inputs: a graph drives parameters; a graph drives the normal.
 inline constexpr uint32_t kReadsGraph = 1u << 30, kGraphNormal = 1u << 29;
@@ -143,7 +142,7 @@ struct MaterialView {
   const TextureUseRecord* uses = nullptr;
   const TextureView* textures = nullptr;
   const OpenPbrRecord* openpbr = nullptr;
-  /// By material; null if no material's program has specific parameters.
+  /// Records of program-specific parameters, indexed by material; null if no material has any.
   const ProgramParameterRecord* own = nullptr;
   const float* energy = nullptr;  ///< energy tables (EnergyTables), if a material needs them
   GraphView graphs{};

@@ -4,8 +4,9 @@
 /// parameters specific to one program (material/description/programs.h). Range checks, the scene
 /// fingerprint, Python keywords and edits, and sandbox calls are derived from it. To add a
 /// parameter of several programs, add a member to Material and to MaterialRecord, a row here, a
-/// line where records are made (scene_materials.cpp), and its use; for one program only, an entry
-/// to its row in material/description/programs.h and its use.
+/// line in scene_materials.cpp, which packs records, and the code that uses the parameter. To add a
+/// parameter of one program, add an entry to the program's row in material/description/programs.h
+/// and the code that uses it.
 #pragma once
 
 #include <span>
@@ -25,7 +26,7 @@ struct SpecificParameter {
   const ProgramParameter& info() const { return info_of(program).own[index]; }
 };
 
-/// Description of a material parameter. Contract: lives as long as the program.
+/// Description of a material parameter. Contract: descriptions have static lifetime.
 struct MaterialParameter {
   const char* name;  ///< keyword of add_material
   std::variant<float Material::*, Vec3<float> Material::*, bool Material::*, SpecificParameter>

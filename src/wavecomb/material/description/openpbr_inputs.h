@@ -11,8 +11,9 @@
 #include "wavecomb/core/vec3.h"
 
 /// X(kind, name, default, least, most), in the order of records and of graph outputs. The defaults
-/// are those of OpenPBR Surface 1.1, except for the weights of its inputs. Kernels and graphs use a
-/// Derived colour; callers set the parameters from which it is computed.
+/// are those of OpenPBR Surface 1.1, except for the weights of its inputs. Inputs of kind Derived
+/// are colours that kernels and graphs use, but that callers cannot set: they are computed from
+/// other parameters.
 ///
 ///   specular_weight        scales the reflectance at normal incidence
 ///   anisotropy, rotation   of specular roughness; rotation in turns from the tangent towards the
@@ -85,7 +86,7 @@ struct OpenPbr : OpenPbrInputs<float> {
   /// (medium/description/mesh_medium.h).
   Vec3<float> transmission_scatter{0, 0, 0};
   float transmission_scatter_anisotropy = 0;
-  /// Where transmissive solids overlap, the medium of the one with the highest priority counts.
+  /// Where transmissive solids overlap, light travels in the medium with the highest priority.
   float nested_priority = 0;
   /// Mean free paths below the surface for each channel, in units of length. 0 means that light
   /// leaves at the point where it entered.

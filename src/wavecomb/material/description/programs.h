@@ -20,8 +20,8 @@ struct ProgramParameter {
   float least = 0, most = 0;
 };
 
-/// Traits of programs, combined as bits. The scene, the accelerator and the pilots ask for traits,
-/// never for a program's name, so that a new program is complete with its row and its BSDF.
+/// Traits of programs, combined as bits. The scene, the accelerator and pilot renders check traits
+/// and never a program's name, so that a new program only needs a table row and a BSDF.
 namespace program_trait {
 inline constexpr uint32_t kEmits = 1;  ///< reads the emission input
 /// A roughness input near 0 makes its lobes sharp enough to focus light.
@@ -30,9 +30,9 @@ inline constexpr uint32_t kGlossy = 2;
 inline constexpr uint32_t kGlass = 4;
 /// Shades curves as fibres whose far side scatters, so rays that start on them ignore them.
 inline constexpr uint32_t kFibre = 8;
-/// Opacity below 1 lets light pass through the BSDF, unless it is presence.
+/// The BSDF transmits light where opacity is below 1, unless the material uses opacity as presence.
 inline constexpr uint32_t kTransmitsByOpacity = 16;
-/// Has the inputs of WAVECOMB_OPENPBR_INPUTS, with its layers and their energy tables.
+/// Has the inputs of WAVECOMB_OPENPBR_INPUTS and the OpenPBR layers, which use energy tables.
 inline constexpr uint32_t kLayered = 32;
 /// Closed meshes may bound a medium, with priorities of nested dielectrics.
 inline constexpr uint32_t kNests = 64;
@@ -45,10 +45,9 @@ inline constexpr uint32_t kSubsurface = 128;  ///< may have subsurface random wa
 ///   ns (for reproducible renders), then its specific parameters as {"name", default, least, most}
 ///
 /// The code is in material/programs/NAME.h, which material/program_table.h includes for tests. A
-/// row starts with P if the class has variants with some parts only
-/// (material/description/variants.h), and with X otherwise. CMake also reads this list, which
-/// requires two spaces and one row on each line. Add new programs at the end, since fingerprints
-/// contain the ids.
+/// row starts with P if the BSDF class has reduced variants (material/description/variants.h), and
+/// with X otherwise. CMake also reads this list, which requires two spaces and one row on each
+/// line. Add new programs at the end, since fingerprints contain the ids.
 #define WAVECOMB_PROGRAMS(X, P)                                                       \
   X(diffuse, Diffuse, 0, 60)                                                          \
   X(metal, Metal, kGlossy, 75)                                                        \
@@ -61,8 +60,8 @@ inline constexpr uint32_t kSubsurface = 128;  ///< may have subsurface random wa
     {"scale_tt", 0.5f, 0, 10}, {"scale_trt", 2, 0, 10}, {"cuticle_tilt", 0, -90, 90}, \
     {"tint_r", 1, 0, 1}, {"tint_tt", 1, 0, 1}, {"tint_trt", 1, 0, 1})
 
-/// Programs for collisions in media (path/media.h), in the same format. No mesh can use them,
-/// and their code is in the folder of the medium.
+/// Programs for collisions in media (path/media.h), in the same format. Meshes cannot use these
+/// programs, whose code is in src/wavecomb/medium.
 #define WAVECOMB_MEDIUM_PROGRAMS(M) M(volume, Volume, kGlossy, 150)
 
 enum class ProgramId : uint8_t {

@@ -65,7 +65,7 @@ InputRange input_range(Input input, const TextureUse& use, const Texture& textur
   float low[3], high[3];
   for (uint32_t c = 0; c < 3; ++c) {
     const uint32_t from = use.channel < 4 ? use.channel : c;
-    // The same operation as in kernels, which preserves order under rounding.
+    // Kernels use the same fma. Its rounding is monotonic, so the range holds for all texels.
     const auto at = [&](float texel) { return fma(texel, use.scale[from], use.bias[from]); };
     const auto [least, most] = std::minmax({at(texels.low[from]), at(texels.high[from])});
     const uint32_t component = first + (is_color(input) || input == Input::kNormal ? c : 0);

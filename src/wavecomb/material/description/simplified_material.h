@@ -14,8 +14,9 @@ struct InputRange {
   Vec3<float> low, high;
 };
 
-/// Returns the range of values that input `input` may read by `use`, clamped as kernels clamp it.
-/// The range of a normal is not clamped, since kernels normalize it instead.
+/// Returns the range of values that `input` may read from `texture` with the channel, scale and
+/// bias of `use`, clamped as in kernels. The range of a normal is not clamped, since kernels
+/// normalize it instead.
 InputRange input_range(Input input, const TextureUse& use, const Texture& texture);
 
 /// Returns `material` with every texture that has the same value everywhere replaced by a constant,

@@ -28,8 +28,8 @@ inline constexpr uint32_t kAllParts = kTexturePart | kEmissionPart | kMetalPart 
                                       kAnisotropyPart;
 
 /// Reduced variants: X(name, program, parts), in ascending order of cost. A material uses the first
-/// variant that has all of its parts. CMake reads this list as well and makes a compile unit for
-/// each row.
+/// variant that has all features of the material. CMake reads this list as well and makes a compile
+/// unit for each row.
 #define WAVECOMB_VARIANTS(X)                               \
   X(gloss, principled, 0)                                  \
   X(tinted_gloss, principled, kMetalPart)                  \
@@ -66,14 +66,13 @@ constexpr ProgramId program_of(uint32_t variant) {
   return program_id(kVariants[variant].program);
 }
 
-/// Returns the parts that a settled material (simplified_material.h) may use, whatever values its
-/// textures have and whatever its graphs return within their ranges (ranges.h). `textures`
-/// are those that the graphs may read. `allows_subsurface` is set if the scene has subsurface
-/// random walks.
+/// Returns the features that a simplified material (simplified_material.h) may use, for any texture
+/// values and any graph outputs within their ranges (ranges.h). The graphs may read `textures`.
+/// `allows_subsurface` is set if the scene has subsurface random walks.
 uint32_t parts_of(const Material& material, const GraphSet& graphs,
                   std::span<const TexturePtr> textures, bool allows_subsurface = false);
 
-/// Returns the least expensive variant of a program that has all of these parts.
+/// Returns the least expensive variant of a program that has all features in `parts`.
 uint32_t cheapest_variant(ProgramId program, uint32_t parts);
 
 }  // namespace wavecomb

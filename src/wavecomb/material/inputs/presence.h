@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Opacity at points of meshes that no path shades: for rays that hit a cut-out, and for light
-/// samples that aim at one.
+/// Opacity at mesh points that are not shading points of a path: hits of rays on cut-outs, and
+/// light samples on cut-out emitters.
 #pragma once
 
 #include "wavecomb/core/rows/fields.h"

@@ -26,8 +26,9 @@ inline F average_fresnel_dielectric(const F& eta) {
   return clamp(fma(p, x, F(-3.3e-4f)), F(0.f), F(1.f));
 }
 
-/// Reflectance F0 + (1 - F0) w(c) of a coat with index >= 1. `exact` blends w between Schlick's (1
-/// - c)^5 (0) and the exact Fresnel curve (1): w = (F_exact - f) / (1 - f) with f = F_exact(1).
+/// Reflectance F0 + (1 - F0) w(c) of a coat with index >= 1. `exact` = 0 selects Schlick's w =
+/// (1-c)^5, and `exact` = 1 the exact Fresnel curve, w = (F_exact - f) / (1 - f) with f =
+/// F_exact(1); values between blend them.
 template <typename F>
 struct CoatFresnel {
   F ior;

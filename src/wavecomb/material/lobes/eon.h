@@ -33,7 +33,7 @@ struct AzimuthFrame {
 /// the multiple-scattering lobe and in its normalisation. The error of this fit is below 0.1 %.
 template <typename F>
 struct EonDiffuse {
-  F roughness, a, average;  ///< A of Fujii's model, and its mean albedo
+  F roughness, a, average;  ///< coefficient A of Fujii's model, and its mean albedo
 
   EonDiffuse() = default;
   explicit EonDiffuse(const F& r) : roughness(r) {

@@ -60,7 +60,7 @@ template <typename F, uint32_t kParts = kAllParts>
 struct OpenPbrBase {
   static constexpr bool kGlass = (kParts & kTransmissionPart) != 0,
                         kFilm = (kParts & kFilmPart) != 0, kBrush = (kParts & kAnisotropyPart) != 0;
-  F metal, opaque, glass;  ///< weights; their sum is 1
+  F metal, opaque, glass;  ///< weights of metal, glossy-diffuse and glass, whose sum is 1
   F roughness;
   AnisotropicGgx<F> ggx;
   Mask<F> smooth, thin, present;
@@ -331,9 +331,9 @@ struct OpenPbrBase {
   }
   static F wall_of(const F& r) { return F(2.f * r) / F(1.f + r); }
 
-  /// Albedo of the interface over the diffuse base with a thin film. Smooth: the reflectance.
-  /// Rough: the albedo without film, plus the difference integrated over the cosines of the visible
-  /// microfacets.
+  /// Albedo of the interface over the diffuse base with a thin film. Smooth: the reflectance. For a
+  /// rough interface, this is the albedo without film, plus the difference made by the film,
+  /// integrated over the cosines of the visible microfacets.
   Color<F> filmed_gloss(const View& v, const F& z, const EnergyLookup<F>& lookup) const {
     const Color<F> mirror = film.over_dielectric(z, gloss_ior);
     const Mask<F> rough = (film.weight > 0.f) & (opaque > 0.f) & not_(smooth);

@@ -16,7 +16,7 @@ inline Mask<F> is_smooth_dielectric(const F& alpha, const F& ior) {
   return (alpha < kDeltaAlpha) | (alpha * abs(F(ior - 1.f)) < 1e-4f);
 }
 
-/// Rough dielectric interface. Refers to the parameters of a BSDF.
+/// Rough dielectric interface. Holds references to the parameters of a BSDF.
 template <typename F>
 struct RoughDielectric {
   const Ggx<F>& ggx;

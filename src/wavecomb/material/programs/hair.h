@@ -17,8 +17,8 @@ namespace wavecomb {
 /// tint_trt.
 ///
 /// The BSDF describes the whole fibre, transmission included; continued rays hit only the outside
-/// of fibres (accel/presence.h). There are no two sides, and |cos theta_i| is included in the
-/// model. It is not reciprocal, because wo determines the offset h of the hit.
+/// of fibres (accel/presence.h). Fibres have no inner side, and |cos theta_i| is included in the
+/// model. The BSDF is not reciprocal, because wo determines the offset h of the hit.
 template <typename F>
 class HairBsdf : public ViewedBsdf<HairBsdf<F>, F> {
   using Viewed = ViewedBsdf<HairBsdf<F>, F>;

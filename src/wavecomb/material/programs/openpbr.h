@@ -39,12 +39,14 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   static constexpr bool kReadsIor = true;
   static constexpr bool kEmits = (kParts & kEmissionPart) != 0;
   static constexpr bool kAbsorbs = (kParts & kTransmissionPart) != 0;
-  // The value is true for all variants, because light selection in the light tree depends on it.
+  // All variants have kTransmits = true, because light selection in the light tree depends on it
+  // and must not differ between variants.
   static constexpr bool kTransmits = true;
   static constexpr bool kHasSubsurface = kBack;
   static constexpr bool kTextured = (kParts & (kTexturePart | kAnisotropyPart)) != 0;
   using Params = OpenPbrParams<F>;
-  /// All inputs or none, because one textured input suffices to align the frame with the texture.
+  /// Inputs that may read textures: all or none of them, because one textured input suffices to
+  /// align the tangent frame with the texture.
   static constexpr uint32_t kInputs =
       !kTextured ? 0u
                  : input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |
@@ -127,10 +129,11 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     typename EonDiffuse<F>::Sampler eon;
     FuzzLobe<F> fuzz;
     Color<F> glossy;        ///< transmission of the interface to the diffuse lobe
-    F fuzz_on, coat_on;     ///< weights on this side
+    F fuzz_on, coat_on;     ///< weights of fuzz and coat on the viewer's side
     F under_fuzz;           ///< transmission through the fuzz
     F coat_compensation;    ///< scale of coat reflection for multiple scattering
-    Color<F> bare, coated;  ///< transmission of the layers: bare + coated coat_color^(1 / (2 mu_i))
+    Color<F> bare, coated;  ///< Transmission of the layers above the base is bare + coated *
+                            ///< coat_color^(1 / (2 mu_i)).
     F p_diffuse, p_back, p_fuzz, p_coat, p_base;
   };
 
@@ -222,7 +225,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     const Mask<F> delta_base = is_base & base_.smooth & above;
     Mask<F> delta_coat(false);
     if constexpr (kCoat) delta_coat = is_coat & coat_.smooth & above;
-    // eval excludes smooth lobes; a mirrored direction may still have density in others.
+    // eval excludes smooth lobes, but rough lobes may still have density in the mirror direction.
     const Mask<F> delta = delta_base | delta_coat;
     const Mask<F> valid = not_(delta) & (e.pdf > 0.f);
     BsdfSample<F> s = empty_sample<F>();
@@ -280,8 +283,8 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   }
 
   Vec3<F> to_view(const View& v, const Vec3<F>& w) const { return turned(mirror_z(w, v.side)); }
-  /// Rotates to the axis of anisotropy, and back. Directions stay unchanged, including the sign of
-  /// zeros, where the rotation is 0.
+  /// Rotates a direction into the frame of anisotropy; turned_back() inverts this. A rotation by 0
+  /// leaves directions bitwise unchanged, including the sign of zeros.
   Vec3<F> turned(const Vec3<F>& w) const {
     if constexpr (!kTurned) return w;
     const Vec3<F> t(fma(turn_cos_, w.x, F(turn_sin_ * w.y)),

@@ -40,8 +40,8 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
   static constexpr bool kReadsIor = true;
   static constexpr bool kEmits = (kParts & kEmissionPart) != 0;
   static constexpr bool kTextured = (kParts & kTexturePart) != 0;
-  /// The set has all inputs or none, because one textured input suffices to align the frame with
-  /// the texture.
+  /// Inputs that may read textures: all or none of them, because one textured input suffices to
+  /// align the tangent frame with the texture.
   static constexpr uint32_t kInputs =
       !kTextured ? 0u
                  : input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |
@@ -77,7 +77,7 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
       multiple_ = select<F>(smooth_, Color<F>(F(0.f)), multiple_);
     else
       multiple_ = select(smooth_, F(0.f), multiple_);
-    // Constructed in place because it is large.
+    // RoughInterface is large, so it is constructed in place.
     std::construct_at(&rough_, interface_, roughness_, ggx_.alpha, lost_, smooth_);
     average_ = rough_.average(f0_, multiple_);
     if constexpr (!kCoat) return;
@@ -107,7 +107,8 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
     F side;
     Vec3<F> o;
     F coat, lost;
-    F lost_share;      ///< multiple scattering: lost / mean
+    F lost_share;      ///< factor of the multiple-scattering lobe: energy lost towards the viewer /
+                       ///< mean loss
     Tint specular;     ///< directional albedo
     Color<F> diffuse;  ///< diffuse colour times transmission towards the viewer
     Color<F> straight;

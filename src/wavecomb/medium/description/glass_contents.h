@@ -21,7 +21,7 @@ struct PlacedObjects {
   std::span<const MatrixStep> steps;
 };
 
-/// Whether to search the meshes of a material for contents, by material.
+/// Flag of each material: whether closed meshes with the material are searched for contents.
 using Glasses = std::vector<bool>;
 /// Returns the result of `test` for each material.
 Glasses glasses_of(std::span<const Material> materials,
@@ -31,10 +31,10 @@ Glasses glasses_of(std::span<const Material> materials,
 /// through the glass on segments that do not end at its surface, so paths have to track a medium
 /// stack if the glass absorbs (needs_medium_stack).
 ///
-/// The test uses the first time step of mesh shapes and instance transforms at mid-shutter. It
-/// tests vertices of curves, and a few points on the part of each triangle that lies within the
-/// bounds of the glass. If it would take longer than about half a second, it stops and returns
-/// true.
+/// The test uses the first time step of mesh shapes and instance transforms at mid-shutter. Tested
+/// points are the vertices of curves, and a few points on the part of each triangle that lies
+/// within the bounds of the glass. If the test would take longer than about half a second, the
+/// function stops and returns true.
 bool glass_holds_objects(const Glasses& glasses, const PlacedObjects& objects);
 /// Returns whether a closed mesh of glass contains the centre of a light.
 bool glass_holds_lights(const Glasses& glasses, const PlacedObjects& objects,

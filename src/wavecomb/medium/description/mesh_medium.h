@@ -27,7 +27,8 @@ struct MeshMedium {
   Color<F> absorption, scattering;  ///< coefficients, per unit of length
   F anisotropy;                     ///< mean cosine of the scattering angle
   F ior;
-  /// In overlaps the medium of highest priority counts; among equal ones, the last entered.
+  /// Where media overlap, the medium of highest priority applies; among equal priorities, the last
+  /// one entered.
   F priority;
   UInt<F> kind;  ///< BoundaryKind
   Vec3<F> pad, pad_too;
@@ -56,12 +57,12 @@ bool is_absorbing_solid(const Material& material, const GraphSet& graphs);
 bool absorbs_by_graph(const Material& material, const GraphSet& graphs);
 /// Returns whether a material needs paths to track a medium stack: it scatters inside, has a
 /// priority, or bounds an absorbing medium without refraction. If `absorbing` is set, absorption
-/// alone is enough. Set it for scenes with volumes, in which a path scattered by a volume inside
-/// the solid has covered part of its length before the collision, and for scenes with objects
-/// inside absorbing glass (medium/description/glass_contents.h).
+/// alone is enough. Set `absorbing` for scenes with volumes, in which a path scattered by a volume
+/// inside the solid has covered part of its length before the collision, and for scenes with
+/// objects inside absorbing glass (medium/description/glass_contents.h).
 bool needs_medium_stack(const Material& material, const GraphSet& graphs, bool absorbing);
 /// Appends the material that shades collisions inside meshes, if a material needs a medium stack.
-/// Returns its index, or kInheritMaterial.
+/// Returns the index of the appended material, or kInheritMaterial.
 uint32_t add_inside_material(std::vector<Material>& materials, const GraphSet& graphs,
                              bool absorbing);
 /// Makes the media of all materials; empty if no material needs a medium stack.

@@ -40,17 +40,18 @@ SubsurfaceKind subsurface_kind(const Material& material, const GraphSet& graphs)
 SubsurfaceMedium<float> make_subsurface_medium(const Material& material, SubsurfaceKind kind);
 
 /// Returns the single-scattering albedo, for mean cosine `anisotropy`, for which a half-space under
-/// uniform illumination has the colour `color`, within 0.4 %. It inverts van de Hulst's
+/// uniform illumination has the colour `color`, within 0.4 %. The function inverts van de Hulst's
 /// approximation
 ///   color = (1 - s) (1 - 0.139 s) / (1 + 1.17 s),  s^2 = (1 - albedo) / (1 - anisotropy albedo)
 /// (van de Hulst, "Multiple Light Scattering", 1980; OpenPBR 1.1), with a fitted correction of s.
 float single_albedo(float color, float anisotropy);
 
 /// Returns the diffusion length of a medium, in mean free paths, from 1.02 to 100. For isotropic
-/// scattering with albedo a it is
+/// scattering with albedo a, the diffusion length is
 ///   1 / sqrt(1 - a^(2.44294 - 0.0215813 a + 0.578637 / a))
-/// (d'Eon and Krivanek, "Zero-Variance Theory for Efficient Subsurface Scattering", 2020). For
-/// other anisotropy it is that of the isotropic medium given by similarity theory.
+/// (d'Eon and Krivanek, "Zero-Variance Theory for Efficient Subsurface Scattering", 2020). An
+/// anisotropic medium has the diffusion length of its equivalent isotropic medium by similarity
+/// theory.
 double diffusion_length(double albedo, double anisotropy);
 
 /// Device view of all media for subsurface random walks.

@@ -36,8 +36,8 @@ struct GridView {
 struct GridBricks {
   std::string name;                  ///< used in messages
   std::span<const int32_t> origins;  ///< x, y, z of the first voxel of each brick, multiples of 8
-  /// Voxels as 32-bit floats, or as 16-bit floats in `halves`: x slowest, z fastest, components
-  /// interleaved. The span of the other type is empty.
+  /// Voxels as 32-bit floats in `floats` or as 16-bit floats in `halves` (the unused span is
+  /// empty): x slowest, z fastest, components interleaved.
   std::span<const float> floats;
   std::span<const uint16_t> halves;
   uint32_t components = 1;
@@ -54,7 +54,7 @@ class VolumeGrid {
   explicit VolumeGrid(const GridBricks& bricks);
 
   GridView view() const;
-  /// Returns the index of the voxel at which the table begins.
+  /// Returns the voxel index (x, y, z) of the lower corner of the grid's table.
   const std::array<int32_t, 3>& first_voxel() const { return first_; }
   size_t brick_count() const { return voxel_words_.size() / words_per_brick(); }
   size_t bytes() const;
@@ -87,12 +87,12 @@ struct VolumeField {
 
 class VolumeMotion;
 
-/// A volume. At a point, with the values of its fields there,
+/// A volume. Its fields determine the optical properties at each point:
 ///   extinction sigma_t = extinction * density     per unit of world length, per channel
 ///   albedo             = albedo * color           fraction of extinction that is scattered
 ///   emitted radiance   = emission * (emission field, or density)   per unit of world length
-/// Scattering uses the Henyey-Greenstein phase function. With a velocity field v, the values at p
-/// at time t are those that the fields have at p - v(p) t.
+/// Scattering uses the Henyey-Greenstein phase function. With a velocity field v, a lookup at point
+/// p and time t reads the other fields at p - v(p) t.
 struct Volume {
   std::string name;
   VolumeField density;  ///< field of one component; 1 everywhere if not given
@@ -102,7 +102,7 @@ struct Volume {
   /// not move.
   VolumeField velocity;
   std::array<float, 2> seconds{0, 0};          ///< times t of shutter open and close
-  std::shared_ptr<const VolumeMotion> motion;  ///< made by SceneBuilder::add_volume
+  std::shared_ptr<const VolumeMotion> motion;  ///< set by SceneBuilder::add_volume
   /// Corners of a homogeneous volume in local space, used if there is no density field.
   std::array<Vec3<float>, 2> box{Vec3<float>(0.f), Vec3<float>(0.f)};
   Affine to_world;
@@ -130,21 +130,23 @@ struct FieldDrift {
 /// Packed volume. All lanes of a packet look up the same volume at a time, so records are read
 /// without gathers.
 struct VolumeRecord {
-  TransformedGrid density;         ///< a null table means 1 in its single cell
-  TransformedGrid color;           ///< a null table means 1 everywhere
+  TransformedGrid density;         ///< without a table, density is 1 in a single cell
+  TransformedGrid color;           ///< without a table, the colour factor is 1 everywhere
   TransformedGrid emission_field;  ///< emission field; equals density if there is none
   float extinction[3], albedo[3], emission[3];
   float max_extinction;  ///< maximum over the channels
   float anisotropy;
   bool is_grey;  ///< extinction is the same in all channels
   bool emits;
-  /// Tracked through separate cells, whose bounds include all values that move through them.
+  /// Whether the volume moves. Tracking then uses density_cells and emission_cells, whose bounds
+  /// include all values that move through a cell during the shutter interval.
   bool moves;
 
   TransformedGrid density_cells, emission_cells;  ///< without a table
   GridView velocity;
-  FieldDrift density_drift, emission_drift;  ///< transforms from the spaces of these cells
-  FieldDrift color_drift;                    ///< from world space
+  FieldDrift density_drift,
+      emission_drift;      ///< transforms from the spaces of density_cells and emission_cells
+  FieldDrift color_drift;  ///< from world space
   float seconds_open, seconds_span;
 };
 

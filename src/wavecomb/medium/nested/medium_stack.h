@@ -44,8 +44,8 @@ class MediumStack {
     r.material_2 = material_[2], r.material_3 = material_[3];
   }
 
-  /// Updates the stack for the medium boundary that the last vertex's ray, selected by `bit`
-  /// (Crossing), has crossed.
+  /// Updates the stack for the medium boundary that a ray of the last path vertex has crossed;
+  /// `bit` (Crossing) selects the ray.
   void cross(const MeshMediaView& view, const UInt<F>& object, const UInt<F>& crossed, Crossing bit,
              const Mask<F>& active) {
     const auto has = [&](Crossing b) { return Mask<F>((crossed & uint32_t{b}) != U(0u)); };
@@ -141,8 +141,8 @@ class MediumStack {
 template <typename F>
 struct BoundaryHit {
   MediumStack<F> after;  ///< medium stack on the other side
-  /// Whether the ray passes unchanged, since another boundary has priority or this one has no
-  /// effect.
+  /// Whether the ray passes unchanged, because a medium of higher priority encloses the boundary or
+  /// the boundary has no effect.
   Mask<F> passes;
   F outer;  ///< index of refraction on the outer side
 };

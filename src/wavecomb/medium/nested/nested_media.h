@@ -40,7 +40,8 @@ class NestedMedia {
         b_(buffers),
         counts_(counts) {}
 
-  /// Returns the medium stack at a point. `keys` may be those of any path.
+  /// Returns the medium stack at a point. The result does not depend on the path that `keys` belong
+  /// to.
   MediumStack<float> stack_at(Vec3<float> p, float time, PresenceKeys keys) const;
 
   /// Traces all rays to the event or surface that stops them. `hits` holds their first hits, and on
@@ -146,13 +147,15 @@ class NestedMedia {
     return Mask<F>(m.kind == UInt<F>(static_cast<uint32_t>(BoundaryKind::kClear))) &
            (max_component(m.scattering) > 0.f);
   }
-  /// Samples the distance to the next collision with the random number `u`. A medium without
-  /// scattering has no collision and keeps a stored number for the first distance. If lights guide
-  /// the distance, stores `u` until the length of the segment is known.
+  /// Samples the distance to the next collision with the random number `u`. In a medium without
+  /// scattering there is no collision, and a random number that is stored for the first distance
+  /// stays stored. If lights guide the distance, `u` is stored until the length of the segment is
+  /// known.
   template <typename F>
   void sample_distance(Rays<F>& r, const MediumStack<F>& stack, const F& u,
                        const Mask<F>& lanes) const;
-  /// Samples the distance by lights, with the stored number, in a medium that ends at `far`.
+  /// Samples the distance by equiangular sampling of a light, with the stored random number, in a
+  /// medium that ends at distance `far`.
   template <typename F>
   EquiangularDistribution<F> sample_equiangular(Rays<F>& r, const MeshMedium<F>& medium,
                                                 const F& far, const Mask<F>& lanes) const;
@@ -160,8 +163,8 @@ class NestedMedia {
   template <typename F>
   Mask<F> scatter_ray(const NestedRays& all, Rays<F>& r, const MeshMedium<F>& medium,
                       const F& length, const Mask<F>& lanes) const;
-  /// Advances rays to their next medium boundary or collision, finishes those that end, and lists
-  /// the others from `left` on. Returns the number of listed rays.
+  /// Advances rays to their next medium boundary or collision, finishes the rays that end, and
+  /// appends the remaining rays to the list at index `left`. Returns the number of appended rays.
   template <typename F>
   size_t advance(const NestedRays& all, const HitSpan& hits, const NestedEvents& events, Rays<F>& r,
                  size_t left) const;

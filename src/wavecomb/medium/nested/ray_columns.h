@@ -20,8 +20,8 @@ struct NestedRays {
 };
 
 /// Results of the rays, as in Flights, and the transmittance of absorption. With `limited`, `t` and
-/// `material` initially hold the event in a volume that stops each ray. Such an event no longer
-/// applies to a ray that has scattered, whose hero becomes kNoHero.
+/// `material` initially hold the event in a volume that stops each ray. The event of a ray is
+/// dropped once the ray has scattered in a mesh medium; its hero channel becomes kNoHero.
 struct NestedEvents {
   bool limited;
   float* t;

@@ -2,16 +2,16 @@
 /// Subsurface random walks in homogeneous media, collision by collision.
 ///
 /// A walk begins where a diffuse lobe enters a subsurface body (OpenPbrBsdf::enters) and ends where
-/// it hits the surface of the same object from inside. There the path continues at a white diffuse
-/// surface, seen from outside, with a light sample and a bounce. Nothing is refracted at either
-/// end. Uniform incident light therefore leaves uniformly, and a flat surface has the requested
-/// colour (medium/description/subsurface.h).
+/// it hits the surface of the same object from inside. At the exit point the path continues as at a
+/// white diffuse surface that is seen from outside, with a light sample and a bounce. Light is not
+/// refracted at the entry or exit point. Uniform incident light therefore leaves uniformly, and a
+/// flat surface has the requested colour (medium/description/subsurface.h).
 ///
 /// Techniques: each walk has a hero channel, which determines its distances (hero wavelengths,
 /// Wilkie et al. 2014), and is either free or guided. A free walk follows the medium's phase
-/// function. A guided walk heads for the surface that it entered by (Krivanek and d'Eon, "A
-/// Zero-Variance-Based Sampling Scheme for Monte Carlo Subsurface Scattering", 2014): with n the
-/// normal there, mu = d n, and nu the diffusion length in mean free paths, it samples
+/// function. A guided walk prefers directions back to the surface where it entered (Krivanek and
+/// d'Eon, "A Zero-Variance-Based Sampling Scheme for Monte Carlo Subsurface Scattering", 2014):
+/// with n the normal there, mu = d n, and nu the diffusion length in mean free paths, it samples
 ///
 ///   p(d) = 1 / (2 pi (nu - mu) ln((nu + 1) / (nu - 1))),
 ///   p(t) = s exp(-s t),   s = (1 - mu / nu) e
@@ -49,15 +49,15 @@ template <typename F>
 struct SubsurfaceWalk {
   Vec3<F> o, d;
   Color<F> throughput;
-  F first;            ///< sum of the channels of the initial throughput
+  F first;            ///< sum of the initial throughput over the channels
   F rest;             ///< distance to the next collision, after begin_flight()
-  UInt<F> seed;       ///< seed of its random numbers
+  UInt<F> seed;       ///< seed of the walk's random numbers
   UInt<F> number;     ///< number of collisions so far
-  UInt<F> normal;     ///< pack_normal() of the outward normal of the surface that it entered by
+  UInt<F> normal;     ///< pack_normal() of the outward surface normal at the entry point
   F choice, flight;   ///< random numbers for the technique and the first distance
   UInt<F> technique;  ///< hero channel, plus kGuided if the walk is guided
   Color<F> free;      ///< q_k p_k of free walks by channel, relative to the sum over all techniques
-  Color<F> guided;    ///< q_k p_k of guided walks, as for free walks
+  Color<F> guided;  ///< q_k p_k of guided walks by channel, relative to the sum over all techniques
 
   static constexpr uint32_t kGuided = 4;
 
@@ -94,8 +94,8 @@ template <typename F, typename Function>
 inline Color<F> each_channel(const Color<F>& a, const Color<F>& b, const Function& f) {
   return {f(a.x, b.x), f(a.y, b.y), f(a.z, b.z)};
 }
-/// Applies a step with these densities by technique, which multiplies the light of the walk by
-/// `through`.
+/// Multiplies the densities of the free and guided techniques by those of a step, and updates the
+/// weight of the walk. `through` is the factor of the step on the light of the walk.
 template <typename F>
 inline void weigh_step(const Color<F>& free, const Color<F>& guided, const Color<F>& through,
                        SubsurfaceWalk<F>& w) {
@@ -179,7 +179,7 @@ inline Mask<F> end_flight(const SubsurfaceMedium<F>& medium, const F& t, const M
   detail::weigh_step<F>(free, guided, select<F>(collides, free * medium.albedo, free), w);
   w.o = fma(w.d, t, w.o);
 
-  // The random numbers of the collision follow the number of the flight.
+  // Random numbers for the collision, independent of those for the flight.
   const Sample4<F> r = walk_samples<F>(w.seed, U(w.number + 0x80000000u));
   const F left = detail::sum(w.throughput);
   F q = select(left < F(kFaintWalk) * w.first, F(left / w.first), F(1.f));

@@ -41,9 +41,9 @@ class WalkQueue {
     size_ += put<F>(size_, {w, ray_index, slot, UInt<F>(kNoMedium), time}, active);
   }
 
-  /// Starts the added walks. medium_of(inst, geom, prim, met) returns the material that they hit on
-  /// their object, which `keys` specify, or kNoMedium. Calls leave(lanes, slot) for paths that do
-  /// not start a walk.
+  /// Starts the added walks. medium_of(inst, geom, prim, met) returns the material of the surface
+  /// that a walk's first ray hits on its object, or kNoMedium. `keys` specify the objects. Calls
+  /// leave(lanes, slot) for paths that do not start a walk.
   template <typename F, typename MediumOf, typename Leave>
   void enter(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
              const PresenceKeys& keys, const MediumOf& medium_of, const Leave& leave) {
@@ -66,9 +66,9 @@ class WalkQueue {
     size_ = left;
   }
 
-  /// Runs all walks to their end. `keys` are indexed by path slot and specify the objects; their
-  /// salt is that of the ray that entered. Calls finish(lanes, who, end, came) for walks that have
-  /// ended. Lanes in `reached_surface` have reached the surface.
+  /// Runs all walks to their end. `keys` are indexed by path slot and specify the object of each
+  /// walk; `keys.salt` is the salt of the ray that entered the object. Calls finish(lanes, who,
+  /// end, came) for walks that have ended. Lanes in `reached_surface` have reached the surface.
   template <typename F, typename Finish>
   void run(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
            PresenceKeys keys, uint64_t& steps, uint64_t& lanes, const Finish& finish) {
@@ -182,7 +182,7 @@ class WalkQueue {
             real(kTime)};
   }
   /// Stores the active lanes contiguously from `i` on, and returns their number. May overwrite up
-  /// to a packet behind them.
+  /// to a packet of walks behind the stored ones.
   template <typename F>
   size_t put(size_t i, const Row<F>& row, const Mask<F>& active) {
     using U = UInt<F>;

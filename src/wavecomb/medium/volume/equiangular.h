@@ -89,9 +89,10 @@ inline EquiangularDistribution<F> equiangular_distribution(const LightView& ligh
   return distribution;
 }
 
-/// Probabilities of the outcome of a segment through a homogeneous medium that ends after length
-/// `x` in it, at distance `at`: the true one, and the one it was sampled with if this channel is
-/// the hero. Both are densities where the segment was `stopped`.
+/// Probabilities, for one channel, of the outcome of a segment that ends after length `x` in a
+/// homogeneous medium, at distance `at` along the ray: the exact probability, and the one of the
+/// sampling technique if the channel is the hero. Where a collision `stopped` the segment, both
+/// probabilities are densities.
 template <typename F>
 struct OutcomeDensity {
   F exact, sampled;

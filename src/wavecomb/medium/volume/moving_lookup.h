@@ -4,7 +4,7 @@
 ///
 /// Moving volumes are traversed by the cells of a grid that bounds the field over the whole shutter
 /// interval (medium/description/volume_motion.h), others by the cells of the field's grid. All
-/// lanes use the same one of the two.
+/// lanes of a packet traverse the same grid.
 #pragma once
 
 #include "wavecomb/medium/volume/grid_lookup.h"

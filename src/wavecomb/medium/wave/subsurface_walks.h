@@ -28,11 +28,11 @@ class SubsurfaceScattering {
   /// Returns whether the scene has subsurface scattering.
   bool has_subsurface() const { return context_.scene.subsurface.media != nullptr; }
   /// Runs the walk of the reference integrator for a path whose ray has entered a subsurface body
-  /// and hit `hit`. The passage leads to the hit. `keys` are those of the ray and include the
-  /// object. If the walk leaves the body, sets `left_body`, and `path` and `hit` describe a ray
-  /// that views the exit point from outside. Returns false if the walk was terminated inside. If
-  /// the ray does not hit the object, returns true with `path` and `hit` unchanged, except that
-  /// path.pdf becomes 0, since no light sample competes with the path.
+  /// and hit `hit`. Query `p` describes the ray segment to the hit. `keys` are the presence keys of
+  /// the ray and include the object. If the walk leaves the body, sets `left_body`, and `path` and
+  /// `hit` describe a ray that views the exit point from outside. Returns false if the walk was
+  /// terminated inside. If the ray does not hit the object, returns true with `path` and `hit`
+  /// unchanged, except that path.pdf becomes 0, since no light sample competes with the path.
   template <typename Hit>
   bool walk(const MediumQuery<float>& p, const PresenceKeys& keys, PathState<float>& path, Hit& hit,
             bool& left_body) const {
@@ -112,7 +112,7 @@ class SubsurfaceScattering {
     }
     if (walk_queue.size() == 0) return;
     PresenceKeys keys = presence_keys(wave.pool, depth, false);
-    // Holds BodyEntry::body (PathRow::take_entry).
+    // The receiver column holds BodyEntry::body (PathRow::take_entry).
     keys.object = &reinterpret_cast<const PathRow<float>*>(wave.pool.paths)->receiver;
     const auto leave = [&](const Mask<F>& lanes, const U& slot) {
       PathRow<F> path = load_row<PathRow, F>(wave.pool.paths, slot, lanes);
@@ -188,7 +188,7 @@ class SubsurfaceScattering {
     counts_.walks += walk_queue.size();
     counts_.walk_steps += walk_queue.size();
   }
-  /// Adds the collisions of ended walks to their materials.
+  /// Adds the number of collisions of each ended walk to the counter of its material.
   template <typename F>
   static void count_collisions(std::span<float> of_material, const WalkEnd<F>& end,
                                const Mask<F>& ended) {
@@ -201,7 +201,8 @@ class SubsurfaceScattering {
       of_material[material[lane]] += static_cast<float>(collisions[lane] + 1);
     }
   }
-  /// Charges the time of walks to their materials, by the collision counts in Wave::scratch.
+  /// Adds the time of walks to the costs of their materials, in proportion to the collision counts
+  /// in Wave::scratch.
   static void charge_walks(Wave& wave, double ns) {
     double all = 0;
     for (const float steps : wave.scratch) all += double{steps};

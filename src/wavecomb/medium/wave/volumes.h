@@ -36,8 +36,8 @@ class Volumes : public SubsurfaceScattering {
                       context.settings->equiangular && has_finite_lights(context.scene.lights)) {}
 
   /// Samples the free flight of the reference integrator in scenes with nested dielectrics, for the
-  /// path `path` with medium stack `stack`, whose ray with `keys` has hit `hit`. The passage leads
-  /// to the hit. May change both the path and the hit.
+  /// path `path` with medium stack `stack`, whose ray with `keys` has hit `hit`. Query `p`
+  /// describes the ray segment to the hit. May change both the path and the hit.
   template <typename Hit>
   Flight<float> sample_nested_flight(const MediumQuery<float>& p, const PresenceKeys& keys,
                                      PathState<float>& path, Hit& hit,

@@ -123,8 +123,8 @@ struct LocalRay {
   Vec3<F> o, d;
 };
 
-/// Returns the ray through (x, y) of the window from the point of the lens at (u, v). Its d.z is
-/// -1; for a latlong camera, d has length 1.
+/// Returns the ray through (x, y) of the window from the point of the lens at (u, v). The direction
+/// d has d.z = -1 or, for a latlong camera, length 1.
 template <typename F>
 inline LocalRay<F> local_ray(const CameraSetup& camera, const F& x, const F& y, const F& u,
                              const F& v) {

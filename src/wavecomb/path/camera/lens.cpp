@@ -9,8 +9,8 @@
 namespace wavecomb {
 namespace {
 
-/// Number of nodes along an edge. In an image of 4,096 pixels they are sixteen pixels apart, and
-/// the error of a strong lens (k1 = 0.3) is a hundredth of a pixel.
+/// Number of nodes along an edge. In an image of 4,096 pixels, nodes are sixteen pixels apart, and
+/// the interpolation error for strong distortion (k1 = 0.3) is a hundredth of a pixel.
 constexpr uint32_t kLensNodes = 257;
 
 using WindowPoint = std::array<double, 2>;

@@ -4,7 +4,7 @@
 ///
 /// A delta lobe keeps its selection probability q, so the density of a cosine bounce is
 ///   p(wi) = (1 - q) |cos theta_i| / pi
-/// on the side of wo. Only programs without transmission use it.
+/// on the side of wo. Only programs without transmission use cosine sampling.
 #pragma once
 
 #include "wavecomb/core/sampler.h"

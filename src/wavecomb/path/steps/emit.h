@@ -21,7 +21,7 @@ inline F bounce_weight(const F& bsdf_pdf, const F& light_pdf) {
 }
 
 /// Returns the radiance of emissive surfaces before MIS in scenes with mesh lights. `emission` is
-/// that of their materials.
+/// the emission of the surfaces' materials.
 template <typename F>
 [[gnu::noinline]] Color<F> mesh_light_emission(const SceneView& scene, const UInt<F>& inst,
                                                const UInt<F>& geom, const Color<F>& emission,
@@ -84,8 +84,8 @@ WAVECOMB_INLINE Color<F> emit(const Vertex<F, kFeatures>& v, const SurfaceIntera
   using U = UInt<F>;
   const SceneView& scene = v.scene;
   Color<F> emission = at.emission;
-  // No other technique finds emission that the camera sees directly or in a mirror. It keeps the
-  // texture filter, since images need antialiasing.
+  // Emission that the camera sees directly or in a mirror keeps the texture filter for
+  // antialiasing. No other technique samples this emission, so the filter does not bias MIS.
   if constexpr (Bsdf::kTextured)
     if (at.textured && v.depth > 0) [[unlikely]] {
       const Mask<F> varies =

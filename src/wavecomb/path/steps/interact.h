@@ -121,7 +121,8 @@ WAVECOMB_INLINE MaterialLookup<Bsdf, F> look_up_material(const Vertex<F, kFeatur
     footprint = footprint_of<F>(v, F(path.cone_width * s.uv_per_length / sqrt(view_cosine)));
   }
   const auto make_point = [&](const Mask<F>& lanes) {
-    // These copies let the originals stay in registers. Only value graphs use them.
+    // Copy the inputs of value graphs, so that the originals stay in registers where materials have
+    // no graphs.
     const MeshHit<F> at = v.hit;
     const Surface<F> surface = s;
     const Vec3<F> dir = path.dir;

@@ -41,8 +41,8 @@ inline ScatteringEvent<F> classify_scattering(const Bsdf& bsdf, const Vec3<F>& w
 
 namespace detail {
 
-/// Directions that light takes at a vertex: to the light sample and along the bounce. Copies, so
-/// that shading can keep the originals in registers.
+/// Directions that light takes at a vertex: to the light sample and along the bounce. The members
+/// are copies, so that shading can keep the originals in registers.
 template <typename Bsdf, typename F>
 struct VertexDirections {
   Bsdf bsdf;

@@ -49,11 +49,11 @@ struct LightCandidate {
   Mask<F> valid;  ///< whether the contribution may be non-zero; otherwise c is undefined
   UInt<F> light;
   UInt<F> shadow_set;      ///< for linked lights
-  ShadowExtent<F> extent;  ///< used for lights with shadow attributes
+  ShadowExtent<F> extent;  ///< extent of the shadow, for lights with shadow attributes
 };
 
 /// Returns the light sample for the sample values `r` in the lanes `active_lights`. `receiver` is
-/// that of the context with its position, and `link` the link class of the surface.
+/// the context's receiver with its position set, and `link` the link class of the surface.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Coupling>
 WAVECOMB_INLINE LightCandidate<F> light_candidate(
     const VertexContext<Bsdf, F, kFeatures, Coupling>& c, const LightReceiver<F>& receiver,
@@ -89,7 +89,8 @@ WAVECOMB_INLINE LightCandidate<F> light_candidate(
     set = shadow_set<F>(lights, light, active_lights);
   }
   Mask<F> valid = active_lights & l.valid & at.is_consistent(l.wi, wi);
-  // The random walk finds light that enters a subsurface body (medium/subsurface/random_walk.h).
+  // Light that enters a subsurface body is sampled by the random walk instead
+  // (medium/subsurface/random_walk.h).
   if constexpr ((kFeatures & kSubsurface) != 0 && Bsdf::kHasSubsurface)
     valid = valid & not_(at.bsdf.enters(c.wo, wi));
   return {to_light.origin, l.wi, l.distance, at.throughput * f_cos * l.weight * w, w, valid,
@@ -106,9 +107,9 @@ inline constexpr uint32_t kFibreCandidates = 3;
 /// Global Illumination", 2005). The mean is that of a single light sample for any densities and
 /// weights in c, so the MIS weights stay those of a single sample. Where rays are expensive, as
 /// among strands, a shadow ray to an important light justifies three evaluations
-/// (docs/decisions/light-candidates.md). `first` belongs to the sample values `r`. The others use
-/// shifted values: evenly over all lights, and on each light by the R2 lattice (M. Roberts, "The
-/// Unreasonable Effectiveness of Quasirandom Sequences", 2018).
+/// (docs/decisions/light-candidates.md). `first` is the candidate for the sample values `r`. The
+/// other candidates use shifted sample values: evenly over all lights, and on each light by the R2
+/// lattice (M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018).
 template <typename F, typename Candidate>
 WAVECOMB_INLINE LightCandidate<F> resample(const LightCandidate<F>& first, const Sample4<F>& r, F u,
                                            const Candidate& candidate) {

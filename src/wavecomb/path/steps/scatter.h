@@ -45,7 +45,8 @@ WAVECOMB_INLINE void scatter(const VertexContext<Bsdf, F, kFeatures, Coupling>& 
   if (v.has(kMeshLights) && v.scene.lights.has_multipliers) [[unlikely]]
     out.next.diffuse = diffuse_share<F>(at.bsdf, c.view, b);
   if constexpr ((kFeatures & kSubsurface) != 0 && Bsdf::kHasSubsurface) {
-    // For medium/subsurface/random_walk.h.
+    // Start a subsurface random walk (medium/subsurface/random_walk.h) if the bounce enters the
+    // body.
     out.next.enters_body = at.bsdf.enters(c.wo, b.wi) & (out.next.pdf > 0.f);
     out.next.entry = {object_of(v.hit.inst, v.hit.mesh),
                       pack_normal<F>(select<F>(c.wo.z < 0.f, -c.frame.n, c.frame.n))};

@@ -12,14 +12,15 @@ namespace wavecomb {
 /// Context of the steps after `interact`: references to values that vertex_steps() (path/vertex.h)
 /// has computed once for the vertex.
 ///
-/// Contract: valid only within vertex_steps(). Steps read it and write VertexResult and the outputs
-/// of Vertex. The steps are inlined, so that no reference costs a memory access.
+/// Contract: valid only within vertex_steps(). Steps read the context, and write VertexResult and
+/// the outputs of Vertex. The steps are inlined, so that no reference costs a memory access.
 template <typename Bsdf, typename F, uint32_t kFeatureSet, typename Coupling>
 struct VertexContext {
   using Program = Bsdf;
   using Float = F;
   using Interaction = decltype(interact<Bsdf, F>(std::declval<const Vertex<F, kFeatureSet>&>()));
-  /// BSDF of the interaction. A program for volumes has a different type than its phase function.
+  /// BSDF of the interaction. For volume programs this is the type of the phase function, which
+  /// differs from the program's class.
   using Scattering = std::remove_cvref_t<decltype(std::declval<const Interaction&>().bsdf)>;
   using View = decltype(std::declval<const Scattering&>().view(std::declval<const Vec3<F>&>()));
   static constexpr uint32_t kFeatures = kFeatureSet;

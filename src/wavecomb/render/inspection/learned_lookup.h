@@ -20,11 +20,13 @@ namespace wavecomb {
 
 /// Data that a render learned before its first pass. Does not change afterwards.
 struct Learned {
-  std::shared_ptr<const Scene> scene;               ///< the rendered scene
-  bool by_tree = false;                             ///< LightView::by_tree
-  std::shared_ptr<const LightCalibration> lights;   ///< null if lights are selected by power
-  std::shared_ptr<const GuidingTraining> training;  ///< guiding training; may have no field
-  std::optional<TransportChoice> transport;         ///< if the settings left it open
+  std::shared_ptr<const Scene> scene;              ///< the rendered scene
+  bool by_tree = false;                            ///< LightView::by_tree
+  std::shared_ptr<const LightCalibration> lights;  ///< null if lights are selected by power
+  std::shared_ptr<const GuidingTraining>
+      training;  ///< guiding training, possibly without a guiding field
+  std::optional<TransportChoice>
+      transport;  ///< chosen transport, if the settings did not specify it
 };
 
 /// Surface point at which learned data is looked up.
@@ -35,7 +37,8 @@ struct LearnedQuery {
 
 /// Learned data at a surface point.
 struct LearnedData {
-  /// Axis that the surface faces (one of kGuidingAxes), and whether the field has a region there.
+  /// Axis that the surface faces (one of kGuidingAxes), and whether the guiding field has a region
+  /// at the point.
   uint32_t axis = 0;
   bool known = false;
   /// Density per steradian of the guiding distribution, if `known`: kGuidingSide rows of

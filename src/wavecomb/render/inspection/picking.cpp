@@ -24,7 +24,7 @@ constexpr float kMiddle = 0.5f;
 SingleRayHit trace(const EmbreeAccelerator& accel, const CameraRay<float>& ray) {
   SingleRayHit hit{};
   const float time = kMiddle;
-  const uint32_t path = 0;  // decides whether partly present surfaces are hit
+  const uint32_t path = 0;  // index that seeds the random presence tests of cut-out surfaces
   accel.intersect(
       {&ray.o.x, &ray.o.y, &ray.o.z, &ray.d.x, &ray.d.y, &ray.d.z, &ray.tfar, nullptr, 1, &time},
       {&hit.t, &hit.u, &hit.v, &hit.prim, &hit.geom, &hit.inst}, 1, false, {&path, &path, 1, 0});

@@ -23,8 +23,8 @@ inline constexpr size_t kRayKinds = 3;
 struct Replay {
   bool alone = true;     ///< trace by Embree alone, else by EmbreeAccelerator
   uint32_t threads = 0;  ///< 0 means all hardware threads
-  /// By kind of ray: rays per packet, and whether Embree is told that they are coherent. Without a
-  /// value, coherence is as recorded.
+  /// Rays per packet and Embree's coherence flag for each kind of ray. Kinds without a flag use the
+  /// recorded one.
   std::array<uint32_t, kRayKinds> width{16, 16, 16};
   std::array<std::optional<bool>, kRayKinds> coherent{};
   std::array<bool, kRayKinds> wanted{true, true, true};  ///< kinds to trace
@@ -39,7 +39,8 @@ struct ReplayTimes {
 
 /// Recorded rays of one render of a scene.
 ///
-/// Contract: see RayRecorder while recording. replay() by one thread at a time, after the render.
+/// Contract: as for RayRecorder while recording. One thread at a time calls replay(), after the
+/// render.
 class RayRecording final : public RayRecorder {
  public:
   /// Holds up to `byte_limit` bytes. Throws Error for scenes with partly present surfaces, which

@@ -16,7 +16,7 @@ constexpr uint32_t kMinPilot = 8, kMaxPilot = 64, kTimedPilot = 16;
 /// are weighted as if they were this bright.
 constexpr double kDarkShare = 0.25;
 
-/// Measurements of the pilot.
+/// Measurements of the pilot render.
 struct Pilot {
   std::vector<double> error;  ///< indexed by pixel: deviation over brightness; negative if unknown
   std::vector<double> cost;   ///< indexed by pixel: mean cost of a sample; empty if not measured
@@ -142,7 +142,7 @@ std::vector<uint32_t> round_parts(const std::vector<double>& parts, uint64_t tot
         --given;
       }
     }
-    if (given == before) {  // all visited pixels are 0: use another one
+    if (given == before) {  // all visited pixels have 0 samples: take the sample from another pixel
       --*std::find_if(out.begin(), out.end(), [](uint32_t n) { return n > 0; });
       --given;
     }
@@ -187,8 +187,8 @@ SampleAllocation allocate_samples(Film& film, const Settings& settings,
 
   SampleAllocation out{pilot_samples(settings), settings.spp, {}};
   const uint32_t more = out.spp - out.pilot;
-  // Multiples of a quantum keep the samples of a pixel nets of the Sobol sequence, and give few
-  // different counts, so that waves are full.
+  // Sample counts are multiples of a quantum, so that the samples of a pixel form nets of the Sobol
+  // sequence, and there are few different counts, which keeps waves full.
   const uint32_t quantum = std::max(1u, std::bit_floor(settings.spp) / 8);
   const uint32_t quanta = more / quantum;
   const size_t count = film.pixel_count();

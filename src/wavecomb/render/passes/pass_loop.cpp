@@ -57,8 +57,8 @@ PassLoop::PassLoop(const RenderPlan& plan, PassState pass, Film& film, PassRunne
     all_started &= samples[i] > 0;
   }
   may_be_cut_ = all_started;
-  // A pass that was interrupted in a render without a time limit may be long. If a timed render
-  // continues it, each pixel gets one sample first.
+  // A checkpoint of a render without a time limit may contain a long unfinished pass. If a timed
+  // render continues this pass, each pixel gets one sample first.
   if (rules_.timed && !all_started) pass_.target = std::min(pass_.target, 1u);
   if (!rules_.adaptive || pass_.light_target == 0)
     pass_.light_target = joint_.samples(pass_.target);
@@ -109,7 +109,8 @@ bool PassLoop::begin_pass(std::span<const uint32_t> samples) {
   const uint64_t active = active_pixels_;
   if (active == 0 || (done >= rules_.spp && !rules_.adaptive)) return false;
   const TimeLeft left{settings_.time_limit - seconds(), samples_per_s_};
-  // Pixels that become active again late catch up with the others.
+  // A pixel that becomes active again late gets enough samples to reach the count of the other
+  // pixels.
   pass_.target = done >= rules_.spp ? rules_.spp : next_target(done, rules_, left, active);
   pass_.light_target = rules_.adaptive && done > 0
                            ? joint_.adaptive_samples(film_, pass_, done, light_done, active)

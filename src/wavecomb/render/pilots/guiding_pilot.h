@@ -33,8 +33,9 @@ double trace_training_paths(WaveContext context, const WaveSetup& waves,
                             TrainingSamples& training_samples,
                             const std::function<bool()>& stopped);
 
-/// Result of a pilot render: two images of some pixels with different seeds. Both use the sampler
-/// of the render, so that their noise is that of well-distributed samples.
+/// Result of a pilot render: two images of some pixels with different seeds. Both images use the
+/// sampler of the render, so that their noise is as low as that of the render's well-distributed
+/// samples.
 struct PilotRender {
   uint32_t samples = 0;             ///< samples per pixel, in each image
   std::vector<double> differences;  ///< difference of the two means of each pixel

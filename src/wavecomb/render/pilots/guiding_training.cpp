@@ -19,9 +19,9 @@ namespace {
 
 /// Training takes one path for every kTrainingShare samples of the render, within these limits.
 constexpr uint64_t kTrainingShare = 8, kMaxTrainingPaths = 700'000, kMinTrainingPaths = 16'384;
-/// For Guiding::kAuto: least number of samples of a render for which a pilot render pays, and the
-/// number of samples for each training path of the first two rounds. The second round takes place
-/// only if the field of the first one reduces noise.
+/// For Guiding::kAuto: minimum number of samples of a render for which a pilot render is
+/// worthwhile, and the number of samples for each training path of the first two rounds. The second
+/// round takes place only if the field of the first one reduces noise.
 constexpr uint64_t kMinAutoSamples = 2'000'000;
 constexpr std::array<uint64_t, 2> kAutoShares = {200, 40};
 constexpr uint64_t kMaxFirstPaths = 30'000, kMaxSecondPaths = 150'000;
@@ -35,9 +35,10 @@ constexpr double kMaxTimeShare = 20, kMaxGuidedTimeShare = 4;
 /// shading.
 constexpr double kRecordingCost = 1.5;
 /// Each image of a pilot render takes one of every kPilotShare samples of the render, within these
-/// limits, and has a limited number of samples per pixel. It renders fewer pixels rather than fewer
-/// samples, because the noise of Sobol samples falls with their number the faster the smoother a
-/// pixel is, and guiding makes the integrand less smooth.
+/// limits, and has a limited number of samples per pixel. A pilot render has fewer pixels rather
+/// than fewer samples per pixel: noise of Sobol samples falls faster with their number for smooth
+/// integrands, and guiding makes the integrand less smooth, so gains at low sample counts would be
+/// misleading.
 constexpr uint64_t kPilotShare = 320, kMinPilotPaths = 2048, kMaxPilotPaths = 65'536;
 constexpr uint32_t kMinPilotSamples = 16, kMaxPilotSamples = 32;
 /// Samples per pixel from which the variance is estimated for learned roulette.
@@ -81,9 +82,9 @@ uint64_t training_paths(const Settings& settings, uint32_t threads) {
   return paths;
 }
 
-/// Returns the mean cost and variance of a path, from the paths of the last round, which belong to
-/// `pixels`, with the effect of roulette. `spread` is the variance without roulette. If it is
-/// unknown, it is estimated from differences between neighbours. Leaves out the paths that differ
+/// Returns the mean cost and variance of a path, with the effect of roulette, from the paths of the
+/// last round, which were traced from `pixels`. `spread` is the variance without roulette. An
+/// unknown variance is estimated from differences between neighbours, without the paths that differ
 /// most.
 PathStatistics mean_path(const TrainingSamples& training_samples, std::span<const uint32_t> pixels,
                          const ImageTiles& tiles, std::optional<double> spread) {
@@ -106,8 +107,8 @@ PathStatistics mean_path(const TrainingSamples& training_samples, std::span<cons
   return mean;
 }
 
-/// One training with all its rounds. For Guiding::kAuto it also decides whether to continue and
-/// whether the render uses the field.
+/// A training run with all its rounds. For Guiding::kAuto, the class also decides whether training
+/// continues and whether the render uses the guiding field.
 class Trainer {
  public:
   Trainer(const WaveContext& render, const Scene& scene, const WaveSetup& waves,
@@ -177,7 +178,7 @@ class Trainer {
       if (round == 0) measure_speed(cost, without);
       if (measure_gain(without) < kMinGains[round] || ended()) return result(false);
     }
-    // The render will be guided, so more training pays through a better field.
+    // The render will be guided, so more training is worthwhile: it improves the guiding field.
     if (is_timed()) max_s_ = double{settings_.time_limit} / kMaxGuidedTimeShare;
     budget_ = max_paths();
     if (statistics_.gain < kFullTrainingGain) budget_ /= 2;

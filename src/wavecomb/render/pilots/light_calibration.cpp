@@ -21,7 +21,7 @@ namespace {
 
 /// Calibration traces one path for every kPixelsOfPath pixels, within these limits.
 constexpr uint32_t kMaxPaths = 16384, kMinPaths = 1024, kPixelsOfPath = 4;
-/// Vertices of a path at which a light is selected.
+/// Number of vertices of a calibration path at which a light is selected.
 constexpr uint32_t kVertices = 3;
 constexpr size_t kChunk = 128;
 /// Light tree nodes above this depth are balanced.

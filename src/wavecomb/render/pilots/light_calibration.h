@@ -4,9 +4,10 @@
 ///
 /// Camera paths over the whole image select lights with probabilities between proportional to power
 /// and uniform. The contributions of the light samples with their MIS weights, relative to the
-/// brightness of the image around, give the new probabilities (light/calibration/balance.h). The
-/// result does not depend on seed, sampler, samples, region, threads, waves or lanes, so that
-/// crops, resumed renders and merged renders use the same probabilities.
+/// brightness of the image around the pixel, give the new probabilities
+/// (light/calibration/balance.h). The result does not depend on seed, sampler, samples, region,
+/// threads, waves or lanes, so that crops, resumed renders and merged renders use the same
+/// probabilities.
 #pragma once
 
 #include <functional>

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Pilot renders: small renders before the first pass that measure what the render needs.
 ///
-/// They run in this order, and each uses the results of those before:
+/// The pilots run in this order, and each pilot uses the results of the previous ones:
 /// 1. light calibration: the contribution of each light to the image (light_calibration.h);
 /// 2. costs of materials (render_costs.h);
 /// 3. aiming: directions for light paths (light_paths/render/light_aiming.h);
 /// 4. training: where light comes from (guiding_training.h).
-/// Each returns its result with the seconds that it took and its statistics. Except for costs,
-/// which change no image, they depend only on counted samples of the whole image. Whether and how
-/// many light paths the render uses was decided before, by a pilot that compares whole renders
-/// (light_paths/render/transport_choice.h).
+/// Each pilot returns its result, its statistics, and its run time in seconds. Except for material
+/// costs, which do not affect the image, results depend only on sample counts, not on timing, and
+/// describe the whole image. Whether and how many light paths the render uses was decided before,
+/// by a pilot that compares whole renders (light_paths/render/transport_choice.h).
 #pragma once
 
 #include <cstddef>
@@ -58,15 +58,15 @@ struct PilotInput {
   RenderCosts& costs;          ///< receives the measured costs
   /// Costs of an earlier render, or null.
   const CostProfile* profile = nullptr;
-  /// Settings of the image that lights are calibrated for: the plan's, or in a pilot render those
-  /// of the actual render.
+  /// Settings of the image for which lights are calibrated: the plan's settings or, in a pilot
+  /// render, the settings of the actual render.
   const Settings& light_settings;
   /// Packed training of an earlier render (packed_training()), which replaces training; or empty.
   std::span<const std::byte> learned;
   /// Result of the joint transport in an earlier pilot render of the same image; may be null.
   std::shared_ptr<const JointPilot::Result> joint;
-  std::function<bool()> stopped;  ///< whether to give up
-  std::function<bool()> halted;   ///< whether to pause soon
+  std::function<bool()> stopped;  ///< returns whether the pilots shall be abandoned
+  std::function<bool()> halted;   ///< returns whether workers shall stop before the next wave
 };
 
 /// Runs the pilots of a render. The results are invalid if `stopped` returned true.

@@ -57,7 +57,7 @@ class ByteReader {
     values.resize(count);
     take(values.data(), count * sizeof(T));
   }
-  /// Throws Error if any bytes are left.
+  /// Throws Error if any bytes have not been read.
   void end() const { check(left_.empty()); }
 
  private:
@@ -152,7 +152,7 @@ Settings training_settings(Settings settings) {
 }
 
 /// Returns the settings with those that do not affect the choice of the transport reset to their
-/// defaults. AOVs and expressions stay, since some exclude light paths.
+/// defaults. AOVs and light path expressions are not reset, since some exclude light paths.
 Settings choice_settings(const Settings& settings) {
   Settings kept = training_settings(settings);
   kept.aovs = settings.aovs;

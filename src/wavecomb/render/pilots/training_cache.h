@@ -16,9 +16,9 @@
 
 namespace wavecomb {
 
-/// Serializes a training and the choice of the transport, if there is one: the size of the field
-/// and a few hundred bytes. Returns no bytes if nothing was chosen or learned: the settings decide,
-/// or the render is too short or was stopped.
+/// Serializes a training and the choice of the transport, if there is one. The result has the size
+/// of the guiding field plus a few hundred bytes, or no bytes if nothing was chosen or trained,
+/// because the settings fix the choice, or the render is too short or was stopped.
 std::vector<std::byte> packed_training(const GuidingTraining& training,
                                        const std::optional<TransportChoice>& transport);
 

@@ -9,7 +9,7 @@
 namespace wavecomb {
 
 /// Costs of materials and textures by name, in nanoseconds per shading record. A later render of
-/// the same stage can start from them.
+/// the same stage can start with these costs.
 struct CostProfile {
   std::vector<std::pair<std::string, float>> materials, textures;
 };

@@ -59,7 +59,8 @@ void RenderCosts::start(const WaveContext& context, const LaneKernels& kernels,
     if (profile) apply(*profile);
   }
   calibrated_ = order;
-  // Roulette affects the image, so it uses reproducible costs unless the settings ask for others.
+  // Roulette affects the image, so it uses reproducible modelled costs, unless the settings ask for
+  // measured costs or the caller provides a profile.
   if (settings_.costs == CostSource::kMeasured || profile) roulette = order;
 }
 
@@ -97,7 +98,7 @@ bool RenderCosts::apply(const CostProfile& profile) {
   }
   for (size_t t = 0; t < order.texture_ns.size(); ++t) {
     const auto at = textures.find(scene_.textures()[t]->name());
-    // 0 means too little to be measured
+    // a cost of 0 means that the texture's cost is too small to be measured
     const bool known = at != textures.end() && at->second >= 0;
     if (known) order.texture_ns[t] = at->second;
     is_complete = is_complete && known;

@@ -38,14 +38,14 @@ class RenderCosts {
   /// Costs before the first pass.
   const CostSnapshot& calibrated() const { return calibrated_; }
   double calibration_s() const { return calibration_s_; }
-  /// Quality of the predictions for the last pass that had any.
+  /// Accuracy of cost predictions, in the last pass that had predictions.
   const CostPrediction& prediction() const { return prediction_; }
-  /// Sums over all passes, by material.
+  /// Total time and number of timed records of each material, over all passes.
   const std::vector<double>& total_ns() const { return total_ns_; }
   const std::vector<uint64_t>& total_timed() const { return total_timed_; }
 
  private:
-  /// Applies a profile. Returns whether it covers all materials and textures.
+  /// Applies a profile. Returns whether the profile covers all materials and textures.
   bool apply(const CostProfile& profile);
 
   const Scene& scene_;

@@ -33,7 +33,8 @@ struct MaterialStatistics {
   double predicted_ns = 0;   ///< cost that the next pass would be scheduled by
 };
 
-/// Selection probability of a part of the lights: as rendered, and by power alone.
+/// Selection probability of a light or group of lights: as used by the render, and if selection
+/// were by power alone.
 struct LightShare {
   std::string name;
   double share, by_power;
@@ -50,15 +51,17 @@ struct LightShares {
 
 /// Statistics of the aiming of light paths.
 struct AimStatistics {
-  uint32_t targets = 0;  ///< spheres; 0 if paths are not aimed
-  uint64_t paths = 0;    ///< training paths; 0 if aiming was not trained
+  uint32_t targets =
+      0;  ///< number of spheres that light paths are aimed at; 0 if paths are not aimed
+  uint64_t paths = 0;  ///< training paths; 0 if aiming was not trained
   double seconds = 0;
 };
 
 /// Statistics of a render. Phase times are sums over workers.
 struct RenderStatistics {
   double build_s = 0, render_s = 0;
-  double first_samples_s = 0;  ///< part of render_s, until the first wave was done
+  double first_samples_s =
+      0;  ///< time from the start of rendering until the first wave was done; included in render_s
   std::vector<std::pair<std::string, double>> phases_s;
   uint64_t samples = 0, rays = 0, shadow_rays = 0, records = 0;
   uint64_t packets = 0, packet_lanes = 0;
@@ -76,17 +79,20 @@ struct RenderStatistics {
   std::vector<uint64_t> rays_at, shadow_rays_at, records_at;
   double run_length = 0, material_homogeneity = 0, texture_homogeneity = 0;
   std::vector<MaterialStatistics> materials;
-  double cost_r2 = 0, cost_mean_error = 0;  ///< of predictions for the last pass that had any
-  uint64_t cost_materials = 0;              ///< materials with a prediction and a measurement
+  double cost_r2 = 0,
+         cost_mean_error =
+             0;  ///< accuracy of cost predictions, in the last pass that had predictions
+  uint64_t cost_materials = 0;  ///< materials with a prediction and a measurement
   std::vector<std::pair<std::string, uint64_t>> policy_uses;  ///< queues ordered by each policy
   double calibration_s = 0;
   LightShares light_calibration;
   AllocationStatistics allotment;
   GuidingStatistics guiding;
   AimStatistics light_aiming;
-  std::vector<std::string> lights_without_paths;  ///< names, if other lights send light paths
-  std::optional<TransportChoice> transport;       ///< for Transport::kAuto
-  std::optional<StoreStatistics> texture_store;   ///< set if texture memory has a limit
+  std::vector<std::string>
+      lights_without_paths;  ///< names of lights that emit no light paths, if other lights do
+  std::optional<TransportChoice> transport;      ///< for Transport::kAuto
+  std::optional<StoreStatistics> texture_store;  ///< set if texture memory has a limit
 };
 
 /// Adds up the counters of the workers, by phase, depth, policy and material, into `statistics`.

@@ -38,8 +38,9 @@ struct Camera {
   std::vector<Affine> steps{};
   Projection projection = Projection::kPerspective;
   /// Visible region: x from window[0] to window[1], y from window[2] to window[3]. A perspective
-  /// camera measures it on the plane z = -1, an orthographic camera perpendicular to its axis in
-  /// scene units, and a latlong camera as longitude and latitude in radians with (0, 0) along -z.
+  /// camera measures the window on the plane z = -1, an orthographic camera perpendicular to its
+  /// axis in scene units, and a latlong camera as longitude and latitude in radians with (0, 0)
+  /// along -z.
   float window[4] = {-0.5f, 0.5f, -0.5f, 0.5f};
   /// Ignored by latlong cameras, which stretch the window to the image.
   Conform conform = Conform::kExpandAperture;

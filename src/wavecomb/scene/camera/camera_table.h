@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Table of camera parameters other than the transform: one row for each member of Camera. Range
 /// checks, the scene fingerprint, the Python keywords and their stub, and the camera poses that the
-/// window sets are derived from it. To add a parameter, add a member, a row here, and its use.
+/// window sets are derived from it. To add a parameter, add a member, a row here, and the code that
+/// uses the parameter.
 #pragma once
 
 #include <array>
@@ -23,7 +24,7 @@ using CameraValue = std::variant<float, uint32_t, FourNumbers, std::vector<FourN
 /// Alternatives of CameraValue, in the same order.
 enum class CameraValueKind : uint8_t { kNumber, kChoice, kFour, kPlanes };
 
-/// Description of a camera parameter. Contract: lives as long as the program.
+/// Description of a camera parameter. Contract: descriptions have static lifetime.
 struct CameraParameter {
   const char* name = "";  ///< keyword of set_camera
   const char* help = "";  ///< one sentence, with the unit

@@ -181,7 +181,7 @@ WAVECOMB_INLINE void note_shapes(Wave& wave, const WaveContext& context, const R
                       p.shape);
 }
 
-/// Surface that the rays of a packet hit. Lanes without one are undefined.
+/// Surface that the rays of a packet hit. Values are undefined in lanes whose ray hit no surface.
 template <typename F>
 struct HitIds {
   UInt<F> prim, geom, mesh;

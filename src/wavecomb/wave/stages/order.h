@@ -12,8 +12,8 @@
 namespace wavecomb {
 
 /// Returns a key of the texture position that a record reads: UDIM tile (7 bits), mip level (4
-/// bits), Morton code of uv on a 128 x 128 grid (14 bits). It is an estimate: the level uses the
-/// mean uv density of the mesh, and texture transforms are ignored.
+/// bits), Morton code of uv on a 128 x 128 grid (14 bits). The key is an estimate: the mip level
+/// uses the mean uv density of the mesh, and texture transforms are ignored.
 template <typename F>
 UInt<F> texture_key(const SceneView& scene, const MeshHit<F>& hit, const F& cone_width,
                     const Mask<F>& active) {

@@ -8,8 +8,8 @@
 
 namespace wavecomb {
 
-/// Largest number of records in a batch. Their columns fit the first-level cache, and time is
-/// measured once per batch.
+/// Largest number of records in a batch. The columns of a batch fit into the first-level cache, and
+/// time is measured once per batch.
 inline constexpr size_t kMaxBatch = 256;
 
 /// Returns the end of the batch that starts at `begin`, a run of records of one program.

@@ -8,8 +8,8 @@
 
 namespace wavecomb {
 
-/// Runs the steps of a vertex. Packet kernels inline them; scalar kernels call the function of the
-/// reference integrator.
+/// Runs the steps of a vertex. Packet kernels inline the steps; scalar kernels call the function of
+/// the reference integrator.
 template <typename Bsdf, typename Joint, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE VertexResult<F> shade_one(const Vertex<F, kFeatures>& v,
                                           typename Joint::template Coupling<F>& joint) {
