@@ -17,7 +17,8 @@ _LEAST_S = 60.0
 _FILES, _TESTS = 30, 40
 _last: float = 0.0
 _by_test: dict[str, float] = {}
-_file = os.environ.pop(FILE, None)  # not for pytest in tests
+# Remove the variable from the environment, so that nested pytest runs do not write to the file.
+_file = os.environ.pop(FILE, None)
 
 
 def since_last() -> float:
@@ -25,7 +26,7 @@ def since_last() -> float:
     global _last
     times = os.times()
     now = times.user + times.system + times.children_user + times.children_system
-    # Only tests that fork import this module.
+    # Only tests that fork processes import the module `forks`.
     if forks := sys.modules.get("forks"):
         now += forks.cpu_s
     out = now - _last if _last else 0.0

@@ -127,7 +127,7 @@ TEST(Cylinder, NothingLeavesItsInside) {
   const Lights lights({make_light(LightKind::kCylinder)});
   const LightView view = lights.view();
   EXPECT_FALSE(sample_light<float>(view, Vec3<float>(0.1f, 0, 0.2f), 0.5f, 0.5f, 0.5f, true).valid);
-  // Through an open end, to the inner wall behind the axis.
+  // The ray enters through an open end of the cylinder and hits the inner wall behind the axis.
   const Vec3<float> from{-2, 0, 0.1f}, dir{0.98058068f, 0, 0.19611614f};
   const auto t = trace(view, from, dir);
   ASSERT_TRUE(t);
@@ -164,7 +164,7 @@ Color<float> sent(const Shaping& shaping, Vec3<float> dir, const Affine& turned 
 
 Vec3<float> off_axis(double degrees, double around = 0) {
   const double t = degrees * kPiD / 180, p = around * kPiD / 180;
-  // phi belongs to the direction towards the light, see docs/lights.md.
+  // The azimuth phi of a profile refers to the direction towards the light (docs/lights.md).
   return {static_cast<float>(-std::sin(t) * std::cos(p)),
           static_cast<float>(-std::sin(t) * std::sin(p)), static_cast<float>(-std::cos(t))};
 }
@@ -261,7 +261,8 @@ TEST(Ies, MeanIsExactAndNormalizes) {
   shaping.ies_normalize = true;
   EXPECT_NEAR(sent(shaping, off_axis(0), {}, {lamp()}).y, 3 * 8 / lamp().mean(), 1e-3);
 
-  // With normalize, power equals that of the unshaped light, up to the factor of a half sphere.
+  // With ies_normalize, the shaped and the unshaped light have equal power, up to a factor for
+  // profiles that cover a hemisphere.
   Light light = make_light(LightKind::kSphere);
   light.radius = 0;
   light.shaping = shaping;

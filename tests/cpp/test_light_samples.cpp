@@ -140,7 +140,7 @@ TEST(LightSamples, OfInfiniteLightsFollowTheirDensity) {
   battery.judge();
 }
 
-/// Profiles that cover one half, and that are asymmetric.
+/// Two IES profiles: one covers a hemisphere, and one is asymmetric.
 std::vector<IesProfile> profiles() {
   return {{{0, 40, 40, 90}, {0}, {1, 3, 0.5f, 2}},
           {{0, 90, 180}, {0, 100, 360}, {1, 2, 3, 3, 0, 1, 1, 2, 3}}};

@@ -84,8 +84,8 @@ TEST(LightTree, WhatShinesCanBeChosen) {
   }
 }
 
-/// The density for bounces equals that of samples, and the estimate equals that with selection by
-/// power.
+/// The light density that MIS uses for bounces equals the density of light samples, and estimates
+/// agree with selection by power.
 TEST(LightTree, BothHalvesOfMisAgree) {
   const Lights lights = random_lights(200, 14, 2);
   const LightView power = lights.view(), view = by_tree(lights);

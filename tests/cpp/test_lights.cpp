@@ -117,7 +117,7 @@ TEST(LightSampling, HitDensityIsTheSamplingDensity) {
         ++outside;
         continue;
       }
-      // weight * pdf is the radiance, and a hit returns the same.
+      // The weight of a light sample times its pdf is the radiance, which a hit returns as well.
       if (!is_dome_image) {
         ASSERT_NEAR(s.weight.y * s.pdf, 3, 1e-5);
       }

@@ -124,7 +124,7 @@ TEST(Limits, ids_of_layers_are_whole_numbers_of_a_float) {
   EXPECT_EQ(refusal([&] { check_id_layers(set, 1u << 25, 1u << 24); }), "");
   EXPECT_NE(refusal([&] { check_id_layers(set, 1, (1u << 24) + 1); }).find("crypto_material"),
             std::string::npos);
-  // The id in the layer is one more than the index.
+  // Cryptomatte layers store index + 1, which a float must represent exactly.
   const float last = static_cast<float>((1u << 24) - 1) + 1.f;
   EXPECT_NE(last, static_cast<float>((1u << 24) - 2) + 1.f);
 }
@@ -159,7 +159,7 @@ TEST(Limits, the_tree_alone_chooses_among_more_lights_than_a_table_can) {
       refusal([&] { chooses_by_tree(LightSelection::kPower, alone); }),
       "by power one of 16,777,215 lights can be chosen; the scene has 102 lights and emissive "
       "triangles; choose --light-selection tree");
-  // Light selection and its probabilities do not use the table.
+  // Selection by light tree does not use the power table.
   by_tree.by_tree = alone.by_tree = true;
   const LightReceiver<float> to(Vec3<float>{4, 5, 2});
   for (uint32_t i = 0; i < 1000; ++i) {

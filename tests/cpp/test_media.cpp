@@ -21,8 +21,8 @@ struct FoggyScene {
   Fog fog;
 };
 
-/// Makes a floor and a light's geometry in fog, and a point light. `on_floor` aims the camera at
-/// the floor.
+/// Makes a foggy scene with a floor and a point light and, if `with_lamp`, a sphere light and a
+/// dome. `on_floor` aims the camera at the floor.
 FoggyScene foggy(const Vec3<float>& extinction, bool with_lamp, bool on_floor, float size) {
   SceneBuilder b;
   const uint32_t grey = b.add_material(make_material(ProgramId::kDiffuse, {0.6f, 0.5f, 0.4f}));

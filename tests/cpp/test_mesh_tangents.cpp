@@ -192,7 +192,8 @@ TEST(Tangents, WhatCancelsOutIsTheTrianglesOwn) {
   fan.normals.assign(21, 0);
   for (size_t i = 1; i < 21; i += 3) fan.normals[i] = 1;
   fan.normals_at = Attribute::kVertex;
-  // Uses texture coordinates per corner, so that u continues past the last spoke.
+  // Use texture coordinates per corner, so that u increases around the fan without wrapping back to
+  // 0.
   for (int i = 0; i < 6; ++i)
     fan.uvs.insert(fan.uvs.end(), {0.5f, 1, float(i) / 6, 0, float(i + 1) / 6, 0});
   fan.uvs_at = Attribute::kCorner;

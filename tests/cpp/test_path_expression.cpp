@@ -14,10 +14,12 @@ namespace wavecomb {
 namespace {
 
 const std::vector<std::string> kKeys{"other", "key"};
-/// A letter for each event, and for each path end with a key: lights, domes, objects, volumes.
+/// Letters that stand for path events and path ends in regular expressions. Upper-case ends have
+/// the key "key": lights, domes, objects, volumes.
 constexpr std::string_view kEventLetters = "abcdefvw", kEndLetters = "lgoeLGOE";
 
-/// A path expression and the equivalent regular expression over those letters.
+/// A light path expression, and the equivalent regular expression over the letters of events and
+/// ends.
 struct Pair {
   const char *expression, *regex;
 };

@@ -74,7 +74,7 @@ OnRect on_rect(const LightRecord& r, const Vec3<float>& from, double a, double b
   return {a, b, d2, cosine * r.area / d2};
 }
 
-/// Density that paths see when they hit a point of the rect.
+/// Light sampling density that MIS uses for paths that hit a point of the rect.
 double hit_density(const LightView& view, const Vec3<float>& from, double a, double b,
                    Color<float>* radiance = nullptr) {
   const LightRecord& r = view.lights[0];
@@ -172,8 +172,8 @@ TEST(PicturedRect, IrradianceIsThatOfItsPicture) {
           const OnRect at = on_rect(r, place.from, a, b);
           Color<float> radiance(0.f);
           hit_density(view, place.from, a, b, &radiance);
-          // cos d^2 = measure d^4 / A: the receiver is parallel to the rect, so both cosines are
-          // equal.
+          // The receiver is parallel to the rect, so its cosine equals the rect's, which follows
+          // from the measure.
           const double cosine = at.measure * at.distance2 / static_cast<double>(r.area);
           exact += static_cast<double>(radiance.y) * cosine * at.measure / kN / kN;
         }

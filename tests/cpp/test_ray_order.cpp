@@ -279,7 +279,7 @@ TEST(RayOrder, QueuesAreOrderedStablyAndFetchedFromTheirSlots) {
             return keys[ray_of[a]] < keys[ray_of[b]];
           });
           EXPECT_EQ(std::vector<uint32_t>(queue.slot, queue.slot + n), expected);
-          // Each entry has the ray of its slot, in any order.
+          // Each entry of the reordered queue holds the ray of the entry's slot.
           const float* const columns[] = {queue.ox, queue.oy, queue.oz,
                                           queue.dx, queue.dy, queue.dz};
           for (size_t i = 0; i < n; ++i) {

@@ -207,7 +207,7 @@ TEST(SettledMaterial, PicturesAreThoseOfTheTextureAndOfTheConstant) {
     for (const Case& c : kCases) {
       Material m = make_material(program, {0.7f, 0.5f, 0.4f}, 0.3f);
       if (c.input == Input::kClearcoatRoughness) m.clearcoat = 0.5f;
-      // Uses another texture, so that all three variants have the same frame.
+      // Add a texture on another input, so that all three materials use the same tangent frame.
       at(m, c.input == Input::kBaseColor ? Input::kSpecularColor : Input::kBaseColor) = use(2);
       Material same = m, other = m, constant = m;
       at(same, c.input) = corner_of(c.constant);

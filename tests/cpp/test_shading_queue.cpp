@@ -109,7 +109,8 @@ TEST(ShadingQueue, ColumnsAreAlignedAndApart) {
       EXPECT_TRUE(other < begin || other >= begin + 4 * (a.words + SoaBlock::kPad));
     }
   }
-  // Records count twice, because the queue moves them from one block to another.
+  // The queue allocates memory for two copies of the records, because materialize() moves them from
+  // one block to another.
   EXPECT_GE(queue.bytes(), 4u * 100 * (2u * Q::kColumns + 2u * kWords + 3u));
 }
 

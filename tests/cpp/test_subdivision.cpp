@@ -75,8 +75,8 @@ TEST(Subdivision, DisplacementOfOneFaceIsSharedAtItsEdges) {
     for (size_t k = 0; k < 3; ++k)
       square += std::pow(double{moved.positions[i + k]} - still.positions[i + k], 2);
     const double distance = std::sqrt(square);
-    // The offset from the surface is none, all, or the fraction of adjacent faces: a half at edges,
-    // a third at corners.
+    // Each point moves by a fraction of the displacement: the fraction of adjacent faces that are
+    // displaced, a half at edges and a third at corners, or 0 or 1.
     double nearest = 1;
     for (const double share : {0.0, 1.0 / 3, 0.5, 1.0})
       nearest = std::min(nearest, std::abs(distance - 0.5 * share));

@@ -13,7 +13,7 @@ using namespace scene_testing;
 using namespace wave_testing;
 using chi_square::Random;
 
-/// A field with arbitrary values for directions, costs, moments and image brightness.
+/// A guiding field with arbitrary values for directions, costs, moments and image brightness.
 class AbsurdField {
  public:
   AbsurdField(const Scene& scene, uint32_t seed) : random_(seed) {

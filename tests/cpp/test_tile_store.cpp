@@ -272,7 +272,7 @@ TEST_F(TileStoreTest, ATextureThatIsExpectedFindsRoom) {
   store->set_waiting(kLimit - 2 * kSize - 100'000);
   store->expect(kSize, 0);
   EXPECT_EQ(store->statistics().file_bytes, 0u);
-  // Decoded data and prefetched tiles count as well.
+  // Decoded data and prefetched tiles count towards the memory limit as well.
   store->expect(kSize, 100'000);
   EXPECT_GT(store->statistics().file_bytes, 0u);
   EXPECT_EQ(all_resident(), 0u);

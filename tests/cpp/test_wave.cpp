@@ -227,7 +227,7 @@ TEST(Wave, ThreadsDoNotShow) {
       s.light_weights = weights;
       s.threads = 1;
       s.integrator = IntegratorKind::kReference;
-      // Without a renderer, lights have their shares by power.
+      // Without a renderer there is no calibration, so lights are selected in proportion to power.
       const RenderedImage expected =
           weights == LightWeights::kPower ? reference(scene, s, accel) : renderer.render(s);
       for (const uint32_t threads : {1u, 2u, 3u}) {

@@ -13,8 +13,8 @@
 ///
 /// Lights with multipliers, and lights that production finds only by light samples
 /// (LightRecord::sampled_only: invisible shapes, shadow links), are evaluated along the same
-/// uniform directions, whether or not other objects are in front of them. Their visibility is
-/// tested with their own shadow set.
+/// uniform directions, whether or not other objects are in front of them. The visibility of these
+/// lights is tested with their own shadow sets.
 ///
 /// Beyond the first vertex of a path, textures are read with the footprint after a diffuse bounce.
 /// Scenes with textured indirect light are therefore exact for diffuse surfaces only.

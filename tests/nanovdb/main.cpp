@@ -5,7 +5,6 @@
 ///
 /// PACKED is none, zip or blosc. BITS is 32; for a float grid it can also be 4, 8, 16 or n, to
 /// which leaves are quantised. Equal grids give equal bytes.
-/// leaves are quantised. The same grids give the same bytes.
 #include <openvdb/openvdb.h>
 
 #include <cstdio>

@@ -27,7 +27,8 @@ def add_rows(
         added: The additional rows.
         follow: Modules that derive data from the table when they are imported.
     """
-    for name in follow:  # import these first, so that later tests see them without the added rows
+    # Import modules before adding rows, so that later tests see them without the added rows.
+    for name in follow:
         importlib.import_module(name)
     rows = MappingProxyType({**table(), **{row.name: row for row in added}})
     for module in [one for name, one in sys.modules.items() if name.startswith("wavecomb.")]:

@@ -94,7 +94,8 @@ class Watch:
         now, cpu = time.monotonic(), self._cpu_s()
         passed, computed = now - self._last, max(0.0, cpu - self._cpu)
         self._busy_s += min(passed, computed)
-        # A gap of a second or more means that this process was halted, and so was the other one.
+        # A gap of a second or more means that this process was halted, and that the supervised
+        # process was halted as well.
         self._idle_s += passed if passed < 1.0 else 0.0
         self._last, self._cpu = now, cpu
         return self._busy_s > self._limit_s or self._idle_s > self.PATIENCE * self._limit_s

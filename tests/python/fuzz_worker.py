@@ -46,7 +46,8 @@ def read(case: Path) -> tuple[str, str]:
     elif case.name == "case.exr":
         try:
             merge([case, case.with_name("good.exr")])
-        except OSError as error:  # merge() may raise it; the command prints it as one line
+        # merge() may raise OSError, which the command `wavecomb merge` prints as one line.
+        except OSError as error:
             line = str(error)
             return ("refused" if line and "\n" not in line else "wrong"), line
     else:
@@ -133,7 +134,7 @@ def main() -> None:
     progress_notes.start(progress_notes.new_page())
     time_limit.limit_s = LOAD_LIMIT_S
     time_limit.end_process = functools.partial(give_up, answers)
-    judge(sys.argv[2])  # imports everything, so that the first case takes no longer
+    judge(sys.argv[2])  # import all modules before the first case, whose time is measured
     with tempfile.TemporaryFile() as spilt:
         written = watch_writes(os.path.realpath(os.path.dirname(sys.argv[2])))
         os.dup2(spilt.fileno(), 1)
@@ -148,7 +149,7 @@ def main() -> None:
             sys.stderr.flush()
             if os.fstat(1).st_size:
                 words = os.pread(1, 4096, 0).decode(errors="replace")
-                # The supervisor filters these lines.
+                # The supervisor ignores output lines that start with CHATTER.
                 if not all(text.startswith(CHATTER) for text in words.splitlines()):
                     outcome, said = "wrong", f"spilt: {words}"
                 os.ftruncate(1, 0)

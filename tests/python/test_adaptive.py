@@ -108,7 +108,8 @@ def test_error_and_variance_of_a_plain_render(cornell: Any) -> None:
     independent = [
         render(cornell, spp=64, sampler="independent", seed=k, error=True) for k in range(24)
     ]
-    here = plain.beauty.max(axis=2) < 1.0  # not the edge of the light, where few samples decide
+    # Exclude the edge of the light, where few samples determine the variance.
+    here = plain.beauty.max(axis=2) < 1.0
     measured = np.var([p.beauty[here] for p in independent], axis=0, ddof=1).mean()
     told = np.mean([p.variance[here] for p in independent])
     assert told == pytest.approx(measured, rel=0.1), "independent samples: Welford is right"

@@ -181,7 +181,8 @@ def test_a_stopped_picture(stage: Path, tmp_path: Path, frames: bool) -> None:
     while not grows(tmp_path) and process.poll() is None:
         assert time.monotonic() < end
         time.sleep(0.02)
-    # The first band is written. The others take ten times as long.
+    # Interrupt the render after the first band is written; the remaining bands take ten times as
+    # long.
     process.send_signal(signal.SIGINT)
     assert process.wait(60) == 130
     if frames:

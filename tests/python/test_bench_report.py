@@ -144,7 +144,7 @@ def test_figures_open_and_are_not_blank(folder: Path) -> None:
         assert pixels.shape[1] > 800
         ink = (np.abs(pixels - 1.0) > 0.1).any(axis=2)
         assert 0.003 < ink.mean() < 0.95, name
-        # Three quarters are not blank; the last panel of a row of two may be missing.
+        # Three of the figure's four quadrants must contain a plot; the fourth may be empty.
         half_y, half_x = ink.shape[0] // 2, ink.shape[1] // 2
         for quarter in (ink[:half_y, :half_x], ink[:half_y, half_x:], ink[half_y:, :half_x]):
             assert quarter.any(), name

@@ -87,7 +87,8 @@ def test_a_program_is_in_its_own_units_alone(units_of: dict[str, set[str]], prog
     if not unity:  # WAVECOMB_BATCH=OFF
         assert units_of[program] == {f"{kernel}.o" for kernel in kernels}
         return
-    # One unit of packets and one of scalar lanes, both of this program's kernels only.
+    # Each program has two unity files, one for packets and one for scalar lanes, which include only
+    # kernels of this program.
     assert units_of[program] == {f"unity_{program}_cxx.cxx.o"} and len(unity) == 2
     included = re.findall(r'^#include ".*/lanes/(.*)"', "".join(map(Path.read_text, unity)), re.M)
     assert sorted(included) == sorted(kernels)

@@ -65,7 +65,7 @@ def test_one_picture_whatever_the_schedule(
     learned = plain.stats["guiding"]
     assert learned["paths"] >= 12000
     assert learned["regions"] > 0
-    # So few paths do not show a gain on Mixed.
+    # On the scene Mixed, so few training paths show no gain.
     if name == "cornell":
         assert (learned["guided_share"] > 0) == (way["guiding"] == "on")
         assert not np.array_equal(plain.beauty, render(scene).beauty)
@@ -269,7 +269,8 @@ def test_auto_decides_alike_whatever_the_schedule(tmp_path: Path) -> None:
     }
     first = wavecomb.render(scene, **part)
     assert first.stats["guiding"]["used"]
-    # A hundredth of the samples shows the gain. Then training goes to its full length.
+    # Training with a hundredth of the samples shows the gain, so training continues to its full
+    # length.
     assert first.stats["guiding"]["paths"] > 1.5 * 480 * 320 * 132 / 100
     ways: list[dict[str, Any]] = [{"threads": 1, "lanes": 1, "wave_size": 64, "policy": "none"}]
     if is_long():
@@ -331,7 +332,7 @@ def test_layers_say_what_became_of_bounces(cornell: Any) -> None:
     way: dict[str, Any] = {"guiding": "on", "roulette": "efficient", "aovs": LEARNED_AOVS}
     both = render(cornell, **way)
     share, survival = (both.aovs[name] for name in LEARNED_AOVS)
-    # In each region, the material samples at least a quarter of the bounces.
+    # In each region, at least a quarter of the bounces are sampled by the BSDF.
     assert 0.1 < share.mean() < share.max() <= 0.75
     assert 0.1 <= survival.min() < survival.mean() < survival.max() <= 1
     assert np.array_equal(both.beauty, render(cornell, **{**way, "aovs": ()}).beauty)

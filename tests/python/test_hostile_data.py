@@ -119,7 +119,7 @@ def test_archives_that_are_no_checkpoints(stage: Path, tmp_path: Path, kind: str
 @pytest.mark.parametrize(
     ("parts", "method", "words"),
     [
-        # It would decompress to 128 MB, and otherwise be a valid archive.
+        # A valid archive, except that it would decompress to 128 MB.
         ({"header": text("{}"), "a": npy(np.zeros(1 << 24))}, zipfile.ZIP_DEFLATED, "compressed"),
         (
             {"header": text("{}"), "a": lying_npy("(1000,)")},

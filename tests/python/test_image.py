@@ -44,7 +44,8 @@ def test_exr_float_is_exact(tmp_path: Path, layers: dict[str, np.ndarray]) -> No
 def test_writing_holds_no_copy(tmp_path: Path, ending: str) -> None:
     beauty = np.full((2048, 256, 3), 0.5, np.float32)
     layers = {"beauty": beauty, "normal": beauty, "depth": beauty[:, :, 0]}
-    image.write_exr(tmp_path / "first.exr", layers)  # load the modules and what they allocate once
+    # Write a first image to import modules and make all allocations that happen only once.
+    image.write_exr(tmp_path / "first.exr", layers)
     tracemalloc.start()
     try:
         if ending == "exr":

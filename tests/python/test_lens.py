@@ -171,7 +171,7 @@ def test_motion_is_in_pixels_to_the_right_and_up(tmp_path: Path) -> None:
     picture = _render(_stage(tmp_path, MOVING, says), spp=16, aovs=["motion", "alpha"], frame=1)
     motion = picture.aovs["motion"]
     covered = picture.aovs["alpha"] == 1
-    # Pixels of a unit of length at distance 8, for this aperture and focal length.
+    # Image size in pixels of one unit of length at distance 8, for this aperture and focal length.
     pixels = SIZE[0] / (20.955 / 20) / 8
     assert covered.sum() > 20
     np.testing.assert_allclose(motion[covered], np.broadcast_to((pixels, pixels / 4),

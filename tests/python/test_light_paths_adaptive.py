@@ -57,7 +57,8 @@ def test_the_error_is_that_of_both_kinds_of_paths(stage: Any, transport: str) ->
     known = np.abs(pictures - mean).sum(axis=(1, 2, 3)).mean() / mean.sum()
     known *= np.sqrt(seeds / (seeds - 1))
     told = np.mean([one.stats["error"] for one in found])
-    # Light that neither half buffer contains does not count: camera paths alone report 0.78 of it.
+    # The reported error misses light that neither half buffer contains: with camera paths alone, it
+    # is 0.78 of the actual error.
     assert 0.7 < told / known < 1.3
     variance = np.mean([one.variance.sum() for one in found])
     assert 0.5 < variance / pictures.var(axis=0, ddof=1).sum() < 2.5

@@ -73,7 +73,7 @@ def test_reading_ahead_changes_nothing(tmp_path: Path) -> None:
         assert x["srgb"] == y["srgb"] and np.array_equal(x["pixels"], y["pixels"])
     warnings = [line for line in b.report.lines() if "cannot be read" in line]
     assert len(warnings) == 2 and any("no such file" in line for line in warnings)
-    assert not Sdf.Layer.Find(str(path))  # closed, also if reading failed
+    assert not Sdf.Layer.Find(str(path))  # the layer is closed even if reading failed
     assert not [t for t in threading.enumerate() if t.name.startswith("wavecomb-image")]
 
 
@@ -138,7 +138,7 @@ def calls_to_read(path: Path, count: int, kind: str) -> int:
         prim.AddTranslateOp().Set(Gf.Vec3d(2.0 * i, 0.0, 0.0))
     stage.Save()
     profile = cProfile.Profile()
-    wavecomb.load(path)  # do not count imports and caches
+    wavecomb.load(path)  # exclude imports and the filling of caches from the count
     with profile:
         wavecomb.load(path)
     return sum(entry.callcount for entry in profile.getstats())

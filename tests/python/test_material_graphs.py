@@ -190,7 +190,7 @@ def test_noise_drives_many_parameters_by_one_program(tmp_path):
     assert np.allclose(got["opacity"][:, 0], mix[:, 0], atol=1e-5)
     for parameter in ("fuzz_color", "coat_color", "transmission_tint"):
         assert np.allclose(got[parameter], mix, atol=1e-5)
-    # All parameters, opacity alone, and what emission needs alone.
+    # The material has three graphs: for all parameters, for opacity only, and for emission only.
     assert len(scene.graphs) == 3
     assert [len(g.outputs) for g in scene.graphs[1:]] == [1, 3]
 
@@ -343,7 +343,7 @@ def test_networks_too_large_are_said_and_leave_parameters_out(tmp_path):
         names.append(f"N{i}")
     for i in range(1, 70):
         first = names[0] if i == 1 else f"S{i - 1}"
-        # The maxima come last, so that all noises are live at the same time.
+        # The max nodes come last, so that the results of all noise nodes are live at the same time.
         nodes += node(
             f"S{i}",
             "ND_max_color3",

@@ -339,7 +339,8 @@ def test_stones_are_closed_and_their_charts_lie_apart(tmp_path: Path) -> None:
     size = uv.max(axis=1) - uv.min(axis=1)
     assert len(uv) == len(faces) and size.max() < 4.0 / 800.0  # 4 texels of about 860
     steps = np.abs(np.diff(uv.mean(axis=1), axis=0)).mean()
-    assert 0.25 < steps < 0.42  # 1 / 3 for independent positions in a unit square
+    # The mean distance per axis is 1/3 for independent positions in the unit square.
+    assert 0.25 < steps < 0.42
 
 
 @pytest.mark.slow

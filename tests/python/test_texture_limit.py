@@ -106,7 +106,8 @@ def test_what_is_small_in_the_picture_goes_first(tmp_path, stage):
     assert at(2 * WHOLE / 1e6)[0] == {"Near": 256, "Far": 256}
     got, words = at(1.3 * WHOLE / 1e6)
     assert got == {"Near": 256, "Far": 128} and "1 of 2 textures without their finest" in words
-    # Far shows 64 times fewer texels, so it loses six levels before Near loses one.
+    # The image shows 64 times fewer texels of texture Far, so Far loses six mip levels before Near
+    # loses one.
     assert at(1.02 * WHOLE / 1e6)[0] == {"Near": 256, "Far": 32}
     got, words = at(0.2 * WHOLE / 1e6)
     assert got["Near"] == 64 and got["Far"] <= 4

@@ -267,7 +267,8 @@ class Renders:
             samples=SPP * more,
             contribution=contribution,
         )
-        # Merging blurs what mirrors show: of the image, only the mean stays.
+        # Merging of light path vertices blurs reflections in mirrors, but keeps the mean of the
+        # image, so only the means are compared.
         return found.of_mean() if "merge_radius" in variant.settings else found
 
 

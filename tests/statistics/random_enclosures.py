@@ -203,7 +203,7 @@ class Enclosures:
             spin = turned(y=self.between(-180, 180))
             self.light("Rect", (x, size, z), size, 1.0, spin)
         elif way == "close":
-            # Above the floor by a thousandth of its size, facing up or down.
+            # A disk light slightly above the floor, facing up or down.
             spin = turned(x=90.0 if self.chance(0.5) else -90.0)
             self.light("Disk", (x, 1e-3, z), size, 0.7, spin)
         else:

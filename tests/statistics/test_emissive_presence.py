@@ -269,8 +269,8 @@ def test_instances(shot: Shot) -> None:
     }}"""
     corner = 0.25 / np.sqrt(1 + 0.25**2)
     above = ALBEDO * 4 / np.pi * corner * np.arctan(corner)
-    # Opacity of the upper one is 1/2 + z, and 1/2 + x of it passes the lower one. By symmetry, the
-    # mean of the product over the upper one is 1/4.
+    # The opacity of the upper square is 1/2 + z, and a fraction 1/2 + x of its light passes the
+    # lower square. By symmetry, the mean of the product over the upper square is 1/4.
     agree(shot(driven(), prims), GLOW * (0.5 * UNDER_SQUARE + 0.25 * above))
 
 

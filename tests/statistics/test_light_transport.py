@@ -188,7 +188,8 @@ def test_cameras_are_unbiased(lens: str, tmp_path: Path, beauty: Any) -> None:
     prims = [p if "Camera" not in p else LENSES[lens] for p in corner(*lights(tmp_path)["rect"])]
     shown = {"projection": "latlong"} if lens == "all round" else {}
     stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *prims), **shown)
-    # Not at the image edge, where camera paths do not cover the tails of wide filters.
+    # Use a wide filter, except where light reaches the image edge: camera paths do not cover the
+    # tails of wide filters there.
     wide: dict[str, Any] = {"filter": "blackman-harris", "filter_width": 3.0}
     if lens == "clipped":
         wide = {}

@@ -96,7 +96,7 @@ def option_row(usage: str, text: str) -> tuple[str, str, str, str]:
     ('`-o, --output`', '`FILE`', 'Image.', 'out.exr')
     """
     names, value = re.fullmatch(r"((?:-\S+(?:,| /)? ?)*)(.*)", usage, re.DOTALL).groups()  # type: ignore[union-attr]
-    if not names:  # an argument of the command
+    if not names:  # the row describes a positional argument of the command
         names, value = value, ""
     choices = re.fullmatch(r"\[(.*\|.*)\]", value)
     shown = ", ".join(map(code, choices[1].split("|"))) if choices else code(value)

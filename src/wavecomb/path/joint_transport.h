@@ -1,21 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Interface to a joint transport: a second light transport algorithm, such as light paths
-/// (light_paths/coupling.h), that samples some of the same light paths as camera paths do, by
+/// (light_paths/coupling.h), that samples some of the same transport paths as camera paths, by
 /// another technique.
 ///
 /// A joint transport affects camera paths in two ways:
 ///
 /// - It adds a technique to the MIS weights of camera paths. With R the density with which the
-/// joint transport samples a path,
-///   relative to the density of bounces and up to the density D of the light's emission
-///   (light/emission/emission.h), the balance heuristic gives the weights
+///   joint transport samples a path, relative to the density of bounces and up to the density D of
+///   the light's emission (light/emission/emission.h), the balance heuristic gives the weights
 ///     bounce        1 / (1 + p_light / p_bounce + R D),
-///     light sample  1 / (1 + p_bounce / p_light + R' D / p_light), where R' is R with p_light in
-///     place of p_bounce.
+///     light sample  1 / (1 + p_bounce / p_light + R' D / p_light),
+///   where R' is R with p_light in place of p_bounce.
 ///   Each vertex multiplies its factors into R (PathState::ratio), which is 0 where the joint
 ///   transport does not reach.
 /// - It receives each camera path vertex between the vertex's light sample and bounce, and may
-/// store the vertex, for example to connect it to other vertices.
+///   store the vertex, for example to connect it to other vertices.
 ///
 /// A joint transport is a class with three member types:
 ///

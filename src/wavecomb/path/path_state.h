@@ -144,7 +144,7 @@ struct ScatteringEvent {
 /// most renders have no AOVs, and values that live until the end of shading would occupy registers.
 template <typename F>
 struct VertexAovs {
-  /// Requested values. Flags of optional fields. Fields without a flag are always written.
+  /// Flags of optional fields. Fields without a flag are always written.
   bool wants_uv = false, wants_lights = false, wants_bounces = false;
   bool wants_events = false;  ///< whether scattering events are classified; implies wants_lights
   Color<F> albedo;

@@ -29,13 +29,13 @@ namespace wavecomb {
 
 /// Packed instance, one cache line. Instance 0 is the world itself (identity).
 struct alignas(64) InstanceRecord {
-  float to_world[12];  ///< 3 x 4 transform, row by row: three columns of A, then the translation
-  uint32_t
-      geometry;  ///< index of the first entry of the instance's group in SceneView::geometry_mesh
+  float to_world[12];  ///< 3 x 4 matrix [A | translation], row by row
+  /// Index of the first entry of the instance's group in SceneView::geometry_mesh.
+  uint32_t geometry;
   uint32_t material;  ///< material of the group's meshes whose material is kInheritMaterial
-  uint32_t emissive;  ///< index of the instance's first entry in SceneView::emissive_lights, if any
-                      ///< mesh emits
-  float side;         ///< sign of det A: -1 for a transform that mirrors
+  /// Index of the instance's first entry in SceneView::emissive_lights, if any mesh emits.
+  uint32_t emissive;
+  float side;  ///< sign of det A: -1 for a transform that mirrors
 };
 static_assert(sizeof(InstanceRecord) == 64);
 
@@ -114,8 +114,8 @@ struct SceneGeometry {
   /// SubsurfaceView::exit_material; kInheritMaterial if no material has a subsurface radius, so
   /// that the scene has no subsurface random walks.
   uint32_t exit_material = kInheritMaterial;
-  std::vector<StepRange>
-      instance_motions;  ///< indexed by instance record; empty if no instance moves
+  /// Ranges of `steps`, indexed by instance record; empty if no instance moves.
+  std::vector<StepRange> instance_motions;
   bool moves() const {
     return mesh_motions.size() > 1 || !steps.empty() ||
            std::ranges::any_of(volumes, &Volume::moves);

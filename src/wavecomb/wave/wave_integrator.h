@@ -25,8 +25,8 @@ class WaveIntegrator final : public Integrator {
   const WaveContext& context_;
   RunWave run_wave_;
   uint32_t lanes_, wave_size_;
-  std::vector<std::unique_ptr<Wave>>
-      waves_;  ///< indexed by worker; each worker's thread allocates its wave
+  /// Indexed by worker. Each worker's thread allocates its wave.
+  std::vector<std::unique_ptr<Wave>> waves_;
 };
 
 }  // namespace wavecomb

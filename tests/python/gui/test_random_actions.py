@@ -16,7 +16,7 @@ from test_viewport import Alt, Control, Left, Middle, No, Right, Shift, drag, wh
 
 ACTIONS = 300
 SEED = 8
-# These open a system dialog or end the window.
+# Random tests leave out actions that open a system dialog or close the window.
 LEFT_OUT = {"action.open", "action.save", "action.save_as", "action.quit", "action.full_screen"}
 
 
@@ -133,7 +133,7 @@ def test_random_actions(cornell_window, qtbot, cornell, tmp_path, monkeypatch):
     before = qInstallMessageHandler(heard)
     monkey = Monkey(window, cornell, broken)
     try:
-        play(monkey, 2 * ACTIONS // 3)  # allocates what is allocated only once
+        play(monkey, 2 * ACTIONS // 3)  # a first run makes all allocations that happen only once
         gc.collect()
         threads, objects, resident = (
             threading.active_count(),

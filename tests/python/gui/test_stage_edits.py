@@ -113,7 +113,8 @@ def test_visibility_is_what_usd_would_make(path, edits, name, shown):
     other = open_stage(path)
     other.SetEditTarget(other.GetSessionLayer())
     prim = UsdGeom.Imageable.Get(other, name)
-    # USD needs the time, since one attribute is animated; our default values override the file.
+    # Pass a time to USD, since one attribute is animated; edits of the window author default values
+    # instead.
     (prim.MakeVisible if shown else prim.MakeInvisible)(Usd.TimeCode(7))
     assert visible(edits.stage) == visible(other)
     for prim_path, seen in visible(edits.stage).items():

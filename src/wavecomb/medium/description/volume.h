@@ -144,9 +144,9 @@ struct VolumeRecord {
 
   TransformedGrid density_cells, emission_cells;  ///< without a table
   GridView velocity;
-  FieldDrift density_drift,
-      emission_drift;      ///< transforms from the spaces of density_cells and emission_cells
-  FieldDrift color_drift;  ///< from world space
+  /// Transforms from the spaces of density_cells and emission_cells.
+  FieldDrift density_drift, emission_drift;
+  FieldDrift color_drift;  ///< transforms from world space
   float seconds_open, seconds_span;
 };
 

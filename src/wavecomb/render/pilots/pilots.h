@@ -66,7 +66,7 @@ struct PilotInput {
   /// Result of the joint transport in an earlier pilot render of the same image; may be null.
   std::shared_ptr<const JointPilot::Result> joint;
   std::function<bool()> stopped;  ///< returns whether the pilots shall be abandoned
-  std::function<bool()> halted;   ///< returns whether workers shall stop before the next wave
+  std::function<bool()> halted;   ///< returns whether a pause was requested
 };
 
 /// Runs the pilots of a render. The results are invalid if `stopped` returned true.
