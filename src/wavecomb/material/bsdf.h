@@ -20,7 +20,8 @@
 ///   lobe
 ///                                           differs between the two directions
 ///
-/// delta_probability, eval, diffuse_f_cos and sample also accept a view in place of wo.
+/// delta_probability, eval, diffuse_f_cos and sample also accept the result of view(wo) in place of
+/// wo.
 ///
 /// A program for scattering in media (kOnSurface false) has a phase function in place of the BSDF,
 /// without a cosine, and
@@ -35,7 +36,8 @@
 
 namespace wavecomb {
 
-/// Compile-time properties of a program. A program derives from this and overrides what differs.
+/// Compile-time properties of a program. A program derives from this struct and overrides members
+/// that differ.
 struct BsdfTraits {
   static constexpr bool kEmits = false;          ///< whether materials of the program may emit
   static constexpr bool kAbsorbs = false;        ///< whether the program attenuates rays inside:
@@ -52,13 +54,13 @@ struct BsdfTraits {
                                                  ///< textures or graphs
   static constexpr bool kReadsIor = false;       ///< whether the program reads the index of
                                                  ///< refraction
-  static constexpr bool kOnSurface = true;       ///< whether the program shades hits; otherwise it
-                                                 ///< has an `interact`
+  static constexpr bool kOnSurface = true;       ///< whether the program shades surface hits; other
+                                                 ///< programs define their own `interact`
   static constexpr bool kOnGaussianSplats = false;  ///< whether the program provides the emission
                                                     ///< of Gaussian splats
-  /// Scatters like a whole fibre around an axis: x of the local frame lies along the fibre
-  /// (geometry/hit/fibre_frame.h), and there are no two sides. Such a BSDF is not reciprocal, so
-  /// light paths exclude it.
+  /// Whether the BSDF describes scattering by a whole fibre: x of the local frame lies along the
+  /// fibre (geometry/hit/fibre_frame.h), and surfaces have no back side. Such a BSDF is not
+  /// reciprocal, so light paths exclude it.
   static constexpr bool kOnFibre = false;
 
   /// Values that depend on wo only, as input of the functions below: wo itself by default.
@@ -71,8 +73,8 @@ struct BsdfTraits {
   static bool passes_light() { return true; }
 };
 
-/// f(wo, wi) |cos theta_i|, and the solid-angle density with which sample() would choose wi. Both
-/// exclude delta lobes.
+/// f(wo, wi) |cos theta_i|, and the solid-angle density with which sample() would choose wi. Value
+/// and pdf exclude delta lobes.
 template <typename F>
 struct BsdfEval {
   Color<F> f_cos;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Tables of the directional albedo of rough interfaces. OpenPBR layers are scaled by them so that
-/// multiple scattering loses no energy (Turquin, "Practical multiple scattering compensation for
-/// microfacet models", 2019).
+/// Tables of the directional albedo of rough interfaces. OpenPBR layers are scaled by these albedos
+/// so that multiple scattering loses no energy (Turquin, "Practical multiple scattering
+/// compensation for microfacet models", 2019).
 #pragma once
 
 #include <span>
@@ -35,8 +35,9 @@ class EnergyTables {
   /// Index of refraction for which anisotropic interfaces are tabulated.
   static constexpr float kBrushedIndex = 1.5f;
 
-  /// Returns the tables of this process. They are computed at the first call (about 0.1 s); those
-  /// of anisotropic surfaces at the first call with `brushed` (another 0.1 s). Thread-safe.
+  /// Returns the tables of this process. The first call computes the tables, which takes about 0.1
+  /// s. The first call with `brushed` computes the tables of anisotropic surfaces, which takes
+  /// another 0.1 s. Thread-safe.
   static const EnergyTables& shared(bool brushed = true);
 
   const float* data() const { return values_.data(); }

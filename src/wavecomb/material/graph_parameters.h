@@ -46,8 +46,8 @@ inline Vec3<F> valid_normal(const Vec3<F>& n) {
 }
 
 /// Runs the graphs of the active lanes, each of which must have one, and writes their outputs to
-/// `p`. Outputs that only "openpbr" reads are skipped. Never inlined, so that materials without
-/// graphs do not pay for its registers.
+/// `p`. Outputs that only "openpbr" reads are skipped. This function is never inlined, so that
+/// materials without graphs do not pay for its registers.
 template <typename F, typename Params>
 [[gnu::noinline]] void drive_parameters(const MaterialView& view, const UInt<F>& material,
                                         const GraphPoint<F>& at, const Mask<F>& active, Params& p) {
@@ -70,7 +70,7 @@ template <typename F, typename Params>
     }
     if (tilts) p.normal = select<F>(same, valid_normal(p.normal), p.normal);
   });
-  // Presence is handled during traversal; a surface that was hit keeps its full opacity.
+  // Ray traversal has already applied presence, so a surface that was hit is fully opaque.
   const Mask<F> presence = Mask<F>((p.flags & U(uint32_t{kPresence})) != U(0u));
   p.opacity = select(presence, opacity, p.opacity);
 }

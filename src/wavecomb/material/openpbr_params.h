@@ -12,7 +12,8 @@
 namespace wavecomb {
 
 /// Parameters in addition to the inputs base_color, metallic, roughness (specular), specular_color,
-/// clearcoat and clearcoat_roughness (coat), and ior. OpenPbr explains them.
+/// clearcoat and clearcoat_roughness (coat), and ior. The struct OpenPbr
+/// (material/description/openpbr_inputs.h) documents the parameters.
 template <typename F>
 struct OpenPbrParams : ShadingParams<F>, OpenPbrInputs<F> {
   F thin_walled;        ///< 0 or 1

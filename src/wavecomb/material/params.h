@@ -60,7 +60,8 @@ WAVECOMB_INLINE void complete_params(const MaterialView& view, const UInt<F>& ma
   const UInt<F> graph = p.flags & UInt<F>(uint32_t{kHasGraph});
   const Mask<F> driven = active & Mask<F>(graph != UInt<F>(0u));
   if (any(driven)) [[unlikely]] {
-    // These copies let the compiler keep the originals in registers for materials without graphs.
+    // Copy values that graphs read, so that the compiler keeps the originals in registers for
+    // materials without graphs.
     const MaterialView v = view;
     const UInt<F> m = material;
     const Mask<F> on = driven;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Interface of integrators. A render owns one integrator, and each worker calls it for one task
+/// Interface of integrators. A render owns one integrator, which each worker calls for one task
 /// after the other.
 #pragma once
 

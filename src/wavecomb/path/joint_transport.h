@@ -5,16 +5,16 @@
 ///
 /// A joint transport affects camera paths in two ways:
 ///
-/// - It adds a technique to the MIS weights of camera paths. With R the density with which the
-///   joint transport samples a path, relative to the density of bounces and up to the density D of
+/// - The joint transport adds a technique to the MIS weights of camera paths. With R the density
+///   with which it samples a path, relative to the density of bounces and up to the density D of
 ///   the light's emission (light/emission/emission.h), the balance heuristic gives the weights
 ///     bounce        1 / (1 + p_light / p_bounce + R D),
 ///     light sample  1 / (1 + p_bounce / p_light + R' D / p_light),
 ///   where R' is R with p_light in place of p_bounce.
 ///   Each vertex multiplies its factors into R (PathState::ratio), which is 0 where the joint
 ///   transport does not reach.
-/// - It receives each camera path vertex between the vertex's light sample and bounce, and may
-///   store the vertex, for example to connect it to other vertices.
+/// - The joint transport receives each camera path vertex between its light sample and its bounce,
+///   and may store the vertex, for example to connect other vertices to it.
 ///
 /// A joint transport is a class with three member types:
 ///

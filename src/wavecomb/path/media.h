@@ -18,8 +18,8 @@
 ///   template <typename F>
 ///   Color<F> transmittance(const MediumQuery<F>&, const Mask<F>& active) const;
 ///
-/// With `kStreams`, the class instead handles all rays of a wave at once, since packets would wait
-/// for their longest segments:
+/// With `kStreams`, the class has functions that handle all rays of a wave at once, since packets
+/// would wait for their longest segments:
 ///
 ///   void sample_wave_flights(Wave&, uint32_t depth, SamplerKind) const;  before collecting hits
 ///   Flight<F> flight(const Wave&, size_t ray, const Color<F>& throughput) const;
@@ -56,8 +56,9 @@ struct Flight {
   Mask<F> stopped;   ///< whether an event ends the flight
   F t;               ///< distance of the event
   UInt<F> material;  ///< material of the event, whose program shades the vertex
-  /// Factor of the throughput. Without an event, it is transmittance over the probability of
-  /// passing; with an event, transmittance times extinction over the density of t.
+  /// Factor of the throughput. Without an event, the factor is the transmittance divided by the
+  /// probability of passing; with an event, transmittance times extinction divided by the density
+  /// of t.
   Color<F> weight;
   Mask<F> has_scattered{false};  ///< whether collisions without a vertex have moved the path
 };

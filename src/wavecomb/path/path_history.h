@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Vertices of paths, stored until the path ends. Training reads them, for example to estimate the
-/// incident radiance along a bounce,
+/// Vertices of paths, stored until the path ends. Training reads the stored vertices, for example
+/// to estimate the incident radiance along a bounce,
 ///   L_j = (R_end - R_j) / T_j
 /// where R_j is the radiance of the path after the light sample of vertex j, and T_j the throughput
 /// after the bounce.
@@ -112,9 +112,9 @@ class PathHistory {
 
 /// Receiver of the vertices of finished paths.
 ///
-/// Contract: all workers call it concurrently, once for each wave (the reference integrator once
-/// for each path). The arguments are valid only during the call. Since workers call in any order,
-/// implementations must add up values as integers to be deterministic
+/// Contract: all workers call the receiver concurrently, once for each wave (the reference
+/// integrator once for each path). The arguments are valid only during the call. Since workers call
+/// in any order, implementations must add up values as integers to be deterministic
 /// (core/encoding/fixed_point.h).
 class HistoryReader {
  public:

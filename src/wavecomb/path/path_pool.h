@@ -117,9 +117,10 @@ inline constexpr size_t kRadianceWords = kRowWords<RadianceRow>;
 static_assert(kRowWords<PathRow> == 16 && kRowWords<ShadowRow> == 16, "a cache line each");
 static_assert(kIsHead<RayHead, PathRow> && kIsHead<RayHead, ShadowRow>);
 
-/// Path state of one wave. A slot holds one (pixel, sample) for the lifetime of its path. Its state
-/// is a row of one cache line, and its shadow ray is a second row, so that shading touches only the
-/// cache lines of the paths it shades, in any order of hits (docs/decisions/path-rows.md).
+/// Path state of one wave. A slot holds one (pixel, sample) for the lifetime of its path. The state
+/// of a path is a row of one cache line, and the shadow ray is a second row, so that shading
+/// touches only the cache lines of the paths it shades, in any order of hits
+/// (docs/decisions/path-rows.md).
 ///
 /// Contract: owned by one wave.
 class PathPool {

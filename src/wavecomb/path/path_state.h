@@ -67,8 +67,8 @@ struct PathState {
   Mask<F> enters_body{false};  ///< whether the bounce enters a subsurface body
   BodyEntry<F> entry{};        ///< that body
   // The following fields are set only in scenes with nested dielectrics (MediumStackRow).
-  F outer{1.f};        ///< index of refraction on the other side of the surface
-  UInt<F> medium{0u};  ///< material whose medium scatters here
+  F outer{1.f};        ///< index of refraction of the medium on the other side of the surface
+  UInt<F> medium{0u};  ///< material whose medium scatters light at this vertex
   F time{0.5f};        ///< shutter time, if lights move
   /// Diffuse fraction of the previous bounce, by colour, if lights have diffuse and specular
   /// multipliers.
@@ -81,8 +81,8 @@ struct PathState {
   }
 };
 
-/// Returns the state of a camera path at the end of its ray of length `t`. Fields that are not in
-/// the row have their default values.
+/// Returns the state of a camera path at the end of its ray of length `t`. State fields that
+/// PathRow does not store have their default values.
 template <typename F>
 WAVECOMB_INLINE PathState<F> path_state(const PathRow<F>& row, const F& t) {
   return {.dir = row.d,
@@ -218,8 +218,8 @@ struct Vertex {
 /// the light's surface.
 inline constexpr float kShadowRayFraction = 0.9999f;
 
-/// Limit of a contribution: scales it to a luminance of at most `limit` (0 means no limit), and
-/// drops it if it is not finite.
+/// Limit of contributions: scales a contribution to a luminance of at most `limit` (0 means no
+/// limit), and drops contributions that are not finite.
 template <typename F>
 class ContributionLimit {
  public:

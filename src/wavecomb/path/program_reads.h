@@ -15,8 +15,8 @@ struct ProgramReads {
   bool has_more = false;
 };
 
-/// Defined in the program's compile unit (program.lanes.cpp.in), so that a change to one program
-/// recompiles no others.
+/// This function is defined in the program's compile unit (program.lanes.cpp.in), so that a change
+/// to one program recompiles no others.
 template <typename Bsdf>
 ProgramReads program_reads();
 

@@ -36,7 +36,7 @@ struct Counts {
   uint64_t walks = 0;       ///< subsurface random walks
   uint64_t walk_steps = 0;  ///< rays traced by subsurface random walks, not included in `rays`
   uint64_t walk_lanes = 0;  ///< lanes of the walks' packets, both active and inactive
-  /// Rays, shadow rays and records at each depth. Depth 0 has the camera rays and their hits.
+  /// Rays, shadow rays and records at each depth. Depth 0 counts camera rays and their hits.
   std::array<uint64_t, kCountedDepths> rays_at{}, shadow_rays_at{}, records_at{};
 
   static uint32_t bucket(uint32_t depth) {

@@ -31,7 +31,7 @@ inline UInt<F> crossed_at(const Vertex<F, kFeatures>& v, const Frame<F>& frame, 
 }
 
 /// Runs the steps of a vertex for the active lanes' paths, all with shading program `Bsdf`. `joint`
-/// couples them to a joint transport (joint_transport.h).
+/// couples the paths to a joint transport (joint_transport.h).
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Coupling>
 WAVECOMB_INLINE VertexResult<F> vertex_steps(const Vertex<F, kFeatures>& v, Coupling& joint) {
   using U = UInt<F>;

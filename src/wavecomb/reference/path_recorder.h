@@ -81,7 +81,7 @@ class PathRecorder {
   }
 
   /// Adds the contribution `c` of `light` to the radiance. `light` is kNoLight for emission of
-  /// other surfaces.
+  /// surfaces that are not lights.
   void add(uint32_t light, const Color<F>& c) {
     radiance_.sum += c;
     if (aovs_.wants_lights()) aovs_.add_light<F>(kSlot, light, c, true);

@@ -167,7 +167,7 @@ class PathTracer : PathRecorder {
   }
 
   /// Adds the emission of volumes along the ray of a path, and samples its free flight to `hit`,
-  /// which becomes the volume event if one stops it.
+  /// which becomes the volume event if an event stops the flight.
   void pass_media(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit) {
     const Flight<F> flight = sample_flight(key, depth, path, hit);
     if constexpr (Media::kHasEmission)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Registration of the joint transport (path/joint_transport.h) in the plan, the pilots and the
-/// passes of a render, and of the pilot that chooses between it and camera paths alone.
+/// passes of a render, and of the pilot that chooses between joint transport and camera paths
+/// alone.
 #pragma once
 
 #include "wavecomb/light_paths/render/light_aiming.h"

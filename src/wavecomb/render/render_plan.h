@@ -57,7 +57,8 @@ struct RenderPlan {
   WaveSetup waves;
   LaneKernels kernels;
   uint32_t pass_samples;  ///< samples_of_pass()
-  /// The policy of the render, or for `adaptive` all those among which each thread chooses.
+  /// The scheduling policy of the render, or for `adaptive` all policies among which each thread
+  /// chooses.
   std::vector<const SchedulingPolicy*> policies;
   std::vector<MaterialTraits> traits;  ///< by material
   FilterTable filter;
@@ -70,7 +71,7 @@ struct RenderPlan {
   /// Creates an empty film with all layers that the settings ask for.
   Film make_film() const;
   /// Creates the data that the waves of the render read. `film` is from make_film(), and `costs`
-  /// and `passes` are those of this render.
+  /// and `passes` belong to the render.
   WaveContext make_context(Film& film, RenderCosts& costs, RayRecorder* recorder,
                            const JointPasses& passes) const;
 

@@ -31,7 +31,7 @@ struct PilotShared {
   std::shared_ptr<const JointPilot::Result>* joint = {};
 };
 
-/// Execution of one render by a plan.
+/// Execution of a render according to its plan.
 ///
 /// Contract: all functions on one thread; run() once, finish() once and last. The arguments of the
 /// constructor outlive the run.
@@ -56,7 +56,7 @@ class RenderRun {
   RenderedImage finish(RenderStatistics& statistics);
 
  private:
-  /// Fills the film from a checkpoint, if there is one. Returns the state of its pass.
+  /// Fills the film from a checkpoint, if there is one. Returns the state of the checkpoint's pass.
   PassState resume();
   void work(PilotCache& cache, const PilotShared& shared,
             const std::function<void(const PilotResults&)>& learned);

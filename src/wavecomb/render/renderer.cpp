@@ -39,7 +39,7 @@ struct WavefrontRenderer::Impl {
   RenderedImage render(const Settings& settings, LightPathShare light_share,
                        const RenderOptions& options, Watch& watch, const PilotShared& shared = {},
                        const std::optional<TransportChoice>& choice = {});
-  /// Decides the transport for `settings`, which leave it open.
+  /// Chooses the transport for `settings` with Transport::kAuto.
   TransportChoice choose(const Settings& settings, const RenderOptions& options, Watch& watch);
   /// Renders a small image for choose_transport(). The pilot stops if the render watched by `outer`
   /// is stopped.

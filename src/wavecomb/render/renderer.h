@@ -66,7 +66,7 @@ struct RenderOptions {
   /// Returns the packed_training() of that render, or nothing to train again.
   std::function<std::vector<std::byte>(Film&, PassState&)> resume{};
   /// packed_training() of an earlier render of the same scene, or of the render that is resumed.
-  /// Used instead of training and of choosing the transport. If empty, the render trains and
+  /// These data replace training and the choice of the transport. If empty, the render trains and
   /// chooses the transport itself. The result of resume() takes precedence for the training.
   std::vector<std::byte> learned{};
   /// Replaces the policy of the settings.
@@ -99,8 +99,8 @@ class WavefrontRenderer {
 
   /// Renders with `settings`. The image depends only on the scene and on the settings that affect
   /// the image, not on threads, wave size, lanes or policy, nor on whether the render was resumed.
-  /// With a time limit, it also depends on the number of samples rendered in that time. Throws
-  /// Error for invalid settings.
+  /// With a time limit, the image also depends on the number of samples rendered in that time.
+  /// Throws Error for invalid settings.
   RenderedImage render(const Settings& settings, const RenderOptions& options = {});
   /// Stops the running render, if there is one, at the end of a wave. render() then returns the
   /// samples so far.

@@ -22,10 +22,10 @@ Affine move_of(const Moves& moves, std::string_view object);
 
 /// Returns the geometry of a scene with its objects moved.
 ///
-/// Moved meshes of the world become instances. All other meshes of the world become one instance
-/// together, so that the next move does not rebuild their acceleration structure. Meshes keep their
-/// ids and arrays. Throws Error for a singular transform, a path without objects or lights, a part
-/// of an instance, and volumes.
+/// Moved meshes of the world become instances. All other meshes of the world together become a
+/// single instance, so that the next move does not rebuild their acceleration structure. Meshes
+/// keep their ids and arrays. Throws Error for a singular transform, a path without objects or
+/// lights, a part of an instance, and volumes.
 std::shared_ptr<const SceneGeometry> moved_geometry(const Scene& unmoved, const Moves& moves);
 
 }  // namespace wavecomb

@@ -46,14 +46,15 @@ struct Placement {
   uint32_t parent = kNoName;  ///< enclosing placement; kNoName for the world
   uint32_t group = 0;         ///< the instanced group
   uint32_t name = kNoName;    ///< index into the name table of the scene
-  uint32_t number = kNoName;  ///< distinguishes placements of the same name
+  uint32_t number = kNoName;  ///< number that distinguishes placements with the same name
 };
 
 /// Names of all objects of a scene: mesh instances, then lights, then volumes.
 ///
 /// The name of an object is its prim path as seen through its instances: "/World/Tree_7/Leaves", or
-/// "/World/Forest[12]/Leaves" for a point instance. Its asset is the nearest enclosing model of
-/// kind component; without one, the outermost instance, or the prim below the stage's root prim.
+/// "/World/Forest[12]/Leaves" for a point instance. The asset of an object is the nearest enclosing
+/// model of kind component; without such a model, the outermost instance, or the prim below the
+/// stage's root prim.
 class ObjectNames {
  public:
   explicit ObjectNames(const Scene& scene);

@@ -74,8 +74,8 @@ struct SceneEdit {
 class SceneBuilder;
 struct PlacedObjects;
 
-/// Geometry, materials, textures, lights and camera, checked and complete. Immutable; any number of
-/// renderers and threads may read it.
+/// Geometry, materials, textures, lights and camera, checked and complete. A scene is immutable;
+/// any number of renderers and threads may read it.
 class Scene : public std::enable_shared_from_this<Scene> {
  public:
   Scene(const Scene&) = delete;
@@ -273,8 +273,8 @@ class SceneBuilder {
                const std::vector<uint64_t>& counts, std::vector<Instance>& out,
                SceneGeometry& geometry) const;
   /// Returns the transforms of a node over the shutter interval, within a group with the transforms
-  /// `outer` if it moves, or the transform `still`. Returns nothing if neither the group nor the
-  /// node moves.
+  /// `outer` if it moves, or the transform `still`. Returns an empty list if neither the group nor
+  /// the node moves.
   std::vector<Affine> composed(std::span<const Affine> outer, const Affine& still,
                                const Node& node) const;
   /// Flattens all groups to instances, without those of singular transforms, and checks counts.

@@ -29,7 +29,7 @@ struct SceneCounts {
 };
 
 /// Throws Error for the first count that exceeds its limit. The message says in one line which
-/// count it is, how many objects there are, and what to do.
+/// limit was exceeded, how many objects there are, and what to do.
 void check_counts(const SceneCounts& counts);
 
 /// Formats 16777216 as "16,777,216".

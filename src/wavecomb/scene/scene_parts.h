@@ -57,7 +57,7 @@ struct Bounds {
 struct Group {
   std::string name;
   std::vector<uint32_t> meshes;
-  std::string root;  ///< prim path prefix of the names of its meshes
+  std::string root;  ///< prim path prefix of the names of the group's meshes
 };
 
 /// An instance of a group in world space.
@@ -161,7 +161,7 @@ struct SceneMaterials {
   std::vector<TextureUseRecord> uses;
   std::vector<uint32_t> programs;  ///< by material
   std::vector<uint32_t> variants;  ///< least expensive variant of the program of each material
-  /// By material: whether smooth tangents affect its shading (tangents.h).
+  /// Flag of each material: whether smooth tangents affect its shading (tangents.h).
   std::vector<uint8_t> wants_tangents;
   std::vector<OpenPbrRecord> openpbr;  ///< records of materials of the program openpbr
   /// Program-specific parameters by material; empty if no material's program has any.

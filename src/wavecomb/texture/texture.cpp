@@ -87,7 +87,7 @@ uint64_t lay_out(const TextureDesc& desc, TextureView& view) {
   uint32_t width = desc.width, height = desc.height;
   for (uint32_t& n = view.level_count; n < TextureView::kMaxLevels;) {
     const uint32_t tiles_x = (width + kTile - 1) / kTile, tiles_y = (height + kTile - 1) / kTile;
-    // The offset may overflow for images that are too large, which the check below rejects.
+    // The offset may overflow for images that are too large, but then the size check throws Error.
     view.levels[n++] = {width, height, tiles_x, static_cast<uint32_t>(texels)};
     texels += uint64_t{tiles_x} * tiles_y * kTile * kTile;
     if (width == 1 && height == 1) break;

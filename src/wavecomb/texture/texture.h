@@ -125,10 +125,10 @@ class Texture {
   size_t spanned_bytes() const;
   /// Mean of the finest level, linear r, g, b, a.
   const float* mean() const { return mean_; }
-  /// Bounds of all lookups with any coordinates, footprint and filter. Covers the stored texels of
-  /// all levels, and black if it is returned outside the image. The range is slightly wider than
-  /// the range of the texels because filters round, unless all texels are equal, but the extension
-  /// never crosses 0.
+  /// Bounds of all lookups with any coordinates, footprint and filter. The bounds cover the stored
+  /// texels of all levels, and black if the wrap mode returns it outside the image. The range is
+  /// slightly wider than the range of the texels because filters round, unless all texels are
+  /// equal, but the extension never crosses 0.
   const TexelRange& range() const { return range_; }
   /// Number of values of the finest level that were infinite or NaN and became 0.
   uint64_t nonfinite_count() const { return nonfinite_count_; }

@@ -75,8 +75,8 @@ bool TileFile::read(std::byte* to, size_t bytes, uint64_t offset) const {
 
 void TileFile::discard(uint64_t offset, uint64_t bytes) {
 #if defined(FALLOC_FL_PUNCH_HOLE)
-  // The call only frees disk space. On file systems that do not support it, the next texture stored
-  // in this range reuses the space.
+  // The call only frees disk space. On file systems that do not support hole punching, the next
+  // texture stored in the range reuses the space.
   [[maybe_unused]] const int done =
       ::fallocate(file_, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, static_cast<off_t>(offset),
                   static_cast<off_t>(bytes));

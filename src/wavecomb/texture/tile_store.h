@@ -36,14 +36,14 @@ struct StoreStatistics {
 /// Texture memory of which at most `limit_bytes`, including volume grids, is resident. Grids stay
 /// in memory as a whole; their size reduces the room for textures, down to a few tiles.
 ///
-/// Readers use plain pointers. While all textures fit, they stay in memory. When one does not fit,
-/// the store writes all textures to a temporary file. From then on, reading an absent tile of
-/// kTileBytes loads it, and evicts another if needed. Threads of the store do this while the reader
-/// waits in a page fault, so that readers notice only the delay.
+/// Readers use plain pointers. While all textures fit, they stay in memory. When a texture does not
+/// fit, the store writes all textures to a temporary file. From then on, reading an absent tile of
+/// kTileBytes loads the tile, and evicts another tile if needed. Threads of the store load and
+/// evict tiles while the reader waits in a page fault, so that readers notice only the delay.
 ///
 /// Contract: all members may be called concurrently. A caller of remove() must ensure that no
-/// thread reads the memory. Only user code may read textures: the kernel cannot resolve these
-/// faults, so never pass them to a system call.
+/// thread reads the memory. Only user code may read textures: the operating system cannot resolve
+/// page faults in its own code, so never pass texture memory to a system call.
 class TileStore {
  public:
   /// Size of a store tile, the unit of transfer between memory and file: 64 texel tiles of a

@@ -25,7 +25,7 @@ struct CalibrationHits {
 };
 
 /// Returns triangles of each material that is bound to a visible mesh, distributed over its meshes.
-/// Leaves out materials without such a mesh.
+/// Leaves out materials that are bound to no visible mesh.
 std::vector<CalibrationHits> find_calibration_hits(const Scene& scene);
 
 /// Returns the properties of the scene's materials that policies may use.

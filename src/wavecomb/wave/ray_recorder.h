@@ -10,10 +10,10 @@ namespace wavecomb {
 
 /// Receives the rays of every wave as they are traced: one call per wave stage, in traversal order.
 ///
-/// Contract: all workers call it concurrently, but calls with the same `wave`, the address of the
-/// worker's buffers, never overlap. The arrays are valid only during the call. Calls are made once
-/// per stage, not per ray. A recorder may allocate and throw, since it serves measurements only.
-/// The reference integrator, which traces single rays, does not call recorders.
+/// Contract: all workers call the recorder concurrently, but calls with the same `wave`, the
+/// address of the worker's buffers, never overlap. The arrays are valid only during the call. Calls
+/// are made once per stage, not per ray. A recorder may allocate and throw, since it serves
+/// measurements only. The reference integrator, which traces single rays, does not call recorders.
 class RayRecorder {
  public:
   virtual ~RayRecorder() = default;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compiled once for each lane width, with WAVECOMB_LANES set to it.
+// This file is compiled once for each lane width, with WAVECOMB_LANES set to the width.
 #include <bit>
 #include <cstring>
 
@@ -59,7 +59,7 @@ double time_material(Wave& wave, const WaveContext& context, const CalibrationHi
   const auto& kernels = kernels_for<F, NoMedia>(context, settings);
   const auto start = PhaseClock::Clock::now();
   for (size_t begin = 0, batch = 1; begin < queue.size; ++batch) {
-    // Partly filled packets are batches of one packet.
+    // To simulate partly filled packets, make each batch a single packet.
     const size_t end =
         hits.fill < 1.f
             ? std::min(queue.size,

@@ -79,11 +79,11 @@ struct OpenPbrInputs {
 /// OpenPBR inputs as callers set them.
 struct OpenPbr : OpenPbrInputs<float> {
   /// If transmission_depth is above 0, transmission_color is the transmittance of a path of that
-  /// length inside; otherwise it tints each crossing.
+  /// length inside; otherwise the colour tints each crossing.
   Vec3<float> transmission_color{1, 1, 1};
   float transmission_depth = 0;
-  /// Scattering inside, as a coefficient times transmission_depth, and the mean cosine of its angle
-  /// (medium/description/mesh_medium.h).
+  /// Scattering coefficient inside the solid, multiplied by transmission_depth, and the mean cosine
+  /// of the scattering angle (medium/description/mesh_medium.h).
   Vec3<float> transmission_scatter{0, 0, 0};
   float transmission_scatter_anisotropy = 0;
   /// Where transmissive solids overlap, light travels in the medium with the highest priority.

@@ -12,8 +12,8 @@ namespace wavecomb {
 /// Maximum number of parameters specific to one program.
 inline constexpr size_t kMaxProgramParameters = 8;
 
-/// A numeric parameter that only materials of one program have. Its name must be unique among all
-/// parameters.
+/// A numeric parameter that only materials of one program have. Names must be unique among the
+/// parameters of all programs.
 struct ProgramParameter {
   const char* name = nullptr;
   float standard = 0;
@@ -28,7 +28,8 @@ inline constexpr uint32_t kEmits = 1;  ///< reads the emission input
 inline constexpr uint32_t kGlossy = 2;
 /// Smooth glass: refracts without a roughness input.
 inline constexpr uint32_t kGlass = 4;
-/// Shades curves as fibres whose far side scatters, so rays that start on them ignore them.
+/// Shades curves as fibres, including scattering at the fibre's far side, so rays that start on a
+/// curve do not hit the same curve.
 inline constexpr uint32_t kFibre = 8;
 /// The BSDF transmits light where opacity is below 1, unless the material uses opacity as presence.
 inline constexpr uint32_t kTransmitsByOpacity = 16;

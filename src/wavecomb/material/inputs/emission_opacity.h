@@ -28,8 +28,8 @@ struct UvOnly {
 }  // namespace detail
 
 /// Returns the radiance that the surface emits at `uv`, regardless of its presence. `footprint` is
-/// that of the ray in uv space. Graphs get the inputs that `make_point(active)` returns, which is
-/// called only if there is a graph.
+/// the ray's footprint in uv space. Graphs get the inputs that `make_point(active)` returns, which
+/// is called only if there is a graph.
 template <typename F, typename MakePoint>
 inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
                                const Footprint<F>& footprint, const MakePoint& make_point,
@@ -49,9 +49,9 @@ inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material
   return fetch_emission<F>(view, material, uv, footprint, detail::UvOnly<F>{uv, footprint}, active);
 }
 
-/// Returns the presence of the surface at `uv`, the probability that a ray hits it. It is 0 or 1
-/// with an opacity threshold, and 1 for materials whose opacity is transparency, which the program
-/// handles. `make_point` has the same role as in fetch_emission.
+/// Returns the presence of the surface at `uv`, the probability that a ray hits it. Presence is 0
+/// or 1 with an opacity threshold, and 1 for materials whose opacity is transparency, which the
+/// program handles. `make_point` has the same role as in fetch_emission.
 template <typename F, typename MakePoint>
 inline F fetch_opacity(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
                        const Footprint<F>& footprint, const MakePoint& make_point,

@@ -7,8 +7,8 @@
 
 namespace wavecomb {
 
-/// Returns the GraphPoint of a hit on surface `s` by a ray along `dir`. Not inlined, to keep
-/// kernels without graphs small.
+/// Returns the GraphPoint of a hit on surface `s` by a ray along `dir`. This function is not
+/// inlined, to keep kernels without graphs small.
 template <typename F>
 [[gnu::noinline, gnu::cold]] GraphPoint<F> graph_point(const SceneView& scene,
                                                        const MeshHit<F>& hit, const Surface<F>& s,

@@ -43,7 +43,8 @@ struct InputReader {
         record(make_reader<MaterialRecord, F>(view_.materials, material_, uniform, active_)),
         textured_inputs(record[&MaterialRecord::textured_inputs]) {}
 
-  /// Returns the value of input `s`: the texture's in lanes that have one, otherwise `constant`.
+  /// Returns the value of input `s`: the texture value in lanes with a texture, otherwise
+  /// `constant`.
   Vec3<F> value(Input s, const Vec3<F>& constant) const {
     const uint32_t bit = input_bit(s);
     const Mask<F> textured = Mask<F>((textured_inputs & UInt<F>(bit)) != UInt<F>(0u)) & active;

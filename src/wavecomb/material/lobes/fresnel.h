@@ -66,8 +66,9 @@ inline DielectricFresnel<F> fresnel_dielectric(const F& cos_i, const F& eta) {
   return {select(total & (eta < 1.f), F(1.f), min(r, F(1.f))), t};
 }
 
-/// Schlick's approximation for a dielectric. It uses the cosine on the side of the lower index, so
-/// it is symmetric and continuous with total internal reflection.
+/// Schlick's approximation for a dielectric. The formula uses the cosine on the side of the lower
+/// index, so that reflectance is symmetric and continuous at the onset of total internal
+/// reflection.
 template <typename F>
 inline DielectricFresnel<F> fresnel_dielectric_schlick(const F& cos_i, const F& eta) {
   const F c = clamp(cos_i, F(0.f), F(1.f));

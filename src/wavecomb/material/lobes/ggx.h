@@ -65,9 +65,9 @@ struct Ggx {
     return F(2.f * d(h)) / F(abs(wo.z) + s(wo));
   }
 
-  /// Samples a visible normal for wo (z >= 0). The reflection of the stretched wo by it is uniform
-  /// on a spherical cap (Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps", HPG
-  /// 2023, listing 3).
+  /// Samples a visible normal for wo (z >= 0). The stretched wo, reflected by the sampled normal,
+  /// is uniform on a spherical cap (Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical
+  /// Caps", HPG 2023, listing 3).
   Vec3<F> sample_visible(const Vec3<F>& wo, const F& u, const F& v) const {
     const Vec3<F> k = normalize(Vec3<F>(alpha * wo.x, alpha * wo.y, wo.z));
     const auto [sin_phi, cos_phi] = sincos_2pi(u);

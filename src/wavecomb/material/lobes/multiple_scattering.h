@@ -9,15 +9,15 @@ namespace wavecomb {
 
 /// Lobe of multiple scattering, f = F_ms L(o) L(i) / (pi L_avg), where L(w) = 1 - E(w) is the
 /// energy that a white GGX surface loses for direction w, and L_avg = 2 int L c dc. With F_ms = 1
-/// the lobe has the albedo L(o), so a white metal keeps all energy. It is reciprocal for any
+/// the lobe has the albedo L(o), so a white metal keeps all energy. The lobe is reciprocal for any
 /// roughness (Kulla and Conty, "Revisiting Physically Based Shading at Imageworks", SIGGRAPH course
 /// 2017).
 ///
 /// L is a polynomial in x = z / (z + alpha / 2) and alpha, fitted to integrals of G2 / G1 over
-/// visible normals. It stays below the true loss: the albedo of a white metal, multiple scattering
-/// included, is 0.98 to 1.001 for alpha >= 0.1. L_avg has a lower limit, so that grazing samples do
-/// not get large weights; for alpha < 0.1 this loses up to 10 % of the energy at grazing angles and
-/// never adds any.
+/// visible normals. The fit stays below the true loss: the albedo of a white metal, multiple
+/// scattering included, is 0.98 to 1.001 for alpha >= 0.1. L_avg has a lower limit, so that grazing
+/// samples do not get large weights; for alpha < 0.1 this loses up to 10 % of the energy at grazing
+/// angles and never adds any.
 template <typename F>
 struct LostEnergy {
   F half_alpha, c1, c2, c3, c4;

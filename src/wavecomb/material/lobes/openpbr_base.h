@@ -20,8 +20,8 @@ inline F importance(const Color<F>& c) {
   return 0.5f * F(luminance(c) + max_component(c));
 }
 
-/// G2 / G1 for the reflected and the refracted direction of a microfacet; 1 where they are not
-/// needed.
+/// G2 / G1 for the reflected and the refracted direction of a microfacet; 1 where the ratios are
+/// not needed.
 template <typename F>
 struct FacetMasking {
   F up = F(1.f), down = F(1.f);

@@ -36,7 +36,7 @@ struct OpenPbrCoat {
 
   /// Values of a coat of weight 1 that depend on wo only.
   struct Layer {
-    F compensation;  ///< scale of its reflection that compensates for multiple scattering
+    F compensation;  ///< factor on the coat's reflection that compensates for multiple scattering
     F albedo;        ///< directional albedo, at most 1
   };
   /// Computes the layer for a viewer at cosine `z`; `energy` is the table of energy_tables.h.

@@ -18,7 +18,7 @@ namespace wavecomb {
 ///
 /// The effective cosine z_e = z + alpha P(x, roughness, index), x = z / (z + 0.4 alpha), is a
 /// polynomial fitted to numerical integrals for exact reflectances of indices from 1.05 to 3 and
-/// for Schlick's formula. The fit prefers overestimates: for alpha >= 0.01 and z >= 0.02, W lies at
+/// for Schlick's formula. The fit tends to overestimate: for alpha >= 0.01 and z >= 0.02, W lies at
 /// most 0.007 below the integrals and 0.012 above them. A smooth interface has z_e = z and L = 0.
 template <typename F>
 struct RoughInterface {

@@ -11,8 +11,8 @@
 namespace wavecomb {
 
 /// Metal BSDF. The reflectance of a metal is base_color at normal incidence with a tint at 82
-/// degrees; with kConductorIndex set, it is that of the measured complex index. A black tint, the
-/// default, means white, which is Schlick's formula.
+/// degrees or, with kConductorIndex set, the Fresnel reflectance of the measured complex index. A
+/// black tint, the default, means white, which is Schlick's formula.
 template <typename F>
 class MetalBsdf : public BsdfTraits {
  public:
@@ -88,7 +88,7 @@ class MetalBsdf : public BsdfTraits {
     return f;
   }
 
-  /// Hemispherical mean of the reflectance. For a measured index it is the mean of the tinted
+  /// Hemispherical mean of the reflectance. For a measured index, this is the mean of the tinted
   /// Schlick curve through the values at 0 and 82 degrees, accurate to about one per cent.
   Color<F> mean_reflectance(const Color<F>& f0) const {
     if (none(exact_)) return tinted_.average();

@@ -18,7 +18,7 @@ namespace wavecomb {
 /// OpenPBR BSDF: fuzz over coat over { metal, glossy diffuse, transmission }. A layer with
 /// directional albedo E towards the viewer scales the layers below by 1 - E (the specification's
 /// albedo scaling), so energy is conserved, but the BSDF is not reciprocal. Lobes are sampled in
-/// proportion to their estimated contribution; eval and pdf are those of the mixture.
+/// proportion to their estimated contribution; eval and pdf return values of the mixture.
 ///
 /// Opaque and thin-walled surfaces are two-sided. Inside a transmissive solid there is no fuzz, and
 /// the coat does not reflect. Subsurface scattering is diffuse reflection, or, with random walks,
@@ -396,7 +396,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   OpenPbrCoat<F> coat_;
   F fuzz_, fuzz_roughness_, turn_cos_, turn_sin_;
   Color<F> fuzz_color_, diffuse_, back_;
-  Color<F> returned_back_;  ///< colour of the light that returns after it entered through `back_`
+  Color<F> returned_back_;  ///< colour of light that enters through the lobe `back_` and returns
   Mask<F> subsurface_{false};
 };
 

@@ -23,7 +23,7 @@ namespace wavecomb {
 /// opacity) times the transmission of the interface, straight through; clearcoat GGX of the same
 /// index times `clearcoat`. The clearcoat dims the layers below by its albedo at the more grazing
 /// of the two directions, which is reciprocal and adds no energy. docs/decisions/preview-surface.md
-/// compares it with the specification and other renderers.
+/// compares this program with the specification and with other renderers.
 ///
 /// A variant compiled for some of the features (material/description/variants.h) gives bitwise
 /// equal results for materials that use no others.
@@ -61,7 +61,8 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
       metallic = select(specular_workflow, F(0.f), params.metallic);
       f0_ = lerp(f0_, params.base_color, metallic);
       f0_ = select<F>(specular_workflow, params.specular_color, f0_);
-      // Metals and the specular workflow use Schlick's formula, dielectrics the exact one.
+      // Metals and the specular workflow use Schlick's formula, dielectrics the exact Fresnel
+      // formula.
       if (!schlick) exact = select(specular_workflow, F(0.f), F(1.f - metallic));
     }
     if constexpr (kMetal || kStraight)

@@ -23,7 +23,8 @@ using Point = Vec3<float>;
 /// Bounds of glass are shrunk by this fraction of their size, so that a table does not count as
 /// inside the glass that stands on it.
 constexpr float kMargin = 1e-3f;
-/// Number of bounds and triangle tests after which the search gives up, about half a second.
+/// Number of tests of bounds and triangles after which the search gives up; reached after about
+/// half a second.
 constexpr size_t kMaxTests = size_t{1} << 28;
 
 bool overlap(const Bounds& a, const Bounds& b) {

@@ -16,7 +16,7 @@ struct GraphSet;
 /// OpenPbrRecord::subsurface.
 enum class SubsurfaceKind : uint8_t {
   kNone,   ///< no random walk
-  kWhole,  ///< all light enters, and the medium gives it its colour
+  kWhole,  ///< all light enters, and absorption in the medium determines the colour
   /// A graph drives the colour, which tints the light that enters; the medium does not absorb.
   kTinted,
 };

@@ -32,7 +32,7 @@ struct GridView {
   float background = 0;  ///< value outside all bricks
 };
 
-/// Input of a grid: voxels in bricks of 8^3, as files store them.
+/// Input of a grid: voxels in bricks of 8^3, the layout of volume files.
 struct GridBricks {
   std::string name;                  ///< used in messages
   std::span<const int32_t> origins;  ///< x, y, z of the first voxel of each brick, multiples of 8

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// VolumeGrid: converts bricks of a file into bricks with a border and a table of them.
+/// VolumeGrid: converts bricks of a file into bricks with a border and a table of brick positions.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -45,7 +45,7 @@ class BrickSource {
       at_[cell] = static_cast<uint32_t>(i);
     }
   }
-  /// The bricks that contain the voxels of a cell and those on its upper faces.
+  /// The bricks that contain the voxels of a cell and the voxels on the cell's upper faces.
   class Corner {
    public:
     Corner(const BrickSource& source, const std::array<uint32_t, 3>& cell)
@@ -147,8 +147,7 @@ VolumeGrid::VolumeGrid(const GridBricks& b)
   const auto [lo, hi] = extent_of(b, name);
   uint64_t cells = 1;
   for (size_t k = 0; k < 3; ++k) {
-    // One more cell at the lower end, for interpolation between the background and the first
-    // voxels.
+    // Add a cell at the lower end, for interpolation between the background and the first voxels.
     first_[k] = static_cast<int32_t>(lo[k]) - static_cast<int32_t>(kBrickEdge);
     size_[k] = static_cast<uint32_t>((hi[k] - first_[k]) / kBrickEdge + 1);
     cells *= size_[k];

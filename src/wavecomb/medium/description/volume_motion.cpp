@@ -41,7 +41,8 @@ WideBox image_of(const WideMap& map, const WideBox& box) {
 /// Table of maxima over boxes of cells.
 class MaxPyramid {
  public:
-  /// `cells`: values, x fastest; `outside`: the value beyond them.
+  /// `cells` holds the values of the cells, x fastest, and `outside` is the value outside all
+  /// cells.
   MaxPyramid(const uint32_t (&size)[3], std::vector<float> cells, float outside)
       : outside_(outside) {
     levels_.push_back({{size[0], size[1], size[2]}, std::move(cells)});

@@ -11,7 +11,8 @@
 
 namespace wavecomb {
 
-/// Bounding cells of a moving field: cubes of the space that it can reach, in units of its bricks.
+/// Bounding cells of a moving field: cubes that cover the space that the field can reach, in units
+/// of the field's bricks.
 struct MovedCells {
   std::array<double, 3> first{};   ///< lower corner, in bricks of the field
   double edge = 1;                 ///< edge length of a cell, in bricks of the field

@@ -26,7 +26,7 @@ struct WideMap {
       m[i][3] = origin[i];
     }
   }
-  /// Returns the map that applies `b` first, then this one.
+  /// Returns the map that applies `b` first, then `*this`.
   WideMap after(const WideMap& b) const {
     WideMap r = *this;
     for (int i = 0; i < 3; ++i)

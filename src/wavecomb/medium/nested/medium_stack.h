@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Medium stack of a path: the medium boundaries (meshes) that it has entered and not left (Schmidt
 /// and Budge, "Simple Nested Dielectrics in Ray Traced Images", 2002). Where several meshes
-/// overlap, the one with the highest priority counts, and among equal priorities the last one
-/// entered.
+/// overlap, the medium of the mesh with the highest priority applies, and among equal priorities
+/// that of the last mesh entered.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -11,7 +11,7 @@
 
 namespace wavecomb {
 
-/// Size of the stack. If the stack overflows, it drops the first boundary that was entered.
+/// Size of the stack. On overflow, the stack drops the first boundary that was entered.
 inline constexpr size_t kMaxMediumStack = 4;
 /// Material of an empty entry.
 inline constexpr uint32_t kNoMaterial = 0xffffffffu;
@@ -75,7 +75,7 @@ class MediumStack {
     }
   }
 
-  /// Returns the entry that counts, the one with the highest priority.
+  /// Returns the entry with the highest priority, whose medium the path is in.
   MediumBoundary<F> top(const MeshMediaView& view, const Mask<F>& active) const {
     MediumBoundary<F> best{U(kNoMaterial), U(kNoMaterial)};
     F most(-kInfinity);
@@ -169,7 +169,7 @@ inline BoundaryHit<F> cross_boundary(const MeshMediaView& view, const MediumStac
   const U kind = gather_field<F>(view.media, &MeshMedium<float>::kind, bound.material, lanes);
   const Mask<F> clear =
       Mask<F>(kind == U(static_cast<uint32_t>(BoundaryKind::kClear))) & (hit.outer == 1.f);
-  // A boundary that a ray leaves without having entered it stays visible.
+  // A boundary that a ray leaves without having entered the mesh stays visible.
   hit.passes =
       lanes & (clear | (same(current, top_after) & (enters | before.contains(bound.object))));
   return hit;

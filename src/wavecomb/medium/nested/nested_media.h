@@ -8,9 +8,9 @@
 ///   the distance is sampled when the next boundary or surface is known.
 ///
 /// Scattering behind a refractive boundary skips light sampling, since no shadow ray can reach a
-/// light, and continues as a random walk. Where the walk hits a surface, it becomes a path again,
-/// with MIS weight 1 for the emission it hits. Scattering inside a clear boundary, which does not
-/// refract, is an event with light sample, bounce and MIS, as in volumes.
+/// light, and continues as a random walk. Where the random walk hits a surface, the path continues
+/// normally, with MIS weight 1 for emission at that surface. Scattering inside a clear boundary,
+/// which does not refract, is an event with light sample, bounce and MIS, as in volumes.
 #pragma once
 
 #include "wavecomb/geometry/hit/surface.h"
@@ -44,9 +44,10 @@ class NestedMedia {
   /// to.
   MediumStack<float> stack_at(Vec3<float> p, float time, PresenceKeys keys) const;
 
-  /// Traces all rays to the event or surface that stops them. `hits` holds their first hits, and on
-  /// return the hits of visible surfaces. `around` is the medium stack at the camera for new paths,
-  /// or null for paths that continue. start(i, path) returns the NestedRayStart of the packet at i.
+  /// Traces all rays to the event or surface that stops them. `hits` holds the rays' first hits,
+  /// and on return the hits of visible surfaces. `around` is the medium stack at the camera for new
+  /// paths, or null for paths that continue. start(i, path) returns the NestedRayStart of the
+  /// packet at i.
   template <typename F, typename Start>
   void sample_flight(const NestedRays& rays, const HitSpan& hits, const NestedEvents& events,
                      const MediumStack<float>* around, PresenceKeys keys, const Start& start) const;
@@ -102,8 +103,9 @@ class NestedMedia {
   }
 
   /// Returns the lanes of a packet whose rays see an object (instance_geometry): it is visible to
-  /// their kind of ray, and linked to the light of a shadow ray. An object that a ray does not see
-  /// neither stops nor attenuates it, but the ray still enters and leaves it.
+  /// their kind of ray, and linked to the light of a shadow ray. An object that is invisible to a
+  /// ray neither stops nor attenuates the ray, but the ray still enters and leaves the object's
+  /// medium.
   template <typename F>
   Mask<F> is_visible(const Rays<F>& r, const UInt<F>& object, const Mask<F>& lanes) const;
   /// Returns the medium inside a boundary, or none if the ray does not see the boundary.
@@ -136,8 +138,8 @@ class NestedMedia {
   F past_hit(const F& t) const {
     return fma(t, F(1.f + 0x1p-20f), F(scene_.scale * 0x1p-21f));
   }
-  /// Returns what the rays of the packet hit. Where a ray passes, `s` and `stack` are moved to the
-  /// other side.
+  /// Returns what the rays of the packet hit. Where a ray passes through a boundary, updates `s`
+  /// and `stack` to the other side.
   template <typename F>
   BoundaryHits<F> intersect_boundary(Rays<F>& r, MediumStack<F>& stack,
                                      const MediumBoundary<F>& current, const Mask<F>& lanes) const;
@@ -261,7 +263,7 @@ inline void NestedMedia::sample_flight(const NestedRays& rays, const HitSpan& hi
     left += scene_.visibility ? store_active<F>(rays, r, active, left)
                               : advance<F>(rays, hits, events, r, left);
   }
-  // The first hits leave out medium boundaries that are invisible to these rays. The rays must
+  // Closest-hit queries skip medium boundaries that are invisible to the rays, but the rays must
   // still enter and leave these boundaries.
   if (scene_.visibility) keys.ray_kind = kVisibleToAll;
   run<F>(rays, left, keys, [&](Rays<F>& r, size_t at) {
@@ -274,7 +276,7 @@ template <typename F>
 inline void NestedMedia::attenuate(const NestedRays& rays, const float* most,
                                    float* const (&product)[3], PresenceKeys keys) const {
   using U = UInt<F>;
-  // Rays also enter and leave boundaries that do not attenuate them.
+  // Rays also enter and leave boundaries of media without attenuation.
   const PresenceKeys requested = keys;
   keys.ray_kind = kVisibleToAll;
   keys.shadow_set = nullptr;
@@ -310,8 +312,8 @@ inline void NestedMedia::attenuate(const NestedRays& rays, const float* most,
   });
 }
 
-/// A ray in an arbitrary direction leaves the boundaries that it has not entered. The first
-/// boundary that it leaves is the innermost one.
+/// Traces a ray in an arbitrary direction to find the media around the point: the meshes that the
+/// ray leaves without having entered, innermost first.
 inline MediumStack<float> NestedMedia::stack_at(Vec3<float> p, float time,
                                                 PresenceKeys keys) const {
   keys.ray_kind = kVisibleToAll;

@@ -19,8 +19,8 @@ struct NestedRays {
   float* stacks;       ///< MediumStackRow
 };
 
-/// Results of the rays, as in Flights, and the transmittance of absorption. With `limited`, `t` and
-/// `material` initially hold the event in a volume that stops each ray. The event of a ray is
+/// Results of the rays, as in Flights, and the transmittance of absorption. If `limited` is set,
+/// `t` and `material` initially hold the volume event that stops each ray. The event of a ray is
 /// dropped once the ray has scattered in a mesh medium; its hero channel becomes kNoHero.
 struct NestedEvents {
   bool limited;
@@ -38,7 +38,7 @@ struct NestedRayStart {
   F first;
 };
 
-/// Mesh and material of a hit, and its object as instance_geometry().
+/// Mesh and material of a hit, and the hit object as instance_geometry().
 template <typename F>
 struct HitObject {
   UInt<F> mesh, material, object;
@@ -65,9 +65,9 @@ struct NestedRayState {
   Color<F> throughput;
   F start;  ///< length covered since the last collision
   F first;  ///< SubsurfaceWalk::first
-  /// Distance to the next collision, or kFar. Before the first scattering it is kFar (1 + u), which
-  /// stores the random number u of the first distance; u is stratified over a pixel's samples. For
-  /// shadow rays it is the remaining length.
+  /// Distance to the next collision, or kFar. Before the first scattering, the value is kFar (1 +
+  /// u), which stores the random number u of the first distance; u is stratified over a pixel's
+  /// samples. For shadow rays, the value is the remaining length.
   F rest;
   UInt<F> seed, number, hero, flags;
   WAVECOMB_FIELDS(o, d, throughput, start, first, rest, seed, number, hero, flags)

@@ -209,7 +209,7 @@ inline size_t NestedMedia::advance(const NestedRays& all, const HitSpan& hits,
     row.crossed = U(0u);
     row.outer = boundary.outer;
     row.medium = current.material;
-    // These rays leave the scene from a mesh that is not closed.
+    // Rays that leave the scene while inside a mesh, which is therefore not closed.
     s.start = select(open & not_(collides) & not_(stopped), F(kInfinity), s.start);
     const U by_event = select(Mask<U>(event), U(scene_.nested_media.event_material),
                               U(uint32_t{Flights::kNoEvent}));

@@ -181,8 +181,8 @@ class WalkQueue {
             number(kMaterial),
             real(kTime)};
   }
-  /// Stores the active lanes contiguously from `i` on, and returns their number. May overwrite up
-  /// to a packet of walks behind the stored ones.
+  /// Stores the active lanes contiguously from `i` on, and returns their number. Up to a packet of
+  /// walks behind the stored walks may be overwritten.
   template <typename F>
   size_t put(size_t i, const Row<F>& row, const Mask<F>& active) {
     using U = UInt<F>;

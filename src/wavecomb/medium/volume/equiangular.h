@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Equiangular sampling of distances along a ray segment, by a light beside it (Kulla and Fajardo,
-/// "Importance Sampling Techniques for Path Tracing in Participating Media", 2012).
+/// Equiangular sampling of distances along a ray segment with respect to a light (Kulla and
+/// Fajardo, "Importance Sampling Techniques for Path Tracing in Participating Media", 2012).
 ///
 /// In a homogeneous medium a distance is sampled from a mixture: by the exponential distribution of
 /// the hero channel (medium/volume/tracking.h) and, with probability q, by equal angles as seen
@@ -20,7 +20,7 @@ namespace wavecomb {
 
 /// Largest probability of equiangular sampling.
 inline constexpr float kMaxEquiangular = 0.5f;
-/// Below this probability equiangular sampling is not used.
+/// Minimum probability of equiangular sampling; smaller values are treated as 0.
 inline constexpr float kMinEquiangular = 0.02f;
 
 /// Returns whether a scene has finite lights.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Interpolated lookup in a voxel grid. All lanes read the same grid, each at its own position.
+/// Interpolated lookup in a voxel grid. All lanes read the same grid, each lane at a different
+/// position.
 #pragma once
 
 #include "wavecomb/core/lanes/lanes.h"

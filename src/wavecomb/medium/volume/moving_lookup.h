@@ -2,9 +2,9 @@
 /// Lookup of volume fields at the time of a ray. The value at p is the field's value at p - v(p) t,
 /// where v is the velocity at p and t the time in seconds since the grids were sampled.
 ///
-/// Moving volumes are traversed by the cells of a grid that bounds the field over the whole shutter
-/// interval (medium/description/volume_motion.h), others by the cells of the field's grid. All
-/// lanes of a packet traverse the same grid.
+/// Rays traverse a moving volume by the cells of a grid that bounds the field over the whole
+/// shutter interval (medium/description/volume_motion.h), and a static volume by the cells of the
+/// field's grid. All lanes of a packet traverse the same grid.
 #pragma once
 
 #include "wavecomb/medium/volume/grid_lookup.h"

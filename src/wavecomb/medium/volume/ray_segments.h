@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Traversal of one volume by many ray segments. A lane takes the next segment when it has finished
+/// Traversal of one volume by many ray segments. A lane that has finished a segment takes the next
 /// one.
 #pragma once
 

@@ -4,9 +4,9 @@
 /// Uses null scattering (Miller, Georgiev and Jarosz, "A null-scattering path integral formulation
 /// of light transport", 2019): null collisions increase the extinction to a majorant that is
 /// constant in each cell of a grid, so that distances to collisions are exponential. Volumes are
-/// sampled one after the other. Where several overlap, the nearest of their collisions is the
-/// collision of all together, since the minimum of independent exponential distances is exponential
-/// with the sum of their rates.
+/// sampled one after the other. Where volumes overlap, the nearest of their sampled collisions is
+/// used, since the minimum of independent exponential distances is exponential with the sum of
+/// their rates.
 ///
 /// The random numbers of collision i in volume v are hashes of (the path's numbers, v, i), so that
 /// the schedule has no effect.
@@ -154,8 +154,9 @@ inline bool has_flight_weights(const VolumeView& volumes, const LightView* dista
   return distance_lights || !are_grey(volumes);
 }
 
-/// Samples only where flights stop, in all volumes. `scratch` receives the original lengths of the
-/// segments, which are `segments.most` and `flights.t`.
+/// Samples the distances at which flights stop, in all volumes, without computing weights.
+/// `scratch` receives the original lengths of the segments, which are `segments.most` and
+/// `flights.t`.
 template <typename F>
 inline void sample_stops(const VolumeView& volumes, const RaySegments& segments,
                          const Flights& flights, float* scratch, const LightView* distance_lights,
@@ -171,9 +172,9 @@ inline void sample_stops(const VolumeView& volumes, const RaySegments& segments,
       detail::sample_flights_in<F>(volumes, i, segments, flights, FlightResults::kStops, counts);
 }
 
-/// Computes the ratios after all stops are known. Flights through the first volumes went further
-/// than the final stop, so they are repeated up to it with the same random numbers. A flight that
-/// its own volume stopped keeps its original length and repeats exactly.
+/// Computes the ratios after all stops are known. Flights through volumes sampled first went
+/// further than the final stop, so they are repeated up to the stop with the same random numbers.
+/// In the volume that stopped a flight, the flight keeps its original length and repeats exactly.
 template <typename F>
 inline void compute_flight_ratios(const VolumeView& volumes, const RaySegments& segments,
                                   const Flights& flights, float* scratch,

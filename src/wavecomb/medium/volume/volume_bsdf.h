@@ -76,7 +76,7 @@ class VolumeBsdf : public BsdfTraits {
     F g(0.f);
     Mask<F> in_mesh(false);
     if (v.has_medium_stack()) {
-      // Absorption was applied before this step.
+      // The free flight has already applied absorption.
       in_mesh = v.active & Mask<F>(v.material == U(v.scene.nested_media.event_material));
       albedo = select<F>(in_mesh, Color<F>(F(1.f)), albedo);
       g = select(in_mesh,

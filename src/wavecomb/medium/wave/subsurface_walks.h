@@ -169,7 +169,7 @@ class SubsurfaceScattering {
   }
 
   /// Starts walks inside the objects of `keys`. Calls leave(lanes, slot) for paths that hit none of
-  /// them, or whose material has no subsurface medium.
+  /// the objects, or whose material has no subsurface medium.
   template <typename F, typename Leave>
   void enter(WalkQueue& walk_queue, const PresenceKeys& keys, uint32_t width,
              const Leave& leave) const {

@@ -102,7 +102,7 @@ class Volumes : public SubsurfaceScattering {
       compute_flight_ratios<F>(volumes_, segments, flights, scratch, distance_lights_,
                                counts_.volumes);
   }
-  /// Returns the flights of the packet of rays at `i`, whose paths have this throughput.
+  /// Returns the flights of the packet of rays at `i`, whose paths have the given throughput.
   template <typename F>
   Flight<F> flight(const Wave& wave, size_t i, const Color<F>& throughput) const {
     const Flights f = flights_of(wave);
@@ -215,7 +215,7 @@ class Volumes : public SubsurfaceScattering {
             c.uints(kHero),
             {c.floats(kAbsorbed), c.floats(kAbsorbed + 1), c.floats(kAbsorbed + 2)}};
   }
-  /// Returns the rays of a queue as segments of these lengths, with the random numbers of
+  /// Returns the rays of a queue as segments with the given lengths and the random numbers of
   /// store_random_numbers().
   template <typename Queue>
   static RaySegments segments_of(const Wave& wave, const Queue& q, const float* most) {

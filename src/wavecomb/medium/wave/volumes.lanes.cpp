@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Waves through volumes. Compiled once for each lane width, with WAVECOMB_LANES set to it.
+// Waves through volumes. This file is compiled once for each lane width, with WAVECOMB_LANES set to
+// the width.
 #include "wavecomb/medium/wave/volumes.h"
 
 #include <bit>

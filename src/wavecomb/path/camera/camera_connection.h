@@ -57,8 +57,8 @@ inline F camera_density(const CameraSetup& camera, const F& det, const F& stretc
   return camera.projection == Projection::kOrthographic ? density : F(density / F(s * spread));
 }
 
-/// Returns 1 / G of the point p that a camera ray along the unit direction d hits, or 0 if it is
-/// out of range.
+/// Returns 1 / G of the point p that a camera ray along the unit direction d hits, or 0 if p is out
+/// of range.
 template <typename F>
 inline F inverse_camera_density(const CameraSetup& camera, const F& time, const Vec3<F>& p,
                                 const Vec3<F>& d, const Mask<F>& active) {

@@ -16,8 +16,8 @@
 namespace wavecomb {
 
 /// Width of a camera ray's cone in pixels. A pixel averages many samples, so that a sample may blur
-/// less than a whole pixel; the full pixel of Igehy's ray differentials looks blurred next to
-/// renderers without cones.
+/// less than a whole pixel; the full pixel of Igehy's ray differentials would blur textures more
+/// than renderers without ray cones do.
 inline constexpr float kConeShare = 0.25f;
 
 /// Camera with its window fitted to an image of width x height pixels, including overscan. A
@@ -36,7 +36,7 @@ struct CameraSetup : Camera {
   std::array<float, 3> rolling{};
 
   /// `overscan` is the number of pixels beyond the window at each edge. Throws Error if the camera
-  /// does not support it.
+  /// does not support overscan.
   CameraSetup(const Camera& camera, uint32_t width, uint32_t height, const FilterTable& table,
               uint32_t overscan = 0);
   bool moves() const { return !transforms.empty(); }

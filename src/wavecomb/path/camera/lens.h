@@ -63,7 +63,7 @@ template <typename F>
 }
 
 /// Samples the regular polygon with `blades` corners in the unit circle uniformly by area. One
-/// corner is at `turn` of a full turn.
+/// corner is at the angle `turn`, as a fraction of a full turn.
 template <typename F>
 [[gnu::noinline, gnu::cold]] Vec2<F> square_to_polygon(const F& u, const F& v, float blades,
                                                        float turn) {

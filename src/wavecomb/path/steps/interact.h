@@ -190,8 +190,8 @@ WAVECOMB_INLINE Vec3<F> SurfaceInteraction<Bsdf, F>::bumped(const Vec3<F>& n,
   return normalize(make_frame<F>(n, tangent, s.handedness).to_world(this->normal));
 }
 
-/// Aligns the frame to the texture in lanes that read one. The frame of a lane depends only on its
-/// own hit, not on the other lanes.
+/// Aligns the frame to the texture in lanes that read one. The frame of a lane depends only on the
+/// lane's hit, not on other lanes.
 template <typename Bsdf, typename F>
 template <uint32_t kFeatures>
 WAVECOMB_INLINE Frame<F> SurfaceInteraction<Bsdf, F>::frame(const Vertex<F, kFeatures>& v) const {

@@ -19,7 +19,7 @@
 
 namespace wavecomb {
 
-/// Returns the receiver for light sampling. Its position is set when a light is sampled.
+/// Returns the receiver for light sampling. The receiver's position is set when a light is sampled.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F, kFeatures>& v,
                                                 const Frame<F>& frame, const Vec3<F>& wo) {

@@ -14,8 +14,8 @@
 namespace wavecomb {
 
 /// Roulette terminates only paths whose throughput is below 1 / kRouletteGain. A gain of 1 saves
-/// rays but adds more noise than that justifies: on the Cornell box, 3 has the least product of
-/// relMSE and ray count (docs/decisions/roulette.md).
+/// rays but adds more noise than the savings justify: on the Cornell box, a gain of 3 has the least
+/// product of relMSE and ray count (docs/decisions/roulette.md).
 inline constexpr float kRouletteGain = 3.f;
 
 /// Returns the probability of shading a vertex that a path has reached, by cost-aware roulette.

@@ -28,7 +28,7 @@ void look_up_field(const GuidingTraining& training, const LearnedQuery& point, L
 /// Counts the lights that evenly spaced random numbers select at the point.
 void count_lights(const Learned& learned, const LearnedQuery& point, LearnedData& out) {
   const Scene& scene = *learned.scene;
-  const LightParts parts = divide_lights(scene, false);  // gives the names
+  const LightParts parts = divide_lights(scene, false);  // supplies the names of lights
   LightView lights = scene.view().lights;
   if (lights.count == 0 || lights.count > kMaxCalibratedLights) return;
   if (parts.size() == 0) {  // a single light or emissive mesh

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Lookup of learned data at a surface point: the guiding distribution and the selection
-/// probabilities of lights. Kernels read the same tables.
+/// probabilities of lights. Lookups read the same tables as kernels.
 #pragma once
 
 #include <array>
@@ -49,7 +49,7 @@ struct LearnedData {
   /// image, before clamping (guiding/roulette.h), or 0 if unknown.
   float survival = 0;
   /// Names of lights and emissive meshes with their selection probability at the point, largest
-  /// first, without those of probability 0. Empty if there are no lights or more than
+  /// first, without those of probability 0. The list is empty if there are no lights or more than
   /// kMaxCalibratedLights.
   std::vector<std::pair<std::string, float>> light_shares;
 };

@@ -43,8 +43,8 @@ struct ReplayTimes {
 /// render.
 class RayRecording final : public RayRecorder {
  public:
-  /// Holds up to `byte_limit` bytes. Throws Error for scenes with partly present surfaces, which
-  /// Embree alone would treat as opaque.
+  /// Records up to `byte_limit` bytes of rays. Throws Error for scenes with partly present
+  /// surfaces, which Embree alone would treat as opaque.
   RayRecording(std::shared_ptr<const Scene> scene, uint64_t byte_limit);
   ~RayRecording() override;
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Planning of a pass: which pixels it renders, from which sample on, and how many samples. Pure
-/// functions of the film's sample counts, the settings, and the time left if there is a limit.
+/// Planning of a pass: which pixels it renders, from which sample on, and how many samples. Plans
+/// are pure functions of the film's sample counts, the settings and, if there is a time limit, the
+/// time left.
 #pragma once
 
 #include <cstdint>

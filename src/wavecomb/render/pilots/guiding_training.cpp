@@ -17,7 +17,8 @@
 namespace wavecomb {
 namespace {
 
-/// Training takes one path for every kTrainingShare samples of the render, within these limits.
+/// Training traces one path for every kTrainingShare samples of the render, within the limits
+/// kMinTrainingPaths and kMaxTrainingPaths.
 constexpr uint64_t kTrainingShare = 8, kMaxTrainingPaths = 700'000, kMinTrainingPaths = 16'384;
 /// For Guiding::kAuto: minimum number of samples of a render for which a pilot render is
 /// worthwhile, and the number of samples for each training path of the first two rounds. The second
@@ -133,8 +134,8 @@ class Trainer {
             std::clamp(samples_ / kPilotShare, kMinPilotPaths, kMaxPilotPaths) / pilot_samples_)),
         field_(std::make_shared<const GuidingField>(grid_)) {
     settings_.seed = 0x2545f491u;
-    // Roulette multiplies the contribution of survivors, and this noise would hide the gain of
-    // guiding.
+    // Disable roulette: it multiplies the contribution of survivors, and the added noise would hide
+    // the gain of guiding.
     settings_.roulette = RouletteKind::kOff;
     if (is_auto() && is_timed()) max_s_ = double{settings_.time_limit} / kMaxTimeShare;
     context_.settings = &settings_;

@@ -19,7 +19,8 @@
 namespace wavecomb {
 namespace {
 
-/// Calibration traces one path for every kPixelsOfPath pixels, within these limits.
+/// Calibration traces one path for every kPixelsOfPath pixels, within the limits kMinPaths and
+/// kMaxPaths.
 constexpr uint32_t kMaxPaths = 16384, kMinPaths = 1024, kPixelsOfPath = 4;
 /// Number of vertices of a calibration path at which a light is selected.
 constexpr uint32_t kVertices = 3;

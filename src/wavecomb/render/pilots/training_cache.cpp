@@ -14,7 +14,7 @@
 namespace wavecomb {
 namespace {
 
-/// Version of the packed format. Increase it when the format changes.
+/// Version of the packed format. Increase this version when the format changes.
 constexpr uint32_t kCacheFormat = 3;
 
 class ByteWriter {

@@ -43,7 +43,7 @@ struct LightShare {
 /// Statistics of the light calibration.
 struct LightShares {
   double seconds = 0;
-  uint32_t paths = 0;         ///< 0 if there was nothing to calibrate
+  uint32_t paths = 0;         ///< number of calibration paths; 0 if there was nothing to calibrate
   bool kept = false;          ///< whether the calibration was taken over from an earlier render
   uint32_t tilted_nodes = 0;  ///< light tree nodes with changed odds
   std::vector<LightShare> parts;

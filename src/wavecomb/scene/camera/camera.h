@@ -34,7 +34,7 @@ enum class RollingShutter : uint32_t { kOff, kTop, kBottom, kLeft, kRight };
 struct Camera {
   Affine to_world;
   /// Camera transforms at equally spaced shutter times, interpolated linearly: two or more if the
-  /// camera moves. The list is empty if the camera stands still at `to_world`.
+  /// camera moves. The list is empty if the camera is static at `to_world`.
   std::vector<Affine> steps{};
   Projection projection = Projection::kPerspective;
   /// Visible region: x from window[0] to window[1], y from window[2] to window[3]. A perspective

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Table of camera parameters other than the transform: one row for each member of Camera. Range
 /// checks, the scene fingerprint, the Python keywords and their stub, and the camera poses that the
-/// window sets are derived from it. To add a parameter, add a member, a row here, and the code that
-/// uses the parameter.
+/// window sets are derived from the table. To add a parameter, add a member, a row here, and the
+/// code that uses the parameter.
 #pragma once
 
 #include <array>

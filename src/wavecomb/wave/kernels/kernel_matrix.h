@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Table of the compiled vertex kernels, with their lane widths and gains. CMake also reads its
-/// rows.
+/// Table of the compiled vertex kernels, with their lane widths and gains. CMake also reads the
+/// rows of the table.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,9 @@
 
 namespace wavecomb {
 
-/// Rows X(kind, set, widths, reduced, gain). Each member of the set has one compile unit for each
-/// width, generated from <kind>.lanes.cpp.in. Sanitized builds compile the units of a program and
+/// Rows X(kind, set, widths, reduced, gain). Each program or variant of the set `set` has one
+/// compile unit for each width, generated from <kind>.lanes.cpp.in. Sanitized builds compile the
+/// units of a program and
 /// a width together.
 ///
 /// `set` is `programs` (WAVECOMB_PROGRAMS) or `variants` (the members of kVariants for surfaces).

@@ -230,7 +230,8 @@ WAVECOMB_INLINE void note_surfaces(Wave& wave, const WaveContext& context, const
 }
 
 /// Reads the ray queue and the hit buffer, and fills the shading queue in the order of the rays.
-/// Paths of a joint transport (`kOfJoint`) contribute nothing where they end.
+/// Paths of a joint transport (`kOfJoint`) do not add environment light or light shapes where they
+/// end.
 template <typename F, typename Media, bool kOfJoint = false>
 void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settings, uint32_t depth,
              [[maybe_unused]] const Media& media) {

@@ -68,7 +68,7 @@ inline bool is_plain(const WaveContext& context, const ShadeSettings& settings) 
          !settings.schlick_fresnel;
 }
 
-/// Returns the kernels, by variant.
+/// Returns the shading kernels, indexed by variant.
 template <typename F, typename Media>
 const detail::BatchKernels<F>& kernels_for(const WaveContext& context,
                                            const ShadeSettings& settings) {
@@ -96,8 +96,8 @@ void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings
   }
 }
 
-/// Appends to `list`, which has `n` rays, the rays with outcome `what` of the packet of records at
-/// `i`.
+/// Appends the rays with outcome `what`, of the packet of records at `i`, to `list`, which already
+/// holds `n` rays.
 template <typename F, typename List>
 WAVECOMB_INLINE void list_rays(const ShadingQueue& queue, size_t i, List& list, size_t& n,
                                ShadingQueue::Outcome what, uint32_t shift) {
