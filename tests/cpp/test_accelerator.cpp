@@ -382,9 +382,9 @@ TEST(Accelerator, CurvesAndPointsDoNotDependOnPackets) {
 }
 
 TEST(Accelerator, CameraRaysDoNotDependOnPackets) {
-  // Bundles of rays from one point or from a lens, as the coherent flag expects. Lens rays graze
-  // the edges of the Cornell box from many points, where coherent packets may differ from single
-  // rays.
+  // Bundles of rays from one point or from a lens, for which the coherent flag is meant. Lens rays
+  // graze the edges of the Cornell box from many points, where coherent packets may differ from
+  // single rays.
   for (const auto& scene : {mixed(), cornell(), emissive_meshes()}) {
     const EmbreeAccelerator accel(scene, 2);
     for (const double radius : {0.0, 0.05, 0.5}) {

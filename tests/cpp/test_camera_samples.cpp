@@ -38,7 +38,7 @@ double filter_at(FilterKind kind, double x) {
   }
   return 0;
 }
-/// Density over pixel offsets of a filter of this width.
+/// Density of a filter with the given width over pixel offsets.
 std::function<double(double)> filter_density(FilterKind kind, double width) {
   constexpr int kSteps = 4000;
   double sum = 0;
@@ -211,7 +211,8 @@ TEST(CameraConnections, AreTheWayBack) {
 }
 
 // A latlong image continues at its opposite edge, and beyond a pole with an offset of half a turn.
-// Light at the edge counts as much as in the middle, at the position where camera samples see it.
+// Light at the edge contributes as much as in the middle, at the position where camera samples see
+// the light.
 TEST(CameraConnections, GoRoundAPictureOfAllDirections) {
   constexpr uint32_t kAcross = 24, kDown = 12;
   const FilterTable table(FilterKind::kGaussian, 4);

@@ -53,7 +53,7 @@ TEST(Cascades, TakeAwayTheOneSampleThatNobodyHasBeside) {
 }
 
 TEST(Cascades, TrustWhatManySamplesSay) {
-  // One in eight samples is bright in every pixel, so that is the true image.
+  // One in eight samples is bright in every pixel, so bright samples belong to the true image.
   Film film = even_film(56, 1);
   for (uint32_t i = 0; i < kSide * kSide; ++i)
     for (uint32_t s = 0; s < 8; ++s) add_sample(film, i, 500, 500, 500);

@@ -27,8 +27,8 @@ using chi_square::Result;
 using Vec = Vec3<float>;
 
 constexpr double kLevel = 1e-7;
-/// `make test-long` uses as many samples as those batteries; with fewer samples, only larger faults
-/// are detected.
+/// `make test-long` uses as many samples as the chi-square batteries of other tests; with fewer
+/// samples, only larger faults are detected.
 const size_t kSamples = is_long() ? 1000000 : 4 * chi_square::usual_samples();
 const double kFault = std::sqrt(1e6 / static_cast<double>(kSamples));
 

@@ -12,8 +12,8 @@ namespace {
 
 using namespace scene_testing;
 
-/// About 80 comparisons in this file. With 4.6 standard errors each, one run in 3,000 with other
-/// seeds fails by chance (Sidak). The seeds are fixed.
+/// This file makes about 80 comparisons with a tolerance of 4.6 standard errors each, so one run in
+/// 3,000 with other seeds fails by chance (Sidak). The seeds are fixed.
 constexpr double kSigmas = 4.6;
 
 Settings settings(uint32_t side = 16, uint32_t spp = 256) {

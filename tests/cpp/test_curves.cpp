@@ -190,7 +190,7 @@ TEST(Curves, HitsEqualBruteForceInDoublePrecision) {
           ++differing;
           continue;
         }
-        // Shading computes the same point and its normal.
+        // Compare the shading point and its normal with the exact hit.
         const Vec3<float> dir{fd[0], fd[1], fd[2]};
         const Surface<float> s =
             setup_surface<float>(scene->view(), {0, 0, prim, found.begin()->u, found.begin()->v},

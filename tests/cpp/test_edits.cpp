@@ -52,7 +52,7 @@ struct Placing {
 };
 
 /// Instances that inherit materials, a mesh with face materials, and a world mesh. With `placing`,
-/// world meshes become instances with these transforms, after all other instances.
+/// world meshes become instances with the given transforms, after all other instances.
 ScenePtr build(const Values& v, const Placing* placing = nullptr) {
   SceneBuilder b;
   const uint32_t sky = add_texture(b, 16, 8, 3, random_texels(16 * 8 * 3, 0.f, 1.5f, 4));

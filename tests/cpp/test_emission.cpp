@@ -279,7 +279,7 @@ TEST(Emission, AimedCarriesTheSame) {
         };
         const bool first = meets({aim.x[0], aim.y[0], aim.z[0]}, aim.radius[0]);
         through += first ? 1 : 0;
-        // Paths of infinite lights that miss the scene do not count.
+        // Paths of infinite lights that miss the scene do not contribute to the power.
         const bool counts = e.light >= view.infinite_count ||
                             meets({view.centre[0], view.centre[1], view.centre[2]}, view.radius);
         const double flux[2] = {counts ? double{e.flux.y} : 0, first ? double{e.flux.y} : 0};

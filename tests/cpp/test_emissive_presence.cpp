@@ -179,7 +179,7 @@ void add_triangle(SceneBuilder& b, const Case& one, int mode, const Affine& plac
   b.add_to_group(group, b.add_mesh(std::move(mesh)));
   b.add_instance(0, group, place);
 }
-/// Makes a scene of one such triangle.
+/// Makes a scene of one emissive triangle with the given material.
 std::shared_ptr<const Scene> make_scene(const Case& one, int mode) {
   SceneBuilder b;
   add_triangle(b, one, mode, translate(3, 1, -2) * rotate(1, 30) * scale(2, 1, -1));

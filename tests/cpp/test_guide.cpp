@@ -69,8 +69,9 @@ TEST(Guide, OctahedralMapKeepsAreas) {
       EXPECT_NEAR(length(octahedral_direction(u, v)), 1, 1e-5);
 }
 
-/// The map from the centre and back are inverse. Chi-square test of the factor as Jacobian: uniform
-/// directions from the centre have the factor as their density from the shading point.
+/// Mapping directions to the sphere's centre and back gives the same directions. A chi-square test
+/// checks the Jacobian: uniform directions from the centre have this density when seen from the
+/// shading point.
 TEST(Guide, SphereMovesDirections) {
   Random random(12);
   chi_square::Battery battery("sphere");

@@ -364,7 +364,8 @@ TEST(DomeDistribution, SearchByLinesEqualsSearchOfTheWholeRow) {
       ASSERT_GT(d.width, 0u);
       ASSERT_EQ(d.coarse.size(), d.height + 1);
       SCOPED_TRACE(testing::Message() << w << " x " << h << ", image " << image);
-      // Tests all rows, or about twenty of many; the marginal distribution follows them.
+      // Tests all rows of small images, or about twenty rows of large ones; the marginal
+      // distribution is stored after the rows.
       for (uint32_t y = 0; y <= d.height;
            y += y == d.height ? 1 : std::min(d.height - y, 1 + d.height / 20)) {
         const uint32_t n = y == d.height ? d.height : d.width;

@@ -28,7 +28,7 @@ TEST(LightTree, ProbabilitiesAddUpToOne) {
         double sum = 0;
         for (uint32_t i = 0; i < view.count; ++i) sum += double{selection_pdf(view, i, to)};
         // Bounds shrink on the way down, so some sample values end at nodes where no light
-        // contributes; then none is selected.
+        // contributes, and no light is selected.
         double none = 0;
         constexpr int kTries = 400;
         for (int i = 0; i < kTries; ++i) {

@@ -378,7 +378,7 @@ TEST(TexturedLights, DomeFollowsOpenExrsConvention) {
   EXPECT_NEAR(seen(0, 0, -1).y, 0, 1e-5);
   EXPECT_NEAR(seen(0, 1, 0).x, 7, 1e-5);
   EXPECT_NEAR(seen(0, -1, 0).x, 0, 1e-5);
-  // Turned by 90 degrees about y, the centre of the image goes from +z to +x.
+  // A rotation of the dome by 90 degrees about y moves the centre of the image from +z to +x.
   light.to_world = rotate(0, 90);
   lights.build({light});
   EXPECT_NEAR(seen(1, 0, 0).y, 1, 1e-5);

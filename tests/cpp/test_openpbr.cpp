@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Reciprocity of OpenPBR: where it holds, where it does not, by how much and why.
-/// test_openpbr_energy.cpp tests its energy, test_programs.cpp what all programs have in common.
+/// test_openpbr_energy.cpp tests energy conservation, and test_programs.cpp tests properties that
+/// all programs have in common.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -160,8 +160,8 @@ TEST(BackwardAutomaton, MeetsTheForwardOneAnywhere) {
   }
 }
 
-/// The expression asks which of the last eleven events were diffuse, which takes 2^11 states
-/// backwards and few states forwards.
+/// The expression depends on which of the last eleven events were diffuse, so the backward
+/// automaton has 2^11 states and the forward automaton only a few.
 TEST(BackwardAutomaton, RefusesWhatIsTooMuch) {
   const PathAutomaton forward(std::vector<NamedExpression>{{"a", "C.{10}D.*[LO]"}}, kKeys);
   EXPECT_LT(forward.states(), 20u);

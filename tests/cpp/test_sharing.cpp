@@ -12,7 +12,8 @@ namespace {
 
 TEST(WorkDistribution, EachThreadTakesTheNextGroup) {
   WorkDistribution sharing;
-  // Two threads: 3 | 1 2, then 2 | 2. The second pass starts when the first has ended.
+  // With two threads, one takes groups of 3 s and 2 s and the other groups of 1 s and 2 s, so the
+  // first pass takes 5 s. The second pass starts when the first has ended.
   sharing.add_pass(std::array{3.0f, 1.0f, 2.0f, 2.0f});
   sharing.add_pass(std::array{0.5f});
   EXPECT_EQ(sharing.groups(), 5u);

@@ -245,8 +245,8 @@ TEST(EdgePixels, OfASquareBeforeTheCamera) {
   EXPECT_NEAR(seen, 2 * 100 / std::sqrt(10001.0), 1e-9);
   placed[14] = 100;
   EXPECT_NEAR(edge_pixels(square, sizes, corners, placed.data(), view), seen / 8, 1e-9);
-  // An orthographic camera sees the same size at any distance. A camera that sees all directions
-  // refines surfaces behind it as well.
+  // In an orthographic camera, the size in pixels does not depend on the distance. A camera that
+  // sees all directions refines surfaces behind it as well.
   view.is_parallel = true;
   view.half[0] = view.half[1] = 2;
   placed[14] = -1000;

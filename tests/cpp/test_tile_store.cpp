@@ -202,7 +202,8 @@ TEST_F(TileStoreTest, GridsLeaveLessForTextures) {
   read_all();
   EXPECT_EQ(store->statistics().grid_bytes, kGrid);
   EXPECT_LE(all_resident() + kGrid, kLimit);
-  // A later grid makes room for itself, down to a few tiles if it is larger than the limit.
+  // Registering a grid later evicts textures, down to a few tiles if the grid is larger than the
+  // limit.
   store->register_grid(&other, 10 * kLimit);
   EXPECT_LE(all_resident(), 32 * TileStore::kTileBytes);
   read_all();
@@ -318,7 +319,7 @@ TEST_F(TileStoreTest, NoMemoryForATileIsSaidAndReadersGoOn) {
   EXPECT_EQ(refused,
             "texture limit: no memory for textures (Cannot allocate memory); give a smaller limit");
   EXPECT_NO_THROW(store->check());
-  // Without handling in the store's thread, the process would end here or the readers would wait
+  // If the store's thread did not handle the error, the process would end or the readers would wait
   // forever.
   std::vector<std::thread> readers;
   std::atomic<int> sum = 0;

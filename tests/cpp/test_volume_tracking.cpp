@@ -139,8 +139,8 @@ Means means_of(uint32_t n, const One& one) {
   }
   return m;
 }
-/// With 4.2 standard errors one comparison in 37,000 fails with other random numbers; there are
-/// about 50.
+/// With a tolerance of 4.2 standard errors, one comparison in 37,000 fails with other random
+/// numbers; this file makes about 50 comparisons.
 void expect_means(const Means& m, const std::array<double, 3>& expected, const std::string& what) {
   for (size_t k = 0; k < 3; ++k) {
     EXPECT_NEAR(m.mean[k], expected[k], 4.2 * m.error[k] + 1e-5) << what << ", channel " << k;

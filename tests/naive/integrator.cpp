@@ -33,8 +33,8 @@ struct Ray {
   uint32_t link = 0;
   F cone_width = 0, cone_spread = 0;
 
-  /// Returns the path state that production functions expect. Their only use of the density is to
-  /// check that it is above 0, which means that a bounce made the ray.
+  /// Returns the path state that production functions expect. These functions use the density only
+  /// to check that it is above 0, which means that a bounce made the ray.
   PathState<F> state() const {
     return {d, Rgb(1.f), is_seen ? 0.f : 1.f, 1.f, cone_width, cone_spread, o, 0u, link};
   }

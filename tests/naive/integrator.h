@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 /// A path tracer for tests that is simple enough to be obviously correct.
 ///
-/// It shares with production all functions without random decisions: ray intersection, shading
-/// points, f |cos| of BSDFs, emission of lights and surfaces along a ray, and light linking. The
-/// naive integrator shares no sampling with production. Directions are uniform over the sphere
-/// (over the hemisphere for opaque programs), there is no light sampling and hence no MIS, no
-/// Russian roulette, and the random number generator is a separate one.
+/// The naive integrator shares with production all functions without random decisions: ray
+/// intersection, shading points, f |cos| of BSDFs, emission of lights and surfaces along a ray, and
+/// light linking. The naive integrator shares no sampling with production. Directions are uniform
+/// over the sphere (over the hemisphere for opaque programs), there is no light sampling and hence
+/// no MIS, no Russian roulette, and the random number generator is a separate one.
 ///
 ///   L(x, wo) = Le + sum over delta lobes c L(x', wi)                    (each followed)
 ///                 + (2 or 4) pi / n sum over n uniform wi f |cos| L(x', wi)

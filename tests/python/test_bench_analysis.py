@@ -260,8 +260,8 @@ def test_incomplete_factorials_use_matched_pairs(tmp_path: Path) -> None:
 
 
 def test_interactions_do_not_take_in_what_differs_besides(tmp_path: Path) -> None:
-    # Large waves at both widths, small ones at 16 lanes only. Order helps at 16 lanes for either
-    # size, so wave size and order do not interact.
+    # The runs have large waves at both lane widths, and small waves at 16 lanes only. Ordering
+    # helps at 16 lanes for both wave sizes, so wave size and ordering do not interact.
     def time(wave_size: int, lanes: int, policy: str) -> float:
         gain = 0.5 if policy == "material" and lanes == 16 else 1.0
         return gain * 16 / lanes * (1.2 if wave_size == 65536 else 1.0)

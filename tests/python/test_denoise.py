@@ -90,12 +90,13 @@ WALL = np.array([0.2, 0.6, 0.4])
 @pytest.mark.parametrize(
     ("program", "wall_z", "material", "albedo", "normal_z"),
     [
-        # The guides of a mirror are those of the wall behind the camera, times the mirror's colour.
+        # Denoiser inputs of a mirror are those of the wall behind the camera, times the mirror's
+        # colour.
         ("metal", 2.0, {"roughness": 0.0, "base_color": (0.9, 0.5, 0.8)}, (0.18, 0.3, 0.32), -1.0),
-        # Rough metal and diffuse surfaces have their own albedo as guide.
+        # For rough metal and diffuse surfaces, the denoiser input is the albedo of the surface.
         ("metal", 2.0, {"roughness": 0.4, "base_color": (0.9, 0.5, 0.8)}, (0.9, 0.5, 0.8), 1.0),
         ("diffuse", 2.0, {"base_color": (0.1, 0.2, 0.3)}, (0.1, 0.2, 0.3), 1.0),
-        # Glass reflects 4 % of the sky, which counts with the albedo of glass.
+        # Glass reflects 4 % of the sky, a part that enters with the albedo of glass, which is 1.
         ("dielectric", -3.0, {"roughness": 0.0}, 0.96 * WALL + 0.04, 1.0),
     ],
 )

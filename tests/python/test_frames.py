@@ -302,7 +302,7 @@ def test_refined_surfaces_are_shared_beside_what_moves(shot):
 
     for frame in (1, 2):
         load_stage(stage, frame=frame, cache=cache, subdivision=2, builder_factory=Counts)
-    # The surface with vertex colours is refined again with its colours.
+    # In the second frame, only the surface with vertex colours is refined again.
     assert made == [2, 1]
 
 

@@ -89,7 +89,8 @@ def spans(path, size, **options):
     seen = np.isfinite(depth) & (depth > 0) & (depth < 1e9)
     assert not seen.all()
     rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
-    # The pixels at either end are covered by half on average.
+    # The first and the last covered pixel are half covered on average, so the extent is one pixel
+    # less.
     wide, high = columns[-1] - columns[0], rows[-1] - rows[0]
     middle = abs(columns[-1] + columns[0] + 1 - size[0]), abs(rows[-1] + rows[0] + 1 - size[1])
     return (wide / size[0], high / size[1]), middle
@@ -148,7 +149,7 @@ def test_an_outline_is_what_matters():
     for direction in rng.normal(size=(200, 3)):
         direction /= np.linalg.norm(direction)
         assert (kept @ direction).max() >= 0.98 * (ball @ direction).max()
-    # The same points sorted by position: whole blocks of points are skipped.
+    # If the same points are sorted by position, whole blocks of points are skipped.
     ball = ball[np.lexsort((ball[:, 0], np.round(8 * ball[:, 1]), np.round(8 * ball[:, 2])))]
     directions = framing.DIRECTIONS.astype(np.float32)
     near = framing._near_the_outside(ball.astype(np.float32), None, directions[:6])
@@ -164,7 +165,7 @@ def test_an_outline_is_what_matters():
     box = np.array([[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]])
     assert len(framing.outline(framing.corners(box))) == 8
     assert len(framing.outline(np.repeat(framing.corners(box), 99, axis=0))) == 8
-    # Of many instances, only those that reach farthest are kept.
+    # Of many instances, only the outermost in some direction are kept.
     places = np.tile(np.eye(4), (5000, 1, 1))
     places[:, 3, :3] = 10.0 * rng.normal(size=(5000, 3))
     every = (kept[None] + places[:, 3:, :3]).reshape(-1, 3)

@@ -110,7 +110,7 @@ def test_flip_of_known_pairs() -> None:
     green[:, :, 1] = 1
     blue = np.zeros_like(black)
     blue[:, :, 2] = 1
-    # FLIP scales its range by the colour difference of green and blue, its largest.
+    # FLIP scales its range by the largest colour difference, which is that of green and blue.
     assert flip(green, blue).mean() == pytest.approx(1.0, abs=0.01)
     assert 0.5 < flip(black, white).mean() <= 1.0
     near = flip(white * np.float32(0.98), white).mean()

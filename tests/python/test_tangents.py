@@ -98,7 +98,8 @@ def test_a_coarse_cone_shines_as_a_fine_one(tmp_path: Path) -> None:
     rows, columns = np.mgrid[0:48, 0:48]
     inside = (rows > 15) & (rows < 33) & (np.abs(columns - 23.5) < 3)
     assert fine[inside].max() > 1  # there is a highlight
-    # Clipped as on a display: 0.04 now, and 0.09 with a constant tangent per triangle.
+    # With values clipped as on a display, the difference is 0.04; a constant tangent per triangle
+    # would give 0.09.
     a, b = np.minimum(coarse, 0.3)[inside], np.minimum(fine, 0.3)[inside]
     assert np.abs(a - b).mean() / b.mean() < 0.06
 

@@ -56,7 +56,7 @@ def naive_module() -> ModuleType:
         for module in folder.glob("wavecomb_naive*.so"):
             core = folder.parents[1] / "libwavecomb.a"
             if core.exists() and core.stat().st_mtime > module.stat().st_mtime:
-                # Its scenes could have a different memory layout.
+                # An older module could expect a different memory layout of scenes.
                 raise ImportError("it is older than the core; run make build-test-tools")
             sys.path.insert(0, str(folder))
             return importlib.import_module("wavecomb_naive")

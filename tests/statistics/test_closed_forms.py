@@ -267,7 +267,8 @@ def test_texture_orientation(shot: Any, tmp_path: Path) -> None:
 
 
 def test_row_0_is_the_top_and_x_runs_right(shot: Any) -> None:
-    # Brighter than 1, so that the loader counts it as a light and adds no default dome.
+    # The emission is above 1, so that the loader treats the surface as a light and adds no default
+    # dome.
     lamp = material("L", "emissive", emissiveColor=(2, 2, 2))
     corners = [(0.2, 0.2, 0), (1, 0.2, 0), (1, 1, 0), (0.2, 1, 0)]
     picture = shot(camera((0, 0, 5), (0, 0, 0), half=0.2), lamp, quad("Q", corners, "L"), spp=16)

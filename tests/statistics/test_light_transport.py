@@ -178,7 +178,8 @@ LENSES = {
         "float focalLength", 'token projection = "orthographic"\nfloat focalLength'
     ),
     "clipped": camera((0.3, 1.6, 3.4), (0.0, 0.6, 0.0), half=0.42, clip=(2.9, 4.3)),
-    # From inside, with the corner behind: its image covers both sides of the latlong seam.
+    # A camera inside the room with a corner behind it, so that the corner's image covers both sides
+    # of the latlong seam.
     "all round": camera((0.3, 0.7, 0.9), (0.5, 0.7, 3.0), half=0.42),
 }
 

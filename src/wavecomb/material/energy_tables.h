@@ -35,9 +35,9 @@ class EnergyTables {
   /// Index of refraction for which anisotropic interfaces are tabulated.
   static constexpr float kBrushedIndex = 1.5f;
 
-  /// Returns the tables of this process. The first call computes the tables, which takes about 0.1
-  /// s. The first call with `brushed` computes the tables of anisotropic surfaces, which takes
-  /// another 0.1 s. Thread-safe.
+  /// Returns the tables of this process. The first call computes the tables, in about 0.1 seconds.
+  /// The first call with `brushed` computes the tables of anisotropic surfaces, in another 0.1
+  /// seconds. Thread-safe.
   static const EnergyTables& shared(bool brushed = true);
 
   const float* data() const { return values_.data(); }

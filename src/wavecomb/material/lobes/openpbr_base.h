@@ -65,7 +65,7 @@ struct OpenPbrBase {
   AnisotropicGgx<F> ggx;
   Mask<F> smooth, thin, present;
   F ior;        ///< index that refracts
-  F glass_ior;  ///< index that determines reflection, by specular_weight
+  F glass_ior;  ///< index that determines reflectance, modified by specular_weight
   F gloss_ior;  ///< index of the interface over the diffuse base, relative to a coat above; >= 1
   F glass_f0, specular_weight;
   Color<F> specular_color, tint;

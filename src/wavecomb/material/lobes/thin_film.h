@@ -34,7 +34,7 @@ inline Color<F> film_sensitivity(const F& opd) {
 
 /// Thin film of index `ior` and `thickness` (nm) in vacuum over a base. Reflectance is the Airy sum
 /// of orders 0 to 3 per RGB channel. Reflection phases are 0 or pi, which approximates metals. A
-/// weight of 0 means: no film.
+/// weight of 0 disables the film.
 template <typename F>
 struct ThinFilm {
   F weight, thickness, ior;

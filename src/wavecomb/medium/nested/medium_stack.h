@@ -98,7 +98,7 @@ class MediumStack {
       any_of = any_of | (Mask<F>(material_[k] != U(kNoMaterial)) & Mask<F>(object_[k] == object));
     return any_of;
   }
-  /// Enters `bound` in `lanes`.
+  /// Pushes `bound` onto the stacks of `lanes`.
   void enter(const MediumBoundary<F>& bound, const Mask<F>& lanes) {
     Mask<U> left(lanes & Mask<F>(material_[kMaxMediumStack - 1] != U(kNoMaterial)));
     remove(0, left);

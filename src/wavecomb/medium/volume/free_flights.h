@@ -10,7 +10,7 @@ namespace wavecomb {
 /// kNoEvent and `ratio` is 1.
 struct Flights {
   static constexpr uint32_t kNoEvent = 0xffffffffu;
-  static constexpr uint32_t kNoHero = 4;  ///< volumes no longer apply to the flight
+  static constexpr uint32_t kNoHero = 4;  ///< hero of flights to which volumes no longer apply
 
   float* t;
   uint32_t* material;  ///< material of the volume that stopped the flight

@@ -40,7 +40,7 @@ template <typename Bsdf, typename F>
 struct MaterialLookup {
   Bsdf bsdf;
   Color<F> throughput;  ///< throughput on arrival at the surface
-  Color<F> emission;    ///< used if the program emits
+  Color<F> emission;    ///< emission of the surface; used only if the program emits
   Vec3<F> normal;       ///< normal in tangent space, if the program reads textures
 };
 

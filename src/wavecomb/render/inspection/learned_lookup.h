@@ -18,7 +18,7 @@
 
 namespace wavecomb {
 
-/// Data that a render learned before its first pass. Does not change afterwards.
+/// Data that a render learned before its first pass. These data do not change during the passes.
 struct Learned {
   std::shared_ptr<const Scene> scene;              ///< the rendered scene
   bool by_tree = false;                            ///< LightView::by_tree

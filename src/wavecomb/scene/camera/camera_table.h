@@ -30,10 +30,10 @@ struct CameraParameter {
   const char* help = "";  ///< one sentence, with the unit
   CameraValueKind kind = CameraValueKind::kNumber;
   double least = -std::numeric_limits<double>::infinity();  ///< lower bound of a number
-  bool is_above = false;                                    ///< the bound is exclusive
+  bool is_above = false;  ///< whether the lower bound is exclusive
   bool may_be_infinite = false;
   std::vector<const char*> choices;
-  bool is_needed = false;  ///< set_camera requires the parameter
+  bool is_needed = false;  ///< whether set_camera requires the parameter
   /// Whether the fingerprint includes the value even if it is the default, as for the first
   /// parameters of the table.
   bool counts_always = false;

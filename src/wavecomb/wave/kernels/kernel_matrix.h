@@ -11,9 +11,8 @@
 namespace wavecomb {
 
 /// Rows X(kind, set, widths, reduced, gain). Each program or variant of the set `set` has one
-/// compile unit for each width, generated from <kind>.lanes.cpp.in. Sanitized builds compile the
-/// units of a program and
-/// a width together.
+/// compile unit for each width, generated from <kind>.lanes.cpp.in. Sanitized builds compile all
+/// units of a program and a width together.
 ///
 /// `set` is `programs` (WAVECOMB_PROGRAMS) or `variants` (the members of kVariants for surfaces).
 /// `widths` is `every` (all widths of the build, and scalar lanes), `ends` (scalar and the widest
