@@ -22,9 +22,9 @@ inline Vec3<float> direction(double cos_theta, double phi) {
           static_cast<float>(cos_theta)};
 }
 
-/// Charts of directions: chart 0 is the upper hemisphere, chart 1 the lower. The coordinates are
-/// azimuth and 1 - |cos theta|. The solid angle is the product of their differentials, and no
-/// precision is lost at the poles.
+/// Charts of directions: chart 0 is the upper hemisphere, chart 1 the lower. The coordinates are x
+/// = 1 - |cos theta| and y = azimuth, so that the solid angle dw is dx dy, and no precision is lost
+/// at the poles.
 inline std::vector<chi_square::Chart> direction_charts() {
   return {{0, 1, -kPiD, kPiD}, {0, 1, -kPiD, kPiD}};
 }

@@ -300,7 +300,8 @@ class LightCharts {
     const double angle = (2 * p.x - 1) * s.size, flat = across(s, angle);
     const double z = s.begin + p.y * s.axis, t = std::hypot(flat, z);
     const D3 w = (s.v * (flat * std::cos(angle)) + s.n * (flat * std::sin(angle)) + s.u * z);
-    // dw = d(angle) d(sin gamma), with sin gamma = z / t.
+    // The solid angle element is d(angle) d(sin gamma), where sin gamma = z / t for the ray to the
+    // point.
     return {w * (1 / t), t, 2 * s.size * s.axis * flat * flat / (t * t * t)};
   }
   static std::array<double, 2> cylinder_place(const Seen& s, const D3& w) {

@@ -229,8 +229,8 @@ inline Material make_material(ProgramId program, const Vec3<float>& color = {0.5
   m.roughness = roughness;
   return m;
 }
-/// Makes a material that emits and reflects like Lambert: a principled surface with a refractive
-/// index of 1.
+/// Makes a material that emits and is a Lambertian reflector: a principled surface with a
+/// refractive index of 1.
 inline Material glowing(float albedo, float radiance) {
   Material m = make_material(ProgramId::kPrincipled, Vec3<float>(albedo), 1);
   m.emission = Vec3<float>(radiance);

@@ -14,7 +14,7 @@ namespace {
 thread_local uint64_t allocations = 0;
 }  // namespace
 
-// glibc's functions behind the names that this program overrides.
+// glibc's original allocation functions, whose public names this program overrides.
 extern "C" {
 void* __libc_malloc(size_t);
 void* __libc_calloc(size_t, size_t);

@@ -129,7 +129,8 @@ TEST(AovFilm, NearestSampleWinsAndTheFirstOfEquals) {
   EXPECT_EQ(layers[3].values, (std::vector<float>{0}));
 }
 
-// The film stores what each row declares, and layers are in the order of the rows.
+// The film stores the values that each row of the AOV table declares, and layers are in the order
+// of the rows.
 TEST(AovFilm, EveryRowHasItsLayer) {
   const AovLayout layout{AovSet{AovSet::kAll}, 2};
   const std::vector<std::string> groups{"key", "sky"};
@@ -188,7 +189,7 @@ TEST(ObjectNames, SeenThroughInstances) {
   const uint32_t second = b.add_placement_name("/World/Tree_2", 0);
   b.add_instance(0, tree, translate(1, 0, 0), kInheritMaterial, first);
   b.add_instance(0, tree, translate(2, 0, 0), kInheritMaterial, second);
-  // A point instancer inside a prototype: instance numbers follow its name.
+  // A point instancer inside a prototype: instance numbers follow the instancer's name.
   const uint32_t leaf = b.add_group("leaf", "/Protos/Leaf");
   b.add_to_group(leaf, mesh("/Protos/Leaf"));
   const uint32_t bush = b.add_group("bush", "/World/Bush_1");

@@ -163,8 +163,9 @@ TEST(CameraSamples, FillTheLensEvenly) {
   battery.judge();
 }
 
-// Light paths project a point to where the camera's ray to it passes. The density equals that of
-// the rays of a pixel: the image area, in pixels, of a small area perpendicular to the ray.
+// Connections of light paths project a point to the film position of the camera ray through the
+// point. The density equals that of the rays of a pixel: the image area, in pixels, of a small area
+// perpendicular to the ray.
 TEST(CameraConnections, AreTheWayBack) {
   const FilterTable table(FilterKind::kGaussian, 3);
   Random random(17);

@@ -152,7 +152,7 @@ TEST(LightSamples, OfTrianglesFollowTheirDensity) {
                          sliver = make_triangle({-3, 0, 0}, {4, 0.01f, 0}, {4, 0, 0});
   see(battery, "triangle", Lights({}, {wide}), kFlat);
   see(battery, "sliver", Lights({}, {sliver}), kFlat);
-  // Textured triangles, partly transparent, several of them.
+  // Several textured, partly transparent triangles.
   Lights textured;
   const uint32_t material = textured.add_material(textured.add_texture(8, 8, sky(8, 8, 20)));
   EmissiveTriangle shown = wide;

@@ -114,7 +114,7 @@ def test_exposure_multiplies_light_and_nothing_else(tmp_path):
             factor = 4.0 if name == "beauty" else 1.0
             np.testing.assert_array_equal(getattr(lit, name), factor * getattr(plain, name))
         np.testing.assert_array_equal(lit.variance, 16 * plain.variance)
-        # The error is a difference over the square root of light (docs/render.md).
+        # The error is a difference divided by the square root of the brightness (docs/render.md).
         np.testing.assert_allclose(lit.error, 2 * plain.error, rtol=1e-6)
         for name, layer in plain.aovs.items():
             if layer.shape[2:] == (3,):

@@ -137,7 +137,7 @@ class Killer:
         killed = ended = 0
         while killed < times:
             process = self.start("a")
-            # From the first steps to shortly after the end of the render.
+            # Kill at times from the first steps of the render to shortly after its end.
             time.sleep(self.random.uniform(0.02, 1.1) * self.whole_s)
             process.kill()
             _, errors = process.communicate()

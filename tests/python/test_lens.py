@@ -200,7 +200,7 @@ def test_a_rolling_shutter_shears(tmp_path: Path) -> None:
     rows = np.flatnonzero(rolled.sum(axis=1) > 5)
     centres = (rolled[rows] * x).sum(axis=1) / rolled[rows].sum(axis=1)
     assert len(rows) > 8 and centres[-2] - centres[1] > 0.8
-    # Each row has a single instant, so edges are sharp.
+    # Each pixel row is exposed at a single instant, so edges are sharp.
     assert (rolled[rows[2:-2]] % 1 > 0).sum(axis=1).max() <= 6
 
 

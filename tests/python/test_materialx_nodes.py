@@ -51,7 +51,7 @@ def rgb(values):
 def test_checkerboard():
     got = Node("ND_checkerboard_color3").give(uvtiling="3, 5", uvoffset="0.25, 0.5").run(AT)
     cell = np.floor(UV * (3, 5) - (0.25, 0.5)).sum(axis=1)
-    # As in MaterialX's graph, the first colour is where the sum is odd.
+    # As in MaterialX's node graph, the checkerboard has its first colour where the sum is odd.
     assert np.array_equal(got[:, 0], np.mod(cell, 2))
 
 

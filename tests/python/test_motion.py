@@ -304,7 +304,8 @@ def test_blur_is_the_mean_of_still_frames(tmp_path, more):
         assert not still.scene.moves
         stills.append(wavecomb.render(still, spp=8, seed=k, **settings).beauty)
     mean = np.mean(stills, axis=0, dtype=np.float64)
-    # 512 samples each: the error of the difference is at most twice that of one.
+    # Both images have 512 samples, so the squared error of their difference is at most twice that
+    # of one image.
     sigma = np.sqrt(2 * np.maximum(np.asarray(blurred.error) ** 2, 1e-6)).reshape(24, 24, -1)
     z = np.abs(mean - blurred.beauty).max(axis=2) / np.maximum(sigma.max(axis=2), 2e-3)
     assert np.quantile(z, 0.95) < 3 and z.max() < 8

@@ -86,7 +86,7 @@ def test_a_moving_light_is_the_mean_of_still_ones(tmp_path: Path, kind: str) -> 
         for n in range(passes):
             picture = wavecomb.render(still, spp=4, seed=100 * k + n, **SETTINGS).beauty
             stills[n] += picture / np.float64(16)
-    # Means over blocks of 4 x 4 pixels. The noise is measured over the passes.
+    # Compare means over blocks of 4 x 4 pixels. The noise is measured over the passes.
     blocks = [p.reshape(passes, 5, 4, 5, 4, 3).mean(axis=(2, 4)) for p in (blurred, stills)]
     means = [b.mean(axis=0) for b in blocks]
     variance = sum(b.var(axis=0, ddof=1) / passes for b in blocks)

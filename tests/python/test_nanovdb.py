@@ -65,7 +65,7 @@ def test_several_grids_and_names(tmp_path: Path) -> None:
     ]
     assert [len(bricks.origins) for bricks in read_all(path)] == [3, 4, 5]
     assert heads[0].value_name == "float"
-    # Several segments, as a writer that appends produces.
+    # A file with several segments, as written by a program that appends grids.
     both = tmp_path / "both.nvdb"
     both.write_bytes(path.read_bytes() * 2)
     assert [head.index for head in vdb.grid_heads(both)] == [0, 0, 1, 2, 1, 3]

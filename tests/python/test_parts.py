@@ -75,7 +75,8 @@ def run(inner: pytest.Pytester, *options: str) -> pytest.RunResult:
 def test_a_user_sees_skips(inner: pytest.Pytester) -> None:
     inner.makepyfile(test_some=TESTS, test_module=MODULE)
     result = run(inner)
-    # Seven lack a dependency, two are for other machines, one is long, and a file cannot import.
+    # Skipped are seven tests that lack a dependency, two tests for other machines, a long test, and
+    # a file that cannot be imported.
     result.assert_outcomes(passed=1, skipped=len(LACKING) + 4, xfailed=1)
     result.stdout.fnmatch_lines(["*engine_that_nobody_has cannot be imported*"])
 

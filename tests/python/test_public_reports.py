@@ -404,21 +404,21 @@ def test_fallback_without_a_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("ops", "order", "place"),
     [
-        # OpenUSD 194: an inverse op without its partner.
+        # OpenUSD issue 194: an inverse op without its partner.
         ("double3 xformOp:translate = (-1, 0, 0)", '"!invert!xformOp:translate"', (1, 0)),
-        # LightUSD 27: a pivot and its inverse.
+        # LightUSD issue 27: a pivot and its inverse.
         (
             "double3 xformOp:translate = (1, 0, 0)\ndouble3 xformOp:translate:pivot = (5, 5, 0)",
             '"xformOp:translate", "xformOp:translate:pivot", "!invert!xformOp:translate:pivot"',
             (1, 0),
         ),
-        # maya-usd pull 1426: a rotation about a pivot.
+        # maya-usd pull request 1426: a rotation about a pivot.
         (
             "double3 xformOp:translate:pivot = (1, 0, 0)\nfloat xformOp:rotateZ = 180",
             '"xformOp:translate:pivot", "xformOp:rotateZ", "!invert!xformOp:translate:pivot"',
             (2, 0),
         ),
-        # OpenUSD 311: a reset of the transform stack.
+        # OpenUSD issue 311: a reset of the transform stack.
         ("double3 xformOp:translate = (1, 0, 0)", RESET + ', "xformOp:translate"', (1, 0)),
     ],
 )  # fmt: skip

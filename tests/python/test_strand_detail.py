@@ -112,5 +112,6 @@ def test_what_is_kept_of_a_layout() -> None:
 def test_numbers_look_random() -> None:
     x = hash_to_unit(np.arange(100_000))
     counts = np.histogram(x, bins=50, range=(0, 1))[0]
-    assert ((counts - 2000) ** 2 / 2000).sum() < 85  # chi-square with 49 degrees of freedom: 0.1 %
+    # The limit is the 0.1 % point of chi-square with 49 degrees of freedom.
+    assert ((counts - 2000) ** 2 / 2000).sum() < 85
     assert abs(np.corrcoef(x[1:], x[:-1])[0, 1]) < 0.01

@@ -188,7 +188,7 @@ def test_ctrl_c_while_modules_are_imported(
         capture_output=True, text=True, timeout=100,
     )  # fmt: skip
     assert "Traceback" not in done.stderr and "internal" not in done.stderr
-    if (tmp_path / "a.exr").exists():  # a library lost the signal, or the render had ended
+    if (tmp_path / "a.exr").exists():  # a library swallowed the signal, or the render had ended
         assert done.returncode in (0, 130)
     else:
         assert done.returncode == 130 and "stopped" in done.stderr, done.stderr

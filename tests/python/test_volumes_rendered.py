@@ -63,7 +63,8 @@ def test_a_slab_of_a_file_lets_through_what_it_should(tmp_path: Path) -> None:
     assert loaded.volumes[0].grids[0].value == "half"
     image = wavecomb.render(loaded, size=(16, 16), spp=256).beauty
     found = image.reshape(-1, image.shape[-1])[:, :3].mean(axis=0)
-    # Seven full steps between eight voxels, and at both ends a linear fall to 0.
+    # The density is constant over the seven steps between eight voxels, and falls linearly to 0 at
+    # both ends.
     depth = 0.5 * 1.5 * 0.25 * (7 + 2 * 0.5)
     wanted = np.exp(-depth * -np.log([0.5, 0.25, 0.125]) / 2)
     assert found == pytest.approx(wanted, abs=0.01)

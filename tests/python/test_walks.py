@@ -144,7 +144,8 @@ def test_a_clear_slab_shows_what_lies_below() -> None:
     builder.set_camera(camera, projection="orthographic", window=(-1, 1, -1, 1))
     settings = _core.Settings(width=16, height=16, spp=64, max_depth=3, filter="box")
     seen = _core.render(builder.build(), settings, None, None, None).beauty.reshape(-1, 3)
-    # A white Lambertian exit above a floor of uniform radiance.
+    # The exit point is a white Lambertian surface above a floor of uniform radiance, so it has the
+    # floor's radiance.
     assert np.allclose(seen.mean(axis=0), (1.0, 2.0, 3.0), rtol=0.01)
 
 

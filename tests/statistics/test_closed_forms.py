@@ -132,8 +132,8 @@ def test_no_program_makes_energy(shot: Any, program: str, roughness: float) -> N
     picture = shot(AT_BALL, WHITE, body, sphere("B", "M"), spp=512, size=16, max_depth=depth)
     mean = picture.mean()
     # Rough glass loses multiple scattering between microfacets (tests/cpp compares a single
-    # interface with the integral). A ball of roughness 1 has 0.36, and Mitsuba's 0.35, by single
-    # scattering at two or more interfaces.
+    # interface with the integral). The mean radiance of a ball of roughness 1 is 0.36, and 0.35 in
+    # Mitsuba, because light crosses two or more interfaces that model single scattering only.
     lowest = {"diffuse": 0.999, "metal": 0.97, "dielectric": 0.35 if roughness > 0.6 else 0.74}
     assert lowest.get(program, 0.99) < mean < 1.003, f"{program} {roughness}: {mean:.4f}"
 

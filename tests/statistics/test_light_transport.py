@@ -304,7 +304,8 @@ def test_light_through_a_plate_of_glass(transport: str, tmp_path: Path, beauty: 
     expected = albedo / np.pi * power * sum(reflected)
     settings: dict[str, Any] = {"max_depth": 7, "sampler": "sobol"}
     found = beauty(stage, 48, 512, transport=transport, **settings)
-    # Several thousand light paths arrive; 2 % more light comes via floor and plate.
+    # Several thousand light paths reach the camera; 2 % more light arrives by reflections between
+    # floor and plate.
     assert found.mean() == pytest.approx(1.01 * expected, rel=0.06)
     assert beauty(stage, 16, 16, **settings).max() == 0.0
 

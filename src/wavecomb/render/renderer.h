@@ -81,8 +81,8 @@ struct RenderOptions {
   /// the variance that the light would add to one sample of a pixel if camera paths had to find it,
   /// divided by scene_brightness() (light_vertex.h).
   bool wants_camera_squares = false;
-  /// If false, render() returns an empty image, for callers that use snapshots. This makes stopping
-  /// the render of a large image faster.
+  /// If false, render() returns an empty image, for callers that use snapshots. Without the image,
+  /// stopping a large render is faster.
   bool wants_picture = true;
 };
 

@@ -30,7 +30,8 @@ def test_marks_are_where_the_map_has_the_direction(ahead):
     for row, column in ((0, 5), (16, 31), (20, 60), (31, 0)):
         x, y = map_point(vectors[row, column], axes)
         assert (x * 64, y * 32) == pytest.approx((column + 0.5, row + 0.5), abs=1e-6)
-    # Up is at the top, forward in the middle, right on the right.
+    # The panel shows the up direction at the top, the forward direction in the middle, and the
+    # right direction on the right.
     assert vectors[0, 0] @ UP > 0.99
     assert axes[1] == pytest.approx(np.cross(axes[0], UP))
 

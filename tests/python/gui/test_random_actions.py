@@ -126,7 +126,7 @@ def test_random_actions(cornell_window, qtbot, cornell, tmp_path, monkeypatch):
     bad = (QtMsgType.QtWarningMsg, QtMsgType.QtCriticalMsg, QtMsgType.QtFatalMsg)
 
     def heard(kind, context, text):
-        # Messages of the offscreen platform about sizes and raising of windows.
+        # Ignore messages of Qt's offscreen platform about sizes and raising of windows.
         if kind in bad and not text.startswith("This plugin does not support"):
             faults.append(text)
 

@@ -51,7 +51,7 @@ struct OpenPbrFacet {
 /// transmission by 1 / (E_R + E_T).
 ///
 /// E_R + E_T is not tabulated for thin films, anisotropic surfaces, and interfaces whose
-/// reflectance differs from that of their index (specular_weight). There, reflection and
+/// reflectance differs from that of their index (specular_weight). In these cases, reflection and
 /// transmission of each microfacet are scaled by s / (R g_R + (1 - R) g_T), with g = G2 / G1 of the
 /// respective direction. s is the same sum for the bare isotropic interface, whose E_R + E_T is
 /// tabulated. A film therefore changes the ratio of reflection to transmission but not their sum.

@@ -52,7 +52,7 @@ struct RoughInterface {
     average_lost_ = select(smooth, F(0.f), lost.mean);
   }
 
-  /// W for cosine z.
+  /// Returns W(z), the mean of w over the visible microfacets.
   F weight(const F& z) const {
     const F x = fma(F(z / max(fma(alpha_, F(0.4f), z), F(1e-20f))), F(2.f), F(-1.f));
     F p = coefficients_[kTerms - 1];

@@ -46,7 +46,7 @@ struct HomogeneousSegments {
 
 /// Samples free flights through a homogeneous volume, including by lights (equiangular.h).
 /// `segments.most` is the original length of each segment, before any volume stopped it, so that
-/// repeated calls sample the lights for the same part. kStops samples where flights stop; kRatios
+/// repeated calls get the same equiangular distribution. kStops samples where flights stop; kRatios
 /// computes the weights after all volumes were sampled.
 template <typename F>
 inline void sample_homogeneous_flights(const VolumeView& volumes, uint32_t i,

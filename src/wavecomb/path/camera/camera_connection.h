@@ -86,7 +86,8 @@ struct CameraConnection {
 };
 
 /// Connects p to the camera. `u` and `v` in [0, 1) sample the point on the lens. If a latlong image
-/// shows a point several times, this returns one position, and LightSplatFilter adds the others.
+/// shows a point several times, this function returns one position, and LightSplatFilter adds the
+/// other positions.
 template <typename F>
 inline CameraConnection<F> connect_to_camera(const CameraSetup& camera, const Vec3<F>& p,
                                              const F& u, const F& v, const F& time,

@@ -19,10 +19,11 @@ namespace wavecomb {
 /// lanes), `widest` (packets only) or `scalar`.
 ///
 /// `reduced` lists the widths in builds with WAVECOMB_REDUCED_KERNELS, such as sanitized builds.
-/// With `none`, such builds run `program` kernels instead. With `first`, the first program has
-/// kernels of every width and the others only scalar kernels, which also shade waves of packets.
-/// Such builds trace waves through volumes in scalar lanes. `gain` states the measured benefit over
-/// the kernel that would otherwise run, or `-` and a reason if there is no such kernel.
+/// With `none`, reduced builds run `program` kernels instead. With `first`, the first program has
+/// kernels of every width and the other programs only scalar kernels, which also shade waves of
+/// packets. Reduced builds trace waves through volumes in scalar lanes. `gain` states the measured
+/// benefit over the kernel that would otherwise run, or `-` and a reason if there is no such
+/// kernel.
 ///
 /// All kernels give bit-identical results: a kernel that lacks a feature (features.h) or a part of
 /// a material runs only where the scene or the material does not use it.
