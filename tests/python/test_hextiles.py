@@ -51,8 +51,8 @@ def test_copies_are_where_materialx_has_them():
         at[:, :2].astype(np.float64), (3, 2), 90, (0.5, 1.5), (0.1, 0.7)
     )
     copies = grid.copies()
-    # The hash is the fractional part of a large number. Floats lose its last digits, so some values
-    # wrap around.
+    # The hash is the fractional part of a large number. Floats lose its last digits, so some hash
+    # values wrap around.
     for k, copy in enumerate(copies):
         assert np.quantile(np.abs(run(copy.turn, at)[:, 0] - turns[k]), 0.95) < 1e-2
         assert np.quantile(np.abs(run(copy.uv, at) - where[k]), 0.95) < 1e-2

@@ -28,8 +28,8 @@ inline constexpr uint32_t kEmits = 1;  ///< reads the emission input
 inline constexpr uint32_t kGlossy = 2;
 /// Smooth glass: refracts without a roughness input.
 inline constexpr uint32_t kGlass = 4;
-/// Shades curves as fibres, including scattering at the fibre's far side, so rays that start on a
-/// curve do not hit the same curve.
+/// Shades curves as whole fibres: the BSDF includes scattering inside the fibre, so rays hit such
+/// meshes only from outside (accel/presence.h).
 inline constexpr uint32_t kFibre = 8;
 /// The BSDF transmits light where opacity is below 1, unless the material uses opacity as presence.
 inline constexpr uint32_t kTransmitsByOpacity = 16;

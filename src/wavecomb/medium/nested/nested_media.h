@@ -40,8 +40,7 @@ class NestedMedia {
         b_(buffers),
         counts_(counts) {}
 
-  /// Returns the medium stack at a point. The result does not depend on the path that `keys` belong
-  /// to.
+  /// Returns the medium stack at a point. Callers may pass the `keys` of any path.
   MediumStack<float> stack_at(Vec3<float> p, float time, PresenceKeys keys) const;
 
   /// Traces all rays to the event or surface that stops them. `hits` holds the rays' first hits,
