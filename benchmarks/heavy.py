@@ -41,7 +41,7 @@ SMALL_MB = 2.0
 LANES = (0, 1)
 """0 means the widest."""
 SEEN = 1000
-"""Materials with fewer records are excluded from the spread of costs."""
+"""Materials with fewer shaded records than this are excluded from the spread of costs."""
 
 
 def main() -> None:

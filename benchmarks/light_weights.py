@@ -33,7 +33,7 @@ import wavecomb
 
 Picture = NDArray[np.float64]
 OUTLIERS = 1e-3
-"""Fraction of pixels, the worst ones, that the trimmed error leaves out."""
+"""Fraction of the pixels, those with the largest errors, that the trimmed error leaves out."""
 STAGES: dict[str, tuple[str, dict[str, Any]]] = {
     "studio": ("studio", {"triangles": 20_000}),
     "mixed": ("mixed", {"triangles": 50_000}),

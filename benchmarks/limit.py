@@ -53,7 +53,7 @@ from wavecomb.run.settings import make_settings
 KINDS = ("camera", "bounce", "shadow")
 WIDTHS = (1, 4, 8, 16)
 COHERENCE = (True, False, None)
-"""None means: the flag that the render set in each wave stage."""
+"""Values of Embree's coherence flag; None means the flag that each wave stage of the render set."""
 Round = dict[str, float]
 
 

@@ -21,7 +21,7 @@ Matrix = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Curves:
-    """Arguments of ``SceneBuilder.add_curves`` beside those of ``Mesh``."""
+    """Arguments of ``SceneBuilder.add_curves`` that ``Mesh`` does not have."""
 
     kind: str
     segments: NDArray[np.uint32]
@@ -39,7 +39,7 @@ class Curves:
 
 @dataclass(frozen=True)
 class Mesh:
-    """Arguments of ``SceneBuilder.add_mesh``; for curves, with ``curves`` and without triangles."""
+    """Arguments of ``SceneBuilder.add_mesh``; curves set ``curves`` and have no triangles."""
 
     positions: NDArray[np.float32]
     indices: NDArray[np.uint32]

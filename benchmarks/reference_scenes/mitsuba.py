@@ -37,8 +37,8 @@ class Film:
         filter: Filter of Wavecomb.
         filter_width: Pixels.
         max_depth: Scattering vertices, as Wavecomb counts them.
-        left_out: Mask (height, width) of pixels that show objects which cannot be drawn.
-        notes: Approximations that were made.
+        left_out: Mask (height, width) of pixels that show objects which cannot be translated.
+        notes: Approximations in the translation of the scene.
     """
 
     size: tuple[int, int]
@@ -59,7 +59,7 @@ def to_stage(scene: Scene, file: Path) -> Film:
 
 
 class _Translator:
-    """Translation of one scene."""
+    """Translator of one Mitsuba scene to a stage."""
 
     def __init__(self, scene: Scene, file: Path) -> None:
         self.scene = scene
@@ -265,7 +265,7 @@ class _Translator:
         return self.out.material("diffuse", {"diffuseColor": (0.5, 0.5, 0.5)}), None
 
     def _material(self, number: int) -> tuple[str, Callable[[Any], Any] | None]:
-        """Path of a material, and a function for the mesh colours if it needs them."""
+        """Return a material's path, and a function for mesh colours if the material needs them."""
         scene, kind, props = self.scene, self.scene.kind(number), self.scene.props(number)
         if kind == "twosided":
             return self._material(next(scene.all_of(number, "BSDF")))

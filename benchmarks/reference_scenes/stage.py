@@ -46,7 +46,7 @@ class Image:
 
 
 class StageWriter:
-    """A stage under construction; ``stage`` is one to add to, by default an empty one."""
+    """Writer of a stage; ``stage`` is a USD stage to add prims to, by default a new one."""
 
     def __init__(self, file: Path, stage: Usd.Stage | None = None) -> None:
         self.file = file
@@ -195,8 +195,8 @@ class StageWriter:
     ) -> str:
         """Add a UsdPreviewSurface with one of Wavecomb's programs; return its path.
 
-        ``own`` are attributes such as wavecomb:eta. ``primvar`` is the source of diffuseColor.
-        ``path`` names an existing material; by default a new one is made.
+        ``own`` are Wavecomb's attributes, such as wavecomb:eta. ``primvar`` is the source of
+        diffuseColor. ``path`` names an existing material; by default a new material is made.
         """
         path = path or self._path("material")
         material = UsdShade.Material.Define(self.stage, path)

@@ -112,9 +112,9 @@ class LoadOptions:
     Attributes:
         camera: Path or unique name of a camera prim; None uses the camera of the render settings,
             else the first of the stage, else one that frames everything.
-        frame: Time code; None means the stage's start, else default values.
-        purposes: Purposes of the geometry: "default", "render", "proxy", "guide"; None uses those
-            of the render settings, else the first two.
+        frame: Time code; None means the stage's start time, or default values in a stage without.
+        purposes: Purposes of the geometry: "default", "render", "proxy", "guide"; None uses the
+            purposes of the render settings, else "default" and "render".
         variants: Variant selections: {"/World/Car{paint}": "red"}; a set without a path is one of
             the default prim.
         mask: Paths or patterns (docs/stages.md) of prims to render, with their descendants and

@@ -50,9 +50,9 @@ def folders() -> tuple[list[str], list[str]]:
 
     Returns:
         First the folders of PYTHONPATH, which precede site-packages. Then the user's site folder,
-        the folder of this package, and folders of dependencies that are in none of these, which
-        occurs in programs that modify ``sys.path``. All are absolute; the working folder and the
-        folder of the program's script are excluded.
+            the folder of this package, and folders of dependencies that are in none of these, which
+            occurs in programs that modify ``sys.path``. All folders are absolute; the working
+            folder and the folder of the program's script are excluded.
     """
     ignores = sys.flags.ignore_environment
     first = [] if ignores else os.environ.get("PYTHONPATH", "").split(os.pathsep)

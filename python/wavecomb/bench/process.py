@@ -126,7 +126,7 @@ class Session:
 
 
 class Switch:
-    """Switch in the worker that turns counting on and off. Does nothing without perf."""
+    """Switch in the worker that turns perf's counting on and off; has no effect without perf."""
 
     def __init__(self, job: dict[str, int] | None) -> None:
         self._job = job
@@ -193,7 +193,7 @@ def run_process(
 
 @dataclass
 class Lines:
-    """JSON objects that a process printed, and its outcome with status "failed"."""
+    """JSON objects that a process printed, and an outcome to report if the process failed."""
 
     lines: list[Any]
     outcome: Outcome

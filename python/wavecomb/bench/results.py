@@ -328,7 +328,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _append(path: Path, line: str) -> None:
-    """Appends a line with one write and a flush, so that only the last can be incomplete."""
+    """Appends a line with one write and a flush, so that only the last line can be incomplete."""
     fd = os.open(path, os.O_WRONLY | os.O_APPEND)
     try:
         os.write(fd, line.encode("utf-8"))

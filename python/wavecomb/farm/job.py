@@ -97,7 +97,7 @@ class Job:
         images: For each image, the index of its shot, and its frame or None.
         files: Files of the stage with their hashes.
         tiles: Columns and rows of each image.
-        file: half, compression, tile and split of ``Picture.save``.
+        file: Arguments half, compression, tile and split of ``Picture.save``.
         exposure: Exposure of PNGs, in stops.
         tone_map: Tone mapping of PNGs.
         denoise: Whether images get the layer ``denoised``.

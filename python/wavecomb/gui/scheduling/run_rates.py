@@ -87,7 +87,7 @@ class Ratio:
 
 
 def stretches(run: Run, least_s: float = 0.0) -> list[tuple[Look, Look]]:
-    """Returns pairs of consecutive looks, joining intervals shorter than ``least_s``."""
+    """Returns pairs of consecutive counter readings; joins intervals shorter than ``least_s``."""
     pairs = []
     start = run.looks[0]
     for look in run.looks[1:]:

@@ -279,7 +279,7 @@ class Live(QObject):
             self.state_changed.emit(state)
 
     def _receive(self, letter: None) -> None:
-        """Handles the newest item of each kind of the render thread's news."""
+        """Handles the newest frame, statistics, error and renderer from the render thread."""
         takes: dict[str, Callable[[Any], None]] = {
             "frame": self._take,
             "statistics": self._take_statistics,

@@ -101,7 +101,7 @@ class PairResult:
         a: File of image A.
         b: File of the reference image B.
         result: Differences; None if the images cannot be compared.
-        problem: Reason why they cannot be compared, or "".
+        problem: Reason why the images cannot be compared, or "".
     """
 
     name: str

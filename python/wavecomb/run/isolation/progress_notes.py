@@ -20,7 +20,7 @@ def new_page() -> int:
 
 
 def open_page(descriptor: int) -> mmap.mmap:
-    """Maps the page of a descriptor."""
+    """Maps the shared page of progress notes from its file descriptor."""
     return mmap.mmap(descriptor, _SLOT * len(_SLOTS))
 
 
