@@ -20,8 +20,8 @@ A round renders every configuration of a stage once, in shuffled order; configur
 measurements share are rendered once. Ratios are taken within a round. Results are medians over
 rounds with a bootstrap interval of 95 %. "best" is the policy or wave size with the lowest median.
 Times exclude loading and scene construction. All images of one size and sample count must be
-bitwise equal, or the benchmark fails. benchmarks/limit.py measures the ratio to Embree alone,
-benchmarks/peers other renderers.
+bitwise equal, or the benchmark fails. The ratio to Embree alone is measured by benchmarks/limit.py,
+and benchmarks/peers compares Wavecomb with other renderers.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ from wavecomb import _core
 
 WIDEST = max(_core.lane_widths())
 WAVE_SIZES = tuple(4**k for k in range(4, 11))
-"""256 to 2^20."""
+"""Compared numbers of paths in a wave, from 256 to 2^20."""
 SPP_FACTORS = (0.5, 1, 2, 4)
 EDGE_FACTORS = (0.5, 0.7071, 1, 1.4142)
 """Factors of the image width, each of which doubles the number of pixels."""
@@ -148,7 +148,7 @@ def reference_choices(args: argparse.Namespace) -> list[Choice]:
 
 
 def reference(stage: Stage) -> Figures:
-    """Time of the wavefront at 1 lane over that of the reference, and speedup of the defaults."""
+    """Return the wavefront's time at 1 lane over the reference's, and the defaults' speedup."""
     scalar = stage.times(REFERENCE)
     return {
         "one_lane_to_reference": ratio(stage.times(ONE_LANE[0]), scalar),

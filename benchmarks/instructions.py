@@ -10,10 +10,10 @@ valgrind does not support AVX-512, so a tree must be built for an older instruct
         --config-settings=build-dir=build/editable \
         --config-settings=cmake.define.WAVECOMB_ARCH=x86-64-v3
 
-Each tree renders the stage in its environment, 96 x 96 with one thread and 8 lanes, once with 4 and
-once with 20 samples per pixel. The difference in instructions divided by the difference in shaded
-records excludes loading and scene construction. `_core` is everything but traversal: camera,
-ordering, shading, film; `libembree4` is traversal.
+Each source tree renders the stage in its Python environment, at 96 x 96 pixels with one thread and
+8 SIMD lanes, once with 4 and once with 20 samples per pixel. The difference in instructions divided
+by the difference in shaded records excludes loading and scene construction. `_core` is everything
+but traversal: camera, ordering, shading, film; `libembree4` is traversal.
 """
 
 from __future__ import annotations

@@ -124,7 +124,7 @@ def measure(name: str, depth: int, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _calibration_s(scene: Any, depth: int, args: argparse.Namespace) -> float:
-    """Seconds of one calibration for an image of the timed size."""
+    """Measure the seconds of one calibration for an image of ``--timed-size``."""
     size = (args.timed_size, args.timed_size)
     stats = wavecomb.render(scene, size=size, spp=1, max_depth=depth, threads=args.threads).stats
     return float(stats["light_calibration"]["seconds"])

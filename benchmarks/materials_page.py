@@ -33,7 +33,7 @@ class Exhibit:
 
     Attributes:
         stage: Path below ``ROOT``.
-        about: What the stage shows, by its documentation.
+        about: Content of the stage, as its documentation describes it.
         options: Options of ``wavecomb render``.
     """
 

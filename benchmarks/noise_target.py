@@ -9,7 +9,7 @@ its mean is biased, mostly towards dark. For each stage and noise target:
 
 - `--seeds` renders stop at the target; n is the mean number of samples per pixel;
 - the same number of plain renders take n samples each;
-- two references with other seeds take 64 n.
+- two references with other seeds take 64 n samples each.
 
 Results:
 

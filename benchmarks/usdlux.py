@@ -50,9 +50,9 @@ over "materials" {
     }
 }
 """
-"""The references show Lambertian surfaces. The stages set a specularColor of 0 at index 1. In
-UsdPreviewSurface's specular workflow this still reflects at grazing angles (F90 is 1); in its
-metallic workflow it is Lambertian.
+"""The references show Lambertian surfaces. The stages set a specularColor of 0 and an index of
+refraction of 1. In UsdPreviewSurface's specular workflow such a surface still reflects at grazing
+angles (F90 is 1); in the metallic workflow it is Lambertian.
 """
 NOT_REACHED = {
     "dome": "the image is seen: OpenUSD's delegate looks up the nearest texel, we are bilinear",

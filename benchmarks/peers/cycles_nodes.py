@@ -15,7 +15,7 @@ _SMOOTH = 0.0317
 
 
 class Nodes:
-    """A material under construction: its nodes and their connections."""
+    """Builder of a Blender material: adds shader nodes and connects their sockets."""
 
     def __init__(self, tree: Any, images: Images) -> None:
         self.tree = tree
@@ -40,7 +40,7 @@ class Nodes:
         self.tree.links.new(socket, self.add(kind).inputs[use])
 
     def vector(self, operation: str, *operands: Any) -> Any:
-        """Component-wise arithmetic."""
+        """Add a node for component-wise arithmetic on vectors."""
         node = self.tree.nodes.new("ShaderNodeVectorMath")
         node.operation = operation
         for socket, value in zip(node.inputs, operands, strict=False):
@@ -122,7 +122,7 @@ def image(values: NDArray[np.float32], space: str, small: bool) -> Any:
 
 
 def make_material(recorded: Recorded, number: int, images: Images) -> Any:
-    """Make a Blender material for a recorded one, with the closest nodes."""
+    """Make a Blender material for a recorded material, with the closest nodes."""
     m = recorded.materials[number]
     made = bpy.data.materials.new(m.get("name") or f"material{number}")
     made.use_nodes = True

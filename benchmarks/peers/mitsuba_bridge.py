@@ -29,8 +29,8 @@ _TURN = np.diag([-1.0, 1.0, -1.0, 1.0])
 
 MOST_PATHS = 1 << 25
 """Maximum number of paths per pass: the vectorised variants hold all paths of a pass in memory,
-about 100 bytes each. A timed image must be one pass (600 x 600 x 64 is): each further seed compiles
-anew.
+about 100 bytes each. A timed image must fit into one pass, as 600 x 600 pixels with 64 samples do,
+because each further pass has another seed and compiles its kernels again.
 """
 
 _FAR = 1e4

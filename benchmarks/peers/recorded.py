@@ -130,8 +130,8 @@ class Recorded:
 def dense(grid: dict[str, Any]) -> tuple[NDArray[np.float32], Matrix]:
     """All voxels of a recorded grid, with a border of its background value.
 
-    Returns values by x, y, z, and the transform (row vectors) from the unit cube, which they divide
-    into equal cells, to object space.
+    Returns values by x, y, z, and the transform (row vectors) to object space from the unit cube,
+    which the voxels divide into equal cells.
     """
     origins, values = grid["origins"], grid["values"]
     edge = values.shape[1]

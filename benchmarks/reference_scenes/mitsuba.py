@@ -115,7 +115,7 @@ class _Translator:
         return film
 
     def _view(self, sensor: int, film: Film) -> tuple[Matrix, tuple[float, float], bool]:
-        """Transform without scale, half the image extent, and whether it is orthographic."""
+        """Return a camera's unscaled transform, half extent, and whether it is orthographic."""
         kind, props = self.scene.kind(sensor), self.scene.props(sensor)
         to_world = self._matrix(sensor)
         scale = np.linalg.norm(to_world[:3, :3], axis=0)
@@ -323,7 +323,7 @@ class _Translator:
         return eta.tolist(), k.tolist()
 
     def _brushed(self, eta: list[float], k: list[float], u: float, v: float) -> str:
-        """OpenPBR metal with these alphas; its reflectance and tint match the index."""
+        """Add OpenPBR metal of alphas u and v that reflects like a metal of the complex index."""
         along, across = max(u, v), min(u, v)
         anisotropy = 1.0 - across / along
         roughness = math.sqrt(along / math.sqrt(2.0 / (1.0 + (1.0 - anisotropy) ** 2)))

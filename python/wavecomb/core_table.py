@@ -56,7 +56,7 @@ class MaterialParameter:
 
     @property
     def annotation(self) -> str:
-        """Python type for the stub.
+        """Python type annotation for the stub _core.pyi.
 
         >>> material_parameters()["emission"].annotation
         'tuple[float, float, float]'
@@ -187,7 +187,7 @@ class LightParameter:
 
     @property
     def annotation(self) -> str:
-        """Python type for the stub.
+        """Python type annotation for the stub _core.pyi.
 
         >>> light_parameters()["color"].annotation, light_parameters()["ies"].annotation
         ('tuple[float, float, float]', 'int | None')
@@ -256,7 +256,7 @@ class CameraParameter:
 
     @property
     def annotation(self) -> str:
-        """Python type for the stub.
+        """Python type annotation for the stub _core.pyi.
 
         >>> camera_parameters()["window"].annotation
         'tuple[float, float, float, float]'

@@ -33,7 +33,7 @@ class Row:
             (a flag that disables something).
         unset: Description of the default.
         option: Option of commands; "" if there is none.
-        metavar: Placeholder of its value.
+        metavar: Placeholder of the option's value in help.
         choices: Valid values.
         many: Whether the option may be repeated.
         least: Smallest number.

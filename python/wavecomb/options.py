@@ -64,7 +64,7 @@ class Setting:
 
     @property
     def annotation(self) -> str:
-        """Python type for the stub.
+        """Python type annotation for the stub _core.pyi.
 
         >>> settings()["light_weights"].annotation
         'Literal["calibrated", "power"]'

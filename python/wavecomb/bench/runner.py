@@ -300,7 +300,7 @@ class Sitting:
             self.say(f"warning: {failed} runs failed; --resume tries them again")
 
     def _failed(self) -> int:
-        """Counts runs of this and earlier sittings that failed and have not succeeded since."""
+        """Counts the runs in the results folder that failed and have not succeeded since."""
         failed = {o["row"]["run_id"] for o in self.folder.objects if o["row"]["status"] != "ok"}
         return len(failed - self.folder.done())
 

@@ -45,7 +45,7 @@ def parse_frames(text: str | Iterable[float]) -> tuple[float, ...]:
 
 
 def _range(part: str, text: str) -> Iterable[Decimal]:
-    """Yields the frames of one item in exact decimal arithmetic."""
+    """Yields the frames of one number or range in exact decimal arithmetic."""
     match = _RANGE.fullmatch(part)
     if match is None:
         raise WavecombError(

@@ -108,7 +108,7 @@ def order_effects(runs: pd.DataFrame, metric: str = "shade_and_order_s") -> pd.D
         ratio(p) = exp(mean over cells of log(T_p / T_none))
         share(p) = log(T_placebo / T_p) / log(T_placebo / T_oracle), of the same means
 
-    The share of the gain is 0 for the placebo and 1 for the oracle. It is given only if the
+    The share of the gain is 0 for the placebo and 1 for the oracle. Shares are computed only if the
     interval of the gap T_placebo / T_oracle excludes 1, because otherwise no gain is shown.
 
     Returns:

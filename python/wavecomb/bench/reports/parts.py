@@ -19,7 +19,7 @@ MAX_ROWS = 60
 
 @dataclass(frozen=True)
 class Part:
-    """Base class of everything below a heading.
+    """Base class of the elements of a report, such as paragraphs, tables and figures.
 
     Attributes:
         kind: Name of the macro of the templates that renders the part.

@@ -140,7 +140,7 @@ def promise(setup: Setup) -> str:
 
 
 def recipe_of(setup: Setup) -> dict[str, Any]:
-    """Returns the fields of a setup that restore these settings."""
+    """Returns the fields of a setup that restore the given settings."""
     return {name: getattr(setup, name) for name in (*FIELDS, "own_policy", "profile")}
 
 

@@ -44,8 +44,8 @@ class Look:
     phases: Mapping[str, float] = field(default_factory=dict)
     """Thread seconds by phase."""
     coherence: Mapping[str, float] = field(default_factory=dict)
-    """Run length and homogeneity of material queues, as means over the run so far. The core reports
-    ratios instead of counters for them."""
+    """Run length and homogeneity of material queues, as means over the run so far, since the core
+    reports no counters for these."""
 
 
 def take_look(stats: Mapping[str, Any]) -> Look:
@@ -76,7 +76,7 @@ class Run:
 
     @property
     def last(self) -> Look:
-        """The latest look."""
+        """The latest counter reading."""
         return self.looks[-1]
 
     def add(self, stats: Mapping[str, Any]) -> None:
@@ -200,7 +200,7 @@ class RunLog:
 
     @property
     def base(self) -> Series | None:
-        """Reference series of comparisons: the pinned one, else the first of this picture."""
+        """Reference series of comparisons: the pinned series, else the picture's first series."""
         if self.pinned is not None:
             return self.pinned
         if self._current is None:

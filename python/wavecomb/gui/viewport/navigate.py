@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Camera movements: orbit, pan, dolly, frame. Pure functions of poses."""
+"""Camera movements: orbit, pan, dolly, frame. All functions are pure."""
 
 from __future__ import annotations
 

@@ -334,7 +334,7 @@ class Session(Live):
             live.resume()
 
     def restart(self) -> None:
-        """Restarts from the first sample, at full size."""
+        """Restarts the render from the first sample, at full size."""
         self._playing = False
         if self.stage is not None:
             super().restart()

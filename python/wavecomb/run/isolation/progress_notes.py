@@ -78,8 +78,8 @@ def crash_message(number: int, where: str, words: str, limit: str = "") -> str:
     Args:
         number: Number of the signal.
         where: Result of ``read``.
-        words: Output of its libraries to stderr.
-        limit: Text of its memory limit.
+        words: Output of the process's libraries to stderr.
+        limit: Text about the memory limit of the process.
     """
     try:
         name = signal.Signals(number).name
