@@ -62,7 +62,7 @@ Figures = dict[str, Any]
 
 
 class Stage:
-    """A loaded stage and the results of its renders: by configuration, one per round."""
+    """A loaded stage and its results: for each configuration, the times of one render per round."""
 
     def __init__(self, name: str, args: argparse.Namespace) -> None:
         self.name, self.args = name, args

@@ -97,7 +97,7 @@ class Scene:
     def material(self, material: int) -> dict[str, Any]:
         """Returns name, program and parameters of a material in the form of add_material.
 
-        Includes the names of its textures, and driven: names of parameters that a graph computes.
+        Includes texture names, and as ``driven`` the parameters that the material's graph computes.
         Raises Error if the id does not exist.
         """
     def light(self, light: int) -> dict[str, Any]:

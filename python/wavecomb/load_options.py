@@ -28,18 +28,18 @@ class Row:
     """Description of a load option for commands and files.
 
     Attributes:
-        help: Description, one sentence.
+        help: Description of the option in one sentence.
         kind: "text", "file", "number", "integer", "pair", "choice", "switch" (on or off), or "not"
             (a flag that disables something).
         unset: Description of the default.
-        option: Option of commands; "" if there is none.
+        option: Name of the command-line option; "" if there is none.
         metavar: Placeholder of the option's value in help.
         choices: Valid values.
         many: Whether the option may be repeated.
         least: Smallest number.
         most: Largest number.
         above: Whether ``least`` itself is excluded.
-        unit: Unit of numbers.
+        unit: Unit of a numeric option.
     """
 
     help: str

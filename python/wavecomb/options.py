@@ -21,8 +21,8 @@ class Setting:
 
     Attributes:
         name: Attribute of ``wavecomb.Settings``, and keyword.
-        label: Label in a form.
-        help: Description, one sentence.
+        label: Label of the setting in the window.
+        help: Description of the setting in one sentence.
         kind: "integer", "number", "flag", "choice" or "text".
         default: Default value; None if it depends on other settings.
         least: Smallest valid number; None means no limit.

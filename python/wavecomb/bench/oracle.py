@@ -203,7 +203,7 @@ def _path(members: Sequence[str], step: Mapping[tuple[str, str], float]) -> list
 
 
 def _greedy(members: Sequence[str], step: Mapping[tuple[str, str], float]) -> list[str]:
-    """Builds a path step by step from the material that gains most by coming next.
+    """Builds the order greedily, by appending the material with the largest gain.
 
     The gain of a material is relative to its mean over all predecessors.
     """

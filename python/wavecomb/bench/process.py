@@ -83,7 +83,7 @@ class Session:
     """Runs one worker under perf, which counts only while the worker has enabled it.
 
     ``command`` is the prefix of the worker's command, and ``fds`` are file descriptors to pass to
-    it. The worker gets ``job`` as the entry ``perf`` of its job.
+    the worker. ``job`` becomes the entry ``perf`` of the job that the worker reads.
     """
 
     def __init__(self, events: dict[str, str], report: Path) -> None:

@@ -34,10 +34,10 @@ class Column:
     """A column of ``runs.csv``.
 
     Attributes:
-        name: Name in the header.
+        name: Name of the column in the header.
         kind: "text", "integer", "number", "flag" (0 or 1) or "json" (an object in one cell).
         unit: Unit, or "".
-        meaning: Description in one sentence.
+        meaning: Description of the column in one sentence.
     """
 
     name: str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Command with many options: help in groups, and sizes in one word or two."""
+"""Command class that groups options in the help and accepts sizes as one word or two."""
 
 from __future__ import annotations
 

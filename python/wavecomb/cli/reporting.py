@@ -83,7 +83,7 @@ class Summary(Reporter):
         return loading_bar(self._console, f"{self._place}{what}")
 
     def begins(self, frame: str, number: int, count: int) -> None:
-        """Makes progress bars name the frame."""
+        """Adds the frame number to the titles of progress bars."""
         self._frame = f"frame {frame} ({number} of {count})"
         self._place = f"{self._frame}: "
 

@@ -45,7 +45,7 @@ class Row:
     """A row of a forest plot.
 
     Attributes:
-        name: Label at the left.
+        name: Label at the left of the row.
         value: Position of the point.
         low: Lower end of the interval; NaN without an interval.
         high: Upper end of the interval; NaN without an interval.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Camera movements: orbit, pan, dolly, frame. All functions are pure."""
+"""Camera movements (orbit, pan, dolly, frame) as functions from one camera pose to another."""
 
 from __future__ import annotations
 

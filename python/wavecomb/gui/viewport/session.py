@@ -106,7 +106,7 @@ class Session(Live):
     def scene(self) -> Scene | None:
         """The core's scene with all edits, or None.
 
-        ``Scene.material(i)`` and ``light(i)`` read values.
+        ``Scene.material(i)`` and ``Scene.light(i)`` return current parameter values.
         """
         if self.renderer is not None:
             return self.renderer.scene

@@ -77,7 +77,7 @@ def crash_message(number: int, where: str, words: str, limit: str = "") -> str:
 
     Args:
         number: Number of the signal.
-        where: Result of ``read``.
+        where: Last activity of the process, from ``read``.
         words: Output of the process's libraries to stderr.
         limit: Text about the memory limit of the process.
     """
