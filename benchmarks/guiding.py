@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare the efficiency of renders with learning (guiding, light shares) and without.
+"""Compare the efficiency of renders with training (guiding, light shares) and without.
 
     .venv/bin/python benchmarks/guiding.py room cornell --spp 64 --seeds 5
     .venv/bin/python benchmarks/guiding.py mixed-lamps kitchen lights --ways power off auto light

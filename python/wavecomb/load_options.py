@@ -95,7 +95,7 @@ class Row:
 
     @property
     def key(self) -> str:
-        """Name among a command's arguments and in checkpoints."""
+        """Name of the option among a command's arguments and in checkpoints."""
         return self.option.removeprefix("--").replace("-", "_") + "s" * (
             self.many and self.option not in ("--mask", "--payloads")
         )
@@ -142,7 +142,7 @@ class LoadOptions:
         exposure: Whether the camera's exposure scales the image.
         lens_settings: Lens settings such as {"lens_k1": "-0.1", "rolling_shutter": "top"}, which
             override the camera's attributes (docs/cameras.md).
-        st_map: ST map image of the lens distortion, in place of coefficients.
+        st_map: ST map image of the lens distortion, which replaces the distortion coefficients.
         render_settings: Path or name of a RenderSettings prim; None uses those that the stage
             names, else the only ones under /Render (docs/cameras.md).
         product: Path or name of a product of the render settings; None uses the first product.

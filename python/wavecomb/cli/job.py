@@ -76,7 +76,7 @@ class Still:
         return self._renderer.render(settings, *arguments, **named)
 
     def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
-        """Returns ``make_stats`` for a result, after ``resumed_s`` seconds of an earlier render."""
+        """Returns the statistics of a result that continues a render of ``resumed_s`` seconds."""
         stage = self._job.options.stage
         return make_stats(result, stage=stage, loaded=self._loaded, resumed_s=resumed_s)
 

@@ -179,10 +179,10 @@ class Run:
             raise WavecombError(f"{self._cluster.what}: all workers are gone")
 
     def _retry_waiting(self) -> None:
-        """Makes the scheduler look again for workers for tasks that had none.
+        """Makes the scheduler reschedule tasks for which it found no suitable worker.
 
-        Dask itself looks only when a worker joins. A joining worker lacks the required resource,
-        because it announces its machine class a little later.
+        Dask itself reschedules such tasks only when a worker joins. A joining worker lacks the
+        required resource, because it announces its machine class a little later.
         """
         from wavecomb.farm.tasks import retry_unrunnable
 

@@ -109,7 +109,7 @@ class FarmPlugin(WorkerPlugin):
 
 
 def retry_unrunnable(dask_scheduler: Any) -> None:
-    """Makes a scheduler look again for workers for tasks that had none.
+    """Makes a scheduler reschedule tasks for which it found no suitable worker.
 
     Args:
         dask_scheduler: The scheduler. The function runs in the process of the scheduler.

@@ -66,7 +66,7 @@ _OTHERS = {
     "unbiased": ("RGB", "light"),
     "variance": ("RGB", "value"),
 }
-"""Letters and content of layers that are no AOVs."""
+"""Channel letters and content of layers that are not AOVs."""
 
 
 def letters(layer: str) -> str:

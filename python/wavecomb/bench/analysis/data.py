@@ -199,9 +199,9 @@ def label(cell: dict[str, Any], names: Sequence[str]) -> str:
 
 
 def varying(cells: Sequence[dict[str, Any]]) -> list[str]:
-    """Returns the settings in which cells differ, except the experiment; else "stage".
+    """Returns "stage" and all other settings in which groups of runs differ.
 
-    The value of a factor is included if no other setting distinguishes cells. A renderer may use a
+    The value of a factor is included if no other setting distinguishes groups. A renderer may use a
     smaller value than the suite requests, for example if a wave is larger than the image.
     """
     # settings shown in the heading, or implied by another setting
@@ -223,14 +223,14 @@ def labelled(
     default: str = "all",
     leave_out: Sequence[str] = (),
 ) -> pd.DataFrame:
-    """Returns a table of rows with the short names of their cells.
+    """Returns a table of rows with the short names of their groups of runs.
 
     Args:
-        rows: Rows with the settings of their cells.
+        rows: Rows with the settings of their groups of runs.
         only: Settings to use; empty means all.
         column: Column for the names.
         default: Name if no setting varies.
-        leave_out: Settings that are not part of a cell.
+        leave_out: Settings that may differ within a group of runs.
     """
     names = varying(rows) if rows else []
     names = [n for n in names if n not in leave_out and (not only or n in only)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ratios to a baseline, cell by cell: times, counts, error, efficiency."""
+"""Ratios to a baseline in groups of comparable runs: times, counts, error, efficiency."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def ratios(
         runs: Runs of one experiment.
         factor: Name of the setting that varies.
         metric: Name of a column.
-        ignore: Further settings that may differ within a cell.
+        ignore: Further settings that may differ within a group of comparable runs.
 
     Returns:
         One row per cell and level: ``cell`` (a short name), ``level``, ``n`` (rounds),

@@ -220,7 +220,7 @@ def order_figure(table: pd.DataFrame, name: str, metric_words: str) -> Captioned
 
 
 def regret_figure(table: pd.DataFrame, name: str) -> CaptionedFigure | None:
-    """Draws the regret of each policy, in a panel per cell."""
+    """Draws the regret of each policy, in a panel per group of comparable runs."""
     if table.empty or table["cell"].nunique() > MAX_PANELS:
         return None
     panels = panels_of(

@@ -36,7 +36,7 @@ class _CalmWheel(QObject):
 
 
 def calm(widget: QWidget) -> None:
-    """Makes a widget react to the wheel only with focus.
+    """Makes a widget react to the mouse wheel only while it has the focus.
 
     Otherwise scrolling a panel would change settings and restart renders.
     """
