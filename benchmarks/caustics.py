@@ -79,7 +79,7 @@ class Stage:
         return picture, time.perf_counter() - begin
 
     def samples(self, way: str) -> int:
-        """Estimate the samples that mode `way` takes in ``--seconds``, from two short renders."""
+        """Estimate the samples that mode `way` takes in ``--seconds``, from short renders."""
         spp, most = 4, self.options.reference // 4
         done, before = 0, 0.0
         while True:

@@ -51,7 +51,7 @@ class Nodes:
         return node.outputs["Vector"]
 
     def texture(self, use: dict[str, Any], signed: bool = False) -> Any:
-        """Add a texture lookup: texel * scale + bias, or the stored texel if `signed`."""
+        """Add a texture lookup: texel * scale + bias; `signed` omits a normal map's 2 n - 1."""
         node = self.tree.nodes.new("ShaderNodeTexImage")
         node.image, node.extension = self.images.get(use["texture"])
         a, b, c, d, e, f = use.get("uv", (1.0, 0.0, 0.0, 0.0, 1.0, 0.0))
