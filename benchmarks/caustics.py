@@ -79,7 +79,7 @@ class Stage:
         return picture, time.perf_counter() - begin
 
     def samples(self, way: str) -> int:
-        """Samples that `way` takes in the time of a round, from a line through two renders."""
+        """Estimate the samples that mode `way` takes in ``--seconds``, from short renders."""
         spp, most = 4, self.options.reference // 4
         done, before = 0, 0.0
         while True:
@@ -92,7 +92,7 @@ class Stage:
             spp = min(wanted, 4 * spp)
 
     def errors(self, picture: wavecomb.Picture) -> dict[str, float]:
-        """The relMSE by FIGURES; 0 for caustics if there are none."""
+        """Return the relMSE of the image and of its caustics, which is 0 without caustics."""
         one, other = (np.asarray(picture.beauty, np.float64) - r for r in self.references)
         pixels = (one * other * self.scale).mean(2)
         some = pixels[self.mask] if self.mask.any() else np.zeros(1)
@@ -105,7 +105,7 @@ class Stage:
 
 
 def trimmed(errors: NDArray[np.float64]) -> float:
-    """Mean without the thousandth of the values that are largest in magnitude."""
+    """Return the mean of all values except the 0.1 % with the largest magnitude."""
     by_size = errors.ravel()[np.argsort(np.abs(errors), axis=None)]
     return float(by_size[: by_size.size - int(by_size.size * TRIMMED_SHARE)].mean())
 

@@ -11,17 +11,17 @@
   ordering and the widest lanes without ordering.
 - reference: the wavefront at 1 lane and with default settings, compared with the scalar depth-first
   reference integrator.
-- threads: --threads threads compared with 1.
+- threads: speedup of --threads threads over one thread.
 - linear: time by number of samples and pixels. A line t = a + b n is fitted with equal weight for
-  relative errors. Results are the largest deviation from it and the constant cost of a call.
+  relative errors. Results are the largest deviation from the line and the constant cost of a call.
 - waves: the default wave size compared with the best of 256 to 2^20.
 
 A round renders every configuration of a stage once, in shuffled order; configurations that several
 measurements share are rendered once. Ratios are taken within a round. Results are medians over
 rounds with a bootstrap interval of 95 %. "best" is the policy or wave size with the lowest median.
 Times exclude loading and scene construction. All images of one size and sample count must be
-bitwise equal, or the benchmark fails. benchmarks/limit.py measures the ratio to Embree alone,
-benchmarks/peers other renderers.
+bitwise equal, or the benchmark fails. The ratio to Embree alone is measured by benchmarks/limit.py,
+and benchmarks/peers compares Wavecomb with other renderers.
 """
 
 from __future__ import annotations
@@ -52,17 +52,17 @@ from wavecomb import _core
 
 WIDEST = max(_core.lane_widths())
 WAVE_SIZES = tuple(4**k for k in range(4, 11))
-"""256 to 2^20."""
+"""Compared numbers of paths in a wave, from 256 to 2^20."""
 SPP_FACTORS = (0.5, 1, 2, 4)
 EDGE_FACTORS = (0.5, 0.7071, 1, 1.4142)
-"""Factors of the image width; each doubles the number of pixels of the one before."""
+"""Factors of the image width, each of which doubles the number of pixels."""
 
 Choice = dict[str, Any]
 Figures = dict[str, Any]
 
 
 class Stage:
-    """A loaded stage and the results of its renders: by configuration, one per round."""
+    """A loaded stage and its results: for each configuration, the times of one render per round."""
 
     def __init__(self, name: str, args: argparse.Namespace) -> None:
         self.name, self.args = name, args
@@ -86,7 +86,7 @@ class Stage:
         return run
 
     def times(self, choice: Choice, *keys: str) -> list[float]:
-        """Sums of the named times per round; by default render_s."""
+        """Return the sum of the named times for each round; by default the render time."""
         return [sum(run[key] for key in keys or ("render_s",)) for run in self.runs[_key(choice)]]
 
     def quickest(self, choices: Sequence[Choice]) -> Choice:
@@ -106,7 +106,7 @@ def traversal_choices(args: argparse.Namespace) -> list[Choice]:
 
 
 def traversal(stage: Stage) -> Figures:
-    """Fractions of the trace and shadow phases."""
+    """Return the fraction of render time that the trace and shadow phases take, by policy."""
     choices = traversal_choices(stage.args)
     shares = {}
     for choice in choices:
@@ -124,7 +124,7 @@ def lanes_choices(args: argparse.Namespace) -> list[Choice]:
 
 
 def lanes(stage: Stage) -> Figures:
-    """Speedup of shading in the widest lanes with ordering."""
+    """Return the speedup of shading by the widest SIMD lanes and by ordering."""
     best = stage.quickest(traversal_choices(stage.args))
     shading = ("shade_s", "order_s")
     scalar = stage.times({"policy": "none", "lanes": 1}, *shading)
@@ -148,7 +148,7 @@ def reference_choices(args: argparse.Namespace) -> list[Choice]:
 
 
 def reference(stage: Stage) -> Figures:
-    """Time of the wavefront at 1 lane over that of the reference, and speedup of the defaults."""
+    """Return the wavefront's time at 1 lane over the reference's, and the defaults' speedup."""
     scalar = stage.times(REFERENCE)
     return {
         "one_lane_to_reference": ratio(stage.times(ONE_LANE[0]), scalar),
@@ -170,7 +170,7 @@ def threads(stage: Stage) -> Figures:
 
 
 def series(args: argparse.Namespace) -> dict[str, list[tuple[int, Choice]]]:
-    """Configurations with increasing samples and pixels: (amount, configuration)."""
+    """Return configurations of increasing sample or pixel counts, as (count, configuration)."""
     spp = [max(1, round(factor * args.spp)) for factor in SPP_FACTORS]
     edges = [round(factor * args.size) for factor in EDGE_FACTORS]
     return {
@@ -184,7 +184,7 @@ def linear_choices(args: argparse.Namespace) -> list[Choice]:
 
 
 def linear(stage: Stage) -> Figures:
-    """Relative deviations of the time from a line."""
+    """Fit render time linearly to samples and to pixels; return the relative deviations."""
     figures: Figures = {}
     for name, points in series(stage.args).items():
         amounts = np.array([amount for amount, _ in points], float)

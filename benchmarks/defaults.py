@@ -5,9 +5,9 @@
     .venv/bin/python benchmarks/defaults.py room caustics --ways plain default light --reference 0
 
 Stages are names of STAGES, ``@tuning`` and ``@validation``, or files. Each stage is rendered with
-several seeds in each way, with one thread; the first way is the baseline. Errors are squared
-relative errors (x - r)^2 / (r^2 + 0.01) against a reference, the mean of four renders of
-``--reference`` samples in the way that suits the stage best, kept in ``out/defaults``. With
+several seeds in each mode of ``--ways``, with one thread; the first mode is the baseline. Errors
+are squared relative errors (x - r)^2 / (r^2 + 0.01) against a reference, the mean of four renders
+of ``--reference`` samples in the best mode for the stage, kept in ``out/defaults``. With
 ``--reference 0``, r is the mean of all images of the stage, which needs no further renders but
 understates errors by a few per cent. Error percentiles are taken over pixels. Cost is user CPU time
 of the whole render, pilots included, so other work on the machine has little effect. Efficiency is
@@ -92,7 +92,7 @@ PERCENTILES = (50, 90, 99, 99.9)
 
 
 def load(name: str, folder: Path) -> Any:
-    """Load a stage by its name in STAGES, or a file."""
+    """Load a stage by its name in STAGES or by its path."""
     stage = STAGES.get(name)
     if stage is None:
         path = Path(name)
@@ -127,7 +127,7 @@ def reference(name: str, scene: Any, options: argparse.Namespace) -> Any:
 
 
 def figures(images: Any, mean: Any, variance: Any) -> dict[str, Any]:
-    """Return the errors of images. Mean errors are corrected for the variance of the reference."""
+    """Return error statistics of images; means exclude the variance of the reference."""
     scale = 1 / (mean**2 + 0.01)
     errors = ((images - mean) ** 2 * scale).mean(axis=-1).reshape(len(images), -1)
     noise = (variance * scale).mean(axis=-1).ravel()
@@ -142,7 +142,7 @@ def figures(images: Any, mean: Any, variance: Any) -> dict[str, Any]:
 
 
 def chosen(stats: dict[str, Any]) -> str:
-    """Describe in a few words what a render chose."""
+    """Describe whether a render used light paths and guiding, with the predicted gains."""
     words = []
     if transport := stats.get("transport"):
         words.append(f"{transport['chosen']} ({transport['gain'] or 0:.2f})")
@@ -153,7 +153,7 @@ def chosen(stats: dict[str, Any]) -> str:
 
 
 def measure(name: str, options: argparse.Namespace, spp: int) -> list[dict[str, Any]]:
-    """Render one stage in all ways; return a row per way."""
+    """Render one stage in all modes; return one table row per mode."""
     scene = load(name, options.folder)
     images: dict[str, list[Any]] = {way: [] for way in options.ways}
     seconds: dict[str, list[float]] = {way: [] for way in options.ways}

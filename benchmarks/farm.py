@@ -7,7 +7,7 @@ With --frames N the camera moves over N frames, and all images are compared bit 
 
     python benchmarks/farm.py out/mixed.usdc --size 1200 800 --workers 4 --rounds 1 --frames 48
 
---way selects the mode: with all AOVs, adaptive to a pixel error, or with a learned field.
+--way selects the mode: all AOVs, adaptive sampling to a pixel error, or a trained guiding field.
 """
 
 from __future__ import annotations

@@ -63,7 +63,7 @@ class Entry:
     failure: str = ""
 
     def card(self) -> str:
-        """HTML of the entry."""
+        """Return the HTML that shows this stage on the page."""
         lines = [f'<article class="{"failed" if self.failure else "done"}">']
         for picture in (self.picture, self.reference):
             if picture is not None:
@@ -89,7 +89,7 @@ class Entry:
 def render(
     stage: Path, name: str, stem: Path, options: argparse.Namespace, extra: Sequence[str] = ()
 ) -> Entry:
-    """Render a stage in a separate process; ``extra`` are more options of the command."""
+    """Render a stage in a separate process; ``extra`` are options of ``wavecomb render``."""
     entry = Entry(name)
     files = {kind: stem.with_name(f"{stem.name}.{kind}") for kind in ("exr", "png", "json")}
     command = [sys.executable, "-m", "wavecomb", "render", str(stage), "--quiet"]

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare the efficiency of renders with learning (guiding, light shares) and without.
+"""Compare the efficiency of renders with training (guiding, light shares) and without.
 
     .venv/bin/python benchmarks/guiding.py room cornell --spp 64 --seeds 5
     .venv/bin/python benchmarks/guiding.py mixed-lamps kitchen lights --ways power off auto light
     .venv/bin/python benchmarks/guiding.py room --seconds 20 --ways power lights lights+pixels
 
 Renders each stage in each mode, with several seeds in turn; the first mode is the baseline.
-``power`` learns nothing, ``off`` is the default, which calibrates light shares. The names of
-learned parts, also joined by ``+``, add to ``power``. Stages are generated in exporter style
+Mode ``power`` trains nothing, and ``off`` is the default, which calibrates light shares. Other
+modes are names of trained parts, joined by ``+``. Stages are generated in exporter style
 (``--plain``) or files; with the suffix ``-lamps`` they are lit by a key light, a fill light and a
 dim dome. The filter is a box of one pixel. relMSE is that of one image: the variance over seeds at
 each pixel, divided by the square of the mean of all images plus 0.01, since all modes have the same
@@ -43,14 +43,14 @@ PARTS: dict[str, dict[str, str]] = {
     "paths": {"roulette": "efficient"},
     "directions": {"guiding": "on"},
 }
-"""Learned parts, each with everything else off."""
+"""Settings that enable one trained part each, with all training otherwise off."""
 
 
 def way(name: str) -> dict[str, str]:
-    """Settings of a mode: one of WAYS, or PARTS joined by ``+``.
+    """Return the settings of a mode: one of WAYS, or PARTS joined by ``+``.
 
     Raises:
-        argparse.ArgumentTypeError: The name is neither.
+        argparse.ArgumentTypeError: The name is not that of a mode.
     """
     if name in WAYS:
         return WAYS[name]
@@ -83,7 +83,7 @@ def load(name: str, folder: Path) -> Any:
 def measure(
     scene: Any, options: argparse.Namespace, budget: dict[str, Any]
 ) -> list[dict[str, Any]]:
-    """Return a row per mode. `budget` is ``spp`` or ``limit`` (seconds) of a render."""
+    """Return a table row per mode. `budget` sets ``spp`` or ``limit`` (seconds) of a render."""
     clock, ends = time.process_time, budget
     if "limit" in budget:
         clock, ends = time.perf_counter, {"spp": 1 << 20, "time_limit": budget["limit"]}

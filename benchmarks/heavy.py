@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measure the gain of ordering where it should be largest: 64 heavy materials, 2 GB of textures.
+"""Measure the gain of ordered shading in its best case: 64 heavy materials, 2 GB of textures.
 
     .venv/bin/python benchmarks/heavy.py              # 2 GB: minutes to write the stage, once
     .venv/bin/python benchmarks/heavy.py --quick      # check that it runs
@@ -39,9 +39,9 @@ from wavecomb.options import settings
 
 SMALL_MB = 2.0
 LANES = (0, 1)
-"""0 means the widest."""
+"""Numbers of SIMD lanes to compare; 0 means the widest."""
 SEEN = 1000
-"""Materials with fewer records are excluded from the spread of costs."""
+"""Materials with fewer shaded records than this are excluded from the spread of costs."""
 
 
 def main() -> None:

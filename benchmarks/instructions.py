@@ -10,10 +10,10 @@ valgrind does not support AVX-512, so a tree must be built for an older instruct
         --config-settings=build-dir=build/editable \
         --config-settings=cmake.define.WAVECOMB_ARCH=x86-64-v3
 
-Each tree renders the stage in its environment, 96 x 96 with one thread and 8 lanes, once with 4 and
-once with 20 samples per pixel. The difference in instructions divided by the difference in shaded
-records excludes loading and scene construction. `_core` is everything but traversal: camera,
-ordering, shading, film; `libembree4` is traversal.
+Each source tree renders the stage in its Python environment, at 96 x 96 pixels with one thread and
+8 SIMD lanes, once with 4 and once with 20 samples per pixel. The difference in instructions divided
+by the difference in shaded records excludes loading and scene construction. `_core` is everything
+but traversal: camera, ordering, shading, film; `libembree4` is traversal.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from pathlib import Path
 
 SAMPLES = (4, 20)
 SHOWN = 3
-"""Number of libraries to print, those with the most instructions."""
+"""Number of libraries to print, in order of decreasing instruction count."""
 RENDER = """
 import json, sys, wavecomb
 picture = wavecomb.render(sys.argv[1], size=(96, 96), spp=int(sys.argv[2]), threads=1,
@@ -38,7 +38,7 @@ print(json.dumps(picture.stats["counts"]["records"]))
 
 
 def main() -> None:
-    """Count, and print a line for each tree and library."""
+    """Count instructions and print a line for each source tree and library."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("stage", type=Path)
     parser.add_argument("trees", type=Path, nargs="*", default=[Path(__file__).parents[1]])
@@ -52,7 +52,7 @@ def main() -> None:
 
 
 def count(tree: Path, stage: Path, spp: int) -> tuple[int, dict[str, int]]:
-    """Return the records and the instructions by library of one render."""
+    """Return the shaded records of one render and the instructions of each library."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "counts"
         done = subprocess.run(

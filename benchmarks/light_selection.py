@@ -5,10 +5,10 @@
     .venv/bin/python benchmarks/light_selection.py --quick       # check that it runs
 
 Uses the street of `wavecomb scene lights`, whose total light is the same with 10 and with 10,000
-lights. For each number, each of `--rounds` rounds has one render by power and one by tree with the
-same seed. Errors are those of the layer `direct`, and of `direct` plus `indirect`; lights that the
-camera sees directly do not depend on selection. Most of the error of indirect light comes from rare
-paths that end close to a light, which light selection cannot find.
+lights. For each number of lights, each of `--rounds` rounds has one render by power and one by tree
+with the same seed. Errors are those of the layer `direct`, and of `direct` plus `indirect`; lights
+that the camera sees directly do not depend on selection. Most of the error of indirect light comes
+from rare paths that end close to a light, which light selection cannot find.
 
 Results, by tree / by power unless stated otherwise:
 

@@ -33,7 +33,7 @@ import wavecomb
 
 Picture = NDArray[np.float64]
 OUTLIERS = 1e-3
-"""Fraction of pixels, the worst ones, that the trimmed error leaves out."""
+"""Fraction of the pixels, those with the largest errors, that the trimmed error leaves out."""
 STAGES: dict[str, tuple[str, dict[str, Any]]] = {
     "studio": ("studio", {"triangles": 20_000}),
     "mixed": ("mixed", {"triangles": 50_000}),
@@ -124,7 +124,7 @@ def measure(name: str, depth: int, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _calibration_s(scene: Any, depth: int, args: argparse.Namespace) -> float:
-    """Seconds of one calibration for an image of the timed size."""
+    """Measure the seconds of one calibration for an image of ``--timed-size``."""
     size = (args.timed_size, args.timed_size)
     stats = wavecomb.render(scene, size=size, spp=1, max_depth=depth, threads=args.threads).stats
     return float(stats["light_calibration"]["seconds"])

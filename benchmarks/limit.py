@@ -12,7 +12,7 @@ width with coherent and incoherent flags and as the render did, and the fastest 
 kind. A round then measures, in shuffled order:
 
 - render: the render, without a recorder;
-- alone: Embree alone, wall time, each kind in its fastest way;
+- alone: wall time of Embree alone, with each kind of ray traced in its fastest way;
 - calls: the same rays through the accelerator's functions, as the render calls them. The
   accelerator's functions fill packets, keep hits canonical by a filter, and store hits.
 
@@ -21,7 +21,7 @@ Ratios are taken within a round:
 - limit: render / alone, both wall time;
 - traversal: the trace and shadow phases (per thread) / alone;
 - calls: calls / alone, that is the cost of filter, set-up and storing of hits;
-- filter share: (calls - alone) / the trace and shadow phases, the fraction of them it takes.
+- filter share: (calls - alone) / the trace and shadow phases, the fraction that the filter takes.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ from wavecomb.run.settings import make_settings
 KINDS = ("camera", "bounce", "shadow")
 WIDTHS = (1, 4, 8, 16)
 COHERENCE = (True, False, None)
-"""None means: the flag that the render set in each wave stage."""
+"""Values of Embree's coherence flag; None means the flag that each wave stage of the render set."""
 Round = dict[str, float]
 
 

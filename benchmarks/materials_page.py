@@ -33,7 +33,7 @@ class Exhibit:
 
     Attributes:
         stage: Path below ``ROOT``.
-        about: What the stage shows, by its documentation.
+        about: Content of the stage, as its documentation describes it.
         options: Options of ``wavecomb render``.
     """
 
@@ -53,7 +53,7 @@ class Exhibit:
 
 
 def _variants(stage: str, about: str, *choices: tuple[str, ...]) -> tuple[Exhibit, ...]:
-    """Return an exhibit for each list of variants."""
+    """Return an image to render for each list of USD variants."""
     return tuple(
         Exhibit(stage, about, tuple(word for one in choice for word in ("--variant", one)))
         for choice in choices
@@ -134,7 +134,7 @@ EXHIBITS = (
 
 
 def exhibits() -> Iterator[Exhibit]:
-    """The exhibits above, and all other stages of the working group's test assets."""
+    """Yield ``EXHIBITS``, and all other stages of the USD working group's test assets."""
     yield from EXHIBITS
     shown = {exhibit.stage for exhibit in EXHIBITS}
     for file in sorted((ROOT / "wg_test_assets").rglob("*")):
@@ -155,7 +155,7 @@ def document_of(stage: Path) -> Path | None:
 
 
 def said_of(stage: Path) -> str:
-    """First sentence about a stage in its documentation, or else of the document."""
+    """Return the first sentence after a stage's name in its README, or the README's first."""
     document = document_of(stage)
     if document is None:
         return ""

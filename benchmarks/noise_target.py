@@ -4,12 +4,12 @@
     .venv/bin/python benchmarks/noise_target.py
     .venv/bin/python benchmarks/noise_target.py --quick          # check that it runs
 
-A pixel that stops as soon as its samples look quiet sometimes stops too early, so its mean is
-biased, mostly towards dark. For each stage and noise target:
+A pixel that stops as soon as its samples appear to have little noise sometimes stops too early, so
+its mean is biased, mostly towards dark. For each stage and noise target:
 
 - `--seeds` renders stop at the target; n is the mean number of samples per pixel;
 - the same number of plain renders take n samples each;
-- two references with other seeds take 64 n.
+- two references with other seeds take 64 n samples each.
 
 Results:
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare each policy with the best one of each stage, to check the default.
+"""Compare each scheduling policy with the best policy of each stage, to check the default.
 
     .venv/bin/python benchmarks/policies.py                       # generated stages, half an hour
     .venv/bin/python benchmarks/policies.py --files shot.usd ...  # and third-party stages

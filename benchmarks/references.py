@@ -84,11 +84,11 @@ class Entry:
 
     @property
     def difference(self) -> float:
-        """Relative difference of the means."""
+        """Relative difference of our image's mean to the reference's mean."""
         return self.ours / self.reference - 1.0
 
     def row(self) -> str:
-        """HTML of the entry."""
+        """Return the HTML table row of this scene."""
 
         def share(value: float | None) -> str:
             return "" if value is None else f"{100 * value:+.2f}"
@@ -102,7 +102,7 @@ class Entry:
         )
 
     def line(self) -> str:
-        """Text for the terminal."""
+        """Return a line about this scene for the terminal."""
         more = "" if self.as_ours is None else f"   as ours {100 * self.as_ours:+6.2f} %"
         return (
             f"{self.name:58s} mean {self.reference:8.5f}   difference {100 * self.difference:+6.2f}"
@@ -121,7 +121,7 @@ def render(stage: Path, spp: int, **settings: Any) -> tuple[Pixels, Pixels]:
 def entry_of(
     name: str, file: Path, ours: Pixels, variance: Pixels, reference: Pixels, kept: NDArray[Any]
 ) -> Entry:
-    """Compare the kept pixels and write the images, with other pixels darkened."""
+    """Compare the pixels of mask ``kept``; write the images with all other pixels darkened."""
     mean = max(float(reference[kept].mean(dtype=np.float64)), 1e-12)
     noise = float(np.sqrt(variance[kept].sum(dtype=np.float64))) / variance[kept].size
     found = compare(ours[kept][None], reference[kept][None])
@@ -166,7 +166,7 @@ def mitsuba_entry(mi: Any, file: Path, stored: Path, options: argparse.Namespace
     """Compare a scene of Mitsuba.
 
     Raises:
-        Inexpressible: The scene cannot be drawn.
+        Inexpressible: A stage cannot express a feature of the scene.
     """
     width = 0 if stored.exists() else WIDTH
     name = name_of(file)

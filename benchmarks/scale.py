@@ -168,7 +168,7 @@ def main() -> None:
 
 
 def _scene_bytes(record: dict[str, Any]) -> int:
-    """Bytes of arrays, records and BVH."""
+    """Return the memory of arrays, records and BVH in bytes."""
     parts = record["memory_bytes"]
     return int(sum(parts[name] for name in ("accelerator", "meshes", "records")))
 

@@ -52,7 +52,7 @@ def sitting_parser(doc: str, name: str) -> argparse.ArgumentParser:
 
 
 def sitting_arguments(parser: argparse.ArgumentParser, **quick: Any) -> argparse.Namespace:
-    """Parse the arguments; ``quick``: values for --quick, which writes beside its stages."""
+    """Parse the arguments; with --quick, the values ``quick`` replace those of the user."""
     args = parser.parse_args()
     if args.quick:
         folder = ROOT / "out" / "quick"
@@ -91,9 +91,9 @@ def load_stage(name: str, folder: Path, triangles: int) -> Any:
 
 
 def phase_times(stats: Mapping[str, Any]) -> dict[str, float]:
-    """Thread seconds of a render by phase, from Picture.stats or Result.stats.
+    """Return thread seconds of a render by phase, from Picture.stats or Result.stats.
 
-    shade_s, order_s (cost of ordering the shading), traversal_s (trace and shadow phases),
+    Keys: shade_s, order_s (cost of ordering the shading), traversal_s (trace and shadow phases),
     phases_total_s; and render_s, wall seconds without loading and scene construction.
     """
     phases = stats["phases_s"]
@@ -134,7 +134,7 @@ def summary(values: Sequence[float]) -> dict[str, float]:
 
 
 def ratio(ours: Sequence[float], theirs: Sequence[float]) -> dict[str, float]:
-    """Summary of ours / theirs, taken within each round."""
+    """Summarize the ratios ours / theirs, each taken within a round."""
     return summary([a / b for a, b in zip(ours, theirs, strict=True)])
 
 
@@ -168,7 +168,7 @@ def write_result(path: Path, schema: str, content: Mapping[str, Any]) -> None:
 
 
 def _what_counts(words: Sequence[str]) -> list[str]:
-    """Arguments without those that are file locations on this machine."""
+    """Return the command-line arguments without file locations of this machine."""
     kept, places = [], ("--folder", "--output", "--cache", "--pictures")
     for before, word in zip(("", *words), words, strict=False):
         if before not in places and word.split("=")[0] not in places:

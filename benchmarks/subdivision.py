@@ -29,7 +29,7 @@ STAGED = ROOT / ".deps" / "embree"
 
 
 def compile_probe(folder: Path) -> list[str]:
-    """Build the program; return the command that runs it."""
+    """Compile the Embree program; return the command that runs it."""
     program = folder / "subdivision_embree"
     source = ROOT / "benchmarks" / "subdivision_embree.cpp"
     command = ["g++", "-std=c++20", "-O2", str(source), "-o", str(program)]
@@ -43,7 +43,7 @@ def compile_probe(folder: Path) -> list[str]:
 
 
 def save(path: Path, points: Any, counts: Any, indices: Any) -> Path:
-    """Save a mesh in the format of the program."""
+    """Save a mesh in the file format that subdivision_embree.cpp reads."""
     with path.open("wb") as file:
         file.write(np.array([len(points), len(counts), indices.size], np.int32).tobytes())
         for array in (points.astype(np.float32), counts.astype(np.int32), indices.astype(np.int32)):

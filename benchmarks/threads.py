@@ -6,8 +6,8 @@
 
 Stages are rendered with 1 and 2 threads, and with 4, 8, 16 and more up to the number of cores, in
 turns of shuffled order, in one process. ``measured`` is the ratio of render times within a round.
-``by groups`` is predicted from the times of groups of waves (``sharing`` in docs/statistics.md):
-passes by list scheduling, and the rest of the render unchanged. Prints a table and writes
+``by groups`` is predicted from the times of groups of waves (``sharing`` in docs/statistics.md), by
+list scheduling of each pass; the rest of the render counts unchanged. Prints a table and writes
 ``results/threads.json``.
 """
 

@@ -50,9 +50,9 @@ over "materials" {
     }
 }
 """
-"""The references show Lambertian surfaces. The stages set a specularColor of 0 at index 1. In
-UsdPreviewSurface's specular workflow this still reflects at grazing angles (F90 is 1); in its
-metallic workflow it is Lambertian.
+"""The references show Lambertian surfaces. The stages set a specularColor of 0 and an index of
+refraction of 1. In UsdPreviewSurface's specular workflow such a surface still reflects at grazing
+angles (F90 is 1); in the metallic workflow it is Lambertian.
 """
 NOT_REACHED = {
     "dome": "the image is seen: OpenUSD's delegate looks up the nearest texel, we are bilinear",
@@ -83,7 +83,7 @@ td, th {{ padding: 2px 10px; text-align: right }} td:first-child {{ text-align: 
 
 @dataclass
 class Entry:
-    """Result of one image."""
+    """Result of comparing one image with its reference."""
 
     name: str
     mean: float
@@ -93,7 +93,7 @@ class Entry:
 
     @property
     def reason(self) -> str:
-        """Reason why its blocks may exceed the noise, or ""."""
+        """Known reason why blocks of this image differ by more than noise, or ""."""
         return NOT_REACHED.get(self.name) or NOT_REACHED.get(self.name.split()[0], "")
 
     @property
@@ -103,7 +103,7 @@ class Entry:
         return v.agrees or (bool(self.reason) and v.mean_agrees)
 
     def row(self) -> str:
-        """HTML of the entry."""
+        """Return the HTML table row of this image."""
         v = self.verdict
         return (
             f"<tr{'' if v.agrees else ' class=off'}><td>{html.escape(self.name)}"
@@ -114,7 +114,7 @@ class Entry:
         )
 
     def line(self) -> str:
-        """Text of the entry."""
+        """Return a line about this image for the terminal."""
         v = self.verdict
         what = "" if v.agrees else "   NOT REACHED" + (f": {self.reason}" if self.reason else "")
         if v.outside:

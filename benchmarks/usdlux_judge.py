@@ -4,7 +4,7 @@
 Our image comes as independent renders (batches). The reference is a single image with an unknown
 number of samples. The noise of the reference is estimated per block from the differences between
 neighbouring pixels of *reference - ours*, minus the part due to our noise. Other differences
-between neighbouring pixels, such as differently filtered outlines, count as noise there.
+between neighbouring pixels, such as differently filtered outlines, therefore count as noise.
 
 Noise is assumed to be independent between pixels, so that the variance of a block is the sum over
 its pixels; z is a normal deviate.
@@ -33,7 +33,7 @@ differences.
 
 @dataclass(frozen=True)
 class Verdict:
-    """Result of one image.
+    """Result of testing one image against its reference.
 
     Attributes:
         difference: Relative difference of the mean to the reference's.
@@ -62,7 +62,7 @@ class Verdict:
 
     @property
     def mean_is_open(self) -> bool:
-        """Whether the means differ by more than that, but by at most three standard errors."""
+        """Whether the means differ by over 0.5 %, but by at most three standard errors more."""
         return 0 < abs(self.difference) - MEAN_LIMIT <= 3 * self.noise
 
     @property

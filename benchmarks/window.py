@@ -116,7 +116,7 @@ class Run:
         }
 
     def stop(self):
-        """Seconds from stop to standstill."""
+        """Measure the seconds from a stop request until the render engine is idle."""
         engine = self.session._engine
         self.session.restart()
         end = time.perf_counter() + 0.4

@@ -10,9 +10,9 @@ rounds of shuffled order. A sheet shows the images, three to a row, after the re
 Wavecomb's with light paths merged within half a pixel and other seeds. relMSE is the mean of (x -
 r)^2 / (r^2 + 0.01 mean(r)^2) without the worst thousandth of the pixels, for the whole image and
 for the caustics: pixels whose light in the reference comes mostly from light paths. Materials are
-those of the bridges. Where a peer's material is an approximation, its error includes the
-difference, so means are printed as well. ptracer has no MIS and cannot render what the camera sees
-through glass.
+converted as mitsuba_bridge.py and cycles_bridge.py describe. Where a peer's material is an
+approximation, its error includes the difference, so means are printed as well. Mitsuba's ptracer
+has no MIS and cannot render what the camera sees through glass.
 """
 
 from __future__ import annotations
@@ -147,7 +147,7 @@ def prepare(name: str, args: argparse.Namespace) -> Job:
 
 
 def opened(column: str, job: Job, args: argparse.Namespace) -> Process:
-    """Start the renderer of a column and load the scene."""
+    """Start the renderer of a table column and load the scene."""
     kind, options = COLUMNS[column]
     return Process(kind, job, args.cache / f"{column.replace(' ', '-')}.log", options)
 

@@ -16,7 +16,7 @@ describe the conversion of materials.
   loads the stage (Wavecomb reads USD, the others read the arrays that Wavecomb's loader made),
   renders one sample (start to first image), then an image with few and one with many samples. The
   marginal rate is the difference in samples over the difference in time. Peak memory is that of the
-  process.
+  renderer's process.
 - Noise: relMSE = mean of (x - r)^2 / (r^2 + 0.01) at equal samples, minus the error of r; mean over
   seeds. r is each renderer's converged image with other seeds. Noise does not depend on the load of
   the machine; images are cached in --cache by version and settings.

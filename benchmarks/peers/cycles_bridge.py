@@ -55,7 +55,7 @@ class CyclesSettings:
 
 
 class CyclesScene:
-    """A recorded scene in Cycles. Only one can exist, since Blender has one database."""
+    """A recorded scene in Cycles. Only one scene can exist, since Blender has one database."""
 
     def __init__(self, recorded: Recorded, settings: CyclesSettings, folder: Path) -> None:
         """``folder`` contains the volume files."""

@@ -15,7 +15,7 @@ _SMOOTH = 0.0317
 
 
 class Nodes:
-    """A material under construction: its nodes and their connections."""
+    """Builder of a Blender material: adds shader nodes and connects their sockets."""
 
     def __init__(self, tree: Any, images: Images) -> None:
         self.tree = tree
@@ -40,7 +40,7 @@ class Nodes:
         self.tree.links.new(socket, self.add(kind).inputs[use])
 
     def vector(self, operation: str, *operands: Any) -> Any:
-        """Component-wise arithmetic."""
+        """Add a node for component-wise arithmetic on vectors."""
         node = self.tree.nodes.new("ShaderNodeVectorMath")
         node.operation = operation
         for socket, value in zip(node.inputs, operands, strict=False):
@@ -51,7 +51,7 @@ class Nodes:
         return node.outputs["Vector"]
 
     def texture(self, use: dict[str, Any], signed: bool = False) -> Any:
-        """Texel * scale + bias; with `signed`, as stored, for nodes that map [0, 1]."""
+        """Add a texture lookup: texel * scale + bias; `signed` omits a normal map's 2 n - 1."""
         node = self.tree.nodes.new("ShaderNodeTexImage")
         node.image, node.extension = self.images.get(use["texture"])
         a, b, c, d, e, f = use.get("uv", (1.0, 0.0, 0.0, 0.0, 1.0, 0.0))
@@ -80,7 +80,7 @@ class Nodes:
         return value
 
     def parameter(self, m: dict[str, Any], name: str, default: Any) -> Any:
-        """A parameter as a texture or a value."""
+        """Return the texture node of a material parameter, or the value if it has no texture."""
         use = m.get("textures", {}).get(name)
         return self.texture(use) if use is not None else m.get(name, default)
 
@@ -122,7 +122,7 @@ def image(values: NDArray[np.float32], space: str, small: bool) -> Any:
 
 
 def make_material(recorded: Recorded, number: int, images: Images) -> Any:
-    """Make a Blender material for a recorded one, with the closest nodes."""
+    """Make a Blender material for a recorded material, with the closest nodes."""
     m = recorded.materials[number]
     made = bpy.data.materials.new(m.get("name") or f"material{number}")
     made.use_nodes = True
@@ -187,7 +187,7 @@ def _metal(nodes: Nodes, m: dict[str, Any]) -> Any:
 
 
 def _dielectric(nodes: Nodes, m: dict[str, Any]) -> Any:
-    """Glass whose colour tints transmission only; Principled takes the square root of it."""
+    """Convert glass that tints transmission only; Principled takes the colour's square root."""
     tint = np.asarray(m.get("base_color", (1.0,) * 3))
     node = nodes.add(
         "ShaderNodeBsdfPrincipled",
@@ -202,7 +202,7 @@ def _dielectric(nodes: Nodes, m: dict[str, Any]) -> Any:
 
 
 def _principled(nodes: Nodes, m: dict[str, Any]) -> Any:
-    """Principled, and plastic: a diffuse base under an interface."""
+    """Convert principled, and plastic as a diffuse base under a dielectric interface."""
     node = nodes.add(
         "ShaderNodeBsdfPrincipled",
         Base_Color=nodes.parameter(m, "base_color", (0.18,) * 3),
@@ -218,7 +218,7 @@ def _principled(nodes: Nodes, m: dict[str, Any]) -> Any:
 
 
 def _openpbr(nodes: Nodes, m: dict[str, Any]) -> Any:
-    """Base, specular, coat and subsurface; without film, fuzz and transmission."""
+    """Convert OpenPBR's base, specular, coat and subsurface, not film, fuzz and transmission."""
     layers = m.get("openpbr", {})
     below = float(layers.get("subsurface_weight", 0.0))
     radius = np.asarray(layers.get("subsurface_radius", (0.0,) * 3), np.float64)
@@ -243,7 +243,7 @@ def _openpbr(nodes: Nodes, m: dict[str, Any]) -> Any:
 
 
 def _hair(nodes: Nodes, m: dict[str, Any]) -> Any:
-    """Hair by the colour of many fibres; graphs per strand are ignored."""
+    """Convert hair by its multiple-scattering colour; graphs per strand are ignored."""
     node = nodes.tree.nodes.new("ShaderNodeBsdfHairPrincipled")
     node.model = "CHIANG"
     node.parametrization = "COLOR"

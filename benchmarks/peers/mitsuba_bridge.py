@@ -29,8 +29,8 @@ _TURN = np.diag([-1.0, 1.0, -1.0, 1.0])
 
 MOST_PATHS = 1 << 25
 """Maximum number of paths per pass: the vectorised variants hold all paths of a pass in memory,
-about 100 bytes each. A timed image must be one pass (600 x 600 x 64 is): each further seed compiles
-anew.
+about 100 bytes each. A timed image must fit into one pass, as 600 x 600 pixels with 64 samples do,
+because each further pass has another seed and compiles its kernels again.
 """
 
 _FAR = 1e4
@@ -40,7 +40,7 @@ _FAR = 1e4
 def find_llvm() -> bool:
     """Set the path of a libLLVM that Dr.Jit can use (16 or newer), unless the environment has one.
 
-    Returns whether there is one; with an older one Dr.Jit would end the process.
+    Returns whether a usable libLLVM exists; Dr.Jit would end the process with an older version.
     """
     if "DRJIT_LIBLLVM_PATH" in os.environ:
         return True
@@ -58,7 +58,7 @@ def find_llvm() -> bool:
 
 
 def load_mitsuba(variant: str | None = None, threads: int | None = None) -> ModuleType:
-    """Import Mitsuba in a variant. None: llvm_ad_rgb if it works, else scalar_rgb.
+    """Import Mitsuba in a variant; by default llvm_ad_rgb if it works, else scalar_rgb.
 
     Raises:
         ImportError: Mitsuba or the variant is missing.
@@ -534,7 +534,7 @@ def _linear(texture: dict[str, Any]) -> NDArray[np.float32]:
 def _rows_to_poles(image: NDArray[Any]) -> NDArray[np.float32]:
     """Resample a latlong image to Mitsuba's convention, with the first and last rows at the poles.
 
-    In Wavecomb and OpenEXR the centres of these rows are half a row inside.
+    In Wavecomb and OpenEXR the first and last rows are centred half a row away from the poles.
     """
     height = len(image)
     at = np.arange(height) * (height / (height - 1)) - 0.5

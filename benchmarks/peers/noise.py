@@ -17,11 +17,11 @@ Picture = NDArray[np.float64]
 _BATCH = 256
 """Samples per pixel of one batch of a converged image; a square, as multijitter requires."""
 _REFERENCE = {"mitsuba": "mitsuba-llvm-multijitter", "cycles": "cycles-no-tree"}
-"""Renderer that makes the converged image of a family; by default the renderer itself."""
+"""Renderer of each family's converged image; by default each renderer makes its own."""
 
 
 _OUTLIERS = 1e-3
-"""Fraction of pixels, the worst ones, that the trimmed error leaves out."""
+"""Fraction of the pixels, those with the largest errors, that the trimmed error leaves out."""
 
 
 def rel_errors(picture: Picture, reference: Picture) -> Picture:
@@ -44,7 +44,7 @@ class Noise:
         self.ours = ours
 
     def measure(self, name: str) -> dict[str, Any]:
-        """Error of each seed minus that of the converged image, and the converged mean.
+        """Measure the error of each seed minus that of the converged image, and the means.
 
         A few pixels with bright caustic paths make relMSE vary by chance. The trimmed error leaves
         out the worst 0.1 % of pixels and is divided by 1 + N / N_ref instead.
@@ -91,8 +91,8 @@ class Noise:
     def _converged(self, name: str) -> tuple[Picture, float]:
         """Mean of batches with other seeds, and its relMSE estimated from their spread.
 
-        E (x - r)^2 = var x + var r, so var r is subtracted. Where errors fall as 1 / N, this equals
-        division by 1 + N / N_ref.
+        E (x - r)^2 = var x + var r, so var r is subtracted. Where errors fall as 1 / N, subtracting
+        var r equals division by 1 + N / N_ref.
         """
         options = self.ours if name == "wavecomb" else {}
         batches = max(2, self.reference_spp // _BATCH)
@@ -111,7 +111,7 @@ class Noise:
 
 
 class _Lazy:
-    """A process that starts when an image, or once its version, is needed."""
+    """A renderer's process that starts when an image or the renderer's version is needed."""
 
     _versions: ClassVar[dict[str, str]] = {}
 

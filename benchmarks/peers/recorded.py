@@ -21,7 +21,7 @@ Matrix = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Curves:
-    """Arguments of ``SceneBuilder.add_curves`` beside those of ``Mesh``."""
+    """Arguments of ``SceneBuilder.add_curves`` that ``Mesh`` does not have."""
 
     kind: str
     segments: NDArray[np.uint32]
@@ -39,7 +39,7 @@ class Curves:
 
 @dataclass(frozen=True)
 class Mesh:
-    """Arguments of ``SceneBuilder.add_mesh``; for curves, with ``curves`` and without triangles."""
+    """Arguments of ``SceneBuilder.add_mesh``; curves set ``curves`` and have no triangles."""
 
     positions: NDArray[np.float32]
     indices: NDArray[np.uint32]
@@ -130,8 +130,8 @@ class Recorded:
 def dense(grid: dict[str, Any]) -> tuple[NDArray[np.float32], Matrix]:
     """All voxels of a recorded grid, with a border of its background value.
 
-    Returns values by x, y, z, and the transform (row vectors) from the unit cube, which they divide
-    into equal cells, to object space.
+    Returns values by x, y, z, and the transform (row vectors) to object space from the unit cube,
+    which the voxels divide into equal cells.
     """
     origins, values = grid["origins"], grid["values"]
     edge = values.shape[1]

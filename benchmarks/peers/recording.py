@@ -48,7 +48,7 @@ class RecordingBuilder(Recorded):
         return self.native.add_material(program, **parameters)
 
     def add_graph(self, *arrays: Any) -> int:
-        """Pass a graph on; peers use the material's constants."""
+        """Add a value graph to the native scene only; peers use the material's constants."""
         return self.native.add_graph(*arrays)
 
     def add_mesh(
@@ -63,7 +63,7 @@ class RecordingBuilder(Recorded):
         name: str = "",
         **labels: Any,
     ) -> int:
-        """Record a mesh; labels for AOVs are passed on."""
+        """Record a mesh; only the native scene receives its labels for AOVs."""
         number = self.native.add_mesh(
             positions,
             indices,
@@ -125,7 +125,7 @@ class RecordingBuilder(Recorded):
         materials: NDArray[np.uint32] | None = None,
         **labels: Any,
     ) -> None:
-        """Record instances of a group; labels are passed on."""
+        """Record instances of a group; only the native scene receives their labels."""
         self.groups[parent].children.append((child, np.asarray(transforms), materials))
         self.native.add_instances(parent, child, transforms, materials, **labels)
 
@@ -137,7 +137,7 @@ class RecordingBuilder(Recorded):
         return self.native.add_light(kind, transform, **options)
 
     def add_mesh_light(self, transform: NDArray[Any], material_sync: str, **options: Any) -> int:
-        """Pass a mesh light on; peers use only its material."""
+        """Add a mesh light to the native scene only; peers use only its material."""
         return self.native.add_mesh_light(transform, material_sync, **options)
 
     def make_volume_grid(
@@ -168,7 +168,7 @@ class RecordingBuilder(Recorded):
         self.native.set_camera(transform, **options)
 
     def build(self) -> RecordingBuilder:
-        """Build the native scene; return this object in its place."""
+        """Build the native scene; return this recording, which replaces it."""
         self.scene = self.native.build()
         self.bounds = np.array(self.scene.bounds, np.float64).reshape(2, 3)
         return self

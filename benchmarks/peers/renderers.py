@@ -17,14 +17,14 @@ CYCLES_PYTHON = ROOT / ".deps" / "cycles" / "bin" / "python"
 
 @dataclass(frozen=True)
 class Renderer:
-    """A column of the comparison.
+    """A renderer of the comparison, with its options.
 
     Attributes:
-        kind: Renderer of worker.py.
-        options: Options of that renderer.
+        kind: Name of the renderer in worker.py.
+        options: Options of the renderer.
         spp: Samples of the short and of the long timed render. Slower renderers take fewer samples,
-            so that turns last equally long. Squares, as Mitsuba's multijitter requires.
-        warm: Whether to render both counts before timing, because Dr.Jit compiles for each.
+            so that turns last equally long. Mitsuba's multijitter requires squares.
+        warm: Whether to render both sample counts before timing: Dr.Jit compiles for each count.
     """
 
     kind: str
@@ -61,7 +61,7 @@ RENDERERS = {
 }
 _APART = ("mitsuba-llvm-volpath", "mitsuba-llvm-ptracer", "cycles-shadow-caustics")
 USUAL = tuple(name for name in RENDERERS if name not in _APART)
-"""All renderers except those for volumes and caustics only."""
+"""All renderers except those that are compared only on volumes or caustics."""
 
 
 @dataclass(frozen=True)

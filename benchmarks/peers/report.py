@@ -18,7 +18,7 @@ _DRAWS = 4000
 def summary(
     turns: dict[str, list[dict[str, Any]]], noise: dict[str, dict[str, Any]], size: int
 ) -> dict[str, Any]:
-    """Return medians of each renderer, and the ratio of Wavecomb to each other one."""
+    """Return medians of each renderer, and ratios of Wavecomb to the other renderers."""
     renderers: dict[str, Any] = {}
     for name in dict.fromkeys([*turns, *noise]):
         facts: dict[str, Any] = {}
@@ -129,7 +129,7 @@ def _number(value: float | None, scale: float = 1.0, digits: int = 2) -> str:
 
 
 def machine() -> dict[str, Any]:
-    """CPU, cores, instruction set, load."""
+    """Return the machine's CPU, cores, instruction set and load."""
     cpu = platform.processor() or platform.machine()
     isa: list[str] = []
     if Path("/proc/cpuinfo").exists():
@@ -151,7 +151,7 @@ def machine() -> dict[str, Any]:
 
 
 def commit() -> dict[str, Any]:
-    """The commit, and whether sources differ from it."""
+    """Return the git commit and the source files that differ from it."""
 
     def git(*words: str) -> str:
         done = subprocess.run(["git", "-C", str(ROOT), *words], capture_output=True, text=True)

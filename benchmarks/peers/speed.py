@@ -14,7 +14,7 @@ from renderers import RENDERERS, Job, Process
 def rounds(
     names: list[str], job: Job, count: int, seed: int, logs: Path, ours: dict[str, Any]
 ) -> dict[str, list[dict[str, Any]]]:
-    """Return the turns of each renderer, by name, in rounds."""
+    """Run the rounds; return the measurements of each renderer by name."""
     rng = random.Random(seed)
     turns: dict[str, list[dict[str, Any]]] = {name: [] for name in names}
     for number in range(count):
@@ -31,8 +31,8 @@ def turn(
 ) -> dict[str, Any]:
     """Run a process from start to end, with a short and a long render.
 
-    The rate is that of the long render. The marginal rate, the difference in samples over the
-    difference in time, excludes the constant cost of a call.
+    The sample rate is taken from the long render. The marginal rate, the difference in samples over
+    the difference in time, excludes the constant cost of a call.
     """
     chosen = RENDERERS[name]
     process = Process(name, job, logs / f"{name}.log", ours if name == "wavecomb" else {})

@@ -11,20 +11,20 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdVol
 from wavecomb.scenes import write_scene
 
 VOLUMES = ("smoke-200", "smoke-500", "clouds-200", "clouds-500", "fog-cornell", "fog-room")
-"""Smoke grids by voxels per edge, without fire; and stages filled with fog."""
+"""Stages with volumes: smoke of 200 or 500 voxels per edge, without fire, and fog in rooms."""
 
 BELOW = ("head", "candles")
 """Stages with subsurface scattering and hair."""
 
 _BROWN = (0.248, 0.435, 0.923)
-"""Absorption for the mean melanin of scene head, 0.52, a third of it pheomelanin (red)."""
+"""Hair absorption for melanin 0.52, the mean of scene head, a third of it pheomelanin (red)."""
 
 _FOG = {"cornell": 0.5, "room": 0.25}
-"""Optical thickness of the fog over the size of the stage's bounds."""
+"""Optical thickness of each stage's fog along the size of the stage's bounds."""
 
 
 def write_stage(name: str, path: Path, plain: bool) -> Path:
-    """Write a stage, those with volumes as a layer over a generated one; return its path."""
+    """Write a stage and return its path; volumes are added in a layer over a generated stage."""
     if name in BELOW:
         return _write_below(name, path)
     if name not in VOLUMES:

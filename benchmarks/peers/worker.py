@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Run one renderer in a separate process, controlled by lines of JSON.
 
-The process loads a stage, renders one sample per pixel, and writes
+The process loads a stage, renders one sample per pixel, and writes a JSON object:
 
     {"load_s", "version", "settings"}
 
-Then the worker answers each request {"spp", "seed", "image": path or null} with
+Then the worker answers each request {"spp", "seed", "image": path or null} with a JSON object:
 
     {"spp", "seconds", "mean", "rays", "peak_mb"}
 
-where spp is the number after rounding by the sampler, seconds is the time of the render call, and
-rays may be null. The image is saved at the path as .npy (height, width, 3). compare.py starts this
-program; Cycles needs the Python of benchmarks/peers/setup.
+In this object spp is the number after rounding by the sampler, seconds is the time of the render
+call, and rays may be null. The image is saved at the path as .npy (height, width, 3). compare.py
+starts this program; Cycles needs the Python of benchmarks/peers/setup.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ GAUSSIAN_WIDTH = 3.0
 
 @dataclass
 class Test:
-    """A stage and how to compare it.
+    """A test of arnold-usd: its stage, and how to compare the images.
 
     Attributes:
         stage: The file to render.
@@ -49,7 +49,7 @@ def to_stage(folder: Path, file: Path) -> Test:
 
 
 def ass_nodes(text: str) -> dict[str, dict[str, list[str]]]:
-    """Nodes of an .ass file: type -> parameter -> words. The last node of each type counts."""
+    """Parse an .ass file: node type -> parameter -> words, from the last node of each type."""
     nodes: dict[str, dict[str, list[str]]] = {}
     for kind, body in re.findall(r"^(\w+)\s*\{(.*?)^\s*\}", text, re.MULTILINE | re.DOTALL):
         found: dict[str, list[str]] = {}
@@ -65,7 +65,7 @@ def ass_nodes(text: str) -> dict[str, dict[str, list[str]]]:
 
 
 class _Translator:
-    """Translation of one test."""
+    """Translator of one test of arnold-usd to a stage."""
 
     def __init__(self, folder: Path, file: Path) -> None:
         self.test = Test(file)

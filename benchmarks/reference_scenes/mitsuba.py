@@ -37,8 +37,8 @@ class Film:
         filter: Filter of Wavecomb.
         filter_width: Pixels.
         max_depth: Scattering vertices, as Wavecomb counts them.
-        left_out: Mask (height, width) of pixels that show objects which cannot be drawn.
-        notes: Approximations that were made.
+        left_out: Mask (height, width) of pixels that show objects which cannot be translated.
+        notes: Approximations in the translation of the scene.
     """
 
     size: tuple[int, int]
@@ -59,7 +59,7 @@ def to_stage(scene: Scene, file: Path) -> Film:
 
 
 class _Translator:
-    """Translation of one scene."""
+    """Translator of one Mitsuba scene to a stage."""
 
     def __init__(self, scene: Scene, file: Path) -> None:
         self.scene = scene
@@ -115,7 +115,7 @@ class _Translator:
         return film
 
     def _view(self, sensor: int, film: Film) -> tuple[Matrix, tuple[float, float], bool]:
-        """Transform without scale, half the image extent, and whether it is orthographic."""
+        """Return a camera's unscaled transform, half extent, and whether it is orthographic."""
         kind, props = self.scene.kind(sensor), self.scene.props(sensor)
         to_world = self._matrix(sensor)
         scale = np.linalg.norm(to_world[:3, :3], axis=0)
@@ -265,7 +265,7 @@ class _Translator:
         return self.out.material("diffuse", {"diffuseColor": (0.5, 0.5, 0.5)}), None
 
     def _material(self, number: int) -> tuple[str, Callable[[Any], Any] | None]:
-        """Path of a material, and a function for the mesh colours if it needs them."""
+        """Return a material's path, and a function for mesh colours if the material needs them."""
         scene, kind, props = self.scene, self.scene.kind(number), self.scene.props(number)
         if kind == "twosided":
             return self._material(next(scene.all_of(number, "BSDF")))
@@ -323,7 +323,7 @@ class _Translator:
         return eta.tolist(), k.tolist()
 
     def _brushed(self, eta: list[float], k: list[float], u: float, v: float) -> str:
-        """OpenPBR metal with these alphas; its reflectance and tint match the index."""
+        """Add OpenPBR metal of alphas u and v that reflects like a metal of the complex index."""
         along, across = max(u, v), min(u, v)
         anisotropy = 1.0 - across / along
         roughness = math.sqrt(along / math.sqrt(2.0 / (1.0 + (1.0 - anisotropy) ** 2)))

@@ -85,7 +85,7 @@ def write_checker(file: Path, first: Sequence[float], second: Sequence[float]) -
 def write_dome(source: Path, file: Path) -> None:
     """Convert a latlong image of Mitsuba, with the first and last rows at the poles, to USD.
 
-    In USD the centres of these rows are half a row inside.
+    In USD the first and last rows are centred half a row away from the poles.
     """
     image = read(source)
     height = len(image)

@@ -46,7 +46,7 @@ class Image:
 
 
 class StageWriter:
-    """A stage under construction; ``stage`` is one to add to, by default an empty one."""
+    """Writer of a stage; ``stage`` is a USD stage to add prims to, by default a new one."""
 
     def __init__(self, file: Path, stage: Usd.Stage | None = None) -> None:
         self.file = file
@@ -96,19 +96,19 @@ class StageWriter:
         return light
 
     def rect_light(self, to_world: Matrix, colour: Colour, width: float, height: float) -> None:
-        """Add a rect that emits this radiance along its -z."""
+        """Add a rect light that emits radiance ``colour`` along its -z axis."""
         light = UsdLux.RectLight.Define(self.stage, self._path("rectLight"))
         self._light(light, to_world, colour)
         light.CreateWidthAttr(width)
         light.CreateHeightAttr(height)
 
     def disk_light(self, to_world: Matrix, colour: Colour) -> None:
-        """Add a disk of radius 1 that emits this radiance along its -z."""
+        """Add a disk light of radius 1 that emits radiance ``colour`` along its -z axis."""
         light = UsdLux.DiskLight.Define(self.stage, self._path("diskLight"))
         self._light(light, to_world, colour).CreateRadiusAttr(1.0)
 
     def sphere_light(self, centre: Sequence[float], radius: float, colour: Colour) -> None:
-        """Add a sphere of this radiance; with radius 0, a point of this radiant intensity."""
+        """Add a sphere light of radiance ``colour``, or of radiant intensity for radius 0."""
         light = UsdLux.SphereLight.Define(self.stage, self._path("sphereLight"))
         to_world = np.eye(4)
         to_world[:3, 3] = centre
@@ -121,7 +121,7 @@ class StageWriter:
         self._light(light, to_world, colour)
 
     def distant_light(self, along: Sequence[float], irradiance: Colour) -> None:
-        """Add a parallel light with this irradiance on a perpendicular surface."""
+        """Add a distant light with irradiance ``colour`` on a perpendicular surface."""
         light = UsdLux.DistantLight.Define(self.stage, self._path("distantLight"))
         z = -np.asarray(along, np.float64) / np.linalg.norm(along)
         x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
@@ -131,7 +131,7 @@ class StageWriter:
         self._light(light, to_world, irradiance).CreateAngleAttr(0.0)
 
     def dome_light(self, to_world: Matrix, colour: Colour, image: Path | None = None) -> None:
-        """Add a dome of this radiance, multiplied by its image if there is one."""
+        """Add a dome light of radiance ``colour``, multiplied by the dome's image if it has one."""
         light = UsdLux.DomeLight.Define(self.stage, self._path("domeLight"))
         self._light(light, to_world, colour)
         if image is not None:
@@ -195,8 +195,8 @@ class StageWriter:
     ) -> str:
         """Add a UsdPreviewSurface with one of Wavecomb's programs; return its path.
 
-        ``own`` are attributes such as wavecomb:eta. ``primvar`` is the source of diffuseColor.
-        ``path`` names an existing material; by default a new one is made.
+        ``own`` are Wavecomb's attributes, such as wavecomb:eta. ``primvar`` is the source of
+        diffuseColor. ``path`` names an existing material; by default a new material is made.
         """
         path = path or self._path("material")
         material = UsdShade.Material.Define(self.stage, path)

@@ -93,11 +93,11 @@ class Scene:
         """
     @property
     def camera(self) -> dict[str, Any]:
-        """Arguments of set_camera without motion; the transform is to_world (4, 4)."""
+        """Camera as arguments of set_camera without motion; the transform is to_world (4, 4)."""
     def material(self, material: int) -> dict[str, Any]:
         """Returns name, program and parameters of a material in the form of add_material.
 
-        Includes the names of its textures, and driven: names of parameters that a graph computes.
+        Includes texture names, and as ``driven`` the parameters that the material's graph computes.
         Raises Error if the id does not exist.
         """
     def light(self, light: int) -> dict[str, Any]:
@@ -111,7 +111,7 @@ class Scene:
         """Names of light groups; the first, "other", contains lights without a group."""
     @property
     def object_names(self) -> list[tuple[str, str]]:
-        """(object, asset) names for Cryptomatte: of meshes instance by instance, then of lights."""
+        """(object, asset) names for Cryptomatte, of all mesh instances, then of all lights."""
     @property
     def moves(self) -> bool:
         """Whether a mesh, an instance or the camera moves while the shutter is open."""
@@ -128,14 +128,14 @@ class TextureStore:
     """Limits the memory of textures and swaps the rest to a temporary file."""
 
     def __init__(self, limit_bytes: int, folder: str) -> None:
-        """``folder`` is for the file, which is created when textures do not fit. Raises Error."""
+        """``folder`` is for the swap file, created when textures exceed the limit. Raises Error."""
     @staticmethod
     def obstacle() -> str:
-        """Returns the reason why this system cannot have a store, or ""."""
+        """Returns the reason why this system cannot swap textures, or ""."""
     @property
     def limit_bytes(self) -> int: ...
     def set_waiting(self, bytes: int) -> None:
-        """Counts images of this total size, which will become textures, towards the limit."""
+        """Counts the bytes of images that are not yet textures towards the memory limit."""
     @property
     def statistics(self) -> dict[str, float]:
         """Current values of ``texture_store`` in docs/statistics.md."""
@@ -490,7 +490,7 @@ class SceneBuilder:
         visible: bool = True,
         # ---- to here ----
     ) -> int:
-        """Adds a light that is made of the triangles of meshes, for add_mesh.
+        """Adds a light that emits from the triangles of the meshes that add_mesh gives it.
 
         transform: from light space, in which shaping is relative to -z, to the mesh's group.
         material_sync: materialGlowTintsLight, independent or noMaterialResponse; a mesh with the
@@ -499,7 +499,7 @@ class SceneBuilder:
         are as in add_light.
         """
     def add_geometry_set(self, rules: dict[str, str]) -> int:
-        """Adds a geometry set for lights.
+        """Adds a set of prims for light linking and shadow linking.
 
         ``rules`` are those of a UsdCollectionMembershipQuery: prim path -> exclude, explicit or
         expand.
@@ -544,7 +544,7 @@ class SceneBuilder:
         """Adds an IES profile for add_light.
 
         Angles are in degrees, ascending: vertical within [0, 180], horizontal from 0 to 360 or a
-        single one. candela: (horizontal, vertical). Raises Error.
+        single angle. candela: (horizontal, vertical). Raises Error.
         """
     def add_light_filter(
         self,
@@ -562,9 +562,9 @@ class SceneBuilder:
 
         The filter acts on light that crosses the plane z = -distance of filter space at (x, y); a
         distance of 0 or less means that there is no such window. sides: four (a, b, c), each of
-        which transmits smoothstep(a x + b y + c). The texture is read at u = picture_u . (x, y, 1)
-        and v = picture_v . (x, y, 1). decay: distances at which light starts to appear, is
-        complete, starts to fade, and vanishes. density: strength of the filter. next: another
+        which transmits smoothstep(a x + b y + c). The texture is read at u = dot(picture_u, p) and
+        v = dot(picture_v, p) for p = (x, y, 1). decay: distances at which light starts to appear,
+        is complete, starts to fade, and vanishes. density: strength of the filter. next: another
         filter. Raises Error.
         """
     def set_camera(
@@ -828,13 +828,13 @@ class Result:
     def cancelled(self) -> bool: ...
     @property
     def costs(self) -> dict[str, dict[str, float]]:
-        """{"materials": {name: ns}, "textures": {name: ns}}.
+        """Cost profile {"materials": {name: ns}, "textures": {name: ns}}.
 
-        A cost profile from which a later render can start.
+        A later render can start from this profile.
         """
     @property
     def stats(self) -> dict[str, Any]:
-        """Plain ints, floats, strings, lists and dicts; docs/statistics.md has the keys."""
+        """Statistics as plain Python values; docs/statistics.md has the keys."""
 
 class Snapshot:
     """State of a paused render, valid only during Watcher.snapshot(). After the call returns, any
@@ -910,7 +910,7 @@ class Renderer:
     """
 
     def __init__(self, scene: Scene, threads: int = 0) -> None:
-        """Builds acceleration structures. threads: for this and for edits; 0 means all.
+        """Builds acceleration structures. threads: number for building and edits; 0 means all.
 
         Raises Error.
         """
@@ -1086,8 +1086,8 @@ def edge_pixels(
 ) -> float:
     """Returns the mean length in pixels of polygon edges, weighted by length.
 
-    Takes the maximum over transforms (k, 4, 4) to the world. Edges outside of the image count an
-    eighth. to_camera: (4, 4) for row vectors. centre, half: of the camera's window.
+    The result is the maximum over transforms (k, 4, 4) to the world. Edges outside of the image
+    count an eighth. to_camera: (4, 4) for row vectors. centre, half: of the camera's window.
     """
 
 def split_quads(
@@ -1150,4 +1150,4 @@ def clip_ears(corners: NDArray[np.float64], most_steps: int = ...) -> tuple[NDAr
 def weld_corners(
     corners: NDArray[np.int32], point_count: int, values: NDArray[np.float32]
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Returns indices (corners,) that merge a point's corners with equal values, and values."""
+    """Merges corners of a point with equal values; returns indices (corners,) and the values."""

@@ -13,10 +13,10 @@ class TooLarge(ValueError):
     """A grid exceeds the memory limit."""
 
 def grids(path: str, heads: bool = False) -> list[dict[str, Any]]:
-    """Returns name, index, type (bytes) and half of each grid.
+    """Returns the name and type (as bytes), index and half-float flag of each grid.
 
-    Also returns the content of its topology unless ``heads``. Raises BrokenFile, OSError or
-    MemoryError.
+    Without ``heads``, also returns facts about the topology of each grid. Raises BrokenFile,
+    OSError or MemoryError.
     """
 
 def bricks(

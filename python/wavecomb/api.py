@@ -215,7 +215,7 @@ def picture_from(
     """Returns the image of a render with its statistics.
 
     Args:
-        result: Result of the core.
+        result: Render result of the native core.
         aovs: Expanded AOVs.
         scene: The scene.
         loaded: The loaded stage; None for a scene of ``SceneBuilder``.

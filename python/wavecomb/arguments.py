@@ -58,7 +58,7 @@ def keywords() -> set[str]:
 
 
 def check_source(source: Any, *, also: Iterable[str] = ()) -> None:
-    """Raises ArgumentError unless a source is a path, a stage, or has one of the attributes."""
+    """Raises ArgumentError unless a source is a path, a stage, or has an attribute of ``also``."""
     if isinstance(source, (str, os.PathLike)) or hasattr(source, "GetRootLayer"):
         return
     if not any(hasattr(source, name) for name in also):

@@ -41,7 +41,7 @@ class MaterialParameter:
     Attributes:
         name: Keyword of ``add_material``.
         kind: "number", "colour" or "flag".
-        default: Default, as in UsdPreviewSurface.
+        default: Default value, the same as in UsdPreviewSurface.
         program: The only program with this parameter; "" if all materials accept it.
         least: Smallest value of the parameter; None means no limit.
         most: Largest number; None means no limit.
@@ -56,7 +56,7 @@ class MaterialParameter:
 
     @property
     def annotation(self) -> str:
-        """Python type for the stub.
+        """Python type annotation for the stub _core.pyi.
 
         >>> material_parameters()["emission"].annotation
         'tuple[float, float, float]'
@@ -156,7 +156,7 @@ class LightParameter:
 
     Attributes:
         name: Keyword of ``add_light``.
-        label: Label in a form.
+        label: Label of the parameter in the window.
         help: Description with unit, one sentence.
         input: UsdLux name without "inputs:"; "" if UsdLux has no equivalent.
         group: "emission", "shape", "shaping" or "response".
@@ -167,7 +167,7 @@ class LightParameter:
         least: Smallest number; None means no limit.
         most: Largest number; None means no limit.
         usual: Upper end of a slider if there is no largest number.
-        choices: Values of a choice.
+        choices: Allowed values of a parameter of kind "choice".
         kinds: Kinds of light that have the parameter.
     """
 
@@ -187,7 +187,7 @@ class LightParameter:
 
     @property
     def annotation(self) -> str:
-        """Python type for the stub.
+        """Python type annotation for the stub _core.pyi.
 
         >>> light_parameters()["color"].annotation, light_parameters()["ies"].annotation
         ('tuple[float, float, float]', 'int | None')
@@ -244,7 +244,7 @@ class CameraParameter:
         kind: "number", "choice", "four" (numbers) or "planes".
         default: Default value; None if ``set_camera`` requires the parameter.
         least: Smallest number; None means no limit.
-        choices: Values of a choice.
+        choices: Allowed values of a parameter of kind "choice".
     """
 
     name: str
@@ -256,7 +256,7 @@ class CameraParameter:
 
     @property
     def annotation(self) -> str:
-        """Python type for the stub.
+        """Python type annotation for the stub _core.pyi.
 
         >>> camera_parameters()["window"].annotation
         'tuple[float, float, float, float]'

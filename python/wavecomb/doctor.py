@@ -84,9 +84,9 @@ def lines(found: dict[str, list[Check]]) -> list[str]:
 
 
 def _try(name: str, look: Callable[[], str]) -> Check:
-    """Checks a native part whose description ``look`` returns.
+    """Checks a native part by calling ``look``, which returns a description of the part.
 
-    A part whose check raises an exception is broken.
+    The part counts as broken if ``look`` raises an exception.
     """
     try:
         return Check(name, OK, look(), True)

@@ -25,7 +25,7 @@ class WavecombError(Error):
     EXIT_CODE = 2
 
     def __init__(self, message: str) -> None:
-        """Folds the message to one line."""
+        """Joins the lines of the message into one."""
         super().__init__(" ".join(str(message).split()))
 
 

@@ -81,7 +81,7 @@ def needed(module: str, what: str, extra: str = "bench") -> Any:
     Args:
         module: Import name.
         what: Feature that needs the library, as the subject of the message, such as "SSIM".
-        extra: Extra of pyproject.toml that contains it.
+        extra: Extra of pyproject.toml that contains the library.
 
     Raises:
         WavecombError: The library is missing; the message explains how to install it.

@@ -39,8 +39,8 @@ def choose(built: Sequence[str], runnable: Sequence[str], forced: str | None = N
         forced: Instruction set that the user requests, if any.
 
     Raises:
-        WavecombError: ``forced`` is unknown, not built or not supported by this CPU, or no library
-            is.
+        WavecombError: ``forced`` is unknown, not built or not supported by this CPU, or this CPU
+            supports no library.
     """
     there_are = ", ".join(isa for isa in ISAS if isa in built)
     if forced:

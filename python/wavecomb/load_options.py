@@ -28,18 +28,18 @@ class Row:
     """Description of a load option for commands and files.
 
     Attributes:
-        help: Description, one sentence.
+        help: Description of the option in one sentence.
         kind: "text", "file", "number", "integer", "pair", "choice", "switch" (on or off), or "not"
             (a flag that disables something).
         unset: Description of the default.
-        option: Option of commands; "" if there is none.
-        metavar: Placeholder of its value.
+        option: Name of the command-line option; "" if there is none.
+        metavar: Placeholder of the option's value in help.
         choices: Valid values.
         many: Whether the option may be repeated.
         least: Smallest number.
         most: Largest number.
         above: Whether ``least`` itself is excluded.
-        unit: Unit of numbers.
+        unit: Unit of a numeric option.
     """
 
     help: str
@@ -95,7 +95,7 @@ class Row:
 
     @property
     def key(self) -> str:
-        """Name among a command's arguments and in checkpoints."""
+        """Name of the option among a command's arguments and in checkpoints."""
         return self.option.removeprefix("--").replace("-", "_") + "s" * (
             self.many and self.option not in ("--mask", "--payloads")
         )
@@ -112,9 +112,9 @@ class LoadOptions:
     Attributes:
         camera: Path or unique name of a camera prim; None uses the camera of the render settings,
             else the first of the stage, else one that frames everything.
-        frame: Time code; None means the stage's start, else default values.
-        purposes: Purposes of the geometry: "default", "render", "proxy", "guide"; None uses those
-            of the render settings, else the first two.
+        frame: Time code; None means the stage's start time, or default values in a stage without.
+        purposes: Purposes of the geometry: "default", "render", "proxy", "guide"; None uses the
+            purposes of the render settings, else "default" and "render".
         variants: Variant selections: {"/World/Car{paint}": "red"}; a set without a path is one of
             the default prim.
         mask: Paths or patterns (docs/stages.md) of prims to render, with their descendants and
@@ -142,7 +142,7 @@ class LoadOptions:
         exposure: Whether the camera's exposure scales the image.
         lens_settings: Lens settings such as {"lens_k1": "-0.1", "rolling_shutter": "top"}, which
             override the camera's attributes (docs/cameras.md).
-        st_map: ST map image of the lens distortion, in place of coefficients.
+        st_map: ST map image of the lens distortion, which replaces the distortion coefficients.
         render_settings: Path or name of a RenderSettings prim; None uses those that the stage
             names, else the only ones under /Render (docs/cameras.md).
         product: Path or name of a product of the render settings; None uses the first product.

@@ -21,8 +21,8 @@ class Setting:
 
     Attributes:
         name: Attribute of ``wavecomb.Settings``, and keyword.
-        label: Label in a form.
-        help: Description, one sentence.
+        label: Label of the setting in the window.
+        help: Description of the setting in one sentence.
         kind: "integer", "number", "flag", "choice" or "text".
         default: Default value; None if it depends on other settings.
         least: Smallest valid number; None means no limit.
@@ -32,10 +32,10 @@ class Setting:
         choices: Value -> its effect, for a choice.
         group: "picture" (content of the image), "work" (amount of computation), or "order"
             (execution).
-        changes_picture: Whether the image depends on it.
-        changes_bits: Whether the bits of the beauty image depend on it at equal sample counts.
-            The bits depend on costs if roulette is cost-aware.
-        changes_expectation: Whether the expectation of the image depends on it.
+        changes_picture: Whether the image depends on the setting.
+        changes_bits: Whether the setting affects the bits of the beauty image at equal sample
+            counts. With cost-aware roulette, the bits also depend on measured shading costs.
+        changes_expectation: Whether the expectation of the image depends on the setting.
     """
 
     name: str
@@ -64,7 +64,7 @@ class Setting:
 
     @property
     def annotation(self) -> str:
-        """Python type for the stub.
+        """Python type annotation for the stub _core.pyi.
 
         >>> settings()["light_weights"].annotation
         'Literal["calibrated", "power"]'

@@ -50,9 +50,9 @@ def folders() -> tuple[list[str], list[str]]:
 
     Returns:
         First the folders of PYTHONPATH, which precede site-packages. Then the user's site folder,
-        the folder of this package, and folders of dependencies that are in none of these, which
-        occurs in programs that modify ``sys.path``. All are absolute; the working folder and the
-        folder of the program's script are excluded.
+            the folder of this package, and folders of dependencies that are in none of these, which
+            occurs in programs that modify ``sys.path``. All folders are absolute; the working
+            folder and the folder of the program's script are excluded.
     """
     ignores = sys.flags.ignore_environment
     first = [] if ignores else os.environ.get("PYTHONPATH", "").split(os.pathsep)
@@ -178,7 +178,7 @@ class _Starter:
 
     @classmethod
     def current(cls) -> _Starter:
-        """Returns the thread of this process; a fork does not inherit the threads of its parent."""
+        """Returns the starter thread; creates a new one after a fork, which inherits no threads."""
         with cls._lock:
             if cls._current is None or cls._current._process != os.getpid():
                 cls._current = cls()
@@ -197,8 +197,8 @@ class _Starter:
 def isolate_multiprocessing() -> None:
     """Makes ``multiprocessing`` start isolated processes, with "spawn" and "forkserver".
 
-    Its children run ``python -c`` and receive this process's ``sys.path``. Commands of Wavecomb
-    call this before they or their libraries use ``multiprocessing``.
+    Children of ``multiprocessing`` run ``python -c`` and receive this process's ``sys.path``.
+    Commands of Wavecomb call this function before they or their libraries use the module.
     """
     from multiprocessing import spawn, util
 

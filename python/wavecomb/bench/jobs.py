@@ -135,8 +135,8 @@ class Jobs:
     def recording(self, config: Config, number: int, ranks: Path | None = None) -> Job:
         """Returns a render from which shading costs are measured.
 
-        Its records are sorted by material, so that each batch holds one material. ``ranks`` is an
-        optional cost file that determines the order of materials.
+        The render's shading records are sorted by material, so that each batch holds one material.
+        ``ranks`` is an optional cost file that determines the order of materials.
         """
         settings = {**config.settings, "policy": "material", "roulette": "throughput"}
         settings |= {"seed": self._suite.golden.seed + 1 + number}
@@ -222,7 +222,7 @@ _COMPILES = ("mitsuba-llvm",)
 
 
 def check_peers(renderers: set[str]) -> None:
-    """Raises WavecombError unless the tools for these peers are installed."""
+    """Raises WavecombError unless the tools for the given other renderers are installed."""
     if not renderers:
         return
     if not WORKER.is_file():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The machine of a sitting: its hardware, software and load."""
+"""Hardware, software and load of the machine that runs a benchmark suite."""
 
 from __future__ import annotations
 
@@ -200,15 +200,15 @@ def _read(path: Path) -> str:
 MAX_OTHERS = 0.05
 """Largest fraction of all cores' time that other processes may take during a run."""
 MAX_SPIN = 1.10
-"""Largest time of the spin relative to its reference."""
+"""Largest time of the spin, a fixed CPU workload, relative to its time on the quiet machine."""
 MAX_NOISY_RUNS = 0.2
 MAX_VARIATION = 0.10
 
 
 def spin_reference(spins: Sequence[float]) -> float:
-    """Returns the spin time of the quiet machine.
+    """Returns the time that the spin, a fixed CPU workload, takes on the quiet machine.
 
-    The spin time of a quiet machine is estimated by the lower quartile, since noise only adds time.
+    The time is estimated by the lower quartile of all measurements, since noise only adds time.
     """
     ordered = sorted(spins)
     return ordered[len(ordered) // 4] if ordered else 0.0
@@ -227,7 +227,7 @@ def is_noisy(others_share: float | None, spin_s: float, reference_s: float) -> b
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise of the machine during a sitting.
+    """Noise of the machine during the execution of a suite.
 
     Attributes:
         runs: Number of runs.

@@ -5,9 +5,10 @@
 ``oracle-best``   the order of material runs that is fastest according to the recordings.
 ``oracle-worst``  the order of material runs that is slowest according to the recordings.
 
-The last two are the policy ``material`` with ranks for costs. It shades the materials of a program
-in ascending cost, so a cost file with ranks produces any order. The cost of a record depends on the
-material shaded just before, which is all that the order of runs can change. The trace therefore
+``oracle-best`` and ``oracle-worst`` use the policy ``material`` with ranks in place of costs. This
+policy shades the materials of a program in ascending cost, so a cost file with ranks can produce
+any order. The cost of a record depends on the material shaded just before, and the order of runs
+changes nothing but the preceding material. The trace therefore
 holds recordings of the same render under different orders of materials, and the best order is the
 path through the materials of a program with the smallest expected cost.
 """
@@ -114,14 +115,14 @@ def best_orders(trace: Sequence[Recording]) -> dict[str, Any]:
     For materials a, b of one program, cost(b after a) is the mean of b's measured ns per record
     over the recordings in which b's run came directly after a's, and of one more value: b's mean
     over all recordings. The additional value damps pairs that were measured only once. Each
-    recording is scaled by its traversal time per ray, which removes drift of the machine. The time
-    of an order is
+    recording is scaled by its traversal time per ray, which removes drift of the machine. An order
+    takes the following time:
 
         sum over b of records(b) * cost(b after its predecessor)
 
     Returns:
         ``best``, ``worst``: all names in order; ``best_ns``, ``worst_ns``, ``mean_ns``: expected ns
-        of all records, where ``mean_ns`` is the mean over the orders of the trace.
+            of all records, where ``mean_ns`` is the mean over the orders of the trace.
     """
     scale = _scales(trace)
     names = sorted({name for recording in trace for name in recording["materials"]})
@@ -184,7 +185,7 @@ def _costs(
 
 
 def _path(members: Sequence[str], step: Mapping[tuple[str, str], float]) -> list[str]:
-    """Returns the order of members with the smallest sum of steps, starting from ""."""
+    """Returns the order of materials with the smallest total cost; the start has the name ""."""
     if len(members) > EXACT:
         return _greedy(members, step)
     best: dict[tuple[frozenset[str], str], tuple[float, list[str]]] = {
@@ -202,7 +203,7 @@ def _path(members: Sequence[str], step: Mapping[tuple[str, str], float]) -> list
 
 
 def _greedy(members: Sequence[str], step: Mapping[tuple[str, str], float]) -> list[str]:
-    """Builds a path step by step from the material that gains most by coming next.
+    """Builds the order greedily, by appending the material with the largest gain.
 
     The gain of a material is relative to its mean over all predecessors.
     """

@@ -277,7 +277,7 @@ class Estimator:
     _bias: list[float] = field(default_factory=list)
 
     def learn(self, config: Config, wall_s: float) -> None:
-        """Takes a finished run into account, also for similar configurations."""
+        """Corrects the estimates of a configuration and of similar ones by a finished run."""
         guess = self._guess(config)
         self.measured[config.name].append(wall_s)
         if guess > 0.0:

@@ -83,7 +83,7 @@ class Session:
     """Runs one worker under perf, which counts only while the worker has enabled it.
 
     ``command`` is the prefix of the worker's command, and ``fds`` are file descriptors to pass to
-    it. The worker gets ``job`` as the entry ``perf`` of its job.
+    the worker. ``job`` becomes the entry ``perf`` of the job that the worker reads.
     """
 
     def __init__(self, events: dict[str, str], report: Path) -> None:
@@ -126,7 +126,7 @@ class Session:
 
 
 class Switch:
-    """Switch in the worker that turns counting on and off. Does nothing without perf."""
+    """Switch in the worker that turns perf's counting on and off; has no effect without perf."""
 
     def __init__(self, job: dict[str, int] | None) -> None:
         self._job = job
@@ -193,7 +193,7 @@ def run_process(
 
 @dataclass
 class Lines:
-    """JSON objects that a process printed, and its outcome with status "failed"."""
+    """JSON objects that a process printed, and an outcome to report if the process failed."""
 
     lines: list[Any]
     outcome: Outcome

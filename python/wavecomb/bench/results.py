@@ -34,10 +34,10 @@ class Column:
     """A column of ``runs.csv``.
 
     Attributes:
-        name: Name in the header.
+        name: Name of the column in the header.
         kind: "text", "integer", "number", "flag" (0 or 1) or "json" (an object in one cell).
         unit: Unit, or "".
-        meaning: Description in one sentence.
+        meaning: Description of the column in one sentence.
     """
 
     name: str
@@ -328,7 +328,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _append(path: Path, line: str) -> None:
-    """Appends a line with one write and a flush, so that only the last can be incomplete."""
+    """Appends a line with one write and a flush, so that only the last line can be incomplete."""
     fd = os.open(path, os.O_WRONLY | os.O_APPEND)
     try:
         os.write(fd, line.encode("utf-8"))

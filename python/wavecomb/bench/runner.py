@@ -97,7 +97,7 @@ class Sitting:
         self.jobs = Jobs(self.suite, self.folder, self.cpus)
 
     def estimator(self) -> Estimator:
-        """Returns an estimator from the folder's results, else from a calibration."""
+        """Returns an estimator of run times, from the folder's results or else a calibration."""
         by_name = {config.name: config for config in self.configs}
         known = from_results(self.folder.objects, by_name)
         return known or calibrate(self.configs, self.cpus)
@@ -246,7 +246,7 @@ class Sitting:
         return outcome
 
     def _one(self, run: Run) -> dict[str, Any]:
-        """Executes a run between two spins, and returns its row."""
+        """Executes a run between two tests of the machine's speed, and returns its row."""
         threads = len(self.cpus)
         before = machine.spin(threads)
         outcome = self._start(run)
@@ -300,7 +300,7 @@ class Sitting:
             self.say(f"warning: {failed} runs failed; --resume tries them again")
 
     def _failed(self) -> int:
-        """Counts runs of this and earlier sittings that failed and have not succeeded since."""
+        """Counts the runs in the results folder that failed and have not succeeded since."""
         failed = {o["row"]["run_id"] for o in self.folder.objects if o["row"]["status"] != "ok"}
         return len(failed - self.folder.done())
 

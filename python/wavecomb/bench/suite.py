@@ -25,7 +25,7 @@ from wavecomb.options import settings
 
 
 class Table:
-    """A TOML table. Keys are taken one by one, and keys that remain are unknown."""
+    """A TOML table whose keys are removed as they are read; keys that remain are unknown."""
 
     def __init__(self, path: Path, where: str, values: Mapping[str, Any]) -> None:
         self.path = path

@@ -27,7 +27,7 @@ Job = dict[str, Any]
 
 
 def main() -> None:
-    """Performs the job and prints the answer. An error of the render is also an answer."""
+    """Performs the job and prints the answer, which states the error if the render fails."""
     job = json.load(sys.stdin)
     # Libraries may print to stdout. Redirect it to stderr, so that the answer is its only line.
     answer = os.dup(1)
@@ -87,8 +87,8 @@ def judge_picture(beauty: Any, spp: float, golden: dict[str, Any] | None) -> dic
 
     The variance of the golden image is that of one sample divided by the golden spp. The variance
     of the golden image increases the measured squared error by the factor 1 + spp / golden spp, so
-    the error is divided by this factor. The correction is too small if learning made the samples
-    better than those of the golden image, which is rendered without learning.
+    the error is divided by this factor. The correction is too small if guiding made the samples
+    less noisy than those of the golden image, which is rendered without guiding.
     """
     import hashlib
 

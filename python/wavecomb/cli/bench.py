@@ -141,7 +141,7 @@ def _event(name: str, /, **values: object) -> None:
 
 @contextlib.contextmanager
 def _stopped_by_sigterm() -> Iterator[None]:
-    """Makes SIGTERM end a sitting as Ctrl-C does, so that the current run ends too."""
+    """Makes SIGTERM end the suite as Ctrl-C does, so that the current run ends too."""
 
     def stop(number: int, frame: object) -> None:
         raise KeyboardInterrupt

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Command with many options: help in groups, and sizes in one word or two."""
+"""Command class that groups options in the help and accepts sizes as one word or two."""
 
 from __future__ import annotations
 
@@ -58,10 +58,10 @@ GROUPS: dict[str, tuple[str, str]] = {
         "isolate sandbox sandbox_read load_limit costs",
     ),
 }
-"""Title of a group -> names of its options in the short help, and of further ones.
+"""Title of a group -> names of its options in the short help, and of options in the full help only.
 
-Options that are not listed belong to the group "This command", or, if a table has them: to "Stage"
-for loading, and to the group of ``SETTING_GROUPS`` for settings.
+Unlisted load options belong to the group "Stage", unlisted settings to their group of
+``SETTING_GROUPS``, and all other unlisted options to the group "This command".
 """
 
 SETTING_GROUPS = {"picture": "Quality", "work": "Light transport", "order": "Performance"}
@@ -187,7 +187,7 @@ class SettingCommand(cloup.Command):
         )  # fmt: skip
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        """Returns the parameters, with the settings at the position of ``setting_options``."""
+        """Returns the parameters of the command, with one option for each render setting."""
         params: list[click.Parameter] = []
         for one in super().get_params(ctx):
             params += one.options() if isinstance(one, SettingPlaceholder) else [one]
@@ -227,7 +227,7 @@ class SettingCommand(cloup.Command):
         formatter.write_text(text)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Writes the examples, and how to see the rest."""
+        """Writes the examples, and how to see all options."""
         full = ctx.meta.get(_FULL, False)
         lines = (self.epilog or "").removeprefix("\b\n").splitlines()
         shown = lines if full else lines[: 1 + MOST_EXAMPLES]

@@ -107,8 +107,8 @@ def compare_command(
     a NaN or an infinity in A or B are counted and left out of all figures; they are equal if their
     bits are equal. Integer formats (PNG, JPEG) are decoded from sRGB and compared as linear light.
 
-    A variance image holds the variance of each pixel's mean. With one or two of them, a z-test
-    reports whether the images can have the same expectation.
+    A variance image holds the variance of each pixel's mean. Given one or two variance images, a
+    z-test reports whether the images can have the same expectation.
 
     Exit codes: 0 equal (or within --tolerance, or the z-test finds no difference), 1 different, 2
     an error.

@@ -17,7 +17,7 @@ def doctor_command(as_json: bool) -> None:
 
     Prints the command that installs each missing part, and renders a small test image.
 
-    Exit codes: 0 everything that rendering needs is installed and works, 2 it is not.
+    Exit codes: 0 if everything that rendering needs is installed and works, 2 otherwise.
     """
     from wavecomb.doctor import as_plain, examine, is_fit, lines
 

@@ -38,7 +38,7 @@ class Still:
     """A stage at one frame, as the source of one image."""
 
     def __init__(self, job: Job, kept: Any = None) -> None:
-        """Creates the source. The object holds ``kept`` until the stage is loaded."""
+        """Creates the source; ``kept`` is an object to keep alive until the stage is loaded."""
         self._renderer: Any = None
         self._kept = kept
         self._job = job
@@ -76,13 +76,13 @@ class Still:
         return self._renderer.render(settings, *arguments, **named)
 
     def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
-        """Returns ``make_stats`` for a result, after ``resumed_s`` seconds of an earlier render."""
+        """Returns the statistics of a result that continues a render of ``resumed_s`` seconds."""
         stage = self._job.options.stage
         return make_stats(result, stage=stage, loaded=self._loaded, resumed_s=resumed_s)
 
 
 class FrameShot:
-    """One frame of a stage that stays open, with the methods of ``Still``."""
+    """Source of one frame of a stage that stays open, with the interface of ``Still``."""
 
     def __init__(self, frames: Frames, frame: float | None, **options: Any) -> None:
         """Creates the source. ``options`` are arguments of ``Frames.load``."""
@@ -188,7 +188,7 @@ class Job:
     def _caught(
         self, picture: Picture, shot: Shot, settings: Any, is_stopped: Callable[[], bool]
     ) -> Picture:
-        """Adds the shadows on catchers to an image, unless the render was stopped."""
+        """Adds the shadows on shadow catchers to an image, unless the render was stopped."""
 
         def render(how: Mapping[str, str]) -> Any:
             shot.load(None, **how)
@@ -274,7 +274,7 @@ class Job:
         """Prepares checkpoints and previews.
 
         Returns:
-            The sinks that save them, the state to resume or None, and its render time in seconds.
+            The sinks that save both, the state to resume or None, and the seconds rendered so far.
         """
         options = self.options
         sinks: list[Sink] = []
@@ -302,7 +302,7 @@ class Job:
         return sinks, state, seconds
 
     def write(self, done: Done) -> tuple[Done, list[str]]:
-        """Writes the files of an image unless written; returns the image and the file names."""
+        """Writes an image's files, unless it was written in bands; returns image and names."""
         if done.picture is None:
             return done, list(done.files)
         options, picture = self.options, done.picture

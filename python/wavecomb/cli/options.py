@@ -157,7 +157,7 @@ class StageOptions:
         return self.values[key]
 
     def as_dict(self) -> dict[str, Any]:
-        """Returns the values as a dictionary for a checkpoint file; ``completed`` reads it back."""
+        """Returns the options' values as a dictionary, which a checkpoint stores."""
         return dict(self.values)
 
     def completed(self, before: dict[str, Any]) -> StageOptions:

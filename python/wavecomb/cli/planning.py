@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks of a command that renders, made before rendering starts, and the jobs they lead to."""
+"""Checks the options of a render command before rendering starts, and builds its jobs."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def _peek(options: RenderOptions) -> tuple[list[ProductSettings], Any]:
 
     Returns:
         One choice for each render product, and an object to hold until the stage is loaded, so that
-        USD reads its layers only once.
+            USD reads its layers only once.
     """
     import_usd()
     from wavecomb.usd import peek_products

@@ -33,7 +33,7 @@ class Product:
     """An image to render.
 
     Attributes:
-        choice: Choices of the stage.
+        choice: Settings of the render product in the stage.
         options: Options of the command, with the image's file names and render product.
         frames: Frames of a sequence; None for a single image.
         folder: Folder that the image must stay in if the stage chose its name; None if the user

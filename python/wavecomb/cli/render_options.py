@@ -91,7 +91,7 @@ class FileOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class RenderOptions(FileOptions):
-    """Options of ``wavecomb render``; those without a declaration are derived from the others.
+    """Options of ``wavecomb render``, and values that are derived from them.
 
     Attributes:
         stage: File of the stage.

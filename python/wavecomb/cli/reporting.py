@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class Reporter:
-    """Base class of reporters. Prints nothing; warnings and errors do not pass through it."""
+    """Base class of reporters, which prints nothing; reporters do not show warnings or errors."""
 
     def loading(self, stage: str) -> contextlib.AbstractContextManager[LoadProgress | None]:
         """Shows that the stage is loading; yields a callback for its progress, or None."""
@@ -77,13 +77,13 @@ class Summary(Reporter):
         return ProgressBar(self._console, f"{self._place}rendering")
 
     def working(self, what: str) -> contextlib.AbstractContextManager[Any]:
-        """Shows a bar without an end."""
+        """Shows an indeterminate progress bar."""
         if self._console is None:
             return super().working(what)
         return loading_bar(self._console, f"{self._place}{what}")
 
     def begins(self, frame: str, number: int, count: int) -> None:
-        """Makes progress bars name the frame."""
+        """Adds the frame number to the titles of progress bars."""
         self._frame = f"frame {frame} ({number} of {count})"
         self._place = f"{self._frame}: "
 
@@ -96,7 +96,7 @@ class Summary(Reporter):
         click.echo(line)
 
     def finished(self, done: Done, report: LoadReport, files: Sequence[str]) -> None:
-        """Prints the summary. For a sequence, its figures are those of the last frame."""
+        """Prints the summary, for a sequence with the figures of the last frame."""
         if self._frame:
             click.echo(f"{self._frame}:")
             files = [f"{len(files)} files"]
@@ -125,7 +125,7 @@ class Lines(Reporter):
     def finished(self, done: Done, report: LoadReport, files: Sequence[str]) -> None:
         """Prints a line {"event": "done", ...}.
 
-        For a sequence, its figures are those of the last frame.
+        For a sequence, the line has the figures of the last frame.
         """
         stats = done.stats
         self._lines.event(

@@ -54,7 +54,7 @@ def enter_to_render(
 
 
 def _layers_of(image: str) -> tuple[str, str, str]:
-    """Returns folder, start and end of the names of the files for each layer."""
+    """Returns the folder, prefix and extension of the names of an image's per-layer files."""
     where, base = os.path.split(os.path.realpath(image))
     stem, ending = os.path.splitext(base)
     return where, f"{stem}.", ending

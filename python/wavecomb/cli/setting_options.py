@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options of commands: one for each render setting, and short ways to declare others."""
+"""Options of commands: one for each render setting, and helpers that declare other options."""
 
 from __future__ import annotations
 
@@ -75,14 +75,14 @@ def _option(row: Setting) -> click.Option:
 
 
 def _offered(row: Setting) -> Iterable[float]:
-    """Returns the steps of a setting that this build supports."""
+    """Returns the allowed numbers of a setting that this build supports."""
     from wavecomb import _core
 
     return _core.lane_widths() if row.name == "lanes" else row.steps
 
 
 class _Steps(click.Choice):
-    """Choice of a few numbers, or a word for 0. Help shows only the numbers in ``offered``."""
+    """Option type for a few numbers or a word for 0; help shows only the numbers ``offered``."""
 
     def __init__(self, row: Setting, offered: Iterable[float]) -> None:
         super().__init__([row.zero, *(f"{step:g}" for step in row.steps)])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders a job on many workers, with the same bits as one process (docs/farm.md).
+"""Renders a job on many workers, bit-identically to one process (docs/farm.md).
 
 >>> from wavecomb import farm
 >>> job = farm.submit("shot.usd", "out/shot.####.exr", frames="1-48")  # doctest: +SKIP

@@ -53,7 +53,7 @@ def submit(
         png: File of a PNG for display.
         stats: File of the statistics, as JSON.
         denoise: Whether images get the layer ``denoised``.
-        file: half, compression, tile and split of ``Picture.save``.
+        file: Arguments half, compression, tile and split of ``Picture.save``.
         strict: Whether a missing file is an error.
         maps: "FROM=TO": workers without the folder FROM look for its files in TO.
         tries: Number of attempts for each task.

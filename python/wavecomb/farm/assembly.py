@@ -28,8 +28,8 @@ from wavecomb.run.bands import sum_stats
 from wavecomb.run.stats import write_stats
 
 _MORE_CHECKS = 4
-"""Error checks that new borders allow for beyond the largest number seen, after some were too
-narrow."""
+"""After borders were too narrow, new borders allow for this many error checks more than any tile
+took."""
 
 
 class NarrowBorder(WavecombError):
@@ -247,8 +247,8 @@ def finish_image(folder: Folder, image: int, machine: str, threads: int = 0) -> 
 
     Returns:
         A dictionary with ``files``, the files written. If tiles must be rendered first, it has
-        ``again``, their indices, and ``checks``, the number of error checks that their borders must
-        allow for, or 0.
+            ``again``, their indices, and ``checks``, the number of error checks that their borders
+            must allow for, or 0.
     """
     job = folder.job
     tasks = list(zip(job.tasks_of(image), job.rectangles(image), strict=True))

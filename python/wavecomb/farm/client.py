@@ -76,7 +76,7 @@ class Run:
     # ---- begin -----------------------------------------------------------------------------------
 
     def work(self, images: list[int]) -> None:
-        """Renders the missing tiles of these images and writes the images."""
+        """Renders the missing tiles of the given images and writes the images."""
         from wavecomb.farm.rendering import error_checks_for
         from wavecomb.farm.tasks import FarmPlugin, restart_stale
 
@@ -179,10 +179,10 @@ class Run:
             raise WavecombError(f"{self._cluster.what}: all workers are gone")
 
     def _retry_waiting(self) -> None:
-        """Makes the scheduler look again for workers for tasks that had none.
+        """Makes the scheduler reschedule tasks for which it found no suitable worker.
 
-        Dask does this when a worker joins. A new worker has no resource at that moment, because it
-        announces its machine class a little later.
+        Dask itself reschedules such tasks only when a worker joins. A joining worker lacks the
+        required resource, because it announces its machine class a little later.
         """
         from wavecomb.farm.tasks import retry_unrunnable
 
@@ -191,7 +191,7 @@ class Run:
             self._cluster.client.run_on_scheduler(retry_unrunnable)
 
     def _submit(self) -> bool:
-        """Submits the next batch. Returns False if there is none."""
+        """Submits the next batch; returns False if no batch is left."""
         from wavecomb.farm.tasks import assemble_image, render_tiles
 
         if self._ready:

@@ -239,7 +239,7 @@ class _SlurmWorkers(Cluster):
         self._next = time.monotonic() + _ASK_S
 
     def check(self, progressed: bool) -> None:
-        """Submits new workers for those whose time in the queue is over."""
+        """Submits new workers to replace those that Slurm no longer lists."""
         super().check(progressed)
         self._starts = 0 if progressed else self._starts
         if time.monotonic() < self._next:

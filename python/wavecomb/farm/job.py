@@ -25,7 +25,7 @@ _MAX_EDGE = 65536
 
 @dataclass(frozen=True)
 class Shot:
-    """Images of one camera or render product.
+    """A shot of a job: all frames of one camera or render product.
 
     Attributes:
         settings: Settings of the whole image, from ``Settings.to_dict``.
@@ -96,8 +96,8 @@ class Job:
         shots: See ``Shot``.
         images: For each image, the index of its shot, and its frame or None.
         files: Files of the stage with their hashes.
-        tiles: Columns and rows of each image.
-        file: half, compression, tile and split of ``Picture.save``.
+        tiles: Numbers of tile columns and tile rows in each image.
+        file: Arguments half, compression, tile and split of ``Picture.save``.
         exposure: Exposure of PNGs, in stops.
         tone_map: Tone mapping of PNGs.
         denoise: Whether images get the layer ``denoised``.
@@ -142,7 +142,7 @@ class Job:
         return hashed(self.as_json())
 
     def shot(self, image: int) -> Shot:
-        """Returns the shot of an image."""
+        """Returns the camera or render product of an image, with its settings."""
         return self.shots[self.images[image][0]]
 
     def frame(self, image: int) -> float | None:

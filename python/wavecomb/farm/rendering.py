@@ -180,7 +180,7 @@ class Renderer:
         return self._open[1]
 
     def _empty(self, task: Task, shot: Shot, frames: Frames, picture: Picture) -> Picture | None:
-        """Renders an image whose last pixel has no samples.
+        """Renders a small image whose last pixel has the values of pixels without samples.
 
         The result is None if no pixel of the whole image lacks samples, and for all tiles but the
         first.

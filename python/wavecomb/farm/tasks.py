@@ -32,7 +32,7 @@ _own_maps = os.environ.get(VARIABLE)
 _kept: Any = None
 """Id, ``Renderer`` and folder of the job that this process worked on last."""
 _current: Any = None
-"""Dask's worker and the key of the current task. Threads other than the task's read this value."""
+"""Dask's worker and the key of the current task, for reading from any thread."""
 _read: dict[str, str] = {}
 """SHA-256 of each stage file that this process has read and USD may have cached."""
 
@@ -109,7 +109,7 @@ class FarmPlugin(WorkerPlugin):
 
 
 def retry_unrunnable(dask_scheduler: Any) -> None:
-    """Makes a scheduler look again for workers for tasks that had none.
+    """Makes a scheduler reschedule tasks for which it found no suitable worker.
 
     Args:
         dask_scheduler: The scheduler. The function runs in the process of the scheduler.
@@ -133,8 +133,9 @@ def render_tiles(
 
     Returns:
         A dictionary: ``done``, image and tile of each finished tile; ``failed``, image, tile and an
-        error line of each tile that cannot be rendered; ``full``, why nothing can be written here,
-        or ""; ``warnings``, lines; ``seconds``, the time taken; ``worker``, its address.
+            error line of each tile that cannot be rendered; ``full``, the reason why no file can be
+            written, or ""; ``warnings``, lines; ``seconds``, the time taken; ``worker``, the
+            address of the worker.
     """
     from wavecomb.farm.job import Task
     from wavecomb.farm.rendering import Stopped
@@ -178,8 +179,8 @@ def assemble_image(
 
     Returns:
         A dictionary: ``again``, tiles that must be rendered first; ``checks``, the number of error
-        checks that their borders must allow for, or 0; ``full``, why nothing can be written here,
-        or ""; ``worker``, its address.
+            checks that their borders must allow for, or 0; ``full``, the reason why no file can be
+            written, or ""; ``worker``, the address of the worker.
     """
     from wavecomb.farm.assembly import finish_image
 

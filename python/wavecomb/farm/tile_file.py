@@ -139,7 +139,7 @@ def save_tile(
         rendered: Rectangle of ``picture`` in the image: the tile, perhaps with a border.
         machine: Class of this machine.
         checks: Number of error checks that the border allows for.
-        empty: An image whose last pixel has no samples.
+        empty: An image whose last pixel has the values of pixels without samples.
         job: The job as JSON, for a tile outside of a job's folder.
         replacing: Context manager that yields the temporary name.
     """

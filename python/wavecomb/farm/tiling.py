@@ -28,7 +28,7 @@ _REACH = 4
 """Distance in pixels over which one error check has an effect: 2 for the mean of errors over
 neighbouring pixels, and 2 for spreading the marks of unfinished pixels."""
 _WINDOW = 2
-"""Radius in pixels of the mean in the layer of errors."""
+"""Radius in pixels of the mean over neighbours that the ``error`` layer holds."""
 
 
 def tiles_of(region: Rectangle, tiles: tuple[int, int]) -> list[Rectangle]:
@@ -103,7 +103,7 @@ def choose_tiles(
     Images stay whole if there are at least two images for each worker.
 
     Args:
-        regions: Regions of the images, each size once.
+        regions: Regions of the images, one for each distinct size.
         pictures: Number of images.
         workers: Expected number of workers.
         whole: Whether tiles cost more than they gain, because each would need a wide border or
@@ -147,8 +147,9 @@ def border(settings: Mapping[str, Any], count: int) -> int:
     """Returns the width, in pixels, of the border to render around a tile.
 
     An error check decides about a pixel from pixels up to 4 away. With a border of 4 pixels for
-    each of ``count`` checks, pixels beyond the border cannot affect an adaptive tile. The layer of
-    errors needs 2 more pixels for its mean. Renders without errors need no border.
+    each of ``count`` checks, pixels beyond the border cannot affect an adaptive tile. The layer
+    ``error`` needs 2 more pixels for its mean over neighbours. Renders without this layer need no
+    border.
     """
     if settings.get("adaptive"):
         return _REACH * count + _WINDOW

@@ -30,7 +30,7 @@ from wavecomb.gui.setup import Setup
 def _qt_says(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
     """Handles messages of Qt.
 
-    A fatal message becomes one error line. All other messages are for developers.
+    A fatal message becomes one error line. All other messages are shown only to developers.
     """
     if kind == QtMsgType.QtFatalMsg:
         line = " ".join(text.split())

@@ -37,7 +37,7 @@ class Mailbox:
         return self._reader.fileno()
 
     def put(self, address: int, letter: Any) -> None:
-        """Adds a message; any thread may call this, and it does not block."""
+        """Adds a message; any thread may call this method, which does not block."""
         self._letters.append((address, letter))
         self.wake()
 

@@ -10,9 +10,9 @@ from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, Qt
 from PySide6.QtGui import QColor, QFont
 
 ColourRole = Qt.ItemDataRole.UserRole + 10
-"""Role of a linear colour, shown as a square before the text."""
+"""Item data role of a linear colour, shown as a square before the text."""
 ToneRole = Qt.ItemDataRole.UserRole + 11
-"""Role of the text's tone: "dim", "warning", "error", or None."""
+"""Item data role of the text's tone: "dim", "warning", "error", or None."""
 
 
 class HeadedModel(QAbstractTableModel):

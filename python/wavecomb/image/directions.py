@@ -33,7 +33,7 @@ def map_directions(
 
     Args:
         up: Unit vector of the map's top row.
-        ahead: Direction of the map's centre column; any direction.
+        ahead: Direction of the map's centre column; may be any direction.
         height: Number of rows. The map has 2 height columns; its right half shows directions to the
             right of ``ahead``.
 

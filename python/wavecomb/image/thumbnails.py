@@ -100,7 +100,7 @@ class DisplayOptions:
 
     Attributes:
         layer: Layer of the file; "" means its colours.
-        denoised: Whether colours are those of the layer denoised, if it exists, instead of beauty.
+        denoised: Whether to show the layer ``denoised``, if the file has one, instead of beauty.
         exposure: Exposure of radiance layers in stops.
         tone_map: Tone mapping of radiance layers, "clamp" or "neutral".
     """

@@ -18,7 +18,7 @@ GUIDES = ("guide_albedo", "guide_normal")
 """Denoiser guides: features of surfaces seen directly, in mirrors or through clear glass."""
 ERRORS = ("error", "variance")
 DEEP = "deep"
-"""Not a layer but a separate deep image, which ``--deep`` writes."""
+"""Name of the deep image, which ``--deep`` writes to a separate file instead of a layer."""
 LIGHT = "light_"
 TECHNIQUES = ("by_bounces", "by_light_samples", "by_light_paths")
 """Contributions of each light transport technique; their sum is the beauty."""
@@ -66,7 +66,7 @@ _OTHERS = {
     "unbiased": ("RGB", "light"),
     "variance": ("RGB", "value"),
 }
-"""Letters and content of layers that are no AOVs."""
+"""Channel letters and content of layers that are not AOVs."""
 
 
 def letters(layer: str) -> str:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from wavecomb.image.rendered import Picture
 
 LAYER = "alpha"
-"""The AOV that receives shadows."""
+"""The AOV to which shadows on catchers are added."""
 PASSES: tuple[Mapping[str, str], ...] = (
     {"catch": "lit", "lights": "hidden"},
     {"catch": "bare", "lights": "hidden"},

@@ -45,7 +45,7 @@ def parse_frames(text: str | Iterable[float]) -> tuple[float, ...]:
 
 
 def _range(part: str, text: str) -> Iterable[Decimal]:
-    """Yields the frames of one item in exact decimal arithmetic."""
+    """Yields the frames of one number or range in exact decimal arithmetic."""
     match = _RANGE.fullmatch(part)
     if match is None:
         raise WavecombError(
@@ -117,8 +117,8 @@ def matching(pattern: str) -> dict[float, str]:
 def fill(pattern: str, frame: float) -> str:
     """Returns the file name of a frame.
 
-    In the last path element, ``####`` is the frame with at least that many digits, ``%04d`` with at
-    least that many characters, and ``<frame>`` without padding. ``$F4``, ``${F4}`` and ``$F`` are
+    In the last path element, ``####`` becomes the frame padded to four digits, ``%04d`` to four
+    characters with the sign, and ``<frame>`` is not padded. ``$F4``, ``${F4}`` and ``$F`` are
     Houdini's forms of ``####`` and ``<frame>``. Fractional frames keep their decimals.
 
     >>> fill("out/a.####.exr", 7), fill("a%04d.png", -7), fill("a_<frame>.exr", 1.5)

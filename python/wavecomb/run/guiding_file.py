@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from wavecomb._core import Settings
 
 BEFORE = "before"
-"""Value in place of a file: each frame starts from the guiding field of the previous frame."""
+"""Option value in place of a file name: each frame starts from the previous frame's guiding
+field."""
 ENDING = ".learned"
 _KIND = "wavecomb-learned"
 _FORMAT = 1

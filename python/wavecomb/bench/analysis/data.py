@@ -37,7 +37,8 @@ BASELINES = {
     "renderer": "wavecomb",
     "case": "off",
 }
-"""Level of each factor that all other levels are compared with. Of numbers it is the smallest."""
+"""Level of each factor that all other levels are compared with; numeric factors use their smallest
+level."""
 
 POLICIES = (
     *("none", "program", "material", "texture", "texture-locality", "cost-benefit"),
@@ -47,7 +48,7 @@ POLICIES = (
 
 PLACEBO = "random-runs"
 BEST_FIRST = (BEST, COSTS)
-"""Oracles that define the possible gain of an order; the first one that was run is used."""
+"""Oracle policies that define the possible gain of an order; the first that was run is used."""
 BOUNDS = (PLACEBO, *ORACLES)
 """Policies that are only bounds: they show how much an order can gain, but are of no practical
 use."""
@@ -187,7 +188,7 @@ _LABELS: dict[str, Callable[[Any], str]] = {
 
 
 def label(cell: dict[str, Any], names: Sequence[str]) -> str:
-    """Returns a short name of a cell from the settings ``names``."""
+    """Returns a short name of a group of comparable runs from its settings ``names``."""
     known = [(name, cell.get(name)) for name in names]
     parts = [
         _LABELS.get(name, str)(value)
@@ -198,10 +199,10 @@ def label(cell: dict[str, Any], names: Sequence[str]) -> str:
 
 
 def varying(cells: Sequence[dict[str, Any]]) -> list[str]:
-    """Returns the settings in which cells differ, except the experiment; else "stage".
+    """Returns "stage" and all other settings in which groups of runs differ.
 
-    The value of a factor is included if nothing else distinguishes cells. A renderer may have used
-    less than the suite requested, for example if a wave is larger than the image.
+    The value of a factor is included if no other setting distinguishes groups. A renderer may use a
+    smaller value than the suite requests, for example if a wave is larger than the image.
     """
     # settings shown in the heading, or implied by another setting
     redundant = ("experiment", "height", "factor", "factor_value")
@@ -222,14 +223,14 @@ def labelled(
     default: str = "all",
     leave_out: Sequence[str] = (),
 ) -> pd.DataFrame:
-    """Returns a table of rows with the short names of their cells.
+    """Returns a table of rows with the short names of their groups of runs.
 
     Args:
-        rows: Rows with the settings of their cells.
+        rows: Rows with the settings of their groups of runs.
         only: Settings to use; empty means all.
         column: Column for the names.
         default: Name if no setting varies.
-        leave_out: Settings that are not part of a cell.
+        leave_out: Settings that may differ within a group of runs.
     """
     names = varying(rows) if rows else []
     names = [n for n in names if n not in leave_out and (not only or n in only)]

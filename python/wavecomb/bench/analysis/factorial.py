@@ -32,25 +32,26 @@ def factors_of(runs: pd.DataFrame) -> list[str]:
 def effects(runs: pd.DataFrame, metric: str) -> pd.DataFrame:
     """Computes the effect of each level of each factor, over all combinations of the other factors.
 
-    The main effect of level l of factor F against its baseline b, over the combinations c of all
-    other factors (and stages) in which both were run, is
+    The main effect compares level l of factor F with its baseline b, over the combinations c of all
+    other factors (and stages) in which both levels were run:
 
         effect(F = l) = exp(mean over c of [log T(l, c) - log T(b, c)])
 
-    and the interaction of F = l with G = m, the factor by which G = m changes it, is
+    The interaction of F = l with G = m is the factor by which G = m changes the effect of F = l:
 
         effect(F = l, G = m) = effect(F = l | G = m) / effect(F = l | G = its baseline)
 
-    over those combinations of the remaining factors in which all four pairs of levels were run. If
-    the suite is not a full factorial, other differences must not count as interaction.
+    An interaction is averaged over the combinations of all other factors in which all four pairs of
+    levels were run. If the suite is not a full factorial, other differences must not count as
+    interaction.
 
-    T is the mean over rounds. Intervals resample rounds; p-values test the effects of single
-    rounds, with Holm's correction over all effects of the table.
+    The metric T is the mean over rounds. Intervals resample rounds; p-values test the effects of
+    single rounds, with Holm's correction over all effects of the table.
 
     Returns:
         One row per effect: ``kind`` ("main" or "interaction"), ``factor``, ``level``, ``baseline``,
-        ``other``, ``other_level`` (interactions), ``name``, ``cells`` (number of pairs), ``n``,
-        ``ratio``, ``low``, ``high``, ``p``, ``verdict``.
+            ``other``, ``other_level`` (interactions), ``name``, ``cells`` (number of pairs), ``n``,
+            ``ratio``, ``low``, ``high``, ``p``, ``verdict``.
     """
     pandas = needed("pandas", "the analysis")
     runs = runs.dropna(subset=[metric])
@@ -105,7 +106,7 @@ def _term(of: tuple[tuple[str, Any], ...], base: dict[str, Any], cells: int) -> 
 
 
 def _rows(terms: list[dict[str, Any]], weights: list[Array], values: Array) -> list[dict[str, Any]]:
-    """Estimates all effects at once, each from the columns that have a weight."""
+    """Estimates all effects at once, each from the combinations with a nonzero weight."""
 
     def statistic(means: Array) -> Array:
         logs = np.log(means)
@@ -175,7 +176,7 @@ def calibration(costs: pd.DataFrame, prediction: str) -> dict[str, Any]:
 
     Returns:
         ``r2``, ``slope``, ``intercept`` (ns), ``mean_error`` (relative, weighted), each with
-        ``_low`` and ``_high``; ``materials``, ``runs``. Empty with fewer than three materials.
+            ``_low`` and ``_high``; ``materials``, ``runs``. Empty with fewer than three materials.
     """
     kept = costs.dropna(subset=[prediction])
     if kept.empty:

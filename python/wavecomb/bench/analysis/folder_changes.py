@@ -92,8 +92,8 @@ def compare_folders(before: Path, after: Path, metric: str = "render_s") -> Fold
     """Compares two result folders.
 
     Ratios are ratios of geometric means; intervals and p-values come from Welch's test (unequal
-    variances) of the logarithms. Runs are not paired, because equal repetitions of two folders
-    share nothing.
+    variances) of the logarithms. Runs are not paired, because the folders have no rounds in
+    common.
 
     Raises:
         WavecombError: A folder holds no results, or no configuration has this metric in both.

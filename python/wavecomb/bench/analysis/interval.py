@@ -48,7 +48,7 @@ class Estimate:
 
     @property
     def known(self) -> bool:
-        """Whether there is an interval."""
+        """Whether the value has an interval."""
         return math.isfinite(self.low) and math.isfinite(self.high)
 
     def columns(self, name: str, prefix: str = "") -> dict[str, float]:
@@ -96,7 +96,8 @@ def bootstrap(rounds: Array, statistic: Statistic, *, positive: bool = False) ->
 def bca(of_rows: Callable[..., Array], n: int, *, widened: bool) -> tuple[Array, Array]:
     """Ends of SciPy's BCa intervals of statistics of resampled rows.
 
-    The percentile interval replaces it for a statistic that does not vary with single rows.
+    The percentile interval replaces the BCa interval for a statistic that does not vary with single
+    rows.
 
     Args:
         of_rows: Maps row indices, (..., rows), to statistics, (m, ...).
@@ -181,7 +182,7 @@ def verdict(estimate: Estimate, p: float, words: tuple[str, str] = ("faster", "s
     Args:
         estimate: The ratio.
         p: p-value, corrected for all verdicts of the table.
-        words: Verdicts for below and above 1.
+        words: Verdicts for ratios below and above 1.
     """
     if estimate.n < 2:
         return "one run"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ratios to a baseline, cell by cell: times, counts, error, efficiency."""
+"""Ratios to a baseline in groups of comparable runs: times, counts, error, efficiency."""
 
 from __future__ import annotations
 
@@ -37,12 +37,13 @@ def ratios(
         runs: Runs of one experiment.
         factor: Name of the setting that varies.
         metric: Name of a column.
-        ignore: Further settings that may differ within a cell.
+        ignore: Further settings that may differ within a group of comparable runs.
 
     Returns:
         One row per cell and level: ``cell`` (a short name), ``level``, ``n`` (rounds),
-        ``mean``, ``ratio``, ``low``, ``high``, ``p`` (Holm's over the whole table), ``verdict``;
-        and the settings of the cell. Empty if nothing is varied or measured.
+            ``mean``, ``ratio``, ``low``, ``high``, ``p`` (Holm's over the whole table),
+            ``verdict``; and the settings of the cell. The table is empty if nothing is varied or
+            measured.
     """
     rows: list[dict[str, Any]] = []
     estimates = []
@@ -107,14 +108,14 @@ def order_effects(runs: pd.DataFrame, metric: str = "shade_and_order_s") -> pd.D
         ratio(p) = exp(mean over cells of log(T_p / T_none))
         share(p) = log(T_placebo / T_p) / log(T_placebo / T_oracle), of the same means
 
-    The share is 0 for the placebo and 1 for the oracle. The share is given only if the interval of
-    the gap T_placebo / T_oracle excludes 1, because otherwise there is no gain to share.
+    The share of the gain is 0 for the placebo and 1 for the oracle. Shares are computed only if the
+    interval of the gap T_placebo / T_oracle excludes 1, because otherwise no gain is shown.
 
     Returns:
         One row per stratum and policy: ``stratum``, ``policy``, ``cells``, ``n``; ``ratio``,
-        ``low``, ``high``, ``p`` (Holm's over the table), ``verdict``; ``placebo_ratio`` and
-        ``share`` with ``_low`` and ``_high``; ``gap_shown``. The rows of policies that are only
-        bounds come last.
+            ``low``, ``high``, ``p`` (Holm's over the table), ``verdict``; ``placebo_ratio`` and
+            ``share`` with ``_low`` and ``_high``; ``gap_shown``. The rows of policies that are only
+            bounds come last.
     """
     strata: dict[tuple[Any, ...], list[pd.DataFrame]] = {}
     for cell, group in cells(runs.dropna(subset=[metric]), "policy"):
@@ -196,12 +197,13 @@ def regrets(runs: pd.DataFrame, metric: str = "render_s") -> pd.DataFrame:
     """Computes the regret of each policy: mean time / smallest mean time of its cell - 1.
 
     The smallest mean is taken over the fixed policies, without the bounds and "adaptive". Every
-    resample finds it again, so the interval accounts for the uncertainty about the best policy. The
-    smallest of noisy means is biased low, so regret is overstated rather than understated.
+    bootstrap resample selects the best policy again, so the interval accounts for the uncertainty
+    about the best policy. The smallest of noisy means is biased low, so regret is overstated rather
+    than understated.
 
     Returns:
         One row per cell and policy: ``cell``, ``policy``, ``n``, ``regret``, ``low``, ``high``,
-        ``best`` (name of the best fixed policy).
+            ``best`` (name of the best fixed policy).
     """
     rows: list[dict[str, Any]] = []
     for cell, group in cells(runs.dropna(subset=[metric]), "policy"):

@@ -45,7 +45,7 @@ class Row:
     """A row of a forest plot.
 
     Attributes:
-        name: Label at the left.
+        name: Label at the left of the row.
         value: Position of the point.
         low: Lower end of the interval; NaN without an interval.
         high: Upper end of the interval; NaN without an interval.
@@ -220,7 +220,7 @@ def order_figure(table: pd.DataFrame, name: str, metric_words: str) -> Captioned
 
 
 def regret_figure(table: pd.DataFrame, name: str) -> CaptionedFigure | None:
-    """Draws the regret of each policy, in a panel per cell."""
+    """Draws the regret of each policy, in a panel per group of comparable runs."""
     if table.empty or table["cell"].nunique() > MAX_PANELS:
         return None
     panels = panels_of(

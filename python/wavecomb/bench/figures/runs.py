@@ -82,7 +82,7 @@ def ratio_figure(
 
 
 def pipeline(runs: pd.DataFrame, name: str) -> CaptionedFigure | None:
-    """Draws stacked phases of each policy, in a panel per cell."""
+    """Draws stacked phases of each policy, in a panel per group of comparable runs."""
     groups = list(cells(runs.dropna(subset=["shade_s"]), "policy"))
     if not groups or len(groups) > MAX_PANELS:
         return None
@@ -121,7 +121,7 @@ def pipeline(runs: pd.DataFrame, name: str) -> CaptionedFigure | None:
 
 
 def coherence(runs: pd.DataFrame, name: str) -> CaptionedFigure | None:
-    """Draws four measures of coherence by policy, with a series for each cell."""
+    """Draws four measures of coherence by policy, with a series per group of comparable runs."""
     groups = list(cells(runs.dropna(subset=["run_length_coherence"]), "policy"))
     if not groups or len(groups) > 6:
         return None

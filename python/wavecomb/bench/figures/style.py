@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Style of figures.
 
-Colours are distinguishable for colour-blind readers, the text colour follows the page, and labels
-stand at the lines.
+Colours are distinguishable for colour-blind readers, the text colour follows the page, and each
+line is labelled at its end.
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ class RunImage:
     """An image that one or more runs rendered.
 
     Attributes:
-        name: Policies that rendered it, and the settings that distinguish it from other images.
+        name: Policies that rendered the image, and settings that distinguish it from other images.
         pixels: Linear colours, (height, width, 3).
     """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parts of a report. The templates ``report.html.j2`` and ``report.md.j2`` render them."""
+"""Parts of a report, which the templates ``report.html.j2`` and ``report.md.j2`` render."""
 
 from __future__ import annotations
 
@@ -19,11 +19,10 @@ MAX_ROWS = 60
 
 @dataclass(frozen=True)
 class Part:
-    """Base class of everything below a heading.
+    """Base class of the elements of a report, such as paragraphs, tables and figures.
 
     Attributes:
-        kind: Name of the macro of the templates that renders it.
-        All marks except "heading" are CSS classes.
+        kind: Name of the macro of the templates that renders the part.
     """
 
     kind: ClassVar[str]
@@ -32,7 +31,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Text(Part):
-    """A paragraph, or a heading with ``mark="heading"``. All other marks are CSS classes."""
+    """A paragraph, or a heading with ``mark="heading"``; all other marks are CSS classes."""
 
     kind = "text"
     text: str
@@ -124,7 +123,7 @@ class Figure(Part):
     """A figure; its files are figures/NAME.svg and figures/NAME.png.
 
     Attributes:
-        name: Unique in a report.
+        name: Name of the figure's files, unique in a report.
         title: Short title.
         caption: Content, unit, kind of whiskers, number of runs.
         drawing: <svg> element.
@@ -143,7 +142,7 @@ class Viewer(Part):
 
     Attributes:
         title: Stage and frame.
-        images: Names and addresses.
+        images: Names and file addresses of the images.
     """
 
     kind = "viewer"

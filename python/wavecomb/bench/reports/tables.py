@@ -128,7 +128,7 @@ def effects_table(found: pd.DataFrame, caption: str) -> Table:
 def mean_table(
     found: pd.DataFrame, caption: str, level_words: str, columns: Mapping[str, str], note: str = ""
 ) -> Table | None:
-    """Shows means by title and column. Omits columns without a value."""
+    """Makes a table of means with one column per metric; omits metrics without a value."""
     kept = {words: name for words, name in columns.items() if found[name].notna().any()}
     rows = [
         [

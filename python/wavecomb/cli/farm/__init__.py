@@ -37,7 +37,7 @@ MAP = click.option(
     ),
 )
 def farm_command() -> None:
-    """Render on several processes or machines, with the same bits as on one.
+    """Render on several processes or machines, bit-identically to one process.
 
     Dask distributes the tasks of a job. The job's folder keeps finished tiles. See docs/farm.md.
     """

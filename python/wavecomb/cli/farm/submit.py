@@ -186,9 +186,9 @@ def plan_command(text: str) -> None:
 
 
 def _tuples(value: Any) -> Any:
-    """Turns lists into tuples, as click gives them.
+    """Converts the lists in parsed JSON to tuples, the type of click's repeated options.
 
-    Jobs remain unchanged, because they stay JSON.
+    The entry "again" is a job, which remains unchanged.
     """
     if isinstance(value, dict):
         return {key: v if key == "again" else _tuples(v) for key, v in value.items()}

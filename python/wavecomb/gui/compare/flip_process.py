@@ -20,7 +20,7 @@ from wavecomb.errors import WavecombError
 
 
 class FlipProcess:
-    """Runner of FLIP processes. ``stop`` ends the current one, from any thread."""
+    """Runner of FLIP processes; ``stop``, called from any thread, ends the running process."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

@@ -40,7 +40,7 @@ class Ask:
 
     @property
     def problem(self) -> str:
-        """Reason why the images have no difference, or "" if they have one."""
+        """Reason why no difference of the images can be computed, or ""."""
         return problem(self.a, self.b, self.look.layer)
 
     def pictures(self) -> tuple[Any, ...]:

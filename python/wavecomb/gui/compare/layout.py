@@ -65,7 +65,7 @@ class Layout:
     def target(self, pane: QRectF, size: QSizeF | None = None) -> QRectF:
         """Returns the rectangle that a whole image covers.
 
-        Images of other sizes share the corner of A.
+        Images of other sizes than image A are aligned with A's top left corner.
         """
         reference = self.size or size or QSizeF(1, 1)
         scale = self.points_per_pixel()

@@ -53,7 +53,7 @@ def _row(name: str) -> Choice | Number:
 class LiveSettings(QWidget):
     """Grid with the settings of both live renders of a comparison.
 
-    A change of a setting restarts only the render of its side.
+    A change of a setting restarts only the render that the setting belongs to.
     """
 
     def __init__(self, source: SideSource, parent: QWidget | None = None) -> None:

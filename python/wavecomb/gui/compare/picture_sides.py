@@ -97,7 +97,7 @@ def _read_npy(path: Path) -> dict[str, Array]:
 
 
 def side_of_frame(frame: Frame, name: str, *, live: bool) -> Side:
-    """Makes a side from a frame of a live render, sharing its arrays, which never change."""
+    """Makes an image to compare from a frame of a live render; shares the frame's arrays."""
     layers = {layer: _three(frame.layer(layer)) for layer in frame.names()}
     done = frame.status.get("samples_done")
     note = f"{frame.width} x {frame.height}"

@@ -76,11 +76,11 @@ class PictureBook:
     def add(
         self, key: Hashable | None, samples: Hashable, mark: str, settings: Mapping[str, Any]
     ) -> Verdict:
-        """Compares an image with the first one of the same key.
+        """Compares an image with the first image of the same key.
 
         Args:
             key: Key from ``picture_key``.
-            samples: Samples of each pixel, or an identifier of their map.
+            samples: Sample count of every pixel, or an identifier of the sample count map.
             mark: Hash from ``fingerprint``.
             settings: Scheduling settings, to report the differences.
         """

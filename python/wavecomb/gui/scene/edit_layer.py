@@ -14,7 +14,7 @@ from wavecomb.image.files.output_file import replacing
 _NOT_REPEATED = frozenset(
     {"subLayers", "subLayerOffsets", "comment", "documentation", "customLayerData", "owner"}
 )
-"""Metadata of the root layer that is not copied to a layer over it."""
+"""Metadata of the root layer that is not copied to a layer of edits over the stage."""
 
 
 def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:

@@ -146,8 +146,8 @@ class FormModel(QObject):
     def is_open(self, group: str) -> bool:
         """Returns whether a heading is open.
 
-        The user's choice decides, or else whether a field below the heading differs from its
-        default.
+        The user can open and close headings. By default, a heading is open if a field below it
+        differs from its default.
         """
         used = any(
             row.kind == DRIVEN or row.value != row.default

@@ -30,7 +30,9 @@ if TYPE_CHECKING:
 
 
 class ListAndForm(QWidget):
-    """A list of prims, and the form of its selected row. The selection survives rereading the list.
+    """A list of prims, and the form of its selected row.
+
+    The selection is kept when the list is read again.
 
     Args:
         model: Model with the rows of the list.

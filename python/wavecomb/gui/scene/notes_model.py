@@ -33,7 +33,7 @@ class Row:
 
 
 def rows_of(stage: LoadedStage) -> list[Row]:
-    """Returns a row for each reported place, and one row for places that were only counted."""
+    """Returns a row for each prim or file of a finding, and one row that counts the others."""
     out: list[Row] = []
     report = stage.report
 

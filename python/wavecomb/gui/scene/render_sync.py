@@ -128,7 +128,7 @@ class RenderSync:
             self.show_step(step)
 
     def _materials_of(self, prim: Sdf.Path) -> set[str]:
-        """Returns the materials in use that a prim is, or that contain the prim."""
+        """Returns the materials in use at a prim's path or at the paths of its ancestors."""
         path, stage = str(prim), self.session.stage
         known = {one for one in stage.material_paths if one} if stage is not None else set()
         return {one for one in known if path == one or path.startswith(one + "/")}

@@ -36,7 +36,8 @@ class SceneEdits(QObject, RenderSync):
         reset(): Another stage or none is open; prims of the earlier stage are invalid.
         structure_changed(): Prims may have been added or removed.
         scene_changed(): The stage was loaded (again), which changes indices of materials and
-        lights. changed(): Something was edited, undone or redone.
+            lights.
+        changed(): A value was edited, or an edit was undone or redone.
 
     Attributes:
         history: Undo history of the edits.

@@ -20,7 +20,7 @@ NAME, TYPE, VISIBILITY, VARIANTS = range(4)
 HEADERS = ("Name", "Type", "Visible", "Variants")
 PathRole = Qt.ItemDataRole.UserRole
 StateRole = Qt.ItemDataRole.UserRole + 1
-"""Role of ``visibility.state`` of a row, for the eye icon."""
+"""Item data role of a prim's visibility state, for the eye icon."""
 
 PREDICATE = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
 ROOT = QModelIndex()

@@ -44,7 +44,7 @@ class VariantSet:
 
 @dataclass(frozen=True)
 class Solo:
-    """The light that is shown alone, or None, and the opinions before of all lights."""
+    """The light that is shown alone, or None, and the earlier visibility of all lights."""
 
     path: str | None = None
     before: Mapping[Key, Opinion | None] = field(default_factory=dict)

@@ -53,8 +53,8 @@ class VariantBar(QWidget):
     def _clear(self) -> None:
         """Removes all rows.
 
-        The widgets are deleted later, because a combo box may be handling the event that leads
-        here.
+        The widgets are deleted later, because a combo box may still be handling the event that
+        caused the call.
         """
         self.combos = {}
         while self._form.rowCount():

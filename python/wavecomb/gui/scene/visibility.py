@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Visibility on a stage, and the opinions needed to change it. The functions author nothing."""
+"""Visibility on a stage, and the opinions that would change it, which the caller authors."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ WAVE_SIZES: dict[Any, str] = {
 
 
 def choice(name: str) -> Choice:
-    """Returns a setting of the core's table as a choice."""
+    """Returns the description of a drop-down field for a setting of the core's table."""
     row = settings()[name]
     values: dict[Any, str] = dict(row.choices)
     if name == "wave_size":
@@ -84,7 +84,7 @@ _SHOWN: dict[str, dict[str, Any]] = {
 
 
 def number(name: str) -> Number:
-    """Returns a setting of the core's table as a number."""
+    """Returns the description of a number field for a setting of the core's table."""
     row = settings()[name]
     values: dict[str, Any] = {"least": row.least or 0, "most": row.most, "zero": row.zero}
     if row.kind == "number":
@@ -140,7 +140,7 @@ def promise(setup: Setup) -> str:
 
 
 def recipe_of(setup: Setup) -> dict[str, Any]:
-    """Returns the fields of a setup that restore these settings."""
+    """Returns the fields of a setup that restore the given settings."""
     return {name: getattr(setup, name) for name in (*FIELDS, "own_policy", "profile")}
 
 

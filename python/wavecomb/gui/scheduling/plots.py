@@ -87,7 +87,7 @@ class Plot(pg.PlotWidget):
             self.retheme()
 
     def wheelEvent(self, event: object) -> None:
-        """Passes the wheel on to the surrounding scroll area."""
+        """Leaves mouse wheel events to the surrounding scroll area."""
         event.ignore()  # type: ignore[attr-defined]
 
 

@@ -57,7 +57,7 @@ class OwnPolicy(SchedulingPolicy):
         self.columns = policy.columns  # type: ignore[misc]
 
     def order(self, queue: Any, costs: Any, keys: Any) -> bool | None:
-        """Calls the function of the loaded policy."""
+        """Calls ``order`` of the loaded policy; adds advice to its exceptions."""
         try:
             return self.policy.order(queue, costs, keys)
         except Exception as error:

@@ -22,12 +22,12 @@ FIELDS = (*names("order", without=("progressive",)), *WORK)
 """Settings that distinguish series. All fields but those of ``WORK`` leave the image unchanged."""
 
 MAX_LOOKS = 240
-"""Largest number of looks in a run. Further looks are thinned out, so that memory use is
-bounded."""
+"""Largest number of counter readings in a run. Beyond it, every second reading is dropped to limit
+memory use."""
 MAX_SERIES = 100
 SHORTEST_S = 0.25
-"""Shortest abandoned run that is kept, in seconds. Shorter ones, as while orbiting, have no
-meaning."""
+"""Shortest abandoned run that is kept, in seconds. Shorter runs, for example while the camera
+orbits, are too short to compare."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ class Look:
     phases: Mapping[str, float] = field(default_factory=dict)
     """Thread seconds by phase."""
     coherence: Mapping[str, float] = field(default_factory=dict)
-    """Run length and homogeneity of material queues, as means over the run so far. The core reports
-    ratios instead of counters for them."""
+    """Run length and homogeneity of material queues, as means over the run so far, since the core
+    reports no counters for these."""
 
 
 def take_look(stats: Mapping[str, Any]) -> Look:
@@ -67,7 +67,7 @@ def take_look(stats: Mapping[str, Any]) -> Look:
 
 @dataclass
 class Run:
-    """One render, as looks in order of time, of which the first has only zeros."""
+    """One render, as counter readings (looks) in order of time; the first reading is all zeros."""
 
     looks: list[Look] = field(default_factory=lambda: [Look(0.0)])
     stats: Mapping[str, Any] = field(default_factory=dict)
@@ -76,11 +76,11 @@ class Run:
 
     @property
     def last(self) -> Look:
-        """The latest look."""
+        """The latest counter reading."""
         return self.looks[-1]
 
     def add(self, stats: Mapping[str, Any]) -> None:
-        """Adds a look to the run."""
+        """Adds a reading of the counters to the run."""
         look = take_look(stats)
         self.stats = stats
         if look.seconds <= self.last.seconds:
@@ -90,7 +90,7 @@ class Run:
             self.looks = [*self.looks[:-1:2], look]
 
     def continues(self, look: Look) -> bool:
-        """Returns whether a look can belong to this run, whose counters never decrease."""
+        """Returns whether a counter reading can belong to this run: counters never decrease."""
         last = self.last
         return not self.finished and look.seconds >= last.seconds and look.samples >= last.samples
 
@@ -99,7 +99,7 @@ class Run:
         return ratio(self.last.records, self.last.packet_lanes)
 
     def shading_ns(self) -> float:
-        """Returns thread ns per record for keys, sort, materialize and shade."""
+        """Returns thread ns per record in the phases keys, sort, materialize and shade."""
         seconds = sum(self.last.phases.get(name, 0.0) for name in (*SORTING, "shade"))
         return 1e9 * ratio(seconds, self.last.records)
 
@@ -115,8 +115,8 @@ class Series:
     number: int
     settings: Mapping[str, Any]
     picture: Hashable
-    """Everything else that determines the amount of work, such as scene, edits, camera, size and
-    seed."""
+    """Key of the inputs besides settings that determine the amount of work, such as scene, edits,
+    camera, size and seed."""
     changed: str
     """Description of the differences from the previous series."""
     runs: list[Run] = field(default_factory=list)
@@ -134,7 +134,7 @@ class Series:
         return max(self.runs, key=lambda run: run.last.seconds)
 
     def does_the_work_of(self, other: Series) -> bool:
-        """Returns whether both do the same work, so that their times can be compared."""
+        """Returns whether two series do the same work, so that their times can be compared."""
         return self.picture == other.picture and all(
             self.settings.get(name) == other.settings.get(name) for name in WORK
         )
@@ -162,7 +162,7 @@ class RunLog:
         Args:
             stats: Statistics of the render.
             settings: Values of the fields in ``FIELDS``, as far as known.
-            picture: Everything else that determines the amount of work, such as scene and size.
+            picture: Key of the other inputs that determine the amount of work, such as the scene.
             finished: Whether the render has ended.
             recipe: Fields of a setup that restore the settings of the run.
         """
@@ -187,7 +187,7 @@ class RunLog:
         return series
 
     def finish(self) -> bool:
-        """Marks the current run as finished. Returns False if it was already."""
+        """Marks the current run as finished; returns False if it was finished already."""
         if self._current is None or self._current.run.finished:
             return False
         self._current.run.finished = True
@@ -200,7 +200,7 @@ class RunLog:
 
     @property
     def base(self) -> Series | None:
-        """Reference series of comparisons: the pinned one, else the first of this picture."""
+        """Reference series of comparisons: the pinned series, else the picture's first series."""
         if self.pinned is not None:
             return self.pinned
         if self._current is None:
@@ -241,7 +241,7 @@ class RunLog:
         return series
 
     def _end_run(self) -> None:
-        """Removes the current run if it was too short to have meaning."""
+        """Removes the current run if it was too short to compare."""
         series = self._current
         if series is None or series.run.finished or series.run.last.seconds >= SHORTEST_S:
             return

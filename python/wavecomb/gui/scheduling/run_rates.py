@@ -2,10 +2,10 @@
 """Speed of runs, its uncertainty, and comparison of runs. Independent of Qt.
 
 A rate is measured over a whole run with constant settings, never over a moment. The spread of a
-rate is computed over the intervals between consecutive looks. Two runs of one picture are compared
-interval by interval at equal samples. Two such runs have done the same work, since paths do not
-depend on the order of shading, and expensive parts of the image have equal weights. A single pair
-of runs cannot reveal effects on whole runs, such as a machine whose speed drifts. A difference
+rate is computed over the intervals between consecutive readings. Two runs of one picture are
+compared interval by interval at equal samples. Two such runs have done the same work, since paths
+do not depend on the order of shading, and expensive parts of the image have equal weights. A single
+pair of runs cannot reveal effects on whole runs, such as a machine whose speed drifts. A difference
 therefore *holds* only if repeated pairs agree.
 """
 
@@ -87,7 +87,7 @@ class Ratio:
 
 
 def stretches(run: Run, least_s: float = 0.0) -> list[tuple[Look, Look]]:
-    """Returns pairs of consecutive looks, joining intervals shorter than ``least_s``."""
+    """Returns pairs of consecutive counter readings; joins intervals shorter than ``least_s``."""
     pairs = []
     start = run.looks[0]
     for look in run.looks[1:]:

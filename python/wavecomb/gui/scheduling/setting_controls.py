@@ -36,7 +36,7 @@ class _CalmWheel(QObject):
 
 
 def calm(widget: QWidget) -> None:
-    """Makes a widget react to the wheel only with focus.
+    """Makes a widget react to the mouse wheel only while it has the focus.
 
     Otherwise scrolling a panel would change settings and restart renders.
     """
@@ -62,7 +62,7 @@ class ChoiceBox(QComboBox):
         self.activated.connect(lambda index: changed(self.field, self.itemData(index)))
 
     def fill(self, values: Mapping[Any, str]) -> None:
-        """Replaces the offered values."""
+        """Replaces the values that the combo box offers."""
         with QSignalBlocker(self):
             self.clear()
             for value, tip in values.items():
@@ -70,7 +70,7 @@ class ChoiceBox(QComboBox):
         self._retell()
 
     def add(self, value: Any, text: str, tip: str) -> None:
-        """Adds an offered value."""
+        """Adds a value to the combo box."""
         self.addItem(text, value)
         self.setItemData(self.count() - 1, tip, Qt.ItemDataRole.ToolTipRole)
 
@@ -85,7 +85,7 @@ class ChoiceBox(QComboBox):
         self._retell()
 
     def find(self, value: Any) -> int:
-        """Returns the index of a value among the offered ones, or -1 if it is not offered."""
+        """Returns the index of a value in the combo box, or -1 if the value is not offered."""
         for index in range(self.count()):
             data = self.itemData(index)
             if data is value or (type(data) is type(value) and data == value):

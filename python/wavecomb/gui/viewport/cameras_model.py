@@ -21,7 +21,7 @@ class CamerasModel(QAbstractListModel):
     """List of camera names, with paths as ``Qt.ItemDataRole.UserRole`` (None for the free camera).
 
     Signals:
-        moved(): The current camera, and with it ``row``, changed.
+        moved(): The current camera and its ``row`` in the list changed.
     """
 
     moved = Signal()

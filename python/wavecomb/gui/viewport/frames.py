@@ -115,7 +115,7 @@ def layers_of_snapshot(snapshot: Snapshot, names: tuple[str, ...]) -> dict[str, 
 
 
 def denoised_frame(frame: Frame) -> tuple[Frame, Any]:
-    """Denoises a frame with Open Image Denoise, faster if it is not the last.
+    """Denoises a frame with Open Image Denoise, in a faster mode until the render has ended.
 
     Returns None as image if guide layers are missing.
     """

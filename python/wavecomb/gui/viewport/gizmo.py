@@ -41,7 +41,7 @@ class Anchor:
         pivot: (3,) point that stays during rotation and scaling.
         axes: (3, 3) directions of the handles, as rows.
         bounds: (2, 3), or None for a light without a size.
-        placement: Its transform on the stage.
+        placement: Transform of the prim on the stage.
         live: Whether the render follows during a drag.
     """
 

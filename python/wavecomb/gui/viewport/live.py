@@ -158,7 +158,7 @@ class Live(QObject):
         *,
         moving: bool = False,
     ) -> None:
-        """Starts rendering a new scene. ``make`` creates its renderer on the render thread.
+        """Starts rendering a new scene; ``make`` creates the renderer on the render thread.
 
         ``moving`` says whether a reduced image is enough.
         """
@@ -168,7 +168,7 @@ class Live(QObject):
         self._submit(Task(self.setup, 0, edit, moving, loaded, make))
 
     def change(self, **values: Any) -> bool:
-        """Changes fields of the setup and restarts. Emits ``failed`` if a value is invalid.
+        """Changes fields of the setup and restarts the render; emits ``failed`` for invalid values.
 
         Returns:
             Returns whether the setup was changed.
@@ -193,7 +193,7 @@ class Live(QObject):
         return True
 
     def edit(self, edit: Edit, *, moving: bool = False) -> None:
-        """Changes the scene and restarts.
+        """Changes the scene and restarts the render.
 
         Args:
             edit: The changes of the scene.
@@ -219,7 +219,7 @@ class Live(QObject):
                 self._flush()  # otherwise after the reduced image, which is being rendered
 
     def restart(self) -> None:
-        """Restarts from the first sample."""
+        """Restarts the render from the first sample."""
         self._moving = False
         self._flush()
 
@@ -279,7 +279,7 @@ class Live(QObject):
             self.state_changed.emit(state)
 
     def _receive(self, letter: None) -> None:
-        """Handles the newest item of each kind of the render thread's news."""
+        """Handles the newest frame, statistics, error and renderer from the render thread."""
         takes: dict[str, Callable[[Any], None]] = {
             "frame": self._take,
             "statistics": self._take_statistics,

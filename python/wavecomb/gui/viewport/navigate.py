@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Camera movements: orbit, pan, dolly, frame. Pure functions of poses."""
+"""Camera movements (orbit, pan, dolly, frame) as functions from one camera pose to another."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ class Pose:
         return {**here, **camera_defaults(), **self.others}
 
     def value(self, name: str) -> Any:
-        """Returns a value of ``others``, or its default."""
+        """Returns the value of a camera parameter in ``others``, or the parameter's default."""
         return self.others[name] if name in self.others else camera_parameters()[name].default
 
     def changed(self, **others: Any) -> Pose:
-        """Returns a copy with some values of ``others`` replaced."""
+        """Returns a copy of the pose with some camera parameters in ``others`` replaced."""
         return replace(self, others={**self.others, **others})
 
     @property

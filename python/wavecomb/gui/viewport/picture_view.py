@@ -25,7 +25,7 @@ _TEXT = QColor(240, 240, 240)
 
 
 def legend_text(legend: Legend) -> str:
-    """Returns the title with the kind of scale."""
+    """Returns the title of a legend, and whether its scale is logarithmic."""
     return f"{legend.title}, logarithmic" if legend.logarithmic else legend.title
 
 

@@ -66,7 +66,7 @@ def save_frame(
 
     Raises:
         OSError, ValueError: The file cannot be written, or an option is invalid. The message of the
-        error is one line.
+            error is one line.
         WavecombError: The render has produced only a preview so far.
     """
     if frame.scale != 1:

@@ -106,7 +106,7 @@ class Session(Live):
     def scene(self) -> Scene | None:
         """The core's scene with all edits, or None.
 
-        ``Scene.material(i)`` and ``light(i)`` read values.
+        ``Scene.material(i)`` and ``Scene.light(i)`` return current parameter values.
         """
         if self.renderer is not None:
             return self.renderer.scene
@@ -239,7 +239,7 @@ class Session(Live):
         """Moves the camera.
 
         Args:
-            pose: New pose. Its ``path`` is None unless it is the authored pose of a camera prim.
+            pose: New pose, whose ``path`` is None unless a camera prim has exactly this pose.
             moving: Whether more movements follow immediately. Images are reduced until ``settle``.
         """
         self.pose = pose
@@ -254,7 +254,7 @@ class Session(Live):
             live.edit(edit.copied(), moving=moving)
 
     def settle(self) -> None:
-        """Ends a movement, also of the twins."""
+        """Ends a movement of the camera or scene, in this render and in its twins."""
         super().settle()
         for live in self.twins:
             live.settle()
@@ -334,7 +334,7 @@ class Session(Live):
             live.resume()
 
     def restart(self) -> None:
-        """Restarts from the first sample, at full size."""
+        """Restarts the render from the first sample, at full size."""
         self._playing = False
         if self.stage is not None:
             super().restart()
@@ -377,7 +377,7 @@ class Session(Live):
     def run(
         self, what: str, work: Callable[[], object], then: Callable[[], None] | None = None
     ) -> None:
-        """Runs ``work`` on another thread, then ``then`` with the result on this one.
+        """Runs ``work`` on another thread, then ``then`` on the window's thread.
 
         See ``Tasks.run``.
         """

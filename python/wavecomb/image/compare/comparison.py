@@ -38,8 +38,8 @@ class Comparison:
         not_finite_differ: Number of excluded pixels with different bits.
         luminance_mean_abs: Mean absolute difference of Rec.709 luminance.
         luminance_max_abs: Largest absolute difference of Rec.709 luminance.
-        luminance_max_at: Column and row of that pixel, from 0 at the top left; None without
-            differences.
+        luminance_max_at: Column and row of the pixel with the largest luminance difference, from 0
+            at the top left; None without differences.
         max_abs: Largest absolute difference of any channel.
         mean_signed: Mean difference of each channel.
         mean_abs: Mean absolute difference of each channel.

@@ -101,7 +101,7 @@ class PairResult:
         a: File of image A.
         b: File of the reference image B.
         result: Differences; None if the images cannot be compared.
-        problem: Reason why they cannot be compared, or "".
+        problem: Reason why the images cannot be compared, or "".
     """
 
     name: str
@@ -146,7 +146,7 @@ def pair_up(a: str, b: str) -> FolderPair:
 
     Args:
         a: A folder, or a name with a frame placeholder.
-        b: The reference, in the same form.
+        b: Folder, or name with a frame placeholder, of the reference images.
 
     Raises:
         WavecombError: A source does not exist, or the two have no name in common.

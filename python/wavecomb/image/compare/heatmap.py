@@ -69,8 +69,8 @@ def heat_map(
 
     - "absolute" shows differences of luminance on a logarithmic scale. This scale covers four
       decades below the largest difference; smaller differences have the darkest colour.
-    - "signed" applies this scale to both signs: A is brighter in orange pixels and darker in blue
-      ones. Differences below the four decades are black.
+    - "signed" uses a logarithmic scale for each sign: A is brighter in orange pixels and darker in
+      blue pixels. Differences more than four decades below the largest are black.
     - "flip-ldr" and "flip-hdr" show FLIP from 0 to 1; see ``perceptual.flip``.
 
     Equal pixels are black; pixels with a NaN or an infinity are cyan.

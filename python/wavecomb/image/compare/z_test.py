@@ -54,7 +54,7 @@ class ZTest:
     z_pixels: Array = field(repr=False, compare=False)
 
     def to_dict(self) -> dict[str, Any]:
-        """Returns the figures for JSON, without those per pixel."""
+        """Returns all results except the per-pixel arrays, for JSON."""
         names = [f.name for f in dataclasses.fields(self) if f.repr]
         return {name: getattr(self, name) for name in names}
 

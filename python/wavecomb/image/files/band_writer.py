@@ -50,7 +50,7 @@ class BandFiles:
             png: File name that ends in .png, or None.
             height: Total number of rows.
             window: Position in a larger image, as in ``write_exr``.
-            file_options: half, compression, tile and split of ``Picture.save``.
+            file_options: Arguments half, compression, tile and split of ``Picture.save``.
             exposure: Exposure of the PNG in stops.
             tone_map: Tone mapping of the PNG.
         """

@@ -112,7 +112,7 @@ class Group:
     """A control group that limits all memory of a process, including shared mappings."""
 
     def __init__(self, path: Path) -> None:
-        """Stores the folder of the group."""
+        """Stores the folder of the control group."""
         self._path = path
 
     @classmethod
@@ -139,12 +139,12 @@ class Group:
         return None
 
     def add(self, pid: int) -> None:
-        """Moves a process into the group."""
+        """Moves a process into the control group."""
         with contextlib.suppress(OSError):
             (self._path / "cgroup.procs").write_text(str(pid))
 
     def close(self) -> None:
-        """Removes the group after its processes have ended."""
+        """Removes the control group after its processes have ended."""
         with contextlib.suppress(OSError):
             self._path.rmdir()
 
@@ -156,7 +156,7 @@ def limit_text(page: mmap.mmap) -> str:
 
 
 UNPACKED = 8160
-"""Largest ratio of a value's size to its size in a .usdc.
+"""Largest ratio of a value's size in memory to its size in a .usdc file.
 
 Integer coding stores 8 bytes in 2 bits, and LZ4 compresses up to 255 bytes to one.
 """

@@ -185,5 +185,5 @@ class Client:
         self._ask("check", str(target))
 
     def publish(self, part: Path, target: Path, *, durable: bool) -> None:
-        """Moves a finished file to its name."""
+        """Moves a finished file to its destination."""
         self._ask("move", part.name, str(target), durable)

@@ -20,7 +20,7 @@ def new_page() -> int:
 
 
 def open_page(descriptor: int) -> mmap.mmap:
-    """Maps the page of a descriptor."""
+    """Maps the shared page of progress notes from its file descriptor."""
     return mmap.mmap(descriptor, _SLOT * len(_SLOTS))
 
 
@@ -77,9 +77,9 @@ def crash_message(number: int, where: str, words: str, limit: str = "") -> str:
 
     Args:
         number: Number of the signal.
-        where: Result of ``read``.
-        words: Output of its libraries to stderr.
-        limit: Text of its memory limit.
+        where: Last activity of the process, from ``read``.
+        words: Output of the process's libraries to stderr.
+        limit: Text about the memory limit of the process.
     """
     try:
         name = signal.Signals(number).name

@@ -46,7 +46,7 @@ CHATTER = (
     "failed call to posix_madvise",
     "UnicodeDecodeError: 'utf-8'",
 )
-"""Starts of library output that is dropped, since a warning reports the problem in more detail."""
+"""First words of library messages that are dropped, since a warning reports the same problem."""
 _NO_VALUE = "No to_python (by-value) converter"
 """Boost.Python's message about a value that USD cannot read."""
 

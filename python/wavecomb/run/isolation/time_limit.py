@@ -22,7 +22,7 @@ BASE_S = 6.0
 """Seconds that any stage may take, which suffices for some hundred thousand prims."""
 
 BYTES_PER_S = 1_000_000
-"""Layer bytes that allow one further second; valid layers are read many times faster."""
+"""Number of layer bytes per further second of the time limit; valid layers are read much faster."""
 
 limit_s: float | None = None
 """Limit in seconds that the user sets (0 disables it); None derives it from the layer size."""

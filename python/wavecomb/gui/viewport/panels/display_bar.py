@@ -155,7 +155,7 @@ class DisplayBar(QToolBar):
     # ---- layers ----------------------------------------------------------------------------------
 
     def _fill_layers(self) -> None:
-        """Fills the box of layers.
+        """Fills the combo box of layers.
 
         The box offers AOVs, light groups if there are several, and rendered expressions.
         """

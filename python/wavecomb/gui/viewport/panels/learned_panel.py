@@ -94,7 +94,7 @@ class LearnedPanel(CursorPanel):
         layout.addWidget(self.follow)
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Updates the panel, which is not updated while it is hidden."""
+        """Updates the panel when it is shown, because hidden panels are not updated."""
         super().showEvent(event)
         self._soon()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Panel of the settings that lighters change: how long to render, what to find, what to clean."""
+"""Panel of the settings that lighters change: render time, light transport, noise removal."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ class Timeline(QWidget):
         set_quietly(self.frame, frame)
 
     def _choose(self, frame: int) -> None:
-        """Shows a frame; uses a reduced image if it is one of many."""
+        """Shows a frame, as a reduced image while playing or while the slider is dragged."""
         self._waiting = True
         self._session.show_time(frame, moving=self.is_playing or self.slider.isSliderDown())
         self._show(frame)
