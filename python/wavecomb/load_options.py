@@ -249,7 +249,8 @@ class LoadOptions:
     )  # fmt: skip
     catch: str = _row(
         "through",
-        "Pass of a render with shadow catchers for which the stage is loaded.",
+        "Which render of a stage with shadow catchers to load: the image, or the catchers with or "
+        "without other objects.",
         "choice",
         choices=CATCH,
     )
@@ -274,8 +275,8 @@ class LoadOptions:
     )  # fmt: skip
     subdivision: str | int = _row(
         "auto",
-        "Refinement of subdivision surfaces: off for polygons, LEVEL times (0 to 10), or auto, "
-        "by their size in the image.",
+        "Refinement of subdivision surfaces: off, LEVEL times (0 to 10), or auto, by their size "
+        "in the image.",
         "text", "--subdivision", metavar="off|LEVEL|auto", unset="auto",
     )  # fmt: skip
     strand_pixels: float = _row(
