@@ -53,7 +53,7 @@ build/.setup: tools/setup tools/wheels tools/setup_embree tools/setup_openvdb to
   constraints.txt pyproject.toml
 	@mkdir -p build && $(SETUP_LOCK) tools/setup && touch $@
 
-# Parts of make test install these while the core is built.
+# Packages that tests need; parts of make test install them while the core is built.
 build/.setup-test: build/.setup
 	@$(SETUP_LOCK) tools/setup test && touch $@
 
@@ -142,8 +142,8 @@ test-cpp: build build/.setup-test ## C++ tests of values, lanes and whole render
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet
 	$(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 
-# CHECKS=all builds all tests, kernels and checks, with line numbers in reports of addresses. It
-# takes five times as long to compile.
+# CHECKS=all builds all tests, kernels and checks, with line numbers in AddressSanitizer's reports,
+# which takes five times as long to compile.
 ASAN_DEBUG = $(if $(filter all,$(CHECKS)),-g1,-g0)
 test-asan: build/.setup-test ## C++ tests of memory and whole renders under AddressSanitizer and UndefinedBehaviorSanitizer
 	@test -e $(ASAN)/build.ninja || $(ASAN_LOCK) $(VENV)/cmake -S . -B $(ASAN) -G Ninja --log-level=NOTICE \
@@ -170,7 +170,8 @@ build-test-tools: build
 test-py: build-test-tools build/.setup-test ## Python and statistical tests
 	@$(MAKE) --no-print-directory run-py
 
-# These targets have no prerequisites: they run as parts of make test, which builds the programs.
+# The run-* targets have no prerequisites: they run as parts of make test, which builds the
+# programs.
 run-py:
 	$(VENV)/python -m pytest -q -n $(JOBS)
 
@@ -205,12 +206,14 @@ test-wheel: wheels ## Install the wheel into a fresh environment and an empty ro
 test-sdist: sdist build/.setup-test ## Build the source distribution in a separate folder, and render
 	$(VENV)/python -m pytest -q -o faulthandler_timeout=3600 tests/packaging/test_sdist.py
 
-# These libraries are compiled from source, since the libraries of the distribution are for another
-# standard library or CPU.
+# The clang and ARM64 builds compile OpenSubdiv and GoogleTest from source, since the distribution's
+# libraries are for another standard library or CPU.
 from_source := -DOpenSubdiv_SOURCE=$(CURDIR)/.deps/source/opensubdiv -DGoogleTest_SOURCE=/usr/src/googletest
-# The builds have two lane widths and little optimisation, since they test correctness, not speed.
+# The clang build has two lane widths and little optimisation, since it tests correctness, not
+# speed.
 clang_widths = 1;$(if $(shell grep -m 1 -o avx2 /proc/cpuinfo 2> /dev/null),8,4)
-# The newest clang. The variable is expanded when used, after tools/setup has installed clang.
+# Path of the newest clang. make expands CLANGXX when it is used, after tools/setup has installed
+# clang.
 CLANGXX ?= $$(ls /usr/bin/clang++-[0-9]* | sort -V | tail -n 1)
 # The oneTBB wheel uses libstdc++, and an exception from a libc++ task ends the process, so the test
 # of exceptions in tasks is left out.

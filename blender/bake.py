@@ -16,7 +16,7 @@ from typing import Any
 from .context import Translation
 
 WIDTH = 2048
-"""Pixels around the horizon."""
+"""Width of the baked image, in pixels."""
 LIMIT_S = 300.0
 
 
@@ -52,7 +52,7 @@ def _is_animated(made: Any) -> bool:
 
 
 def _content(made: Any) -> str:
-    """Returns a text that changes with anything in the node tree."""
+    """Returns a text that describes all nodes and values of the node tree of a world."""
     lines: list[str] = []
     _describe(made.node_tree, lines)
     return "\n".join(lines)

@@ -10,7 +10,7 @@ import bpy
 
 
 def main(blend: str, name: str, file: str, width: int, time: float) -> None:
-    """Opens no scene: takes the world out of a file and renders it alone."""
+    """Loads the world of a .blend file into an empty scene and renders it."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     with bpy.data.libraries.load(blend) as (_, wanted):
         wanted.worlds = [name]
@@ -31,7 +31,7 @@ def main(blend: str, name: str, file: str, width: int, time: float) -> None:
     kind = camera if hasattr(camera, "panorama_type") else camera.cycles
     kind.panorama_type = "EQUIRECTANGULAR"
     thing = bpy.data.objects.new("panorama", camera)
-    # Looks along +X with +Z up.
+    # The camera looks along +X with +Z up.
     thing.rotation_euler = (1.5707963267948966, 0.0, -1.5707963267948966)
     scene.collection.objects.link(thing)
     scene.camera = thing

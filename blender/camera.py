@@ -14,14 +14,14 @@ SETTINGS = "/Render/Settings"
 
 
 class NoCamera(Exception):
-    """The scene cannot be rendered from its camera; the message says why."""
+    """Raised if a scene has no supported camera; the message gives the reason."""
 
 
 def write_camera(into: Translation, size: tuple[int, int]) -> None:
     """Writes the scene's camera for a full image of ``size`` pixels.
 
     Raises:
-        NoCamera: There is none, or its projection is not supported.
+        NoCamera: The scene has no camera, or the camera's projection is not supported.
     """
     scene, thing = into.scene, into.scene.camera
     if thing is None:
@@ -59,7 +59,7 @@ def _without_scale(matrix: Any) -> Any:
 
 
 def _frame(into: Translation, data: Any, prim: Prim, size: tuple[int, int]) -> None:
-    """Writes the aperture: the image's part of the sensor, shifted."""
+    """Writes the camera's aperture, which is the part of the sensor that the image shows."""
     render = into.scene.render
     across = size[0] * render.pixel_aspect_x
     up = size[1] * render.pixel_aspect_y
@@ -69,7 +69,7 @@ def _frame(into: Translation, data: Any, prim: Prim, size: tuple[int, int]) -> N
         sensor = data.sensor_width
     else:
         sensor = data.sensor_width if fit == "HORIZONTAL" else data.sensor_height
-    # Tenths of a metre; Blender's sensors and lenses are in millimetres.
+    # Converts millimetres (Blender) to tenths of scene units, which are metres (USD).
     fitted = float(sensor) * 1e-2
     if data.type == "ORTHO":
         fitted = float(data.ortho_scale) * 10.0

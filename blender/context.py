@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""State that all parts of one translation share."""
+"""State that all parts of the translation of one scene share."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ OWN = "/Wavecomb"
 
 @dataclass
 class Translation:
-    """A scene on its way to a stage.
+    """State of the translation of a Blender scene to a USD stage.
 
     Attributes:
         depsgraph: Evaluated scene.
         folder: Folder of the stage and its files.
         layer: The correction layer.
-        report: Messages.
+        report: Messages about unsupported and approximated features.
         time: Time code of the frame.
         options: Additional options of ``wavecomb render``.
         samples: World matrices of moving objects over the shutter interval, by object name.
-        instancing: Whether the exporter wrote prototypes.
+        instancing: Whether the exporter wrote instances as prototypes.
     """
 
     depsgraph: Any
@@ -50,7 +50,7 @@ class Translation:
         return os.path.join(self.folder, name)
 
     def matrices(self, name: str, matrix: Any) -> dict[float, Any]:
-        """Returns an object's matrices by time; one if it does not move."""
+        """Returns the matrices of an object by time; a static object has a single matrix."""
         return self.samples.get(name) or {self.time: matrix}
 
 

@@ -12,9 +12,9 @@ from .usda import Prim, safe_name
 
 
 def write_curves(into: Translation) -> None:
-    """Replaces what the exporter writes for curve objects: strands of a fixed width."""
+    """Writes curve objects as meshes; Blender's exporter writes strands of a fixed width."""
     for thing in into.depsgraph.objects:
-        # The exporter of Blender 4.2 leaves texts out.
+        # The exporter of Blender 4.2 does not write text objects.
         kinds = ("CURVE", "SURFACE") if into.instancing else ("CURVE", "SURFACE", "FONT")
         if thing.type not in kinds or thing.data is None:
             continue

@@ -118,7 +118,7 @@ class WavecombRenderEngine(bpy.types.RenderEngine):
         return export_stage(depsgraph, session, size, sampled)
 
     def _watch(self, render: Render, show: Any) -> None:
-        """Passes progress on until the process ends or the user cancels."""
+        """Shows progress in Blender until the process ends or the user cancels."""
         start, asked = time.monotonic(), None
         while render.is_running:
             event = render.event(0.1)

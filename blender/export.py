@@ -25,7 +25,7 @@ GEOMETRY, CORRECTION, STAGE = "geometry.usdc", "correction.usda", "stage.usda"
 
 
 class ExportError(Exception):
-    """The scene could not be exported; the message says why."""
+    """Raised if a scene cannot be exported; the message gives the reason."""
 
 
 @dataclass
@@ -49,7 +49,7 @@ class Exported:
 
 @dataclass
 class Session:
-    """State that is kept between the frames of an animation.
+    """State that is kept between the frames of an animation, to reuse exported geometry.
 
     Attributes:
         folder: Folder of the stage.

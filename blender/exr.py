@@ -14,7 +14,7 @@ TYPES = {0: np.dtype("<u4"), 1: np.dtype("<f2"), 2: np.dtype("<f4")}
 
 
 class ExrError(Exception):
-    """A file is not one that this module reads."""
+    """Raised if a file is damaged or not an EXR file that this module supports."""
 
 
 def read(file: str) -> dict[str, np.ndarray]:

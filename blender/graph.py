@@ -23,7 +23,7 @@ WIDTHS = {"float": 1, "vector2": 2, "color3": 3, "vector3": 3, "vector4": 4}
 
 @dataclass(frozen=True)
 class Value:
-    """A constant, or the output of a node.
+    """Value of a shader or node input: a constant, or the output of a MaterialX node.
 
     Attributes:
         kind: MaterialX type.
@@ -146,7 +146,7 @@ class Graph:
         return self.node(f"combine3_{kind}", kind, in1=x, in2=y, in3=z)
 
     def clamped(self, value: Value) -> Value:
-        """Clamps a value to 0 to 1."""
+        """Clamps a value to the range [0, 1]."""
         if value.constant is not None:
             parts = value.constant if isinstance(value.constant, tuple) else (value.constant,)
             low = tuple(min(max(part, 0.0), 1.0) for part in parts)

@@ -25,7 +25,7 @@ def write_hair(n: Nodes, node: Any, material: Prim, path: str) -> None:
         inputs["absorption_coefficient"] = _absorption(n, node, radial)
         inputs |= _lobes(n, rough, radial)
         inputs["ior"] = number(_constant(n, node, "IOR", 1.55))
-        # 0.5 means no tilt, 0 and 1 mean 90 degrees.
+        # A cuticle_angle of 0.5 means no tilt; 0 and 1 mean a tilt of 90 degrees.
         tilt = _constant(n, node, "Offset", math.radians(2.0))
         inputs["cuticle_angle"] = number(0.5 - tilt / math.pi)
         for name in ("Random Color", "Random Roughness", "Coat"):
@@ -52,7 +52,7 @@ def _constant(n: Nodes, node: Any, name: str, default: float) -> float:
 
 
 def _lobes(n: Nodes, longitudinal: float, azimuthal: float) -> dict[str, Any]:
-    """Converts perceptual roughness to the variances that the BSDF takes."""
+    """Converts perceptual roughness to the roughness inputs of the BSDF, which are variances."""
     found: dict[str, Any] = {}
     v = (0.726 * longitudinal + 0.812 * longitudinal**2 + 3.7 * longitudinal**20) ** 2
     s = 0.265 * azimuthal + 1.194 * azimuthal**2 + 5.372 * azimuthal**22

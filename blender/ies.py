@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Angular laws of Cycles' spot and area lights, written as IES profiles.
+"""Angular falloff of Cycles' spot and area lights, written as IES profiles.
 
-UsdLux shapes a spot by a smooth step of the angle, while Cycles uses one of the cosine. A profile
-expresses the law of Cycles exactly at its angles, and linearly between them.
+UsdLux shapes a spot by a smooth step of the angle, while Cycles uses a smooth step of the cosine.
+An IES profile equals the falloff of Cycles at the angles of the profile, and is interpolated
+linearly between the angles.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import math
 from collections.abc import Callable
 
 STEPS = 256
-"""Intervals of the angle over which the law falls."""
+"""Number of intervals of the angles in an IES profile."""
 
 
 def spot_law(size: float, blend: float) -> Callable[[float], float]:
@@ -59,7 +60,7 @@ def _mean_tangent(half: float) -> float:
 
 
 def profile(law: Callable[[float], float], last: float) -> str:
-    """Returns the text of an IES file for a law that is 0 beyond the angle ``last`` (radians)."""
+    """Returns the text of an IES file for a falloff that is 0 beyond ``last`` radians."""
     last = min(last, math.pi)
     angles = [last * i / STEPS for i in range(STEPS + 1)]
     values = [law(angle) for angle in angles]

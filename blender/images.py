@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files of Blender's images for the renderer."""
+"""Provides Blender's images to the renderer as files."""
 
 from __future__ import annotations
 
@@ -39,10 +39,11 @@ def file_of(into: Translation, image: Any, associate: bool = False) -> str | Non
     of the stage.
 
     Args:
-        into: The translation.
+        into: State of the scene translation.
         image: The image.
         associate: Whether colours are multiplied by alpha, as Cycles does with straight alpha
-            where nothing uses the node's alpha. It multiplies encoded values.
+            where nothing uses the node's alpha. Colours are multiplied as stored, before they are
+            converted to linear values.
     """
     import bpy
 
@@ -69,7 +70,7 @@ def file_of(into: Translation, image: Any, associate: bool = False) -> str | Non
 
 
 def _alpha_of(image: Any) -> np.ndarray | None:
-    """Returns the alpha of each pixel if some colours have to be multiplied by it."""
+    """Returns the alpha of each pixel, or None if no colour has to be multiplied by alpha."""
     if image.alpha_mode != "STRAIGHT" or image.channels != 4 or not image.size[0]:
         return None
     pixels = np.empty(4 * image.size[0] * image.size[1], np.float32)
@@ -80,7 +81,7 @@ def _alpha_of(image: Any) -> np.ndarray | None:
 
 def _saved(into: Translation, image: Any, alpha: np.ndarray | None = None) -> str | None:
     if not image.has_data:
-        # Reading a pixel makes Blender load the image.
+        # Blender loads an image when a pixel of the image is read.
         _ = image.pixels[:1] if image.size[0] else None
     if not image.size[0]:
         into.report.miss("image without pixels", image.name)

@@ -187,7 +187,7 @@ def _sun(into: Translation, light: Any, prim: Prim, samples: dict[float, Any]) -
 def _area(into: Translation, light: Any, prim: Prim, samples: dict[float, Any]) -> float:
     """Writes an area light; returns the intensity of one watt.
 
-    The object's scale becomes part of the size, so that the area is that of Cycles.
+    The scale of the object becomes part of the size, so that the area is as in Cycles.
     """
     width = float(light.size)
     height = float(light.size_y) if light.shape in ("RECTANGLE", "ELLIPSE") else width

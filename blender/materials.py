@@ -17,7 +17,7 @@ DEFAULT = f"{OWN}/Default"
 
 
 def write_materials(into: Translation) -> None:
-    """Writes every material of a visible object, and the one of objects without material."""
+    """Writes the materials of all visible objects, and a default for objects without material."""
     default = dict(NEUTRAL, base_color=colour((0.8, 0.8, 0.8)), specular_weight=number(1.0))
     _write(into, DEFAULT, default, None)
     into.layer.over(ROOT).apply("MaterialBindingAPI")
@@ -45,7 +45,7 @@ def _used(into: Translation) -> list[Any]:
 
 
 def write_material(into: Translation, material: Any, path: str) -> None:
-    """Writes one material over the exporter's."""
+    """Writes a material to the correction layer, which overrides the exporter's material."""
     tree = material.node_tree if material.use_nodes else None
     if tree is None:
         base = colour(material.diffuse_color)

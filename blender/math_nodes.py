@@ -101,7 +101,7 @@ def _checker(n: Nodes, node: Any, socket: Any) -> Value | None:
         return None
     g = n.graph
     scaled = g.op("multiply", where, g.to("vector3", n.read(node, "Scale", "float")))
-    # Away from the border of a cell, on which objects often lie.
+    # The lookup is shifted away from the borders of cells, on which surfaces often lie.
     cells = g.node("floor_vector3", "vector3", in_=g.op("add", scaled, vector((1e-6,) * 3)))
     total = g.node("dotproduct_vector3", "float", in1=cells, in2=vector((1, 1, 1)))
     odd = g.node("modulo_float", "float", in1=total, in2=number(2.0))

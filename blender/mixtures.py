@@ -9,7 +9,7 @@ from .nodes import Nodes
 
 
 def mixed(n: Nodes, a: Surface, b: Surface, factor: Value) -> Surface:
-    """Interpolates two surfaces. Exact for one lobe each; otherwise inputs are averaged."""
+    """Interpolates two surfaces: exactly if each has one lobe, else by averaging their inputs."""
     g = n.graph
     rest = g.op("subtract", number(1.0), factor) if factor.constant is None else None
     rest = rest or number(1.0 - factor.constant)
@@ -43,7 +43,7 @@ def _is_thin(one: Surface) -> bool:
 
 
 def _translucency(n: Nodes, a: Surface, b: Surface, factor: Value, rest: Value) -> Surface | None:
-    """Mix of a diffuse and a translucent shader: a thin wall, by its anisotropy."""
+    """Returns a mix of diffuse and translucent shaders as an anisotropic thin wall, or None."""
     thin, solid, share = (a, b, rest) if _is_thin(a) else (b, a, factor)
     if is_zero(thin["subsurface_weight"]) or not is_zero(solid["specular_weight"]):
         return None
@@ -59,9 +59,9 @@ def _translucency(n: Nodes, a: Surface, b: Surface, factor: Value, rest: Value) 
 
 
 def _separate_colours(a: Surface, b: Surface) -> None:
-    """Gives a diffuse surface its colour by the subsurface lobe of radius 0.
+    """Moves the colour of a diffuse surface to the subsurface lobe, with radius 0.
 
-    The base colour is then free for the metal that it is mixed with.
+    The base colour can then hold the colour of the metal that the surface is mixed with.
     """
     for one, other in ((a, b), (b, a)):
         is_metal = other["base_metalness"].constant == 1.0
@@ -80,7 +80,7 @@ def _separate_colours(a: Surface, b: Surface) -> None:
 
 
 def _differs(a: Surface, b: Surface) -> bool:
-    """Returns whether averaging changes more than weights."""
+    """Returns whether two surfaces differ in more than the weights of lobes."""
     weights = {"base_weight", "emission_color", "base_metalness", "transmission_weight"}
     changed = {k for k in a if k in b and a[k] != b[k]} - weights - {"geometry_opacity"}
     if is_zero(a["base_weight"]) or is_zero(b["base_weight"]):

@@ -21,9 +21,9 @@ class Shape:
     """The geometry of an object at one time.
 
     Attributes:
-        topology: Checksum of everything but positions.
+        topology: Checksum of all geometry data except positions.
         content: Checksum of positions.
-        points: Positions, or None where nothing needs them.
+        points: Positions, or None if they are not needed.
     """
 
     topology: int
@@ -33,15 +33,15 @@ class Shape:
 
 @dataclass
 class Sampled:
-    """Motion of a frame.
+    """Samples of moving and deforming objects for one frame.
 
     Attributes:
         frame: Time of the frame.
         matrices: World matrices by object and time.
         local: Matrices relative to the parent, by object and time.
         shapes: Shapes of meshes by object and time.
-        signature: Objects, their data and topology: what the exported geometry depends on.
-        base: Checksum of the positions of each object, and its local matrix, as exported.
+        signature: Value that changes whenever the geometry has to be exported again.
+        base: Checksum of positions and local matrix of each exported object, by object.
         shutter: Opening and closing time relative to the frame; None without motion blur.
     """
 
@@ -146,7 +146,7 @@ def _signature(depsgraph: Any, found: Sampled) -> object:
 
 
 def _drop_still(found: Sampled) -> None:
-    """Reduces what does not move within the shutter to one sample, at the frame."""
+    """Reduces objects that do not move within the shutter interval to a single sample."""
     for table in (found.matrices, found.local):
         for name, samples in table.items():
             if len({_key(matrix) for matrix in samples.values()}) == 1:
@@ -157,7 +157,7 @@ def _drop_still(found: Sampled) -> None:
 
 
 def write_motion(into: Translation, sampled: Sampled, base: dict[str, Any]) -> None:
-    """Writes transforms and points that move, or differ from those of the exported geometry."""
+    """Writes transforms and points that move, or differ from the exported geometry."""
     for name, samples in sampled.local.items():
         thing = into.depsgraph.objects.get(name)
         if thing is None or thing.type in ("CAMERA", "LIGHT"):
@@ -184,7 +184,7 @@ def _write_points(into: Translation, thing: Any, shapes: dict[float, Shape]) -> 
         return
     prim = into.layer.over(data_path(thing))
     prim.sample("point3f[] points", {time: shape.points for time, shape in shapes.items()})
-    # Normals of the exported shape would be wrong for the new points.
+    # The exported normals belong to the old points.
     if any(polygon.use_smooth for polygon in thing.data.polygons[:64]):
         normals = _vertex_normals(thing.data)
         prim.lines.append("normal3f[] normals = None")

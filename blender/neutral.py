@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces as inputs of OpenPBR."""
+"""Representation of surfaces as inputs of OpenPBR."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ NEUTRAL: Surface = {
     "emission_color": BLACK,
     "geometry_opacity": number(1.0),
 }
-"""A white diffuse surface: values that an incomplete surface has."""
+"""A white diffuse surface, whose values are the defaults of other surfaces."""
 
 
 def is_zero(value: Value) -> bool:

@@ -54,7 +54,7 @@ def _coordinates(n: Nodes, node: Any, socket: Any) -> Value | None:
 
 
 def _generated(n: Nodes) -> Value | None:
-    """Returns positions from 0 to 1 in the bounds of the only object with the material."""
+    """Returns generated coordinates, 0 to 1 in the bounds of the object with the material."""
     owners = {
         thing.data.name: thing
         for thing in n.into.scene.objects
@@ -160,7 +160,7 @@ def _normal_map(n: Nodes, node: Any, socket: Any) -> Value | None:
 
 
 def _mix(n: Nodes, node: Any, socket: Any) -> Value | None:
-    """Mix of Blender 3.4 and later; sockets of one name differ by identifier."""
+    """Translates the node Mix, whose sockets of equal name differ by identifier."""
     names = {"FLOAT": "Float", "VECTOR": "Vector", "RGBA": "Color"}
     if node.data_type not in names:
         return None
@@ -204,7 +204,7 @@ def _blended(n: Nodes, blend: str, a: Value, b: Value, factor: Value, clamp: boo
 
 
 def _ramp(n: Nodes, node: Any, socket: Any) -> Value | None:
-    """Color ramp, looked up in an image of 1024 texels."""
+    """Translates the node Color Ramp to a lookup in an image of 1024 texels."""
     at = n.graph.clamped(n.read(node, "Fac", "float"))
     ramp = node.color_ramp
     if at.constant is not None:
@@ -227,7 +227,7 @@ def _ramp(n: Nodes, node: Any, socket: Any) -> Value | None:
 
 
 def _ramp_file(n: Nodes, node: Any) -> str:
-    """Writes a ramp as a floating-point image."""
+    """Writes a colour ramp as a floating-point image."""
     file = n.into.file(f"ramp-{safe_name(n.owner)}-{safe_name(node.name)}.exr")
     rows = [tuple(node.color_ramp.evaluate(i / 1023.0))[:3] for i in range(1024)]
     texels = np.array(rows, np.float32)

@@ -22,8 +22,8 @@ class Nodes:
     """Translates the nodes of one material.
 
     Attributes:
-        into: The translation.
-        graph: Nodes that were made.
+        into: State of the scene translation.
+        graph: MaterialX nodes of the material.
         owner: Name of the material, for messages.
         normal: Shading normal that the surface's normal input gave, if any.
     """
@@ -85,7 +85,7 @@ class Nodes:
         return None
 
     def _group(self, node: Any, socket: Any) -> Value | None:
-        """Continues inside a group."""
+        """Returns the value of an output of a node group, from the nodes inside the group."""
         if node.node_tree is None:
             return None
         output = next((n for n in node.node_tree.nodes if n.type == "GROUP_OUTPUT"), None)
@@ -101,7 +101,7 @@ class Nodes:
             self._groups.pop()
 
     def _group_input(self, socket: Any) -> Value | None:
-        """Continues outside of the group."""
+        """Returns the value of an input of a node group, from the nodes outside of the group."""
         if not self._groups:
             return None
         group = self._groups.pop()
@@ -112,7 +112,7 @@ class Nodes:
             self._groups.append(group)
 
     def shader(self, socket: Any) -> tuple[Any, list[Any]] | None:
-        """Returns the shader node that drives a socket, with the groups around it."""
+        """Returns the shader node that drives a socket, with the enclosing groups of the node."""
         link = next((link for link in socket.links if link.is_valid and not link.is_muted), None)
         if link is None:
             return None
@@ -133,13 +133,13 @@ class Nodes:
         return node, list(self._groups)
 
     def within(self, groups: list[Any]) -> None:
-        """Sets the groups around the nodes that are read next."""
+        """Sets the enclosing groups of the nodes that are translated next."""
         self._groups = list(groups)
 
     def miss(self, feature: str) -> None:
-        """Reports a feature without effect."""
+        """Reports a feature of the material that has no effect."""
         self.into.report.miss(feature, self.owner)
 
     def approximate(self, feature: str) -> None:
-        """Reports an approximated feature."""
+        """Reports a feature of the material that is approximated."""
         self.into.report.approximate(feature, self.owner)

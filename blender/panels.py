@@ -31,21 +31,21 @@ class _Panel:
 
 
 class WAVECOMB_PT_sampling(_Panel, bpy.types.Panel):
-    """Samples and when to stop."""
+    """Panel of sampling and noise settings."""
 
     bl_label = "Sampling"
     rows = ("spp", "noise", "time_limit", "denoise", "seed")
 
 
 class WAVECOMB_PT_light_paths(_Panel, bpy.types.Panel):
-    """Light paths."""
+    """Panel of light transport settings."""
 
     bl_label = "Light Paths"
     rows = ("max_depth", "guiding", "transport", "clamp_indirect", "firefly", "lights")
 
 
 class WAVECOMB_PT_film(_Panel, bpy.types.Panel):
-    """Film and motion."""
+    """Panel of film and motion blur settings."""
 
     bl_label = "Film"
     rows = ("filter", "steps")
@@ -62,7 +62,7 @@ class WAVECOMB_PT_film(_Panel, bpy.types.Panel):
 
 
 class WAVECOMB_PT_performance(_Panel, bpy.types.Panel):
-    """Performance and further options."""
+    """Panel of threads and further command-line options."""
 
     bl_label = "Performance"
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
@@ -82,7 +82,7 @@ _HIDDEN = frozenset(
 
 
 def _common() -> Iterator[Any]:
-    """Yields panels of Blender, and those of Cycles' lights and world, that apply here as well."""
+    """Yields the panels of Blender that also apply to Wavecomb."""
     for kind in bpy.types.Panel.__subclasses__():
         engines = getattr(kind, "COMPAT_ENGINES", None)
         if engines is None or kind.__name__ in _HIDDEN:
@@ -92,7 +92,7 @@ def _common() -> Iterator[Any]:
 
 
 def show_common() -> None:
-    """Shows Blender's own panels for this engine."""
+    """Shows Blender's own panels if Wavecomb is the render engine."""
     for kind in _common():
         kind.COMPAT_ENGINES.add("WAVECOMB")
 

@@ -64,8 +64,8 @@ PASSES = (
     Pass("TransCol", "use_pass_transmission_color", "RGB", "", ("1", "1", "1"), "COLOR"),
     _rgb("Denoising Albedo", "wavecomb_albedo", "albedo", "albedo"),
 )  # fmt: skip
-"""Passes of light hold it with the surface's colour; colour passes are white, so that Blender's
-sums of products stay right."""
+"""Supported passes. Light passes include the colour of the surface, so colour passes are white:
+the sum of the products of light and colour passes still gives the image."""
 
 CRYPTOMATTE = (
     ("use_pass_cryptomatte_object", "crypto_object", "CryptoObject"),
@@ -75,7 +75,7 @@ CRYPTOMATTE = (
 
 
 def wanted(view_layer: Any, denoise: bool) -> Iterator[Pass]:
-    """Yields the passes that a view layer has, besides Combined."""
+    """Yields the passes that a view layer enables, without the pass Combined."""
     for one in PASSES:
         if one.name == "Denoising Albedo":
             cycles = getattr(view_layer, "cycles", None)

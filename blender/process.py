@@ -18,17 +18,17 @@ _FOUND: dict[str, tuple[str, str]] = {}
 
 
 class WavecombError(Exception):
-    """Wavecomb could not be started or failed; the message is one line."""
+    """Raised if Wavecomb cannot be started or fails; the message is one line."""
 
 
 def locate(wanted: str) -> tuple[str, str]:
-    """Returns Wavecomb's Python and its module that starts isolated processes.
+    """Returns Wavecomb's Python interpreter and the module that starts isolated processes.
 
     Args:
         wanted: Program ``wavecomb`` or its Python; empty searches PATH.
 
     Raises:
-        WavecombError: It was not found, or it does not start.
+        WavecombError: Wavecomb was not found, or does not start.
     """
     program = shutil.which(wanted or "wavecomb")
     if program is None:
@@ -76,10 +76,10 @@ class Render:
     """A running ``wavecomb render``."""
 
     def __init__(self, program: str, arguments: Sequence[str]) -> None:
-        """Starts it; it ends with this process.
+        """Starts the render, which ends when this process ends.
 
         Raises:
-            WavecombError: It could not be started.
+            WavecombError: The render could not be started.
         """
         python, boot = locate(program)
         words = [python, "-I", boot, f"--parent={os.getpid()}", "wavecomb", "render", *arguments]
@@ -110,7 +110,7 @@ class Render:
                 self._events.put(event)
 
     def event(self, wait_s: float) -> dict[str, Any] | None:
-        """Returns the next progress event; None if there is none within ``wait_s``."""
+        """Returns the next progress event, or None if no event arrives within ``wait_s``."""
         try:
             return self._events.get(timeout=wait_s)
         except queue.Empty:
@@ -118,16 +118,16 @@ class Render:
 
     @property
     def is_running(self) -> bool:
-        """Whether the process has not ended, or events of it are left."""
+        """Whether the process is running, or has events that were not read."""
         return self._process.poll() is None or not self._events.empty()
 
     def stop(self) -> None:
-        """Asks it to stop, which keeps the samples so far; kills it if it does not."""
+        """Asks the render to stop, which keeps the finished samples."""
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGTERM)
 
     def kill(self) -> None:
-        """Kills it with its children."""
+        """Kills the render process and its child processes."""
         if self._process.poll() is None:
             try:
                 os.killpg(self._process.pid, signal.SIGKILL)
@@ -136,10 +136,10 @@ class Render:
             self._process.wait()
 
     def finish(self) -> list[str]:
-        """Waits for the end; returns warnings.
+        """Waits for the end of the render; returns its warnings.
 
         Raises:
-            WavecombError: It failed; the message is its last line.
+            WavecombError: The render failed; the message is its last line of output.
         """
         code = self._process.wait()
         self._reader.join(timeout=10.0)

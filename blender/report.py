@@ -5,7 +5,7 @@ from __future__ import annotations
 
 
 class Report:
-    """Collects messages, each once, in the order in which they came.
+    """Collects messages, each once, in the order of their arrival.
 
     Attributes:
         missing: Features that have no effect in the render.
@@ -31,7 +31,7 @@ class Report:
             owners.append(owner)
 
     def lines(self) -> list[str]:
-        """Returns one line per feature, with the names of its owners."""
+        """Returns one line per feature, with the names of the data-blocks that use the feature."""
         found = []
         for word, table in (("not supported", self.missing), ("approximated", self.near)):
             for feature, owners in table.items():

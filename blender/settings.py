@@ -102,13 +102,13 @@ class WavecombPreferences(bpy.types.AddonPreferences):
 
 
 def preferences() -> Any:
-    """Returns the preferences; defaults if the extension runs outside of Blender's list."""
+    """Returns the preferences; None if Blender does not list the extension."""
     found = bpy.context.preferences.addons.get(__package__ or "")
     return found.preferences if found is not None else None
 
 
 def program() -> str:
-    """Returns the program that the preferences, or the variable WAVECOMB, name."""
+    """Returns the program ``wavecomb`` of the preferences, or else of the variable WAVECOMB."""
     import os
 
     chosen = preferences()

@@ -13,7 +13,7 @@ from .nodes import Nodes
 
 
 def surface_of(n: Nodes, socket: Any) -> Surface | None:
-    """Returns the surface that drives a shader socket; None if nothing does."""
+    """Returns the surface that drives a shader socket; None if nothing drives the socket."""
     found = n.shader(socket)
     if found is None:
         return None
@@ -71,7 +71,7 @@ def _principled(n: Nodes, node: Any) -> Surface:
 
 
 def _specular(n: Nodes, node: Any, found: Surface) -> None:
-    """Specular IOR Level scales the reflectance at normal incidence; 0.5 leaves it."""
+    """Translates Specular IOR Level, which scales reflectance at normal incidence (0.5: by 1)."""
     ior = n.read(node, "IOR", "float")
     level = n.read(node, "Specular IOR Level", "float")
     found["specular_weight"] = number(1.0)
@@ -99,8 +99,8 @@ def _anisotropy(n: Nodes, node: Any, found: Surface) -> None:
     if amount.constant is None:
         n.miss("anisotropy by a node")
         return
-    # Blender: aspect = sqrt(1 - 0.9 a), alpha along = alpha / aspect, across = alpha * aspect.
-    # OpenPBR: ratio across to along is 1 - anisotropy, their mean square is alpha squared.
+    # Blender has alpha_x = alpha / aspect and alpha_y = alpha * aspect, with aspect = sqrt(1 - 0.9
+    # a). OpenPBR has alpha_y / alpha_x = 1 - anisotropy and (alpha_x^2 + alpha_y^2) / 2 = alpha^2.
     aspect = (1.0 - 0.9 * min(max(amount.constant, 0.0), 1.0)) ** 0.5
     ratio = aspect * aspect
     found["specular_roughness_anisotropy"] = number(1.0 - ratio)
@@ -122,7 +122,7 @@ def _transmission(n: Nodes, node: Any, found: Surface, base: Value) -> None:
 
 
 def _root(n: Nodes, value: Value) -> Value:
-    """Square root of a colour: light enters and leaves glass through two surfaces."""
+    """Returns the square root of a colour, since light crosses two surfaces of glass."""
     if value.constant is not None:
         return colour([max(v, 0.0) ** 0.5 for v in value.constant])
     return n.graph.node("power_color3FA", "color3", in1=value, in2=number(0.5))
@@ -170,7 +170,7 @@ def _film(n: Nodes, node: Any, found: Surface) -> None:
     if is_zero(thickness):
         return
     found["thin_film_weight"] = number(1.0)
-    # Nanometres to micrometres.
+    # Blender's thickness is in nanometres, and OpenPBR's is in micrometres.
     found["thin_film_thickness"] = n.graph.op("multiply", thickness, number(1e-3))
     if thickness.constant is not None:
         found["thin_film_thickness"] = number(thickness.constant * 1e-3)
@@ -253,7 +253,7 @@ def _transparent(n: Nodes, node: Any) -> Surface:
         found["geometry_opacity"] = number(1.0 - tint.constant[0])
         return found
     n.approximate("coloured Transparent BSDF (its shadow is opaque)")
-    # A thin wall without an interface that transmits the tint.
+    # The result is a thin wall without reflection that transmits the tint.
     found |= {"transmission_weight": number(1.0), "transmission_color": tint}
     found |= {"specular_weight": number(0.0), "specular_roughness": number(0.0)}
     found["geometry_thin_walled"] = number(1.0)

@@ -11,11 +11,11 @@ import numpy as np
 
 
 class Asset(str):
-    """A file name, written between at signs."""
+    """A file name, which USD text encloses in at signs (@)."""
 
 
 class Path(str):
-    """A path of a prim or property, written between angle brackets."""
+    """A path of a prim or property, which USD text encloses in angle brackets."""
 
 
 def text_of(value: Any) -> str:
@@ -90,7 +90,7 @@ class Prim:
         self.metadata.append(f"prepend apiSchemas = {text_of(list(schemas))}")
 
     def transform(self, samples: Mapping[float, Any]) -> None:
-        """Replaces the transform by matrices of Blender, by time."""
+        """Replaces the transform of the prim by Blender's matrices, given by time."""
         rows = {time: matrix_rows(matrix) for time, matrix in samples.items()}
         self.sample("matrix4d xformOp:transform", rows)
         self.lines.append('uniform token[] xformOpOrder = ["xformOp:transform"]')
@@ -120,7 +120,7 @@ class Layer:
         return self._at(path)
 
     def define(self, path: str, kind: str = "") -> Prim:
-        """Returns the specification at a path as a definition of a type.
+        """Returns the specification at a path, as a definition of the prim type ``kind``.
 
         Outside of the exporter's prims, missing ancestors become scopes: a prim below an
         undefined one is not traversed.
@@ -159,9 +159,9 @@ class Layer:
 
 
 def safe_name(name: str) -> str:
-    """Returns the prim name that Blender's exporter makes of a name, without Unicode.
+    """Returns the prim name that Blender's exporter gives to an object, without Unicode.
 
-    Each byte that an identifier cannot have becomes an underscore.
+    Each byte that is not allowed in an identifier becomes an underscore.
     """
     data = name.encode() or b"_"
     letters = [chr(b) if chr(b).isascii() and (chr(b).isalnum() or b == 95) else "_" for b in data]

@@ -12,13 +12,13 @@ SHAPES = {"MESH", "CURVE", "SURFACE", "FONT", "META", "CURVES", "POINTCLOUD", "V
 
 
 def write_visibility(into: Translation) -> None:
-    """Writes attributes of objects that some rays do not see, or that are holdouts."""
+    """Writes attributes of holdouts, and of objects that are hidden from some rays."""
     _hide_originals(into)
     for thing in into.depsgraph.objects:
         if thing.type not in SHAPES or thing.data is None:
             continue
-        # Flags of Blender are not inherited by children, while those of USD are. The shapes of
-        # instances cannot be overridden.
+        # Children inherit visibility attributes in USD, but not in Blender, so the attributes of an
+        # object with children are written to its data. Data of instances cannot be overridden.
         path = data_path(thing) if thing.children else object_path(thing)
         flags = _flags(into, thing)
         if thing.is_shadow_catcher:
@@ -35,8 +35,8 @@ def write_visibility(into: Translation) -> None:
 
 
 def _hide_originals(into: Translation) -> None:
-    """Removes objects that their parent instances; the exporter writes the original as well."""
-    # The render's depsgraph does not list them.
+    """Hides objects that their parent instances, since the exporter also writes the originals."""
+    # The objects of the depsgraph do not include these originals.
     for thing in into.depsgraph.scene.objects:
         if thing.parent is None or thing.parent.instance_type not in ("VERTS", "FACES"):
             continue
@@ -44,7 +44,7 @@ def _hide_originals(into: Translation) -> None:
         if into.instancing:
             hidden.metadata.append("active = false")
         else:
-            # Instances refer to the shape below the original.
+            # The original is not deactivated, since instances refer to its data.
             hidden.set("token visibility", "invisible")
 
 

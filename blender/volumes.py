@@ -13,7 +13,7 @@ Colour = tuple[float, float, float]
 
 
 def write_volume(n: Nodes, socket: Any, path: str, surface: Surface | None) -> None:
-    """Writes a volume shader; beside glass, its medium."""
+    """Writes a volume shader, or the medium of glass if the material has a surface."""
     found = n.shader(socket)
     if found is None:
         return
@@ -108,7 +108,7 @@ def _define(
         volume.connect("token inputs:edf", f"{path}/WavecombEdf.outputs:out")
     volume.lines.append("token outputs:out")
     material.connect("token outputs:mtlx:volume", f"{path}/WavecombVolume.outputs:out")
-    # The exporter's own surface would otherwise hide the medium.
+    # The surface that the exporter wrote would hide the medium, so it is disconnected.
     material.lines.append("token outputs:surface.connect = None")
 
 

@@ -19,7 +19,7 @@ AXES = Matrix(((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))).to_4x4()
 
 
 def write_world(into: Translation) -> None:
-    """Writes the world of the scene; none means black."""
+    """Writes the world of the scene; a scene without a world is black."""
     world = into.scene.world
     prim = into.layer.define(DOME, "DomeLight")
     if world is None:
@@ -71,7 +71,7 @@ def _surface(into: Translation, world: Any, prim: Any, node: Any) -> None:
 
 
 def _image(into: Translation, prim: Any, node: Any) -> bool:
-    """Writes an equirectangular image; returns whether the node is one that a dome can show."""
+    """Writes an environment image; returns whether a dome light can represent the node."""
     if node.projection != "EQUIRECTANGULAR" or node.image is None:
         return False
     turn = _turn(node.inputs["Vector"])
@@ -88,7 +88,7 @@ def _image(into: Translation, prim: Any, node: Any) -> bool:
 
 
 def _turn(socket: Any) -> Any:
-    """Returns the rotation from a direction to the one that is looked up; None if not rigid."""
+    """Returns the rotation of the texture coordinates; None if the mapping is not a rotation."""
     if not socket.links:
         return Matrix.Identity(3)
     source = socket.links[0].from_node

@@ -4,8 +4,8 @@
 #
 # OpenSubdiv_ROOT: an additional folder to search.
 # OpenSubdiv_NEEDS_OPENMP: set if the library is linked with libgomp.
-# OpenSubdiv_SOURCE: folder of its sources. The required parts are then compiled with Wavecomb's
-# flags, for another CPU or standard library than the distribution's.
+# OpenSubdiv_SOURCE: folder of OpenSubdiv's sources. If set, the required parts of OpenSubdiv are
+# compiled with Wavecomb's flags, for another CPU or standard library than the distribution's.
 
 # _osd_version(FOLDER): sets OpenSubdiv_VERSION from the headers in FOLDER.
 function(_osd_version folder)
@@ -22,7 +22,7 @@ if(OpenSubdiv_SOURCE)
   target_include_directories(wavecomb_opensubdiv SYSTEM PUBLIC "${OpenSubdiv_SOURCE}")
   target_compile_features(wavecomb_opensubdiv PUBLIC cxx_std_14)
   target_compile_options(wavecomb_opensubdiv PRIVATE -w)
-  # An imported target, so that exported targets refer to it by this name.
+  # An imported target, so that exported targets refer to OpenSubdiv by the same name.
   add_library(OpenSubdiv::osdCPU INTERFACE IMPORTED)
   set_target_properties(OpenSubdiv::osdCPU PROPERTIES INTERFACE_LINK_LIBRARIES wavecomb_opensubdiv)
   set(OpenSubdiv_LIBRARY wavecomb_opensubdiv)

@@ -30,8 +30,8 @@ foreach(program IN LISTS program_headers)
       "(src/wavecomb/material/description/programs.h) has no row for it")
   endif()
 endforeach()
-# Programs of media: rows of WAVECOMB_MEDIUM_PROGRAMS, "M(name, Class, ...)". These kernels have no
-# separate compilation units.
+# Programs of media: rows of WAVECOMB_MEDIUM_PROGRAMS, "M(name, Class, ...)". Kernels of
+# media have no separate compilation units.
 wavecomb_read_rows(media material/description/programs.h " M\\([a-z_0-9]+, ")
 list(TRANSFORM media REPLACE "^.*\\(([a-z_0-9]+), $" "\\1")
 # Variants as "name:program": first the full programs, then rows of WAVECOMB_VARIANTS, "X(name,
@@ -44,8 +44,8 @@ list(APPEND variants ${reduced})
 set(lane_sources ${core_sources})
 list(FILTER lane_sources INCLUDE REGEX "\\.lanes\\.cpp$")
 list(FILTER core_sources EXCLUDE REGEX "\\.lanes\\.cpp$|/render/lane_kernels\\.cpp$")
-# Sources excluded from unity batches (WAVECOMB_BATCH), because they reuse local names of others:
-# lights, bare_traversal.cpp and ears.cpp.
+# Sources excluded from unity batches (WAVECOMB_BATCH), because their local names collide with names
+# in other sources: lights, bare_traversal.cpp and ears.cpp.
 file(GLOB alone "${PROJECT_SOURCE_DIR}/src/wavecomb/light/kinds/*.cpp" "${PROJECT_SOURCE_DIR}/src/wavecomb/light/filters/*.cpp")
 list(APPEND alone "${PROJECT_SOURCE_DIR}/src/wavecomb/accel/bare_traversal.cpp" "${PROJECT_SOURCE_DIR}/src/wavecomb/geometry/tessellation/ears.cpp")
 set(refiner "${PROJECT_SOURCE_DIR}/src/wavecomb/geometry/tessellation/subdivision.cpp")
@@ -54,9 +54,9 @@ if(WAVECOMB_SANITIZE)
   # Sanitizers triple the time to optimise OpenSubdiv's templates.
   set_source_files_properties(${refiner} PROPERTIES COMPILE_OPTIONS -O0 SKIP_PRECOMPILE_HEADERS ON)
 endif()
-# Sources whose speed no render notices (descriptions, checks, tables, the plan of a render) are
-# compiled with -O1, which takes a compiler two thirds of the time. Sources with loops over
-# vertices, texels, pixels or training samples are excepted.
+# Sources that take a negligible part of the render time (descriptions, checks, tables, the plan of
+# a render) are compiled with -O1, in two thirds of the compile time. Sources with loops over
+# vertices, texels, pixels or training samples keep full optimisation.
 set(cold ${core_sources})
 list(FILTER cold INCLUDE REGEX
   "/src/wavecomb/(core|scene|render|(light|material|medium)/description|light/(tree|calibration)|geometry/mesh|graph/parameters|light_paths/render)/([a-z_]+/)?[a-z_]+\\.cpp$")
@@ -75,7 +75,8 @@ list(APPEND cold ${refiner} "${PROJECT_SOURCE_DIR}/src/wavecomb/light_paths/setu
 list(REMOVE_ITEM core_sources ${cold})
 file(GLOB_RECURSE core_headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/*.h"
   "${PROJECT_SOURCE_DIR}/src/wavecomb/*.inl")
-# For the core only. -Wconversion would also warn about int to float, which is common in kernels.
+# Warnings for the core only. -Wconversion would also warn about conversions from int to float,
+# which are common in kernels.
 set(core_warnings -Wfloat-conversion)
 
 # Third-party headers that nearly every unit includes. Parsing them is half of the compile time of a
@@ -115,8 +116,8 @@ function(wavecomb_kernel_units var kind set width)
 endfunction()
 
 # wavecomb_lane_units(VAR WIDTH WIDEST REDUCED): generates the units for WIDTH lanes in a build
-# whose widest lanes are WIDEST: those of WAVECOMB_KERNELS (with its column `reduced` if REDUCED),
-# and one for each *.lanes.cpp. Units of different widths differ in WAVECOMB_LANES.
+# whose widest lanes are WIDEST: the units of WAVECOMB_KERNELS (with its column `reduced` if
+# REDUCED), and one unit for each *.lanes.cpp. Units of different widths differ in WAVECOMB_LANES.
 function(wavecomb_lane_units var width widest reduced)
   set(all "")
   foreach(row IN LISTS kernels)
@@ -155,7 +156,8 @@ function(wavecomb_lane_units var width widest reduced)
 endfunction()
 
 # wavecomb_add_core(NAME FLAGS [STATIC]): adds the library NAME, compiled with FLAGS from
-# wavecomb_add_flags. It always contains scalar units, whose kernels the reference integrator uses.
+# wavecomb_add_flags. The library always contains scalar units, whose kernels the reference
+# integrator uses.
 function(wavecomb_add_core name flags)
   add_library(${name} ${ARGN} ${core_sources} ${core_headers})
   target_compile_features(${name} PUBLIC cxx_std_20)
@@ -167,7 +169,7 @@ function(wavecomb_add_core name flags)
     OpenSubdiv::osdCPU)
   get_target_property(widths ${flags} WAVECOMB_WIDTHS)
   set_target_properties(${name} PROPERTIES UNITY_BUILD ${WAVECOMB_BATCH} UNITY_BUILD_BATCH_SIZE 10
-    DEFINE_SYMBOL "")  # as other precompiled headers are compiled
+    DEFINE_SYMBOL "")  # so that precompiled headers of other targets match
   set(cold_target ${name}_cold)
   add_library(${cold_target} OBJECT ${cold})
   target_include_directories(${cold_target} PRIVATE "${PROJECT_SOURCE_DIR}/src")
@@ -180,7 +182,7 @@ function(wavecomb_add_core name flags)
   if(WAVECOMB_SANITIZE)
     target_precompile_headers(${name} REUSE_FROM ${cold_target})
   else()
-    # GCC 12 fails where a precompiled header of -O1 is used with -O3.
+    # GCC 12 fails if a header that was precompiled with -O1 is used with -O3.
     target_precompile_headers(${name} PRIVATE ${wavecomb_pch})
   endif()
   set_target_properties(${cold_target} PROPERTIES UNITY_BUILD ${WAVECOMB_BATCH} UNITY_BUILD_BATCH_SIZE 10)

@@ -52,7 +52,8 @@ else()
   set(WAVECOMB_EMBREE_IS_STAGED FALSE)
 endif()
 
-# Debug builds use the release library too. Embree loads that one, and a process needs a single one.
+# Debug builds also use oneTBB's release library, since Embree loads it, and a process needs a
+# single copy of oneTBB.
 set(TBB_FIND_RELEASE_ONLY ON)
 if(WAVECOMB_EMBREE_IS_STAGED)
   find_package(TBB CONFIG QUIET COMPONENTS tbb PATHS "${_hint_tbb}" NO_DEFAULT_PATH)
@@ -74,7 +75,7 @@ else()
   set(WAVECOMB_TBB_IS_WHEEL FALSE)
 endif()
 
-# Uses Far and Sdc of OpenSubdiv, not its evaluators or OpenGL.
+# Wavecomb uses Far and Sdc of OpenSubdiv, not its evaluators or OpenGL.
 list(APPEND CMAKE_MODULE_PATH "${PROJECT_SOURCE_DIR}/cmake")
 find_package(OpenSubdiv 3.4 MODULE QUIET)
 if(NOT OpenSubdiv_FOUND)

@@ -10,20 +10,21 @@ include(CheckCXXSourceCompiles)
 set(WAVECOMB_LANE_WIDTHS "" CACHE STRING
   "Lane widths to build, of 1;4;8;16 (default: 1 and the widest that the target has); all: every width it has")
 
-# Options for every instruction set.
+# Compile options for every instruction set.
 add_library(wavecomb_common INTERFACE)
 target_compile_features(wavecomb_common INTERFACE cxx_std_20)
 target_compile_options(wavecomb_common INTERFACE
   -ffp-contract=off -fno-strict-aliasing -fno-math-errno -fno-trapping-math
   -Wall -Wextra -Wpedantic $<$<CXX_COMPILER_ID:GNU>:-Wshadow=local> -Wnon-virtual-dtor -Woverloaded-virtual -Wextra-semi -Wno-psabi
-  # Masks of scalar lanes are bool.
+  # Masks of scalar lanes are of type bool, and kernels combine masks by & and |.
   $<$<CXX_COMPILER_ID:Clang,AppleClang>:-Wno-bitwise-instead-of-logical>
   # Once inlined, GCC 12's own intrinsics cause false warnings of uninitialized and out-of-bounds
   # vectors.
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-maybe-uninitialized;-Wno-uninitialized;-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>
   $<$<BOOL:${WAVECOMB_WERROR}>:-Werror>)
-# Checks of every reference and of every scope double the compile time of kernels and containers,
-# and quadruple that of packets. WAVECOMB_SANITIZE=all, as in `make test-long`, enables them.
+# Sanitizer checks of every reference and of every scope double the compile time of kernels and
+# containers, and quadruple the compile time of packets. WAVECOMB_SANITIZE=all, as in `make
+# test-long`, enables them.
 if(WAVECOMB_SANITIZE)
   if(WAVECOMB_SANITIZE STREQUAL "thread")
     set(_sanitize -fsanitize=thread -fno-omit-frame-pointer)
@@ -101,8 +102,8 @@ function(wavecomb_add_flags name arch)
   endif()
   target_compile_definitions(${name} INTERFACE WAVECOMB_MAX_LANES=${most}
     WAVECOMB_REDUCED_KERNELS=${reduced})
-  # Only for units that list the widths. Other units compile to the same objects for any set of
-  # widths.
+  # Only units that list the lane widths use these definitions. All other units compile to the same
+  # objects for any set of widths.
   add_library(${name}_widths INTERFACE)
   foreach(width IN LISTS widths)
     target_compile_definitions(${name}_widths INTERFACE WAVECOMB_HAS_LANES_${width}=1)

@@ -30,12 +30,13 @@ if(NOT WAVECOMB_HAS_CPU_LEVELS)
     "x86-64-v2 to x86-64-v4 (__builtin_cpu_supports); take GCC 12 or newer.")
 endif()
 
-# wavecomb._cpu runs on every CPU: compiler's baseline, Python's C API, no library but libc.
+# wavecomb._cpu runs on every CPU, since it is compiled for the compiler's baseline instruction set
+# and uses only Python's C API and libc.
 Python_add_library(wavecomb_cpu MODULE "${PROJECT_SOURCE_DIR}/bindings/cpu/cpu.cpp")
 target_compile_definitions(wavecomb_cpu PRIVATE Py_LIMITED_API=0x030A0000)
 target_link_libraries(wavecomb_cpu PRIVATE wavecomb_common)
 if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
-  # It calls no libc function, but auditwheel needs the dependency to determine the libc.
+  # wavecomb._cpu calls no libc function, but auditwheel determines the libc from this dependency.
   target_link_libraries(wavecomb_cpu PRIVATE "-Wl,--push-state,--no-as-needed" -l:libc.so.6 "-Wl,--pop-state")
 endif()
 set_target_properties(wavecomb_cpu PROPERTIES OUTPUT_NAME _cpu CXX_VISIBILITY_PRESET hidden

@@ -11,8 +11,8 @@ execute_process(COMMAND "${Python_EXECUTABLE}" -m nanobind --cmake_dir
 find_package(nanobind CONFIG REQUIRED)
 
 # A stable-ABI module serves every Python from 3.10, with nanobind in the wheel nanobind-backend.
-# With libc++ this works on macOS only (see nb_defs.h). Elsewhere nanobind is linked statically, for
-# the current Python version only.
+# With libc++ a stable-ABI module works on macOS only (see nb_defs.h). With libc++ on other systems,
+# nanobind is linked statically, for the current Python version only.
 check_cxx_source_compiles("#include <version>
 #ifndef _LIBCPP_VERSION
 #error no
@@ -57,7 +57,8 @@ set(_osd_link "")
 if(OpenSubdiv_NEEDS_OPENMP AND CMAKE_SYSTEM_NAME STREQUAL "Linux")
   execute_process(COMMAND "${CMAKE_CXX_COMPILER}" -print-file-name=libgomp.so.1
     OUTPUT_VARIABLE _gomp_library OUTPUT_STRIP_TRAILING_WHITESPACE)
-  # A direct dependency uses our rpath. OpenSubdiv then finds the runtime already loaded.
+  # As a direct dependency of the module, the OpenMP runtime is found by the module's rpath, and is
+  # already loaded when OpenSubdiv needs it.
   set(_osd_link "-Wl,--push-state,--no-as-needed" gomp "-Wl,--pop-state")
 endif()
 
@@ -68,8 +69,7 @@ function(wavecomb_add_module name core flags folder)
   target_compile_definitions(${name} PRIVATE WAVECOMB_VERSION="${PROJECT_VERSION}")
   target_link_libraries(${name} PRIVATE ${core} ${flags} TBB::tbb ${_osd_link})
   target_precompile_headers(${name} PRIVATE ${wavecomb_pch} <nanobind/nanobind.h> <nanobind/ndarray.h>)
-  # Export only the entry point. Otherwise other libraries could bind to code for this instruction
-  # set.
+  # Export only the entry point, so that no other library binds to code for this instruction set.
   if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
     target_link_options(${name} PRIVATE "-Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/python_exports.map")
     set_property(TARGET ${name} APPEND PROPERTY LINK_DEPENDS "${PROJECT_SOURCE_DIR}/cmake/python_exports.map")

@@ -183,8 +183,8 @@ class LoadOptions:
         "choice", "--lights", choices=LIGHT_SHAPES, unset="visible",
     )  # fmt: skip
     shutter: tuple[float, float] | None = _row(
-        None, "Opening and closing time of the shutter, in time codes from the frame.", "pair",
-        "--shutter", metavar="OPEN CLOSE", unset="the camera's",
+        None, "Opening and closing time of the shutter, in time codes relative to the frame.",
+        "pair", "--shutter", metavar="OPEN CLOSE", unset="the camera's",
     )  # fmt: skip
     motion_blur: bool | None = _row(None, "Render without motion blur.", "not", "--no-motion-blur")
     motion_steps: int | None = _row(
@@ -214,7 +214,7 @@ class LoadOptions:
         "--camera-exposure", unset="on",
     )  # fmt: skip
     depth_of_field: bool | None = _row(
-        None, "Whether to render depth of field, by the camera's fStop.", "switch",
+        None, "Whether to render depth of field as defined by the camera's fStop.", "switch",
         "--depth-of-field", unset="unless the render settings disable it",
     )  # fmt: skip
     lens_settings: Mapping[str, str] | None = _row(
@@ -249,7 +249,8 @@ class LoadOptions:
     )  # fmt: skip
     catch: str = _row(
         "through",
-        "Pass of a render with shadow catchers for which the stage is loaded.",
+        "Which render of a stage with shadow catchers to load: the image, or the catchers with or "
+        "without other objects.",
         "choice",
         choices=CATCH,
     )
@@ -274,8 +275,8 @@ class LoadOptions:
     )  # fmt: skip
     subdivision: str | int = _row(
         "auto",
-        "Refinement of subdivision surfaces: off for polygons, LEVEL times (0 to 10), or auto, "
-        "by their size in the image.",
+        "Refinement of subdivision surfaces: off, LEVEL times (0 to 10), or auto, by their size "
+        "in the image.",
         "text", "--subdivision", metavar="off|LEVEL|auto", unset="auto",
     )  # fmt: skip
     strand_pixels: float = _row(

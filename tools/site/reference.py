@@ -64,7 +64,7 @@ def table(head: Sequence[str], body: Iterable[Sequence[str]]) -> str:
 
 
 def bounds(least: float | None, most: float | None) -> str:
-    """Format the bounds that are given."""
+    """Format the range of a number; None means that there is no bound."""
     ends = [f"{end:.10g}" if end is not None and abs(end) < 1e30 else "" for end in (least, most)]
     if ends[0] and ends[1]:
         return f"{ends[0]} to {ends[1]}"

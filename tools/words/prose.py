@@ -28,7 +28,7 @@ COMMENT_HASH = re.compile(r"^\s*#(?!!)[#:]*(.*)$")
 TRAILING_HASH = re.compile(r"^(.*?\S)\s{2,}# (.*)$")
 STRINGS = r'(?:[fr]?"(?:[^"\\\n]|\\.)*"\s*)+'
 HELP_POSITIONS = {"option": 2, "_row": 1, "Row": 0}
-"""Functions of Python -> position of their help text."""
+"""Names of Python functions -> position of the help text in their arguments."""
 LITERALS = re.compile(STRINGS)
 NO_PROSE = re.compile(
     r"SPDX-License|^\s*(?:noqa|fmt:|type:|clang-format|pragma|namespace )|^[-=\s]*$|^-{3,} "
@@ -41,12 +41,12 @@ LINKS_IN_BRACKETS = re.compile(rf"\s*\({LINK.pattern}(?:,\s+{LINK.pattern})*\)")
 
 @functools.lru_cache(maxsize=1)
 def nodes_of(text: str) -> list[ast.AST]:
-    """Nodes of the syntax tree of Python code. Raises SyntaxError."""
+    """Returns the nodes of the syntax tree of Python code. Raises SyntaxError."""
     return list(ast.walk(ast.parse(text)))
 
 
 def comments(text: str, whole: re.Pattern[str], trailing: re.Pattern[str]) -> Iterator[Text]:
-    """Blocks of consecutive comment lines, and comments behind code with their continuation."""
+    """Yields blocks of comment lines, and comments behind code with their continuation lines."""
     block: list[str] = []
     start, behind_at = 0, -1
     for number, line in enumerate([*text.splitlines(), ""], start=1):
@@ -69,12 +69,12 @@ def comments(text: str, whole: re.Pattern[str], trailing: re.Pattern[str]) -> It
 
 
 def joined(literals: str) -> str:
-    """The text of adjacent string literals."""
+    """Returns the text of adjacent C++ string literals."""
     return "".join(re.findall(r'"((?:[^"\\\n]|\\.)*)"', literals)).replace('\\"', '"')
 
 
 def python_helps(text: str) -> Iterator[tuple[int, str]]:
-    """Lines and texts of help in Python code: keywords, and arguments by HELP_POSITIONS."""
+    """Yields line and text of each help text in calls, by keyword or by HELP_POSITIONS."""
     try:
         calls = nodes_of(text)
     except SyntaxError:
@@ -91,7 +91,7 @@ def python_helps(text: str) -> Iterator[tuple[int, str]]:
 
 
 def helps(name: str, text: str) -> Iterator[Text]:
-    """Help texts of options in Python, and literals with a space in tables of the core."""
+    """Yields help texts of Python options, and string literals of tables in the core."""
     if name.startswith("python/wavecomb/") and name.endswith(".py"):
         found = list(python_helps(text))
     elif name.startswith("src/") and name.endswith("_table.cpp"):
@@ -106,13 +106,13 @@ def helps(name: str, text: str) -> Iterator[Text]:
 
 
 def plain(markdown: str) -> str:
-    """A paragraph without link targets, brackets of links alone, and tags outside of code."""
+    """Returns a paragraph without link targets, brackets that hold only links, and HTML tags."""
     said = LINKS_IN_BRACKETS.sub("", re.sub(r"(`[^`]*`)|<[^>]+>", r"\1", markdown))
     return " ".join(LINK.sub(r"\1", said).split())
 
 
 def prose_lines(text: str) -> Iterator[tuple[int, str]]:
-    """Lines of a page that are no code."""
+    """Yields the lines of a page, with empty text in place of code."""
     fenced = indented = False
     before = ""
     for number, line in enumerate(text.splitlines(), start=1):
@@ -126,7 +126,7 @@ def prose_lines(text: str) -> Iterator[tuple[int, str]]:
 
 
 def paragraphs(text: str) -> Iterator[Text]:
-    """Paragraphs, list items, headings and table cells of a page."""
+    """Yields paragraphs, list items, headings and table cells of a page."""
     block: list[str] = []
     start = 0
     for number, line in [*prose_lines(text), (0, "")]:
@@ -145,7 +145,7 @@ def paragraphs(text: str) -> Iterator[Text]:
 
 
 def texts(name: str, text: str) -> list[Text]:
-    """All prose of a file."""
+    """Returns all prose of a file."""
     suffix = pathlib.PurePath(name).suffix
     if suffix == ".md":
         return list(paragraphs(text))
@@ -160,9 +160,9 @@ def texts(name: str, text: str) -> list[Text]:
 
 
 def docstring_blocks(string: str) -> Iterator[tuple[int, str]]:
-    """Paragraphs and list items of a docstring, without code, with their lines from 0.
+    """Yields line number (from 0) and text of paragraphs and list items of a docstring.
 
-    Each entry of a section such as `Args:` is an item "name: meaning".
+    Examples are left out. Each entry of a section such as `Args:` is a list item.
     """
     block: list[str] = []
     start, in_section, is_code = 0, False, False
@@ -182,9 +182,9 @@ def docstring_blocks(string: str) -> Iterator[tuple[int, str]]:
 
 
 def docstrings(text: str) -> tuple[list[tuple[int, str]], str]:
-    """Docstrings of Python code with their first lines, and the code without strings of many lines.
+    """Returns docstrings with their first line numbers, and the code without multi-line strings.
 
-    Other strings of many lines, such as stages in tests, are no prose.
+    Other multi-line strings, such as stages in tests, are not prose.
     """
     try:
         nodes = nodes_of(text)

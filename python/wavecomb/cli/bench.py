@@ -67,14 +67,14 @@ def list_command() -> None:
     option("--resume", "flag", "Continue an interrupted suite with the results in DIR."),
     option(
         "--repetitions N", "count",
-        "Number of repetitions of each run.  [default: of the suite]",
+        "Number of repetitions of each run.  [default: the suite's]",
     ),
     option("--only GLOB", "text", "Run only configurations whose name matches."),
     option(
         "--stage NAME", "text", "Run only this stage; repeat for more.",
         name="only_these", multiple=True,
     ),
-    option("--threads N", "count", "Number of render threads.  [default: of the suite]"),
+    option("--threads N", "count", "Number of render threads.  [default: the suite's]"),
     option("--seed N", click.IntRange(min=0), "Seed of the random order of runs."),
     option("--time-limit MINUTES", "positive", "Start no run that would end after this time."),
     option("--stages FOLDER", "path", "Folder with additional stages for the suite."),

@@ -66,7 +66,7 @@ def isolate_option(command: F) -> F:
         expose_value=False,
         callback=_ask_reads,
         help="Folder that the sandbox may read besides named files and libraries (repeatable).  "
-        "[default: everything that you may read]",
+        "[default: all readable folders]",
     )(command)
     command = click.option(
         "--sandbox",
@@ -75,8 +75,8 @@ def isolate_option(command: F) -> F:
         envvar="WAVECOMB_SANDBOX",
         expose_value=False,
         callback=_ask_sandbox,
-        help="Sandbox the child process with bubblewrap: no network, only outputs are writable; "
-        "`on` fails if that is impossible.  [default: auto, if possible]",
+        help="Sandbox the child process with bubblewrap: no network, and only outputs are "
+        "writable.  [default: auto, if possible]",
     )(command)
     command = click.option(
         "--memory-limit",

@@ -138,7 +138,7 @@ class RenderOptions(FileOptions):
         "--frames RANGE",
         "text",
         "Frames to render, such as 1-48, 1-48x2 or 1,5,9; file names need a placeholder, as in "
-        "shot.####.exr, shot.%04d.exr, shot.$F4.exr or shot.<frame>.exr.",
+        "shot.####.exr.",
     )
     skip_existing: bool = declared(
         "--skip-existing", "flag", "With --frames, skip frames whose files already exist."
@@ -205,8 +205,8 @@ class RenderOptions(FileOptions):
     learn_from: str | None = declared(
         "--learn-from FILE|before",
         "text",
-        "Use the guiding data of another render instead of training; with `before` each of "
-        "--frames uses those of the previous frame.",
+        "Use the guiding data of another render, or with `before` of the previous frame, instead "
+        "of training.",
     )
     learn_to: str | None = declared(
         "--learn-to FILE.learned", "path", "Save the guiding data of this render for --learn-from."

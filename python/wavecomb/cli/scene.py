@@ -41,27 +41,43 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
     option("--dragon FILE", "path", "OBJ, PLY or USD mesh that replaces the built-in dragon."),
     option(
         "--triangles N", "count",
-        "Number of triangles of the built-in dragon, or of the stone field.",
+        "Number of triangles of the built-in dragon, or of the stone field.  "
+        "[default: 250000]",
     ),
-    option("--seed N", click.IntRange(min=0), "Random seed of the scene's layout and patterns."),
-    option("--texture-size N", click.IntRange(min=16), "Largest texture size, in texels."),
-    option("--aspect X", "positive", "Aspect ratio of the camera, width / height."),
+    option(
+        "--seed N", click.IntRange(min=0),
+        "Random seed of the scene's layout and patterns.  [default: 1]",
+    ),
+    option(
+        "--texture-size N", click.IntRange(min=16),
+        "Largest texture size, in texels.  [default: 2048]",
+    ),
+    option(
+        "--aspect X", "positive",
+        "Aspect ratio of the camera, width / height.  [default: the scene's]",
+    ),
     option(
         "--material NAME", "text",
-        "Material of scene cornell-dragon: gold, copper, glass or jade.",
+        "Material of scene cornell-dragon: gold, copper, glass or jade.  [default: gold]",
     ),
-    option("--materials N", "count", "Number of materials of scenes spread and heavy."),
+    option(
+        "--materials N", "count",
+        "Number of materials of scenes spread and heavy.  [default: 16]",
+    ),
     option(
         "--programs N", click.IntRange(1, 5),
-        "Number of kinds of materials in scene spread, 1 to 5.",
+        "Number of kinds of materials in scene spread, 1 to 5.  [default: 5]",
     ),
-    option("--lights N", "count", "Number of lights in scene lights."),
+    option("--lights N", "count", "Number of lights in scene lights.  [default: 1000]"),
     option(
         "--lamps", "flag",
         "Illuminate scenes mixed and dragon with a key light, a fill light and a dim dome.",
     ),
-    option("--strands N", "count", "Number of hair strands in scenes fur and head."),
-    option("--splats N", "count", "Number of Gaussian splats in scene splats."),
+    option(
+        "--strands N", "count",
+        "Number of hair strands in scenes fur and head.  [default: 100000]",
+    ),
+    option("--splats N", "count", "Number of Gaussian splats in scene splats.  [default: 60000]"),
     option("--capture FILE", "path", "PLY file of 3D Gaussian splats to use in scene splats."),
     option(
         "--capture-linear", "flag",
@@ -69,12 +85,16 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
     ),
     option(
         "--voxels N", click.IntRange(min=16),
-        "Number of voxels along the longest edge in scenes smoke and clouds.",
+        "Number of voxels along the longest edge in scenes smoke and clouds.  [default: 160]",
     ),
-    option("--texture-mb X", Real(0), "Memory of all textures of scenes spread and heavy, in MB."),
+    option(
+        "--texture-mb X", Real(0),
+        "Memory of all textures of scenes spread and heavy, in MB.  [default: 16]",
+    ),
     option(
         "--shader-cost X", Real(1),
-        "Octaves of noise on the most expensive material of scene spread; 1 means none.",
+        "Octaves of noise on the most expensive material of scene spread; 1 means none.  "
+        "[default: 1]",
     ),
     option(
         "--plain", "flag",

@@ -204,8 +204,8 @@ std::vector<SettingInfo> work_settings() {
           {{"auto",
             "Path guiding and light paths are used where short pilot renders predict a gain."},
            {"plain",
-            "No pilot renders: guiding and transport of mode auto mean no guiding and no light "
-            "paths."}},
+            "There are no pilot renders; mode auto of guiding and transport means no guiding and "
+            "no light paths."}},
           "Whether short pilot renders decide about path guiding and light paths."),
       choice<&S::transport>("transport", "Transport",
                             {{"path", "Paths start at the camera only."},

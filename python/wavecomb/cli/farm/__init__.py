@@ -59,8 +59,8 @@ def opened(job: str, maps: tuple[str, ...] = ()) -> Folder:
 @JOB
 @ON
 @click.option("--threads", type=click.IntRange(min=0), default=0, metavar="N",
-              help="Number of render threads of each local worker.  [default: of the job, else "
-                   "equal]")  # fmt: skip
+              help="Number of render threads of each local worker.  [default: the job's, else an "
+                   "equal share of the cores]")  # fmt: skip
 @MAP
 @DASHBOARD
 @click.option("--quiet", is_flag=True, help="Print only warnings and errors.")

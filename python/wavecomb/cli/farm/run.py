@@ -24,9 +24,8 @@ _SHOW_S = 0.5
 
 ON = click.option(
     "--on", default="local", metavar="local[:N]|dask:ADDRESS|slurm[:N]|none",
-    help="Where to render: on N workers of this machine, the workers of a Dask cluster, N "
-    "workers that Slurm starts, or none, to only write the job.  [default: local, one "
-    "worker on all cores]",
+    help="Render with N local workers, a Dask cluster or N Slurm workers; none only writes the "
+    "job.  [default: local, one worker]",
 )  # fmt: skip
 DASHBOARD = click.option(
     "--dashboard", type=click.IntRange(0, 65535), is_flag=False, flag_value=0, default=None,

@@ -57,7 +57,7 @@ _PLAN_S = 4 * 3600.0
 @click.option(
     "--strict/--no-strict",
     default=True,
-    help="Treat a missing texture or layer as an error.  [default: strict]",
+    help="Whether a missing texture or layer is an error.  [default: strict]",
 )
 @click.option(
     "--map", "maps", multiple=True, metavar="FROM=TO",
@@ -66,8 +66,8 @@ _PLAN_S = 4 * 3600.0
 @click.option(
     "--isa",
     metavar="NAME",
-    help="CPU instruction set for all workers, such as x86-64-v3, so that older and newer "
-    "machines render the same bits.",
+    help="CPU instruction set of all workers, such as x86-64-v3, so that all render the same "
+    "bits.  [default: each machine's]",
 )
 @DASHBOARD
 @click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
