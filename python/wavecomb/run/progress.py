@@ -106,7 +106,7 @@ def was_interrupted() -> bool:
 
 
 class Interrupt:
-    """Context manager that records the first Ctrl-C or SIGTERM; further ones act as usual.
+    """Context manager that records the first Ctrl-C or SIGTERM and then restores the handlers.
 
     Contract: handles signals on the main thread only; on other threads it does nothing.
     """
@@ -150,8 +150,8 @@ class Interrupt:
 def progress_console(*, quiet: bool = False) -> Console | None:
     """Returns the console for progress (standard error), or None if it is not visible.
 
-    Rich decides whether it is a terminal. Rich is loaded only if standard error is a terminal or an
-    environment variable that Rich respects claims so.
+    Rich decides whether standard error is a terminal. To save time, Rich is loaded only if standard
+    error is a terminal or if an environment variable of Rich says that it is one.
     """
     is_terminal = sys.stderr is not None and sys.stderr.isatty()
     if quiet or not (is_terminal or any(name in os.environ for name in _FORCED)):
@@ -177,11 +177,11 @@ class Silent:
 
 
 def figures(status: Mapping[str, Any], columns: int = 200) -> list[str]:
-    """Returns the figures next to a bar, the most important first: time left, error, rates, passes.
+    """Returns the texts beside a progress bar: time left, error, samples and rays per second, pass.
 
     Args:
         status: Values of ``Snapshot.status`` in _core.pyi.
-        columns: Width available for the figures; figures that do not fit are left out.
+        columns: Width available for the texts; the last texts are left out if they do not fit.
     """
     rates = speed(status)
     said = []

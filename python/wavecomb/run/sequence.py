@@ -68,7 +68,8 @@ class Frames:
         """Loads the stage at a frame.
 
         Args:
-            frame: Time code; None means the stage's start, else default values.
+            frame: Time code; None means the start time code of the stage, or default values
+                if the stage has none.
             progress: Progress callback as in ``wavecomb.load``.
             **changes: Fields of ``LoadOptions`` that replace the initial options.
 
@@ -128,7 +129,7 @@ class Frames:
         )
 
     def stats(self, result: Result, **options: Any) -> dict[str, Any]:
-        """Returns ``make_stats`` of the last render; ``options`` are its further arguments."""
+        """Returns statistics of the last render; ``options`` are passed to ``make_stats``."""
         options |= {"loaded": self._loaded, "is_built": self._is_built}
         return make_stats(result, stage=os.fspath(self._path), **options)
 

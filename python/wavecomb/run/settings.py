@@ -39,7 +39,8 @@ def prepare(
 ) -> tuple[Any, dict[str, dict[str, float]] | None, tuple[str, ...], Settings]:
     """Validates arguments of ``render``.
 
-    Returns a custom policy, cost profile, AOVs and settings.
+    Returns the scheduling policy and the cost profile if they are custom (else None), the AOV names
+    and the settings.
     """
     own: Any = None
     if isinstance(policy, str):
@@ -156,7 +157,7 @@ def image_size(settings: Settings) -> tuple[int, int]:
 
 
 def has_error_layers(settings: Settings) -> bool:
-    """Returns whether a render with these settings has the layers error and variance."""
+    """Returns whether a render with these settings writes error and variance layers."""
     return bool(
         settings.adaptive or settings.noise or settings.error or settings.allocate != "even"
     )

@@ -47,7 +47,7 @@ def build_heavy(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def layers(options: SceneOptions, index: int) -> int:
-    """Returns the layers of material ``index``: 0 in the first ninth, ``LAYERS`` for the last."""
+    """Returns the number of texture layers of material ``index``, from 0 to ``LAYERS``."""
     share = index / max(options.materials - 1, 1)
     return min(int((LAYERS + 1) * share), LAYERS)
 
@@ -108,7 +108,7 @@ def _material(
 def _define(
     writer: StageWriter, name: str, edge: int, index: int, colour: np.ndarray | None
 ) -> str:
-    """Defines a pattern in a colour, or a roughness map, and returns its texture name."""
+    """Registers a colour or (if ``colour`` is None) roughness texture; returns its name."""
 
     def made(size: int, source: np.random.Generator) -> Image:
         grey = grey_pattern(index, size, source)

@@ -101,7 +101,7 @@ def _material(
 
 
 def _texture(writer: StageWriter, index: int, edge: int, colour: tuple[float, ...]) -> str:
-    """Defines a pattern in a colour and returns its texture name."""
+    """Registers a texture with a pattern in a colour; returns the texture's name."""
 
     def tinted(size: int, source: np.random.Generator) -> Image:
         grey = grey_pattern(index, size, source)

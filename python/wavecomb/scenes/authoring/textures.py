@@ -262,7 +262,7 @@ def sky(width: int, height: int, seed: int) -> Image:
 
 
 def write_image(path: Path, image: Image, data_format: str) -> None:
-    """Writes an image, never partially.
+    """Writes an image atomically.
 
     Args:
         path: PNG or EXR file.

@@ -160,7 +160,7 @@ class Extent:
         return self.length * self.perimeter * self.detail
 
     def grid(self, density: float) -> tuple[int, int]:
-        """Returns rings and columns for ``density`` triangles per unit of weight.
+        """Returns rings and columns for ``density`` triangles per unit of ``weight``.
 
         The tube has ``2 * rings * columns`` triangles.
         """

@@ -310,7 +310,7 @@ def _frame_half(lens: Lens, size: tuple[int, int]) -> tuple[float, float]:
 
 
 def frame_planes(up_axis: str, lens: Lens, size: tuple[int, int]) -> Matrix:
-    """Returns the directions (4, 3) whose extents ``frame_points`` needs for the same arguments."""
+    """Returns the directions (4, 3) in which ``frame_points`` needs the extent of the geometry."""
     flat = lens.projection == "orthographic"
     return planes(_frame_axes(up_axis), None if flat else _frame_half(lens, size))
 

@@ -32,7 +32,7 @@ MANY_POINTS = 1 << 16
 """Larger point sets are reduced to their outline before more points are added."""
 
 _FEW_PLACES = 512
-"""Up to this number of instances, all are processed; of more, only the extreme instances."""
+"""Of more instances than this number, only the extreme ones are processed."""
 
 
 def _spread(count: int) -> Points:
@@ -96,8 +96,9 @@ def _farthest(
 def _near_the_outside(
     points: NDArray[np.float32], radii: NDArray[np.float32] | None, directions: NDArray[np.float32]
 ) -> NDArray[np.intp]:
-    """Returns indices of points without those runs whose bounds lie inside the outline of a sample.
+    """Returns indices of points that may be extreme.
 
+    Leaves out runs of consecutive points whose bounds lie inside the outline of a sample of points.
     Consecutive points of a mesh are mostly close to each other, so runs have small bounds.
     """
     step = max(1, len(points) // _SAMPLE)

@@ -216,8 +216,8 @@ def remove_invalid_points(
         holes: Indices of faces that are not drawn.
 
     Returns:
-        Returns points with invalid ones replaced, the faces that are drawn, and a message about
-        faces left out, which is "" if no face uses an invalid point.
+        Points with replacements for the invalid ones, indices of all faces that are not drawn, and
+        a message, which is "" if no face uses an invalid point.
 
     Raises:
         MeshError: No face remains, or counts and indices are inconsistent.

@@ -43,7 +43,7 @@ class NurbsStrands(Strands):
     """Curves whose Bezier points are linear combinations of their control points.
 
     Attributes:
-        pieces: Conversion of each curve.
+        pieces: Bezier conversion of each curve.
     """
 
     pieces: tuple[_BezierConversion, ...] = ()

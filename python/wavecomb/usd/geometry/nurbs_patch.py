@@ -233,7 +233,10 @@ def _blend(axes: tuple[_Axis, _Axis], values: Floats) -> tuple[Floats, Floats, F
 
 
 def spline_sum(axis: _Axis, part: int, grid: Floats) -> Floats:
-    """Sums a grid over its first index, weighted by basis functions (0) or derivatives (1)."""
+    """Sums a grid over its first index, weighted by basis functions or their derivatives.
+
+    ``part`` is 0 for the basis functions and 1 for their derivatives.
+    """
     shares, columns = axis.spline.weights(axis.span, axis.at)[part], axis.spline.columns(axis.span)
     out = np.zeros((len(axis.at), *grid.shape[1:]))
     for k in range(axis.spline.order):

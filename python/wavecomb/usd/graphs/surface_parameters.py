@@ -281,7 +281,7 @@ def _as_it_is(_node: Node, _operands: tuple[Value, ...]) -> Value | None:
 
 
 def kind_of(parameter: str) -> str:
-    """Returns the kind of use of a parameter's values."""
+    """Returns ``BASE``, ``COLOUR``, ``NUMBER`` or ``NORMAL`` for a surface parameter."""
     if parameter == "base_color":
         return BASE
     if parameter == "normal":

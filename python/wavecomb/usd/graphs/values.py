@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Creates, folds and compiles values of graphs to the flat programs of the core.
+"""Creates values of shader graphs, folds constants, and compiles values to programs of the core.
 
 A value is a tuple of parts, one per component. A part is a number or a component of a node, so that
 swizzles, extractions and combinations need no operation.
@@ -151,7 +151,7 @@ class Graph:
 
 
 def assemble(outputs: dict[int, Part]) -> Graph:
-    """Compiles parts, by component number, to a program.
+    """Compiles parts to a program; ``outputs`` maps component numbers to parts.
 
     Raises:
         GraphTooLarge: The program needs more registers or operations than available.

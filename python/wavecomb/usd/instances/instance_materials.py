@@ -63,7 +63,10 @@ class InstanceMaterials:
         self.materials = materials
 
     def of_proxies(self, instance: Usd.Prim) -> tuple[str, ...]:
-        """Returns material paths of all prims below an instance; equal ones may share a group."""
+        """Returns material paths of all prims below an instance.
+
+        Instances of a prototype with equal material paths may share a group.
+        """
         prims = [
             prim
             for prim in Usd.PrimRange(instance, Usd.TraverseInstanceProxies())

@@ -120,7 +120,7 @@ def _targets(prim: Usd.Prim) -> Iterator[Sdf.Path]:
 
 
 NONE = "none"
-"""Value in place of patterns that loads no payload."""
+"""Option value that loads no payloads, used in place of patterns."""
 
 
 def load_payloads(stage: Usd.Stage, wanted: Sequence[str]) -> None:

@@ -120,7 +120,7 @@ class Gel:
         return (r, g, b)
 
     def multiplied(self, options: Mapping[str, Any]) -> dict[str, float]:
-        """Returns the changed multipliers of a light with these options."""
+        """Returns the light's diffuse and specular multipliers that the gel changes."""
         return {
             name: factor * float(options.get(name, 1.0))
             for name, factor in (("diffuse", self.diffuse), ("specular", self.specular))

@@ -211,10 +211,7 @@ class FilterReader:
         return Filter(np.eye(4), decay=(decay[0], decay[1], decay[2], decay[3]))
 
     def _flaps(self, inputs: FilterInputs, light: Usd.Prim, before: str = "") -> Filter:
-        """Reads Karma barn doors: 0 is open and 1 covers the whole cone.
-
-        The softness of door edges uses the same scale.
-        """
+        """Reads Karma barn doors, whose positions and edge softness range from 0 (open) to 1."""
         if inputs.value("invert", "invertblockers", "invert_blockers"):
             self._report.missing("inverted light doors (not inverted)", inputs.prim.GetPath())
         away, size = self._cone(inputs, light)
@@ -253,7 +250,7 @@ class FilterReader:
     # ---- inputs ----------------------------------------------------------------------------
 
     def _cone(self, inputs: FilterInputs, light: Usd.Prim) -> tuple[float, float]:
-        """Returns a distance that is large for the light, and half the width of its cone there."""
+        """Returns a distance much larger than the light, and the cone's radius there."""
         angle = number(light.GetAttribute("inputs:shaping:cone:angle").Get(self._time), 90.0)
         if not angle < 89.0:
             self._report.missing(

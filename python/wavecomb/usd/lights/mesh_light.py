@@ -81,7 +81,7 @@ class MeshLights:
         self._report.missing(what, path)
 
     def _light_material(self, hidden: bool) -> int:
-        """Returns the material of meshes without response: radiance 1, tinted in the core."""
+        """Returns a material that emits radiance 1, which the core scales for each light."""
         parameters = {"emission": (1.0, 1.0, 1.0)}
         if not hidden:
             return self._materials.add(Surface("mesh light", "emissive", parameters))
