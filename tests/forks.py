@@ -179,7 +179,7 @@ def _is_python(words: Sequence[str]) -> bool:
 
 
 def _is_booted(words: Sequence[str]) -> bool:
-    """Whether this is a command of ``wavecomb.processes`` without other flags of Python."""
+    """Whether arguments start a command of ``wavecomb.processes`` without other flags of Python."""
     return words[0] == "-I" and words[1].endswith(os.path.join("wavecomb", "boot.py"))
 
 
@@ -258,7 +258,7 @@ def _fork(request: Mapping[str, Any], descriptors: Sequence[int]) -> None:
 
 
 def _end(code: object) -> None:
-    """End this process as Python does, but skip module teardown, half of the remaining time."""
+    """End this process like Python, but skip the teardown of modules, which takes long."""
     if code is not None and not isinstance(code, int):
         print(code, file=sys.stderr)
         code = 1

@@ -243,7 +243,7 @@ def write(path: str | Path, made: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _described(grid: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns a grid as the plug-in takes it; raises ValueError if its arrays are inconsistent."""
+    """Returns a grid in the plug-in's form; raises ValueError if its arrays are inconsistent."""
     values, origins = np.asarray(grid["values"]), np.ascontiguousarray(grid["origins"], np.int32)
     channels = 3 if values.ndim == 5 else 1
     count = len(origins)

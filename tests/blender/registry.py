@@ -29,7 +29,7 @@ class ParityScene:
     """A scene made by script.
 
     Attributes:
-        name: Name, which names its images.
+        name: Name of the scene and of its images.
         group: Heading of the page.
         make: Function that fills the empty scene.
         expected: Bounds of the comparison.

@@ -226,7 +226,7 @@ def combined_still_life() -> None:
 
 @scene("Combined")
 def combined_room() -> None:
-    """A closed room with one area light, by many bounces."""
+    """A closed room with one area light and many diffuse bounces."""
     diffuse = bpy.data.materials.new("walls")
     diffuse.use_nodes = True
     shader(diffuse, "ShaderNodeBsdfDiffuse", Color=(0.7, 0.65, 0.6))
@@ -265,7 +265,7 @@ def combined_motion_lights() -> None:
 
 @scene("Combined", 0.97, 1.02, 0.1, "caustics, which converge slowly")
 def combined_mirrors() -> None:
-    """A mirror, a coated ball and a light that both show."""
+    """A mirror and a coated ball, which both reflect a visible light."""
     studio(0.1)
     mirror = principled("mirror", metallic=1.0, roughness=0.0, base_color=(0.95, 0.95, 0.95))
     thing = cube(mirror, at=(0, 1.5, 1.2), size=2.4, turn=(0, 0, 0.1))

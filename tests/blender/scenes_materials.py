@@ -91,7 +91,7 @@ def principled_anisotropic() -> None:
 
 @scene("Principled", 0.99, 1.015, 0.15, "another model of rough diffuse surfaces (EON)")
 def principled_diffuse_roughness() -> None:
-    """A rough diffuse base, where Blender has it."""
+    """A rough diffuse base, in Blender versions that support it."""
     names = {"roughness": 1.0, "specular_ior_level": 0.0}
     material = _ball(base_color=(0.7, 0.5, 0.3), **names)
     node = shader_of(material)

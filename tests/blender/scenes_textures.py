@@ -24,7 +24,7 @@ from registry import scene
 
 @scene("Textures")
 def texture_image() -> None:
-    """An image by texture coordinates."""
+    """An image mapped by texture coordinates."""
     studio()
     wall(textured()[0])
 
@@ -81,7 +81,7 @@ def texture_normal_map() -> None:
 
 @scene("Textures", outside=0.2, why="sharp highlights converge slowly")
 def texture_roughness() -> None:
-    """Roughness and metalness by an image."""
+    """Roughness and metalness driven by an image."""
     studio()
     material = principled(base_color=(0.8, 0.6, 0.4))
     node = add(material, "ShaderNodeTexImage", image=picture())

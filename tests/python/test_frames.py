@@ -116,7 +116,7 @@ def vary_camera(stage):
 
 
 def vary_lens(stage):
-    """Makes one frame's camera invalid, and gives the next one no depth of field."""
+    """Makes the camera invalid in one frame, and disables depth of field in the next frame."""
     camera = UsdGeom.Camera.Get(stage, "/World/Rig/Camera")
     ramp(camera.CreateFocalLengthAttr(), [50, 0, 50, 50])
     ramp(camera.CreateFStopAttr(), [0.5, 0.5, 0, 2])
@@ -166,7 +166,7 @@ def subdivide(stage):
 
 
 def vary_near_surfaces(stage):
-    """Moves the camera from where surfaces are a few pixels large to where they are many."""
+    """Moves the camera closer, so that surfaces grow from a few pixels to many pixels."""
     subdivide(stage)
     ramp(
         UsdGeom.Xformable.Get(stage, "/World/Rig/Camera")

@@ -233,7 +233,7 @@ def test_colours_of_captures_are_decoded() -> None:
 
 
 def sidak(tests: int, level: float = 1e-4) -> float:
-    """Returns the deviation that any of ``tests`` means exceeds with this probability."""
+    """Returns the z limit that any of ``tests`` means exceeds with probability ``level``."""
     from scipy.stats import norm
 
     return float(norm.isf(0.5 * (1.0 - (1.0 - level) ** (1.0 / tests))))

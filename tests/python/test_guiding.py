@@ -45,7 +45,7 @@ def cornell(stage: Path) -> Any:
 
 @pytest.fixture(scope="module")
 def mixed(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Many programs, textures, glass, a dome and a sun."""
+    """A stage with many shading programs, textures, glass, a dome and a sun."""
     path = tmp_path_factory.mktemp("guiding") / "mixed.usdc"
     write_scene("mixed", path, triangles=20000, texture_size=256)
     return wavecomb.load(path).scene

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Interface to MaterialX: the only module that imports ``wavecomb.usd.materialx``.
 
-Without that package or the ``materialx`` wheel, stages still load: MaterialX materials are replaced
-by displayColor or left out, which is reported once.
+Stages also load if ``wavecomb.usd.materialx`` or the ``materialx`` wheel is missing: displayColor
+replaces MaterialX materials, or they are left out, which is reported once.
 """
 
 from __future__ import annotations

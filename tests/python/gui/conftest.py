@@ -135,5 +135,5 @@ def wait_final(qtbot, session, timeout=20000):
 
 @pytest.fixture
 def final(qtbot):
-    """wait_final(session) without the bot."""
+    """``wait_final`` as a function of a session, without the argument ``qtbot``."""
     return lambda session, timeout=20000: wait_final(qtbot, session, timeout)

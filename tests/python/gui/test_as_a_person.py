@@ -100,7 +100,7 @@ def select(person):
 
 
 def edit(person, tmp_path, name):
-    """Types a number into the first material that has one, undoes it, and types it again."""
+    """Edits the first material with a numeric field, undoes the edit, and repeats it."""
     person.click(person.ask("tab", "Materials"))
     for path in person.ask("materials"):
         if path and person.ask("material", path):

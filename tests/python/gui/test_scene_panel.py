@@ -72,7 +72,7 @@ def picture(path):
 
 
 def settle(qtbot, session):
-    """Waits until nothing is being read."""
+    """Waits until the session has read its stage."""
     busy = []
     session.busy.connect(busy.append)
     qtbot.waitUntil(lambda: not session._jobs, timeout=20000)

@@ -81,7 +81,7 @@ def value_of(shader: UsdShade.Shader, name: str, time: Usd.TimeCode, default: An
 
 
 def layer_of_value(attribute: Usd.Attribute | None) -> Sdf.Layer | None:
-    """Returns the layer of the strongest opinion with a value; relative paths are anchored there.
+    """Returns the layer of the strongest opinion with a value, which anchors relative paths.
 
     Stronger opinions may hold only metadata or a connection.
     """
@@ -329,7 +329,7 @@ def tile_files(pattern: str) -> list[tuple[int, str]]:
 
 
 def image_files(material: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
-    """Yields files that shaders in a material name, as a guess at the images that it needs."""
+    """Yields files that shaders in a material name; the material probably needs these images."""
     for prim in _each_once(material):
         for attribute in prim.GetAuthoredAttributes():
             if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset:

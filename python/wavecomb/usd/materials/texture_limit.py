@@ -55,8 +55,8 @@ class _Entry:
     """A texture that would be created.
 
     Attributes:
-        wanted: Texels across that the image can resolve; None if unknown, which keeps all mip
-            levels.
+        wanted: Largest texture width in texels that the image can resolve; None if unknown, which
+            keeps all mip levels.
         drop: Number of finest mip levels that are not loaded.
     """
 

@@ -30,7 +30,7 @@ def definition(node: Any) -> Any:
 
 
 def implementation(document: Document, nodedef: Any) -> Any:
-    """Returns the node graph of a definition that the document itself makes, else None."""
+    """Returns the node graph that implements a definition of the document, or None."""
     import MaterialX as mx
 
     if nodedef is None or nodedef.getName() not in document.definitions:
