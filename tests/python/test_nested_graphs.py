@@ -73,7 +73,7 @@ def test_a_chain_that_doubles(tmp_path):
 
 
 def test_a_chain_of_different_values_is_listed(tmp_path):
-    """p feeds q, so no value repeats. The network has 2^30 steps and is reported as too large."""
+    """A network of 2^30 nodes whose values all differ is reported as too large."""
     document(tmp_path, 30, CHAINED, "1, 1, 1")
     scene, loaded = load(tmp_path, STAGE)
     what = (

@@ -8,8 +8,8 @@ Both integrators render batches with different random numbers. Means over blocks
 over the image are compared per channel by Welch's t. Suspicious results (|z| of 3.3 or more) are
 rendered again with new random numbers and 12 times the samples, and if still suspicious with 60
 times. Only a difference beyond the limit each time is a fault; the level is Sidak's correction of 1
-% for all scenes of a run. Repetition is needed because light that uniform directions seldom find
-mostly gives a mean that is too low, less so with more samples.
+% for all scenes of a run. Repetition is needed because the mean is usually too low if uniform
+directions seldom find the light; more samples reduce this effect.
 """
 
 from __future__ import annotations

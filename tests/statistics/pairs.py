@@ -78,7 +78,7 @@ CHOICES: dict[str, tuple[Any, ...]] = {
 FURTHER = 300
 """Factor of the samples of a last repeat, for differences that a few rare paths can make."""
 MOST_UNDECIDED = 0.01
-"""Fraction of the stages of a run that may have undecided comparisons; one stage always may."""
+"""Fraction of the stages of a run that may have undecided comparisons; one is always allowed."""
 MERGED_TOLERANCE = 0.03
 """Relative difference that a blurred caustic may cause in the image mean, by loss at edges."""
 SMOOTH_TOLERANCE = 0.01
@@ -188,8 +188,8 @@ class Renders:
     def reference(self, variant: Variant) -> Variant:
         """Returns the settings to compare a variant with: plain ones, or light paths.
 
-        Camera paths cannot find a point or a direction through a smooth lobe, and light paths can.
-        If a stage has both, only renders with light paths agree with each other.
+        Camera paths cannot find point or distant lights through a smooth lobe; light paths can.
+        If a stage has such lights and lobes, only renders with light paths agree with each other.
         """
         transport = variant.settings.get("transport", "path")
         unseen = {"sun light", "point light"} & set(self.scene.features)
@@ -279,7 +279,8 @@ def examine(
     Args:
         scene: The scene.
         seed: Its seed.
-        repeats: Number of repeats of suspicious comparisons. Open ones have all repeats.
+        repeats: Number of repeats of suspicious comparisons; undecided comparisons have up to
+            ``len(MORE)`` repeats.
         tests: Number of comparisons of the run.
     """
     from wavecomb import _core

@@ -45,7 +45,7 @@ def fibres(kind: str) -> tuple[Any, Any]:
 
 
 def splines(kind: str) -> tuple[Any, float]:
-    """Control points, and the radius."""
+    """Control points of the splines, (n, k, 3), and the fibre radius."""
     if kind == "fibre":
         return line(np.array([[-3.0, -2.0, 0.4]]), np.array([[3.0, 2.0, -0.4]])), 0.07
     if kind == "head":

@@ -155,7 +155,7 @@ def flat(mean: float, seed: int) -> Any:
 
 
 def sparse(mean: float, seed: int, paths: float) -> Any:
-    """Batches with all light from equal paths, ``paths`` of which each pixel expects in all.
+    """Batches in which all light comes from ``paths`` equal paths per pixel, on average.
 
     The paths are ten times as rare in the left third of the image, as behind a small opening.
     """
@@ -207,7 +207,7 @@ def test_a_difference_without_noise_is_a_fault() -> None:
 
 
 def test_contributions_of_earlier_comparisons_count() -> None:
-    """A path that an earlier comparison met may be missing from both renders."""
+    """A bright path that an earlier comparison found may be missing from both renders."""
     found = judge(flat(1.02, 1), flat(1.0, 2), samples=64)
     assert found.is_sure(MANY * 12)
     assert np.all(found.contribution < 64 * 0.05)

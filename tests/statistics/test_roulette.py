@@ -50,8 +50,8 @@ def test_absurd_costs_do_not_bias(cornell: Any, beauty: Any, start: int, fewer: 
 
 
 def test_roulette_ends_paths(cornell: Any) -> None:
-    """Roulette by throughput shades fewer records than none; expensive materials fewer than cheap
-    ones.
+    """Roulette by throughput reduces the number of shaded records, and cost-aware roulette
+    terminates more paths at expensive materials.
     """
 
     def counts(**settings: Any) -> Any:

@@ -29,8 +29,7 @@ def _collected(qapp, _modules):
     """Destroys the garbage of a test after it, on the window's thread.
 
     Tests create Qt objects without a window. Automatic collection would destroy reference cycles
-    with
-    such objects in a later test, on any thread that allocates, and may deadlock
+    with such objects in a later test, on any thread that allocates, and may deadlock
     (docs/decisions/window-threads.md). test_threads.py checks, in separate processes in which all
     threads collect, that the window itself leaves no such cycles.
     """
