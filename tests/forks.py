@@ -57,7 +57,7 @@ def run(
     cwd: str | Path | None = None,
     timeout: float = 100,
 ) -> subprocess.CompletedProcess[str]:
-    """Run Python with these arguments like `subprocess.run`, and capture its output as text."""
+    """Run Python with the given arguments, like `subprocess.run`; capture the output as text."""
     pipe, command = subprocess.PIPE, [sys.executable, *words]
     process = Popen(command, stdout=pipe, stderr=pipe, text=True, env=env, cwd=cwd)
     with process:
@@ -233,7 +233,7 @@ def _serve(channel: socket.socket) -> dict[str, Any] | None:
 
 
 def _fork(request: Mapping[str, Any], descriptors: Sequence[int]) -> None:
-    """Continue in a child with its descriptors; this process waits and reports the child's exit."""
+    """Continue in a child with the given descriptors; the parent waits and reports its exit."""
     import fcntl
 
     told, *given = (fcntl.fcntl(one, fcntl.F_DUPFD_CLOEXEC, 500) for one in descriptors)

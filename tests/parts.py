@@ -65,13 +65,13 @@ def missing(part: str) -> str:
 
 
 def needs(*parts: str) -> pytest.MarkDecorator:
-    """Mark tests that have these requirements; `missing` lists the possible names."""
+    """Mark tests that have the given requirements; `missing` lists the possible names."""
     reasons = [f"{part}: {reason}" for part in parts if (reason := missing(part))]
     return pytest.mark.skipif(bool(reasons), reason="needs " + "; ".join(reasons))
 
 
 def needs_asset(*files: str) -> pytest.MarkDecorator:
-    """Mark tests that need these files below `ASSETS`; folders are not accepted."""
+    """Mark tests that need the given files below `ASSETS`; folders are not accepted."""
     absent = [file for file in files if not (ASSETS / file).is_file()]
     return pytest.mark.skipif(bool(absent), reason=f"needs {', '.join(absent)} in {ASSETS}")
 
@@ -94,10 +94,10 @@ def written_scenes() -> list[str]:
 
 
 def only_where(condition: object, reason: str) -> pytest.MarkDecorator:
-    """Mark tests for certain machines or builds only. CI accepts this kind of skip."""
+    """Mark tests for certain machines or builds only. CI accepts the skip."""
     return pytest.mark.skipif(not condition, reason=NOT_HERE + reason)
 
 
 def not_here(reason: str) -> NoReturn:
-    """Skip a test that this machine or this build cannot run. CI accepts this kind of skip."""
+    """Skip a test that this machine or this build cannot run. CI accepts the skip."""
     pytest.skip(NOT_HERE + reason)

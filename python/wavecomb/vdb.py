@@ -43,12 +43,12 @@ _NUMBERS = {"float", "double", "vec3s", "vec3d", "fp4", "fp8", "fp16", "fpn"}
 
 @dataclass(frozen=True)
 class GridHead:
-    """A grid in the table of a file.
+    """Entry of a grid in the table of a .vdb file.
 
     Attributes:
         number: Position of the grid in the file.
         name: Name of the grid, which several grids may share.
-        index: Index among grids with this name.
+        index: Index among grids with the same name.
         type_name: OpenVDB's type name such as "Tree_float_5_4_3"; in .nvdb files also
             "Tree_fp8_5_4_3".
         is_half: Whether floats are stored in 16 bits.

@@ -89,7 +89,7 @@ def result_of(scene: Any) -> Image:
 
 
 def render(scene: Any, engine: str, seed: int) -> tuple[Image, float]:
-    """Renders the scene; returns the image and the seconds."""
+    """Renders the scene; returns the image and the render time in seconds."""
     scene.render.engine = engine
     scene.cycles.seed = scene.wavecomb.seed = seed
     start = time.perf_counter()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of parity scenes."""
+"""Table of Blender scenes that are compared with Cycles."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class ParityScene:
 
     Attributes:
         name: Name of the scene and of its images.
-        group: Heading of the page.
+        group: Heading under which the documentation lists the scene.
         make: Function that fills the empty scene.
         expected: Bounds of the comparison.
         spp: Samples per pixel of each of two renders.

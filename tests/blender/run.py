@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders parity scenes in Blender: ``python run.py OUTPUT [SCENE ...]``.
+"""Renders Blender scenes with Cycles and Wavecomb: ``python run.py OUTPUT [SCENE ...]``.
 
 Writes a JSON file with the comparison of each scene and an image that shows Cycles to the left and
 Wavecomb to the right.

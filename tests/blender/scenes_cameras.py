@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parity scenes of cameras, motion and volumes, and scenes that combine features."""
+"""Blender scenes compared with Cycles: cameras, motion, volumes, and combined features."""
 
 from __future__ import annotations
 

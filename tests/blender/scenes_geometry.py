@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parity scenes of geometry, instances and visibility."""
+"""Blender scenes compared with Cycles: geometry, instances and visibility."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parity scenes of lights and worlds."""
+"""Blender scenes compared with Cycles: lights and worlds."""
 
 from __future__ import annotations
 

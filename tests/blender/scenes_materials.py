@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parity scenes of materials."""
+"""Blender scenes compared with Cycles: materials."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parity scenes of textures and value nodes."""
+"""Blender scenes compared with Cycles: textures and value nodes."""
 
 from __future__ import annotations
 

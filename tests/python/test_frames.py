@@ -273,7 +273,7 @@ def test_scene_and_hierarchy_stay_where_the_camera_moves(shot):
 
 
 def test_levels_of_surfaces_follow_the_camera(shot):
-    """The scene is rebuilt in frames where a surface is refined further, and only there."""
+    """The scene is rebuilt only in frames where a surface needs further refinement."""
     vary_near_surfaces(shot)
     shot.Save()
     frames = Frames(shot.GetRootLayer().realPath, size=(100, 100))

@@ -32,7 +32,7 @@ def filled(builder: Any, ior: float, roughness: float = 0.0, **layers: Any) -> i
 
 
 def absorbing(sigma: Any) -> dict[str, Any]:
-    """Returns the layers of a medium with these absorption coefficients."""
+    """Returns the OpenPBR inputs of a medium with the given absorption coefficients."""
     return {"transmission_color": tuple(np.exp(-np.array(sigma))), "transmission_depth": 1.0}
 
 

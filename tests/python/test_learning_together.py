@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Allotted samples combined with path guiding.
 
-Resuming of such renders is tested in test_checkpoint.py, and that they are unbiased in
-tests/statistics/test_learning.py.
+test_checkpoint.py tests resuming, and tests/statistics/test_learning.py tests that there is no
+bias.
 """
 
 from __future__ import annotations

@@ -62,7 +62,9 @@ def document(folder, depth, feed, value):
 
 
 def test_a_chain_that_doubles(tmp_path):
-    """Each level uses the one below twice: 2^32 nodes by path, but only 33 different ones."""
+    """Each level of nested graphs uses the level below twice: 2^32 nodes, with only 33
+    different values.
+    """
     depth = 32
     document(tmp_path, depth, BOTH, ", ".join([str(0.5**depth)] * 3))
     started = time.process_time()

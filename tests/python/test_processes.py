@@ -385,7 +385,7 @@ STARTERS = {
     "sys": {"executable"},
 }  # fmt: skip
 CLUSTERS = {"multiprocessing", "ProcessPoolExecutor", "LocalCluster", "Nanny", "SubprocessCluster"}
-"""Users of multiprocessing. A file that uses such a module must call isolate_multiprocessing()."""
+"""Names that use multiprocessing. Files with such names must call isolate_multiprocessing()."""
 
 WORTH_PARSING = re.compile(
     rf"\b({'|'.join(CLUSTERS)}|subprocess|pty|asyncio|QProcess)\b|sys\.executable"

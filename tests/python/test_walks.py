@@ -104,14 +104,14 @@ def test_the_albedo_of_a_collision_gives_the_colour(anisotropy: float) -> None:
 
 
 def test_adding_and_doubling_is_chandrasekhars() -> None:
-    """Both formulas agree for isotropic scattering."""
+    """Adding-doubling and Chandrasekhar's formula agree for isotropic scattering."""
     for albedo in (0.3, 0.9, 0.99):
         assert abs(color_of(albedo, 0.0) - chandrasekhar(albedo)) < 1e-4
 
 
 @pytest.mark.parametrize("anisotropy", [0.0, 0.3, 0.6, -0.3, -0.6])
 def test_a_flat_wall_has_the_colour_asked_for(anisotropy: float) -> None:
-    """The colour is exact within 1 % and noise."""
+    """The colour of a flat wall is the requested one within 1 % and noise."""
     colors = (0.2, 0.5, 0.85)
     seen = slab(300.0, spp=192, subsurface_color=colors, subsurface_anisotropy=anisotropy)
     for channel, color in enumerate(colors):

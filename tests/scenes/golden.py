@@ -192,6 +192,6 @@ def verdict(made: Array, mean: Array, variance: Array) -> Verdict:
 
 
 def each(names: list[str]) -> Iterator[Golden]:
-    """Yield the scenes of these names, or all scenes if there are none."""
+    """Yield the scenes with the given names, or all scenes if no names are given."""
     for name in names or golden_names():
         yield read_golden(name)

@@ -8,14 +8,14 @@ A stage is rendered with plain settings and with each of ``variants``: light pat
 sampling, roulettes, the choice of lights, hidden lights, and random combinations of all of them.
 Both renders are sets of batches that have different seeds. ``judge`` compares block means and the
 image mean by Welch's t. A comparison with |z| of 3.3 or more is repeated with 12 and then with 60
-times as many samples and other seeds. It is a fault if |z| is too large each time, at the level
-that Sidak's correction leaves of 1 % for all comparisons of a run.
+times as many samples and other seeds. A difference is a fault if |z| is too large each time, at the
+level that Sidak's correction leaves of 1 % for all comparisons of a run.
 
 Where a few paths carry most of the light, z is not normal: a render that has found none of them has
-a small variance. Such a difference is a fault only if it is more than these paths can make by
-chance (``Comparison.is_sure``). Otherwise the comparison is repeated with ``FURTHER`` times as many
-samples. If the difference is too large even then, the comparison is undecided. A run in which more
-than ``MOST_UNDECIDED`` of the stages have such comparisons fails.
+a small variance. A difference is then a fault only if it is larger than the chance effect of a few
+paths (``Comparison.is_sure``). Comparisons of smaller differences are repeated with ``FURTHER``
+times as many samples. If the difference is too large even then, the comparison is undecided. A run
+in which more than ``MOST_UNDECIDED`` of the stages have such comparisons fails.
 """
 
 from __future__ import annotations

@@ -191,7 +191,7 @@ def test_equal_sparse_images_agree() -> None:
 
 @pytest.mark.parametrize("paths", [0.2, 2.0, 20.0])
 def test_a_difference_is_found_once_paths_suffice(paths: float) -> None:
-    """Half of the light is missing: certain once a block of 16 pixels expects some 50 paths."""
+    """Missing half of the light is certainly a fault if a block of 16 pixels expects 50 paths."""
     found = judge(flat(0.5, 1), sparse(1.0, 2, paths) + flat(1e-3, 3))
     assert found.is_sure(MANY * 12) == (paths > 4), found.events.max()
 

@@ -215,7 +215,7 @@ def bar_width(columns: int) -> int:
 class ProgressBar(Silent):
     """Progress bar with passes, samples and rays per second, error and time left.
 
-    The bar is a context manager.
+    The progress bar is a context manager.
     """
 
     def __init__(self, console: Console, title: str = "rendering") -> None:
@@ -307,5 +307,5 @@ class ProgressLines(Silent):
         self.event("wrote", file=path)
 
     def event(self, name: str, **values: Any) -> None:
-        """Writes a line with any event."""
+        """Writes an event as a line of JSON."""
         self._write(json.dumps({"event": name, **values}))

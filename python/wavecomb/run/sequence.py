@@ -30,8 +30,8 @@ class Frames:
     """Frames of an open stage; each image is bit-identical to that of a separate render.
 
     If only views change, this class keeps the scene with its acceleration structures and reads the
-    camera. Otherwise it traverses the stage again, but reuses unchanged meshes and textures of the
-    previous frame.
+    camera. If anything else changes, the stage is traversed again, but unchanged meshes and
+    textures of the previous frame are reused.
 
     Contract: files of the stage must not change, except images.
     """

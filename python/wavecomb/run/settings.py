@@ -87,8 +87,8 @@ def make_settings(
 ) -> Settings:
     """Returns validated settings; raises WavecombError or _core.Error with a one-line message.
 
-    ``size`` is the image size without overscan, and ``aovs`` are expanded. Also checks that the
-    image fits into this machine's memory, by ``check_memory`` unless ``fits`` is given.
+    ``size`` is the image size without overscan, and ``aovs`` are expanded. Also checks by ``fits``
+    (default: ``check_memory``) that the image fits into this machine's memory.
     """
     from wavecomb import _core
     from wavecomb.errors import WavecombError
@@ -118,7 +118,8 @@ def check_memory(settings: Settings, aovs: Sequence[str], light_groups: int = 1)
     Args:
         settings: Settings of the render.
         aovs: Expanded AOVs.
-        light_groups: Number of light groups of the scene; repeat the check once it is known.
+        light_groups: Number of light groups of the scene; if unknown, repeat the check after
+            loading.
     """
     from wavecomb.errors import WavecombError
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenes with caustics, such as a glass ball and a gold ring under a small light.
 
-Paths from the camera rarely find the light that these objects focus.
+Paths from the camera rarely find light that glass or metal focuses.
 """
 
 from __future__ import annotations

@@ -68,9 +68,9 @@ _KINDS: tuple[dict[str, float | tuple[float, float]], ...] = (
         "fuzz_weight": 0.3,
     },
 )
-"""Inputs of OpenPBR surfaces: paint, metal, lacquer, cloth, thin film, glass, and all lobes. The
-materials use these kinds of surface in turn, after a diffuse UsdPreviewSurface. A pair is a range
-for a random value."""
+"""Inputs of OpenPBR surfaces: paint, metal, lacquer, cloth, thin film, glass, and all lobes.
+Materials use the kinds of surface in turn, after a diffuse UsdPreviewSurface. A pair is a range for
+a random value."""
 
 
 def _inputs(kind: dict[str, float | tuple[float, float]], rng: np.random.Generator) -> Inputs:

@@ -79,7 +79,7 @@ _PROGRAMS = (
     lambda colour: materials.metal(colour, 0.25),
     lambda colour: materials.dielectric(colour, 0.1),
 )
-"""Functions that make a material from its colour. The first ``programs`` of them are used in
+"""Functions that make a material from its colour. The first ``programs`` functions are used in
 turn."""
 
 

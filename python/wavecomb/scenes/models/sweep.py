@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Closed tubes swept along a cubic B-spline, the parts of the dragon.
+"""Closed tubes swept along a cubic B-spline, of which the dragon is made.
 
 A tube has a centre line, an elliptic section that changes along it, an "up" direction that keeps
 the section from twisting, and an optional relief, a displacement along the section's radius.

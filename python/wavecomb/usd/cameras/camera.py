@@ -40,7 +40,7 @@ ALL_ROUND = (-math.pi, math.pi, -0.5 * math.pi, 0.5 * math.pi)
 
 MAX_STOPS = 60.0
 MAX_EXPOSURE = 1e12
-"""Exposures beyond these limits are treated as mistakes and ignored."""
+"""Limits of exposures, in stops and as a factor; larger values are ignored as mistakes."""
 
 MAX_CLIP_PLANES = 16
 

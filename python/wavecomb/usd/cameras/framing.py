@@ -26,10 +26,10 @@ _RUN = 256
 _SAMPLE = 4096
 
 _FEW_POINTS = 200
-"""Point sets up to this size are their own outline."""
+"""Largest number of points that are all kept as an outline."""
 
 MANY_POINTS = 1 << 16
-"""Larger point sets are reduced to their outline before more points are added."""
+"""Number of points above which a set is reduced to its outline before points are added."""
 
 _FEW_PLACES = 512
 """Of more instances than this number, only the extreme ones are processed."""
@@ -182,8 +182,8 @@ def fit(
     """Computes the position from which a pinhole camera frames the points.
 
     A point (x, y, z) in camera axes is inside the image where |x - cx| <= half (cz - z), and the
-    same for y. This gives four planes; the tighter pair of opposite planes touches the points, and
-    the points are centred between both pairs.
+    same for y. The edges of the image are four planes; the tighter pair of opposite planes touches
+    the points, and the points are centred between both pairs.
 
     Args:
         points: (n, 3).

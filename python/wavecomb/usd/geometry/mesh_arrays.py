@@ -255,7 +255,7 @@ def faces_with(bad: Mask, counts: Ints, indices: Ints) -> Ints:
 def fill_invalid(points: Array, bad: Mask, counts: Ints, indices: Ints) -> Array:
     """Replaces each invalid point by the mean of the valid points of its faces.
 
-    This mean distorts adjacent faces least when they are subdivided.
+    The mean distorts adjacent faces least when they are subdivided.
     """
     out = points.copy()
     good = np.flatnonzero(~bad)

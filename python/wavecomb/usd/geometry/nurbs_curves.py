@@ -215,7 +215,7 @@ def _bezier_conversion(spline: Spline, weights: Floats | None) -> _BezierConvers
 Floats = NDArray[np.float64]
 
 MAX_ORDER = 32
-"""Orders above this limit are treated as mistakes."""
+"""Largest order of a NURBS curve; higher orders are treated as mistakes."""
 
 
 @dataclass(frozen=True)

@@ -226,7 +226,7 @@ class Drivers:
         return None
 
     def surface(self, program: str, parameters: dict[str, Any]) -> Surface:
-        """Returns the surface of the material with these constants."""
+        """Returns the surface of the material with the given constants."""
         return Surface(
             str(self.networks.material.GetPath()),
             program,

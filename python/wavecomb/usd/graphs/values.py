@@ -313,7 +313,7 @@ class Expressions:
     def attribute(self, name: str, width: int, fallback: Value) -> Value:
         """Returns a primvar that is read at hits.
 
-        Its value is ``fallback`` on a mesh without such a primvar or with fewer components.
+        The value is ``fallback`` on meshes whose primvar is missing or has fewer components.
         """
         return self._all(self._node("attribute", width, (fit(fallback, width),), 0, None, name))
 

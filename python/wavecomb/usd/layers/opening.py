@@ -276,7 +276,7 @@ def open_editable(
     """Opens a stage that can be inspected and edited while another copy of it is loaded.
 
     Opens the stage like ``open_stage``, but also resolves MaterialX files in unselected variants.
-    Selecting these variants later then changes no layer while another thread reads it.
+    Selecting other variants later thus changes no layer while another thread reads it.
 
     Args:
         file: .usd, .usda, .usdc or .usdz.
@@ -342,8 +342,8 @@ def select_variants(stage: Usd.Stage, variants: Mapping[str, str]) -> None:
 
 
 _changed: dict[str, Sdf.Layer] = {}
-"""Layers that this process has changed, by identifier. They are never released, since USD would
-read them again."""
+"""Layers that this process has changed, by identifier. Changed layers are never released, since USD
+would read them again."""
 
 
 def change_layers(layers: Iterable[Sdf.Layer]) -> None:

@@ -70,7 +70,7 @@ class Filter:
 def add_filters(
     builder: _core.SceneBuilder, filters: Sequence[Filter], transform: NDArray[np.float64]
 ) -> int | None:
-    """Adds the filters of a light with this transform; returns their combined id."""
+    """Adds the filters of a light with the given transform; returns their combined id."""
     known: int | None = None
     for one in filters:
         known = builder.add_light_filter(

@@ -292,7 +292,7 @@ class InputValues:
 def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
     """Returns the resolved file of an asset value, or the authored path if it does not resolve.
 
-    For a UDIM texture this is the pattern that contains ``<UDIM>``.
+    For a UDIM texture, the result is the pattern that contains ``<UDIM>``.
     """
     if not isinstance(value, Sdf.AssetPath):
         return _file_of_text(str(value or ""), attribute)

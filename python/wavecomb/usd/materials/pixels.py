@@ -329,7 +329,7 @@ class ReadAhead:
         self._ready: dict[str, Future[Image]] = {}
 
     def want(self, paths: Iterable[str]) -> None:
-        """Queues images that will be needed, most likely in this order."""
+        """Queues images that will be needed, most likely in the given order."""
         if self._threads == 1:
             return
         for path in paths:

@@ -3,7 +3,7 @@
 
 Before loading, reads the headers of all image files and computes the memory of their textures.
 While the sum exceeds the limit, removes the finest level of the texture with the most texels per
-image pixel. So a render never waits for a file, and the same stage, view and limit give the same
+image pixel. Renders thus never wait for files, and the same stage, view and limit give the same
 image.
 """
 

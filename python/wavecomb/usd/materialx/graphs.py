@@ -20,7 +20,7 @@ A short document may nest graphs into billions of nodes.
 """
 
 _SMALL = 32
-"""Node graphs with at most this many nodes are never instanced."""
+"""Largest number of nodes of node graphs that are never instanced."""
 
 
 def definition(node: Any) -> Any:
