@@ -30,7 +30,7 @@ HARMLESS = frozenset((
     "OPENBLAS_NUM_THREADS",
 ))  # fmt: skip
 """Variables that are read when a command runs, or that a command sets before it imports the module
-which reads them. All other modules may be read at import."""
+which reads them. All other variables may be read at import."""
 
 _MOST = 100_000
 _Popen = subprocess.Popen

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Requirements of tests, and skips that CI accepts.
 
-A test whose requirement is missing is skipped on a user's machine. A missing part fails the test
-where everything must be installed: in CI (`CI=true`), or with `WAVECOMB_STRICT=1`. `conftest.py`
-applies this to every skip, including `pytest.skip` and `pytest.importorskip`. Two kinds of skips
-are always accepted: tests that only `make test-long` runs, and those that `only_where` or
-`not_here` skips because of the machine or the build.
+A test whose requirement is missing is skipped on a user's machine. A missing requirement fails the
+test where everything must be installed: in CI (`CI=true`), or with `WAVECOMB_STRICT=1`.
+`conftest.py` applies this to every skip, including `pytest.skip` and `pytest.importorskip`. Two
+kinds of skips are always accepted: tests that only `make test-long` runs, and those that
+`only_where` or `not_here` skips because of the machine or the build.
 
     pytestmark = needs("wavecomb._core")
 

@@ -57,7 +57,7 @@ def scene(
     spp: int = 128,
     messages: tuple[str, ...] = (),
 ) -> Callable[[Callable[[], None]], Callable[[], None]]:
-    """Adds a function to the table, under its name."""
+    """Adds a scene to the table, under the name of its function."""
 
     def added(make: Callable[[], None]) -> Callable[[], None]:
         expected = Expected(low, high, outside, why)

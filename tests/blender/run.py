@@ -83,7 +83,7 @@ def refresh(output: Path) -> None:
 
 
 def main(words: list[str]) -> int:
-    """Runs the named scenes, or all."""
+    """Renders the named scenes, or all scenes."""
     output = Path(words[0])
     output.mkdir(parents=True, exist_ok=True)
     failed = 0

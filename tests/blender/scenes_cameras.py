@@ -281,7 +281,7 @@ def combined_mirrors() -> None:
 
 @scene("Combined")
 def combined_graph() -> None:
-    """A material graph: an image, a ramp and a mask by facing drive five inputs."""
+    """A material graph in which an image, a ramp and a facing-ratio mask drive five inputs."""
     studio()
     material, surface, node = textured("graph")
     surface.inputs["Specular IOR Level"].default_value = 0.5

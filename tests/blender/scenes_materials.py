@@ -61,19 +61,19 @@ def principled_metal_half() -> None:
 
 @scene("Principled")
 def principled_ior() -> None:
-    """A high index of refraction."""
+    """A material with a high index of refraction."""
     _ball(base_color=(0.5, 0.1, 0.1), ior=2.2, roughness=0.2)
 
 
 @scene("Principled")
 def principled_specular_level() -> None:
-    """A low Specular IOR Level."""
+    """A material with a low Specular IOR Level."""
     _ball(base_color=(0.1, 0.3, 0.5), specular_ior_level=0.2, roughness=0.25)
 
 
 @scene("Principled")
 def principled_specular_high() -> None:
-    """A high Specular IOR Level."""
+    """A material with a high Specular IOR Level."""
     _ball(base_color=(0.1, 0.3, 0.5), specular_ior_level=1.0, roughness=0.25)
 
 

@@ -125,7 +125,7 @@ def texture_checker() -> None:
 
 @scene("Textures")
 def texture_colour_nodes() -> None:
-    """Hue, gamma, contrast, inversion and a multiplied colour."""
+    """An image with adjusted hue, gamma and contrast, inverted and multiplied by a colour."""
     studio()
     material, surface, node = textured()
     hue = put(add(material, "ShaderNodeHueSaturation"), Hue=0.6, Saturation=0.8, Value=0.9)
@@ -147,7 +147,7 @@ def texture_colour_nodes() -> None:
 
 @scene("Textures")
 def texture_fresnel_mix() -> None:
-    """Two colours by a Fresnel node, in a group."""
+    """Two colours that a Fresnel node mixes, in a node group."""
     studio()
     material = principled(roughness=1.0, specular_ior_level=0.0)
     group = bpy.data.node_groups.new("edge", "ShaderNodeTree")

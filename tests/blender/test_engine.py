@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The render engine: the command line's image, errors, cancelling, animation, .blend files."""
+"""The Blender render engine: images, errors, cancelling, animation, and .blend files."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_errors_are_one_line(blender: Run, tmp_path: Path) -> None:
 
 
 def test_animation_exports_geometry_once(blender: Run, tmp_path: Path) -> None:
-    """Frames with motion blur reuse the exported geometry and equal frames rendered alone."""
+    """Frames with motion blur reuse the exported geometry; each equals a frame rendered alone."""
     row = _rows(blender(str(HERE / "engine_cases.py"), "animation", str(tmp_path)))
     assert row["exports"] == 1
     assert float(str(row["difference"])) < 1e-6

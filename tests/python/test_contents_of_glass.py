@@ -31,7 +31,7 @@ def scene(
     """A ball of glass around the origin, with a grey card inside and a light at x = ``lamp``.
 
     Args:
-        tinted: The glass absorbs.
+        tinted: Whether the glass absorbs.
         stone: Whether the card is inside of the glass; otherwise it is beside it.
         lamp: Position of the light.
         graph: Adds a graph to a builder and returns its number.

@@ -475,7 +475,7 @@ def test_what_floats_cannot_hold_is_said(
 
 
 def test_cameras_and_positions_of_the_window() -> None:
-    """Camera poses of the window are in scene space; it shows world space."""
+    """Camera poses in the window are in scene space; displayed positions are in world space."""
     from wavecomb.gui.viewport.navigate import Pose
     from wavecomb.gui.viewport.scene_lookup import camera_pose
 

@@ -281,7 +281,7 @@ def test_auto_decides_alike_whatever_the_schedule(tmp_path: Path) -> None:
 
 
 def test_auto_leaves_a_stage_alone_where_it_does_not_pay() -> None:
-    """Under an even dome, all directions contribute as the material expects."""
+    """Guiding is not used under a uniform dome, where BSDF sampling is already good."""
     builder = wavecomb.SceneBuilder()
     quad = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
     points = np.array([[-9, -1, 9], [9, -1, 9], [9, -1, -9], [-9, -1, -9]], np.float32)
@@ -312,7 +312,7 @@ def test_auto_learns_only_where_that_is_a_small_share(cornell: Any) -> None:
 
 
 def test_a_limit_of_time_is_taught_for_as_long_as_it_may_be(cornell: Any) -> None:
-    """The first round assumes a training speed; the others use the measured one."""
+    """The first round of training assumes a speed; later rounds use the measured speed."""
     way: dict[str, Any] = {"spp": 2**20, "threads": 2, "guiding": "on", "region": (0, 0, 1, 1)}
     learned = render(cornell, time_limit=3.0, **way).stats["guiding"]
     assert learned["rounds"] == 3

@@ -18,7 +18,7 @@ WIDE = 4.0
 
 
 def filled(builder: Any, ior: float, roughness: float = 0.0, **layers: Any) -> int:
-    """Returns a glass or liquid, or a fog bounded by the mesh if the index is 1."""
+    """Returns a material of glass or liquid, or of fog that a mesh bounds if the index is 1."""
     return int(
         builder.add_material(
             "openpbr",

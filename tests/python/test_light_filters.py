@@ -158,7 +158,7 @@ GLOSSY = """def Material "Gloss" {
 
 @pytest.mark.parametrize("transport", ["path", "light"])
 def test_a_barn_before_a_rect_is_four_boards(tmp_path, transport):
-    """Light samples, bounces and light paths through a barn door, against real geometry."""
+    """Light samples, bounces and light paths through a barn door, compared with real geometry."""
     floor = GLOSSY + quad("Floor", 3, 0, "rel material:binding = </Gloss>")
     size = "float inputs:width = 2\nfloat inputs:height = 2"
     window = barn("float inputs:width = 0.8\nfloat inputs:height = 1.6", 3)

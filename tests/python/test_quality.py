@@ -34,7 +34,7 @@ def render(scene: Any, **settings: Any) -> Any:
 
 @pytest.fixture(scope="module")
 def default(caustics: Any) -> Any:
-    """A part of an image whose guiding and transport pilots decide."""
+    """A part of an image for which pilot renders choose guiding and transport."""
     return render(caustics)
 
 

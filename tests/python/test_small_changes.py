@@ -319,7 +319,7 @@ def test_a_light_that_lacks_something_does_not_compile(
 
 @pytest.mark.slow
 def test_a_setting(tmp_path: Path, compiler: list[str]) -> None:
-    """And its use. ``test_settings_table.py`` shows that options and fields follow."""
+    """A new setting compiles, and so does code that reads the setting."""
     assert len(SETTING) <= 2
     applied(tmp_path, SETTING)
     done = compiled(tmp_path, compiler, "settings_table.cpp", "settings.cpp")

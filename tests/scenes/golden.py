@@ -49,7 +49,7 @@ class Golden:
     """A scene and its render options.
 
     Attributes:
-        name: Name of its folder.
+        name: Name of the scene's folder.
         size: Width and height; multiples of 8.
         reference_spp: Samples of each of the reference's 32 batches.
         spp: Samples of each of the test's 16 batches.

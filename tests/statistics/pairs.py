@@ -80,7 +80,7 @@ FURTHER = 300
 MOST_UNDECIDED = 0.01
 """Fraction of the stages of a run that may have undecided comparisons; one is always allowed."""
 MERGED_TOLERANCE = 0.03
-"""Relative difference that a blurred caustic may cause in the image mean, by loss at edges."""
+"""Relative loss of the image mean that a blurred caustic may cause at edges."""
 SMOOTH_TOLERANCE = 0.01
 """Relative difference that light paths may cause on smooth coarse meshes.
 

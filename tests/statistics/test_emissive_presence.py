@@ -138,7 +138,7 @@ def driven() -> str:
 
 
 def under_mask(mask: NDArray[np.float32]) -> float:
-    """As UNDER_SQUARE, with a bilinear, clamped mask over the square: the mean of o / r^4."""
+    """Radiance of the floor below a square whose opacity is a bilinear, clamped mask."""
     n, steps = len(mask), 400
     at = (np.arange(steps) + 0.5) / steps
     texel = np.clip(at * n - 0.5, 0, n - 1)

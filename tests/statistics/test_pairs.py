@@ -75,7 +75,7 @@ def test_settings_agree_at_night(seed: int, tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_few_stages_are_undecided_at_night() -> None:
-    """Runs after the stages, in the same process."""
+    """This test runs after the tests of all stages, in the same process."""
     assert len(UNDECIDED) <= most_undecided(MANY), UNDECIDED
 
 

@@ -84,7 +84,7 @@ _earlier: list[int] = []
 
 
 def keep_interrupts() -> None:
-    """Records Ctrl-C signals, so that the next ``Interrupt`` handles those that were lost.
+    """Records Ctrl-C signals, so that the next ``Interrupt`` handles signals that were lost.
 
     ``KeyboardInterrupt`` is lost if it is raised in a callback of a library that prints exceptions
     and continues. Use this function in commands, which a ``KeyboardInterrupt`` ends, but not in a

@@ -184,7 +184,7 @@ def use(person, tmp_path, name):
 
 @pytest.mark.slow
 def test_small_stages(person, tmp_path):
-    """MaterialX, .mtlx files, instances, no light, no camera, a missing layer, a broken stage."""
+    """Stages with MaterialX, .mtlx files, instances, missing layers or errors, or without light."""
     looks, referring = write_stage(tmp_path), write_referring(tmp_path)
     broken = tmp_path / "broken.usda"
     broken.write_text(BROKEN)

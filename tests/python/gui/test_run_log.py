@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Statistics as runs and series, rates, ratios and the table, without Qt."""
+"""Log of render statistics without Qt: runs, series, rates, ratios and the table."""
 
 from __future__ import annotations
 

@@ -122,7 +122,7 @@ def test_space_and_eye_toggle(panel, same_as_saved, qtbot, stage_path):
 
 
 def test_keys_of_the_window(qtbot, stage_path, tmp_path):
-    """F in the tree frames the selection, and Ctrl+Z undoes with the focus anywhere."""
+    """Key F in the prim tree frames the selection, and Ctrl+Z undoes with the focus anywhere."""
     from PySide6.QtCore import QSettings
 
     from wavecomb.gui.main_window import MainWindow

@@ -138,7 +138,7 @@ class InstanceBinding:
     """Material and primvars that instances pass to their prototype.
 
     Attributes:
-        key: Equal for equal appearance; None if the instance passes nothing.
+        key: Key that is equal for equal appearance; None if the instance passes nothing.
         inherited: Constant primvars of the instance.
         material: Material for prims without a binding, which reads primvars of the meshes.
     """

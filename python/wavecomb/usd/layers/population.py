@@ -94,7 +94,7 @@ def _always(stage: Usd.Stage) -> Iterator[Sdf.Path]:
 
 
 def _needed(prims: Iterable[Usd.Prim]) -> Iterator[Sdf.Path]:
-    """Yields prims that some prims, their descendants and their ancestors refer to."""
+    """Yields prims to which given prims, their descendants or their ancestors refer."""
     for top in prims:
         if not top:
             continue

@@ -313,7 +313,7 @@ def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
 
 
 def _file_of_text(name: str, attribute: Usd.Attribute | None) -> str:
-    """Returns the file that a string names.
+    """Returns the path of the file that a string names.
 
     Relative names are anchored at the layer that holds the string.
     """
