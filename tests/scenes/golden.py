@@ -3,7 +3,7 @@
 
 `ref.exr` is the mean of independent renders by the reference integrator (scalar, depth first),
 `ref_var.exr` the variance of that mean for each pixel and channel. Only tools/update_references
-writes them.
+writes the reference images.
 
 An image is tested as independent renders as well ("batches" with one seed each), so nothing is
 assumed about the noise within a render:

@@ -76,7 +76,7 @@ CHOICES: dict[str, tuple[Any, ...]] = {
     "sampler": ("sobol", "independent"),
 }
 FURTHER = 300
-"""Factor of the samples of a last repeat, for differences that a few rare paths can make."""
+"""Factor of the samples in the last repeat, for differences that a few rare paths may cause."""
 MOST_UNDECIDED = 0.01
 """Fraction of the stages of a run that may have undecided comparisons; one is always allowed."""
 MERGED_TOLERANCE = 0.03
@@ -84,7 +84,7 @@ MERGED_TOLERANCE = 0.03
 SMOOTH_TOLERANCE = 0.01
 """Relative difference that light paths may cause on smooth coarse meshes.
 
-A ball of 8 rings of faces differs by up to 0.5 %, and by a quarter of that with twice as many
+A ball of 8 rings of faces differs by up to 0.5 %, a ball of 16 rings by up to 0.13 %
 (docs/light-paths.md).
 """
 

@@ -86,7 +86,7 @@ def test_mirrors_with_tilted_normals_see_the_sky(
 
 
 def test_grey_furnace(shot: Any) -> None:
-    """A body of albedo a has radiance a."""
+    """A body of albedo a under uniform radiance 1 has radiance a."""
     albedo = np.array((0.8, 0.5, 0.2))
     body = material("M", "diffuse", diffuseColor=tuple(albedo))
     picture = shot(AT_BALL, WHITE, body, sphere("B", "M"))
@@ -200,7 +200,7 @@ def test_disk_light(shot: Any) -> None:
 
 
 def test_rect_light(shot: Any) -> None:
-    """A rect with a corner overhead: form factor of a parallel rectangle (Howell's B-3)."""
+    """A rect light with a corner overhead: form factor of a parallel rectangle (Howell's B-3)."""
     a, b, h = 1.2, 0.7, 2.0
     place = turned(-90) @ moved(a / 2, h, b / 2)
     lamp = light("Rect", colour=(8, 4, 2), transform=place, width=a, height=b)
@@ -213,7 +213,7 @@ def test_rect_light(shot: Any) -> None:
 
 
 def test_rect_light_shines_one_way(shot: Any) -> None:
-    """A rect emits along -z and is black at the back."""
+    """A rect light emits along -z and is black at the back."""
     up = light("Rect", transform=turned(90) @ moved(0, 2, 0), width=1, height=1)
     below = camera((0, 1.5, 0), (0, 0, 0), half=0.004)
     assert shot(below, FLOOR, ground("M"), up, max_depth=3, spp=16).max() == 0.0

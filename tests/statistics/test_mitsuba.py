@@ -2,8 +2,8 @@
 """Wavecomb compared with Mitsuba 3's `path`: images agree within noise.
 
 Every stage is USD text that our loader reads; Mitsuba gets the arrays that our scene builder
-received. A wrong orientation would therefore be wrong in both, so test_closed_forms.py tests it
-separately. Tests state where the models differ by design.
+received. A wrong orientation would therefore be wrong in both renderers, so test_closed_forms.py
+tests orientations separately. Tests state where the models differ by design.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A field of stones with materials as complex and as diverse as those of a production.
 
-Each material is a network of MaterialX nodes: separate images, mixed by fractals in space and
-graded, which drive one of eight kinds of surface, from plain paint to all lobes at once. The first
-material reads one image; the last one mixes eight layers. The materials thus differ in shading
-program, lobes, textures and cost, without repeating work artificially.
+Each material is a network of MaterialX nodes: separate images, mixed by fractal noise in space and
+colour-graded, which drive one of eight kinds of surface, from plain paint to all lobes at once. The
+first material reads one image; the last one mixes eight layers. The materials thus differ in
+shading program, lobes, textures and cost, without repeating work artificially.
 """
 
 from __future__ import annotations

@@ -59,7 +59,7 @@ def _edge(options: SceneOptions) -> int:
 
 
 def octaves(options: SceneOptions, index: int) -> int:
-    """Returns the octaves of noise on material ``index``.
+    """Returns the number of octaves of noise on material ``index``.
 
     The octaves grow geometrically from 1 for the first material, which means no noise, to
     ``shader_cost`` for the last.

@@ -100,7 +100,7 @@ class Lens:
 
 
 def find_camera(stage: Usd.Stage, wanted: str | None) -> Usd.Prim | None:
-    """Returns camera ``wanted``, else that of the render settings, else the stage's first camera.
+    """Returns the camera ``wanted``, that of the render settings, or the stage's first camera.
 
     Raises:
         WavecombError: ``wanted`` names no camera.

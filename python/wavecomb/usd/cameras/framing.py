@@ -48,7 +48,7 @@ DIRECTIONS = np.concatenate([np.eye(3), -np.eye(3), _spread(_DIRECTIONS - 6)])
 
 
 def with_directions(more: Points | None) -> Points:
-    """Returns ``DIRECTIONS`` followed by ``more`` (k, 3), in which the outline is exact."""
+    """Returns ``DIRECTIONS`` followed by further directions (k, 3) in which outlines are exact."""
     return DIRECTIONS if more is None else np.concatenate([DIRECTIONS, more])
 
 

@@ -100,7 +100,7 @@ class PatchReader:
             prim: A UsdGeomNurbsPatch.
             matrix: Transform from the patch to its group.
             uv_names: Primvars for texture coordinates; without one, u and v run from 0 to 1.
-            inherited: Constant primvars of its ancestors.
+            inherited: Constant primvars of the patch's ancestors.
             motion: The shutter over which points are read; None reads them at the frame.
 
         Raises:
@@ -185,7 +185,7 @@ class PatchReader:
         names: Sequence[str],
         inherited: Sequence[Any],
     ) -> Array:
-        """Returns UVs (n, 2) from a primvar of the control points, else the parameters."""
+        """Returns UVs (n, 2) from a primvar of the control points, else surface parameters."""
         u, v = axes
         try:
             primvar = first_primvar(prim, names, inherited, self.time)

@@ -120,7 +120,7 @@ _OP = np.dtype(
 class Graph:
     """A compiled program in the form that ``SceneBuilder.add_graph`` takes.
 
-    ``attributes`` are names of primvars that it reads, with their numbers of components.
+    ``attributes`` are names of primvars that the program reads, with numbers of components.
     """
 
     ops: bytes

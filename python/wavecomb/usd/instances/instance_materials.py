@@ -197,7 +197,7 @@ class InstanceBindings:
         Args:
             instance: The point instancer.
             root: The prototype.
-            chosen: (k,) indices of its instances in the authored arrays.
+            chosen: (k,) indices of instances in the authored arrays.
             count: Number of authored instances.
             predicate: Predicate of prims in prototypes.
         """

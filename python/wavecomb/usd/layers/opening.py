@@ -33,8 +33,8 @@ _IDLE = 0.1
 def abort_on_fifo() -> Iterator[None]:
     """Aborts a block that opens layers if USD waits for a FIFO.
 
-    While the process is idle, a thread checks the files that loaded layers name. An expendable
-    process is ended with a message of one line. In other processes the thread opens the FIFO for
+    While the process is idle, a thread checks the files that loaded layers name. A process that is
+    expendable ends with a one-line message. In other processes the thread opens the FIFO for
     writing and closes it, so that USD reads an empty layer; the block then raises.
 
     Raises:

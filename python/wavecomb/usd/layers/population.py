@@ -24,7 +24,7 @@ _PROXIES = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
 
 
 def populate(stage: Usd.Stage, paths: Sequence[str]) -> None:
-    """Restricts a stage to the prims at and below some paths, their ancestors, and what they need.
+    """Restricts a stage to prims at and below given paths, their ancestors, and prims they need.
 
     Prims need their materials, prototypes of point instancers and sources of shader connections.
     All cameras, lights and render settings are kept, except those inside instances that are left

@@ -303,11 +303,11 @@ def _before(prim: Usd.Prim, light: Usd.Prim, time: Usd.TimeCode) -> NDArray[np.f
 
 
 def _scaled(line: Line, edge: float, size: float) -> Line:
-    """Scales a line so that it rises from 0 to 1 within ``edge``; 0 gives a hard edge."""
+    """Scales a linear function to rise from 0 to 1 within ``edge``; 0 gives a hard edge."""
     k = 1.0 / edge if edge > size / _SHARP else _SHARP / size
     return (line[0] * k, line[1] * k, line[2] * k)
 
 
 def _side(x: float, y: float, room: float, edge: float, size: float) -> Line:
-    """Returns the line of the side in direction -(x, y), at distance ``room`` from the centre."""
+    """Returns the linear function of a window side at distance ``room`` in direction -(x, y)."""
     return _scaled((x, y, room), edge, max(size, 1e-6))

@@ -37,7 +37,7 @@ class MeshLight:
 
 
 class MeshLights:
-    """The mesh lights of one stage, which it adds to the scene.
+    """Factory of the mesh lights of one stage, which adds them to the scene.
 
     Attributes:
         any: Whether there is a mesh light.

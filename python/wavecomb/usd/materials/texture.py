@@ -140,7 +140,8 @@ class TextureTable:
 
         ``store`` is the texture store of the builder. ``drops`` may be set to the number of finest
         mip levels that each texture leaves out, and ``origin`` to the world position of the scene's
-        origin, for graphs. The table does not keep the context's stage, since it may outlive it.
+        origin, for graphs. The table does not keep the context's stage, since the table may outlive
+        the stage.
         """
         self.store = store
         self.working = context.options.working_space

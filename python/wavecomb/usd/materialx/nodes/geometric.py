@@ -167,7 +167,7 @@ def _transform(n: NodeCall) -> Value:
 
 @_node("transformpoint")
 def _transform_point(n: NodeCall) -> Value:
-    """Transforms relative to the shading point, whose position is known in both spaces."""
+    """Transforms a point relative to the shading point, whose position both spaces provide."""
     m = n.make
     starts, ends = _spaces(n)
     p = _transformed(n, (0.0, 0.0, 0.0))
