@@ -50,9 +50,7 @@ def test_absurd_costs_do_not_bias(cornell: Any, beauty: Any, start: int, fewer: 
 
 
 def test_roulette_ends_paths(cornell: Any) -> None:
-    """Roulette by throughput reduces the number of shaded records, and cost-aware roulette
-    terminates more paths at expensive materials.
-    """
+    """Roulette by throughput and cost-aware roulette reduce the number of shaded records."""
 
     def counts(**settings: Any) -> Any:
         picture = wavecomb.render(cornell, size=(48, 48), spp=16, max_depth=8, **settings)
