@@ -30,7 +30,7 @@ HARMLESS = frozenset((
     "OPENBLAS_NUM_THREADS",
 ))  # fmt: skip
 """Variables that are read when a command runs, or that a command sets before it imports the module
-which reads them. All other modules may be read at import."""
+which reads them. All other variables may be read at import."""
 
 _MOST = 100_000
 _Popen = subprocess.Popen
@@ -57,7 +57,7 @@ def run(
     cwd: str | Path | None = None,
     timeout: float = 100,
 ) -> subprocess.CompletedProcess[str]:
-    """Run Python with these arguments like `subprocess.run`, and capture its output as text."""
+    """Run Python with the given arguments, like `subprocess.run`; capture the output as text."""
     pipe, command = subprocess.PIPE, [sys.executable, *words]
     process = Popen(command, stdout=pipe, stderr=pipe, text=True, env=env, cwd=cwd)
     with process:
@@ -179,7 +179,7 @@ def _is_python(words: Sequence[str]) -> bool:
 
 
 def _is_booted(words: Sequence[str]) -> bool:
-    """Whether this is a command of ``wavecomb.processes`` without other flags of Python."""
+    """Whether arguments start a command of ``wavecomb.processes`` without other flags of Python."""
     return words[0] == "-I" and words[1].endswith(os.path.join("wavecomb", "boot.py"))
 
 
@@ -233,7 +233,7 @@ def _serve(channel: socket.socket) -> dict[str, Any] | None:
 
 
 def _fork(request: Mapping[str, Any], descriptors: Sequence[int]) -> None:
-    """Continue in a child with its descriptors; this process waits and reports the child's exit."""
+    """Continue in a child with the given descriptors; the parent waits and reports its exit."""
     import fcntl
 
     told, *given = (fcntl.fcntl(one, fcntl.F_DUPFD_CLOEXEC, 500) for one in descriptors)
@@ -258,7 +258,7 @@ def _fork(request: Mapping[str, Any], descriptors: Sequence[int]) -> None:
 
 
 def _end(code: object) -> None:
-    """End this process as Python does, but skip module teardown, half of the remaining time."""
+    """End this process like Python, but skip the teardown of modules, which takes long."""
     if code is not None and not isinstance(code, int):
         print(code, file=sys.stderr)
         code = 1

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Requirements of tests, and skips that CI accepts.
 
-A test whose requirement is missing is skipped on a user's machine. A missing part fails the test
-where everything must be installed: in CI (`CI=true`), or with `WAVECOMB_STRICT=1`. `conftest.py`
-applies this to every skip, including `pytest.skip` and `pytest.importorskip`. Two kinds of skips
-are always accepted: tests that only `make test-long` runs, and those that `only_where` or
-`not_here` skips because of the machine or the build.
+A test whose requirement is missing is skipped on a user's machine. A missing requirement fails the
+test where everything must be installed: in CI (`CI=true`), or with `WAVECOMB_STRICT=1`.
+`conftest.py` applies this to every skip, including `pytest.skip` and `pytest.importorskip`. Two
+kinds of skips are always accepted: tests that only `make test-long` runs, and those that
+`only_where` or `not_here` skips because of the machine or the build.
 
     pytestmark = needs("wavecomb._core")
 
@@ -65,13 +65,13 @@ def missing(part: str) -> str:
 
 
 def needs(*parts: str) -> pytest.MarkDecorator:
-    """Mark tests that have these requirements; `missing` lists the possible names."""
+    """Mark tests that have the given requirements; `missing` lists the possible names."""
     reasons = [f"{part}: {reason}" for part in parts if (reason := missing(part))]
     return pytest.mark.skipif(bool(reasons), reason="needs " + "; ".join(reasons))
 
 
 def needs_asset(*files: str) -> pytest.MarkDecorator:
-    """Mark tests that need these files below `ASSETS`; folders are not accepted."""
+    """Mark tests that need the given files below `ASSETS`; folders are not accepted."""
     absent = [file for file in files if not (ASSETS / file).is_file()]
     return pytest.mark.skipif(bool(absent), reason=f"needs {', '.join(absent)} in {ASSETS}")
 
@@ -94,10 +94,10 @@ def written_scenes() -> list[str]:
 
 
 def only_where(condition: object, reason: str) -> pytest.MarkDecorator:
-    """Mark tests for certain machines or builds only. CI accepts this kind of skip."""
+    """Mark tests for certain machines or builds only. CI accepts the skip."""
     return pytest.mark.skipif(not condition, reason=NOT_HERE + reason)
 
 
 def not_here(reason: str) -> NoReturn:
-    """Skip a test that this machine or this build cannot run. CI accepts this kind of skip."""
+    """Skip a test that this machine or this build cannot run. CI accepts the skip."""
     pytest.skip(NOT_HERE + reason)

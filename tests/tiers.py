@@ -13,7 +13,7 @@ FILE = Path(__file__).with_name("long_tests.txt")
 
 @dataclass(frozen=True)
 class Row:
-    """A pattern of node ids of long tests, and one of a short test of the same kind."""
+    """A row of long_tests.txt: pattern of long tests, and a similar short test."""
 
     long: str
     representative: str

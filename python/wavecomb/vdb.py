@@ -43,12 +43,12 @@ _NUMBERS = {"float", "double", "vec3s", "vec3d", "fp4", "fp8", "fp16", "fpn"}
 
 @dataclass(frozen=True)
 class GridHead:
-    """A grid in the table of a file.
+    """Entry of a grid in the table of a .vdb file.
 
     Attributes:
         number: Position of the grid in the file.
         name: Name of the grid, which several grids may share.
-        index: Index among grids with this name.
+        index: Index among grids with the same name.
         type_name: OpenVDB's type name such as "Tree_float_5_4_3"; in .nvdb files also
             "Tree_fp8_5_4_3".
         is_half: Whether floats are stored in 16 bits.
@@ -243,7 +243,7 @@ def write(path: str | Path, made: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _described(grid: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns a grid as the plug-in takes it; raises ValueError if its arrays are inconsistent."""
+    """Returns a grid in the plug-in's form; raises ValueError if its arrays are inconsistent."""
     values, origins = np.asarray(grid["values"]), np.ascontiguousarray(grid["origins"], np.int32)
     channels = 3 if values.ndim == 5 else 1
     count = len(origins)

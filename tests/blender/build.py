@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Makes objects, lights and materials for the scenes of the parity suite."""
+"""Makes objects, lights and materials for scenes that compare Wavecomb with Cycles."""
 
 from __future__ import annotations
 
@@ -198,5 +198,5 @@ def studio(strength: float = 0.4) -> None:
 
 
 def show_lights() -> None:
-    """Gives lights a shape in Wavecomb: smooth glass and mirrors show nothing else of a light."""
+    """Makes lights visible in Wavecomb, so that mirrors and smooth glass show them."""
     bpy.context.scene.wavecomb.lights = "visible"

@@ -18,7 +18,7 @@ OUTPUT = Path(os.environ.get("WAVECOMB_PARITY", ROOT / "out" / "blender"))
 
 @pytest.fixture(params=PYTHONS, ids=lambda path: path.parts[-3])
 def blender(request: pytest.FixtureRequest) -> Callable[..., subprocess.CompletedProcess[str]]:
-    """Returns a function that runs Python with a Blender, each version in turn."""
+    """Returns a function that runs a Python script in Blender, for each Blender version."""
 
     def run(*words: str, **variables: str) -> subprocess.CompletedProcess[str]:
         environment = {**os.environ, "WAVECOMB": str(Path(sys.prefix, "bin", "wavecomb"))}

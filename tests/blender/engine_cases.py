@@ -23,7 +23,7 @@ import numpy as np  # noqa: E402
 
 
 def emit(**row: Any) -> None:
-    """Prints a row for the test."""
+    """Prints a row of results, which the test parses."""
     print("ROW " + json.dumps(row), flush=True)
 
 
@@ -40,7 +40,7 @@ def _ball(spp: int = 16) -> Any:
 
 
 def same(folder: Path) -> None:
-    """Renders by F12, and its stage by the command line."""
+    """Renders by F12, then renders the exported stage by the command line."""
     scene, _ = _ball()
     engine = _engine()
     kept: dict[str, Any] = {}

@@ -89,7 +89,7 @@ def result_of(scene: Any) -> Image:
 
 
 def render(scene: Any, engine: str, seed: int) -> tuple[Image, float]:
-    """Renders the scene; returns the image and the seconds."""
+    """Renders the scene; returns the image and the render time in seconds."""
     scene.render.engine = engine
     scene.cycles.seed = scene.wavecomb.seed = seed
     start = time.perf_counter()
@@ -101,10 +101,11 @@ def compare(cycles: list[Image], wavecomb: list[Image]) -> dict[str, float]:
     """Compares renders with two seeds each, by means of blocks.
 
     Returns:
-        ``ratio``: mean of Wavecomb over that of Cycles; ``noise``: its standard error;
-        ``colour``: largest deviation of a channel's ratio from 1; ``outside``: fraction of blocks
-        that differ by more than 2 % and four standard errors; ``worst``: largest relative
-        difference of a block; ``alpha``: largest difference of a block's alpha.
+        ``ratio``, the mean of Wavecomb over that of Cycles, and ``noise``, its standard error.
+        ``colour``: Largest deviation of a channel's ratio from 1.
+        ``outside``: Fraction of blocks that differ by more than 2 % and four standard errors.
+        ``worst``: Largest relative difference of a block.
+        ``alpha``: Largest difference of a block's alpha.
     """
     a, b = (np.mean(images, axis=0)[..., :3].astype(np.float64) for images in (cycles, wavecomb))
     half = [0.5 * (one[0] - one[1])[..., :3].astype(np.float64) for one in (cycles, wavecomb)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of parity scenes."""
+"""Table of Blender scenes that are compared with Cycles."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class ParityScene:
     """A scene made by script.
 
     Attributes:
-        name: Name, which names its images.
-        group: Heading of the page.
+        name: Name of the scene and of its images.
+        group: Heading under which the documentation lists the scene.
         make: Function that fills the empty scene.
         expected: Bounds of the comparison.
         spp: Samples per pixel of each of two renders.
@@ -57,7 +57,7 @@ def scene(
     spp: int = 128,
     messages: tuple[str, ...] = (),
 ) -> Callable[[Callable[[], None]], Callable[[], None]]:
-    """Adds a function to the table, under its name."""
+    """Adds a scene to the table, under the name of its function."""
 
     def added(make: Callable[[], None]) -> Callable[[], None]:
         expected = Expected(low, high, outside, why)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders parity scenes in Blender: ``python run.py OUTPUT [SCENE ...]``.
+"""Renders Blender scenes with Cycles and Wavecomb: ``python run.py OUTPUT [SCENE ...]``.
 
 Writes a JSON file with the comparison of each scene and an image that shows Cycles to the left and
 Wavecomb to the right.
@@ -83,7 +83,7 @@ def refresh(output: Path) -> None:
 
 
 def main(words: list[str]) -> int:
-    """Runs the named scenes, or all."""
+    """Renders the named scenes, or all scenes."""
     output = Path(words[0])
     output.mkdir(parents=True, exist_ok=True)
     failed = 0

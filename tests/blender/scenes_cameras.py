@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parity scenes of cameras, motion and volumes, and scenes that combine features."""
+"""Blender scenes compared with Cycles: cameras, motion, volumes, and combined features."""
 
 from __future__ import annotations
 
@@ -226,7 +226,7 @@ def combined_still_life() -> None:
 
 @scene("Combined")
 def combined_room() -> None:
-    """A closed room with one area light, by many bounces."""
+    """A closed room with one area light and many diffuse bounces."""
     diffuse = bpy.data.materials.new("walls")
     diffuse.use_nodes = True
     shader(diffuse, "ShaderNodeBsdfDiffuse", Color=(0.7, 0.65, 0.6))
@@ -265,7 +265,7 @@ def combined_motion_lights() -> None:
 
 @scene("Combined", 0.97, 1.02, 0.1, "caustics, which converge slowly")
 def combined_mirrors() -> None:
-    """A mirror, a coated ball and a light that both show."""
+    """A mirror and a coated ball, which both reflect a visible light."""
     studio(0.1)
     mirror = principled("mirror", metallic=1.0, roughness=0.0, base_color=(0.95, 0.95, 0.95))
     thing = cube(mirror, at=(0, 1.5, 1.2), size=2.4, turn=(0, 0, 0.1))
@@ -281,7 +281,7 @@ def combined_mirrors() -> None:
 
 @scene("Combined")
 def combined_graph() -> None:
-    """A material graph: an image, a ramp and a mask by facing drive five inputs."""
+    """A material graph in which an image, a ramp and a facing-ratio mask drive five inputs."""
     studio()
     material, surface, node = textured("graph")
     surface.inputs["Specular IOR Level"].default_value = 0.5

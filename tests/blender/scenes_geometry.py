@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parity scenes of geometry, instances and visibility."""
+"""Blender scenes compared with Cycles: geometry, instances and visibility."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ def instance_linked_data() -> None:
 
 @scene("Instances")
 def instance_collection() -> None:
-    """Instances of a collection that holds a light."""
+    """Instances of a collection that contains a light."""
     floor()
     world((0.1, 0.1, 0.1))
     camera()

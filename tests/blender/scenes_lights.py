@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parity scenes of lights and worlds."""
+"""Blender scenes compared with Cycles: lights and worlds."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def light_emission_node() -> None:
 
 @scene("Lights")
 def light_no_shadow() -> None:
-    """A light without shadows beside one with."""
+    """A light without shadows beside a light with shadows."""
     _ground()
     light("POINT", 500.0, shadow_soft_size=0.1, use_shadow=False)
     light("POINT", 500.0, at=(-3, -1, 3), shadow_soft_size=0.1)
@@ -215,7 +215,7 @@ def world_colour() -> None:
 
 @scene("Worlds")
 def world_none() -> None:
-    """No world at all."""
+    """A scene without a world."""
     _ground()
     bpy.context.scene.world = None
     light("SUN", 2.0, angle=0.1)
@@ -257,7 +257,7 @@ def world_image() -> None:
 
 @scene("Worlds")
 def world_image_turned() -> None:
-    """An environment image that a mapping node turns."""
+    """An environment image that a mapping node rotates."""
     _ground()
     _environment(1.1)
 
@@ -278,7 +278,7 @@ def world_sky() -> None:
 
 @scene("Worlds")
 def world_gradient() -> None:
-    """A world of nodes, baked: a gradient by height."""
+    """A world whose nodes, a gradient by height, are baked."""
     _ground()
     node = world()
     tree = bpy.context.scene.world.node_tree

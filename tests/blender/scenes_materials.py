@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parity scenes of materials."""
+"""Blender scenes compared with Cycles: materials."""
 
 from __future__ import annotations
 
@@ -61,19 +61,19 @@ def principled_metal_half() -> None:
 
 @scene("Principled")
 def principled_ior() -> None:
-    """A high index of refraction."""
+    """A material with a high index of refraction."""
     _ball(base_color=(0.5, 0.1, 0.1), ior=2.2, roughness=0.2)
 
 
 @scene("Principled")
 def principled_specular_level() -> None:
-    """A low Specular IOR Level."""
+    """A material with a low Specular IOR Level."""
     _ball(base_color=(0.1, 0.3, 0.5), specular_ior_level=0.2, roughness=0.25)
 
 
 @scene("Principled")
 def principled_specular_high() -> None:
-    """A high Specular IOR Level."""
+    """A material with a high Specular IOR Level."""
     _ball(base_color=(0.1, 0.3, 0.5), specular_ior_level=1.0, roughness=0.25)
 
 
@@ -91,7 +91,7 @@ def principled_anisotropic() -> None:
 
 @scene("Principled", 0.99, 1.015, 0.15, "another model of rough diffuse surfaces (EON)")
 def principled_diffuse_roughness() -> None:
-    """A rough diffuse base, where Blender has it."""
+    """A rough diffuse base, in Blender versions that support it."""
     names = {"roughness": 1.0, "specular_ior_level": 0.0}
     material = _ball(base_color=(0.7, 0.5, 0.3), **names)
     node = shader_of(material)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parity scenes of textures and value nodes."""
+"""Blender scenes compared with Cycles: textures and value nodes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from registry import scene
 
 @scene("Textures")
 def texture_image() -> None:
-    """An image by texture coordinates."""
+    """An image mapped by texture coordinates."""
     studio()
     wall(textured()[0])
 
@@ -81,7 +81,7 @@ def texture_normal_map() -> None:
 
 @scene("Textures", outside=0.2, why="sharp highlights converge slowly")
 def texture_roughness() -> None:
-    """Roughness and metalness by an image."""
+    """Roughness and metalness driven by an image."""
     studio()
     material = principled(base_color=(0.8, 0.6, 0.4))
     node = add(material, "ShaderNodeTexImage", image=picture())
@@ -125,7 +125,7 @@ def texture_checker() -> None:
 
 @scene("Textures")
 def texture_colour_nodes() -> None:
-    """Hue, gamma, contrast, inversion and a multiplied colour."""
+    """An image with adjusted hue, gamma and contrast, inverted and multiplied by a colour."""
     studio()
     material, surface, node = textured()
     hue = put(add(material, "ShaderNodeHueSaturation"), Hue=0.6, Saturation=0.8, Value=0.9)
@@ -147,7 +147,7 @@ def texture_colour_nodes() -> None:
 
 @scene("Textures")
 def texture_fresnel_mix() -> None:
-    """Two colours by a Fresnel node, in a group."""
+    """Two colours that a Fresnel node mixes, in a node group."""
     studio()
     material = principled(roughness=1.0, specular_ior_level=0.0)
     group = bpy.data.node_groups.new("edge", "ShaderNodeTree")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The render engine: the command line's image, errors, cancelling, animation, .blend files."""
+"""The Blender render engine: images, errors, cancelling, animation, and .blend files."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def _rows(done: subprocess.CompletedProcess[str]) -> dict[str, object]:
 
 
 def test_command_line_writes_the_same_image(blender: Run, tmp_path: Path) -> None:
-    """F12 and ``wavecomb render`` on the stage that it kept give the same values."""
+    """F12 and ``wavecomb render`` on the exported stage give the same values."""
     row = _rows(blender(str(HERE / "engine_cases.py"), "same", str(tmp_path)))
     assert row["same"] is True
 
 
 def test_errors_are_one_line(blender: Run, tmp_path: Path) -> None:
-    """A missing program, a missing camera and a killed process: Blender lives on."""
+    """A missing program, a missing camera and a killed process do not end Blender."""
     row = _rows(blender(str(HERE / "engine_cases.py"), "errors", str(tmp_path)))
     assert "Wavecomb was not found" in str(row["program"])
     assert "has no camera" in str(row["camera"])
@@ -41,7 +41,7 @@ def test_errors_are_one_line(blender: Run, tmp_path: Path) -> None:
 
 
 def test_animation_exports_geometry_once(blender: Run, tmp_path: Path) -> None:
-    """Frames with motion blur reuse the exported geometry and equal frames rendered alone."""
+    """Frames with motion blur reuse the exported geometry; each equals a frame rendered alone."""
     row = _rows(blender(str(HERE / "engine_cases.py"), "animation", str(tmp_path)))
     assert row["exports"] == 1
     assert float(str(row["difference"])) < 1e-6

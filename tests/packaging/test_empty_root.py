@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The wheel in a root file system with only Python, glibc and libstdc++.
 
-The root has no compiler, shell, pip or network. The wheel installs from a folder of wheels and
-renders the same images as outside, with each of its libraries, also with another Python version.
+The root has no compiler, shell, pip or network. The wheel installs from a folder of wheels. Each of
+its libraries renders the same images inside the root as outside, also with another Python version.
 `make test-wheel` runs this; it needs `apt-get`.
 """
 
@@ -29,7 +29,7 @@ NEWER = {"bookworm": "trixie", "jammy": "noble"}
 
 
 def suites() -> list[str]:
-    """This machine's suite, and one with another Python version."""
+    """Debian or Ubuntu suites to test: this machine's, and one with a newer Python."""
     if not (shutil.which("apt-get") and shutil.which("dpkg-deb")):
         return []
     own = succeed([ROOT / "tools" / "debs", "suite"]).strip()

@@ -35,7 +35,7 @@ _PHASES = {
 def run_row(
     time: float, rng: np.random.Generator, noise: float, shake: float, **settings: Any
 ) -> dict[str, Any]:
-    """Returns a result row with the shading time ``time`` times ``shake`` and noise."""
+    """Returns a result row whose shading time is ``time``, multiplied by ``shake`` and noise."""
     row = {**DEFAULTS, **settings}
     order = 0.0 if row["policy"] == "none" else 0.02
     scale = shake * float(np.exp(rng.normal(0, noise)))

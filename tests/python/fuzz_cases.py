@@ -94,7 +94,7 @@ def splice(rng: random.Random, data: bytes) -> bytes:
 
 
 def tail_words(rng: random.Random, data: bytes) -> bytes:
-    """Applies ``huge_words`` near the end of a file, where .usdc has sections, .usdz names."""
+    """Applies ``huge_words`` near the end, where .usdc files have tables and .usdz files names."""
     start = len(data) * 2 // 3
     return data[:start] + huge_words(rng, data[start:])
 

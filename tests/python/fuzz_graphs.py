@@ -18,7 +18,7 @@ BOUND = TRIANGLE.replace(
     'def Mesh "T" {',
     'def Mesh "T" (prepend apiSchemas = ["MaterialBindingAPI"]) {\nrel material:binding = </M>\n',
 )
-"""The same mesh with the material /M."""
+"""USD text of a mesh with the material /M."""
 
 
 def _write(folder: Path, text: str, name: str = "stage.usda") -> Path:

@@ -113,8 +113,8 @@ def watch_writes(inside: str) -> list[str]:
 
 
 def give_up(answers: TextIO, line: str) -> NoReturn:
-    """Answers and ends the process. USD composes such a stage without end, so nothing else stops
-    it.
+    """Answers and ends the process. USD never finishes composing some stages, and nothing else
+    stops it.
     """
     answer = {"outcome": "refused", "said": line, "ended": True}
     print(json.dumps(answer), file=answers, flush=True)

@@ -18,7 +18,7 @@ _core = pytest.importorskip("wavecomb._core")
 
 POINTS = [(x, y, 0.0) for y in range(3) for x in range(3)]
 FACES = [(0, 1, 4), (0, 4, 3), (1, 2, 5), (1, 5, 4), (3, 4, 7), (3, 7, 6), (4, 5, 8), (4, 8, 7)]
-"""Triangles over [0, 2]^2. Each face is one triangle."""
+"""Triangles over [0, 2]^2. Each face of the test mesh is one triangle."""
 
 CAMERA = """def Camera "Cam" {
     token projection = "orthographic"

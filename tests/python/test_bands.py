@@ -111,7 +111,7 @@ def test_a_cropped_picture_says_where_it_lies(stage: Path, whole: Path, tmp_path
 
 
 def test_a_cropped_picture_in_memory(stage: Path) -> None:
-    """Cropped and adaptive from Python: errors near the edges are those of a region."""
+    """Cropped renders in memory, also adaptive ones, equal the same part of a full-size image."""
     region = (30, 20, 110, 180)
     for more in ({}, {"noise": 0.2, "spp": 64}):
         options = {"size": SIZE, "spp": 4, "region": region, **more}

@@ -46,7 +46,8 @@ def of_program(order: list[str], names: dict[str, str], program: str) -> list[st
 
 @pytest.mark.parametrize("drift", [False, True])
 def test_best_order_is_found(drift: bool) -> None:
-    """A material costs half if it follows its alphabetical predecessor. The machine may drift."""
+    """A material costs half if it follows its alphabetical predecessor. The speed of the machine
+    may drift."""
     names = {"a": "p", "b": "p", "c": "p", "d": "p", "x": "q", "y": "q"}
 
     def cost(before: str, name: str) -> float:

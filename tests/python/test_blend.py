@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``wavecomb render scene.blend`` without Blender: the search for it, and a program in its place.
+"""``wavecomb render scene.blend`` without Blender: search for Blender, and a fake Blender.
 
 ``tests/blender`` has the tests with Blender.
 """

@@ -47,12 +47,12 @@ OTHER: dict[str, Any] = {
     "four": (-2.0, 2.0, -1.0, 1.0),
     "planes": [[0.0, 0.0, 1.0, 2.0]],
 }
-"""A value other than the default, by kind."""
+"""A non-default value for each kind of camera parameter."""
 OF_NAME: dict[str, Any] = {
     "aperture_blades": 5.0,
     "lens_map": [[0.0, 0.0, 1.0, 0.0], [0.0, 1.0, 1.0, 1.0]],
 }
-"""Values for parameters with a smaller range."""
+"""Values of camera parameters with a smaller range."""
 
 
 def _other(row: CameraParameter) -> Any:

@@ -146,7 +146,7 @@ def test_orthographic_picture_is_a_closed_form(tmp_path):
 
 
 def test_every_scheduling_gives_the_same_bits(tmp_path):
-    """Parallel rays, rays in all directions, and rays through a lens."""
+    """Cameras with parallel rays, with rays in all directions, and with a lens."""
     text = SKY + BALL + 'def Sphere "Far" { double radius = 4\n' + back(-9) + "}\n"
     text += f'def Camera "Cam" {{ {back(5)} float fStop = 1\nfloat focusDistance = 4\nCLIP }}'
     clip = "float4[] clippingPlanes = [(0.1, 0.1, -1, -4.2)]"

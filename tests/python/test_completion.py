@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Completion in real shells, and a first run without arguments."""
+"""Command-line completion in real shells, and a first run without arguments."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from wavecomb.usd.graphs.values import PARAMETERS, Expressions, assemble, number
 
 SIGMA = np.array([0.3, 0.7, 1.1])
 GLASS, STONE = 0, 1
-"""Numbers of the materials."""
+"""Material ids of the glass and of the card inside the glass."""
 LAMP = {"radius": 0.1, "color": (30, 28, 25)}
 
 
@@ -31,7 +31,7 @@ def scene(
     """A ball of glass around the origin, with a grey card inside and a light at x = ``lamp``.
 
     Args:
-        tinted: The glass absorbs.
+        tinted: Whether the glass absorbs.
         stone: Whether the card is inside of the glass; otherwise it is beside it.
         lamp: Position of the light.
         graph: Adds a graph to a builder and returns its number.
@@ -125,7 +125,7 @@ def test_edits_search_glass_again(
 
 @pytest.mark.parametrize("layer", ["transmission_scatter", "nested_priority"])
 def test_edits_that_need_media_inside_of_meshes(layer: str) -> None:
-    """Scattering and priorities, too, begin with an edit."""
+    """Edits can add scattering or a nesting priority to glass."""
     value: Any = (0.5, 0.5, 0.5) if layer == "transmission_scatter" else 1.0
     renderer = _core.Renderer(scene(stone=False))
     first = image(renderer)
@@ -155,7 +155,7 @@ def graph_of(**driven: Any) -> Any:
 
 
 def test_glass_with_a_graph_elsewhere_is_searched() -> None:
-    """Constant absorption counts even if a graph drives other parameters, such as transmission."""
+    """Light paths are refused for constant absorption, also if a graph drives other parameters."""
     tint = {"transmission_color": tuple(np.exp(-SIGMA))}
     for driven, weight in (("roughness", 1.0), ("transmission_weight", 0.0)):
         for stone in (True, False):
@@ -181,6 +181,6 @@ def test_absorption_by_a_graph() -> None:
 
 
 def test_absorption_by_a_graph_in_a_stage_of_media() -> None:
-    """Such glass does not absorb where paths track what they are inside of, which is said."""
+    """With nested dielectrics, a warning says that a graph's absorption has no effect."""
     made = scene(graph=graph_of(extinction=1.0), stone=False, nested_priority=1.0)
     assert [line for line in made.warnings if "does not absorb" in line], made.warnings

@@ -94,7 +94,7 @@ def test_sizes_are_those_of_the_world(tmp_path):
 
 @pytest.mark.parametrize(("bright", "lit"), [(1.0, True), (0.001, False)])
 def test_emissive_textures_count_by_their_means(tmp_path, bright, lit):
-    """An emissive texture counts by its mean, here of a map that may be mostly black."""
+    """The mean of an emissive texture, which may be mostly black, decides whether it is a light."""
     side = 64
     pixels = np.zeros((side, side, 3), np.float32)
     pixels[: max(int(side * bright), 1), : max(int(side * bright), 1)] = 5.0

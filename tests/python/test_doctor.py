@@ -118,7 +118,7 @@ def test_install_commands_name_the_packages_of_an_extra(extra: str) -> None:
 def test_qt_libraries_that_are_missing_come_with_their_packages(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """ldd's list names what is missing; doctor and the window name the packages."""
+    """From ldd's list of missing libraries, doctor and the window name the packages to install."""
     ldd = tmp_path / "ldd"
     ldd.write_text(
         "#!/bin/sh\n"

@@ -119,10 +119,10 @@ def illuminance(folder: Path, light: str) -> np.ndarray:
 def test_distant_lights_are_divided_by_their_size_factor(
     tmp_path: Path, angle: float, normalize: bool, expected: float
 ) -> None:
-    """The size factor is 1, pi sin^2(angle / 2), or pi (2 - sin^2) beyond a hemisphere.
+    """The size factor of a distant light is pi sin^2(angle / 2), or 1 for angle 0.
 
-    With inputs:normalize, intensity is the illuminance in lux. The square sees at most a
-    hemisphere of the light.
+    Above 180 degrees, the factor is pi (2 - sin^2(angle / 2)). With inputs:normalize,
+    intensity is the illuminance in lux. The square sees at most a hemisphere of the light.
     """
     light = (
         f'def DistantLight "L" {{\n{EMITTED}float inputs:angle = {angle}\n'

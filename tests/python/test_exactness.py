@@ -360,7 +360,7 @@ LARGE = (32, 24), OPTIONS["wave_size"]
 def test_every_choice(
     scene: str, roulette: str, size: tuple[int, int], waves: list[int], scene_of: Any
 ) -> None:
-    """All combinations of options, with many waves, two waves, and one wave per thread."""
+    """All combinations of options render the same image, with many waves or one per thread."""
     spp = 8
     expected = plain(scene_of, scene, roulette, size, spp)
     names = ("policy", "materialize", "wave_size", "threads", "ray_order")

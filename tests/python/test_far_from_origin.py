@@ -219,7 +219,7 @@ def test_without_a_camera(tmp_path: Path) -> None:
 
 
 def test_the_middle_of_what_is_drawn(tmp_path: Path) -> None:
-    """Authored extents count. Hidden purposes, lights and invalid extents do not."""
+    """The middle is that of authored extents, without hidden prims, lights and invalid extents."""
     box = """def Cube "{}" {{
         {}
         double3 xformOp:translate = ({}, 0, 0)
@@ -359,7 +359,7 @@ def test_origins(x: float) -> None:
 
 
 def test_world_positions_of_graphs(tmp_path: Path) -> None:
-    """A gradient over world x has the brightness of its coordinate."""
+    """A material that shows world-space x has the right brightness far from the origin."""
     body = """
     def Camera "Camera" {
         token projection = "orthographic"
@@ -475,7 +475,7 @@ def test_what_floats_cannot_hold_is_said(
 
 
 def test_cameras_and_positions_of_the_window() -> None:
-    """Camera poses of the window are in scene space; it shows world space."""
+    """Camera poses in the window are in scene space; displayed positions are in world space."""
     from wavecomb.gui.viewport.navigate import Pose
     from wavecomb.gui.viewport.scene_lookup import camera_pose
 

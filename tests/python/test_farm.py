@@ -94,7 +94,7 @@ def test_a_layout_has_as_many_tiles_as_asked_for(count: int) -> None:
 
 
 def test_a_border_is_good_for_all_looks(stage: Path) -> None:
-    """An adaptive render that never converges checks its error as often as the border allows."""
+    """An adaptive render that never converges makes at most ``max_error_checks`` error checks."""
     settings = {"spp": 200, "min_spp": 16}
     picture = wavecomb.render(stage, size=(8, 8), adaptive=1e-6, **settings)
     assert error_checks(settings) < picture.stats["passes"] <= max_error_checks(settings)

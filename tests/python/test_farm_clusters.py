@@ -169,7 +169,7 @@ def test_by_dask(stage: Path, tmp_path: Path) -> None:
 
 
 def certificates(place: Path) -> dict[str, str]:
-    """Writes new certificates. Returns environment variables for Dask that name them."""
+    """Writes new TLS certificates. Returns environment variables with their paths for Dask."""
     from distributed import Security
 
     place.mkdir()

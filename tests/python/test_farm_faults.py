@@ -134,7 +134,7 @@ def test_twenty_kills_and_stops(stage: Path, tmp_path: Path) -> None:
 
 
 def test_a_stage_that_kills_its_workers(stage: Path, tmp_path: Path) -> None:
-    """After its retries, the image is named in one line, and nothing waits for ever."""
+    """After all retries, one line names the failed image, and the client ends."""
     folder = made(stage, tmp_path, 400_000, tiles="1x1", tries=2)
     client = client_of(folder)
     killed: set[int] = set()

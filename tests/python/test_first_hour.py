@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a new user types first: short commands, stages in memory, edits, mistakes."""
+"""Commands and code that new users type first: short commands, stages in memory, mistakes."""
 
 from __future__ import annotations
 

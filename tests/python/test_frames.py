@@ -116,7 +116,7 @@ def vary_camera(stage):
 
 
 def vary_lens(stage):
-    """Makes one frame's camera invalid, and gives the next one no depth of field."""
+    """Makes the camera invalid in one frame, and disables depth of field in the next frame."""
     camera = UsdGeom.Camera.Get(stage, "/World/Rig/Camera")
     ramp(camera.CreateFocalLengthAttr(), [50, 0, 50, 50])
     ramp(camera.CreateFStopAttr(), [0.5, 0.5, 0, 2])
@@ -166,7 +166,7 @@ def subdivide(stage):
 
 
 def vary_near_surfaces(stage):
-    """Moves the camera from where surfaces are a few pixels large to where they are many."""
+    """Moves the camera closer, so that surfaces grow from a few pixels to many pixels."""
     subdivide(stage)
     ramp(
         UsdGeom.Xformable.Get(stage, "/World/Rig/Camera")
@@ -273,7 +273,7 @@ def test_scene_and_hierarchy_stay_where_the_camera_moves(shot):
 
 
 def test_levels_of_surfaces_follow_the_camera(shot):
-    """The scene is rebuilt in frames where a surface is refined further, and only there."""
+    """The scene is rebuilt only in frames where a surface needs further refinement."""
     vary_near_surfaces(shot)
     shot.Save()
     frames = Frames(shot.GetRootLayer().realPath, size=(100, 100))

@@ -38,7 +38,9 @@ def tuples(values: Any) -> str:
 
 
 def particles(name: str = "S", **values: Any) -> str:
-    """Returns a prim with these attributes. Quaternions have w first, harmonics are (n, k, 3)."""
+    """Returns a splat prim with the given attributes. Quaternions have w first, harmonics are
+    (n, k, 3).
+    """
     harmonics = np.asarray(values["harmonics"], float)
     n = len(values["positions"])
     lines = [
@@ -77,7 +79,7 @@ def recorded(path: Path) -> tuple[Any, str]:
 
 
 def read(folder: Path, *lines: str) -> tuple[Any, str]:
-    """Returns the recorded splats of a prim with these lines, or None, and the messages."""
+    """Returns the recorded splats (or None) of a prim given as USD text, and the messages."""
     body = "\n".join(lines)
     path = stage(folder, f'def ParticleField3DGaussianSplat "S" {{\n{body}\n}}')
     scene, told = recorded(path)
@@ -233,7 +235,7 @@ def test_colours_of_captures_are_decoded() -> None:
 
 
 def sidak(tests: int, level: float = 1e-4) -> float:
-    """Returns the deviation that any of ``tests`` means exceeds with this probability."""
+    """Returns the z limit that any of ``tests`` means exceeds with probability ``level``."""
     from scipy.stats import norm
 
     return float(norm.isf(0.5 * (1.0 - (1.0 - level) ** (1.0 / tests))))

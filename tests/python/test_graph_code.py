@@ -38,7 +38,7 @@ def run(value, at, lanes=1):
 
 
 def check(value, at, rtol=2e-4, atol=2e-4, part=1.0):
-    """Compares a value with NumPy, and a packet with a scalar bit by bit."""
+    """Compares a value with NumPy, and packet evaluation with scalar evaluation bit by bit."""
     scalar, packet = run(value, at, 1), run(value, at, 16)
     assert scalar.tobytes() == packet.tobytes()
     expected = evaluate(value, at)

@@ -45,7 +45,7 @@ def cornell(stage: Path) -> Any:
 
 @pytest.fixture(scope="module")
 def mixed(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Many programs, textures, glass, a dome and a sun."""
+    """A stage with many shading programs, textures, glass, a dome and a sun."""
     path = tmp_path_factory.mktemp("guiding") / "mixed.usdc"
     write_scene("mixed", path, triangles=20000, texture_size=256)
     return wavecomb.load(path).scene
@@ -261,7 +261,7 @@ def test_the_summary_says_what_was_learned(stage: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_auto_decides_alike_whatever_the_schedule(tmp_path: Path) -> None:
-    """Guiding helps where light enters through a door; the reference integrator also finds that."""
+    """All schedules, and the reference integrator, choose guiding in a room lit through a door."""
     write_scene("room", tmp_path / "room.usdc", plain=True)
     scene = wavecomb.load(tmp_path / "room.usdc").scene
     part: dict[str, Any] = {
@@ -282,7 +282,7 @@ def test_auto_decides_alike_whatever_the_schedule(tmp_path: Path) -> None:
 
 
 def test_auto_leaves_a_stage_alone_where_it_does_not_pay() -> None:
-    """Under an even dome, all directions contribute as the material expects."""
+    """Guiding is not used under a uniform dome, where BSDF sampling is already good."""
     builder = wavecomb.SceneBuilder()
     quad = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
     points = np.array([[-9, -1, 9], [9, -1, 9], [9, -1, -9], [-9, -1, -9]], np.float32)
@@ -299,7 +299,7 @@ def test_auto_leaves_a_stage_alone_where_it_does_not_pay() -> None:
 
 
 def test_auto_learns_only_where_that_is_a_small_share(cornell: Any) -> None:
-    """Training takes a small fraction of the samples, or of the time; 9 s are too few."""
+    """Guiding is trained only if a small fraction of the samples or of the time limit suffices."""
     part: dict[str, Any] = {"guiding": "auto", "region": (0, 0, 1, 1)}
     assert render(cornell, spp=488, **part).stats["guiding"] is None
     learned = render(cornell, spp=1000, **part).stats["guiding"]
@@ -313,7 +313,7 @@ def test_auto_learns_only_where_that_is_a_small_share(cornell: Any) -> None:
 
 
 def test_a_limit_of_time_is_taught_for_as_long_as_it_may_be(cornell: Any) -> None:
-    """The first round assumes a training speed; the others use the measured one."""
+    """The first round of training assumes a speed; later rounds use the measured speed."""
     way: dict[str, Any] = {"spp": 2**20, "threads": 2, "guiding": "on", "region": (0, 0, 1, 1)}
     learned = render(cornell, time_limit=3.0, **way).stats["guiding"]
     assert learned["rounds"] == 3
@@ -361,7 +361,7 @@ def floor(albedo: float) -> Any:
 
 
 def test_survival_is_the_probability_of_roulette() -> None:
-    """After a bounce off an albedo of 0.2 it is min(3 x 0.2, 1); for rays that miss, 1."""
+    """The survival AOV is min(3 x 0.2, 1) after a bounce off an albedo of 0.2, and 1 for misses."""
     picture = render(
         floor(0.2), spp=4, filter="box", aovs=("survival",), roulette="throughput", roulette_depth=1
     )
@@ -398,7 +398,7 @@ def test_what_was_learned_can_be_looked_up(cornell: Any) -> None:
 
 @pytest.mark.parametrize("weights", ["power", "calibrated"])
 def test_shares_of_lights_are_those_of_the_render(mixed: Any, weights: str) -> None:
-    """Selection probabilities by power are the same everywhere, and in the statistics."""
+    """Selection by power has the same light probabilities at all points and in the statistics."""
     renderer = _core.Renderer(mixed)
     settings = _core.Settings(
         width=SIZE, height=SIZE, spp=1, light_selection="power", light_weights=weights

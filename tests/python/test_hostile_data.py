@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Malicious checkpoints, images, profiles and documents: one line each, within a short time."""
+"""Malicious checkpoints, images, profiles and documents cause one error line in a short time."""
 
 from __future__ import annotations
 

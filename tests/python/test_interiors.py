@@ -18,7 +18,7 @@ WIDE = 4.0
 
 
 def filled(builder: Any, ior: float, roughness: float = 0.0, **layers: Any) -> int:
-    """Returns a glass or liquid, or a fog bounded by the mesh if the index is 1."""
+    """Returns a material of glass or liquid, or of fog that a mesh bounds if the index is 1."""
     return int(
         builder.add_material(
             "openpbr",
@@ -32,7 +32,7 @@ def filled(builder: Any, ior: float, roughness: float = 0.0, **layers: Any) -> i
 
 
 def absorbing(sigma: Any) -> dict[str, Any]:
-    """Returns the layers of a medium with these absorption coefficients."""
+    """Returns the OpenPBR inputs of a medium with the given absorption coefficients."""
     return {"transmission_color": tuple(np.exp(-np.array(sigma))), "transmission_depth": 1.0}
 
 
@@ -41,7 +41,7 @@ def slab(builder: Any, low: float, high: float, material: int) -> None:
 
 
 def seen_from_above(builder: Any, spp: int = 4, size: int = 8, depth: int = 8, **more: Any) -> Any:
-    """Returns the pixels of an orthographic camera that looks down from 5."""
+    """Returns the pixels of an orthographic camera that looks down from height 5."""
     camera = np.eye(4)
     camera[3, 2] = more.pop("height", 5.0)
     builder.set_camera(camera, projection="orthographic", window=(-1, 1, -1, 1))
@@ -131,7 +131,7 @@ def test_shadow_rays_bring_what_passes() -> None:
     [({"shadow": False}, 0.0), ({"bounces": False}, 2.0), ({"camera": False}, 2.0)],
 )
 def test_fog_dims_the_rays_that_see_it(rays: dict[str, bool], passes: float) -> None:
-    """Only visibility to shadow rays decides over fog of thickness 2 that light passes."""
+    """Fog of thickness 2 dims light samples if, and only if, it is visible to shadow rays."""
     pixels = []
     for sigma in (np.zeros(3) + 1e-6, SIGMA):
         builder = wavecomb.SceneBuilder()
@@ -176,7 +176,7 @@ def test_fog_around_a_floor_dims_the_rays_that_see_it(rays: dict[str, bool], pas
     ("rays", "passes"), [({}, 2.0), ({"bounces": False}, 1.0), ({"camera": False}, 1.0)]
 )
 def test_paths_know_that_they_have_left_fog(rays: dict[str, bool], passes: float) -> None:
-    """Paths pass fog to a mirror and back to a ceiling, whose shadow rays are outside of it."""
+    """Paths pass through fog to a mirror and back to a ceiling, outside of the fog."""
     pixels = []
     for sigma in (np.zeros(3) + 1e-6, SIGMA):
         builder = wavecomb.SceneBuilder()
@@ -488,7 +488,7 @@ def Material "M"
 
 
 def test_a_stage_says_what_is_inside(tmp_path: Path) -> None:
-    """Scattering, its anisotropy and the priority of standard_surface."""
+    """Scattering, its anisotropy and the nesting priority of standard_surface are read."""
     from usd_recorder import load, said
 
     scene, loaded = load(tmp_path, LIQUID)

@@ -58,7 +58,7 @@ class Kind:
     Attributes:
         stage: Name of the fixture that writes the stage.
         options: Options of the command.
-        frames: Frames of a sequence. Without any, a checkpoint is resumed.
+        frames: Frames of a sequence; if empty, the render resumes from a checkpoint.
         sandbox: Value of WAVECOMB_SANDBOX.
     """
 
@@ -189,7 +189,7 @@ Start = Callable[[str, int], Killer]
 
 @pytest.fixture
 def start(request: pytest.FixtureRequest, tmp_path: Path) -> Start:
-    """A function that renders a kind once, undisturbed, and returns its killer."""
+    """A function that returns a ``Killer`` for a kind of render, after one undisturbed render."""
 
     def make(name: str, seed: int) -> Killer:
         kind = KINDS[name]

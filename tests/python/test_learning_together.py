@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Allotted samples combined with path guiding.
+"""Setting ``allocate`` (sample allocation) combined with path guiding.
 
-Resuming of such renders is tested in test_checkpoint.py, and that they are unbiased in
-tests/statistics/test_learning.py.
+test_checkpoint.py tests resuming, and tests/statistics/test_learning.py tests that there is no
+bias.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def both(cornell: Any) -> wavecomb.Picture:
 
 
 def test_the_field_is_that_of_an_even_render(cornell: Any, both: wavecomb.Picture) -> None:
-    """The number of training paths follows spp, which allotment does not change."""
+    """The number of training paths follows spp, which sample allocation does not change."""
     even = render(cornell, **{**BOTH, "allocate": "even"})
     for fact in FACTS:
         assert both.stats["guiding"][fact] == even.stats["guiding"][fact], fact

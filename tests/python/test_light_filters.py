@@ -158,7 +158,7 @@ GLOSSY = """def Material "Gloss" {
 
 @pytest.mark.parametrize("transport", ["path", "light"])
 def test_a_barn_before_a_rect_is_four_boards(tmp_path, transport):
-    """Light samples, bounces and light paths through a barn door, against real geometry."""
+    """Light samples, bounces and light paths through a barn door, compared with real geometry."""
     floor = GLOSSY + quad("Floor", 3, 0, "rel material:binding = </Gloss>")
     size = "float inputs:width = 2\nfloat inputs:height = 2"
     window = barn("float inputs:width = 0.8\nfloat inputs:height = 1.6", 3)
@@ -224,7 +224,7 @@ def test_doors_of_a_spot_are_by_its_cone(tmp_path):
 
 KARMA = 'def LightFilter "{0}" {{ uniform token lightFilter:shaderId = "{1}"\n{2}\n}}\n'
 CONE = POINT + "\nfloat inputs:shaping:cone:angle = 36.86989764584402"
-"""The square around this cone is 6 wide on the floor at distance 4, which covers the floor."""
+"""A light cone whose bounding square is 6 wide at distance 4 and thus covers the floor."""
 
 
 def test_karmas_doors_stand_on_the_light_or_before_it(tmp_path):

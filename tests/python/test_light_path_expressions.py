@@ -151,7 +151,7 @@ def test_they_are_what_other_layers_say(loaded: Any) -> None:
 
 
 def test_diffuse_light_is_what_lights_without_specular_give(loaded: Any, tmp_path: Path) -> None:
-    """The diffuse layer, in light samples and bounces, equals the light of a diffuse-only light."""
+    """The diffuse layer equals a render whose lights affect only diffuse reflection."""
     seen = _render(loaded, {"a": "C<RD><L.'key'>", "b": "C<RD>B"}, spp=256)
     other = wavecomb.load(_stage(tmp_path, 0))
     only = _render(other, {"a": "C.<L.'key'>", "b": "C.B"}, spp=256)

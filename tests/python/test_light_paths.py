@@ -122,7 +122,7 @@ def test_what_it_does_not_go_with_is_one_line(
 
 
 def test_brightness_of_lights_does_not_matter(stages: Any) -> None:
-    """Splat units scale with the lights: 2^20 times the power is exactly 2^20 times as bright."""
+    """Multiplying a light's power by 2^20 multiplies light splats and image by exactly 2^20."""
     from pxr import Usd, UsdLux
 
     path = stages("caustics")

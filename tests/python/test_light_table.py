@@ -53,7 +53,7 @@ def another(row: LightParameter) -> Any:
 
 
 def build(*lights: dict[str, Any], mesh_light: dict[str, Any] | None = None) -> Any:
-    """Returns a scene with these lights, and with objects that they may refer to."""
+    """Returns a scene with the given lights, and with objects that the lights may refer to."""
     builder = core.SceneBuilder(1)
     builder.add_texture(np.full((4, 8, 3), 0.5, np.float32), srgb=False, name="/sky.exr")
     builder.add_ies([0.0, 90.0], [0.0], np.array([[100, 0]], np.float32))

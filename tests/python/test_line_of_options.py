@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The options of ``wavecomb render`` take a straight line from the command to the core."""
+"""Options of ``wavecomb render`` pass through few modules on their way to the core."""
 
 from __future__ import annotations
 
@@ -90,9 +90,9 @@ def module_of(code: CodeType) -> str:
 
 
 def test_options_visit_few_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """From the parsed command to the core, without what ``load_stage`` calls in ``usd``.
+    """Options visit few files from the parsed command to the core, not counting ``wavecomb.usd``.
 
-    That function takes all load options as one object, ``LoadOptions``.
+    ``load_stage`` takes all load options as one object, ``LoadOptions``.
     """
     stage = tmp_path / "a.usda"
     stage.write_text(STAGE)
@@ -131,7 +131,7 @@ def test_options_visit_few_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def test_each_option_is_declared_once() -> None:
-    """Each field of the dataclass declares its option; only derived ones have none."""
+    """Each field of the dataclass declares its option, except derived fields."""
     fields = dataclasses.fields(declarations.RenderOptions)
     derived = [one.name for one in fields if "option" not in one.metadata]
     assert derived == ["stage", "image", "source", "settings", "whole"]

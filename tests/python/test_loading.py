@@ -281,7 +281,8 @@ print((memory("VmHWM") - before) / count)
 
 @LINUX
 def test_instances_are_not_held_twice_while_a_scene_is_made() -> None:
-    """An instance needs about 150 bytes. The builder frees its copy before records are made."""
+    """An instance needs about 150 bytes. The builder frees
+    its copy of the instances before the scene's records are made."""
     pytest.importorskip("wavecomb._core")
     run = subprocess.run([sys.executable, "-c", MANY], capture_output=True, text=True, check=True)
     assert 100 < float(run.stdout) < 260, run.stdout

@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = Path(wavecomb.__file__).parent
 
 MOST = 23
-"""Number of files, Python and C++ together."""
+"""Maximum number of Python and C++ files through which a material passes."""
 
 NOT_ON_THE_PATH = {"isa.py", "usd/stage/report.py"}
 """Files that do not count: choice of the native library, and messages about the stage."""

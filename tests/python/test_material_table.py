@@ -40,7 +40,7 @@ def with_rows(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def build(program: str = "principled", **values: Any) -> Any:
-    """Returns a scene with one triangle whose material has these parameters."""
+    """Returns a scene with one triangle whose material has the given parameters."""
     builder = core.SceneBuilder(1)
     builder.add_material(program, name="/M", **values)
     triangle = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)

@@ -49,7 +49,7 @@ def reason(identifier):
 
 @functools.cache
 def by_category(*support):
-    """Returns definitions with these kinds of support, by category."""
+    """Returns definitions with the given kinds of support, by category."""
     found = collections.defaultdict(list)
     for identifier in patterns():
         if support_of(identifier) in support:

@@ -125,7 +125,7 @@ def test_fractal2d_is_a_sum_of_flat_noise():
 
 
 def test_blackbody():
-    """White at 6500 K, red below; at 2856 K the chromaticity of CIE illuminant A."""
+    """A black body is white at 6500 K, redder below, and like CIE illuminant A at 2856 K."""
 
     def chromaticity(kelvin):
         value = Node("ND_blackbody").give(temperature=kelvin).run(AT[:1])[0].astype(float)

@@ -45,7 +45,7 @@ def run(*words: object, limit: float = LIMIT_MB) -> subprocess.CompletedProcess[
 
 
 def packed_indices(folder: Path) -> list[object]:
-    """Writes 400 MB of indices compressed to 130 KB. Returns a command that reads these indices."""
+    """Writes 400 MB of indices compressed to 130 KB. Returns a command that reads the indices."""
     stage = Usd.Stage.CreateNew(str(folder / "bomb.usdc"))
     mesh = UsdGeom.Mesh.Define(stage, "/M")
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.zeros((3, 3), np.float32)))
@@ -58,7 +58,7 @@ def packed_indices(folder: Path) -> list[object]:
 
 
 def packed_texture(folder: Path) -> list[object]:
-    """Writes 320 MB of pixels compressed to a few MB. Returns a command that reads these pixels."""
+    """Writes 320 MB of pixels compressed to a few MB. Returns a command that reads the pixels."""
     spec = oiio.ImageSpec(9000, 9000, 4, "uint8")
     output = oiio.ImageOutput.create(str(folder / "t.tif"))
     spec.attribute("compression", "zip")
@@ -75,13 +75,13 @@ def packed_texture(folder: Path) -> list[object]:
 
 
 def large_picture(folder: Path) -> list[object]:
-    """Writes a small stage. Returns a command that renders it with too large a film."""
+    """Writes a small stage. Returns a command that renders the stage with too large a film."""
     (folder / "s.usda").write_text('#usda 1.0\ndef Sphere "S" {\n    double radius = 1\n}\n')
     return ["render", folder / "s.usda", "-o", folder / "o.exr", "--size", 6000, 6000]
 
 
 def large_merge(folder: Path) -> list[object]:
-    """Writes images of 190 MB compressed to a few KB. Returns a command that merges them."""
+    """Writes images of 190 MB compressed to a few KB. Returns a command that merges the images."""
     for name in "ab":
         spec = oiio.ImageSpec(4000, 4000, 3, "float")
         spec.attribute("compression", "zip")

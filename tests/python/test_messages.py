@@ -92,7 +92,7 @@ def test_arguments_that_are_not_utf_8(tmp_path: Path, words: tuple[bytes, ...]) 
 
 
 def test_a_folder_whose_name_is_not_utf_8(tmp_path: Path) -> None:
-    """Relative names in such a folder work, or are refused in one line."""
+    """Relative file names in a folder whose name is not UTF-8 work, or cause one error line."""
     folder = tmp_path / os.fsdecode(NOT_TEXT)
     folder.mkdir()
     (folder / "a.usda").write_text(STAGE)
@@ -156,7 +156,7 @@ def test_synonyms_stand_for_options_that_there_are() -> None:
      ("aov", "aovs="), ("ray_depth", "max_depth=8"), ("cores", "threads"), ("smaples", "spp=64")],
 )  # fmt: skip
 def test_a_misspelt_keyword_has_a_suggestion(given: str, wanted: str) -> None:
-    """The synonyms are those of the command line."""
+    """Suggestions for keywords use the same synonyms as the command line."""
     with pytest.raises(wavecomb.Error, match="is no keyword; did you mean") as caught:
         wavecomb.render("gone.usda", **{given: 3})
     assert wanted in str(caught.value)

@@ -151,7 +151,7 @@ def put(at: int, value: int, code: str = "<Q") -> Any:
 
 
 HEAD = 16 + 176 + len("d\0")
-"""Bytes before the grid."""
+"""Number of bytes in a .nvdb file before its first grid."""
 ROOT = HEAD + GRID_BYTES + 64
 
 

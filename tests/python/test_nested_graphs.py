@@ -62,7 +62,9 @@ def document(folder, depth, feed, value):
 
 
 def test_a_chain_that_doubles(tmp_path):
-    """Each level uses the one below twice: 2^32 nodes by path, but only 33 different ones."""
+    """Each level of nested graphs uses the level below twice: 2^32 nodes, with only 33
+    different values.
+    """
     depth = 32
     document(tmp_path, depth, BOTH, ", ".join([str(0.5**depth)] * 3))
     started = time.process_time()
@@ -73,7 +75,7 @@ def test_a_chain_that_doubles(tmp_path):
 
 
 def test_a_chain_of_different_values_is_listed(tmp_path):
-    """p feeds q, so no value repeats. The network has 2^30 steps and is reported as too large."""
+    """A network of 2^30 nodes whose values all differ is reported as too large."""
     document(tmp_path, 30, CHAINED, "1, 1, 1")
     scene, loaded = load(tmp_path, STAGE)
     what = (

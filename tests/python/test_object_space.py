@@ -12,7 +12,7 @@ SHIFT = np.array([3.0, -1.0, 0.5])
 
 
 def hits(n=50):
-    """Returns points on an object with this transform, with orthonormal shading frames."""
+    """Returns points on an object with a given transform, with orthonormal shading frames."""
     table = points(n).astype(np.float64)
     table[:, 3:6] = table[:, 6:9] @ MATRIX.T + SHIFT
     table[:, 21:30] = np.linalg.inv(MATRIX).ravel()

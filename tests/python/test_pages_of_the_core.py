@@ -20,7 +20,7 @@ MADE_UP = {
     *("VertexCounts", "expensive_first.cpp"),
     *("ring.h", "ring.cpp", "minnaert.h", "NAME.h"),
 }
-"""Names of the examples."""
+"""Names that only the examples in pages define."""
 
 
 @cache

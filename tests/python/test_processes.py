@@ -301,7 +301,7 @@ def is_running(pid: int) -> bool:
 @linux
 @pytest.mark.parametrize("where", ["main", "thread"])
 def test_a_process_ends_with_its_parent_and_not_before(where: str) -> None:
-    """The kernel's parent-death signal depends on the starting thread, whose end must not count."""
+    """A child ends with its parent process, but not with the thread that started the child."""
     words = [sys.executable, "-c", PARENT, where]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as parent:
         assert parent.stdout is not None
@@ -385,7 +385,7 @@ STARTERS = {
     "sys": {"executable"},
 }  # fmt: skip
 CLUSTERS = {"multiprocessing", "ProcessPoolExecutor", "LocalCluster", "Nanny", "SubprocessCluster"}
-"""Users of multiprocessing. A file that uses such a module must call isolate_multiprocessing()."""
+"""Names that use multiprocessing. Files with such names must call isolate_multiprocessing()."""
 
 WORTH_PARSING = re.compile(
     rf"\b({'|'.join(CLUSTERS)}|subprocess|pty|asyncio|QProcess)\b|sys\.executable"

@@ -440,7 +440,7 @@ def test_transforms(ops: str, order: str, place: tuple[int, int], tmp_path: Path
 
 @pytest.mark.parametrize("kind", ["Capsule_1", "Cylinder_1"])
 def test_two_radii(kind: str, tmp_path: Path) -> None:
-    """OpenUSD 3113: radius 1 at the bottom, 0.3 at the top."""
+    """OpenUSD 3113: a capsule or cylinder of radius 1 at the bottom and 0.3 at the top."""
     body = f"""def {kind} "Shape" {{
         double height = 2
         double radiusBottom = 1

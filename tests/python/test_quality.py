@@ -34,7 +34,7 @@ def render(scene: Any, **settings: Any) -> Any:
 
 @pytest.fixture(scope="module")
 def default(caustics: Any) -> Any:
-    """A part of an image whose guiding and transport pilots decide."""
+    """A part of an image for which pilot renders choose guiding and transport."""
     return render(caustics)
 
 
@@ -72,8 +72,8 @@ def test_all_parts_and_schedules_decide_alike(caustics: Any, default: Any) -> No
 
 
 def test_a_decision_is_handed_on(caustics: Any, default: Any) -> None:
-    """Neither a render that gets the decision of another nor a second one of a renderer repeats
-    the pilots."""
+    """Pilot renders are not repeated if an earlier render's decision is given, or known to the
+    renderer."""
     settings = _core.Settings(**PART)
     again = _core.render(caustics, settings, learned=default.learned)
     assert again.stats["transport"]["why"] == "by an earlier render"
@@ -95,7 +95,7 @@ def test_a_resumed_render_keeps_its_decision(caustics: Any, default: Any) -> Non
 
 
 def test_more_samples_do_not_change_the_transport_of_a_render(caustics: Any) -> None:
-    """A render too short for light paths has no film for them when it is resumed with more."""
+    """A render with too few samples for light paths stays without them when resumed with more."""
     short = {**PART, "spp": 4}
     stop = StopAt(1)
     _core.render(caustics, _core.Settings(**short), watcher=stop, interval=0.001)

@@ -234,7 +234,7 @@ def test_compare_refuses(frames: Path, others: Path, tmp_path: Path) -> None:
 
 
 def test_both_work_in_their_sandbox(frames: Path, others: Path, tmp_path: Path) -> None:
-    """Both commands run in a sandbox in which only their outputs can be written."""
+    """``sheet`` and ``compare`` run in a sandbox in which only their outputs can be written."""
     page, sheet = tmp_path / "a.html", tmp_path / "b.html"
     done = forks.wavecomb("sheet", frames / "shot.####.exr", "-o", sheet)
     assert (done.returncode, done.stderr) == (0, "")

@@ -24,7 +24,7 @@ def rotation(degrees, axis=(1, 0, 0)):
 
 
 def pose(time):
-    """Returns (rotation, translation) of B, then of A, as in the animation."""
+    """Returns (rotation, translation) of joints B and A, in the joint order of the animation."""
     return [(rotation(20 * time, (0, 1, 0)), (0, 0.1 * time, 1)), (rotation(30 * time), (0, 0, 0))]
 
 

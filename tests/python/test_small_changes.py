@@ -234,7 +234,7 @@ template VertexResult<float> shade_vertex<DiffuseBsdf<float>, float, kEverything
 
 @pytest.fixture(scope="module")
 def compiler() -> list[str]:
-    """The command that checks a file as the library is compiled, without the folder of includes."""
+    """The library's compiler command for a syntax check, without the folder of headers."""
     commands = ROOT / "build" / "editable" / "compile_commands.json"
     if not commands.exists():
         not_here("the library was not built by make build")
@@ -268,7 +268,7 @@ def applied(tree: Path, change: Change) -> None:
 def compiled(
     tree: Path, compiler: list[str], *files: str, text: str = ""
 ) -> subprocess.CompletedProcess[str]:
-    """Checks files of a tree by their names, or a text, without making code."""
+    """Checks the syntax of named files of a source tree, or of a text."""
     (tree / "use.cpp").write_text(text)
     found = [path for file in files for path in (tree / CORE).rglob(file)]
     assert len(found) == len(files)
@@ -319,7 +319,7 @@ def test_a_light_that_lacks_something_does_not_compile(
 
 @pytest.mark.slow
 def test_a_setting(tmp_path: Path, compiler: list[str]) -> None:
-    """And its use. ``test_settings_table.py`` shows that options and fields follow."""
+    """A new setting compiles, and so does code that reads the setting."""
     assert len(SETTING) <= 2
     applied(tmp_path, SETTING)
     done = compiled(tmp_path, compiler, "settings_table.cpp", "settings.cpp")
@@ -349,7 +349,7 @@ def test_a_parameter_of_light_paths(tmp_path: Path, compiler: list[str]) -> None
 
 @pytest.mark.slow
 def test_a_transport(tmp_path: Path, compiler: list[str]) -> None:
-    """The example of docs/writing-a-transport.md: vertex steps take its class."""
+    """The example of docs/writing-a-transport.md compiles as a class of the vertex steps."""
     file = f"{CORE}/vertex_counts/vertex_counts.h"
     (tmp_path / file).parent.mkdir(parents=True)
     applied(tmp_path, {file: ("", page("writing-a-transport")[0])})

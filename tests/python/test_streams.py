@@ -70,7 +70,7 @@ def test_a_result_that_is_lost_is_an_error_and_a_reader_that_ends_is_none(
 
 
 def test_a_closed_stream_is_not_given_to_a_file(stage: Path, tmp_path: Path) -> None:
-    """Otherwise messages of libraries would be written to the first file that is opened."""
+    """With closed streams, messages of libraries do not end up in the first file that is opened."""
     words = "render a.usda -o a.exr --stats a.json --isolate off"
     done = shell(f"{WAVECOMB} {words} {SMALL} <&- >&- 2>&-", tmp_path)
     assert done.returncode == 0

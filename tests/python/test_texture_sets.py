@@ -88,7 +88,7 @@ def test_parts_of_a_mesh_have_their_own(tmp_path):
 
 
 def test_the_picture_is_that_of_the_set_as_the_mesh_s(tmp_path):
-    """A roughness texture on a second set looks as on an only set."""
+    """A roughness texture looks the same on the second of two UV sets as on the only UV set."""
     two = stage(tmp_path)
     write_image(tmp_path / "flat.png", np.full((2, 2, 3), 102, np.uint8), "uint8")
     two = two.replace("@t.png@", "@rough.png@", 1).replace("@t.png@", "@flat.png@")

@@ -35,7 +35,7 @@ def test_no_representative_is_long() -> None:
 
 
 def collected(request: pytest.FixtureRequest) -> list[str]:
-    """All tests: those of this run if it has all files of the list, otherwise collected."""
+    """Node ids of all tests, collected again if this run lacks files of tests/long_tests.txt."""
     sides = [side for row in ROWS for side in (row.long, row.representative)]
     files = sorted({side.partition("::")[0] for side in sides})
     files = [file for file in files if (ROOT / file).is_file()]
@@ -53,7 +53,7 @@ def collected(request: pytest.FixtureRequest) -> list[str]:
 
 @pytest.mark.slow
 def test_every_row_names_tests(request: pytest.FixtureRequest) -> None:
-    """Both sides of each row are collected. A renamed test must be renamed there too."""
+    """Both sides of each row of tests/long_tests.txt name existing tests."""
     nodes = collected(request)
     sides = {side for row in ROWS for side in (row.long, row.representative)}
     lost = [side for side in sides if not any(tiers.matches(side, node) for node in nodes)]

@@ -268,7 +268,7 @@ def test_instancers_and_instances_nest_to_any_depth(tmp_path, depth):
 
 
 def test_colours_of_instances_reach_through_nested_ones(tmp_path):
-    """The innermost instancer with a colour counts, also with indices and invisible ids."""
+    """The innermost instancer with a colour determines it, also with indices and invisible ids."""
     text = f"""
     def PointInstancer "Outer" {{
         rel prototypes = [</Outer/Plain>, </Outer/Own>]

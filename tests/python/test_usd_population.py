@@ -173,7 +173,7 @@ def test_the_command_takes_masks_and_session_layers(tmp_path):
 
 
 def test_what_is_drawn_at_all(tmp_path):
-    """Payloads are drawn. Inactive, abstract and undefined prims, and other purposes, are not."""
+    """Payloads are drawn, but not inactive, abstract or undefined prims or other purposes."""
     (tmp_path / "load.usda").write_text(
         f'#usda 1.0\n(defaultPrim = "P")\ndef Xform "P" {{\n def Mesh "Paid" {{ {QUAD} }}\n}}\n'
     )

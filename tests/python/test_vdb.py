@@ -171,7 +171,7 @@ def test_what_cannot_be_written_is_one_line(
 
 @pytest.mark.parametrize("kind", ["int32", "bool", "vec3i"])
 def test_a_type_that_is_not_read_is_named(tmp_path: Path, kind: str) -> None:
-    """The table lists grids of other types. Reading one gives an error with its type."""
+    """The table lists grids of other types. Reading such a grid gives an error with its type."""
     path = tmp_path / "a.vdb"
     vdb.write(path, [{"name": "d", **noise(1)}])
     data = path.read_bytes()

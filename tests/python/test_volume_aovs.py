@@ -114,7 +114,7 @@ def test_transmittance_is_the_exponential(picture: wavecomb.Picture) -> None:
 
 
 def test_opacity_is_half_where_it_should_be(tmp_path: Path, picture: wavecomb.Picture) -> None:
-    """In thick fog, ln 2 / extinction beyond its face at distance 3; in thin fog, at the wall."""
+    """Depth of half opacity: ln 2 / extinction behind the face of thick fog, else at the wall."""
     thick = _load(tmp_path, 1.5 - ABSORPTION)
     depth = _render(thick, spp=512).aovs["half_depth"].astype(np.float64)
     assert depth.mean() == pytest.approx(3 + math.log(2) / 1.5, rel=0.01)

@@ -70,7 +70,7 @@ def test_a_grid_that_grows_along_the_ray(kind: Any) -> None:
 
 
 def test_emission_and_absorption() -> None:
-    """The emission eps / sigma (1 - exp(-sigma x)) is added to exp(-sigma x) of the wall."""
+    """Emission eps per unit adds eps / sigma (1 - exp(-sigma x)) to the attenuated wall."""
     builder = _core.SceneBuilder()
     builder.add_volume(
         IDENTITY,

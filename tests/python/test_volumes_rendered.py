@@ -51,7 +51,7 @@ def Camera "Cam" {
 
 
 def test_a_slab_of_a_file_lets_through_what_it_should(tmp_path: Path) -> None:
-    """exp(-sigma d s), with a density of 1.5 over 8 voxels that falls to 0 at both ends."""
+    """The transmittance matches 8 voxels of density 1.5, which falls to 0 at both ends."""
     values = np.full((16, 8, 8, 8), 1.5, np.float16)
     cells = [[x, y, 0] for x in range(-2, 2) for y in range(-2, 2)]
     bricks = {"origins": np.array(cells, np.int32) * 8, "values": values}
@@ -76,7 +76,7 @@ VIEW = (
     (-0.397505939, 0.244264171, 0.884490848, 0.0), (-63.5111198, 138.246094, 375.207275, 1.0),
 )  # fmt: skip
 FIELD_OF_VIEW = 54.4322243
-"""Field of view of its test.ass, as is the camera. The sky of radiance 1 is hidden there."""
+"""Field of view in degrees of the camera in Arnold's test.ass, to which the sky is invisible."""
 
 
 def smoke_of_arnold(folder: Path, scatter: float) -> Any:

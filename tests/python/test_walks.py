@@ -85,7 +85,7 @@ def color_of(albedo: float, anisotropy: float, n: int = 20) -> float:
 
 
 def test_a_half_space_is_chandrasekhars() -> None:
-    """Under uniform light with isotropic scattering, within 0.5 % and noise, for each channel."""
+    """The albedo of a half-space with isotropic scattering is exact within 0.5 % and noise."""
     colors = (0.3, 0.6, 0.9)
     seen = slab(200.0, spp=256, subsurface_color=colors)
     for channel, color in enumerate(colors):
@@ -104,14 +104,14 @@ def test_the_albedo_of_a_collision_gives_the_colour(anisotropy: float) -> None:
 
 
 def test_adding_and_doubling_is_chandrasekhars() -> None:
-    """Both formulas agree for isotropic scattering."""
+    """Adding-doubling and Chandrasekhar's formula agree for isotropic scattering."""
     for albedo in (0.3, 0.9, 0.99):
         assert abs(color_of(albedo, 0.0) - chandrasekhar(albedo)) < 1e-4
 
 
 @pytest.mark.parametrize("anisotropy", [0.0, 0.3, 0.6, -0.3, -0.6])
 def test_a_flat_wall_has_the_colour_asked_for(anisotropy: float) -> None:
-    """The colour is exact within 1 % and noise."""
+    """The colour of a flat wall is the requested one within 1 % and noise."""
     colors = (0.2, 0.5, 0.85)
     seen = slab(300.0, spp=192, subsurface_color=colors, subsurface_anisotropy=anisotropy)
     for channel, color in enumerate(colors):
@@ -150,14 +150,14 @@ def test_a_clear_slab_shows_what_lies_below() -> None:
 
 
 def third_exponential_integral(x: float) -> float:
-    """Returns E_3(x), by substitution int_0^1 mu exp(-x / mu) dmu."""
+    """Returns the exponential integral E_3(x) = int_0^1 mu exp(-x / mu) dmu."""
     nodes, weights = leggauss(96)
     mu, w = 0.5 * (nodes + 1), 0.5 * weights
     return float((w * mu * np.exp(-x / mu)).sum())
 
 
 def test_a_black_slab_lets_through_what_misses_all_collisions() -> None:
-    """2 E_3(optical depth) for uniform light, for each channel, within 0.5 % and noise."""
+    """The transmittance for uniform light is 2 E_3(optical depth), within 0.5 % and noise."""
     radius = (1.0, 0.6, 0.3)
     depth = 0.5
     seen = slab(depth, spp=512, subsurface_color=(0, 0, 0), subsurface_radius=radius)
@@ -356,7 +356,7 @@ def lit_ball(builder: Any) -> None:
 
 @pytest.mark.parametrize("anisotropy", [0.0, 0.5])
 def test_walks_are_a_medium_in_the_same_mesh(anisotropy: float) -> None:
-    """Equals the same medium rendered as a mesh interior in a diffusely transmitting skin."""
+    """Subsurface scattering equals the same medium in a mesh with a diffuse transmission."""
     colors, radii = np.array([0.8, 0.5, 0.3]), np.array([0.5, 0.25, 0.1])
 
     def walk(builder: Any) -> None:

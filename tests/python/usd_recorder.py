@@ -274,7 +274,7 @@ class Recorder:
 
 
 def write(folder: Path, text: str, name: str = "stage.usda") -> Path:
-    """Writes a stage with these prims. Braces may be on one line with statements."""
+    """Writes a stage with the given prims. Braces may be on one line with statements."""
     path = folder / name
     header = "" if text.startswith("#usda") else "#usda 1.0\n"
     path.write_text(header + text.replace("{", "{\n").replace("}", "\n}\n"))
@@ -282,7 +282,9 @@ def write(folder: Path, text: str, name: str = "stage.usda") -> Path:
 
 
 def load(folder: Path, text: str, **options) -> tuple[Recorder, LoadedStage]:
-    """Loads a stage with these prims. Meshes stay as they are unless ``subdivision`` is given."""
+    """Loads a stage with the given prims. Meshes stay as they are unless ``subdivision`` is
+    given.
+    """
     options.setdefault("subdivision", "off")
     loaded = load_stage(write(folder, text), builder_factory=Recorder, **options)
     return loaded.scene, loaded

@@ -3,7 +3,7 @@
 
 `ref.exr` is the mean of independent renders by the reference integrator (scalar, depth first),
 `ref_var.exr` the variance of that mean for each pixel and channel. Only tools/update_references
-writes them.
+writes the reference images.
 
 An image is tested as independent renders as well ("batches" with one seed each), so nothing is
 assumed about the noise within a render:
@@ -49,7 +49,7 @@ class Golden:
     """A scene and its render options.
 
     Attributes:
-        name: Name of its folder.
+        name: Name of the scene's folder.
         size: Width and height; multiples of 8.
         reference_spp: Samples of each of the reference's 32 batches.
         spp: Samples of each of the test's 16 batches.
@@ -192,6 +192,6 @@ def verdict(made: Array, mean: Array, variance: Array) -> Verdict:
 
 
 def each(names: list[str]) -> Iterator[Golden]:
-    """Yield the scenes of these names, or all scenes if there are none."""
+    """Yield the scenes with the given names, or all scenes if no names are given."""
     for name in names or golden_names():
         yield read_golden(name)

@@ -8,8 +8,8 @@ Both integrators render batches with different random numbers. Means over blocks
 over the image are compared per channel by Welch's t. Suspicious results (|z| of 3.3 or more) are
 rendered again with new random numbers and 12 times the samples, and if still suspicious with 60
 times. Only a difference beyond the limit each time is a fault; the level is Sidak's correction of 1
-% for all scenes of a run. Repetition is needed because light that uniform directions seldom find
-mostly gives a mean that is too low, less so with more samples.
+% for all scenes of a run. Repetition is needed because the mean is usually too low if uniform
+directions seldom find the light; more samples reduce this effect.
 """
 
 from __future__ import annotations
@@ -117,20 +117,20 @@ class Comparison:
 
 
 def level(tests: int) -> float:
-    """Significance level of one of this number of tests, by Sidak's correction."""
+    """Significance level of each of ``tests`` tests, by Sidak's correction."""
     return float(-np.expm1(np.log1p(-LEVEL) / tests))
 
 
 def limit(tests: int) -> float:
-    """Limit of |z| for each of this number of tests."""
+    """Limit of |z| for each of ``tests`` tests."""
     return float(stats.norm.isf(level(tests) / 2.0))
 
 
 def typical_contribution(batches: Array, samples: int) -> Array:
     """Contribution of a path, averaged with the contribution as weight, (height, width, 3).
 
-    It is the ratio of variance to mean of single samples, which is E[x^2] / E[x] for rare paths. If
-    all light comes from paths of one contribution, the value is that contribution.
+    The result is the ratio of variance to mean of single samples, which is E[x^2] / E[x] for rare
+    paths. If all light comes from paths of one contribution, the value is that contribution.
 
     Args:
         batches: Images, (n, height, width, 3).

@@ -8,14 +8,14 @@ A stage is rendered with plain settings and with each of ``variants``: light pat
 sampling, roulettes, the choice of lights, hidden lights, and random combinations of all of them.
 Both renders are sets of batches that have different seeds. ``judge`` compares block means and the
 image mean by Welch's t. A comparison with |z| of 3.3 or more is repeated with 12 and then with 60
-times as many samples and other seeds. It is a fault if |z| is too large each time, at the level
-that Sidak's correction leaves of 1 % for all comparisons of a run.
+times as many samples and other seeds. A difference is a fault if |z| is too large each time, at the
+level that Sidak's correction leaves of 1 % for all comparisons of a run.
 
 Where a few paths carry most of the light, z is not normal: a render that has found none of them has
-a small variance. Such a difference is a fault only if it is more than these paths can make by
-chance (``Comparison.is_sure``). Otherwise the comparison is repeated with ``FURTHER`` times as many
-samples. If the difference is too large even then, the comparison is undecided. A run in which more
-than ``MOST_UNDECIDED`` of the stages have such comparisons fails.
+a small variance. A difference is then a fault only if it is larger than the chance effect of a few
+paths (``Comparison.is_sure``). Comparisons of smaller differences are repeated with ``FURTHER``
+times as many samples. If the difference is too large even then, the comparison is undecided. A run
+in which more than ``MOST_UNDECIDED`` of the stages have such comparisons fails.
 """
 
 from __future__ import annotations
@@ -76,15 +76,15 @@ CHOICES: dict[str, tuple[Any, ...]] = {
     "sampler": ("sobol", "independent"),
 }
 FURTHER = 300
-"""Factor of the samples of a last repeat, for differences that a few rare paths can make."""
+"""Factor of the samples in the last repeat, for differences that a few rare paths may cause."""
 MOST_UNDECIDED = 0.01
-"""Fraction of the stages of a run that may have undecided comparisons; one stage always may."""
+"""Fraction of the stages of a run that may have undecided comparisons; one is always allowed."""
 MERGED_TOLERANCE = 0.03
-"""Relative difference that a blurred caustic may cause in the image mean, by loss at edges."""
+"""Relative loss of the image mean that a blurred caustic may cause at edges."""
 SMOOTH_TOLERANCE = 0.01
 """Relative difference that light paths may cause on smooth coarse meshes.
 
-A ball of 8 rings of faces differs by up to 0.5 %, and by a quarter of that with twice as many
+A ball of 8 rings of faces differs by up to 0.5 %, a ball of 16 rings by up to 0.13 %
 (docs/light-paths.md).
 """
 
@@ -188,8 +188,8 @@ class Renders:
     def reference(self, variant: Variant) -> Variant:
         """Returns the settings to compare a variant with: plain ones, or light paths.
 
-        Camera paths cannot find a point or a direction through a smooth lobe, and light paths can.
-        If a stage has both, only renders with light paths agree with each other.
+        Camera paths cannot find point or distant lights through a smooth lobe; light paths can.
+        If a stage has such lights and lobes, only renders with light paths agree with each other.
         """
         transport = variant.settings.get("transport", "path")
         unseen = {"sun light", "point light"} & set(self.scene.features)
@@ -280,7 +280,8 @@ def examine(
     Args:
         scene: The scene.
         seed: Its seed.
-        repeats: Number of repeats of suspicious comparisons. Open ones have all repeats.
+        repeats: Number of repeats of suspicious comparisons; undecided comparisons have up to
+            ``len(MORE)`` repeats.
         tests: Number of comparisons of the run.
     """
     from wavecomb import _core

@@ -57,7 +57,7 @@ class Enclosures:
         }[kind](np.asarray(centre, np.float64))
 
     def light(self, kind: str, at: Any, size: float, power: float, spin: Any = None) -> None:
-        """Add a light of about this size; its radiance compensates for a small area."""
+        """Add a light of about the given size; its radiance compensates for a small area."""
         place = (np.eye(4) if spin is None else spin) @ moved(*at)
         radiance = colour(self.random.uniform(0.5, 1.0, 3) * power / size**2)
         extent = {

@@ -187,7 +187,7 @@ class Materials:
         return self.open_pbr_of(inputs)
 
     def open_pbr_of(self, inputs: dict[str, str]) -> str:
-        """Add an open_pbr_surface with these inputs ("type name" to value); return its path."""
+        """Add an open_pbr_surface with given inputs ("type name" to value); return its path."""
         name = f"M{len(self.prims)}"
         lines = "\n".join(
             f"{key.split()[0]} inputs:{key.split()[1]} = {value}" for key, value in inputs.items()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small random scenes that combine features: a floor, some objects, lights and settings.
 
-Everything is a function of the seed. Lights are large and close and lobes are wide, so that uniform
-directions find them; images are tiny and paths short.
+The seed determines everything in a scene. Lights are large and close and lobes are wide, so that
+uniform directions find them; images are tiny and paths short.
 """
 
 from __future__ import annotations

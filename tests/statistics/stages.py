@@ -173,7 +173,7 @@ def material(
     k: Vector | None = None,
     **inputs: Any,
 ) -> str:
-    """UsdPreviewSurface with a program. ``texture`` is a file for diffuseColor: clamped, raw."""
+    """UsdPreviewSurface with a program. ``texture`` is a raw image for diffuseColor."""
     lines = [f'custom string wavecomb:program = "{program}"']
     for key, value in (("eta", eta), ("k", k)):
         if value is not None:

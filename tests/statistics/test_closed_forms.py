@@ -86,7 +86,7 @@ def test_mirrors_with_tilted_normals_see_the_sky(
 
 
 def test_grey_furnace(shot: Any) -> None:
-    """A body of albedo a has radiance a."""
+    """A body of albedo a under uniform radiance 1 has radiance a."""
     albedo = np.array((0.8, 0.5, 0.2))
     body = material("M", "diffuse", diffuseColor=tuple(albedo))
     picture = shot(AT_BALL, WHITE, body, sphere("B", "M"))
@@ -126,7 +126,7 @@ PROGRAMS: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("roughness", [0.0, 0.1, 0.3, 0.6, 1.0])
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_no_program_makes_energy(shot: Any, program: str, roughness: float) -> None:
-    """White in a white furnace: at most 1, and at least what the model conserves."""
+    """White furnace: the radiance is at most 1, and not below the known loss of the program."""
     body = material("M", program, roughness=roughness, **PROGRAMS[program])
     depth = 32 if program == "dielectric" else 1
     picture = shot(AT_BALL, WHITE, body, sphere("B", "M"), spp=512, size=16, max_depth=depth)
@@ -144,7 +144,7 @@ def test_clearcoat_makes_no_energy(shot: Any) -> None:
 
 
 def test_smooth_glass_keeps_all_energy(shot: Any) -> None:
-    """The radiance scaling 1 / eta^2 cancels on the way out: exactly 1 for all paths that end."""
+    """Furnace test of smooth glass: the radiance scaling 1 / eta^2 cancels where paths leave."""
     body = material("M", "dielectric", diffuseColor=(1, 1, 1), roughness=0.0, ior=1.5)
     picture = shot(AT_BALL, WHITE, body, sphere("B", "M", rings=48, smooth=True), max_depth=200)
     assert abs(picture.mean() - 1.0) < 2e-3
@@ -163,7 +163,7 @@ def floor_radiance(shot: Any, *lights: str) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize("angle", [0.0, 0.53, 20.0])
 def test_distant_light(shot: Any, angle: float) -> None:
-    """Normalised: irradiance E at normal incidence for any angle, and E cos(40°) on the floor.
+    """A normalised distant light has irradiance E at normal incidence, and here E cos(40°).
 
     The cosine averaged over a cone above the horizon is the cosine of its axis.
     """
@@ -175,7 +175,7 @@ def test_distant_light(shot: Any, angle: float) -> None:
 
 
 def test_distant_light_not_normalized(shot: Any) -> None:
-    """Radiance L over the cone: irradiance pi L sin^2(half angle)."""
+    """A distant light of radiance L has the irradiance pi L sin^2(half angle)."""
     sun = light("Distant", colour=(2, 1, 3), transform=turned(-90), angle=30.0)
     expected = 0.5 * np.array((2, 1, 3)) * np.sin(np.radians(15)) ** 2
     assert np.abs(floor_radiance(shot, sun) / expected - 1.0).max() < 5e-3
@@ -190,7 +190,7 @@ def test_sphere_light(shot: Any) -> None:
 
 
 def test_disk_light(shot: Any) -> None:
-    """Parallel to the floor and centred: E = pi L r^2 / (r^2 + h^2)."""
+    """A disk of radius r at height h has the irradiance pi L r^2 / (r^2 + h^2) below its centre."""
     lamp = light("Disk", colour=(8, 4, 2), transform=turned(-90) @ moved(0, 3, 0), radius=1.0)
     # The camera starts below the disk, so that its rays do not hit the disk.
     below = camera((0, 2.5, 0), (0, 0, 0), half=0.004)
@@ -200,7 +200,7 @@ def test_disk_light(shot: Any) -> None:
 
 
 def test_rect_light(shot: Any) -> None:
-    """A rect with a corner overhead: form factor of a parallel rectangle (Howell's B-3)."""
+    """A rect light with a corner overhead: form factor of a parallel rectangle (Howell's B-3)."""
     a, b, h = 1.2, 0.7, 2.0
     place = turned(-90) @ moved(a / 2, h, b / 2)
     lamp = light("Rect", colour=(8, 4, 2), transform=place, width=a, height=b)
@@ -213,7 +213,7 @@ def test_rect_light(shot: Any) -> None:
 
 
 def test_rect_light_shines_one_way(shot: Any) -> None:
-    """A rect emits along -z and is black at the back."""
+    """A rect light emits along -z and is black at the back."""
     up = light("Rect", transform=turned(90) @ moved(0, 2, 0), width=1, height=1)
     below = camera((0, 1.5, 0), (0, 0, 0), half=0.004)
     assert shot(below, FLOOR, ground("M"), up, max_depth=3, spp=16).max() == 0.0
@@ -249,7 +249,7 @@ def test_dome_orientation(shot: Any, tmp_path: Path, turn: tuple[float, float]) 
 
 
 def test_texture_orientation(shot: Any, tmp_path: Path) -> None:
-    """USD: (0, 0) is the lower left of the image, v points up. 2 x 2 texels on a quad facing us."""
+    """In USD, (0, 0) is the lower left of the image and v points up: 2 x 2 texels on a quad."""
     from wavecomb.scenes.authoring.textures import write_image
 
     image = np.array([[(1, 0, 0), (0, 1, 0)], [(0, 0, 1), (1, 1, 0)]], np.float32)
@@ -305,7 +305,7 @@ def test_point_light_shadow_edge(shot: Any) -> None:
 
 
 def test_mirror_shows_the_dome(shot: Any, tmp_path: Path) -> None:
-    """A mirror in the plane z = 0, seen at an angle: the sky in the reflected direction."""
+    """A mirror in the plane z = 0, seen at an angle, shows the sky in the reflected direction."""
     path = write_sky(tmp_path)
     silver = material("M", "metal", diffuseColor=(1, 1, 1), roughness=0.0)
     face = quad("Q", [(-5, -5, 0), (5, -5, 0), (5, 5, 0), (-5, 5, 0)], "M")
@@ -319,7 +319,7 @@ def test_mirror_shows_the_dome(shot: Any, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_fresnel_of_a_pane(shot: Any) -> None:
-    """Straight through a pane: two interfaces with all interreflections."""
+    """Light straight through a pane: transmittance of two interfaces with all interreflections."""
     glass = material("M", "dielectric", diffuseColor=(1, 1, 1), roughness=0.0, ior=1.5)
     pane = box("Pane", (-9, -9, -0.1), (9, 9, 0.1), "M")
     lamp = light("Rect", transform=look_at((0, 0, -3), (0, 0, 0)), width=1, height=1)

@@ -138,7 +138,7 @@ def driven() -> str:
 
 
 def under_mask(mask: NDArray[np.float32]) -> float:
-    """As UNDER_SQUARE, with a bilinear, clamped mask over the square: the mean of o / r^4."""
+    """Radiance of the floor below a square whose opacity is a bilinear, clamped mask."""
     n, steps = len(mask), 400
     at = (np.arange(steps) + 0.5) / steps
     texel = np.clip(at * n - 0.5, 0, n - 1)
@@ -243,7 +243,7 @@ def test_bounces_and_light_samples_alone(shot: Shot, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("roughness", [0.2, 0.6])
 def test_on_gloss(shot: Shot, roughness: float) -> None:
-    """On glossy floors, where bounces and light samples share the light: half of the full value."""
+    """A half-present light has half of its effect on glossy floors, with MIS of both techniques."""
     metal = material("M", "metal", diffuseColor=(0.9, 0.9, 0.9), roughness=roughness)
     scene: dict[str, Any] = {
         "view": camera((0, 1, 2), (0, 0, 1), half=0.02, lens=SHUTTER),

@@ -29,7 +29,7 @@ TILT = 3.0
 
 
 def colour(absorption: float, azimuthal: float) -> float:
-    """Colour of hair with this absorption (Chiang et al. 2016, eq. 9)."""
+    """Colour of hair with a given absorption (Chiang et al. 2016, eq. 9)."""
     a = azimuthal
     divisor = 5.969 - 0.215 * a + 2.532 * a**2 - 10.73 * a**3 + 5.574 * a**4 + 0.245 * a**5
     return math.exp(-math.sqrt(absorption) * divisor)
@@ -45,7 +45,7 @@ def fibres(kind: str) -> tuple[Any, Any]:
 
 
 def splines(kind: str) -> tuple[Any, float]:
-    """Control points, and the radius."""
+    """Control points of the splines, (n, k, 3), and the fibre radius."""
     if kind == "fibre":
         return line(np.array([[-3.0, -2.0, 0.4]]), np.array([[3.0, 2.0, -0.4]])), 0.07
     if kind == "head":

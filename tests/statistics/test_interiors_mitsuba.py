@@ -61,7 +61,7 @@ def stage(ior: float) -> Any:
 
 @pytest.mark.parametrize("ior", [1.0, 1.4])
 def test_media_in_meshes(mitsuba: ModuleType, beauty: Any, fewer: int, ior: float) -> None:
-    """Behind an index-matched boundary, and behind a refracting one."""
+    """Media behind an index-matched boundary and behind a refracting one equal Mitsuba's."""
     from mitsuba_bridge import MitsubaScene, PeerSettings
 
     recorded = stage(ior)

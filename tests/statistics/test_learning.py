@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Learning changes noise but not the mean: each learned part, and all parts, against none.
+"""Learning changes noise but not the mean: each learned part, and all together.
 
 Each stage is rendered with many seeds for each setting. Tiles of the image are compared by Welch's
 t, at a level that is Sidak's correction of 1 % over all stages, settings, tiles and channels of the
@@ -76,7 +76,7 @@ GENERATED = 23
 TESTS = (GENERATED + len(PUBLIC)) * len(WAYS) * TILES[0] * TILES[1] * 3
 LEVEL = 1.0 - (1.0 - 0.01) ** (1.0 / TESTS)
 AGAIN = 0.01
-"""Level of the second test."""
+"""Significance level of the second test."""
 
 FAST = ("cornell", "studio")
 Array = NDArray[np.float64]

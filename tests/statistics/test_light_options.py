@@ -35,21 +35,21 @@ def shaped(text: str, *lines: str) -> str:
 
 
 def test_cone_of_a_distant_light(shot: Any) -> None:
-    """Of a light 60 degrees wide, a cone of 10 degrees around the axis remains: L pi sin^2."""
+    """A cone of half angle 10 degrees limits the irradiance to pi L sin^2(10 degrees)."""
     sun = shaped(light("Distant", transform=DOWN, angle=60), "float inputs:shaping:cone:angle = 10")
     expected = np.pi * np.sin(np.radians(10)) ** 2
     assert shot(sun, spp=4096) == pytest.approx(expected, rel=2e-3)
 
 
 def test_focus_of_a_distant_light(shot: Any) -> None:
-    """Integral of L cos^2 cos over a cone of half angle 30 degrees: pi / 2 (1 - cos^4)."""
+    """With focus 2, the irradiance of half angle 30 degrees is pi / 2 (1 - cos^4(30 degrees))."""
     sun = shaped(light("Distant", transform=DOWN, angle=60), "float inputs:shaping:focus = 2")
     expected = np.pi / 2 * (1 - np.cos(np.radians(30)) ** 4)
     assert shot(sun, spp=4096) == pytest.approx(expected, rel=1e-3)
 
 
 def test_profile_of_a_parallel_light(shot: Any, tmp_path: Path) -> None:
-    """Angle 0: the candela value on the axis, times 3."""
+    """An IES profile scales a light of angle 0 by the candela value on the axis."""
     (tmp_path / "lamp.ies").write_text(
         "IESNA:LM-63-2002\nTILT=NONE\n1 1000 1 3 1 1 2 0.1 0.1 0\n1 1 10\n0 45 90\n0\n7 3 0\n"
     )

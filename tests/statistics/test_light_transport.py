@@ -278,11 +278,12 @@ def test_aiming_in_a_wide_stage_is_unbiased(kind: str, tmp_path: Path, beauty: A
 
 @pytest.mark.parametrize("transport", ["light", "bdpt"])
 def test_light_through_a_plate_of_glass(transport: str, tmp_path: Path, beauty: Any) -> None:
-    """A point light over a clear plate over a floor: camera paths cannot find it.
+    """A point light above a clear plate above a floor, which camera paths cannot find.
 
-    Below the point, rays are vertical, and a plate of thickness t and index n shifts the point by t
-    (1 - 1 / n). With R = ((n - 1) / (n + 1))^2, light reflected inside m times comes from 2 m t / n
-    further away: E = I sum_m (1 - R)^2 R^(2 m) / (h - t (1 - 1 / n) + 2 m t / n)^2.
+    Below the light, of height h and intensity I, rays are vertical, and a plate of thickness t and
+    index n shifts the light by t (1 - 1 / n). Light that is reflected inside m times comes from
+    2 m t / n further away, so with R = ((n - 1) / (n + 1))^2 the irradiance is
+    E = I sum_m (1 - R)^2 R^(2 m) / (h - t (1 - 1 / n) + 2 m t / n)^2.
     """
     height, thick, index, albedo, power = 2.0, 0.3, 1.5, 0.6, 10.0
     glass = material("Clear", "dielectric", roughness=0.0, ior=index, diffuseColor=(1, 1, 1))

@@ -158,7 +158,7 @@ def test_mirrors_show_what_cameras_see(shot: Any) -> None:
 
 @pytest.mark.parametrize(("scale", "scheme"), [(1.0, "none"), (3.0, "none"), (3.0, "catmullClark")])
 def test_normalize_divides_by_the_area(shot: Any, scale: float, scheme: str) -> None:
-    """In world space: radiance times area stays constant, subdivided or not."""
+    """inputs:normalize keeps radiance times world-space area constant, also with subdivision."""
     place = np.diag((scale, 2 * scale, scale, 1)) @ turned(x=-90) @ moved(0, 1, 0)
     mesh = lamp(ALONE, "bool inputs:normalize = 1", "float inputs:intensity = 5", place=place,
                 scheme=scheme)  # fmt: skip
@@ -177,7 +177,7 @@ def test_sphere_of_triangles_is_a_sphere_light(shot: Any) -> None:
 
 
 def test_textured_glow_is_tinted(shot: Any, tmp_path: Path) -> None:
-    """The image equals that of the same texture with the tint in its scale, without a light."""
+    """A tinted mesh light looks like an emissive mesh whose texture is scaled by the tint."""
     pixels = np.random.default_rng(3).random((8, 8, 3)).astype(np.float32)
     out = oiio.ImageBuf(oiio.ImageSpec(8, 8, 3, "float"))
     out.set_pixels(oiio.ROI(), pixels)

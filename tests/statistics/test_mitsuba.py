@@ -2,8 +2,8 @@
 """Wavecomb compared with Mitsuba 3's `path`: images agree within noise.
 
 Every stage is USD text that our loader reads; Mitsuba gets the arrays that our scene builder
-received. A wrong orientation would therefore be wrong in both, so test_closed_forms.py tests it
-separately. Where the models differ by design, the test says so.
+received. A wrong orientation would therefore be wrong in both renderers, so test_closed_forms.py
+tests orientations separately. Tests state where the models differ by design.
 """
 
 from __future__ import annotations
@@ -211,7 +211,8 @@ def test_gold(check: Check, recorded: Any, tmp_path: Path, roughness: float) -> 
     """A conductor with measured index.
 
     Mitsuba's masking and shadowing are separable, ours are height-correlated; and Mitsuba omits
-    multiple scattering, which we compensate. These differences are invisible up to alpha 0.04.
+    multiple scattering, which we compensate. The differences between the models are invisible up to
+    alpha 0.04.
     """
     dome = light("Dome", texture=write_sky(tmp_path))
     gold = material("Gold", "metal", eta=GOLD_ETA, k=GOLD_K, roughness=roughness)
@@ -269,10 +270,10 @@ def test_rough_gold_gives_back_what_single_scattering_loses(
 ) -> None:
     """At alpha 0.2 in a white furnace, Mitsuba's gold loses about 7 %, Wavecomb's does not.
 
-    By hand: GGX of alpha 0.2025 loses L = 0.0837 on average (integral of G2 / G1 over visible
-    normals). Further bounces return the fraction F^2 (1 - L) / (1 - F L) of this energy, which is
-    0.92, 0.64 and 0.12 for the mean reflectances F of red, green and blue, 0.97, 0.81 and 0.36. A
-    distant ball gains this amount of energy.
+    Computed by hand, GGX of alpha 0.2025 loses L = 0.0837 on average (integral of G2 / G1 over
+    visible normals). Further bounces return the fraction F^2 (1 - L) / (1 - F L) of the lost
+    energy, which is 0.92, 0.64 and 0.12 for the mean reflectances F of red, green and blue, 0.97,
+    0.81 and 0.36. A distant ball gains as much energy as the further bounces return.
     """
     from mitsuba_bridge import PeerSettings
 

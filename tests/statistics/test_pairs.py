@@ -75,7 +75,7 @@ def test_settings_agree_at_night(seed: int, tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_few_stages_are_undecided_at_night() -> None:
-    """Runs after the stages, in the same process."""
+    """This test runs after the tests of all stages, in the same process."""
     assert len(UNDECIDED) <= most_undecided(MANY), UNDECIDED
 
 
@@ -155,7 +155,7 @@ def flat(mean: float, seed: int) -> Any:
 
 
 def sparse(mean: float, seed: int, paths: float) -> Any:
-    """Batches with all light from equal paths, ``paths`` of which each pixel expects in all.
+    """Batches in which all light comes from ``paths`` equal paths per pixel, on average.
 
     The paths are ten times as rare in the left third of the image, as behind a small opening.
     """
@@ -191,7 +191,7 @@ def test_equal_sparse_images_agree() -> None:
 
 @pytest.mark.parametrize("paths", [0.2, 2.0, 20.0])
 def test_a_difference_is_found_once_paths_suffice(paths: float) -> None:
-    """Half of the light is missing: certain once a block of 16 pixels expects some 50 paths."""
+    """Missing half of the light is certainly a fault if a block of 16 pixels expects 50 paths."""
     found = judge(flat(0.5, 1), sparse(1.0, 2, paths) + flat(1e-3, 3))
     assert found.is_sure(MANY * 12) == (paths > 4), found.events.max()
 
@@ -207,7 +207,7 @@ def test_a_difference_without_noise_is_a_fault() -> None:
 
 
 def test_contributions_of_earlier_comparisons_count() -> None:
-    """A path that an earlier comparison met may be missing from both renders."""
+    """A bright path that an earlier comparison found may be missing from both renders."""
     found = judge(flat(1.02, 1), flat(1.0, 2), samples=64)
     assert found.is_sure(MANY * 12)
     assert np.all(found.contribution < 64 * 0.05)

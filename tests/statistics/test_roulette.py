@@ -50,9 +50,7 @@ def test_absurd_costs_do_not_bias(cornell: Any, beauty: Any, start: int, fewer: 
 
 
 def test_roulette_ends_paths(cornell: Any) -> None:
-    """Roulette by throughput shades fewer records than none; expensive materials fewer than cheap
-    ones.
-    """
+    """Roulette by throughput and cost-aware roulette reduce the number of shaded records."""
 
     def counts(**settings: Any) -> Any:
         picture = wavecomb.render(cornell, size=(48, 48), spp=16, max_depth=8, **settings)

@@ -149,7 +149,7 @@ def test_more_samples_extend_fewer(cornell: Any, beauty: Any) -> None:
     """Sample k does not depend on the count: the first 4 of 8 samples are those of a 4-sample
     render.
 
-    Correlation of the noise: sqrt(4 / 8), and none with another seed.
+    The noise of both renders has a correlation of sqrt(4 / 8), but 0 with another seed.
     """
     plain = {"sampler": "independent", "max_depth": 1}
     truth = beauty(cornell, 32, 2048, seed=50, **plain)

@@ -21,7 +21,7 @@ FEW = ("sphere:18", "rect:28", "cylinder:1", "disk:1", "iesTest:5")
 
 
 def files(pictures: tuple[str, ...]) -> list[str]:
-    """Reference files of the UsdLux suite for these images."""
+    """Stages and reference images of the UsdLux suite for images "stage:frame"."""
     found = []
     for stage, _, frame in (picture.partition(":") for picture in pictures):
         found += [

@@ -30,7 +30,7 @@ ABOUT = {
 
 
 def pages() -> dict[str, str]:
-    """Return file name -> Markdown."""
+    """Return the Markdown text of each generated page, by file name."""
     return {
         "options.md": options_page(),
         "settings.md": settings_page(),

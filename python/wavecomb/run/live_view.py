@@ -40,7 +40,8 @@ def watching(asked: bool | None, space: str = "rec709") -> Iterator[ProgressDisp
     """Shows a render inside the block; yields None if there is no display.
 
     Args:
-        asked: True shows it in a notebook or terminal, None only in a notebook, False nowhere.
+        asked: True shows the render in a notebook or terminal, None only in a notebook, False
+            nowhere.
         space: Working colour space of the image.
     """
     shown = None
@@ -68,7 +69,7 @@ class View(Protocol):
     """Interface of a live view in a notebook."""
 
     def bar(self, share: float, text: str) -> None:
-        """Shows the completed fraction of the render, from 0 to 1, and figures such as rates."""
+        """Shows the completed fraction of the render, 0 to 1, and text such as its speed."""
 
     def picture(self, png: bytes) -> None:
         """Shows the current image."""
@@ -92,7 +93,7 @@ class WidgetView:
         display(self._all)
 
     def bar(self, share: float, text: str) -> None:
-        """Shows the completed fraction and figures."""
+        """Shows the completed fraction of the render and a text."""
         self._bar.value, self._text.value = share, text
 
     def picture(self, png: bytes) -> None:
@@ -116,7 +117,7 @@ class IPythonView:
         self._bar = self._picture = ""
 
     def bar(self, share: float, text: str) -> None:
-        """Shows the completed fraction and figures."""
+        """Shows the completed fraction of the render and a text."""
         self._bar = (
             f"<progress max='1' value='{share:.4f}' style='width:20em'></progress> "
             f"{html.escape(text)}"

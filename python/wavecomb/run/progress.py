@@ -84,7 +84,7 @@ _earlier: list[int] = []
 
 
 def keep_interrupts() -> None:
-    """Records Ctrl-C signals, so that the next ``Interrupt`` handles those that were lost.
+    """Records Ctrl-C signals, so that the next ``Interrupt`` handles signals that were lost.
 
     ``KeyboardInterrupt`` is lost if it is raised in a callback of a library that prints exceptions
     and continues. Use this function in commands, which a ``KeyboardInterrupt`` ends, but not in a
@@ -106,7 +106,7 @@ def was_interrupted() -> bool:
 
 
 class Interrupt:
-    """Context manager that records the first Ctrl-C or SIGTERM; further ones act as usual.
+    """Context manager that records the first Ctrl-C or SIGTERM and then restores the handlers.
 
     Contract: handles signals on the main thread only; on other threads it does nothing.
     """
@@ -150,8 +150,8 @@ class Interrupt:
 def progress_console(*, quiet: bool = False) -> Console | None:
     """Returns the console for progress (standard error), or None if it is not visible.
 
-    Rich decides whether it is a terminal. Rich is loaded only if standard error is a terminal or an
-    environment variable that Rich respects claims so.
+    Rich decides whether standard error is a terminal. To save time, Rich is loaded only if standard
+    error is a terminal or if an environment variable of Rich says that it is one.
     """
     is_terminal = sys.stderr is not None and sys.stderr.isatty()
     if quiet or not (is_terminal or any(name in os.environ for name in _FORCED)):
@@ -177,11 +177,11 @@ class Silent:
 
 
 def figures(status: Mapping[str, Any], columns: int = 200) -> list[str]:
-    """Returns the figures next to a bar, the most important first: time left, error, rates, passes.
+    """Returns the texts beside a progress bar: time left, error, samples and rays per second, pass.
 
     Args:
         status: Values of ``Snapshot.status`` in _core.pyi.
-        columns: Width available for the figures; figures that do not fit are left out.
+        columns: Width available for the texts; the last texts are left out if they do not fit.
     """
     rates = speed(status)
     said = []
@@ -215,7 +215,7 @@ def bar_width(columns: int) -> int:
 class ProgressBar(Silent):
     """Progress bar with passes, samples and rays per second, error and time left.
 
-    The bar is a context manager.
+    The progress bar is a context manager.
     """
 
     def __init__(self, console: Console, title: str = "rendering") -> None:
@@ -307,5 +307,5 @@ class ProgressLines(Silent):
         self.event("wrote", file=path)
 
     def event(self, name: str, **values: Any) -> None:
-        """Writes a line with any event."""
+        """Writes an event as a line of JSON."""
         self._write(json.dumps({"event": name, **values}))

@@ -30,8 +30,8 @@ class Frames:
     """Frames of an open stage; each image is bit-identical to that of a separate render.
 
     If only views change, this class keeps the scene with its acceleration structures and reads the
-    camera. Otherwise it traverses the stage again, but reuses unchanged meshes and textures of the
-    previous frame.
+    camera. If anything else changes, the stage is traversed again, but unchanged meshes and
+    textures of the previous frame are reused.
 
     Contract: files of the stage must not change, except images.
     """
@@ -68,7 +68,8 @@ class Frames:
         """Loads the stage at a frame.
 
         Args:
-            frame: Time code; None means the stage's start, else default values.
+            frame: Time code; None means the start time code of the stage, or default values
+                if the stage has none.
             progress: Progress callback as in ``wavecomb.load``.
             **changes: Fields of ``LoadOptions`` that replace the initial options.
 
@@ -128,7 +129,7 @@ class Frames:
         )
 
     def stats(self, result: Result, **options: Any) -> dict[str, Any]:
-        """Returns ``make_stats`` of the last render; ``options`` are its further arguments."""
+        """Returns statistics of the last render; ``options`` are passed to ``make_stats``."""
         options |= {"loaded": self._loaded, "is_built": self._is_built}
         return make_stats(result, stage=os.fspath(self._path), **options)
 

@@ -39,7 +39,8 @@ def prepare(
 ) -> tuple[Any, dict[str, dict[str, float]] | None, tuple[str, ...], Settings]:
     """Validates arguments of ``render``.
 
-    Returns a custom policy, cost profile, AOVs and settings.
+    Returns the scheduling policy and the cost profile if they are custom (else None), the AOV names
+    and the settings.
     """
     own: Any = None
     if isinstance(policy, str):
@@ -86,8 +87,8 @@ def make_settings(
 ) -> Settings:
     """Returns validated settings; raises WavecombError or _core.Error with a one-line message.
 
-    ``size`` is the image size without overscan, and ``aovs`` are expanded. Also checks that the
-    image fits into this machine's memory, by ``check_memory`` unless ``fits`` is given.
+    ``size`` is the image size without overscan, and ``aovs`` are expanded. Also checks by ``fits``
+    (default: ``check_memory``) that the image fits into this machine's memory.
     """
     from wavecomb import _core
     from wavecomb.errors import WavecombError
@@ -117,7 +118,8 @@ def check_memory(settings: Settings, aovs: Sequence[str], light_groups: int = 1)
     Args:
         settings: Settings of the render.
         aovs: Expanded AOVs.
-        light_groups: Number of light groups of the scene; repeat the check once it is known.
+        light_groups: Number of light groups of the scene; if unknown, repeat the check after
+            loading.
     """
     from wavecomb.errors import WavecombError
 
@@ -156,7 +158,7 @@ def image_size(settings: Settings) -> tuple[int, int]:
 
 
 def has_error_layers(settings: Settings) -> bool:
-    """Returns whether a render with these settings has the layers error and variance."""
+    """Returns whether a render with these settings writes error and variance layers."""
     return bool(
         settings.adaptive or settings.noise or settings.error or settings.allocate != "even"
     )

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenes with caustics, such as a glass ball and a gold ring under a small light.
 
-Paths from the camera rarely find the light that these objects focus.
+Paths from the camera rarely find light that glass or metal focuses.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ _WAVES = (
 
 LENS_FOCUS, _LENS_RADIUS = 2.0, 0.9
 """Focal length and half width of the lens, in scene units. The light is at twice the focal length,
-so its image is equally far on the other side, and of equal size."""
+so the lens images it at the same distance and size on the other side."""
 
 _LAND = 100.0
 """Half extent of the landscape along x and z; the ring in the landscape has radius 1."""

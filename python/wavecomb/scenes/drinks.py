@@ -141,7 +141,7 @@ def below_surface(
 
 def _candle(writer: StageWriter, name: str, at: tuple[float, float, float], radius: float,
             height: float, columns: int) -> None:  # fmt: skip
-    """Adds wax with a rim around a shallow pool, a wick, and a flame that is also a light."""
+    """Adds a candle: wax with a shallow pool, a wick, and a flame that is also a light."""
     rim = 0.12 * radius
     profile = np.array([
         (0.0, 0.0), (0.97 * radius, 0.0), (radius, 0.03 * radius), (radius, height - rim),

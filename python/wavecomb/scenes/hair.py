@@ -107,8 +107,8 @@ def add_strands(
         strands: Points of the strands, (n, points, 3), root first.
         width: Width at the root, in scene units.
         material: Name of the bound material.
-        primvars: By name, interpolation (uniform or varying) and values, which are numbers or
-            colours.
+        primvars: Interpolation (uniform or varying) and values (numbers or colours) of each
+            primvar, by name.
     """
     count, points = strands.shape[:2]
     flat = strands.reshape(-1, 3).astype(np.float32)

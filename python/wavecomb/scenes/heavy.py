@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A field of stones with materials as complex and as diverse as those of a production.
 
-Each material is a network of MaterialX nodes: separate images, mixed by fractals in space and
-graded, which drive one of eight kinds of surface, from plain paint to all lobes at once. The first
-material reads one image; the last one mixes eight layers. The materials thus differ in shading
-program, lobes, textures and cost, without repeating work artificially.
+Each material is a network of MaterialX nodes: separate images, mixed by fractal noise in space and
+colour-graded, which drive one of eight kinds of surface, from plain paint to all lobes at once. The
+first material reads one image; the last one mixes eight layers. The materials thus differ in
+shading program, lobes, textures and cost, without repeating work artificially.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def build_heavy(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def layers(options: SceneOptions, index: int) -> int:
-    """Returns the layers of material ``index``: 0 in the first ninth, ``LAYERS`` for the last."""
+    """Returns the number of texture layers of material ``index``, from 0 to ``LAYERS``."""
     share = index / max(options.materials - 1, 1)
     return min(int((LAYERS + 1) * share), LAYERS)
 
@@ -68,9 +68,9 @@ _KINDS: tuple[dict[str, float | tuple[float, float]], ...] = (
         "fuzz_weight": 0.3,
     },
 )
-"""Inputs of OpenPBR surfaces: paint, metal, lacquer, cloth, thin film, glass, and all lobes. The
-materials use these kinds of surface in turn, after a diffuse UsdPreviewSurface. A pair is a range
-for a random value."""
+"""Inputs of OpenPBR surfaces: paint, metal, lacquer, cloth, thin film, glass, and all lobes.
+Materials use the kinds of surface in turn, after a diffuse UsdPreviewSurface. A pair is a range for
+a random value."""
 
 
 def _inputs(kind: dict[str, float | tuple[float, float]], rng: np.random.Generator) -> Inputs:
@@ -108,7 +108,7 @@ def _material(
 def _define(
     writer: StageWriter, name: str, edge: int, index: int, colour: np.ndarray | None
 ) -> str:
-    """Defines a pattern in a colour, or a roughness map, and returns its texture name."""
+    """Registers a colour or (if ``colour`` is None) roughness texture; returns its name."""
 
     def made(size: int, source: np.random.Generator) -> Image:
         grey = grey_pattern(index, size, source)

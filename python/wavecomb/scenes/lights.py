@@ -168,8 +168,8 @@ _LOOKS = {
 def build_studio(writer: StageWriter, options: SceneOptions) -> None:
     """Builds 90 objects in rows on a matt floor, with key light, fill light and a dim, even dome.
 
-    Computed over the whole stage, the dome has most of the power. It contributes little light to
-    the image, which BSDF sampling finds as well.
+    The dome has most of the power of the stage but contributes little light to the image, and BSDF
+    sampling finds this light as well.
     """
     rng = np.random.default_rng([options.seed, 3])
     writer.material("Floor", materials.diffuse((0.35, 0.34, 0.33)))

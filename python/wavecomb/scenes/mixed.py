@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The stages of the experiments: the Cornell box, and 90 instanced objects and a mirror.
+"""Stages for tests and benchmarks: the Cornell box, and 90 instanced objects with a mirror.
 
-``SceneOptions.lamps`` lights them with a key, a fill, and a dim, even dome instead.
+``SceneOptions.lamps`` replaces the usual lights by a key light, a fill light and a dim dome.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def _set(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def _frame(writer: StageWriter, mirror: np.ndarray) -> None:
-    """Adds four boxes around the mirror, (4, 3) corners, and a back board."""
+    """Adds a frame and a back board for a mirror with corners (4, 3)."""
     right = mirror[1] - mirror[0]
     rise = mirror[3] - mirror[0]
     right, rise = right / np.linalg.norm(right), rise / np.linalg.norm(rise)

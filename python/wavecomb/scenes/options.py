@@ -77,7 +77,7 @@ class SceneOptions:
             raise SceneError(f"seed must not be negative: {self.seed}")
 
     def dragon_mesh(self) -> Mesh:
-        """Returns the dragon to use: the built-in one, or the file's mesh scaled to its size."""
+        """Returns the built-in dragon, or the mesh of a file scaled to the dragon's size."""
         if self.dragon is None:
             return dragon(self.triangles)
         from wavecomb.scenes.models.mesh_file import load_dragon

@@ -23,8 +23,7 @@ from wavecomb.scenes.models.ply import ply_vertices
 from wavecomb.scenes.options import SceneOptions
 
 _COUNTS = {0: 0, 9: 1, 24: 2, 45: 3}
-"""Degree of the spherical harmonics, by the number of coefficients after the first, over all
-channels."""
+"""Degree of the spherical harmonics, by the number of ``f_rest_*`` coefficients in a PLY file."""
 _DIRECTIONS = 128
 """Number of directions in which colours are evaluated."""
 _CHUNK = 1 << 15
@@ -192,7 +191,7 @@ def turns_to(normals: FloatArray, spin: FloatArray) -> FloatArray:
 
 
 def colours(points: FloatArray, normals: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Returns coefficients (n, 4, 3) of degree 1 of the splats' emission, minus 0.5."""
+    """Returns spherical harmonics (n, 4, 3) up to degree 1 of the splats' colours minus 0.5."""
     height = np.maximum(points[:, 1] / points[:, 1].max(), 0.0)
     bands = 0.5 + 0.5 * np.sin(26.0 * height + 2.0 * np.sin(5.0 * points[:, 0]))
     low, high = np.array([0.06, 0.30, 0.26]), np.array([0.85, 0.55, 0.16])

@@ -59,7 +59,7 @@ def _edge(options: SceneOptions) -> int:
 
 
 def octaves(options: SceneOptions, index: int) -> int:
-    """Returns the octaves of noise on material ``index``.
+    """Returns the number of octaves of noise on material ``index``.
 
     The octaves grow geometrically from 1 for the first material, which means no noise, to
     ``shader_cost`` for the last.
@@ -79,7 +79,7 @@ _PROGRAMS = (
     lambda colour: materials.metal(colour, 0.25),
     lambda colour: materials.dielectric(colour, 0.1),
 )
-"""Functions that make a material from its colour. The first ``programs`` of them are used in
+"""Functions that make a material from its colour. The first ``programs`` functions are used in
 turn."""
 
 
@@ -101,7 +101,7 @@ def _material(
 
 
 def _texture(writer: StageWriter, index: int, edge: int, colour: tuple[float, ...]) -> str:
-    """Defines a pattern in a colour and returns its texture name."""
+    """Registers a texture with a pattern in a colour; returns the texture's name."""
 
     def tinted(size: int, source: np.random.Generator) -> Image:
         grey = grey_pattern(index, size, source)

@@ -55,7 +55,7 @@ class Noise:
         return found
 
     def fractal(self, points: Points, octaves: int, gain: float = 0.5) -> NDArray[np.float32]:
-        """Sums octaves of twice the frequency and ``gain`` times the weight, in [0, 1]."""
+        """Sums octaves of noise to [0, 1], each with ``gain`` times the weight of the last."""
         found = np.zeros(len(points), np.float32)
         weight, weights = 1.0, 0.0
         for octave in range(octaves):

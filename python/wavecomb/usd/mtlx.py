@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Interface to MaterialX: the only module that imports ``wavecomb.usd.materialx``.
 
-Without that package or the ``materialx`` wheel, stages still load: MaterialX materials are replaced
-by displayColor or left out, which is reported once.
+Stages also load if ``wavecomb.usd.materialx`` or the ``materialx`` wheel is missing: displayColor
+replaces MaterialX materials, or they are left out, which is reported once.
 """
 
 from __future__ import annotations
@@ -54,12 +54,12 @@ def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
     """Makes a stage use the MaterialX files that its layers name.
 
     Changes the layers in memory, which then can no longer be saved. Unreadable files stay missing;
-    ``report_problems`` reports them. The call is fast if no such file is missing.
+    ``report_problems`` reports them. The call is fast if no MaterialX file is missing.
 
     Args:
         stage: The stage.
         everywhere: Whether to include unselected variants, which takes a pass over all layers.
-            Selecting these variants later, on any thread, then changes no layer.
+            Selecting other variants later, on any thread, then changes no layer.
     """
     if (everywhere or any(True for _ in unopened_materialx(stage))) and is_there():
         from wavecomb.usd.materialx import references

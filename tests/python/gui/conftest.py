@@ -29,8 +29,7 @@ def _collected(qapp, _modules):
     """Destroys the garbage of a test after it, on the window's thread.
 
     Tests create Qt objects without a window. Automatic collection would destroy reference cycles
-    with
-    such objects in a later test, on any thread that allocates, and may deadlock
+    with such objects in a later test, on any thread that allocates, and may deadlock
     (docs/decisions/window-threads.md). test_threads.py checks, in separate processes in which all
     threads collect, that the window itself leaves no such cycles.
     """
@@ -135,5 +134,5 @@ def wait_final(qtbot, session, timeout=20000):
 
 @pytest.fixture
 def final(qtbot):
-    """wait_final(session) without the bot."""
+    """``wait_final`` as a function of a session, without the argument ``qtbot``."""
     return lambda session, timeout=20000: wait_final(qtbot, session, timeout)

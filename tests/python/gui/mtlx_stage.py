@@ -174,7 +174,7 @@ def Xform "World"
     }
 }
 """
-"""Refers to a .mtlx file and to a missing layer, and binds without applying the schema."""
+"""A stage with a .mtlx file, a missing layer, and a binding without MaterialBindingAPI."""
 
 
 def write_stage(folder):

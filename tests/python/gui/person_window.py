@@ -130,7 +130,7 @@ class Look:
         return {name: [corner.x() + line[-1][0], corner.y() + line[-1][1]] for name, line in found}
 
     def frame(self):
-        """Returns the frame of the timeline, and the one that the scene was loaded at."""
+        """Returns the frame that the timeline shows and the frame of the loaded scene."""
         return [self.window.timeline.frame.value(), self.window.session.stage.frame]
 
     def widths(self):

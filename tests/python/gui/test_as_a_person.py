@@ -100,7 +100,7 @@ def select(person):
 
 
 def edit(person, tmp_path, name):
-    """Types a number into the first material that has one, undoes it, and types it again."""
+    """Edits the first material with a numeric field, undoes the edit, and repeats it."""
     person.click(person.ask("tab", "Materials"))
     for path in person.ask("materials"):
         if path and person.ask("material", path):
@@ -184,7 +184,7 @@ def use(person, tmp_path, name):
 
 @pytest.mark.slow
 def test_small_stages(person, tmp_path):
-    """MaterialX, .mtlx files, instances, no light, no camera, a missing layer, a broken stage."""
+    """Stages with MaterialX, .mtlx files, instances, missing layers or errors, or without light."""
     looks, referring = write_stage(tmp_path), write_referring(tmp_path)
     broken = tmp_path / "broken.usda"
     broken.write_text(BROKEN)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Comparison code that needs no window: image sides, figures, and FLIP in a process."""
+"""Image comparison without a window: image sides, error metrics, FLIP in a separate process."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ def drop(widget, at, *paths):
 
 @pytest.fixture
 def pair(qtbot, window, files):
-    """A window with A and B, dropped together."""
+    """A comparison window with images A and B, which were dropped together."""
     drop(window.view, QPoint(10, 10), files["a"], files["b"])
     qtbot.waitUntil(lambda: window.a.side is not None and window.b.side is not None)
     settled(qtbot, window)
@@ -230,9 +230,7 @@ def test_without_a_stage_keeping_says_so(qtbot, window):
 
 @pytest.mark.slow
 def test_kept_picture_against_live_settings(qtbot, session):
-    """A render with another policy gives equal bits, and one with another seed other noise. The
-    viewport continues.
-    """
+    """Another policy gives equal bits, another seed other noise; the viewport continues."""
     window = CompareWindow(session)
     qtbot.addWidget(window)
     window.show()

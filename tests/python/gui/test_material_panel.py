@@ -136,7 +136,7 @@ EDITS = [
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["Car", "Wood", "Standard", "Gltf"])
 def test_an_edit_is_what_is_saved(panel, same_as_saved, final, name, qtbot):
-    """Each edit renders as its saved file, and undoing all edits restores the image."""
+    """After each edit, the image equals that of the saved file; undo restores the image."""
     materials = panel.materials
     materials.choose(f"{LOOKS}/{name}")
     before = final(panel.session).beauty

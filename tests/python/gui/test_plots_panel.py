@@ -36,7 +36,7 @@ def panel(session: Any, qtbot: Any) -> PlotsPanel:
 
 
 def render(panel: PlotsPanel, session: Any, qtbot: Any, **settings: Any) -> None:
-    """Renders once more, to the end."""
+    """Renders another image until it is complete."""
     if settings:
         session.change(**settings)
     else:

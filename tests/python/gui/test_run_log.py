@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Statistics as runs and series, rates, ratios and the table, without Qt."""
+"""Log of render statistics without Qt: runs, series, rates, ratios and the table."""
 
 from __future__ import annotations
 
@@ -177,7 +177,7 @@ def test_time_of_is_linear_between_looks() -> None:
 
 
 def test_runs_are_compared_at_equal_samples() -> None:
-    """Without its expensive half, a run has a higher rate but equal speed at equal samples."""
+    """A run's inexpensive first half has a higher rate, but equal speed at equal samples."""
     log = RunLog()
     fill(log, PROGRAM, 1.0)
     whole = log.series[0].run

@@ -72,7 +72,7 @@ def picture(path):
 
 
 def settle(qtbot, session):
-    """Waits until nothing is being read."""
+    """Waits until the session has read its stage."""
     busy = []
     session.busy.connect(busy.append)
     qtbot.waitUntil(lambda: not session._jobs, timeout=20000)
@@ -122,7 +122,7 @@ def test_space_and_eye_toggle(panel, same_as_saved, qtbot, stage_path):
 
 
 def test_keys_of_the_window(qtbot, stage_path, tmp_path):
-    """F in the tree frames the selection, and Ctrl+Z undoes with the focus anywhere."""
+    """Key F in the prim tree frames the selection, and Ctrl+Z undoes with the focus anywhere."""
     from PySide6.QtCore import QSettings
 
     from wavecomb.gui.main_window import MainWindow

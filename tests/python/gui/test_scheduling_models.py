@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The same-image indicator, policies from files, choices, without Qt."""
+"""Models of the scheduling panel without Qt: image comparison, policy files, choices."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from wavecomb.gui import bridge
 from wavecomb.gui.worker import Errands, Worker, refuse_qt
 
 HARMLESS = (QColor, QPoint, QPointF, QRect, QRectF, QSize)
-"""Value types without a lock or thread affinity."""
+"""Qt value types without a lock or thread affinity."""
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +83,7 @@ def alone(test):
 @pytest.mark.slow
 @alone
 def test_garbage_that_holds_qt_is_found(qapp):
-    """Checks the method that the next test uses."""
+    """Checks that ``Saved`` finds a Qt object in garbage, as other tests rely on."""
 
     class Loop(QObject):
         def __init__(self):
@@ -166,7 +166,7 @@ class Told:
 
 
 class Gate:
-    """Jobs that wait until the gate opens."""
+    """Jobs of a worker that wait for the event ``open``."""
 
     def __init__(self):
         self.open = threading.Event()

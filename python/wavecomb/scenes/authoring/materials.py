@@ -139,8 +139,8 @@ def plain(info: MaterialInfo) -> MaterialInfo:
 
     Matt surfaces get the specular reflection that UsdPreviewSurface gives all dielectrics. Metals
     lose the tint of their edges. Glass becomes specular reflection with straight transmission,
-    because UsdPreviewSurface has no refraction. The only tint of glass without refraction is its
-    opacity, so coloured glass is partly covered by its colour.
+    because UsdPreviewSurface has no refraction. Coloured glass gets some opacity instead, since
+    straight transmission cannot be tinted.
     """
     inputs = {key: value for key, value in info.inputs.items() if key not in _SPECULAR_WORKFLOW}
     if info.program == "dielectric":
@@ -254,9 +254,9 @@ class Network:
         """Adds a hair BSDF as the final shader.
 
         Args:
-            absorption: Node that computes absorption, without types:
+            absorption: Node that computes absorption, without the type suffix:
                 ``chiang_hair_absorption_from_color`` or ``deon_hair_absorption_from_melanin``.
-            roughness: Inputs of ``chiang_hair_roughness``, as ``node`` takes them.
+            roughness: Inputs of ``chiang_hair_roughness``, in the form of the inputs of ``node``.
             **inputs: Inputs of the absorption node.
         """
         colour = self._shader("Absorption", f"ND_{absorption}", inputs)

@@ -43,7 +43,7 @@ def _vec(values: Sequence[float] | FloatArray) -> Gf.Vec3f:
 
 
 class StageWriter:
-    """Builder of a Y-up stage in memory. ``save`` writes the stage, never partially.
+    """Builder of a Y-up stage in memory. ``save`` writes the stage atomically.
 
     Texture files are written as soon as a material needs them, to ``<stem>_textures/`` beside the
     stage, and are referenced by relative paths.
@@ -227,7 +227,7 @@ class StageWriter:
         return name
 
     def own_material(self, name: str, material: UsdShade.Material) -> str:
-        """Registers a material that was made by other means for ``bind``; returns the name."""
+        """Registers an existing material, so that ``bind`` finds it; returns the name."""
         self._materials[name] = material
         return name
 

@@ -110,7 +110,7 @@ _TILE_SEED = 77
 def _tile_layout(size: int) -> tuple[Image, Image, Image, Image]:
     """Returns joint mask, tone of each tile, fine grain and broad stains, each (size, size).
 
-    The two tile images share this layout, so it uses a fixed seed.
+    The seed is fixed, since the colour and roughness images of the tiles share the layout.
     """
     rng = np.random.default_rng(_TILE_SEED)
     x, y = grid(size)
@@ -262,7 +262,7 @@ def sky(width: int, height: int, seed: int) -> Image:
 
 
 def write_image(path: Path, image: Image, data_format: str) -> None:
-    """Writes an image, never partially.
+    """Writes an image atomically.
 
     Args:
         path: PNG or EXR file.

@@ -200,14 +200,14 @@ def dragon(triangles: int = 250_000) -> Mesh:
     """Makes the dragon.
 
     Args:
-        triangles: Number of triangles, from ``MIN_TRIANGLES`` to ``MAX_TRIANGLES``. The result is
-            within one percent.
+        triangles: Number of triangles, from ``MIN_TRIANGLES`` to ``MAX_TRIANGLES``. The mesh
+            deviates from this number by at most one percent.
 
     Returns:
         A mesh of closed, overlapping parts with outward faces, smooth normals and uv.
 
     Raises:
-        SceneError: The number is out of range.
+        SceneError: ``triangles`` is out of range.
     """
     if not MIN_TRIANGLES <= triangles <= MAX_TRIANGLES:
         raise SceneError(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-"""Any float64 array. The docstring of each function states the shape."""
+"""Any float64 array. The docstring of each function states the array's shape."""
 
 _CHUNK_FACES = 1 << 20
 

@@ -24,8 +24,8 @@ from wavecomb.scenes.models.mesh import (
 from wavecomb.scenes.models.ply import RawMesh, fans, read_ply
 
 TARGET_DIAGONAL = 3.05
-"""Diagonal of the built-in dragon's bounding box, in scene units. Imported meshes are scaled to
-this diagonal."""
+"""Diagonal of the built-in dragon's bounding box, in scene units. Imported meshes are scaled to the
+same diagonal."""
 
 _TEXTURE_LENGTH = 0.5
 _USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")

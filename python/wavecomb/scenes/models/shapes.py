@@ -137,7 +137,7 @@ def turned(profile: Sequence[Vector] | FloatArray, columns: int, steps: int = 4)
 
     Args:
         profile: Control points (radius, height) of a spline from axis to axis, upwards on the
-            outside. A point given twice is nearly a corner.
+            outside. Repeating a control point makes the curve almost sharp there.
         columns: Cells around.
         steps: Cells between two control points.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Closed tubes swept along a cubic B-spline, the parts of the dragon.
+"""Closed tubes swept along a cubic B-spline, of which the dragon is made.
 
 A tube has a centre line, an elliptic section that changes along it, an "up" direction that keeps
 the section from twisting, and an optional relief, a displacement along the section's radius.
@@ -160,7 +160,7 @@ class Extent:
         return self.length * self.perimeter * self.detail
 
     def grid(self, density: float) -> tuple[int, int]:
-        """Returns rings and columns for ``density`` triangles per unit of weight.
+        """Returns rings and columns for ``density`` triangles per unit of ``weight``.
 
         The tube has ``2 * rings * columns`` triangles.
         """

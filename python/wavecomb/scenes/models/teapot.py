@@ -161,8 +161,8 @@ def _tessellate(patches: FloatArray, turns: int, level: int, repeats: float) -> 
     """Tessellates a part in Newell's coordinates.
 
     Args:
-        patches: (k, 4, 4, 3), ``turns`` patches around for each step along.
-        turns: Number of patches around.
+        patches: Bezier patches (k, 4, 4, 3); each ``turns`` of them go once around the part.
+        turns: Number of patches around the part.
         level: Cells along each patch edge.
         repeats: Texture repeats around the part.
     """
@@ -193,7 +193,7 @@ def teapot(level: int = 16) -> Mesh:
         level: Cells along each patch edge, at least 1; yields about ``64 * level**2`` triangles.
 
     Returns:
-        The mesh with analytic normals, and uv whose unit is a sixth of the height around.
+        The mesh with analytic normals, and uv that repeats once per 6.28 teapot units.
     """
     if level < 1:
         raise SceneError(f"teapot level must be at least 1, not {level}")

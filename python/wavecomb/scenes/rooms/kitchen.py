@@ -39,7 +39,7 @@ _SHELF, _HIGH = 1.45, 2.25
 """Lower and upper edge of the wall cupboards."""
 _CUPBOARD = 0.34
 _WINDOW = (1.35, 2.55, 1.12, 2.12)
-"""Extent of the window: x from, x to, y from, y to."""
+"""Extent of the window: lowest and highest x, lowest and highest y."""
 _TILE, _GAP = 0.10, 0.003
 _OBJECTS = "/World/Objects"
 _TEAPOT_SCALE = 0.036
@@ -137,7 +137,7 @@ def _tiles(writer: StageWriter, rng: np.random.Generator) -> None:
 
 
 def _on(run: _Run, at: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Converts a position along a row's front, upwards and out of the wall to world space."""
+    """Converts a position from the local frame of a row of cupboards to world space."""
     turned = turn_about(1, run.turn) @ np.array(at)
     x, y, z = turned + np.array(run.place)
     return float(x), float(y), float(z)

@@ -159,7 +159,7 @@ def _bookcase(
     back, middle = 0.02, 1.14
 
     def at(along: float, height: float, out: float) -> tuple[float, float, float]:
-        """Converts a position along the bookcase's front, height and distance from the wall."""
+        """Returns the world position of a point, given relative to the bookcase."""
         return back + out, height, middle - along
 
     add_object(writer, f"{_OBJECTS}/Bookcase", shell.bookcase(), at(0.0, 0.0, 0.0), 90.0)

@@ -64,7 +64,7 @@ def _walls(writer: StageWriter) -> None:
 def _solid(
     writer: StageWriter, path: str, low: FloatArray, high: FloatArray, material: str
 ) -> None:
-    """Adds a box of flat polygons with texture coordinates in metres, boards along x on a floor."""
+    """Adds a box of flat polygons with texture coordinates in metres; v is along x on top."""
     points: list[FloatArray] = []
     uv: list[FloatArray] = []
     polygons: list[list[int]] = []

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Objects on the room's table, such as cups and glasses, and in the kitchen, such as pots.
 
-Each function returns parts that stand on y = 0 about the origin, except where it says otherwise.
+Each function returns parts that stand on y = 0 about the origin, unless its docstring says
+otherwise.
 """
 
 from __future__ import annotations
@@ -300,7 +301,7 @@ def faucet(columns: int) -> list[Part]:
 def pendant(columns: int, cord: float) -> list[Part]:
     """Makes an enamel lampshade that hangs from y = 0 on a cord.
 
-    The light of the pendant belongs 0.11 m below the end of the cord.
+    Callers should put the light of the pendant 0.11 m below the end of the cord.
     """
     shade = [
         (0, -0.005),

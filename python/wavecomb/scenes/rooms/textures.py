@@ -92,7 +92,7 @@ def planks_roughness(size: int, rng: np.random.Generator) -> Image:
 
 
 def walnut(size: int, rng: np.random.Generator) -> Image:
-    """Oiled walnut with a calm, nearly straight grain along v."""
+    """Oiled walnut with an even, nearly straight grain along v."""
     x, y = grid(size)
     warp = fractal(x, y, 5, 4, rng, 0.45, rows=1)
     ring = ((12.0 * x + 3.0 * warp) % 1.0).astype(np.float32)

@@ -40,7 +40,7 @@ ALL_ROUND = (-math.pi, math.pi, -0.5 * math.pi, 0.5 * math.pi)
 
 MAX_STOPS = 60.0
 MAX_EXPOSURE = 1e12
-"""Exposures beyond these limits are treated as mistakes and ignored."""
+"""Limits of exposures, in stops and as a factor; larger values are ignored as mistakes."""
 
 MAX_CLIP_PLANES = 16
 
@@ -100,7 +100,7 @@ class Lens:
 
 
 def find_camera(stage: Usd.Stage, wanted: str | None) -> Usd.Prim | None:
-    """Returns camera ``wanted``, else that of the render settings, else the stage's first camera.
+    """Returns the camera ``wanted``, that of the render settings, or the stage's first camera.
 
     Raises:
         WavecombError: ``wanted`` names no camera.
@@ -310,7 +310,7 @@ def _frame_half(lens: Lens, size: tuple[int, int]) -> tuple[float, float]:
 
 
 def frame_planes(up_axis: str, lens: Lens, size: tuple[int, int]) -> Matrix:
-    """Returns the directions (4, 3) whose extents ``frame_points`` needs for the same arguments."""
+    """Returns the directions (4, 3) in which ``frame_points`` needs the extent of the geometry."""
     flat = lens.projection == "orthographic"
     return planes(_frame_axes(up_axis), None if flat else _frame_half(lens, size))
 

@@ -26,13 +26,13 @@ _RUN = 256
 _SAMPLE = 4096
 
 _FEW_POINTS = 200
-"""Point sets up to this size are their own outline."""
+"""Largest number of points that are all kept as an outline."""
 
 MANY_POINTS = 1 << 16
-"""Larger point sets are reduced to their outline before more points are added."""
+"""Number of points above which a set is reduced to its outline before points are added."""
 
 _FEW_PLACES = 512
-"""Up to this number of instances, all are processed; of more, only the extreme instances."""
+"""Of more instances than this number, only the extreme ones are processed."""
 
 
 def _spread(count: int) -> Points:
@@ -48,7 +48,7 @@ DIRECTIONS = np.concatenate([np.eye(3), -np.eye(3), _spread(_DIRECTIONS - 6)])
 
 
 def with_directions(more: Points | None) -> Points:
-    """Returns ``DIRECTIONS`` followed by ``more`` (k, 3), in which the outline is exact."""
+    """Returns ``DIRECTIONS`` followed by further directions (k, 3) in which outlines are exact."""
     return DIRECTIONS if more is None else np.concatenate([DIRECTIONS, more])
 
 
@@ -96,8 +96,9 @@ def _farthest(
 def _near_the_outside(
     points: NDArray[np.float32], radii: NDArray[np.float32] | None, directions: NDArray[np.float32]
 ) -> NDArray[np.intp]:
-    """Returns indices of points without those runs whose bounds lie inside the outline of a sample.
+    """Returns indices of points that may be extreme.
 
+    Leaves out runs of consecutive points whose bounds lie inside the outline of a sample of points.
     Consecutive points of a mesh are mostly close to each other, so runs have small bounds.
     """
     step = max(1, len(points) // _SAMPLE)
@@ -181,8 +182,8 @@ def fit(
     """Computes the position from which a pinhole camera frames the points.
 
     A point (x, y, z) in camera axes is inside the image where |x - cx| <= half (cz - z), and the
-    same for y. This gives four planes; the tighter pair of opposite planes touches the points, and
-    the points are centred between both pairs.
+    same for y. The edges of the image are four planes; the tighter pair of opposite planes touches
+    the points, and the points are centred between both pairs.
 
     Args:
         points: (n, 3).

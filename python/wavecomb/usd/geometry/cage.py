@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Control cage of a subdivision surface, with its rules and its size in the image."""
+"""Control cage of a subdivision surface, its subdivision rules, and its size in pixels."""
 
 from __future__ import annotations
 
@@ -192,7 +192,7 @@ def crease_pairs(
 Matrices = NDArray[np.float64]
 
 NEAREST = 16
-"""Number of instances of a mesh that are measured edge by edge; the rest appear smaller."""
+"""Number of instances of a mesh, the largest in the image, whose edges are measured in pixels."""
 
 
 class ViewSize:
@@ -221,8 +221,9 @@ class ViewSize:
     def distances(self, points: NDArray[Any], to_world: Matrices) -> NDArray[np.float64]:
         """Returns the factors (n,) by which lengths at points (n, 3) of a prim appear reduced.
 
-        For a perspective camera this factor is the depth in front of it, or the distance behind it.
-        For a latlong camera the factor is the distance, and for an orthographic camera 1.
+        For a perspective camera, the factor is the depth of a point in front of the camera, or the
+        distance of a point behind the camera. For a latlong camera the factor is the distance, and
+        for an orthographic camera 1.
         """
         if self.projection == "orthographic":
             return np.ones(len(points))

@@ -56,7 +56,7 @@ class CurveArrays:
     Attributes:
         kind: linear-tube, cubic-tube, linear-ribbon or cubic-ribbon; sphere for points.
         positions: (n, 3) control points or points, or (s, n, 3) at s steps over the shutter.
-        segments: (m,) segment words of ``SceneBuilder.add_curves``; None for points.
+        segments: (m,) 32-bit words that ``SceneBuilder.add_curves`` takes; None for points.
         radii: (n,) radii of control points or points.
         normals: (n, 3) or (s, n, 3) normals of ribbons; None for tubes and points.
         uvs: (m, 2, 2) at both ends of segments, or (n, 2) for points; None if not needed.

@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from wavecomb import _core
 
 MIN_BYTES = 20
-"""Least memory per mesh point in bytes: half a triangle of 12 bytes plus about 32 bytes in the
+"""Least memory per mesh point in bytes, rounded down.
 
-acceleration structure.
+Half a triangle per point, with 12 bytes of indices and about 32 bytes of acceleration structure.
 """
 
 _SHARE = 8

@@ -342,7 +342,7 @@ class MeshReader:
     ) -> Primvar | None:
         """Returns the primvar for texture coordinates.
 
-        If the materials name primvars and the mesh has no coordinates at all, they are (0, 0).
+        All texture coordinates are (0, 0) if materials name primvars but the mesh has none.
         """
         try:
             primvar = first_primvar(prim, names, inherited, self.time)

@@ -216,8 +216,8 @@ def remove_invalid_points(
         holes: Indices of faces that are not drawn.
 
     Returns:
-        Returns points with invalid ones replaced, the faces that are drawn, and a message about
-        faces left out, which is "" if no face uses an invalid point.
+        Points with replacements for the invalid ones, indices of all faces that are not drawn, and
+        a message, which is "" if no face uses an invalid point.
 
     Raises:
         MeshError: No face remains, or counts and indices are inconsistent.
@@ -255,7 +255,7 @@ def faces_with(bad: Mask, counts: Ints, indices: Ints) -> Ints:
 def fill_invalid(points: Array, bad: Mask, counts: Ints, indices: Ints) -> Array:
     """Replaces each invalid point by the mean of the valid points of its faces.
 
-    This mean distorts adjacent faces least when they are subdivided.
+    The mean distorts adjacent faces least when they are subdivided.
     """
     out = points.copy()
     good = np.flatnonzero(~bad)

@@ -43,7 +43,7 @@ class NurbsStrands(Strands):
     """Curves whose Bezier points are linear combinations of their control points.
 
     Attributes:
-        pieces: Conversion of each curve.
+        pieces: Bezier conversion of each curve.
     """
 
     pieces: tuple[_BezierConversion, ...] = ()
@@ -76,7 +76,7 @@ class HermiteStrands(Strands):
     tangents: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     def fit(self, primvar: Primvar, width: int) -> tuple[NDArray[Any], str]:
-        """Returns primvar values that fit these curves; vertex primvars are treated as varying."""
+        """Returns primvar values that fit the curves; vertex primvars are treated as varying."""
         values, kind = super().fit(primvar, width)
         return values, "varying" if kind == "vertex" else kind
 
@@ -215,7 +215,7 @@ def _bezier_conversion(spline: Spline, weights: Floats | None) -> _BezierConvers
 Floats = NDArray[np.float64]
 
 MAX_ORDER = 32
-"""Orders above this limit are treated as mistakes."""
+"""Largest order of a NURBS curve; higher orders are treated as mistakes."""
 
 
 @dataclass(frozen=True)
@@ -227,7 +227,7 @@ class Spline:
         order: Degree + 1.
         count: Number of control points.
         spans: (k,) index of the first knot of each non-empty span.
-        ends: (k, 2) parameters at which each span begins and ends, clipped to the range.
+        ends: (k, 2) parameters at which each span begins and ends, clipped to the curve's range.
     """
 
     knots: Floats

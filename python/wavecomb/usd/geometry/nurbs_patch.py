@@ -100,7 +100,7 @@ class PatchReader:
             prim: A UsdGeomNurbsPatch.
             matrix: Transform from the patch to its group.
             uv_names: Primvars for texture coordinates; without one, u and v run from 0 to 1.
-            inherited: Constant primvars of its ancestors.
+            inherited: Constant primvars of the patch's ancestors.
             motion: The shutter over which points are read; None reads them at the frame.
 
         Raises:
@@ -185,7 +185,7 @@ class PatchReader:
         names: Sequence[str],
         inherited: Sequence[Any],
     ) -> Array:
-        """Returns UVs (n, 2) from a primvar of the control points, else the parameters."""
+        """Returns UVs (n, 2) from a primvar of the control points, else surface parameters."""
         u, v = axes
         try:
             primvar = first_primvar(prim, names, inherited, self.time)
@@ -233,7 +233,10 @@ def _blend(axes: tuple[_Axis, _Axis], values: Floats) -> tuple[Floats, Floats, F
 
 
 def spline_sum(axis: _Axis, part: int, grid: Floats) -> Floats:
-    """Sums a grid over its first index, weighted by basis functions (0) or derivatives (1)."""
+    """Sums a grid over its first index, weighted by basis functions or their derivatives.
+
+    ``part`` is 0 for the basis functions and 1 for their derivatives.
+    """
     shares, columns = axis.spline.weights(axis.span, axis.at)[part], axis.spline.columns(axis.span)
     out = np.zeros((len(axis.at), *grid.shape[1:]))
     for k in range(axis.spline.order):

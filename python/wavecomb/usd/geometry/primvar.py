@@ -188,7 +188,7 @@ def spread(primvar: Primvar, topology: Topology, width: int) -> tuple[NDArray[np
 
     Args:
         primvar: The primvar.
-        topology: Topology of its mesh.
+        topology: Topology of the primvar's mesh.
         width: Number of components c; additional ones are cut.
 
     Raises:

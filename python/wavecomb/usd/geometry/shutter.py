@@ -123,8 +123,8 @@ class Motion:
 
         Args:
             prim: An Xformable prim.
-            parent: Animated transform of its parent; None if the parent is static or if the prim
-                resets the transform stack.
+            parent: Animated transform of the prim's parent; None if the parent is static or if the
+                prim resets the transform stack.
             above: Transform of a static parent.
         """
         if parent is None and not UsdGeom.Xformable(prim).TransformMightBeTimeVarying():

@@ -126,7 +126,7 @@ class SplatReader:
     def _fitting(
         self, prim: Usd.Prim, name: str, otherwise: tuple[float, ...], count: int
     ) -> NDArray[Any]:
-        """Returns (count, width) values.
+        """Returns the values of an attribute, (count, width).
 
         As UsdVol requires, cuts longer arrays and ignores shorter ones.
         """

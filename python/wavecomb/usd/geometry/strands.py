@@ -41,7 +41,7 @@ _AT_ONCE = 1 << 16
 
 
 def runs(counts: Index) -> tuple[Index, Index]:
-    """Returns the run of each element and its position in the run, for runs of given lengths."""
+    """Returns the run index of each element and its position in the run, from the runs' lengths."""
     owner = np.repeat(np.arange(len(counts)), counts)
     starts = np.cumsum(counts) - counts
     return owner, np.arange(len(owner)) - starts[owner]
@@ -141,7 +141,7 @@ class Strands:
         return words
 
     def controls(self, values: NDArray[Any], kind: str) -> Array:
-        """Returns float32 values at every control point from values (n, c) of an interpolation.
+        """Interpolates values (n, c) of a primvar to every control point; returns float32.
 
         Args:
             values: Authored values of the whole prim, ``sizes[kind]`` of them.
@@ -184,7 +184,7 @@ class Strands:
     def ends(
         self, values: NDArray[Any], kind: str
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Returns values (n, c) of an interpolation at the first and last point of each segment."""
+        """Interpolates values (n, c) of a primvar to the first and last point of each segment."""
         values = np.asarray(values, np.float64)
         curve, at = runs(self.segments)
         if kind == "constant":

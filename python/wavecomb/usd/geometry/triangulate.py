@@ -17,7 +17,7 @@ _CHUNK = 1 << 17
 _EAR_STEPS = 1 << 26
 """Limit of ear clipping steps for one polygon, about one second of work.
 
-The worst known polygon of 100,000 corners takes two thirds of this limit.
+The worst known polygon of 100,000 corners takes two thirds of the limit.
 """
 
 

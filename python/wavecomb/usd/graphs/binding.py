@@ -90,7 +90,7 @@ def bound(
 
 
 def with_uv_sets(surface: Surface, sets: Mapping[str, str], own: str) -> Surface:
-    """Returns the surface for a mesh whose own texture coordinates are not the set that it reads.
+    """Returns the surface for a mesh whose default texture coordinates the surface does not read.
 
     Args:
         surface: Result of ``bound`` if its graph reads primvars.
@@ -118,7 +118,7 @@ def with_uv_sets(surface: Surface, sets: Mapping[str, str], own: str) -> Surface
 
 
 def _texel(make: Expressions, use: Mapping[str, Any], uv: Value, width: int) -> Value:
-    """Returns the value of a texture use at different texture coordinates."""
+    """Returns the value that a texture has for a parameter at other texture coordinates."""
     m = use["uv"]
     at = tuple(
         make.op("add", make.op("dot", uv, numbers(*row[:2])), numbers(row[2]))[0]

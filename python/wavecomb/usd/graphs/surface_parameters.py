@@ -226,7 +226,7 @@ class Drivers:
         return None
 
     def surface(self, program: str, parameters: dict[str, Any]) -> Surface:
-        """Returns the surface of the material with these constants."""
+        """Returns the surface of the material with the given constants."""
         return Surface(
             str(self.networks.material.GetPath()),
             program,
@@ -281,7 +281,7 @@ def _as_it_is(_node: Node, _operands: tuple[Value, ...]) -> Value | None:
 
 
 def kind_of(parameter: str) -> str:
-    """Returns the kind of use of a parameter's values."""
+    """Returns ``BASE``, ``COLOUR``, ``NUMBER`` or ``NORMAL`` for a surface parameter."""
     if parameter == "base_color":
         return BASE
     if parameter == "normal":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Creates, folds and compiles values of graphs to the flat programs of the core.
+"""Creates values of shader graphs, folds constants, and compiles values to programs of the core.
 
 A value is a tuple of parts, one per component. A part is a number or a component of a node, so that
 swizzles, extractions and combinations need no operation.
@@ -120,7 +120,7 @@ _OP = np.dtype(
 class Graph:
     """A compiled program in the form that ``SceneBuilder.add_graph`` takes.
 
-    ``attributes`` are names of primvars that it reads, with their numbers of components.
+    ``attributes`` are names of primvars that the program reads, with numbers of components.
     """
 
     ops: bytes
@@ -151,7 +151,7 @@ class Graph:
 
 
 def assemble(outputs: dict[int, Part]) -> Graph:
-    """Compiles parts, by component number, to a program.
+    """Compiles parts to a program; ``outputs`` maps component numbers to parts.
 
     Raises:
         GraphTooLarge: The program needs more registers or operations than available.
@@ -313,7 +313,7 @@ class Expressions:
     def attribute(self, name: str, width: int, fallback: Value) -> Value:
         """Returns a primvar that is read at hits.
 
-        Its value is ``fallback`` on a mesh without such a primvar or with fewer components.
+        The value is ``fallback`` on meshes whose primvar is missing or has fewer components.
         """
         return self._all(self._node("attribute", width, (fit(fallback, width),), 0, None, name))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Groups of the scene during construction, their bindings from outside, and their emitters."""
+"""Groups of the scene during construction, material bindings of their instances, and emitters."""
 
 from __future__ import annotations
 

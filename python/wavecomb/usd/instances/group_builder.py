@@ -276,7 +276,7 @@ class GroupBuilder:
         purpose: str,
         predicate: Any = None,
     ) -> Group | None:
-        """Returns the group of some prims, which is built only once.
+        """Returns the group that contains the given prims; builds each group only once.
 
         Warns and returns None if the group contains itself.
         """

@@ -63,7 +63,10 @@ class InstanceMaterials:
         self.materials = materials
 
     def of_proxies(self, instance: Usd.Prim) -> tuple[str, ...]:
-        """Returns material paths of all prims below an instance; equal ones may share a group."""
+        """Returns material paths of all prims below an instance.
+
+        Instances of a prototype with equal material paths may share a group.
+        """
         prims = [
             prim
             for prim in Usd.PrimRange(instance, Usd.TraverseInstanceProxies())
@@ -135,7 +138,7 @@ class InstanceBinding:
     """Material and primvars that instances pass to their prototype.
 
     Attributes:
-        key: Equal for equal appearance; None if the instance passes nothing.
+        key: Key that is equal for equal appearance; None if the instance passes nothing.
         inherited: Constant primvars of the instance.
         material: Material for prims without a binding, which reads primvars of the meshes.
     """
@@ -194,7 +197,7 @@ class InstanceBindings:
         Args:
             instance: The point instancer.
             root: The prototype.
-            chosen: (k,) indices of its instances in the authored arrays.
+            chosen: (k,) indices of instances in the authored arrays.
             count: Number of authored instances.
             predicate: Predicate of prims in prototypes.
         """

@@ -109,7 +109,7 @@ def report_grid_memory(
 def report_ignored_volumes(
     volumes: tuple[VolumeFacts, ...], materials: list[str], report: LoadReport
 ) -> None:
-    """Reports that light scattered inside these materials does not interact with volumes there."""
+    """Reports that volumes inside given materials do not affect light scattered in them."""
     for name in materials if volumes else ():
         what = "volumes inside refracting, scattering materials: light scattered there ignores them"
         report.note(what, name)

@@ -33,8 +33,8 @@ _IDLE = 0.1
 def abort_on_fifo() -> Iterator[None]:
     """Aborts a block that opens layers if USD waits for a FIFO.
 
-    While the process is idle, a thread checks the files that loaded layers name. An expendable
-    process is ended with a message of one line. In other processes the thread opens the FIFO for
+    While the process is idle, a thread checks the files that loaded layers name. A process that is
+    expendable ends with a one-line message. In other processes the thread opens the FIFO for
     writing and closes it, so that USD reads an empty layer; the block then raises.
 
     Raises:
@@ -276,7 +276,7 @@ def open_editable(
     """Opens a stage that can be inspected and edited while another copy of it is loaded.
 
     Opens the stage like ``open_stage``, but also resolves MaterialX files in unselected variants.
-    Selecting these variants later then changes no layer while another thread reads it.
+    Selecting other variants later thus changes no layer while another thread reads it.
 
     Args:
         file: .usd, .usda, .usdc or .usdz.
@@ -342,8 +342,8 @@ def select_variants(stage: Usd.Stage, variants: Mapping[str, str]) -> None:
 
 
 _changed: dict[str, Sdf.Layer] = {}
-"""Layers that this process has changed, by identifier. They are never released, since USD would
-read them again."""
+"""Layers that this process has changed, by identifier. Changed layers are never released, since USD
+would read them again."""
 
 
 def change_layers(layers: Iterable[Sdf.Layer]) -> None:

@@ -24,7 +24,7 @@ _PROXIES = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
 
 
 def populate(stage: Usd.Stage, paths: Sequence[str]) -> None:
-    """Restricts a stage to the prims at and below some paths, their ancestors, and what they need.
+    """Restricts a stage to prims at and below given paths, their ancestors, and prims they need.
 
     Prims need their materials, prototypes of point instancers and sources of shader connections.
     All cameras, lights and render settings are kept, except those inside instances that are left
@@ -94,7 +94,7 @@ def _always(stage: Usd.Stage) -> Iterator[Sdf.Path]:
 
 
 def _needed(prims: Iterable[Usd.Prim]) -> Iterator[Sdf.Path]:
-    """Yields prims that some prims, their descendants and their ancestors refer to."""
+    """Yields prims to which given prims, their descendants or their ancestors refer."""
     for top in prims:
         if not top:
             continue
@@ -120,7 +120,7 @@ def _targets(prim: Usd.Prim) -> Iterator[Sdf.Path]:
 
 
 NONE = "none"
-"""Value in place of patterns that loads no payload."""
+"""Option value that loads no payloads, used in place of patterns."""
 
 
 def load_payloads(stage: Usd.Stage, wanted: Sequence[str]) -> None:

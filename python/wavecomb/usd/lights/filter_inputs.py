@@ -55,12 +55,12 @@ class FilterInputs:
         return default if value is None else number(value, default)
 
     def word(self, name: str, default: str, *others: str) -> str:
-        """Returns a token or string."""
+        """Returns the value of an input that is a token or string."""
         value = self.value(name, *others)
         return default if value is None else word(value, default)
 
     def colour(self, name: str, default: Colour, report: LoadReport) -> Colour:
-        """Returns a finite colour in linear Rec.709."""
+        """Returns the value of a colour input, finite and in linear Rec.709."""
         value = self.value(name)
         if value is None:
             return default
@@ -120,7 +120,7 @@ class Gel:
         return (r, g, b)
 
     def multiplied(self, options: Mapping[str, Any]) -> dict[str, float]:
-        """Returns the changed multipliers of a light with these options."""
+        """Returns the light's diffuse and specular multipliers that the gel changes."""
         return {
             name: factor * float(options.get(name, 1.0))
             for name, factor in (("diffuse", self.diffuse), ("specular", self.specular))

@@ -70,7 +70,7 @@ class Filter:
 def add_filters(
     builder: _core.SceneBuilder, filters: Sequence[Filter], transform: NDArray[np.float64]
 ) -> int | None:
-    """Adds the filters of a light with this transform; returns their combined id."""
+    """Adds the filters of a light with the given transform; returns their combined id."""
     known: int | None = None
     for one in filters:
         known = builder.add_light_filter(
@@ -211,10 +211,7 @@ class FilterReader:
         return Filter(np.eye(4), decay=(decay[0], decay[1], decay[2], decay[3]))
 
     def _flaps(self, inputs: FilterInputs, light: Usd.Prim, before: str = "") -> Filter:
-        """Reads Karma barn doors: 0 is open and 1 covers the whole cone.
-
-        The softness of door edges uses the same scale.
-        """
+        """Reads Karma barn doors, whose positions and edge softness range from 0 (open) to 1."""
         if inputs.value("invert", "invertblockers", "invert_blockers"):
             self._report.missing("inverted light doors (not inverted)", inputs.prim.GetPath())
         away, size = self._cone(inputs, light)
@@ -253,7 +250,7 @@ class FilterReader:
     # ---- inputs ----------------------------------------------------------------------------
 
     def _cone(self, inputs: FilterInputs, light: Usd.Prim) -> tuple[float, float]:
-        """Returns a distance that is large for the light, and half the width of its cone there."""
+        """Returns a distance much larger than the light, and the cone's radius there."""
         angle = number(light.GetAttribute("inputs:shaping:cone:angle").Get(self._time), 90.0)
         if not angle < 89.0:
             self._report.missing(
@@ -306,11 +303,11 @@ def _before(prim: Usd.Prim, light: Usd.Prim, time: Usd.TimeCode) -> NDArray[np.f
 
 
 def _scaled(line: Line, edge: float, size: float) -> Line:
-    """Scales a line so that it rises from 0 to 1 within ``edge``; 0 gives a hard edge."""
+    """Scales a linear function to rise from 0 to 1 within ``edge``; 0 gives a hard edge."""
     k = 1.0 / edge if edge > size / _SHARP else _SHARP / size
     return (line[0] * k, line[1] * k, line[2] * k)
 
 
 def _side(x: float, y: float, room: float, edge: float, size: float) -> Line:
-    """Returns the line of the side in direction -(x, y), at distance ``room`` from the centre."""
+    """Returns the linear function of a window side at distance ``room`` in direction -(x, y)."""
     return _scaled((x, y, room), edge, max(size, 1e-6))

@@ -99,7 +99,7 @@ class LightReader:
         profiles: Profiles | None = None,
         links: LinkTable | None = None,
     ) -> None:
-        """Creates a reader; None for ``textures``, ``profiles`` or ``links`` skips that kind."""
+        """Creates a reader that ignores each of textures, profiles and links that is None."""
         self.time, self.report = context.time, context.report
         self.hidden = context.hides_lights
         self.textures = textures

@@ -37,7 +37,7 @@ class MeshLight:
 
 
 class MeshLights:
-    """The mesh lights of one stage, which it adds to the scene.
+    """Factory of the mesh lights of one stage, which adds them to the scene.
 
     Attributes:
         any: Whether there is a mesh light.
@@ -81,7 +81,7 @@ class MeshLights:
         self._report.missing(what, path)
 
     def _light_material(self, hidden: bool) -> int:
-        """Returns the material of meshes without response: radiance 1, tinted in the core."""
+        """Returns a material that emits radiance 1, which the core scales for each light."""
         parameters = {"emission": (1.0, 1.0, 1.0)}
         if not hidden:
             return self._materials.add(Surface("mesh light", "emissive", parameters))

@@ -16,7 +16,7 @@ _DISPLAYED = ("primvars:displayColor", "primvars:displayOpacity")
 
 @dataclass(slots=True)
 class Parent:
-    """A prim with its children's common properties.
+    """Parent prim of gprims, with properties that its children share.
 
     Attributes:
         prim: The parent prim.

@@ -327,7 +327,7 @@ class MaterialTable:
         return number
 
     def splats(self) -> int:
-        """Returns the material id of Gaussian splats, which carry their own radiance."""
+        """Returns the material id of Gaussian splats, whose radiance is stored per splat."""
         return self.add(SPLATS)
 
     def _convert(self, material: UsdShade.Material) -> Surface:

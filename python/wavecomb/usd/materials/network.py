@@ -81,7 +81,7 @@ def value_of(shader: UsdShade.Shader, name: str, time: Usd.TimeCode, default: An
 
 
 def layer_of_value(attribute: Usd.Attribute | None) -> Sdf.Layer | None:
-    """Returns the layer of the strongest opinion with a value; relative paths are anchored there.
+    """Returns the layer of the strongest opinion with a value, which anchors relative paths.
 
     Stronger opinions may hold only metadata or a connection.
     """
@@ -292,7 +292,7 @@ class InputValues:
 def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
     """Returns the resolved file of an asset value, or the authored path if it does not resolve.
 
-    For a UDIM texture this is the pattern that contains ``<UDIM>``.
+    For a UDIM texture, the result is the pattern that contains ``<UDIM>``.
     """
     if not isinstance(value, Sdf.AssetPath):
         return _file_of_text(str(value or ""), attribute)
@@ -313,7 +313,7 @@ def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
 
 
 def _file_of_text(name: str, attribute: Usd.Attribute | None) -> str:
-    """Returns the file that a string names.
+    """Returns the path of the file that a string names.
 
     Relative names are anchored at the layer that holds the string.
     """
@@ -329,7 +329,7 @@ def tile_files(pattern: str) -> list[tuple[int, str]]:
 
 
 def image_files(material: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
-    """Yields files that shaders in a material name, as a guess at the images that it needs."""
+    """Yields files that shaders in a material name; the material probably needs these images."""
     for prim in _each_once(material):
         for attribute in prim.GetAuthoredAttributes():
             if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset:

@@ -64,7 +64,7 @@ class Parameter:
         type_name: Type of the attribute.
         driven_by: Driver of the value, such as "texture marble.png" or "primvar displayColor"; ""
             for a constant.
-        reason: Why no attribute can be authored; "" if one can be.
+        reason: Reason why no attribute can be authored, or "" if it can.
         definition: MaterialX definition of the input; None for UsdPreviewSurface.
     """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Decodes image files to arrays, ahead of need on separate threads."""
+"""Decodes image files to arrays; separate threads decode images before they are needed."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Image:
     def automatic_srgb(self) -> bool:
         """Whether ``sourceColorSpace = auto`` means sRGB.
 
-        Uses the file's declaration; without one, 8-bit images with 3 or 4 channels are sRGB.
+        If the file declares no encoding, 8-bit images with 3 or 4 channels are sRGB.
         """
         if self.encoded is not None:
             return self.encoded
@@ -316,7 +316,7 @@ class ReadAhead:
     """
 
     def __init__(self, threads: int = 0, limit_bytes: int | None = None) -> None:
-        """``threads`` read images; 0 means one per core, and 1 disables reading ahead.
+        """``threads`` is the number of reader threads: 0 means one per core, 1 never reads ahead.
 
         ``limit_bytes`` limits the pixels that are ready or being read; None means no limit.
         """
@@ -329,7 +329,7 @@ class ReadAhead:
         self._ready: dict[str, Future[Image]] = {}
 
     def want(self, paths: Iterable[str]) -> None:
-        """Queues images that will be needed, most likely in this order."""
+        """Queues images that will be needed, most likely in the given order."""
         if self._threads == 1:
             return
         for path in paths:

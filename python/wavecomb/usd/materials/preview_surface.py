@@ -188,7 +188,7 @@ class PreviewReader:
         return texture if texture is not None else (float(value or 0.0) or None)
 
     def _input(self, parameter: str, source: Source, default: Any) -> Any:
-        """Returns a constant for a parameter; None if its default or a texture is used.
+        """Returns a constant for a parameter; None if the parameter has a texture or its default.
 
         Adds textures to ``textured`` and primvars to ``primvars``.
         """

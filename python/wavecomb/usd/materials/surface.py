@@ -108,7 +108,7 @@ DEFAULTS: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Surface:
-    """A program with its parameters.
+    """A shading program with its parameters.
 
     Attributes:
             name: Name for messages.

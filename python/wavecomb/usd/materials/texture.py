@@ -69,7 +69,7 @@ class TiledImage:
 
 
 def _converts(space: str) -> bool:
-    """Returns whether pixels in this space must be converted before they are stored."""
+    """Returns whether pixels in a colour space must be converted before they are stored."""
     return space not in (RAW, CURVE)
 
 
@@ -108,7 +108,7 @@ def texture_store(
     Returns the store of ``reuse`` if its limit is equal, so that shared textures count as well.
 
     Raises:
-        WavecombError: The store cannot be created with this limit.
+        WavecombError: A texture store with the given limit cannot be created.
     """
     from wavecomb import _core
 
@@ -140,7 +140,8 @@ class TextureTable:
 
         ``store`` is the texture store of the builder. ``drops`` may be set to the number of finest
         mip levels that each texture leaves out, and ``origin`` to the world position of the scene's
-        origin, for graphs. The table does not keep the context's stage, since it may outlive it.
+        origin, for graphs. The table does not keep the context's stage, since the table may outlive
+        the stage.
         """
         self.store = store
         self.working = context.options.working_space
@@ -165,7 +166,7 @@ class TextureTable:
         self._ahead.want(file for file in files if self._known(file) is None)
 
     def _known(self, path: str) -> Image | None:
-        """Returns the image that the previous scene made of this file, unless the file changed."""
+        """Returns the image that the previous scene made of a file, unless the file changed."""
         if self._reuse is None:
             return None
         if path not in self._unchanged:

@@ -3,7 +3,7 @@
 
 Before loading, reads the headers of all image files and computes the memory of their textures.
 While the sum exceeds the limit, removes the finest level of the texture with the most texels per
-image pixel. So a render never waits for a file, and the same stage, view and limit give the same
+image pixel. Renders thus never wait for files, and the same stage, view and limit give the same
 image.
 """
 
@@ -55,8 +55,8 @@ class _Entry:
     """A texture that would be created.
 
     Attributes:
-        wanted: Texels across that the image can resolve; None if unknown, which keeps all mip
-            levels.
+        wanted: Largest texture width in texels that the image can resolve; None if unknown, which
+            keeps all mip levels.
         drop: Number of finest mip levels that are not loaded.
     """
 

@@ -20,7 +20,7 @@ A short document may nest graphs into billions of nodes.
 """
 
 _SMALL = 32
-"""Node graphs with at most this many nodes are never instanced."""
+"""Largest number of nodes of node graphs that are never instanced."""
 
 
 def definition(node: Any) -> Any:
@@ -30,7 +30,7 @@ def definition(node: Any) -> Any:
 
 
 def implementation(document: Document, nodedef: Any) -> Any:
-    """Returns the node graph of a definition that the document itself makes, else None."""
+    """Returns the node graph that implements a definition of the document, or None."""
     import MaterialX as mx
 
     if nodedef is None or nodedef.getName() not in document.definitions:

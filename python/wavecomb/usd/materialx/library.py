@@ -111,7 +111,7 @@ class FlatGraph:
 
 @functools.cache
 def definition_of(identifier: str) -> Definition | None:
-    """Returns the definition with this name; None if the library has none."""
+    """Returns the definition with a given name; None if the library has none."""
     with _reading:
         nodedef = library().getNodeDef(identifier)
         if nodedef is None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writes MaterialX materials and looks as prims, with their shaders and material assignments.
 
-Geometry paths are written below ``/MaterialX/Collections``; a reference to a look in place of a
-model maps them to paths below that model. Each look is a variant of ``LookVariant`` on
+Geometry paths are written below ``/MaterialX/Collections``. If a model references a look, USD maps
+these paths to paths below the model. Each look is a variant of ``LookVariant`` on
 ``/ModelRoot``.
 """
 

@@ -69,12 +69,12 @@ def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
     """Makes a stage use the MaterialX files that its layers name.
 
     Changes the layers in memory, which then can no longer be saved. Unreadable files stay missing;
-    ``report_problems`` reports them. The call is fast if no such file is missing.
+    ``report_problems`` reports them. The call is fast if no MaterialX file is missing.
 
     Args:
         stage: The stage.
         everywhere: Whether to include unselected variants, which takes a pass over all layers.
-            Selecting these variants later, on any thread, then changes no layer.
+            Selecting other variants later, on any thread, then changes no layer.
     """
     tried: set[tuple[str, str]] = set()
     for turn in range(MAX_ROUNDS):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads render settings of a stage and maps its render vars to AOVs.
 
-A var is recognised by the name that some renderer uses, or by its light path expression.
+A render var is recognised by the name that a renderer uses for it, or by its light path expression.
 """
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ def find_products(
 def read_product_settings(
     stage: Usd.Stage, wanted: str | None, product: str | None, report: LoadReport
 ) -> list[ProductSettings]:
-    """Returns one choice per product to render, at least one.
+    """Returns the settings of each product to render; default settings if there are none.
 
     Args:
         stage: The stage.
@@ -251,7 +251,7 @@ def _is_switch(value: Any) -> bool:
 
 
 def _camera(stage: Usd.Stage, prims: Sequence[Usd.Prim], report: LoadReport) -> str | None:
-    """Returns the first camera that the prims name."""
+    """Returns the first camera that render settings or products name."""
     for prim in prims:
         for path in UsdRender.SettingsBase(prim).GetCameraRel().GetForwardedTargets():
             camera = stage.GetPrimAtPath(path)
@@ -344,7 +344,7 @@ def aov_of(prim: UsdRender.Var) -> str | None:
 def _of_expression(text: str, name: str) -> str | None:
     """Returns the AOV of a light path expression; None if it is invalid.
 
-    An expression without a built-in AOV is named after its var.
+    The AOV of any other expression has the name of its render var.
 
     >>> [_of_expression(text, "a") for text in ("C.*", "C<..>[<L.>O]", "C.*<L.'key'>", "C<RD>L")]
     ['beauty', 'direct', 'light_key', 'lpe:a=C<RD>L']

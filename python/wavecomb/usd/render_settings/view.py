@@ -89,7 +89,7 @@ def peek_products(
     product: str | None = None,
     session_layer: str | Path | None = None,
 ) -> tuple[list[ProductSettings], Usd.Stage]:
-    """Reads the render settings of a stage; returns one choice per product, at least one.
+    """Reads a stage's render settings for each product; default settings if there are none.
 
     Composes nothing else and reports nothing, since loading the stage repeats all messages. Keeping
     the returned stage alive until the stage is loaded avoids reading its layers twice.

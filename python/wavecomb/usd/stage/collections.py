@@ -182,7 +182,7 @@ def light_group(prim: Usd.Prim, inherited: Sequence[Any] | None = None) -> str:
 
 
 class LightGroups:
-    """Light groups of a stage, with names that are valid in channels and a limited number."""
+    """Light groups of a stage: a limited number, with names that are valid in channel names."""
 
     def __init__(self, report: LoadReport) -> None:
         self._report = report

@@ -26,7 +26,7 @@ NEAR = 2.0**14
 """Largest coordinate whose spacing of float32 numbers is at most 1/1024 unit."""
 
 CELL = 2.0**12
-"""Scene origins are multiples of this length, so that most frames of a moving camera share one."""
+"""Grid spacing of scene origins, so that most frames of a moving camera share an origin."""
 
 MANY = 4096
 """Maximum number of prims that determine the centre of a stage without a camera."""
@@ -184,8 +184,8 @@ class LoadContext:
         origin: World position that becomes the origin of the scene.
         purposes: Purposes of the geometry that is rendered.
         binding_purposes: Purposes of material bindings in order of preference.
-        framed: Directions (k, 3) in which the extent of the world is needed to frame it; None if a
-            camera prim defines the view.
+        framed: Directions (k, 3) in which the default camera needs the extent of the world; None if
+            a camera prim defines the view.
     """
 
     stage: Usd.Stage

@@ -79,7 +79,7 @@ def load_stage(
             changed only if ``variants`` are given, and must not change during the call.
         options: Options of the load. Mask, payloads and session layer require a file.
         editable: Whether to keep equal materials separate and to keep ``textures``, for programs
-            that edit the scene. This option does not change the image.
+            that edit the scene. ``editable`` does not change the image.
         reuse: ``textures`` of an earlier load; textures of unchanged files are shared.
         cache: Cache of an open stage that was read at another frame; unchanged data is shared. The
             cache does not change the image.

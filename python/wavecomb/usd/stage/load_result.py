@@ -86,7 +86,7 @@ class LoadedStage:
 
     @contextlib.contextmanager
     def renderer(self, threads: int = 0) -> Iterator[tuple[_core.Renderer, bool]]:
-        """Yields a renderer of the scene for exclusive use, and whether it was built now.
+        """Yields a renderer of the scene for exclusive use, and whether it was newly built.
 
         The most recently returned renderer is kept with its acceleration structures and light
         statistics, for the next render. `threads` is the number of threads for building a renderer.

@@ -47,7 +47,7 @@ NAMES = frozenset({*_FLAGS, *_ARNOLD_BOUNCES, _KARMA, _CATCHER})
 
 
 class RayVisibility:
-    """The ray visibility of prims, which it passes to the scene.
+    """Reader of the ray visibility of prims, which passes the visibility to the scene.
 
     Attributes:
         catchers: Paths of prims that are shadow catchers.

@@ -257,7 +257,7 @@ def capture_diagnostics(report: LoadReport) -> Iterator[None]:
 def _hooked(report: LoadReport) -> Iterator[None]:
     """Adds exceptions to the report that USD's C++ code catches from Python and prints.
 
-    Such errors are caused by values of types that Python does not know.
+    Values of types that Python does not know cause such exceptions.
     """
     before = sys.excepthook
 

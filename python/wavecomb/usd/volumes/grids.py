@@ -110,7 +110,7 @@ class GridTable:
         self._known: dict[tuple[Any, ...], Grid | None] = {}
 
     def find(self, fields: Mapping[str, Field], name: str) -> Field | None:
-        """Returns the field with this name, or one whose grid has this name."""
+        """Returns the field with a given name, or else a field whose grid has the name."""
         if name in fields:
             return fields[name]
         for field in fields.values():
@@ -319,8 +319,8 @@ _FIRST, _LAST, _COUNT = 1000.0, 15000.0, 512
 def radiance(kelvin: NDArray[Any]) -> NDArray[np.float32]:
     """Returns black-body radiance in linear Rec.709 (..., 3), with luminance sigma T^4 / pi in MW.
 
-    This is the unit of Cycles: 1 at 2729 K and 11.3 at 5000 K. Below 1000 K the chromaticity of
-    1000 K is used.
+    The unit is that of Cycles: the luminance is 1 at 2729 K and 11.3 at 5000 K. Below 1000 K the
+    chromaticity of 1000 K is used.
     """
     hot = np.clip(np.asarray(kelvin, np.float64), 0.0, _HOTTEST)
     strength = (STEFAN_BOLTZMANN * 1e-6 / np.pi) * hot**4

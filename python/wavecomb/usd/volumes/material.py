@@ -25,7 +25,7 @@ from wavecomb.usd.volumes.shaders import (
 )
 
 _CONTEXTS = ("mtlx", "", "arnold")
-"""Render contexts whose volume outputs are tried, in this order."""
+"""Render contexts whose volume outputs are read, in order of preference."""
 
 
 def volume_shader(material: UsdShade.Material) -> UsdShade.Shader | None:

@@ -27,11 +27,11 @@ class FieldColour:
 
     @property
     def is_black(self) -> bool:
-        """Whether the colour is 0, so that the field does not matter."""
+        """Whether the colour is 0, so that the field has no effect."""
         return not any(self.colour)
 
     def scaled(self, by: Colour) -> FieldColour:
-        """Returns this colour and field multiplied by another colour."""
+        """Returns the product with another colour, multiplied by the same field."""
         return replace(self, colour=product(self.colour, by))
 
 

@@ -191,9 +191,9 @@ _OPAQUE = 1e-4
 def read_standard(shader: UsdShade.Shader, inputs: Inputs) -> OpticalProperties:
     """Returns the properties of a ``standard_volume`` shader.
 
-    At density 1, the transmittance over the length ``transparent_depth`` is ``transparent``. So the
-    extinction coefficient is density * -ln(transparent) / transparent_depth per stage unit. Inputs
-    and defaults follow Arnold's documentation.
+    At density 1, the transmittance over the length ``transparent_depth`` is ``transparent``. The
+    extinction coefficient is therefore density * -ln(transparent) / transparent_depth per stage
+    unit. Inputs and defaults follow Arnold's documentation.
     """
     dense = inputs.driven(shader, "density", WHITE)
     transparent = inputs.driven(shader, "transparent", grey(math.exp(-1.0)))

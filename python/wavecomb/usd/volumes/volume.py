@@ -34,7 +34,7 @@ class Volume:
         options: Arguments of ``SceneBuilder.add_volume`` except ``to_world``.
         corners: (8, 3) corners of the volume's bounds in object space.
         grids: Descriptions of the volume's grids.
-        may_light: Whether it may light a scene by its emission.
+        may_light: Whether the volume may light a scene by its emission.
     """
 
     options: dict[str, Any]

@@ -2,8 +2,8 @@
 """MaterialX nodes for geometry: positions, primvars, normal maps, spaces, time and patterns.
 
 With M the linear part of the object-to-world transform, graphs can read the rows of the inverse of
-M (``normal_x`` ...) and the position in both spaces. The columns of M are the cross products of
-these rows divided by their determinant.
+M (``normal_x`` ...) and the position in both spaces. The columns of M are cross products of rows of
+the inverse, divided by its determinant.
 """
 
 from __future__ import annotations
@@ -167,7 +167,7 @@ def _transform(n: NodeCall) -> Value:
 
 @_node("transformpoint")
 def _transform_point(n: NodeCall) -> Value:
-    """Transforms relative to the shading point, whose position is known in both spaces."""
+    """Transforms a point relative to the shading point, whose position both spaces provide."""
     m = n.make
     starts, ends = _spaces(n)
     p = _transformed(n, (0.0, 0.0, 0.0))

@@ -28,7 +28,7 @@ MAX_DEPTH = 100
 MAX_NODES = 10_000
 """Maximum number of nodes in the networks of a material.
 
-In instanced node graphs, whose paths are long, the limit is a tenth of this.
+The limit is ten times lower in instanced node graphs, whose paths are long.
 """
 
 PER_COMPONENT = {"overlay": "ND_overlay_float"}

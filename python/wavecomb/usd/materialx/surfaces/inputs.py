@@ -23,7 +23,7 @@ _SLIDERS = {"emissive_strength": 10.0, "attenuation_distance": 10.0, "thickness"
 
 
 class _ReadInputs(LayerInputs):
-    """Recorder of the inputs that are read; the value 1 makes ``layers_of`` read all of them."""
+    """Fake shader inputs, all of value 1, that record the names which ``layers_of`` reads."""
 
     def __init__(self) -> None:
         self.read: set[str] = set()

@@ -38,9 +38,9 @@ class Row:
         default: Default of the input: a number, a colour, or a bool for a switch.
         factor: Factor on a number.
         divisor: Divisor of a number.
-        driven: Whether a node may drive the parameter. Otherwise the mean of the node's value is
-            used everywhere, unless ``drive_layers`` handles the input.
-        weight: Another input that multiplies this one, with its default.
+        driven: Whether a node may drive the parameter. A parameter that nodes may not drive has the
+            mean of the node's value everywhere, unless ``drive_layers`` handles the input.
+        weight: Input that multiplies the parameter, with its default.
     """
 
     input: str
@@ -303,7 +303,7 @@ class SurfaceReader:
             self.parameters[name] = constant if len(constant) > 1 else constant[0]
 
     def missing(self, what: str) -> None:
-        """Reports something that is not supported."""
+        """Reports a feature of the shader that is not supported."""
         self.report.missing(what, self.material.GetPath())
 
 
