@@ -155,6 +155,10 @@ Args:
         number. It is even.
     two: Another one.
 
+Returns:
+    A number that
+    is even.
+
 - An item.
 - Another item.
 
@@ -164,8 +168,9 @@ Args:
         (0, "Does a thing."),
         (5, "one: The first number. It is even."),
         (7, "two: Another one."),
-        (9, "An item."),
-        (10, "Another item."),
+        (10, "A number that is even."),
+        (13, "An item."),
+        (14, "Another item."),
     ]
 
 

@@ -162,16 +162,20 @@ def texts(name: str, text: str) -> list[Text]:
 def docstring_blocks(string: str) -> Iterator[tuple[int, str]]:
     """Yields line number (from 0) and text of paragraphs and list items of a docstring.
 
-    Examples are left out. Each entry of a section such as `Args:` is a list item.
+    Examples are left out. Each entry of a section such as `Args:` is a list item, but the texts of
+    `Returns:` and `Yields:` are paragraphs.
     """
     block: list[str] = []
-    start, in_section, is_code = 0, False, False
+    start, in_section, has_entries, is_code = 0, False, False, False
     for number, line in enumerate([*inspect.cleandoc(string).split("\n"), ""]):
         said = line.strip()
         indent = len(line) - len(line.lstrip())
         is_head = SECTION.fullmatch(line) is not None
         in_section = is_head or (in_section and (indent > 0 or not said))
-        starts = not said or is_head or said.startswith("- ") or (in_section and indent == 4)
+        if is_head:
+            has_entries = said not in ("Returns:", "Yields:")
+        is_entry = in_section and has_entries and indent == 4
+        starts = not said or is_head or is_entry or said.startswith("- ")
         if block and starts:
             yield start, " ".join(block)
             block = []
