@@ -13,7 +13,7 @@ BATCH ?= ON
 # Lane widths to compile: "default" means scalar code and the widest vectors of the target CPU, and
 # "all" means every supported width. Later builds keep the lane widths of the last build.
 LANES ?= $(shell cat build/.lanes 2> /dev/null || echo default)
-# Amount of checks in make test-asan: ON (the default checks) or all.
+# Sanitizer checks that make test-asan enables: ON (the default checks) or all.
 CHECKS ?= ON
 ASAN := build/asan$(if $(filter all,$(CHECKS)),-all)
 TSAN := build/tsan
@@ -34,11 +34,12 @@ SETUP_LOCK := $(if $(LOCK),$(LOCK)-setup)
 ASAN_LOCK := $(if $(LOCK),$(LOCK)-asan)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_NO_INPUT := 1
-# Tools that search PATH find the programs of the environment first.
+# Put the programs of the virtual environment first in PATH.
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
 CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLists.txt tests/naive/CMakeLists.txt benchmarks/micro/CMakeLists.txt)
-# The list includes directories, whose time changes when a file is added or removed.
+# NATIVE_INPUTS also lists directories, whose modification time changes when a file is added or
+# removed.
 NATIVE_INPUTS := $(shell find src bindings 2> /dev/null)
 CPP_FILES := $(shell find src bindings tests/cpp tests/naive benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' -o -name '*.inl' \) 2> /dev/null)
 
@@ -53,7 +54,7 @@ build/.setup: tools/setup tools/wheels tools/setup_embree tools/setup_openvdb to
   constraints.txt pyproject.toml
 	@mkdir -p build && $(SETUP_LOCK) tools/setup && touch $@
 
-# Parts of make test install these while the core is built.
+# make test installs the test dependencies while the core is built.
 build/.setup-test: build/.setup
 	@$(SETUP_LOCK) tools/setup test && touch $@
 
@@ -142,7 +143,7 @@ test-cpp: build build/.setup-test ## C++ tests of values, lanes and whole render
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet
 	$(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 
-# CHECKS=all builds all tests, kernels and checks, with line numbers in reports of addresses. It
+# CHECKS=all builds all tests, kernels and sanitizer checks, with line numbers in stack traces, and
 # takes five times as long to compile.
 ASAN_DEBUG = $(if $(filter all,$(CHECKS)),-g1,-g0)
 test-asan: build/.setup-test ## C++ tests of memory and whole renders under AddressSanitizer and UndefinedBehaviorSanitizer
@@ -205,12 +206,13 @@ test-wheel: wheels ## Install the wheel into a fresh environment and an empty ro
 test-sdist: sdist build/.setup-test ## Build the source distribution in a separate folder, and render
 	$(VENV)/python -m pytest -q -o faulthandler_timeout=3600 tests/packaging/test_sdist.py
 
-# These libraries are compiled from source, since the libraries of the distribution are for another
-# standard library or CPU.
+# OpenSubdiv and GoogleTest are compiled from source, since the distribution's binaries are for
+# another standard library or CPU.
 from_source := -DOpenSubdiv_SOURCE=$(CURDIR)/.deps/source/opensubdiv -DGoogleTest_SOURCE=/usr/src/googletest
-# The builds have two lane widths and little optimisation, since they test correctness, not speed.
+# The Clang builds have two lane widths and little optimisation, since they test correctness, not
+# speed.
 clang_widths = 1;$(if $(shell grep -m 1 -o avx2 /proc/cpuinfo 2> /dev/null),8,4)
-# The newest clang. The variable is expanded when used, after tools/setup has installed clang.
+# The newest clang. Make expands CLANGXX when it is used, after tools/setup has installed clang.
 CLANGXX ?= $$(ls /usr/bin/clang++-[0-9]* | sort -V | tail -n 1)
 # The oneTBB wheel uses libstdc++, and an exception from a libc++ task ends the process, so the test
 # of exceptions in tasks is left out.
@@ -225,8 +227,8 @@ build/.setup-clang: build/.setup-test
 build/.setup-arm64: build/.setup
 	@$(SETUP_LOCK) tools/setup arm64 && touch $@
 
-# Test the module in an environment with the packages of .venv but without the editable Wavecomb of
-# .venv. (Python ignores .pth files of another environment.)
+# Test the built Python module in an environment with the packages of .venv but without the editable
+# Wavecomb of .venv. (Python ignores .pth files of another environment.)
 test-clang: build/.setup-clang ## C++ tests and the Python module with clang and libc++, which is close to macOS
 	@test -e $(CLANG)/build.ninja || $(LOCK) $(VENV)/cmake -S . -B $(CLANG) -G Ninja --log-level=NOTICE $(from_source) \
 	  -DCMAKE_CXX_COMPILER="$(CLANGXX)" -DCMAKE_CXX_FLAGS=-stdlib=libc++ -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" \

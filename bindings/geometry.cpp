@@ -25,7 +25,7 @@ namespace {
 template <typename T>
 using Array = nb::ndarray<const T, nb::c_contig, nb::device::cpu>;
 
-/// Returns an array of a description, which keeps it alive, or an empty span if the key is missing.
+/// Returns the array `d[key]`, which `d` keeps alive, or an empty span if the key is missing.
 template <typename T>
 std::span<const T> span_of(const nb::dict& d, const char* key) {
   if (!d.contains(key) || d[key].is_none()) return {};

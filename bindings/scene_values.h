@@ -54,7 +54,7 @@ nanobind::list program_rows();
 nanobind::dict material_dict(const wavecomb::Scene& scene, uint32_t material);
 
 /// Converts the arguments of Renderer.edit(). Values that are not given stay unchanged. Throws
-/// Error that names the object and the value.
+/// Error that names the object and the invalid value.
 wavecomb::SceneEdit scene_edit(const wavecomb::Scene& scene, const nanobind::object& camera,
                                const nanobind::dict& materials, const nanobind::dict& lights,
                                const nanobind::dict& moves);

@@ -54,9 +54,9 @@ if(WAVECOMB_SANITIZE)
   # Sanitizers triple the time to optimise OpenSubdiv's templates.
   set_source_files_properties(${refiner} PROPERTIES COMPILE_OPTIONS -O0 SKIP_PRECOMPILE_HEADERS ON)
 endif()
-# Sources whose speed no render notices (descriptions, checks, tables, the plan of a render) are
-# compiled with -O1, which takes a compiler two thirds of the time. Sources with loops over
-# vertices, texels, pixels or training samples are excepted.
+# Sources that do not affect render time (descriptions, checks, tables, the plan of a render) are
+# compiled with -O1, which reduces compile time by a third. Sources with loops over vertices,
+# texels, pixels or training samples are excepted.
 set(cold ${core_sources})
 list(FILTER cold INCLUDE REGEX
   "/src/wavecomb/(core|scene|render|(light|material|medium)/description|light/(tree|calibration)|geometry/mesh|graph/parameters|light_paths/render)/([a-z_]+/)?[a-z_]+\\.cpp$")
@@ -114,9 +114,10 @@ function(wavecomb_kernel_units var kind set width)
   set(${var} ${units} PARENT_SCOPE)
 endfunction()
 
-# wavecomb_lane_units(VAR WIDTH WIDEST REDUCED): generates the units for WIDTH lanes in a build
-# whose widest lanes are WIDEST: those of WAVECOMB_KERNELS (with its column `reduced` if REDUCED),
-# and one for each *.lanes.cpp. Units of different widths differ in WAVECOMB_LANES.
+# wavecomb_lane_units(VAR WIDTH WIDEST REDUCED): generates the translation units for WIDTH lanes in
+# a build whose widest lanes are WIDEST: the units of WAVECOMB_KERNELS (only those of its column
+# `reduced` if REDUCED is true), and a unit for each *.lanes.cpp. Units of different widths differ
+# in WAVECOMB_LANES.
 function(wavecomb_lane_units var width widest reduced)
   set(all "")
   foreach(row IN LISTS kernels)
@@ -155,7 +156,8 @@ function(wavecomb_lane_units var width widest reduced)
 endfunction()
 
 # wavecomb_add_core(NAME FLAGS [STATIC]): adds the library NAME, compiled with FLAGS from
-# wavecomb_add_flags. It always contains scalar units, whose kernels the reference integrator uses.
+# wavecomb_add_flags. The library always contains scalar kernels, which the reference integrator
+# uses.
 function(wavecomb_add_core name flags)
   add_library(${name} ${ARGN} ${core_sources} ${core_headers})
   target_compile_features(${name} PUBLIC cxx_std_20)
@@ -167,7 +169,8 @@ function(wavecomb_add_core name flags)
     OpenSubdiv::osdCPU)
   get_target_property(widths ${flags} WAVECOMB_WIDTHS)
   set_target_properties(${name} PROPERTIES UNITY_BUILD ${WAVECOMB_BATCH} UNITY_BUILD_BATCH_SIZE 10
-    DEFINE_SYMBOL "")  # as other precompiled headers are compiled
+    # No export symbol, so that precompiled headers of other targets can be reused.
+    DEFINE_SYMBOL "")
   set(cold_target ${name}_cold)
   add_library(${cold_target} OBJECT ${cold})
   target_include_directories(${cold_target} PRIVATE "${PROJECT_SOURCE_DIR}/src")
@@ -212,7 +215,8 @@ function(wavecomb_add_core name flags)
     target_compile_options(${lanes} PRIVATE ${core_warnings})
     target_link_libraries(${lanes} PRIVATE ${flags} embree TBB::tbb)
     target_sources(${name} PRIVATE $<TARGET_OBJECTS:${lanes}>)
-    # The kernels of a program are compiled together: they instantiate the same templates.
+    # The kernels of a shading program are compiled in one unit, because they instantiate the same
+    # templates.
     set_target_properties(${lanes} PROPERTIES UNITY_BUILD ${WAVECOMB_BATCH} UNITY_BUILD_MODE GROUP)
   endforeach()
   # Headers that units of kernels include, except programs and code specific to each kernel.

@@ -52,12 +52,13 @@ else()
   set(WAVECOMB_EMBREE_IS_STAGED FALSE)
 endif()
 
-# Debug builds use the release library too. Embree loads that one, and a process needs a single one.
+# Debug builds also use oneTBB's release library. Embree loads the release library, and a process
+# must contain a single oneTBB.
 set(TBB_FIND_RELEASE_ONLY ON)
 if(WAVECOMB_EMBREE_IS_STAGED)
   find_package(TBB CONFIG QUIET COMPONENTS tbb PATHS "${_hint_tbb}" NO_DEFAULT_PATH)
 else()
-  # Ignore PATH, which may contain the bin directory of the environment.
+  # Ignore PATH, which may contain the bin directory of the virtual environment and thus its oneTBB.
   find_package(TBB CONFIG QUIET COMPONENTS tbb NO_SYSTEM_ENVIRONMENT_PATH NO_CMAKE_ENVIRONMENT_PATH)
 endif()
 if(NOT TBB_FOUND)
@@ -83,7 +84,7 @@ if(NOT OpenSubdiv_FOUND)
 endif()
 
 # OpenVDB, for the plug-in that reads volumes (WavecombVdb.cmake). OpenVDB must be linked with the
-# oneTBB above, so it comes from the same source as Embree.
+# oneTBB chosen above, so OpenVDB comes from the same source as Embree.
 option(WAVECOMB_VDB "Python: build the plug-in that reads volumes, where OpenVDB is found" ON)
 set(WAVECOMB_STAGED_OPENVDB "${PROJECT_SOURCE_DIR}/.deps/openvdb")
 if(WAVECOMB_PYTHON AND WAVECOMB_VDB)

@@ -16,7 +16,7 @@ target_compile_features(wavecomb_common INTERFACE cxx_std_20)
 target_compile_options(wavecomb_common INTERFACE
   -ffp-contract=off -fno-strict-aliasing -fno-math-errno -fno-trapping-math
   -Wall -Wextra -Wpedantic $<$<CXX_COMPILER_ID:GNU>:-Wshadow=local> -Wnon-virtual-dtor -Woverloaded-virtual -Wextra-semi -Wno-psabi
-  # Masks of scalar lanes are bool.
+  # The mask type of scalar lanes is bool, so kernels apply bitwise operators to bool values.
   $<$<CXX_COMPILER_ID:Clang,AppleClang>:-Wno-bitwise-instead-of-logical>
   # Once inlined, GCC 12's own intrinsics cause false warnings of uninitialized and out-of-bounds
   # vectors.
@@ -101,8 +101,8 @@ function(wavecomb_add_flags name arch)
   endif()
   target_compile_definitions(${name} INTERFACE WAVECOMB_MAX_LANES=${most}
     WAVECOMB_REDUCED_KERNELS=${reduced})
-  # Only for units that list the widths. Other units compile to the same objects for any set of
-  # widths.
+  # Only translation units that list the lane widths use the NAME_widths library. Other units
+  # compile to the same object code for any set of widths.
   add_library(${name}_widths INTERFACE)
   foreach(width IN LISTS widths)
     target_compile_definitions(${name}_widths INTERFACE WAVECOMB_HAS_LANES_${width}=1)

@@ -30,7 +30,8 @@ if(NOT WAVECOMB_HAS_CPU_LEVELS)
     "x86-64-v2 to x86-64-v4 (__builtin_cpu_supports); take GCC 12 or newer.")
 endif()
 
-# wavecomb._cpu runs on every CPU: compiler's baseline, Python's C API, no library but libc.
+# wavecomb._cpu must run on every CPU, so it is compiled for the compiler's baseline instruction set
+# and uses only Python's C API and libc.
 Python_add_library(wavecomb_cpu MODULE "${PROJECT_SOURCE_DIR}/bindings/cpu/cpu.cpp")
 target_compile_definitions(wavecomb_cpu PRIVATE Py_LIMITED_API=0x030A0000)
 target_link_libraries(wavecomb_cpu PRIVATE wavecomb_common)

@@ -57,7 +57,8 @@ set(_osd_link "")
 if(OpenSubdiv_NEEDS_OPENMP AND CMAKE_SYSTEM_NAME STREQUAL "Linux")
   execute_process(COMMAND "${CMAKE_CXX_COMPILER}" -print-file-name=libgomp.so.1
     OUTPUT_VARIABLE _gomp_library OUTPUT_STRIP_TRAILING_WHITESPACE)
-  # A direct dependency uses our rpath. OpenSubdiv then finds the runtime already loaded.
+  # Link the OpenMP runtime directly, so that the loader finds it by the module's rpath. OpenSubdiv
+  # then finds the runtime already loaded.
   set(_osd_link "-Wl,--push-state,--no-as-needed" gomp "-Wl,--pop-state")
 endif()
 
@@ -68,15 +69,15 @@ function(wavecomb_add_module name core flags folder)
   target_compile_definitions(${name} PRIVATE WAVECOMB_VERSION="${PROJECT_VERSION}")
   target_link_libraries(${name} PRIVATE ${core} ${flags} TBB::tbb ${_osd_link})
   target_precompile_headers(${name} PRIVATE ${wavecomb_pch} <nanobind/nanobind.h> <nanobind/ndarray.h>)
-  # Export only the entry point. Otherwise other libraries could bind to code for this instruction
-  # set.
+  # Export only the module's entry point. Otherwise other libraries could bind to code for this
+  # instruction set.
   if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
     target_link_options(${name} PRIVATE "-Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/python_exports.map")
     set_property(TARGET ${name} APPEND PROPERTY LINK_DEPENDS "${PROJECT_SOURCE_DIR}/cmake/python_exports.map")
   endif()
   # In site-packages/wavecomb, `lib` holds the installed libraries, and ../../.. is <venv>/lib with
   # libtbb.so.12 of the tbb wheel (omitted if oneTBB is the distribution's). In the build tree, the
-  # linked directories suffice.
+  # directories of the linked libraries suffice.
   string(REGEX REPLACE "[^/]+" ".." up "${folder}")
   if(up)
     string(APPEND up "/")

@@ -8,7 +8,7 @@ get_filename_component(_root "${CMAKE_CURRENT_LIST_DIR}/../.deps/arm64" ABSOLUTE
 set(_libraries "${_root}/usr/lib/aarch64-linux-gnu")
 file(GLOB embree_DIR "${_libraries}/cmake/embree-*")
 set(TBB_DIR "${_libraries}/cmake/TBB")
-# The staged libraries may need a newer glibc than the compiler's. Link with the staged one.
+# The staged libraries may need a newer glibc than the compiler's. Link with the staged glibc.
 set(CMAKE_EXE_LINKER_FLAGS_INIT "-Wl,--allow-shlib-undefined,-rpath-link,${_libraries}")
 set(CMAKE_CROSSCOMPILING_EMULATOR "qemu-aarch64;-L;${_root}")
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)

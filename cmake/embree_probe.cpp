@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that Embree's headers and library match. tools/setup_embree compiles and runs it if the
-// two come from different releases. Checks the version, the compile-time options that change the
-// layout of RTCHit (instance levels, instance arrays) for single rays and packets of 16, filter
-// functions and ray masks.
+// Checks that Embree's headers and library match. tools/setup_embree compiles and runs this program
+// if headers and library come from different releases. Checks the version, the compile-time options
+// that change the layout of RTCHit (instance levels, instance arrays) for single rays and packets
+// of 16, filter functions and ray masks.
 #include <embree4/rtcore.h>
 
 #include <cmath>
@@ -160,7 +160,7 @@ int main() {
   check(rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_TASKING_SYSTEM) == 1,
         "tasks run on oneTBB");
 
-  // The triangle itself, with a filter function.
+  // Scene with one triangle, which has a filter function.
   RTCScene object = rtcNewScene(device);
   RTCGeometry mesh = triangle(device);
   rtcSetGeometryIntersectFilterFunction(mesh, filter);

@@ -13,7 +13,8 @@
 int main(int argc, char** argv) {
   if (argc != 2) return 2;
   openvdb::initialize();
-  // The library makes the grid. Instantiating it here would double the time to compile.
+  // The library creates the grid by type name. Instantiating the grid type here would double the
+  // compile time.
   const auto grid = openvdb::GridBase::createGrid("Tree_float_5_4_3");
   grid->setName("density");
   grid->setSaveFloatAsHalf(true);

@@ -104,7 +104,7 @@ void shade(benchmark::State& state, ProgramId program, const Look& look, float f
   count_items(state, "record", kRecords);
 }
 
-/// Whether a program supports the features of a look.
+/// Returns whether a shading program supports a material's textures and layers.
 bool has(ProgramId program, const Look& look) {
   const bool layered = program == ProgramId::kPrincipled || program == ProgramId::kOpenPbr;
   // Program "emissive" has no base colour.

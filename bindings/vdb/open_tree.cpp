@@ -59,7 +59,7 @@ void visit_node(const Node& node, OnTile&& on_tile, OnChild&& on_child) {
   }
 }
 
-/// Traverses a tree from its root: active tiles of all levels, and leaves.
+/// Traverses a tree from its root and visits active tiles of all levels and leaves.
 template <typename Tree, typename OnTile, typename OnLeaf>
 void walk(const Tree& tree, OnTile&& on_tile, OnLeaf&& on_leaf) {
   using Upper = typename Tree::RootNodeType::ChildNodeType;

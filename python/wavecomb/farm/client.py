@@ -240,7 +240,9 @@ class Run:
                 self._take_image(batch.image, result)
         elif future.status == "error":
             self._take_error(batch, future.exception())
-        else:  # lost or cancelled by another client, or its worker ended before sending the result
+        # The task was lost or cancelled by another client, or its worker ended before sending the
+        # result.
+        else:
             self._cluster.client.cancel([future])
             self._cluster.check(False)
             self._put_back(batch)
@@ -254,7 +256,7 @@ class Run:
         """
         result = None
         if future.status == "finished":
-            with contextlib.suppress(Exception):  # _take reads the error from the status
+            with contextlib.suppress(Exception):  # _take() reports the error of a failed task
                 result = future.result()
         self._ended.put((future, result))
 

@@ -51,8 +51,9 @@ struct PresenceKeys {
   const uint32_t* shadow_set = nullptr;
   uint32_t shadow_stride = 0;
   uint32_t ray_kind = kVisibleToCamera;  ///< a RayVisibility flag
-  /// object_of() of the only object that each ray can hit, with the stride of the hashes. Rays that
-  /// are restricted to one object hit no lights. Null means that rays hit all objects.
+  /// The only object that each ray can hit, as a value of object_of(), with the same stride as
+  /// pixel_hash. Rays that are restricted to one object hit no lights. Null means that rays hit all
+  /// objects.
   const uint32_t* object = nullptr;
 };
 
@@ -74,10 +75,10 @@ class EmbreeAccelerator {
   /// out of memory.
   EmbreeAccelerator(std::shared_ptr<const Scene> scene, uint32_t threads,
                     HitRule rule = HitRule::kList);
-  /// Creates an accelerator for a scene edited from that of `origin`. Shares the BVH, or the groups
-  /// whose meshes are unchanged. Groups are rebuilt if the presence filtering or hair status of a
-  /// mesh changes; then, or if
-  /// an object moves or the shape or position of a light changes, the top level is rebuilt.
+  /// Creates an accelerator for an edited version of the scene of `origin`. Shares the BVH, or the
+  /// groups whose meshes are unchanged. Groups are rebuilt if the presence filtering or hair status
+  /// of a mesh changes; then, or if an object moves or the shape or position of a light changes,
+  /// the top level is rebuilt.
   EmbreeAccelerator(std::shared_ptr<const Scene> edited, const EmbreeAccelerator& origin,
                     uint32_t threads);
   ~EmbreeAccelerator();
@@ -95,11 +96,11 @@ class EmbreeAccelerator {
 
   /// Returns whether a triangle list replaces the BVH.
   bool has_list() const;
-  /// Memory of the BVH in bytes.
+  /// Returns the memory of the BVH in bytes.
   size_t bytes() const;
   /// Widest packet that Embree traces natively on this CPU.
   uint32_t native_width() const;
-  /// Top-level RTCScene. Accelerators that share the BVH return the same one.
+  /// Top-level RTCScene. Accelerators that share the BVH return the same RTCScene.
   RTCSceneTy* embree_scene() const;
 
  private:

@@ -31,8 +31,7 @@ class EmbreeHierarchy {
   EmbreeHierarchy(const EmbreeHierarchy&) = delete;
   EmbreeHierarchy& operator=(const EmbreeHierarchy&) = delete;
 
-  /// Returns whether a hierarchy built for `scene`, which must have the same geometry, would be
-  /// equal.
+  /// Returns whether this hierarchy can be used for `scene`, which must have the same geometry.
   bool fits(const Scene& scene) const;
 
   HitRule rule() const { return rule_; }
@@ -40,7 +39,7 @@ class EmbreeHierarchy {
   RTCScene top() const { return top_; }
   uint32_t first_world() const { return first_world_; }  ///< geometry id of the world's first mesh
   uint32_t first_light() const { return first_light_; }  ///< geometry id of light record 0
-  /// Memory of all hierarchies of the device, in bytes.
+  /// Returns the memory of all hierarchies of the device in bytes.
   size_t bytes() const;
 
  private:
@@ -54,8 +53,8 @@ class EmbreeHierarchy {
   std::shared_ptr<const SceneGeometry> geometry_;
   HitRule rule_;
   std::shared_ptr<EmbreeDevice> device_;
-  std::vector<uint8_t> filtered_;      ///< indexed by mesh: see filtered_meshes()
-  std::vector<uint8_t> fibres_;        ///< indexed by mesh: see fibre_meshes()
+  std::vector<uint8_t> filtered_;      ///< result of filtered_meshes(), indexed by mesh
+  std::vector<uint8_t> fibres_;        ///< result of fibre_meshes(), indexed by mesh
   std::vector<LightGeometry> shapes_;  ///< by light record
   RTCScene top_ = nullptr;
   std::vector<RTCScene> group_scenes_;

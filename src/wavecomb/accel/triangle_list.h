@@ -13,13 +13,13 @@ namespace wavecomb {
 
 /// Geometry of a small static scene as a flat list in world space.
 ///
-/// Below about a hundred triangles, a BVH costs more than it saves. Here each lane holds one ray,
-/// and all lanes test the same triangle. Triangles are transformed to a frame with z along the ray,
-/// where the edge functions of two adjacent triangles are exact negatives (Woop, Benthin and Wald,
-/// "Watertight Ray/Triangle Intersection", JCGT 2(1) 2013; a rotation replaces their shear, so that
-/// no lane has to choose an axis). The hit distance is that to the triangle's plane. No operation
-/// depends on other rays, and the first triangle of the list wins ties, so hits are canonical
-/// without a filter.
+/// Below about a hundred triangles, a BVH costs more than it saves. TriangleList instead holds one
+/// ray in each lane, and all lanes test the same triangle. Triangles are transformed to a frame
+/// with z along the ray, where the edge functions of two adjacent triangles are exact negatives
+/// (Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1) 2013; TriangleList
+/// replaces the paper's shear by a rotation, so that no lane has to choose an axis). The hit
+/// distance is the distance to the triangle's plane. No operation depends on other rays, and the
+/// first triangle of the list wins ties, so hits are canonical without a filter.
 ///
 /// Contract: immutable; reads the scene's materials through the view passed to each call.
 class TriangleList {
@@ -32,7 +32,7 @@ class TriangleList {
   /// Returns null if the scene exceeds these limits or has motion, curves or points.
   static std::unique_ptr<const TriangleList> make(const Scene& scene);
 
-  /// Like the functions of EmbreeAccelerator; `width` is 1, 4, 8 or 16.
+  /// Find the same hits as the functions of EmbreeAccelerator; `width` is 1, 4, 8 or 16.
   void intersect(const SceneView& scene, const RaySpan& rays, const HitSpan& hits, uint32_t width,
                  const PresenceKeys& keys) const;
   void occluded(const SceneView& scene, const RaySpan& rays, uint32_t* occluded, uint32_t width,
@@ -54,7 +54,7 @@ class TriangleList {
     LightGeometry light_geometry;
     float centre[3], radius;
   };
-  /// Ids of hits by entry: triangles, then light shapes, then one entry for a miss.
+  /// Ids of hits, indexed by list entry: triangles, then light shapes, then one entry for a miss.
   struct Ids {
     std::vector<uint32_t> prim, geom, inst;
   };

@@ -9,7 +9,8 @@
 
 namespace wavecomb {
 
-/// Modelled cost of a ray in nanoseconds, about the time to trace a ray among a million triangles.
+/// Modelled cost of a ray in nanoseconds, about the time to trace a ray in a scene of a million
+/// triangles.
 inline constexpr float kModelRayNs = 250;
 
 /// Cost of each path.
@@ -26,7 +27,8 @@ class PathCostRows {
   /// Returns whether costs come from the model instead of being measured.
   bool models_cost() const { return wants_cost() && models_; }
   bool wants_time() const { return wants_cost() && !models_cost(); }
-  /// Adds a modelled cost in nanoseconds. Calls for one path come in the order of its vertices.
+  /// Adds a modelled cost in nanoseconds. The caller adds the costs of a path in the order of its
+  /// vertices.
   void add_cost(size_t slot, float ns) const { cost_ns_.rows[slot] += ns; }
   /// Adds the modelled cost of a ray to each path in slots slot(0) ... slot(n - 1), if costs are
   /// modelled.
@@ -52,7 +54,7 @@ class PathCostRows {
   size_t cost_bytes() const { return cost_ns_.bytes(); }
   void clear_costs(size_t slots) const { cost_ns_.zero(slots); }
 
-  SlotRows cost_ns_;  ///< one word for each slot
+  SlotRows cost_ns_;  ///< cost in nanoseconds of each path slot
 
  private:
   bool models_ = false;

@@ -16,7 +16,8 @@ namespace wavecomb {
 class PathFirstHits {
  public:
   PathFirstHits() = default;
-  /// Allocates the rows that `set` needs. `tables` may be null if nothing in `set` needs them.
+  /// Allocates the rows for the AOVs in `set`. `tables` may be null if no AOV in `set` needs
+  /// tables.
   PathFirstHits(size_t capacity, const AovSet& set, const AovTables* tables)
       : names_(tables), transmits_(set.has(Aov::kTransmittance)) {
     const auto rows = [&](SlotRows& block, bool wanted, size_t words) {
@@ -112,7 +113,7 @@ class PathFirstHits {
       n += block->bytes();
     return n;
   }
-  /// Clears the slots below `slots`.
+  /// Clears the rows of the first `slots` path slots.
   void clear_hits(size_t slots) const {
     alpha_.zero(slots);
     motion_.zero(slots);
@@ -131,8 +132,8 @@ class PathFirstHits {
   SlotRows alpha_;   ///< 1 if the camera ray hit something opaque
 
  private:
-  /// Stores the depth of the ray's end, and whether a volume stopped it, in the first two words of
-  /// RayEndRow.
+  /// Stores the depth at which a camera ray ends, and whether a volume stopped the ray, in the
+  /// first two words of RayEndRow.
   template <typename F>
   void scatter_ray_end(const UInt<F>& slot, const F& depth, const F& in_volume,
                        const Mask<F>& active) const {

@@ -10,8 +10,8 @@
 ///   resolve    the path's values are added to the film
 ///
 /// Rows exist only for the requested AOVs. Splitting the radiance into emission, direct and
-/// indirect light costs nothing in shading, since copies of it before the light samples of the
-/// first two vertices are enough.
+/// indirect light costs nothing in shading, since it needs only copies of the radiance before the
+/// light samples of the first two vertices.
 #pragma once
 
 #include <array>
@@ -32,7 +32,7 @@
 namespace wavecomb {
 
 /// Calls put(aov, value) for each AOV of the first vertex whose source is kVertex. `value` has the
-/// channels of the AOV, and `path` is the state that arrived.
+/// channels of the AOV, and `path` is the path's state before the vertex.
 template <typename F, typename Put>
 inline void for_each_vertex_value(const VertexAovs<F>& v, const PathState<F>& /*path*/,
                                   const Put& put) {
@@ -84,7 +84,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
 
   // ---- before the first ray ---------------------------------------------------------------------
 
-  /// Clears the slots below `slots`.
+  /// Clears the rows of the first `slots` path slots.
   void clear(size_t slots) {
     for (const Block* block :
          {&vertex_, &guides_, &groups_, &light_samples_, &bounces_, &early_connections_})
@@ -112,7 +112,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     return (depth == 0 && vertex_) || guides_ || wants_lights() || bounces_;
   }
 
-  /// Records a shaded vertex. `path` is the state that arrived there.
+  /// Records a shaded vertex. `path` is the path's state before the vertex.
   template <typename F>
   void vertex(uint32_t depth, const UInt<F>& slot, const VertexAovs<F>& v, const PathState<F>& path,
               const Mask<F>& active) const {
@@ -137,7 +137,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
 
   // ---- light ------------------------------------------------------------------------------------
 
-  /// Returns whether contributions must be reported by light.
+  /// Returns whether callers must report contributions separately for each light.
   bool wants_lights() const { return groups_ || expressions_; }
   /// Returns the index of the stored light group of each lane's light, or kNoGroup.
   template <typename F>
@@ -160,7 +160,8 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     if (groups_) add<F>(slot, UInt<F>(tables_->group_of_rest), c, active);
     if (expressions_) expressions_.add_volume_emission<F>(slot, c, active);
   }
-  /// Adds the contribution `c` of the light sample of the last vertex, from a light of `group`.
+  /// Adds the contribution `c` of the light sample at the last vertex; the sampled light is in
+  /// light group `group`.
   template <typename F>
   void add_direct(const UInt<F>& slot, const UInt<F>& group, const Color<F>& c,
                   const Mask<F>& active) const {
@@ -204,13 +205,13 @@ class PathAovs : public PathFirstHits, public PathCostRows {
         });
   }
 
-  /// Copies the radiance of the paths in slots below `slots`. It includes the emission at the
-  /// vertex at `depth`, but not its light sample.
+  /// Copies the radiance of the paths in the first `slots` slots. The radiance must include the
+  /// emission at the vertex at `depth`, but not the vertex's light sample.
   void end_depth(uint32_t depth, const float* radiance, size_t slots) const {
     if (depth < parts_.size() && parts_[depth])
       std::memcpy(parts_[depth].rows, radiance, slots * kRadianceWords * sizeof(float));
   }
-  /// Copies the radiance for `depth` and all later vertices, after the paths have ended.
+  /// Copies the radiance of ended paths as the radiance at `depth` and at all later vertices.
   void end_path(uint32_t depth, const float* radiance, size_t slots) const {
     for (; depth < parts_.size(); ++depth) end_depth(depth, radiance, slots);
   }
@@ -246,15 +247,15 @@ class PathAovs : public PathFirstHits, public PathCostRows {
       for (uint32_t slot = begin; slot < end; ++slot) each(slot);
     }
   };
-  // Parts of resolve(): how camera rays end; values of vertices and first hits; radiance by source;
-  // bounces and costs.
+  // Steps of resolve(), which add to the film: ends of camera rays; values of vertices and first
+  // hits; radiance by source; bounces and costs.
   void resolve_ends(AovFilm& film, size_t pixel, const SlotRange& slots,
                     const float* radiance) const;
   void resolve_vertices(AovFilm& film, size_t pixel, const SlotRange& slots) const;
   void resolve_light(AovFilm& film, size_t pixel, const SlotRange& slots,
                      const float* radiance) const;
   void resolve_work(AovFilm& film, size_t pixel, const SlotRange& slots) const;
-  /// Calls put(aov, words) for each stored AOV of vertices of this kind. `words` holds its first
+  /// Calls put(aov, words) for each stored vertex AOV of a kind. `words` points to the AOV's first
   /// word in the row of slot 0.
   template <typename Put>
   void for_each_vertex_aov(AovKind kind, const Put& put) const;
@@ -264,7 +265,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
             &groups_, &guides_,   &light_samples_, &bounces_};
   }
 
-  /// Marks an AOV without words in vertex_.
+  /// Value in vertex_at_ for AOVs that vertex_ does not store.
   static constexpr uint32_t kNoWords = 0xffffffffu;
   static constexpr std::array<uint32_t, kAovCount> no_words() {
     std::array<uint32_t, kAovCount> at{};
@@ -299,11 +300,11 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   AovLayout layout_;
   const AovTables* tables_ = nullptr;
   Block vertex_;
-  /// First word of each AOV in a row of vertex_, or kNoWords.
+  /// Index of each AOV's first word in a row of vertex_, or kNoWords.
   std::array<uint32_t, kAovCount> vertex_at_ = no_words();
   std::array<Block, 2> parts_;  ///< radiance before the light samples of vertices 0 and 1
   /// Contributions of connections at first vertices. These contributions are indirect light,
-  /// although they are added between the two copies in parts_.
+  /// although they are added between the two radiance copies in parts_.
   Block early_connections_;
   Block groups_;  ///< radiance by light group; the groups of a slot are adjacent
   Block guides_, bounces_;

@@ -2,13 +2,13 @@
 /// Radiance of paths by light path expressions (core/path_expressions/path_expression.h). Runs only
 /// if the render has expressions.
 ///
-/// A path carries an automaton state for each of its three colours. At a scattering with diffuse
-/// fraction s of a colour, that colour continues as diffuse with probability s and as glossy
-/// otherwise; all three colours use the same random number. Later contributions are added as a
-/// whole to the expressions of the state, so that the layers of a partition add up to the beauty
-/// and each layer has the correct mean. Light samples are split by s directly, without a random
-/// choice. Emission that a bounce hits is also split directly if the light has different diffuse
-/// and specular multipliers.
+/// A path carries an automaton state for each of its three colours. At a scattering event whose
+/// diffuse fraction in a colour is s, the automaton takes the diffuse event for that colour with
+/// probability s, and the glossy event otherwise; all three colours use the same random number.
+/// Later contributions are added in full to the expressions that match the state, so that
+/// complementary layers add up to the beauty and each layer has the correct mean. Light samples are
+/// split in proportion to s, without a random choice. Emission that a bounce hits is also split
+/// directly if the light has different diffuse and specular multipliers.
 #pragma once
 
 #include <array>
@@ -27,11 +27,12 @@ namespace wavecomb {
 template <typename F>
 struct ExpressionRow {
   UInt<F> states;  ///< states of the three colours, ten bits each
-  // Current light sample: states before its scattering, event, path end, and diffuse fraction.
+  // Current light sample: automaton states before the scattering, scattering event, path end, and
+  // diffuse fraction.
   UInt<F> light_states, light_event, light_end;
   Color<F> light_diffuse;
-  // Last bounce, for lights with multipliers: states before it, its event plus 1 (0 for a specular
-  // bounce and before the first bounce), and its diffuse fraction.
+  // Last bounce, for lights with multipliers: automaton states before the bounce, its event plus 1
+  // (0 for a specular bounce and before the first bounce), and its diffuse fraction.
   UInt<F> from_states, bounce;
   Color<F> bounce_diffuse;
   WAVECOMB_FIELDS(states, light_states, light_event, light_end, light_diffuse, from_states, bounce,
@@ -66,7 +67,7 @@ struct ColourStates {
         state * PathAutomaton::kNextWords + event + select(Mask<U>(event < volume), lobe, U(0u));
     return gather<U>(table, at, Mask<U>(active));
   }
-  /// Returns the states after a bounce. `u` in [0, 1) chooses the lobe of each colour.
+  /// Returns the automaton states after a bounce. `u` in [0, 1) chooses the lobe of each colour.
   template <typename F>
   static UInt<F> after(const uint32_t* table, const UInt<F>& states,
                        const ScatteringEvent<F>& bounce, const F& u, const Mask<F>& active) {
@@ -106,7 +107,7 @@ class PathExpressions {
   /// Returns the radiance of the path in `slot`: rgb for each expression.
   const float* sums(size_t slot) const { return sums_.floats(0) + slot * words_; }
 
-  /// Clears the slots below `slots`.
+  /// Clears the rows of the first `slots` path slots.
   void clear(size_t slots) {
     if (!*this) return;
     std::memset(rows_.floats(0), 0, slots * kRowWords<ExpressionRow> * sizeof(float));

@@ -30,7 +30,7 @@ struct VolumeHit {
 /// Geometry and material that a camera ray hits first.
 template <typename F>
 struct FirstSurface {
-  UInt<F> inst, geom;  ///< geom: geometry within the instance's group
+  UInt<F> inst, geom;  ///< instance, and index of the geometry within its group
   UInt<F> material;
 };
 

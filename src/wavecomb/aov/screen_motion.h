@@ -39,7 +39,8 @@ inline Vec2<F> screen_motion(const CameraSetup& camera, const Vec3<F>& first, co
   return {select(valid, x, F(0.f)), select(valid, y, F(0.f))};
 }
 
-/// Returns the motion of the point that is at `p` on lights `light` at `time`.
+/// Returns the screen motion of the points that are at `p` on lights `light` at shutter time
+/// `time`.
 template <typename F>
 inline Vec2<F> screen_motion_of_light(const LightView& lights, const CameraSetup& camera,
                                       const UInt<F>& light, const Vec3<F>& p, const F& time,

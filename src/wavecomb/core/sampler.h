@@ -46,11 +46,11 @@ enum class VertexSet : uint32_t {
   kShadow,    ///< transmittance along the vertex's shadow ray
   kEmission,  ///< start of a light path, at depth 0: choice of the light, and time
 };
-/// Upper limit of depths with distinct sets.
+/// Upper limit of path depths that have distinct sample sets.
 inline constexpr uint32_t kSetDepths = 1u << 23;
 
-/// Returns the index of a sample set at a depth of the path. The indices of the first two sets of
-/// vertices alternate from 1 on; each other set has a separate block of indices.
+/// Returns the index of a sample set at a depth of the path. The indices of the first two vertex
+/// sets alternate with depth, starting at 1; each other vertex set has a separate block of indices.
 inline constexpr uint32_t vertex_set(VertexSet name, uint32_t depth) {
   const auto i = static_cast<uint32_t>(name);
   return i < 2 ? 1 + i + 2 * depth : (i << 24) + depth;
@@ -58,8 +58,8 @@ inline constexpr uint32_t vertex_set(VertexSet name, uint32_t depth) {
 
 namespace detail {
 
-/// Laine-Karras permutation: bit k of the result depends only on bits 0..k, so that on reversed
-/// bits it is an Owen scramble (constants from Burley 2020, section 4).
+/// Laine-Karras permutation: bit k of the result depends only on bits 0..k, so that it is an Owen
+/// scramble of bit-reversed values (constants from Burley 2020, section 4).
 template <typename U>
 WAVECOMB_INLINE U laine_karras(U x, const U& seed) {
   x += seed;

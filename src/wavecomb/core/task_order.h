@@ -11,9 +11,9 @@
 
 namespace wavecomb {
 
-/// Annotations of one parallel loop: code before the loop happens before its tasks, and they happen
-/// before join(). The tasks of a loop are not ordered among each other. TaskOrder does nothing in
-/// builds without ThreadSanitizer.
+/// Annotations of one parallel loop: code before the loop happens before the loop's tasks, and the
+/// tasks happen before join(). The tasks of a loop are not ordered among each other. TaskOrder does
+/// nothing in builds without ThreadSanitizer.
 ///
 ///     const TaskOrder order;
 ///     tbb::parallel_for(size_t{0}, n, order.around([&](size_t i) { ... }));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Storage for the AOVs (arbitrary output variables) of a render. Only requested AOVs take memory.
-/// The AOV's row in core/aov.h says how samples are combined; the caller supplies their values.
+/// Each AOV's row in core/aov.h defines how its samples are combined; the caller supplies the
+/// sample values.
 #pragma once
 
 #include <array>
@@ -42,8 +43,8 @@ class AovFilm {
 
   /// Cryptomatte levels: object, material, asset.
   static constexpr uint32_t kCryptoLevels = 3;
-  /// Number of ids written per pixel; CryptoPixel counts up to kIds. An RGBA layer holds two, so
-  /// files have three layers per level.
+  /// Number of ids written per pixel; CryptoPixel counts up to kIds. An RGBA layer holds two ids
+  /// with their coverage, so files have three layers per level.
   static constexpr uint32_t kCryptoRanks = 6;
 
   const AovLayout& layout() const { return layout_; }
@@ -92,7 +93,7 @@ class AovFilm {
       crypto_[1][pixel].add(tables.material_id[material]);
   }
 
-  /// Sums of the deep image; empty if the render has none.
+  /// Sums of the deep image; empty if the render has no deep image.
   DeepFilm& deep() { return deep_; }
 
   // ---- light splats (contributions of light paths) ----------------------------------------------
@@ -122,11 +123,11 @@ class AovFilm {
   /// Returns the layer of an AOV and frees its sums.
   AovLayer take(Aov aov, const std::vector<uint32_t>& samples);
   /// Returns all stored layers that were not taken. Each AOV's sums are freed as soon as its layer
-  /// is complete. Layers of light groups are named "light_NAME", those of expressions "lpe_NAME".
+  /// is complete. Layers of light groups are named "light_NAME", layers of expressions "lpe_NAME".
   std::vector<AovLayer> finish(const std::vector<uint32_t>& samples,
                                const std::vector<std::string>& multi_layer_names) &&;
   size_t bytes() const;
-  /// Returns the deep image and frees its sums; empty if the render has none.
+  /// Returns the deep image and frees its sums; empty if the render has no deep image.
   DeepLayer take_deep(const std::vector<uint32_t>& samples);
   /// Calls block(name, values) for each vector of sums, for checkpoints. The sums of the deep image
   /// are not included; use DeepFilm::packed().

@@ -203,7 +203,7 @@ def varying(cells: Sequence[dict[str, Any]]) -> list[str]:
     The value of a factor is included if nothing else distinguishes cells. A renderer may have used
     less than the suite requested, for example if a wave is larger than the image.
     """
-    # settings shown in the heading, or implied by another setting
+    # columns that the heading already shows, or that follow from another column
     redundant = ("experiment", "height", "factor", "factor_value")
     names = [name for name in (*SETTINGS, "variant") if name not in redundant]
     differ = [n for n in names if len({str(cell.get(n, "")) for cell in cells}) > 1]

@@ -211,7 +211,8 @@ class BenchPanel(TakesFiles, QWidget):
 
     def _end_suite(self, code: int, text: str, error: str) -> None:
         self._measuring = False
-        if self._session.state != "stopped":  # In this state the user stopped the viewport.
+        # "stopped" means that the user stopped the viewport's render.
+        if self._session.state != "stopped":
             self._session.resume()
         self._enable(True)
         self.bar.setRange(0, max(self._runs, 1))

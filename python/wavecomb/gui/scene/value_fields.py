@@ -160,7 +160,7 @@ class NumberField(Field):
         self.row.addWidget(self.spin)
         self.finish()
         self._place(self.spin.value())
-        # The range of the values alone would make the field wider.
+        # Set a fixed width, because Qt would size the field for the largest possible value.
         widest = max(f"{bounds.soft_high:.{bounds.decimals}f}", "-0.000", key=len)
         text = self.spin.fontMetrics().horizontalAdvance(widest)
         self.spin.setFixedWidth(max(text + theme.em(2.2), theme.em(5)))

@@ -193,7 +193,7 @@ def opposite(pose: Pose, pivot: Vector, up_axis: str) -> Pose:
 def _framed(pose: Pose, axes: Matrix, points: Matrix, aspect: float) -> Pose:
     low, high = points.min(axis=0), points.max(axis=0)
     centre = 0.5 * (low + high)
-    if pose.projection == "latlong":  # such a camera sees everything from the centre
+    if pose.projection == "latlong":  # a latlong camera at the centre sees all points
         return _placed(pose, axes, centre)
     x0, x1, y0, y1 = pose.fitted(round(1000 * aspect), 1000)
     half = 0.5 * (x1 - x0), 0.5 * (y1 - y0)

@@ -280,7 +280,8 @@ def become_child(given: str) -> None:
 
 def _become_expendable(parent: int, page: int, words: int) -> None:
     os.setpgid(0, 0)
-    # Outside of the terminal's foreground group, writing must not stop the process.
+    # Ignore SIGTTOU, so that writing to the terminal from outside its foreground process group does
+    # not stop the process.
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
     end_with_parent(parent)
     progress_notes.start(page)

@@ -269,7 +269,7 @@ class Strands:
         end = base + step * self.segments
         out[end] = points[step][last]
         if lead:
-            # Both strands get the same point, bit for bit.
+            # Start and end of a closed curve get bit-identical points.
             out[end] = points[0][first]
             out[base - 1] = points[step - 1][last]
             out[end + 1] = points[1][first]

@@ -124,7 +124,7 @@ def _expand_c(vertical: Floats, horizontal: Floats, candela: Floats) -> IesProfi
 
     def mirrored(about: float) -> None:
         nonlocal horizontal, candela
-        # This mirrors all vertical planes except the plane of symmetry itself.
+        # Mirror all vertical planes except the plane of symmetry itself.
         inner = slice(-2, None, -1)
         horizontal = np.append(horizontal, 2 * about - horizontal[inner])
         candela = np.append(candela, candela[inner], axis=0)

@@ -329,7 +329,8 @@ class TextureTable:
         return pixels
 
     def _add(self, path: str, image: Image, space: str, wrap_s: str, wrap_t: str) -> int:
-        # Pixels are released once they are in the scene; a second use reads the file again.
+        # The pixels were released once they were in the scene; for a second use, the file is read
+        # again.
         here = image if image.is_here else read_image(path)
         pixels = self._as_stored(path, here, space, (wrap_s, wrap_t))
         if self.store is not None:
@@ -338,7 +339,7 @@ class TextureTable:
             return self._builder.add_texture(
                 pixels, srgb=space == CURVE, wrap_s=wrap_s, wrap_t=wrap_t, name=path
             )
-        # The texture store has no room for the texture.
+        # add_texture() raises ValueError if the texture store has no room.
         except ValueError as error:
             raise WavecombError(str(error)) from None
         finally:

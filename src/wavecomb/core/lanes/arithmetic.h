@@ -62,8 +62,8 @@ inline F clamp(const F& x, const F& lo, const F& hi) {
   return min(max(x, lo), hi);
 }
 
-/// Returns a b + c, rounded once if the target has FMA and twice otherwise; the same for scalars
-/// and packets.
+/// Returns a b + c, rounded once if the target has FMA and twice otherwise. Scalars and packets
+/// give the same result.
 template <LaneValue F>
 inline F fma(const F& a, const std::type_identity_t<F>& b, const std::type_identity_t<F>& c) {
 #if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
@@ -168,7 +168,7 @@ template <typename M>
 inline uint32_t mask_bits(const M& m) {
   if constexpr (requires { m.k; }) {
     return static_cast<uint32_t>(m.k) & ((1u << M::Size) - 1u);
-  } else if constexpr (requires { m.a1; }) {  // the packet consists of two halves
+  } else if constexpr (requires { m.a1; }) {  // Dr.Jit splits a wide packet into two halves
     return mask_bits(m.a1) | (mask_bits(m.a2) << M::Size1);
   } else {
 #if defined(__aarch64__)

@@ -32,8 +32,8 @@ inline void store(void* p, const T& value) {
 }
 
 namespace detail {
-/// Copy of a packet's lanes in memory. Replaces Dr.Jit's entry(), which reads integer registers
-/// through a pointer that may not alias them; GCC 12 miscompiles this.
+/// Copy of a packet's lanes in memory. Replaces Dr.Jit's entry(), which violates strict aliasing
+/// when it reads integer registers, so that GCC 12 miscompiles it.
 template <typename T>
 struct InMemory {
   using Value = std::conditional_t<
@@ -50,7 +50,7 @@ struct InMemory {
 template <typename T, typename Index, typename M>
 inline T gather_words(const void* base, const Index& index, const M& active) {
 #if defined(__AVX2__)
-  if constexpr (requires { active.a1; })  // consists of two halves
+  if constexpr (requires { active.a1; })  // Dr.Jit splits a wide packet into two halves
     return T(gather_words<typename T::Array1>(base, drjit::low(index), active.a1),
              gather_words<typename T::Array2>(base, drjit::high(index), active.a2));
   else

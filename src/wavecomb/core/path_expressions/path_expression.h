@@ -37,7 +37,7 @@ inline constexpr uint32_t kDiffuseEvent = 0, kGlossyEvent = 1, kSingularEvent = 
 /// Emitter at the end of a path: a light, a dome light, or an emissive object or volume.
 enum class PathEnd : uint32_t { kLight, kBackground, kObject, kVolume };
 inline constexpr uint32_t kPathEnds = 4;
-/// Returns the index of an end whose light belongs to group `key`.
+/// Returns the index of a path end whose light belongs to light group `key`.
 constexpr uint32_t path_end(PathEnd end, uint32_t key) {
   return kPathEnds * key + static_cast<uint32_t>(end);
 }
@@ -57,7 +57,7 @@ struct PathAutomaton {
   PathAutomaton(std::span<const NamedExpression> expressions, std::span<const std::string> keys);
 
   uint32_t expressions = 0;       ///< number of expressions
-  uint32_t ends = 0;              ///< number of path_end() indices
+  uint32_t ends = 0;              ///< number of path ends, as indexed by path_end()
   std::vector<uint32_t> next;     ///< [state][event], kNextWords per state
   std::vector<uint32_t> matched;  ///< [state][end]: one bit per expression
   uint32_t states() const { return static_cast<uint32_t>(next.size() / kNextWords); }

@@ -128,7 +128,7 @@ WAVECOMB_INLINE uint32_t word_of(Member Record::* member) {
   return static_cast<uint32_t>((address(kRecord.*member) - address(kRecord)) / 4);
 }
 
-/// Returns the words of a row, by lane, for store_rows. Words beyond the fields are 0.
+/// Returns the words of a row, by lane, for store_rows. Words after the last field are 0.
 template <template <typename> class Row, typename F>
 WAVECOMB_INLINE std::array<F, kRowWords<Row>> words_of_row(const Row<F>& row) {
   static_assert(sizeof(Row<float>) == 4 * kFieldWords<Row>, "WAVECOMB_FIELDS lists all fields");
@@ -158,7 +158,7 @@ struct IsHead<std::tuple<H&...>, std::tuple<R&...>> {
 
 }  // namespace detail
 
-/// True if the first fields of Row are those of Head.
+/// Whether the row type Row begins with the fields of the row type Head.
 template <template <typename> class Head, template <typename> class Row>
 inline constexpr bool kIsHead =
     detail::IsHead<decltype(std::declval<Head<float>&>().fields()),
