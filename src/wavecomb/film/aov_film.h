@@ -148,14 +148,15 @@ class AovFilm {
   static uint32_t level_index(Aov level) {
     return aov_index(level) - aov_index(Aov::kCryptoObject);
   }
-  /// Number of values per pixel in the sums of an AOV.
+  /// Returns the number of values per pixel in the sums of an AOV.
   size_t words_of(const AovRow& row) const {
     if (row.kind == AovKind::kGroups) return 3 * layout_.light_groups;
     if (row.kind == AovKind::kMedian) return MedianSketch::kWords;
     return row.kind == AovKind::kExpressions ? 3 * layout_.expressions : row.channels;
   }
   AovLayer crypto_layer(Aov level, const std::vector<uint32_t>& samples) const;
-  /// Returns layer `which` of the light groups or of the expressions.
+  /// Returns layer `which` of the AOV with all light groups, or of the AOV with all light path
+  /// expressions.
   AovLayer multi_layer(Aov aov, uint32_t which, std::string name,
                        const std::vector<uint32_t>& samples) const;
   /// Calls layer(aov, which, name) for each stored light group and expression.
@@ -173,7 +174,7 @@ class AovFilm {
   AovLayout layout_;
   LightSplatLayout light_splat_layout_;
   size_t pixels_ = 0;
-  // Indexed by aov_index(aov); empty if the AOV is not stored.
+  // Pixel values of each AOV, indexed by aov_index(aov); empty if the AOV is not stored.
   std::array<std::vector<double>, kAovCount> sums_;
   std::array<std::vector<float>, kAovCount> nearest_;
   std::array<std::vector<CryptoPixel>, kCryptoLevels> crypto_;
@@ -181,7 +182,7 @@ class AovFilm {
                            ///< light splats
   LightSplatScale light_splat_scale_;
   DeepFilm deep_;
-  std::vector<uint32_t> hits_;  ///< number of samples that hit something
+  std::vector<uint32_t> hits_;  ///< number of samples per pixel that hit something
   std::vector<float> centre2_;  ///< squared distance of the nearest sample to the centre, pixels^2
 };
 

@@ -57,11 +57,11 @@ class Cascades {
  private:
   using Layer = std::array<float, 3>;
   using Sum = std::array<Layer, kLayers>;
-  /// Luminance of each layer, of one pixel or summed over several.
+  /// Luminance of each layer, for one pixel or summed over several pixels.
   using Levels = std::array<float, kLayers>;
 
-  /// Returns r_i of `layer` from the layers of the pixel (`own`) and the sums over its
-  /// neighbourhood (`around`, of `pixels` pixels with `samples_around` samples).
+  /// Returns the reliability r_i of `layer`. `own` holds the layers of the pixel, `around` their
+  /// sums over its neighbourhood of `pixels` pixels with `samples_around` samples.
   float kept_fraction(const Levels& own, const Levels& around, float pixels, float samples,
                       float samples_around, uint32_t layer) const;
 

@@ -11,8 +11,8 @@
 /// N, the flat colour of everything that covers the pixel; the composited alpha is the covered
 /// fraction.
 ///
-/// Memory is bounded by `most` bins per pixel. If a sample would exceed that, the two neighbouring
-/// bins with the smallest joint extent relative to their depth are merged.
+/// Memory is bounded by `most` bins per pixel. If a sample would exceed this limit, the two
+/// neighbouring bins whose joint depth range is smallest relative to its depth are merged.
 #pragma once
 
 #include <cstddef>
@@ -36,7 +36,7 @@ struct DeepBin {
 };
 
 /// Allocator of zeroed memory that uses calloc, so that untouched pages take no physical memory.
-/// For types whose default value is all zero bytes.
+/// Suitable only for types whose default value is all zero bytes.
 template <typename T>
 struct ZeroedMemory {
   using value_type = T;
@@ -81,10 +81,10 @@ class DeepFilm {
   void add(size_t pixel, float z, bool in_volume, const float* rgb);
   /// Returns the deep samples of all pixels. `samples`: sample count of each pixel.
   DeepLayer layer(const std::vector<uint32_t>& samples) const;
-  /// Returns the state for checkpoints: one byte per pixel with its number of bins, then the bins
-  /// in use, pixel by pixel.
+  /// Returns the state of the deep image for checkpoints: one byte per pixel with its number of
+  /// bins, then the bins in use, pixel by pixel.
   std::vector<std::byte> packed() const;
-  /// Restores the state from packed() bytes. Throws Error if they do not fit this image.
+  /// Restores the state from packed() bytes. Throws Error if the bytes do not fit this image.
   void unpack(std::span<const std::byte> bytes);
   /// Upper bound of the memory use in bytes.
   size_t bytes() const { return used_.size() * (1 + limits_.most * sizeof(DeepBin)); }
@@ -96,7 +96,8 @@ class DeepFilm {
 
   DeepLimits limits_;
   std::vector<uint8_t> used_;  ///< number of bins in use, by pixel
-  /// Bin 0 of all pixels, then bin 1 and so on. Higher bins that few pixels reach stay unmapped.
+  /// Bin 0 of all pixels, then bin 1 of all pixels, and so on, so that the memory of bins that no
+  /// pixel uses stays unmapped.
   std::vector<DeepBin, ZeroedMemory<DeepBin>> bins_;
 };
 

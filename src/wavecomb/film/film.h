@@ -17,11 +17,12 @@
 
 namespace wavecomb {
 
-/// Sums of samples per pixel, in double precision so that 65,536 samples stay exact to float.
+/// Sums of samples per pixel, in double precision, so that the mean of 65,536 samples is exact to
+/// float precision.
 ///
 /// Contract: at most one thread writes to a pixel at a time and adds its samples in sample order;
 /// different pixels may be written concurrently. Light splats may be added by any thread in any
-/// order. Row 0 is the top of the window; coordinates (x, y) are those of the whole image.
+/// order. Row 0 is the top of the window; coordinates (x, y) refer to the whole image.
 class Film {
  public:
   /// Creates a film for the pixels of `window`. `with_error`: also stores sums for error and
@@ -44,18 +45,18 @@ class Film {
   bool has_error() const { return !errors_.empty(); }
   Pixel& pixel(uint32_t x, uint32_t y) { return pixels_[index(x, y)]; }
   ErrorSums& error(uint32_t x, uint32_t y) { return errors_[index(x, y)]; }
-  /// Allocates sums for light splats in units of `unit`, for `paths` light path indices of which
-  /// each stands for `scale` light paths per sample. The beauty then is the sum of pixel means and
-  /// splat means; AOVs get splat sums as well.
+  /// Allocates sums for light splats in units of `unit`, for `paths` light path indices, each of
+  /// which represents `scale` light paths per sample. The beauty is then the sum of pixel means and
+  /// splat means. AOVs that include light splats also get splat sums.
   void allocate_light_splats(FixedPoint unit, size_t paths = 0, double scale = 1) {
     splats_ = LightSplatLayer(pixels_.size(), unit, paths, scale, has_error());
     aovs_.allocate_light_splats(unit);
   }
-  /// Allocates a row of `words` floats per pixel, which a joint transport keeps between the camera
-  /// paths and its own paths of a pass.
+  /// Allocates a row of `words` floats per pixel, in which a transport that combines camera and
+  /// light paths keeps data between the camera paths and the light paths of a pass.
   void allocate_joint_rows(size_t words) { joint_rows_.assign(pixels_.size() * words, 0.f); }
   std::span<const float> joint_rows() const { return joint_rows_; }
-  /// Sets the row of pixel `i`.
+  /// Sets the joint transport's row of pixel `i`.
   void set_joint_row(size_t i, std::span<const float> row) {
     std::copy(row.begin(), row.end(), joint_rows_.data() + i * row.size());
   }
@@ -107,22 +108,24 @@ class Film {
   /// Returns the sample count of each pixel.
   std::vector<uint32_t> samples() const;
   /// Returns the variance of each pixel's mean, rgb, under the assumption of independent samples.
-  /// Infinite for pixels with fewer than two samples; empty without error sums.
+  /// The variance is infinite for pixels with fewer than two samples; the result is empty if the
+  /// film has no error sums.
   std::vector<float> variance() const;
 
-  /// Named memory block of the film's state. Copying all blocks to a film of the same size and
-  /// layout restores it from a checkpoint. Deep samples are not included.
+  /// Named memory block of the film's state. To restore a film from a checkpoint, copy all blocks
+  /// to a film of the same size and layout. Deep samples are not included.
   struct Block {
     std::string name;
     std::span<std::byte> bytes;
   };
   std::vector<Block> blocks();
 
-  /// Final layers of a render; empty if not stored.
+  /// Final layers of a render. Layers that are not stored are empty.
   struct Layers {
     std::vector<float> beauty, albedo, normal, depth, variance;
     std::vector<uint32_t> samples;
-    std::vector<AovLayer> aovs;  ///< AovFilm::finish, plus "unbiased" if beauty is reweighted
+    /// Layers of AovFilm::finish, and the layer "unbiased" if fireflies are reduced.
+    std::vector<AovLayer> aovs;
     DeepLayer deep;
   };
   /// Returns all layers and ends the film. Sums are freed as soon as they are used, because sums

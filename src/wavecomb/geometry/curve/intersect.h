@@ -48,7 +48,7 @@ struct SubSegment {
   uint32_t node = 1;
 };
 
-/// Type of query: the first hit, all hits, or whether there is any hit (u and v are then not
+/// Type of query: the first hit, all hits, or whether there is any hit (for which u and v are not
 /// computed).
 enum class CurveQuery { kFirst, kAll, kAny };
 
@@ -57,9 +57,9 @@ Bounds curve_bounds(const Mesh& mesh, uint32_t prim, uint32_t step = 0);
 
 /// Returns hits with 0 < t <= tfar, t in units of |dir|, on the outside and inside of a primitive
 /// of a mesh of curves or points. End caps of tubes that lie inside the adjoining segment are not
-/// hit. `time`: in [0, 1] over the mesh's motion steps. `outside`: skips hits from inside. Includes
-/// all hits on the given sub-segment and possibly others of its segment; hits are bit-identical to
-/// those of the whole segment.
+/// hit. `time`: in [0, 1] over the mesh's motion steps. If `outside`, hits on the inside of tubes
+/// are skipped. Returns all hits on the given sub-segment and possibly further hits on its segment;
+/// hits are bit-identical to the hits of a query for the whole segment.
 CurveHits intersect_curve(const Mesh& mesh, const SubSegment& sub_segment, const CurveRay& ray,
                           float tfar, CurveQuery query, float time = 0, bool outside = false);
 

@@ -9,8 +9,8 @@
 
 namespace wavecomb {
 
-/// Texture coordinates over a triangle: those of vertex 0, and the differences of the other
-/// vertices.
+/// Texture coordinates over a triangle: the coordinates of vertex 0, and the differences of the
+/// other two vertices from it.
 template <typename F>
 struct UvTriangle {
   Vec2<F> t0, d1, d2;
@@ -50,8 +50,8 @@ WAVECOMB_INLINE UvTriangle<F> uv_triangle(const MeshReader<F>& mesh,
 
 }  // namespace detail
 
-/// Returns the texture coordinates of a hit at (u, v) of primitive `prim`, the same as
-/// setup_surface computes.
+/// Returns the texture coordinates of a hit at (u, v) of primitive `prim`, as setup_surface()
+/// computes them.
 template <typename F>
 inline Vec2<F> hit_uv(const MeshRecord* meshes, const UInt<F>& mesh, const UInt<F>& prim,
                       const F& u, const F& v, const Mask<F>& active) {
