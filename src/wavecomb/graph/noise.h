@@ -10,7 +10,7 @@
 
 namespace wavecomb::noise {
 
-/// Clamps x so that its floor and neighbouring cells fit an integer; NaN becomes 0.
+/// Clamps x so that its floor and the indices of neighbouring cells fit an integer; NaN becomes 0.
 template <typename F>
 inline F bounded(const F& x) {
   return clamp(select(x == x, x, F(0.f)), F(-1e9f), F(1e9f));
@@ -56,7 +56,8 @@ inline U hash(const U (&words)[N]) {
 /// Converts 32 bits to a float in [0, 1].
 template <typename F>
 inline F unit_of(const UInt<F>& bits) {
-  // Converts two 16-bit halves exactly, which avoids an unsigned conversion.
+  // Convert the two 16-bit halves separately, which is exact and avoids a slow conversion of
+  // unsigned integers.
   const F high = F(Int<F>(bits >> 16)), low = F(Int<F>(bits & 0xffffu));
   return fma(high, F(65536.f), low) * (1.f / 4294967296.f);
 }
@@ -79,7 +80,7 @@ inline F gradient(const UInt<F>& h, const F (&p)[2]) {
   const F u = select(swap, p[1], p[0]), v = select(swap, p[0], p[1]);
   return signed_by<F>(u, h, 0) + signed_by<F>(F(2.f * v), h, 1);
 }
-/// Scalar product with one of 12 gradients, towards the edges of a cube.
+/// Scalar product with one of 12 gradients, which point to the edge midpoints of a cube.
 template <typename F>
 inline F gradient(const UInt<F>& hash, const F (&p)[3]) {
   using U = UInt<F>;
@@ -147,13 +148,14 @@ inline F cell(const F (&p)[N], uint32_t k) {
   return unit_of<F>(hash(at));
 }
 
-/// Distances to the three nearest feature points, ascending, and the value of the nearest one's
-/// cell.
+/// Distances to the three nearest feature points in ascending order, and the hashed value of the
+/// cell with the nearest feature point.
 template <typename F>
 struct Worley {
   F nearest[3], cell;
 };
-/// Evaluates Worley noise in N dimensions. A `jitter` of 0 puts the points at the cell centres.
+/// Evaluates Worley noise in N dimensions. A `jitter` of 0 puts the feature points at the cell
+/// centres.
 template <typename F, size_t N>
 inline Worley<F> worley(const F (&p)[N], const F& jitter) {
   using U = UInt<F>;

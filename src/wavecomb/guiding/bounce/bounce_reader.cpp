@@ -75,8 +75,8 @@ void BounceReader::read(const PathHistory& history, uint32_t slot, const Color<f
             is_bright && !is_black_path ? double{contribution} : 0.0, 1,
             plan_.costs.vertex(v.material)};
     if (count + 1 >= plan_.roulette_depth) {
-      // Throughput over image brightness of a path that reached the vertex, divided by its survival
-      // probability.
+      // Throughput of a path that reached the vertex, divided by the image brightness and by the
+      // path's survival probability.
       const double share = double{arrived} * double{inverse_scale} / reached;
       step.survival = guiding.known
                           ? double{efficient_survival<float>(guiding, static_cast<float>(share))}

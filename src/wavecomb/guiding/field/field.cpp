@@ -19,15 +19,15 @@ namespace {
 constexpr size_t kCellRecords = 2048;
 /// Minimum number of records for a region to get a separate distribution.
 constexpr double kMinRegionRecords = 64;
-/// Maximum number of records from which the directions of a cell are computed.
+/// Maximum number of records from which the direction distribution of a cell is computed.
 constexpr size_t kDirections = 8192;
-/// Weight of the parent cell's distribution and moments, in records.
+/// Weight of the parent cell's distribution and moments, as an equivalent number of records.
 constexpr double kPrior = 64;
-/// Minimum number of records of a material before it limits guiding.
+/// Minimum number of records of a material for which a minimum of bsdf_share is computed.
 constexpr double kMaterialRecords = 512;
-/// Factor on the survival probability of roulette. Moments from few training paths miss rare light,
-/// and a path that is terminated too often makes a bright pixel, while one that continues too often
-/// costs a few rays.
+/// Factor on the survival probability of roulette. Moments from few training paths miss rare light.
+/// Terminating such paths too often causes bright pixels, while continuing them too often costs
+/// only a few rays.
 constexpr double kSafety = 1.5;
 /// Fraction of bounces that the BSDF samples in the first round, before moments are known.
 constexpr float kFirstShare = 0.5f;
@@ -101,13 +101,14 @@ class GuidingFieldBuilder {
   }
 
  private:
-  /// Statistics of the records of one cell whose surfaces face one axis.
+  /// Statistics of the records of a cell on surfaces that face one axis direction.
   struct RegionPart {
-    DirectionBins density{};  ///< density by direction, whose sum is 1, or 0 if nothing is known
+    /// Weights of direction bins, which sum to 1, or are all 0 without data.
+    DirectionBins density{};
     double count = 0;
-    ParallaxSphere sphere;  ///< centre of the directions of `density`
+    ParallaxSphere sphere;  ///< sphere from whose centre the directions of `density` are measured
     ShareMoments moments;
-    uint32_t region = kNoGuidingRegion;  ///< once created
+    uint32_t region = kNoGuidingRegion;  ///< region of the guiding field, once created
   };
   using Cell = std::array<RegionPart, kGuidingAxes>;
 
@@ -124,8 +125,8 @@ class GuidingFieldBuilder {
         parts_.material_share[m] = kBsdfShares[moments[m].best()];
   }
 
-  /// Returns the clamp for values: sqrt(n) times the mean of n values, so that no single one
-  /// dominates.
+  /// Returns the limit to which values are clamped, so that no single value dominates: sqrt(n)
+  /// times the mean of n values.
   static double largest(std::span<const TrainingRecord> records) {
     double sum = 0;
     for (const TrainingRecord& r : records) sum += double{r.value};
@@ -165,7 +166,7 @@ class GuidingFieldBuilder {
   }
 
   /// Returns the region of a cell and axis. A cell with too few records uses the region of the
-  /// nearest ancestor with enough, or kNoGuidingRegion.
+  /// nearest ancestor with enough records, or kNoGuidingRegion if there is none.
   uint32_t region_of(uint32_t depth, uint32_t axis) {
     RegionPart& part = levels_[depth][axis];
     if (part.count < kMinRegionRecords)
@@ -230,7 +231,7 @@ class GuidingFieldBuilder {
     }
   }
 
-  /// Writes `entry` to all grid entries that the node covers.
+  /// Writes `entry` to all grid entries that the octree node covers.
   void fill(uint32_t depth, uint32_t code, uint32_t entry) {
     const uint32_t x = compact_bits_3(code), y = compact_bits_3(code >> 1),
                    z = compact_bits_3(code >> 2);
@@ -301,11 +302,12 @@ void GuidingField::compute_survival(std::span<const BounceSample> training_sampl
     double count = 0, squared = 0, cost = 0;
   };
   const size_t regions = parts_.bsdf_share.size();
-  std::vector<Sums> sums(regions + 1);  // the last one: all regions
+  std::vector<Sums> sums(regions + 1);  // the last element is for all regions
   parts_.survival.assign(regions, 0.f);
   const auto add = [](Sums& s, const BounceSample& sample) {
     s.count += 1;
-    // Not clamped as values are: a region whose light varies strongly should terminate few paths.
+    // Do not clamp second moments as field values are clamped, since a region whose light varies
+    // strongly should terminate few paths.
     if (std::isfinite(sample.squared)) s.squared += double{sample.squared};
     s.cost += double{sample.cost};
   };
