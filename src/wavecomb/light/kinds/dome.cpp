@@ -25,7 +25,7 @@ void set_axes(LightRecord& record, const Affine& m) {
   put(record.n, z);
 }
 
-/// Adds the sampling distribution of the image. Returns the mean luminance of the image.
+/// Adds the sampling distribution of the dome's image. Returns the image's mean luminance.
 double add_image(LightRecord& record, LightBuildContext& context) {
   Distribution2D d = density_of(record, context, &build_dome_distribution);
   const double mean = d.mean_luminance;

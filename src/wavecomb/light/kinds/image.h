@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Sampling of image points by a Distribution2D, and their density, for all lights with an image
-/// that maps to the unit square.
+/// Sampling of image points with a Distribution2D, and the density of these points, for all lights
+/// with an image that maps to the unit square.
 ///
-/// x is s, to the right; y points down from the top row, so it is 1 - t.
+/// The image coordinate x equals s and points to the right; y points down from the top row, so y =
+/// 1 - t.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +13,8 @@
 
 namespace wavecomb::detail {
 
-/// Interval `index` of a row: its start, and its number of counts out of the row's 65536.
+/// Interval with index `index` of a row of a Distribution2D: its start, and its number of counts
+/// out of the row's 65536.
 template <typename F>
 struct Interval {
   UInt<F> index, begin, count;
