@@ -141,7 +141,7 @@ inline KindHit<F> hit_cylinder(const LightReader<F>& light, const Vec3<F>& origi
           select(front, cylinder_pdf<F>(c, size), F(0.f))};
 }
 
-/// Samples a path from a point uniform over the outer surface.
+/// Samples a light path that starts uniformly on the outer surface of the cylinder.
 template <typename F>
 inline KindEmission<F> emit_cylinder(const EmissionQuery<F>& q) {
   const LightReader<F>& light = q.light;

@@ -28,7 +28,7 @@ inline KindHit<F> hit_disk(const LightReader<F>& light, const Vec3<F>& dir, cons
           area_to_solid_angle<F>(F(t * t), cos_light, light.area())};
 }
 
-/// Samples a path from a point uniform over the disk.
+/// Samples a light path that starts uniformly on the disk.
 template <typename F>
 inline KindEmission<F> emit_disk(const EmissionQuery<F>& q) {
   const LightReader<F>& light = q.light;
