@@ -11,9 +11,9 @@
 /// estimates the number of samples of similar brightness. C_i is the mean of c_i over the 3 x 3
 /// neighbourhood of pixels. A layer is trusted if it has enough samples, or if one of its samples
 /// changes the result little:
-///   r_i = max(((C_i < 1 ? C_i : c_i) - 1) / kappa,   n I_i / (tau B_i)),   clamped to [0, 1],
-/// where I_i is the mean brightness of all layers below i in the 3 x 3 neighbourhood. The removed
-/// energy,
+///   r_i = max((k_i - 1) / kappa,   n I_i / (tau B_i)),   clamped to [0, 1],
+/// where k_i is C_i if C_i < 1 and c_i otherwise, and I_i is the mean brightness of all layers
+/// below i in the 3 x 3 neighbourhood. The removed energy,
 ///   sum_i (1 - r_i) S_i / n,
 /// tends to 0 as n grows. Layer 0 is always kept in full.
 #pragma once

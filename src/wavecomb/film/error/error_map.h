@@ -16,13 +16,14 @@ inline constexpr uint32_t kErrorWindow = 2;
 
 /// Error estimates of an image.
 struct ErrorMap {
-  /// Error of each pixel: the mean over the window of e = sum over rgb |I - A| / sqrt(sum over rgb
-  ///   I) with I the mean of all samples and A the mean of one half of them (Dammertz, Hanika and
-  ///   Keller, "A Hierarchical Automatic Stopping Condition for Monte Carlo Global Illumination",
-  ///   WSCG 2010, equation 1). With light splats, I and A include the splats, and A includes only
-  ///   the splats of one half. For independent samples |I - A| is distributed like |I - truth|. The
-  ///   error is infinite if no pixel of the window has an estimate yet; pixels that are not finite
-  ///   count as 0.
+  /// Error of each pixel: the mean over the window of
+  ///   e = sum over rgb |I - A| / sqrt(sum over rgb I),
+  /// with I the mean of all samples and A the mean of one half of them (Dammertz, Hanika and
+  /// Keller, "A Hierarchical Automatic Stopping Condition for Monte Carlo Global Illumination",
+  /// WSCG 2010, equation 1). With light splats, I and A include the splats, and A includes only the
+  /// splats of one half. For independent samples |I - A| is distributed like |I - truth|. The error
+  /// is infinite if no pixel of the window has an estimate yet; pixels that are not finite count as
+  /// 0.
   std::vector<float> error;
   /// Mean relative error of the image, sum |I - A| / sum I over all pixels and channels; infinite
   /// if no pixel has an estimate yet.

@@ -3,11 +3,11 @@
 ///
 /// The matrix W, the inverse of scale and orientation, transforms offsets from the splat's centre
 /// to units of standard deviations. A ray o + t d hits a Gaussian splat where its response is
-/// greatest, at t = -(W o . W d) / |W d|^2. The offset of this point is w = W o + t W d in standard
-/// deviations. The splat is present with probability
+/// greatest, at t = -dot(W o, W d) / |W d|^2. The offset of this point is w = W o + t W d in
+/// standard deviations. The splat is present with probability
 ///   alpha = opacity exp(-|w|^2 / 2),
-/// and can be hit where |w| <= 3 and alpha >= 1/255. w is perpendicular to Wd; the hit's (u, v) are
-/// the components of w along the axes of gaussian_splat_frame().
+/// and can be hit where |w| <= 3 and alpha >= 1/255. w is perpendicular to W d; the hit's (u, v)
+/// are the components of w along the axes of gaussian_splat_frame().
 #pragma once
 
 #include <span>

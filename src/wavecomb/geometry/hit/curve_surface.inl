@@ -38,7 +38,7 @@ inline CurvedPoint<F> tube_point(const CurveSegment<F>& s, const F& u, const F& 
 }
 
 /// Returns the point of a ribbon at (u, v). The derivative of its unit width direction b = B / |B|
-/// with B = c' x n is (B' - b (b . B')) / |B|.
+/// with B = c' x n is (B' - b dot(b, B')) / |B|.
 template <typename F>
 inline CurvedPoint<F> ribbon_point(const CurveSegment<F>& s, const F& u, const F& v) {
   const CurvePoint<F> at = curve_point<F>(s, u);

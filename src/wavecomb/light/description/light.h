@@ -67,7 +67,8 @@ struct LightFilter {
   /// smoothstep(a x + b y + c) of the light.
   std::array<Vec3<float>, 4> sides{
       {{0.f, 0.f, 1.f}, {0.f, 0.f, 1.f}, {0.f, 0.f, 1.f}, {0.f, 0.f, 1.f}}};
-  /// Gobo image on the window, looked up at u = picture_u . (x, y, 1), v = picture_v . (x, y, 1).
+  /// Gobo image on the window, looked up at u = dot(picture_u, (x, y, 1)), v = dot(picture_v, (x,
+  /// y, 1)).
   uint32_t texture = kNoTexture;
   Vec3<float> picture_u{1, 0, 0.5f}, picture_v{0, 1, 0.5f};
   /// Distance ramps: light rises from 0 at near_start to its full value at near_end, and falls from

@@ -21,11 +21,10 @@ struct InstanceRecord;
 ///   disk      p centre, u, v half axes, n, area
 ///   sphere    p centre, radius (0: a point light, radiance is then radiant intensity), area
 ///   cylinder  p centre of one end, u axis to the other end, radius, area
-///   distant   n unit direction in which light travels, one_minus_cos of its half angle (0: a
-///   single
-///             direction, radiance is then irradiance at normal incidence)
+///   distant   n unit direction in which light travels, one_minus_cos of the cone's half angle (0:
+///             a single direction, radiance is then irradiance at normal incidence)
 ///   dome      u, v, n: world axes of the dome's local x, y, z
-///   triangle  an instance of a mesh light: the values that its triangles share. radiance is the
+///   triangle  values that the triangles of a mesh light instance share: radiance, which is the
 ///             emitted radiance for kIndependent, else a factor of the material's emission; area
 struct alignas(64) LightRecord {
   float p[3], u[3], v[3], n[3];

@@ -5,7 +5,7 @@
 /// window, the plane z = -distance, at w = x + e (distance + x_z) / -e_z. The radiance is
 /// multiplied by the factors
 ///   doors     product over four sides of smoothstep(a w_x + b w_y + c)
-///   picture   texel at (u . (w_x, w_y, 1), v . (w_x, w_y, 1))
+///   picture   texel at (dot(u, (w_x, w_y, 1)), dot(v, (w_x, w_y, 1)))
 ///   decay     clamped functions of the distance d to the illuminated point:
 ///             near (d - near_start) / (near_end - near_start),
 ///             far 1 - (d - far_start) / (far_end - far_start)

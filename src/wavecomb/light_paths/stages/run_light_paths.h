@@ -52,10 +52,11 @@ void run_light_paths(Wave& wave, const WaveContext& context, const WaveTask& tas
   run_stages<F>(wave, context, task, LightPathStages<F>());
 }
 
-/// Stages that waves of camera paths run for light paths (NoJointStages in wave/run_wave.h).
+/// Additional wave stages of camera paths in renders with light paths (the counterpart of
+/// NoJointStages in wave/run_wave.h).
 template <typename F>
 struct LightPathJointStages {
-  /// Traces the light paths whose vertices the camera paths of the task connect to.
+  /// Traces the light paths to whose vertices the camera paths of the task connect.
   static void begin(Wave& wave, const WaveContext& context, const WaveTask& task) {
     LightPathBuffers& light = wave.joint;
     if (light.merge_points) light.merge_points.clear(task.path_count());
