@@ -24,7 +24,7 @@ VENV := .venv/bin
 # Native libraries in the wheels of make wheels: portable, or a list of instruction sets as in
 # WAVECOMB_ISAS.
 ISAS ?= portable
-# Options of make fuzz.
+# Options of the target fuzz.
 MINUTES ?= 10
 SEED ?= 1
 JOBS ?= $(shell nproc 2> /dev/null || echo 2)
@@ -63,7 +63,8 @@ lanes:
 build/.lanes: lanes
 	@mkdir -p build; [ "$$(cat $@ 2> /dev/null)" = "$(LANES)" ] || echo "$(LANES)" > $@
 
-# pip configures, builds and installs once. After an edit of a source, CMake alone is faster.
+# The first build uses pip, which configures, builds and installs the package. After an edit of a
+# source file, building with CMake alone is faster.
 build/.configured: build/.setup build/.lanes $(CMAKE_INPUTS) pyproject.toml $(wildcard .deps/openvdb/.complete)
 	@echo "build: configuring"
 	@$(LOCK) $(VENV)/python -m pip install -q --no-build-isolation --no-deps -e . --config-settings=build-dir=$(BUILD) \

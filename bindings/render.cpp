@@ -110,7 +110,8 @@ class PythonPolicy final : public SchedulingPolicy {
     std::copy(values.begin(), values.end(), own);
     return owned<const T>(own, values.size());
   }
-  /// Converts the result of order() to bool. Throws Error for other types.
+  /// Converts the result of order(), which must be a Python or NumPy bool. Throws Error for values
+  /// of another type.
   bool truth(const nb::object& result) const {
     const auto type = nb::cast<std::string>(result.type().attr("__name__"));
     if (type != "bool" && type != "bool_")

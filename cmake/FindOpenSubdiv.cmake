@@ -4,8 +4,8 @@
 #
 # OpenSubdiv_ROOT: an additional folder to search.
 # OpenSubdiv_NEEDS_OPENMP: set if the library is linked with libgomp.
-# OpenSubdiv_SOURCE: folder of its sources. The required parts are then compiled with Wavecomb's
-# flags, for another CPU or standard library than the distribution's.
+# OpenSubdiv_SOURCE: folder of OpenSubdiv's sources. The required parts are then compiled with
+# Wavecomb's flags, for another CPU or standard library than the distribution's.
 
 # _osd_version(FOLDER): sets OpenSubdiv_VERSION from the headers in FOLDER.
 function(_osd_version folder)

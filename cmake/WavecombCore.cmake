@@ -12,8 +12,8 @@ function(wavecomb_read_rows var file pattern)
   set(${var} ${rows} PARENT_SCOPE)
 endfunction()
 
-# Rows of WAVECOMB_PROGRAMS: "X(name, Class, ...)" or "P(name, Class, ...)". Each program has a
-# header with its name.
+# Rows of WAVECOMB_PROGRAMS: "X(name, Class, ...)" or "P(name, Class, ...)". Each shading program
+# has a header with the program's name.
 wavecomb_read_rows(programs material/description/programs.h "\n  [XP]\\([a-z_0-9]+, ")
 list(TRANSFORM programs REPLACE "^.*\\(([a-z_0-9]+), $" "\\1")
 file(GLOB program_headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/material/programs/*.h")
@@ -30,8 +30,8 @@ foreach(program IN LISTS program_headers)
       "(src/wavecomb/material/description/programs.h) has no row for it")
   endif()
 endforeach()
-# Programs of media: rows of WAVECOMB_MEDIUM_PROGRAMS, "M(name, Class, ...)". These kernels have no
-# separate compilation units.
+# Programs of media: rows of WAVECOMB_MEDIUM_PROGRAMS, "M(name, Class, ...)". Kernels of media
+# programs are not compiled in separate units.
 wavecomb_read_rows(media material/description/programs.h " M\\([a-z_0-9]+, ")
 list(TRANSFORM media REPLACE "^.*\\(([a-z_0-9]+), $" "\\1")
 # Variants as "name:program": first the full programs, then rows of WAVECOMB_VARIANTS, "X(name,
@@ -78,8 +78,8 @@ file(GLOB_RECURSE core_headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wave
 # For the core only. -Wconversion would also warn about int to float, which is common in kernels.
 set(core_warnings -Wfloat-conversion)
 
-# Third-party headers that nearly every unit includes. Parsing them is half of the compile time of a
-# small unit.
+# Third-party headers that nearly every unit includes. Parsing these headers takes half of the
+# compile time of a small unit.
 set(wavecomb_pch <algorithm> <array> <chrono> <cmath> <cstring> <functional> <limits> <memory> <numeric>
   <optional> <span> <string> <utility> <vector> <drjit/packet.h>)
 

@@ -10,7 +10,7 @@ include(CheckCXXSourceCompiles)
 set(WAVECOMB_LANE_WIDTHS "" CACHE STRING
   "Lane widths to build, of 1;4;8;16 (default: 1 and the widest that the target has); all: every width it has")
 
-# Options for every instruction set.
+# Compile options for all instruction sets.
 add_library(wavecomb_common INTERFACE)
 target_compile_features(wavecomb_common INTERFACE cxx_std_20)
 target_compile_options(wavecomb_common INTERFACE

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cost of ordering a queue: sorting keys, and moving records compared with reading them by index.
-// Times are per record.
+// The reported times are per record.
 
 #include <algorithm>
 #include <numeric>

@@ -128,7 +128,7 @@ class CyclesScene:
         cycles.caustics_reflective = cycles.caustics_refractive = True
         cycles.blur_glossy = 0.0
         cycles.pixel_filter_type = "BOX"
-        # Wavecomb's n scattering vertices are n - 1 bounces here.
+        # Wavecomb's limit of n scattering vertices corresponds to n - 1 bounces in Cycles.
         bounces = settings.max_depth - 1
         cycles.max_bounces = bounces
         cycles.diffuse_bounces = cycles.glossy_bounces = bounces

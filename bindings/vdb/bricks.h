@@ -60,9 +60,9 @@ struct Bricks {
 struct BrickOptions {
   /// Upper limit of the bricks' memory in bytes.
   uint64_t max_bytes = 0;
-  /// Inactive voxels that hold the background value become 0.
+  /// Whether inactive voxels that hold the background value are set to 0.
   bool background_is_zero = false;
-  /// Bricks that hold only zeros are left out.
+  /// Whether bricks that hold only zeros are left out.
   bool drops_empty = false;
 };
 
@@ -91,7 +91,7 @@ class BrickWriter {
 
   /// Buffer for the values of the next brick, x slowest, channels fastest.
   float* scratch() { return scratch_; }
-  /// Appends the brick in scratch().
+  /// Appends the brick whose values are in the buffer scratch().
   void add(const Origin& origin);
   /// Appends the bricks of a tile, whose voxels all have the same value (`channels` components).
   void add_tile(const Origin& first, int32_t edge, const float* value);

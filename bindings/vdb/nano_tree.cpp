@@ -28,7 +28,8 @@ class Buffer {
 
   uint64_t size() const { return size_; }
 
-  /// Returns `count` structures at an offset. Throws BrokenFile if they exceed the buffer.
+  /// Returns `count` structures at an offset. Throws BrokenFile if the structures exceed the
+  /// buffer.
   template <typename T>
   const T* at(uint64_t offset, uint64_t count = 1) const {
     if (offset > size_ || offset % alignof(T) != 0 || count > (size_ - offset) / sizeof(T))

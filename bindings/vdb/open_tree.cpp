@@ -30,7 +30,7 @@ Origin origin_of(const openvdb::Coord& xyz) {
 }
 
 /// Calls `use` with the grid as its concrete type. Returns false if bricks are not supported for
-/// it. Each supported type costs about one second of compile time.
+/// grids of this type. Each supported type costs about one second of compile time.
 template <typename Use>
 bool with_grid(const openvdb::GridBase& grid, Use&& use) {
   const auto as = [&]<typename Value>() {

@@ -388,7 +388,7 @@ def run(
         try:
             at_work.work(left)
         except (OSError, RuntimeError, TimeoutError) as error:
-            cluster.check(False)  # check raises a clearer error if the scheduler is gone
+            cluster.check(False)  # check() raises a clearer error if the scheduler has ended
             raise WavecombError(f"{cluster.what}: {' '.join(str(error).split())}") from error
         outcome.stopped = outcome.stopped or is_stopped()
     return outcome

@@ -105,7 +105,8 @@ class Bridge(QObject):
             try:
                 receive(letter[1])
             except BaseException:
-                self._mailbox.wake()  # Delivers the remaining messages later.
+                # Wake the mailbox, so that it delivers the remaining messages later.
+                self._mailbox.wake()
                 raise
 
 

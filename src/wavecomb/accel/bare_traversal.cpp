@@ -90,7 +90,7 @@ void query(Arguments& args, bool coherent) {
 }
 
 /// Calls trace(base, n, valid) for each packet of rays; n < W only in the last packet. Returns the
-/// sum of the results.
+/// sum of the results of trace().
 template <uint32_t W, typename Trace>
 size_t for_each_packet(size_t size, Trace&& trace) {
   alignas(64) int valid[W];

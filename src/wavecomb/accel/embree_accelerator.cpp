@@ -78,7 +78,7 @@ struct EmbreeAccelerator::Impl {
   SceneView view;
   RTCScene top;
   uint32_t first_world, first_light;  ///< as in EmbreeHierarchy
-  uint32_t native;                    ///< rays in the widest native packet
+  uint32_t native;                    ///< number of rays in the widest native packet
   /// List that replaces the BVH in small scenes; null in other scenes.
   std::unique_ptr<const TriangleList> list;
   bool is_hair;  ///< whether most primitives are curve segments
@@ -94,7 +94,7 @@ struct EmbreeAccelerator::Impl {
         list(hierarchy->rule() == HitRule::kList ? TriangleList::make(*scene) : nullptr),
         is_hair(is_mostly_hair(*scene)) {}
 
-  /// Hits of a packet as Embree reports them: one value per ray.
+  /// Hits of a packet as Embree reports them: arrays with one value per ray.
   struct PacketHits {
     const float* t;  ///< QueryContext::t
     const float *u, *v;

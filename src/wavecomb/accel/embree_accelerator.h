@@ -14,15 +14,15 @@ namespace wavecomb {
 /// Rays to trace, in SoA layout. Directions are unit vectors; tnear is 0.
 struct RaySpan {
   const float *ox, *oy, *oz, *dx, *dy, *dz;
-  const float* tfar;     ///< maximum distance of each ray; null means unlimited
+  const float* tfar;     ///< maximum distance of each ray; null means no limit
   const uint32_t* slot;  ///< path slots for PresenceKeys; null means that the ray index is the slot
   size_t size;
-  const float* time = nullptr;  ///< shutter time in [0, 1]; null means 0
+  const float* time = nullptr;  ///< shutter time of each ray in [0, 1]; null means 0
 };
 
-/// Output columns for hits. Barycentric u, v are as in HitBuffer. `inst` is an index into
-/// SceneView::instances and `geom` a geometry within its group; or `inst` is kLightShape and `geom`
-/// the index of the light record, or `inst` is kNoHit.
+/// Output columns for hits. The barycentrics u and v are defined as in HitBuffer. `inst` is an
+/// index into SceneView::instances and `geom` a geometry within its group; or `inst` is kLightShape
+/// and `geom` the index of the light record, or `inst` is kNoHit.
 struct HitSpan {
   float *t, *u, *v;
   uint32_t *prim, *geom, *inst;
@@ -38,22 +38,22 @@ inline U object_of(const U& inst, const U& mesh) {
 }
 
 /// Per-path data that decides whether a surface with partial presence stops a ray. The random
-/// numbers are keyed by the path, so that traversal order has no effect. Arrays are indexed by
-/// slot.
+/// numbers are keyed by the path, so that traversal order has no effect. The arrays are indexed by
+/// path slot.
 struct PresenceKeys {
   const uint32_t* pixel_hash = nullptr;
   const uint32_t* sample = nullptr;
-  uint32_t stride = 1;  ///< distance between slots, in 32-bit words
+  uint32_t stride = 1;  ///< distance between the values of consecutive slots, in 32-bit words
   /// Differs for each depth and for shadow rays, so that crossings are independent.
   uint32_t salt = 0;
   /// For shadow rays with light linking: 1 + index of the set of geometry that casts shadows, or 0
-  /// for all geometry. Null without light linking.
+  /// for all geometry. The pointer is null without light linking.
   const uint32_t* shadow_set = nullptr;
   uint32_t shadow_stride = 0;
   uint32_t ray_kind = kVisibleToCamera;  ///< a RayVisibility flag
   /// The only object that each ray can hit, as a value of object_of(), with the same stride as
-  /// pixel_hash. Rays that are restricted to one object hit no lights. Null means that rays hit all
-  /// objects.
+  /// pixel_hash. Rays that are restricted to one object hit no lights. A null pointer means that
+  /// rays hit all objects.
   const uint32_t* object = nullptr;
 };
 
@@ -71,14 +71,14 @@ enum class HitRule : uint8_t {
 /// thread-safe.
 class EmbreeAccelerator {
  public:
-  /// Builds with up to `threads` threads; 0 uses all. Throws Error if Embree fails, for example if
-  /// out of memory.
+  /// Builds the acceleration structure with up to `threads` threads; 0 means all threads. Throws
+  /// Error if Embree fails, for example if out of memory.
   EmbreeAccelerator(std::shared_ptr<const Scene> scene, uint32_t threads,
                     HitRule rule = HitRule::kList);
-  /// Creates an accelerator for an edited version of the scene of `origin`. Shares the BVH, or the
-  /// groups whose meshes are unchanged. Groups are rebuilt if the presence filtering or hair status
-  /// of a mesh changes; then, or if an object moves or the shape or position of a light changes,
-  /// the top level is rebuilt.
+  /// Creates an accelerator for an edited version of the scene of `origin`. Shares the BVH with
+  /// `origin`, or the groups whose meshes are unchanged. Groups are rebuilt if the presence
+  /// filtering or hair status of a mesh changes; then, or if an object moves or the shape or
+  /// position of a light changes, the top level is rebuilt.
   EmbreeAccelerator(std::shared_ptr<const Scene> edited, const EmbreeAccelerator& origin,
                     uint32_t threads);
   ~EmbreeAccelerator();
@@ -98,7 +98,7 @@ class EmbreeAccelerator {
   bool has_list() const;
   /// Returns the memory of the BVH in bytes.
   size_t bytes() const;
-  /// Widest packet that Embree traces natively on this CPU.
+  /// Returns the width of the widest packet that Embree traces natively on this CPU.
   uint32_t native_width() const;
   /// Top-level RTCScene. Accelerators that share the BVH return the same RTCScene.
   RTCSceneTy* embree_scene() const;

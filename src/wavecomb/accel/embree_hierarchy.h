@@ -18,9 +18,9 @@ struct EmbreeDevice;
 
 /// Embree geometries of meshes, scenes of groups, and the top-level scene with light shapes.
 ///
-/// Contract: immutable. Keeps the mesh arrays alive. The hierarchy depends on materials only by the
-/// choice of meshes that need the presence filter; the filter reads the materials of the traced
-/// scene.
+/// Contract: immutable. The hierarchy keeps the mesh arrays alive. The hierarchy depends on
+/// materials only by the choice of meshes that need the presence filter; the filter reads the
+/// materials of the traced scene.
 class EmbreeHierarchy {
  public:
   /// `origin`: hierarchy of a scene with the same meshes, whose device, geometries and groups are
@@ -37,8 +37,9 @@ class EmbreeHierarchy {
   HitRule rule() const { return rule_; }
   RTCDevice device() const;
   RTCScene top() const { return top_; }
-  uint32_t first_world() const { return first_world_; }  ///< geometry id of the world's first mesh
-  uint32_t first_light() const { return first_light_; }  ///< geometry id of light record 0
+  /// Embree geometry id of the world's first mesh.
+  uint32_t first_world() const { return first_world_; }
+  uint32_t first_light() const { return first_light_; }  ///< Embree geometry id of light record 0
   /// Returns the memory of all hierarchies of the device in bytes.
   size_t bytes() const;
 

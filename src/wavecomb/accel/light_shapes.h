@@ -12,7 +12,8 @@ namespace wavecomb {
 /// Geometry of a light, without its emission.
 struct LightGeometry {
   LightShape shape = LightShape::kNone;
-  LightRecord light{};                  ///< only kind, p, u, v and radius are set
+  /// Light record, of which only kind, p, u, v and radius are set.
+  LightRecord light{};
   const LightKindInfo* kind = nullptr;  ///< null for kNone
   LightMotion motion{};                 ///< motion of the light, if any; moving lights use
                                         ///< LightShape::kCustom

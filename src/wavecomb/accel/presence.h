@@ -13,7 +13,7 @@ namespace wavecomb {
 /// Point on a primitive that the ray of a path may hit.
 struct PresenceQuery {
   uint32_t instance;  ///< 0 for the world
-  uint32_t geom;      ///< geometry within the instance's group
+  uint32_t geom;      ///< index of the geometry within the instance's group
   uint32_t mesh, prim;
   float u, v;     ///< position on the primitive; for triangles, barycentric coordinates
   uint32_t slot;  ///< slot of the path

@@ -212,7 +212,7 @@ struct ListTracer {
 
 namespace {
 
-/// Calls trace(F*) with the lane type F for `width`.
+/// Calls trace() with the lane type for `width` lanes, passed as a null pointer of that type.
 template <typename Trace>
 void in_lanes(uint32_t width, const Trace& trace) {
   switch (width) {

@@ -26,8 +26,9 @@ class TriangleList {
  public:
   /// With more triangles, a BVH is faster (docs/decisions/small-scene-traversal.md).
   static constexpr uint32_t kMaxTriangles = 96;
-  static constexpr uint32_t kMaxVertices = 128;  ///< distinct positions
-  static constexpr uint32_t kMaxShapes = 4;      ///< lights that are not parallelograms
+  static constexpr uint32_t kMaxVertices = 128;  ///< maximum number of distinct vertex positions
+  /// Maximum number of lights that are not parallelograms.
+  static constexpr uint32_t kMaxShapes = 4;
 
   /// Returns null if the scene exceeds these limits or has motion, curves or points.
   static std::unique_ptr<const TriangleList> make(const Scene& scene);
@@ -43,7 +44,7 @@ class TriangleList {
     float n[3], p[3];
     uint16_t vertex[3];
     bool filtered;       ///< whether hits must pass accepts_hit()
-    bool in_same_plane;  ///< whether n and p equal those of the previous triangle
+    bool in_same_plane;  ///< whether n and p equal n and p of the previous triangle
     uint32_t mesh;
   };
   struct Vertex {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Contributions by light group. Runs only if the render has light groups.
+/// Contributions by light group. The functions run only if the render has light groups.
 #pragma once
 
 #include "wavecomb/aov/aov_tables.h"

@@ -9,9 +9,9 @@
 ///   end_depth  the radiance includes the emission at vertex `depth`, but not its light sample
 ///   resolve    the path's values are added to the film
 ///
-/// Rows exist only for the requested AOVs. Splitting the radiance into emission, direct and
-/// indirect light costs nothing in shading, since it needs only copies of the radiance before the
-/// light samples of the first two vertices.
+/// The rows of a path contain only the requested AOVs. Splitting the radiance into emission, direct
+/// and indirect light costs nothing in shading, since it needs only copies of the radiance before
+/// the light samples of the first two vertices.
 #pragma once
 
 #include <array>
@@ -47,8 +47,8 @@ inline void for_each_vertex_value(const VertexAovs<F>& v, const PathState<F>& /*
 class PathAovs : public PathFirstHits, public PathCostRows {
  public:
   PathAovs() = default;
-  /// Allocates the rows that `layout` needs. `tables` may be null if nothing in `layout` needs
-  /// them.
+  /// Allocates the rows for the AOVs in `layout`. `tables` may be null if no AOV in `layout` needs
+  /// tables.
   PathAovs(size_t capacity, const AovLayout& layout, const AovTables* tables)
       : PathFirstHits(capacity, layout.set, tables),
         PathCostRows(layout.set.has(Aov::kCost) ? capacity : 0, tables && tables->models_cost),
@@ -154,7 +154,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     if (groups_) add<F>(slot, group_of<F>(light, active), c, active);
     if (expressions_) expressions_.add<F>(slot, light, c, active);
   }
-  /// Adds emission of volumes.
+  /// Adds the emission of volumes to paths.
   template <typename F>
   void add_volume_emission(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
     if (groups_) add<F>(slot, UInt<F>(tables_->group_of_rest), c, active);
@@ -233,13 +233,13 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   /// `radiance` holds the RadianceRow of each slot.
   void resolve(AovFilm& film, size_t pixel, size_t begin, size_t end, const float* radiance) const;
 
-  // For tests: rows of light groups, or null.
+  // Returns the rows of light groups, or null; for tests.
   const float* group_rows() const { return groups_.rows; }
 
  private:
   using Block = SlotRows;
 
-  /// Slots of the paths of one pixel.
+  /// Range of the slots with paths of one pixel.
   struct SlotRange {
     uint32_t begin, end;
     template <typename Each>
@@ -285,7 +285,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
                            {g.albedo, g.normal, select(v.is_clear, F(0.f), F(1.f))}, updates);
   }
 
-  /// Adds the bounce of a vertex, if it has one.
+  /// Counts the bounce of a vertex, if the vertex has a bounce.
   template <typename F>
   void add_bounce(const UInt<F>& slot, const VertexAovs<F>& v, const Mask<F>& active) const {
     const Mask<F> has_survival = active & (v.survival >= 0.f);
@@ -303,8 +303,8 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   /// Index of each AOV's first word in a row of vertex_, or kNoWords.
   std::array<uint32_t, kAovCount> vertex_at_ = no_words();
   std::array<Block, 2> parts_;  ///< radiance before the light samples of vertices 0 and 1
-  /// Contributions of connections at first vertices. These contributions are indirect light,
-  /// although they are added between the two radiance copies in parts_.
+  /// Contributions of connections at the first vertices of camera paths. These contributions are
+  /// indirect light, although they are added between the two radiance copies in parts_.
   Block early_connections_;
   Block groups_;  ///< radiance by light group; the groups of a slot are adjacent
   Block guides_, bounces_;

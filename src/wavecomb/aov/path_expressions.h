@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Radiance of paths by light path expressions (core/path_expressions/path_expression.h). Runs only
-/// if the render has expressions.
+/// Radiance of paths by light path expressions (core/path_expressions/path_expression.h). The
+/// functions run only if the render has light path expressions.
 ///
 /// A path carries an automaton state for each of its three colours. At a scattering event whose
 /// diffuse fraction in a colour is s, the automaton takes the diffuse event for that colour with
@@ -23,10 +23,10 @@
 
 namespace wavecomb {
 
-/// State of a path for light path expressions.
+/// Row with the state of a path for light path expressions.
 template <typename F>
 struct ExpressionRow {
-  UInt<F> states;  ///< states of the three colours, ten bits each
+  UInt<F> states;  ///< automaton states of the three colours, ten bits each
   // Current light sample: automaton states before the scattering, scattering event, path end, and
   // diffuse fraction.
   UInt<F> light_states, light_event, light_end;
@@ -56,8 +56,8 @@ struct ColourStates {
   static UInt<F> of(const UInt<F>& states, uint32_t colour) {
     return (states >> (kBits * colour)) & kMask;
   }
-  /// Returns the state after a scattering, by the automaton's table `next`. Scatterings in volumes
-  /// and subsurface bodies have no diffuse or glossy lobes.
+  /// Returns the automaton state after a scattering event, from the automaton's table `next`.
+  /// Scatterings in volumes and subsurface bodies have no diffuse or glossy lobes.
   template <typename F>
   static UInt<F> next(const uint32_t* table, const UInt<F>& state, const UInt<F>& event,
                       const UInt<F>& lobe, const Mask<F>& active) {
@@ -84,7 +84,7 @@ struct ColourStates {
 
 /// Light path expression states and sums of the paths of a wave.
 ///
-/// Contract: owned by one PathAovs. Slots must be below the capacity, and those of the active
+/// Contract: owned by a PathAovs object. Slots must be below the capacity, and those of the active
 /// lanes distinct.
 class PathExpressions {
  public:
@@ -139,8 +139,8 @@ class PathExpressions {
     add_to<F>(slot, states, UInt<F>(end_of_light_[lights_ + 1]), c, active);
   }
 
-  /// Records a shaded vertex, whose scatterings `v` classifies. `has_shadow` marks the lanes with a
-  /// light sample.
+  /// Records a shaded vertex; `v` contains the classification of its scattering events.
+  /// `has_shadow` marks the lanes with a light sample.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void scatter(uint32_t depth, const UInt<F>& slot,
                                             const SampleKey<F>& key, const VertexAovs<F>& v,
@@ -193,7 +193,7 @@ class PathExpressions {
   UInt<F> states(const UInt<F>& slot, const Mask<F>& active) const {
     return load_row<ExpressionRow, F>(rows_.floats(0), slot, active).states;
   }
-  /// Returns the state after a scattering.
+  /// Returns the automaton state after a scattering event.
   template <typename F>
   UInt<F> next(const UInt<F>& state, const UInt<F>& event, const UInt<F>& lobe,
                const Mask<F>& active) const {
@@ -243,7 +243,7 @@ class PathExpressions {
     add_part(kGlossyEvent, c - diffuse);
     return here;
   }
-  /// Returns the states of all three colours after a scattering.
+  /// Returns the automaton states of all three colours after a scattering event.
   template <typename F>
   UInt<F> next_of_all(const UInt<F>& states, const UInt<F>& event, const UInt<F>& lobe,
                       const Mask<F>& active) const {

@@ -40,7 +40,7 @@ inline constexpr uint32_t kTimeSet = 0xffffffffu;
 /// Sample sets that a path uses at each vertex. Each step of a vertex has a named sample set, so
 /// that adding or removing a step does not change the random numbers of other steps.
 enum class VertexSet : uint32_t {
-  kLight,     ///< light sampling (choice, u, v) and Russian roulette
+  kLight,     ///< light sampling (selection of a light, u, v) and Russian roulette
   kBsdf,      ///< BSDF sampling: lobe, u, v
   kFlight,    ///< sampling along the ray segment to the vertex (path/media.h)
   kShadow,    ///< transmittance along the vertex's shadow ray

@@ -62,7 +62,7 @@ enum class Guiding : uint8_t { kAuto, kOn, kOff };
 /// Whether records are moved into shading order. kAuto: off, which is faster.
 enum class Materialize : uint8_t { kAuto, kOn, kOff };
 
-/// Largest width or height, and largest number of pixels.
+/// Maximum width or height of an image, and maximum number of pixels.
 inline constexpr uint32_t kMaxSize = 65535;
 inline constexpr uint32_t kMaxPixels = 1u << 28;
 
@@ -87,7 +87,8 @@ struct Settings {
   uint32_t seed = 0;
   SamplerKind sampler = SamplerKind::kSobol;
   FilterKind filter = FilterKind::kBlackmanHarris;
-  std::optional<float> filter_width;  ///< full width in pixels; default_filter_width() if not set
+  /// Full width of the pixel filter in pixels; default_filter_width() if not set.
+  std::optional<float> filter_width;
   RouletteKind roulette = RouletteKind::kAuto;
   uint32_t roulette_depth = 2;  ///< first vertex at which roulette may terminate a path
   /// Costs affect the image only through cost-aware roulette; kMeasured then makes it vary from run
@@ -103,8 +104,8 @@ struct Settings {
   /// (medium/volume/equiangular.h).
   bool equiangular = false;
   Quality quality = Quality::kAuto;
-  uint32_t learn_memory_mb = 64;  ///< memory limit of learned data
-  /// Sample every non-delta bounce by cosine.
+  uint32_t learn_memory_mb = 64;  ///< memory limit of training data
+  /// Sample every non-delta bounce from a cosine lobe.
   bool cosine_sampling = false;
   IntegratorKind integrator = IntegratorKind::kWavefront;
   Transport transport = Transport::kPath;
@@ -117,7 +118,8 @@ struct Settings {
   Firefly firefly = Firefly::kKeep;
   /// AOVs to store; the beauty does not depend on them.
   AovSet aovs;
-  std::vector<std::string> light_groups;          ///< names for Aov::kLightGroups; empty means all
+  /// Names of the light groups to store for Aov::kLightGroups; empty means all.
+  std::vector<std::string> light_groups;
   std::vector<NamedExpression> expressions;       ///< for Aov::kExpressions
   uint32_t deep_samples = DeepLimits{}.most;      ///< maximum samples of a deep pixel
   float deep_tolerance = DeepLimits{}.tolerance;  ///< depth tolerance of deep images
@@ -125,13 +127,14 @@ struct Settings {
   /// value. 0 means off.
   float adaptive = 0;
   /// Adaptive sampling: stop when the image's mean relative error is at most this value. 0 means
-  /// off. Cannot be combined with `adaptive`.
+  /// off. This setting cannot be combined with `adaptive`.
   float noise = 0;
   uint32_t min_spp = 16;  ///< adaptive sampling: samples before the first error estimate
   /// Distribution of samples over pixels in renders whose total sample count is set by spp or a
   /// time limit.
   Allocate allocate = Allocate::kEven;
-  /// Time limit of rendering in seconds; 0 means none. The image then has the samples done so far.
+  /// Time limit of rendering in seconds; 0 means none. After the time limit, the image has the
+  /// samples done so far.
   float time_limit = 0;
   /// Make domes and distant lights transparent to the camera, for compositing.
   bool alpha = false;
@@ -145,9 +148,10 @@ struct Settings {
   uint32_t overscan = 0;
   bool crop = false;  ///< restrict the film and the image to the region
   // ---- below: how the image is computed; never changes it ----
-  uint32_t threads = 0;    ///< number of threads; 0 means all that the process may use
+  uint32_t threads = 0;    ///< number of threads; 0 means all threads that the process may use
   uint32_t wave_size = 0;  ///< paths per wave, 64 to 2^20; 0 means the default
-  uint32_t lanes = 0;      ///< lanes of kernels: 1, 4, 8 or 16; 0 means the widest that was built
+  /// Lane width of kernels: 1, 4, 8 or 16; 0 means the largest width in the build.
+  uint32_t lanes = 0;
   /// Packets are faster than single rays and find bit-identical hits
   /// (docs/decisions/canonical-hits.md).
   Traversal traversal = Traversal::kPackets;

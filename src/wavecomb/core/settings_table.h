@@ -30,9 +30,9 @@ enum class SettingGroup : uint8_t { kImage, kWork, kOrder };
 
 /// Row of the settings table.
 ///
-/// Contract: a row lives as long as the program.
+/// Contract: a row exists as long as the program runs.
 struct SettingInfo {
-  const char* name = "";   ///< attribute name; options use - for _
+  const char* name = "";   ///< attribute name; command line options contain - instead of _
   const char* label = "";  ///< label in a form
   const char* help = "";   ///< one sentence
   /// Whether the image depends on the setting; otherwise the setting affects only how the image is

@@ -24,7 +24,7 @@ class TaskOrder {
   TaskOrder(const TaskOrder&) = delete;
   TaskOrder& operator=(const TaskOrder&) = delete;
 
-  /// Wraps `body` as a task of the loop.
+  /// Wraps `body`, the loop's body, as an annotated task.
   ///
   /// Contract: this object and `body` outlive the task.
   template <typename Body>

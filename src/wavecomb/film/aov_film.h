@@ -82,8 +82,8 @@ class AovFilm {
     for (uint32_t c = 0; c < row_of(aov).channels && !all.empty(); ++c)
       all[pixel * row_of(aov).channels + c] = values[c];
   }
-  /// Adds a sample to the Cryptomatte levels. `object`: index of ObjectNames; either id may be
-  /// kNoHitId.
+  /// Adds a sample to the Cryptomatte levels. `object` is an index of ObjectNames; `object` and
+  /// `material` may be kNoHitId.
   void add_ids(size_t pixel, uint32_t object, uint32_t material, const CryptoTables& tables) {
     if (object != kNoHitId) {
       if (!crypto_[0].empty()) crypto_[0][pixel].add(tables.object_id[object]);

@@ -48,7 +48,7 @@ class Cascades {
   /// cascades are stored. `samples`: sample count of each pixel.
   std::vector<float> excess(const std::vector<uint32_t>& samples) const;
   size_t bytes() const { return sums_.size() * sizeof(Sum); }
-  /// Calls block(name, values) for the sums, for checkpoints.
+  /// Calls block(name, values) for the cascade sums, to write or read checkpoints.
   template <typename Block>
   void for_each_block(const Block& block) {
     block("cascades", sums_);

@@ -27,11 +27,11 @@ uint32_t crypto_id(std::string_view name);
 
 /// Ids seen in one pixel with their sample counts, in bounded memory.
 ///
-/// Counts are exact while there are at most kIds ids. A further id replaces the id with the fewest
-/// samples and inherits its count (A. Metwally, D. Agrawal, A. El Abbadi, "Efficient Computation of
-/// Frequent and Top-k Elements in Data Streams", 2005). Hence counts always add up to the number of
-/// samples that hit something, no count is too small, and every id with more than 1 / kIds of the
-/// samples is present.
+/// Sample counts are exact while a pixel has at most kIds ids. A further id replaces the id with
+/// the fewest samples and inherits its count (A. Metwally, D. Agrawal, A. El Abbadi, "Efficient
+/// Computation of Frequent and Top-k Elements in Data Streams", 2005). Hence counts always add up
+/// to the number of samples that hit something, no count is too small, and every id with more than
+/// 1 / kIds of the samples is present.
 struct CryptoPixel {
   static constexpr uint32_t kIds = 8;
   uint32_t id[kIds] = {};
@@ -57,8 +57,8 @@ struct CryptoPixel {
   }
 };
 
-/// Cryptomatte ids of the object and material indices that kernels use. Built once per render and
-/// only if requested.
+/// Cryptomatte ids of the object and material indices that kernels use. The tables are built once
+/// per render, if Cryptomatte is requested.
 struct CryptoTables {
   /// Indexed by instance; object index = first_object[instance] + geometry.
   std::vector<uint32_t> first_object;

@@ -30,7 +30,7 @@ namespace wavecomb {
 /// Samples of a pixel within one depth range.
 struct DeepBin {
   double r = 0, g = 0, b = 0;  ///< sum of radiance
-  float front = 0, back = 0;   ///< least and greatest depth
+  float front = 0, back = 0;   ///< smallest and largest depth of the bin's samples
   uint32_t count = 0;          ///< number of samples
   uint32_t in_volume = 0;      ///< number of samples that scattered in a volume
 };
@@ -61,7 +61,8 @@ struct DeepLayer {
   /// Channels of a sample: R, G, B, A, Z, ZBack. Colours are premultiplied.
   static constexpr size_t kChannels = 6;
   std::vector<uint32_t> counts;  ///< number of samples of each pixel
-  std::vector<float> values;     ///< kChannels values per sample; nearest samples first
+  /// KChannels values per sample; the samples of a pixel are in order of increasing depth.
+  std::vector<float> values;
   bool empty() const { return counts.empty(); }
 };
 
@@ -76,8 +77,8 @@ class DeepFilm {
   DeepFilm(size_t pixels, const DeepLimits& limits);
 
   bool empty() const { return used_.empty(); }
-  /// Adds a sample of depth z >= 0. `rgb`: radiance of the path. `in_volume`: the camera ray
-  /// scattered in a volume.
+  /// Adds a sample of depth z >= 0. `rgb` is the radiance of the path. `in_volume` is true if the
+  /// camera ray scattered in a volume.
   void add(size_t pixel, float z, bool in_volume, const float* rgb);
   /// Returns the deep samples of all pixels. `samples`: sample count of each pixel.
   DeepLayer layer(const std::vector<uint32_t>& samples) const;
@@ -95,7 +96,7 @@ class DeepFilm {
   void insert(size_t pixel, uint32_t at, const DeepBin& added);
 
   DeepLimits limits_;
-  std::vector<uint8_t> used_;  ///< number of bins in use, by pixel
+  std::vector<uint8_t> used_;  ///< number of bins in use for each pixel
   /// Bin 0 of all pixels, then bin 1 of all pixels, and so on, so that the memory of bins that no
   /// pixel uses stays unmapped.
   std::vector<DeepBin, ZeroedMemory<DeepBin>> bins_;

@@ -32,7 +32,7 @@ class Film {
   Film(uint32_t width, uint32_t height, const AovLayout& aovs, bool with_error = false)
       : Film(Region{0, 0, width, height}, aovs, with_error) {}
 
-  /// Sums of one pixel.
+  /// Sums of the samples of one pixel.
   struct Pixel {
     double r = 0, g = 0, b = 0;
     uint32_t samples = 0;
@@ -40,7 +40,7 @@ class Film {
 
   uint32_t width() const { return window_.width(); }
   uint32_t height() const { return window_.height(); }
-  /// Pixels of the image that this film covers.
+  /// Returns the rectangle of pixels that this film covers.
   const Region& window() const { return window_; }
   bool has_error() const { return !errors_.empty(); }
   Pixel& pixel(uint32_t x, uint32_t y) { return pixels_[index(x, y)]; }
@@ -80,14 +80,14 @@ class Film {
   void update_splat_aovs();
   LightSplatLayer& splats() { return splats_; }
   const LightSplatLayer& splats() const { return splats_; }
-  /// Row-major index of an image pixel within the window.
+  /// Returns the row-major index of an image pixel within the window.
   size_t index(uint32_t x, uint32_t y) const { return window_.index(x, y); }
   const Pixel& pixel(size_t i) const { return pixels_[i]; }
   const ErrorSums& error(size_t i) const { return errors_[i]; }
   size_t pixel_count() const { return pixels_.size(); }
   AovFilm& aovs() { return aovs_; }
   const AovFilm& aovs() const { return aovs_; }
-  /// Memory use in bytes.
+  /// Returns the memory use in bytes.
   size_t bytes() const {
     return pixels_.size() * sizeof(Pixel) + aovs_.bytes() + errors_.size() * sizeof(ErrorSums) +
            splats_.bytes() + cascades_.bytes() + joint_rows_.size() * sizeof(float);
@@ -128,9 +128,9 @@ class Film {
     std::vector<AovLayer> aovs;
     DeepLayer deep;
   };
-  /// Returns all layers and ends the film. Sums are freed as soon as they are used, because sums
-  /// and layers together are the peak memory of small scenes. `multi_layer_names`: see
-  /// AovFilm::layer.
+  /// Returns all layers; the film cannot be used afterwards. Sums are freed as soon as they have
+  /// been used, because sums and layers together are the peak memory of small scenes.
+  /// `multi_layer_names`: see AovFilm::layer.
   Layers finish(const std::vector<std::string>& multi_layer_names) &&;
 
  private:

@@ -20,10 +20,10 @@ class FilterTable {
   FilterTable(FilterKind kind, float width);
 
   /// Returns the inverse cumulative distribution: kBins + 2 offsets in pixels, where entry i
-  /// belongs to the sample value u = i / kBins. The last offset is repeated.
+  /// belongs to the sample value u = i / kBins. The last offset is stored twice.
   const float* offsets() const { return offsets_.data(); }
 
-  /// Half the filter's full width in pixels.
+  /// Returns half of the filter's full width in pixels.
   float radius() const { return radius_; }
   /// Returns the density per pixel of the sampled offsets at `x` pixels from the pixel centre. This
   /// density is the filter weight of light that arrives at this offset.

@@ -15,11 +15,11 @@
 namespace wavecomb {
 
 /// Operations of value graphs, which work on each component unless noted. The comments call the
-/// operands a, b and c. The order must match `graph_codes` in the bindings.
+/// operands a, b and c. The order of the operations must match `graph_codes` in the bindings.
 enum class GraphCode : uint8_t {
-  kCopy,   ///< result component k is operand k
+  kCopy,   ///< component k of the result is operand k
   kInput,  ///< GraphInput `number`
-  kImage,  ///< image `number` at uv coordinates a: r, g, b, alpha
+  kImage,  ///< r, g, b and alpha of image `number` at texture coordinates a
   kAdd,
   kSubtract,
   kMultiply,
@@ -33,7 +33,7 @@ enum class GraphCode : uint8_t {
   kEqual,       ///< 1 if a = b, else 0
   kMix,         ///< a + (b - a) c
   kClamp,       ///< a clamped to [b, c]
-  kSelect,      ///< the result is b if a is not 0, else c
+  kSelect,      ///< b if a is not 0, else c
   kSmoothstep,  ///< smoothstep of a between b and c
   kAbs,
   kFloor,
@@ -65,7 +65,7 @@ inline constexpr uint32_t kGraphCodeCount = 39;
 
 /// Inputs that a hit provides to graphs.
 enum class GraphInput : uint8_t {
-  kUv,             ///< texture coordinates, 2 components; all others have 3
+  kUv,             ///< texture coordinates, with 2 components; all other inputs have 3
   kPosition,       ///< position in world space
   kLocalPosition,  ///< position in the space of the instanced group of meshes
   kNormal,         ///< unit shading normal in world space
@@ -125,7 +125,8 @@ struct Graph {
   std::vector<float> constants;
   std::vector<GraphImage> images;
   std::vector<GraphOutput> outputs;
-  std::vector<std::string> attributes;  ///< attribute names; kAttribute operations index them
+  /// Names of the attributes that kAttribute operations read by index.
+  std::vector<std::string> attributes;
   /// Returns whether an output drives any of the `count` parameter components from index `first`
   /// on.
   bool drives(uint32_t first, uint32_t count = 1) const {
@@ -147,7 +148,7 @@ struct GraphView {
   const float* constants = nullptr;
   const GraphImage* images = nullptr;
   const GraphOutput* outputs = nullptr;
-  uint32_t inputs = 0;  ///< graph_input_bit of all inputs that any program reads
+  uint32_t inputs = 0;  ///< bits (graph_input_bit) of all inputs that any program reads
   AttributeView attributes{};
 };
 
@@ -178,8 +179,8 @@ struct GraphSet {
 /// Returns the inputs that a program reads, as bits of graph_input_bit.
 uint32_t graph_inputs(const Graph& graph);
 
-/// Throws Error if a program reads or writes out of range. `name`: the owner of the graph, for the
-/// message. `parameters`: number of components that outputs may drive.
+/// Throws Error if a program reads or writes out of range. `name` is the owner of the graph, for
+/// error messages. `parameters` is the number of parameter components that outputs may drive.
 void check_graph(const Graph& graph, const std::string& name, size_t texture_count,
                  uint32_t parameters);
 

@@ -91,8 +91,8 @@ inline F gradient(const UInt<F>& hash, const F (&p)[3]) {
   return signed_by<F>(u, h, 0) + signed_by<F>(v, h, 1);
 }
 
-/// Evaluates gradient noise in N dimensions, range about [-1, 1]. Writes K uncorrelated values (1
-/// or 3).
+/// Evaluates gradient noise in N dimensions, range about [-1, 1]. Writes K (1 or 3) uncorrelated
+/// noise values.
 template <size_t K, typename F, size_t N>
 inline void perlin(const F (&p)[N], F* out) {
   using U = UInt<F>;
@@ -171,7 +171,7 @@ inline Worley<F> worley(const F (&p)[N], const F& jitter) {
   for (F& x : to_nearest) x = F(0.f);
   constexpr uint32_t kCells = N == 2 ? 9 : 27;
   for (uint32_t c = 0; c < kCells; ++c) {
-    // The first axis varies slowest, as in MaterialX's loops.
+    // Visit cells with the first axis varying slowest, as MaterialX does.
     const uint32_t digits[3] = {N == 2 ? c / 3 : c / 9, N == 2 ? c % 3 : c / 3 % 3, c % 3};
     U at[N + 1];
     for (size_t i = 0; i < N; ++i) at[i] = base[i] + U(digits[i]) - U(1u);

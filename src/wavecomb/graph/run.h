@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Evaluation of value graphs at hits. Definitions are in run.inl.
+/// Evaluation of value graphs at hits. The functions are defined in run.inl.
 #pragma once
 
 #include "wavecomb/graph/graph.h"
@@ -24,15 +24,15 @@ struct GraphPoint {
   MeshPosition<F> mesh_position;  ///< position on the mesh, at which attributes are interpolated
 };
 
-/// Runs `program` for all active lanes at `at`. `registers` has room for kMaxGraphRegisters values
-/// and receives the results. The result of a lane depends only on that lane's point. `textures`
-/// holds the scene's textures, which the graph's images refer to.
+/// Runs `program` for all active lanes with the inputs `at`. `registers` has room for
+/// kMaxGraphRegisters values and receives the results. The result of a lane depends only on that
+/// lane's point. `textures` holds the scene's textures, which the graph's images refer to.
 template <typename F>
 [[gnu::noinline]] void run_graph(const GraphView& view, const GraphProgram& program,
                                  const TextureView* textures, const GraphPoint<F>& at,
                                  const Mask<F>& active, F* registers);
 
-/// Returns the value of an output after run_graph.
+/// Returns the value of an output after a call of run_graph().
 template <typename F>
 inline F graph_output(const GraphView& view, const GraphProgram& program, const GraphOutput& output,
                       const F* registers) {

@@ -24,7 +24,7 @@ class ImageTiles {
   ImageTiles(const Settings& settings, std::vector<double> inverse_scales);
 
   uint32_t count() const { return rows_ * rows_; }
-  /// Returns the tile of a pixel.
+  /// Returns the index of a pixel's tile.
   uint32_t of(uint32_t pixel) const;
   /// Returns whether any path contributed light.
   bool is_lit() const { return !inverse_.empty(); }
@@ -33,7 +33,7 @@ class ImageTiles {
   double inverse_scale(uint32_t pixel) const { return inverse_[of(pixel)]; }
   /// Inverse brightness by tile, row by row; empty if no path contributed light.
   const std::vector<double>& inverse_scales() const { return inverse_; }
-  /// Writes the tiles to `view`, if any path contributed light.
+  /// Sets the tiles of `view`, if any path contributed light.
   void apply(GuidingView& view) const;
 
  private:

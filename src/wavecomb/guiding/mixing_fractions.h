@@ -32,8 +32,9 @@ struct ShareMoments {
   }
   /// Adds the moments and the count of `other`, multiplied by `factor`.
   void add(const ShareMoments& other, double factor);
-  /// Returns the index of the best fraction. Returns the index that means no guiding unless another
-  /// fraction reduces the second moment below kWorthwhile times the moment without guiding.
+  /// Returns the index of the best fraction in kBsdfShares. Returns the index that means no guiding
+  /// unless another fraction reduces the second moment below kWorthwhile times the moment without
+  /// guiding.
   size_t best() const;
   static constexpr double kWorthwhile = 0.95;
 };

@@ -23,7 +23,7 @@ namespace wavecomb {
 /// Sphere on which the incident light of a region is assumed to lie.
 struct ParallaxSphere {
   float centre[3] = {};        ///< mean position of the region's training bounces
-  float inverse_distance = 0;  ///< 1 / radius; 0 means no parallax compensation
+  float inverse_distance = 0;  ///< one over the sphere's radius; 0 means no parallax compensation
 };
 
 /// Maximum distance of a shading point from the centre, in radii.

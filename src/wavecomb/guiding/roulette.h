@@ -32,13 +32,13 @@ inline F efficient_survival(const GuidingLookup<F>& guiding, const F& share) {
 struct BounceSample {
   uint64_t position_key;  ///< bounce_position_key
   float value;            ///< TrainingRecord::value, or 0 if the bounce contributed no light
-  float squared;          ///< second moment under roulette
+  float squared;          ///< second moment of the bounce under roulette
   float cost;             ///< expected cost of the bounce and the rest of the path, in rays
 };
 
 /// Expected cost and variance of a camera path under roulette, or their means over paths.
 struct PathStatistics {
-  double cost = 0;  ///< expected cost, in rays
+  double cost = 0;  ///< expected cost of a path, in rays
   /// Variance that roulette adds to a path. In the mean over paths, this member is the total
   /// variance of a path, divided by the squared brightness of the image.
   double variance = 0;

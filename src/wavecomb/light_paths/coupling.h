@@ -109,7 +109,7 @@ class LightPathCoupling {
   MergePointOffer<F> merge_point_;  ///< merge point of the vertex, if light paths are merged
 };
 
-/// Light paths as a joint transport.
+/// Joint transport with light paths (path/joint_transport.h).
 struct LightPaths {
   using Context = LightPathContext;
   using Buffers = LightPathBuffers;

@@ -85,7 +85,7 @@ struct JointVertex {
   }
 };
 
-/// Computes the state of R at the vertex, before its bounce. `awaits_merge` holds the lanes whose
+/// Computes the state of R at a vertex, before its bounce. `awaits_merge` holds the lanes whose
 /// bounces so far were all deltas.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
 WAVECOMB_INLINE JointVertex<F> joint_vertex(const LightPathContext& context,

@@ -122,7 +122,7 @@ struct LightVertexResult {
   LightPathState<F> next;  ///< state of the light path after the bounce, in addition to v.next
   /// Film position in pixels of the contribution, if there is a shadow ray.
   F x, y;
-  Vec3<F> p;             ///< position of the vertex
+  Vec3<F> p;             ///< position of the light path's vertex
   Mask<F> is_candidate;  ///< whether vertices of camera paths may connect to the vertex
 };
 

@@ -84,7 +84,7 @@ class LightPathAovs {
   bool wants_events() const { return backward_ != nullptr; }
   size_t bytes() const { return states_.bytes() + connections_.bytes(); }
 
-  /// Starts paths at lights `light`.
+  /// Initialises the AOV state of light paths that start at lights `light`.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void begin(const UInt<F>& slot, const UInt<F>& light,
                                           const Mask<F>& active) const {

@@ -27,7 +27,8 @@ class MergeGrid {
    public:
     Search() = default;
     Search(const MergeGrid& grid, float x, float y, float z) : grid_(&grid), at_{x, y, z} {}
-    /// Advances to the next point and returns its pixel in `pixel`. Returns false at the end.
+    /// Advances to the next point and returns its pixel in `pixel`. Returns false if there is no
+    /// further point.
     bool next(uint32_t& pixel);
 
    private:

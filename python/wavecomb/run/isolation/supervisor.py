@@ -325,7 +325,7 @@ def _wait(process: int, child: Callable[[], int]) -> tuple[int, set[int]]:
             continue
         target = child() or process
         with contextlib.suppress(ProcessLookupError):
-            # Ctrl-Z stops both processes; SIGCONT continues both.
+            # Ctrl-Z stops both the parent and the sandboxed process; SIGCONT continues both.
             if number == signal.SIGTSTP:
                 os.kill(target, signal.SIGSTOP)
                 os.kill(os.getpid(), signal.SIGSTOP)

@@ -129,7 +129,7 @@ def _expand_c(vertical: Floats, horizontal: Floats, candela: Floats) -> IesProfi
         horizontal = np.append(horizontal, 2 * about - horizontal[inner])
         candela = np.append(candela, candela[inner], axis=0)
 
-    # Intensities at phi and 180 - phi are equal.
+    # With this symmetry, intensities at the angles phi and 180 - phi are equal.
     if (first, last) == (90, 270):
         both = np.append(horizontal, (180 - horizontal) % 360)
         horizontal, rows = np.unique(both, return_index=True)

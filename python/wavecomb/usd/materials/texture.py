@@ -351,7 +351,7 @@ class TextureTable:
     def mean(self, number: int) -> NDArray[np.float64]:
         """Returns a texture's linear mean (4,) by reading its file again; 1 if there is no file."""
         key = next((key for key, known in self._ids.items() if known == number), ())
-        # Keys of UDIM textures have three elements.
+        # The keys of UDIM textures have three elements.
         if len(key) == 3:
             means = [self.mean(tile) for _, tile in key[1]]
             return np.asarray(np.mean(means, axis=0)) if means else np.ones(4)

@@ -175,7 +175,9 @@ class Traversal:
             if kind != "other":
                 listed = tuple(prim.GetAuthoredPropertyNames())
                 known = self._names.get(listed)
-                if known is None:  # Most prims share a set of property names.
+                # Cache by the list of property names, since most prims have the same list as
+                # another prim.
+                if known is None:
                     has_primvars = any(name.startswith("primvars:") for name in listed)
                     known = self._names[listed] = frozenset(listed), has_primvars
                 names, has_primvars = known

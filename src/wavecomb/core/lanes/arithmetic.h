@@ -126,7 +126,7 @@ inline F bits_float(const UInt<F>& x) {
     return drjit::reinterpret_array<F>(x);
 }
 
-/// Returns |x| with the sign bit of `sign`.
+/// Returns the magnitude of x with the sign bit of `sign`.
 template <LaneValue F>
 WAVECOMB_INLINE F copysign(const F& x, const F& sign) {
   return bits_float<F>((float_bits<F>(x) & 0x7fffffffu) | (float_bits<F>(sign) & 0x80000000u));
@@ -183,7 +183,7 @@ inline uint32_t mask_bits(const M& m) {
 }
 }  // namespace detail
 
-/// Returns one bit per lane, with lane 0 as the lowest.
+/// Returns a mask as bits, one per lane, with lane 0 in the lowest bit.
 template <typename F>
 inline uint32_t lane_bits(const Mask<F>& m) {
   if constexpr (kIsScalar<F>)
@@ -198,7 +198,7 @@ inline uint32_t count(const Mask<F>& m) {
   return static_cast<uint32_t>(std::popcount(lane_bits<F>(m)));
 }
 
-/// Returns 0, 1, 2, ... in the lanes.
+/// Returns the lane index (0, 1, 2, ...) in each lane.
 template <typename F>
 inline UInt<F> lane_index() {
   if constexpr (kIsScalar<F>)

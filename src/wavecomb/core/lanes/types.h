@@ -67,9 +67,9 @@ inline constexpr bool kIsScalar = kWidth<T> == 1;
 template <typename F>
 using UInt64 = typename detail::Width<F>::U64;
 
-/// Types of lane values. Argument-dependent lookup also finds Dr.Jit's functions of the same names.
-/// Dr.Jit's functions have no constraint, so this constraint makes Wavecomb's functions the better
-/// match.
+/// Concept of the types of lane values. Argument-dependent lookup also finds Dr.Jit's functions of
+/// the same names. Dr.Jit's functions have no constraint, so this constraint makes Wavecomb's
+/// functions the better match.
 template <typename T>
 concept LaneValue = std::is_arithmetic_v<T> || drjit::is_array_v<T>;
 

@@ -28,9 +28,11 @@ struct BackwardAutomaton {
   explicit BackwardAutomaton(const PathAutomaton& forward);
 
   uint32_t forward_states = 0;
-  std::vector<uint32_t> begin;    ///< [end]: initial state of a light path that starts at this end
-  std::vector<uint32_t> next;     ///< [state][event], PathAutomaton::kNextWords per state
-  std::vector<uint32_t> matched;  ///< [state][forward state]: one bit per expression
+  std::vector<uint32_t> begin;  ///< [end]: initial state of a light path that starts at this end
+  /// Transition table [state][event], with PathAutomaton::kNextWords words per state.
+  std::vector<uint32_t> next;
+  /// Matched expressions [state][forward state], with one bit per expression.
+  std::vector<uint32_t> matched;
   uint32_t states() const { return static_cast<uint32_t>(next.size() / PathAutomaton::kNextWords); }
 };
 

@@ -56,10 +56,11 @@ struct PathAutomaton {
   /// not a valid expression or uses an unknown key.
   PathAutomaton(std::span<const NamedExpression> expressions, std::span<const std::string> keys);
 
-  uint32_t expressions = 0;       ///< number of expressions
-  uint32_t ends = 0;              ///< number of path ends, as indexed by path_end()
-  std::vector<uint32_t> next;     ///< [state][event], kNextWords per state
-  std::vector<uint32_t> matched;  ///< [state][end]: one bit per expression
+  uint32_t expressions = 0;  ///< number of expressions
+  uint32_t ends = 0;         ///< number of path ends, as indexed by path_end()
+  /// Transition table [state][event], with kNextWords words per state.
+  std::vector<uint32_t> next;
+  std::vector<uint32_t> matched;  ///< matched expressions [state][end], with one bit per expression
   uint32_t states() const { return static_cast<uint32_t>(next.size() / kNextWords); }
 };
 

@@ -24,7 +24,7 @@
 #include "wavecomb/core/rows/rows.h"
 #include "wavecomb/core/vec3.h"
 
-/// Lists all fields of a row in order.
+/// Macro that lists all fields of a row in order.
 #define WAVECOMB_FIELDS(...)                      \
   WAVECOMB_INLINE constexpr auto fields() {       \
     return std::tie(__VA_ARGS__);                 \
@@ -111,7 +111,7 @@ WAVECOMB_INLINE void for_each_word(T& value, const One& one) {
 
 }  // namespace detail
 
-/// Number of words in the fields of a row.
+/// Number of 32-bit words in the fields of a row.
 template <template <typename> class Row>
 inline constexpr size_t kFieldWords = detail::WordsOf<Row<float>>::value;
 /// Distance between the starts of two consecutive rows, in 32-bit words.
@@ -119,7 +119,7 @@ template <template <typename> class Row>
 inline constexpr size_t kRowWords = std::bit_ceil(kFieldWords<Row>);
 
 /// Returns the word index of a member in a row or record: word_of(&Row<float>::slot). Compilers
-/// reduce word_of() to a constant.
+/// evaluate word_of() to a constant.
 template <typename Record, typename Member>
 WAVECOMB_INLINE uint32_t word_of(Member Record::* member) {
   static_assert(std::is_trivially_copyable_v<Record>);

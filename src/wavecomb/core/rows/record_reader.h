@@ -43,7 +43,7 @@ struct RecordReader {
   F at(float (Record::*member)[N], size_t i) const {
     return word<F, float>(word_of(member) + static_cast<uint32_t>(i));
   }
-  /// Reads the row that is stored at the start of the record.
+  /// Reads a row of fields that is stored at the start of the record.
   template <template <typename> class Row>
   Row<F> row() const {
     Row<F> row;

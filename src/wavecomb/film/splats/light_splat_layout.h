@@ -12,7 +12,8 @@ namespace wavecomb {
 /// scattered at least once, so a splat is direct light (one scattering) or indirect light (several
 /// scatterings), but never emission.
 struct LightSplatLayout {
-  static constexpr uint32_t kNotStored = 0xffffffffu;  ///< the layer is not stored
+  /// Position that means that the layer is not stored.
+  static constexpr uint32_t kNotStored = 0xffffffffu;
 
   uint32_t direct = kNotStored, indirect = kNotStored;
   uint32_t first_group = kNotStored, first_expression = kNotStored;

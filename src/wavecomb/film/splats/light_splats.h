@@ -46,7 +46,7 @@ class LightSplatList {
   std::vector<LightSplat> splats_;
 };
 
-/// Fixed-point sums of light splats. A `sum_index` is an index into the sums.
+/// Fixed-point sums of light splats.
 ///
 /// A single 64-bit sum cannot cover the range of splat values. Values of at least `kMinCoarse`
 /// units are added to a second sum whose unit is 2^kCoarseExponent times as large.
@@ -67,7 +67,7 @@ class LightSplatSums {
 
   bool empty() const { return sums_.empty(); }
   size_t bytes() const { return sums_.size() * sizeof(Sum); }
-  /// Adds a value to a sum atomically.
+  /// Atomically adds a value to a sum.
   void add(size_t sum_index, float r, float g, float b) {
     const FixedPoint coarse{unit_.exponent + kCoarseExponent};
     Sum& sum = sums_[sum_index];
@@ -121,7 +121,7 @@ class LightSplatLayer {
 
   LightSplatLayer() = default;
   /// `paths`: number of light path indices, each of which represents `scale` light paths per
-  /// sample. `with_error`: also sums one half of the samples separately.
+  /// sample. If `with_error`, one half of the samples is also summed separately.
   LightSplatLayer(size_t pixels, FixedPoint unit, size_t paths = 0, double scale = 1,
                   bool with_error = false)
       : sums_(pixels, unit),

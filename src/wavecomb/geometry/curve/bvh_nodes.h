@@ -23,10 +23,10 @@ class CurveBvhNodes {
  public:
   static constexpr uint32_t kMaxSubSegments = 8;  ///< maximum number of sub-segments per node
 
-  /// Returns whether nodes can be built for a mesh.
+  /// Returns whether curve BVH nodes can be built for a mesh.
   static bool supports(const Mesh& mesh) { return mesh.is_strands() && !mesh.deforms(); }
 
-  /// Function that runs two tasks, possibly in parallel.
+  /// Function that runs two given tasks, possibly in parallel.
   using Task = std::function<void()>;
   using RunBoth = std::function<void(const Task&, const Task&)>;
 

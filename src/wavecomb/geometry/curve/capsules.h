@@ -9,8 +9,8 @@ namespace wavecomb {
 
 /// Returns the lanes whose capsules a ray along the z axis certainly misses. A capsule is the union
 /// of spheres of `radius` around the points of the line from a to b; hits matter only within z_near
-/// <= z <= z_far. `rounding` bounds the error of x and y of the ends. The caller must extend z_near
-/// and z_far by the error of z.
+/// <= z <= z_far. `rounding` bounds the rounding error of the x and y coordinates of a and b. The
+/// caller must extend the interval from z_near to z_far by the rounding error of z.
 template <typename F>
 inline Mask<F> passes_capsules(const Vec3<F>& a, const Vec3<F>& b, const F& radius,
                                const F& rounding, const F& z_near, const F& z_far) {

@@ -20,7 +20,7 @@ uint32_t first_point(const Mesh& mesh, uint32_t prim) {
   return mesh.indices[prim] & kCurveFirstPoint;
 }
 
-/// Intersection of a ray with one segment.
+/// Intersection of a ray with one curve segment.
 class SegmentTest {
  public:
   SegmentTest(const Mesh& mesh, uint32_t prim, const PointsAt& points, const RaySpace& ray,
@@ -334,7 +334,7 @@ class SegmentTest {
   Bezier curve_;
   V normal_[4];
   double bulge_ = 0;            ///< deviation of the final sub-segments from straight lines
-  double z_near_ = -kInfinity;  ///< least z of relevant entry points
+  double z_near_ = -kInfinity;  ///< smallest z of entry points that matter
   int side_ = -1;               ///< extrema to find: -1 means entry points, 1 exit points
   /// Whether the ray entered behind its origin or from the adjoining segment.
   bool may_be_inside_ = false;

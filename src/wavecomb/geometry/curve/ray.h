@@ -32,7 +32,7 @@ struct CurveRay {
   curve_math::RaySpace space;
   float origin[3], dir[3];
   float axis[3][3];
-  float length;  ///< length of the direction
+  float length;  ///< length of the ray direction
 };
 
 }  // namespace wavecomb

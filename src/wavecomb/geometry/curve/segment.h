@@ -29,7 +29,7 @@ struct CurveSegment {
   std::array<Vec3<F>, 4> p;
   std::array<F, 4> r;        ///< radii
   std::array<Vec3<F>, 4> n;  ///< normals, for ribbons
-  Mask<F> cubic;             ///< lanes with cubic segments; others are lines
+  Mask<F> cubic;             ///< lanes with cubic segments; the segments in other lanes are lines
 };
 
 /// Point c and radius r of a curve at a parameter, and their derivatives.
@@ -83,8 +83,8 @@ struct TubeFrame {
   F cos_side, sin_side;
 };
 
-/// Returns the tube frame. If control points coincide and the derivative is zero, the next control
-/// points give the direction.
+/// Returns the tube frame of a segment at u. If control points coincide and the derivative is zero,
+/// the next control points give the direction.
 template <typename F>
 inline TubeFrame<F> tube_frame(const CurveSegment<F>& s, const CurvePoint<F>& at) {
   Vec3<F> d = at.dc;

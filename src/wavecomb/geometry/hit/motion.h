@@ -22,7 +22,7 @@ inline F path_time(SamplerKind sampler, const SampleKey<F>& key) {
   return sample_4d<F>(sampler, key, kTimeSet).x;
 }
 
-/// A transform for each lane: rows of A and the translation.
+/// Transform of each lane: the rows of A and the translation.
 template <typename F>
 struct MatrixLanes {
   Vec3<F> row[3], t;
@@ -104,7 +104,7 @@ class MovingRows {
 template <typename F>
 struct MovedInstance {
   Mask<F> moves;
-  MatrixLanes<F> to_world;  ///< lanes whose instances move
+  MatrixLanes<F> to_world;  ///< transforms, valid in lanes whose instances move
   F side;                   ///< sign of the determinant of to_world
   F size;                   ///< bound of all terms of a world position, for the rounding error
 };

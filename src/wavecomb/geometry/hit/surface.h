@@ -19,7 +19,7 @@ template <typename F>
 struct TrianglePoint {
   UInt<F> corner;              ///< index of the triangle's first corner
   std::array<UInt<F>, 3> i;    ///< vertices
-  Vec3<F> p0, p1, p2, e1, e2;  ///< positions of the vertices, edges from the first
+  Vec3<F> p0, p1, p2, e1, e2;  ///< positions of the vertices, and edges from the first vertex
   Vec3<F> p;                   ///< hit point
   F b0, b1, b2;                ///< barycentrics
   /// Twice the triangle's area in world space; 1 for degenerate triangles.

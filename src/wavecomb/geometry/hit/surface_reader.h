@@ -31,7 +31,7 @@ struct Surface {
   /// 1 if v runs along ng x dpdu; -1 if it runs the other way, as in a mirrored texture.
   F handedness;
   Vec2<F> uv;
-  F uv_per_length;  ///< sqrt(uv area / world area) of the triangle
+  F uv_per_length;  ///< sqrt(uv area / world-space area) of the triangle
   F offset;         ///< bound of the position error along ng
   /// Vector along ng from p to the smooth surface that the vertex normals imply (see surface.h).
   Vec3<F> terminator;
@@ -107,7 +107,8 @@ class MeshReader {
         active);
   }
 
-  const MeshRecord* shared_ = nullptr;  ///< the mesh of all active lanes, if they share one
+  /// Mesh of all active lanes, if they have the same mesh; else null.
+  const MeshRecord* shared_ = nullptr;
   const MeshRecord* records_[kWidth<F>];
 };
 
@@ -115,7 +116,7 @@ class MeshReader {
 template <typename F>
 struct InstanceMaps {
   Vec3<F> row[3], t;
-  F side;  ///< sign of the determinant of A
+  F side;  ///< sign of the determinant of the linear map
 
   WAVECOMB_INLINE InstanceMaps(const InstanceRecord* instances, const UInt<F>& inst,
                                const Mask<F>& active) {

@@ -48,7 +48,7 @@ struct TangentCodes {
         for (size_t k = 0; k < 3; ++k) after[k].value[i] = before[k].value[i];
     }
   }
-  /// Returns the tangent of corner k.
+  /// Returns the tangent of triangle corner k.
   Vec3<F> tangent(size_t k) const {
     const Vec3<F> a = decode_direction<F>(load<UInt<F>>(before[k].value));
     if (!moves) return a;

@@ -45,7 +45,7 @@ enum class Primitive : uint8_t {
 /// Shape and opacity of a Gaussian splat, made by geometry/gaussian_splat/gaussian_splat.h; centre
 /// and colour are stored separately.
 struct alignas(64) GaussianSplatRow {
-  float whiten[9];  ///< rows of the map from offsets to standard deviations
+  float whiten[9];  ///< rows of the matrix that maps offsets to units of standard deviations
   float opacity;    ///< opacity along a ray through the centre
   float cut;      ///< square of the cutoff in standard deviations, beyond which rays miss the splat
   float half[3];  ///< half extents of the bounding box about the centre
@@ -75,8 +75,10 @@ struct Mesh {
   Attribute normals_at = Attribute::kNone;
   std::span<const float> uvs;  ///< 2 floats per vertex or corner; if empty, uv are the barycentrics
   Attribute uvs_at = Attribute::kNone;
-  std::span<const uint32_t> face_materials;  ///< material of each primitive, or empty
-  uint32_t material = kInheritMaterial;      ///< used if face_materials is empty
+  /// Material of each primitive; empty if all have the same material.
+  std::span<const uint32_t> face_materials;
+  /// Material of all primitives, used if face_materials is empty.
+  uint32_t material = kInheritMaterial;
   /// Light group of the mesh's emission (SceneBuilder::light_group)
   uint32_t light_group = 0;
   /// Index that SceneBuilder::add_mesh_light() returned, or kNoLight.
@@ -94,7 +96,7 @@ struct Mesh {
 
   bool is_curved() const { return primitive != Primitive::kTriangle; }
   bool is_strands() const { return is_curved() && !is_dots(); }
-  /// Returns whether each point is a primitive.
+  /// Returns whether each point of the mesh is a primitive.
   bool is_dots() const {
     return primitive == Primitive::kSphere || primitive == Primitive::kGaussianSplat;
   }
@@ -124,7 +126,7 @@ struct alignas(64) MeshRecord {
   uint32_t flags;
   /// sqrt(uv area / object-space area), summed over all triangles; 0 without uvs.
   float uv_density;
-  uint32_t motion;  ///< index into MotionView::meshes
+  uint32_t motion;  ///< index of the mesh's motion in MotionView::meshes
   uint64_t radii;
 };
 static_assert(sizeof(MeshRecord) == 64);

@@ -29,8 +29,8 @@ static_assert(sizeof(MeshMotion) == 24);
 /// Position of a time in [0, 1] among `segments` + 1 equally spaced motion steps.
 template <typename F>
 struct StepInterpolation {
-  UInt<F> before;  ///< index of the step at or before the time
-  F part;          ///< interpolation weight of the following step
+  UInt<F> before;  ///< index of the last motion step that is not after the time
+  F part;          ///< interpolation weight of the next step
 
   StepInterpolation(const F& time, const UInt<F>& segments) {
     const F at = time * F(Int<F>(segments));
@@ -48,7 +48,8 @@ struct StepRange {
 
 /// Packed transform of an instance at one motion step.
 struct alignas(64) MatrixStep {
-  float to_world[12] = {};  ///< rows of A, each followed by its translation
+  /// Rows of the 3 x 4 matrix: each row of A, followed by a component of the translation.
+  float to_world[12] = {};
   float pad[4] = {};
 
   MatrixStep() = default;

@@ -88,8 +88,8 @@ std::array<V, 3> contributions(const Corners& at, size_t triangle, uint32_t step
 
 /// Group of corners that share a tangent.
 struct Share {
-  uint32_t corner;  ///< the first corner of the group
-  uint32_t next;    ///< another group at the same vertex, or kNone
+  uint32_t corner;  ///< first corner of the group
+  uint32_t next;    ///< next group at the same vertex, or kNone
 };
 constexpr uint32_t kNone = 0xffffffffu;
 
@@ -125,7 +125,7 @@ struct Sum {
   float weight = 0;
 };
 
-/// Returns the mean tangent of each group at one step.
+/// Returns the mean tangent of each corner group at one motion step.
 std::vector<Sum> add_up(const Mesh& mesh, const Corners& at, uint32_t step,
                         const std::vector<uint32_t>& of_corner, size_t share_count) {
   std::vector<Sum> sums(share_count);

@@ -34,8 +34,8 @@ MeshTangents make_tangents(const Mesh& mesh);
 
 /// Packed reference to the tangents of a mesh.
 struct TangentRecord {
-  uint64_t codes = 0;     ///< address, or 0 if the mesh has no tangents
-  uint32_t step = 0;      ///< number of codes of one step, for a mesh that deforms
+  uint64_t codes = 0;     ///< address of the tangent codes, or 0 if the mesh has no tangents
+  uint32_t step = 0;      ///< number of codes per motion step, for a mesh that deforms
   uint32_t segments = 0;  ///< number of motion steps minus one
   uint32_t at_corners = 0;
   uint32_t pad = 0;
@@ -51,7 +51,7 @@ struct SceneTangents {
 
   /// Tangents by mesh, null for meshes without tangents; empty if no mesh has tangents.
   std::vector<std::shared_ptr<const MeshTangents>> of_mesh;
-  std::vector<TangentRecord> records;  ///< indexed by mesh; empty if no mesh has tangents
+  std::vector<TangentRecord> records;  ///< record of each mesh; empty if no mesh has tangents
   uint64_t bytes() const;
 };
 

@@ -34,7 +34,7 @@ struct FaceVaryingIndices {
 /// Control cage: polygons, creases and boundary rules. The caller owns the arrays; Subdivision
 /// reads them in its constructor only.
 struct Cage {
-  std::string name;  ///< used in error messages
+  std::string name;  ///< name of the surface in error messages
   Scheme scheme = Scheme::kCatmullClark;
   BoundaryRule boundary = BoundaryRule::kEdgeAndCorner;
   FaceVaryingRule face_varying = FaceVaryingRule::kCornersPlus1;
@@ -66,8 +66,8 @@ struct Welded {
   std::vector<float> values;
 };
 /// Merges equal values of corners that share a vertex, bit for bit. `corners` are vertex indices
-/// below `vertex_count`; `values` is (corners, width). Throws Error if indices or sizes are
-/// invalid.
+/// below `vertex_count`; `values` is (corners, width). Throws Error if vertex indices or array
+/// sizes are invalid.
 Welded weld_corners(std::span<const int32_t> corners, uint32_t vertex_count,
                     std::span<const float> values, uint32_t width);
 

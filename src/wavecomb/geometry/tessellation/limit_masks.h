@@ -127,7 +127,7 @@ inline int other_end(const Far::TopologyLevel& level, int edge, int vertex) {
   return ends[0] == vertex ? ends[1] : ends[0];
 }
 
-/// Returns the vertex of a face two corners after `corner`.
+/// Returns the vertex of a face that is two corners after `corner`.
 inline int opposite(const Far::TopologyLevel& level, int face, int corner) {
   const Far::ConstIndexArray points = level.GetFaceVertices(face);
   const int at = corner + 2;

@@ -12,7 +12,7 @@ namespace {
 
 /// Weight of the mean length of edges outside the image.
 constexpr double kOutsideWeight = 0.125;
-/// Image bounds are enlarged by this factor.
+/// Factor by which the image bounds are enlarged.
 constexpr double kMargin = 1.1;
 
 Point transformed(const double* m, const Point& p) {

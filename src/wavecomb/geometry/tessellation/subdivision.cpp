@@ -105,7 +105,7 @@ struct Subdivision::Refiner {
     return face;
   }
 
-  /// Collects the visible faces.
+  /// Collects the visible faces of the last level.
   void find_visible_faces() {
     const Far::TopologyLevel& cage = far->GetLevel(0);
     for (int f = 0; f < cage.GetNumFaces() && !has_holes; ++f) has_holes = cage.IsFaceHole(f);

@@ -17,14 +17,14 @@ struct RefinedFaces {
   /// Number of vertices of the level, including vertices of holes.
   uint32_t vertex_count = 0;
   std::vector<uint32_t> corners;  ///< vertex index of each corner
-  std::vector<uint32_t> base;     ///< cage face that each face came from
+  std::vector<uint32_t> base;     ///< index of the cage face of each face
   /// Index of each corner's value in face-varying channel 0; empty without channels.
   std::vector<uint32_t> first_values;
 
   size_t count() const { return base.size(); }
 };
 
-/// A uniformly refined cage. Values are evaluated on the limit surface.
+/// A uniformly refined cage. The member functions evaluate values on the limit surface.
 ///
 /// Contract: immutable; safe for concurrent use. Loops over faces and vertices use the threads of
 /// with_threads(), and the results do not depend on the number of threads. In the constructor and
@@ -42,7 +42,7 @@ class Subdivision {
   /// Returns whether at most two faces meet at each edge, and only one fan of faces at each vertex.
   /// Non-manifold edges and vertices are kept sharp.
   bool is_manifold() const;
-  /// Number of vertices of the finest level.
+  /// Returns the number of vertices of the finest level.
   uint32_t vertex_count() const;
 
   /// Returns the visible faces, that is, all faces except holes and faces without a limit surface

@@ -21,7 +21,7 @@ constexpr size_t kBand = 16384;
 struct Work {
   RefinedFaces faces;
   std::vector<float> positions;   ///< 3 per vertex
-  std::vector<uint32_t> sectors;  ///< index of the normal of each corner
+  std::vector<uint32_t> sectors;  ///< index of each corner's normal
   std::vector<float> normals;     ///< 3 per normal
   std::vector<float> uvs;         ///< 2 per texture coordinate
   /// Index of each corner's texture coordinate in `uvs`; empty without texture coordinates.

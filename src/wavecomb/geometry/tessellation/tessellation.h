@@ -32,13 +32,13 @@ struct SurfacePrimvar {
   /// At level 0, face-varying values other than uvs have the shape (triangles, 3, width).
   std::span<const float> values;
   uint32_t width = 1;
-  uint32_t channel = 0;  ///< index into Cage::channels if face-varying
+  uint32_t channel = 0;  ///< index into Cage::channels, for face-varying primvars
 };
 
 /// Input of make_surface(). The caller owns the arrays.
 struct SurfaceDesc {
   Cage cage;
-  std::span<const float> points;  ///< 3 per point of the cage
+  std::span<const float> points;  ///< 3 coordinates per point of the cage
   /// Subdivision level; 0 means that the triangles in `triangles` are displaced without
   /// subdivision.
   uint32_t level = 1;
@@ -70,15 +70,15 @@ struct SurfaceMesh {
   std::vector<float> positions, normals, uvs;  ///< 3, 3 and 2 floats per point; uvs may be empty
   /// 3 point indices per triangle, counter-clockwise as seen from outside.
   std::vector<uint32_t> triangles;
-  std::vector<uint32_t> faces;          ///< cage face of each triangle
+  std::vector<uint32_t> faces;          ///< index of the cage face of each triangle
   std::vector<SurfaceValues> primvars;  ///< values of each primvar in SurfaceDesc::primvars
   bool is_manifold = true;
 };
 
-/// Triangulates the surface. Points lie on the limit surface and have its normals. Displaced points
-/// move along the limit normal by the mean displacement of the adjacent faces, so no gaps open at
-/// seams of texture coordinates or materials; their normals are those of the displaced triangles.
-/// Throws Error with a one-line description if the input is invalid.
+/// Triangulates the surface. Points lie on the limit surface and have the normals of the limit
+/// surface. Displaced points move along the limit normal by the mean displacement of the adjacent
+/// faces, so no gaps open at seams of texture coordinates or materials; their normals are those of
+/// the displaced triangles. Throws Error with a one-line description if the input is invalid.
 SurfaceMesh make_surface(const SurfaceDesc& desc);
 
 }  // namespace wavecomb

@@ -13,9 +13,9 @@
 namespace wavecomb {
 namespace {
 
-/// Returns one over the length of the bounce ray from vertex `i`. A value of 0 means that the
-/// bounce ray left the scene. A negative value means that the length is unknown, because the next
-/// vertex was not recorded.
+/// Returns one over the length of the bounce ray from vertex `i`. The value 0 means that the bounce
+/// ray left the scene. A negative value means that the length is unknown, because the next vertex
+/// was not recorded.
 float bounce_inverse_distance(const PathHistory& history, uint32_t slot, uint32_t i) {
   if (i + 1 == BounceReader::kVertices) return -1;
   if (i + 1 >= history.count(slot)) return 0;

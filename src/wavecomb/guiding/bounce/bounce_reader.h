@@ -38,7 +38,7 @@ struct PathCosts {
 
 /// Parameters of a training round.
 struct TrainingPlan {
-  uint32_t first, samples;  ///< first sample and number of samples of each pixel
+  uint32_t first, samples;  ///< first sample index and number of samples of each pixel
   uint32_t max_depth;
   const GuidingGrid& grid;
   GuidingView guide;        ///< guiding field of the bounces; empty if bounces are not guided
@@ -60,7 +60,7 @@ class BounceReader final : public HistoryReader {
 
   uint32_t most() const override { return kVertices; }
   void ended(const PathHistory& history, const float* radiance, const WaveTask& task) override;
-  /// Appends the training samples in path order.
+  /// Appends all training samples to `training_samples`, in path order.
   void append_to(TrainingSamples& training_samples) const;
 
  private:

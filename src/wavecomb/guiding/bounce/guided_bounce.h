@@ -17,7 +17,7 @@
 
 namespace wavecomb {
 
-/// Whether bounces of program `Bsdf` can be guided.
+/// Whether bounces of shading program `Bsdf` can be guided.
 template <typename Bsdf>
 inline constexpr bool kGuided = Bsdf::kHasNonDelta && Bsdf::kOnSurface;
 

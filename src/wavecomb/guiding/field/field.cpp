@@ -15,7 +15,7 @@
 namespace wavecomb {
 namespace {
 
-/// Cells with more records than this are divided.
+/// Maximum number of records in a cell; cells with more records are divided.
 constexpr size_t kCellRecords = 2048;
 /// Minimum number of records for a region to get a separate distribution.
 constexpr double kMinRegionRecords = 64;
@@ -25,9 +25,9 @@ constexpr size_t kDirections = 8192;
 constexpr double kPrior = 64;
 /// Minimum number of records of a material for which a minimum of bsdf_share is computed.
 constexpr double kMaterialRecords = 512;
-/// Factor on the survival probability of roulette. Moments from few training paths miss rare light.
-/// Terminating such paths too often causes bright pixels, while continuing them too often costs
-/// only a few rays.
+/// Factor by which the survival probability of roulette is increased. Moments from few training
+/// paths miss rare light. Terminating such paths too often causes bright pixels, while continuing
+/// them too often costs only a few rays.
 constexpr double kSafety = 1.5;
 /// Fraction of bounces that the BSDF samples in the first round, before moments are known.
 constexpr float kFirstShare = 0.5f;
@@ -185,7 +185,7 @@ class GuidingFieldBuilder {
   }
 
   /// Processes the octree node of `depth` whose Morton codes share the prefix of `code`. The
-  /// records of the cell are [begin, end).
+  /// records of the node are [begin, end).
   void divide(uint32_t depth, uint32_t code, size_t begin, size_t end) {
     read(depth, begin, end);
     if (end - begin <= cell_records_ || depth == kGuidingBits) {
@@ -265,12 +265,13 @@ class GuidingFieldBuilder {
   GuidingField& field_;
   GuidingFieldArrays& parts_;  ///< parts of field_
   bool first_, guides_;
-  std::vector<TrainingRecord> records_;  ///< sorted by Morton code
+  std::vector<TrainingRecord> records_;  ///< training records, sorted by Morton code
   std::vector<ShareRatios> ratios_;      ///< ratios of records_; empty in the first round
   std::vector<uint32_t> codes_;
   size_t cell_records_ = kCellRecords;
   std::array<std::vector<const TrainingRecord*>, kGuidingAxes> by_axis_;  ///< scratch of read()
-  std::array<Cell, kGuidingBits + 1> levels_;  ///< path from the root to the node in divide()
+  /// Cells on the path from the root to the node that divide() processes.
+  std::array<Cell, kGuidingBits + 1> levels_;
   double contributing_ = 0, guided_ = 0, off_ = 0, on_ = 0;
 };
 

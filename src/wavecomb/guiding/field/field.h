@@ -2,7 +2,7 @@
 /// The guiding field: incident light by region of space and direction, learned from training
 /// bounces.
 ///
-/// Cells are an octree over the bounds of the scene. A cell with more than kCellRecords
+/// The cells form an octree over the bounds of the scene. A cell with more than kCellRecords
 /// contributing bounces is divided. A region is the part of a cell whose surfaces face one axis
 /// direction. The distribution of a region is the mean value of its bounces by direction. If there
 /// are few bounces, it is blended with the distribution q of the parent cell:
@@ -51,7 +51,8 @@ struct GuidingFieldStatistics {
   double guided_share = 0, moment_ratio = 1;
 };
 
-/// A guiding field and the arrays that kernels read. Immutable except for compute_survival.
+/// A guiding field and the arrays that kernels read. The field is immutable except for
+/// compute_survival().
 class GuidingField {
  public:
   /// Creates an empty field. An empty field does not guide bounces, but defines the grid of

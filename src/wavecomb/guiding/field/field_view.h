@@ -36,7 +36,7 @@ inline constexpr uint32_t kNoGuidingRegion = 0xffffffffu;
 
 /// Pointers to the arrays of the guiding field. If `grid` is null, bounces are not guided.
 struct GuidingView {
-  const uint32_t* grid = nullptr;  ///< kGuidingTopCells entries, then bricks
+  const uint32_t* grid = nullptr;  ///< grid: kGuidingTopCells entries, followed by bricks
   /// Region, or kNoGuidingRegion, at index kGuidingAxes * cell + axis.
   const uint32_t* cells = nullptr;
   const uint32_t* tables = nullptr;  ///< kGuidingWords per region

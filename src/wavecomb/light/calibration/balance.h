@@ -14,7 +14,7 @@
 ///
 ///   G = E_q[(a / (p + r))^2] - 2 (N - M) E_q[a r / (p + r)^2],   a = g / q, r = b / q,
 ///
-/// has the same value for all lights of nonzero probability. Then p is proportional to the square
+/// has the same value for all lights of nonzero probability p. Then p is proportional to the square
 /// root of the second moment for a light that bounces cannot hit, and 0 for a light that bounces
 /// sample as well as light samples do.
 #pragma once

@@ -30,7 +30,7 @@ struct LightParts {
   std::vector<std::pair<uint32_t, uint32_t>> of_mesh;
 
   size_t size() const { return power.size(); }
-  /// Returns the part of a selected light.
+  /// Returns the part to which a selected light belongs.
   uint32_t of(uint32_t light) const;
 };
 
@@ -60,14 +60,14 @@ struct CalibratedLights {
   /// Selection probability of each light; empty for selection by tree.
   std::vector<float> selection_pdf;
   std::vector<uint32_t> power_bins;
-  PowerTable power_table;  ///< table with a null pointer to the bins
+  PowerTable power_table;  ///< table for power_bins, with a null pointer to the bins
   std::vector<uint32_t> infinite_ends;
   std::vector<float> infinite_pdf;
   uint32_t tree_numbers = 0;
   /// Calibrated nodes of the light tree; empty if the tree is not changed.
   std::vector<LightTreeNode> nodes;
 
-  /// Replaces the tables of `view`. Contract: afterwards the view points into this object.
+  /// Replaces the tables of `view`. Contract: after the call, `view` points into this object.
   void apply(LightView& view) const;
 };
 

@@ -19,7 +19,8 @@ constexpr uint32_t kRows = 256;
 /// fraction of the cell that the texel covers.
 template <typename Add>
 void for_each_overlap(uint64_t i, uint64_t n, uint64_t cells, const Add& add) {
-  const uint64_t begin = i * cells, end = begin + cells;  // bounds in units of 1 / (n cells)
+  // Bounds of the texel in units of 1 / (n * cells)
+  const uint64_t begin = i * cells, end = begin + cells;
   for (uint64_t c = begin / n; c * n < end; ++c) {
     const uint64_t covered = std::min(end, (c + 1) * n) - std::max(begin, c * n);
     add(static_cast<size_t>(c), static_cast<double>(covered) / static_cast<double>(n));

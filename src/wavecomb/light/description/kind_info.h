@@ -47,13 +47,14 @@ struct LightKindInfo {
   std::vector<const char*> parameters;
   /// Table rows of parameters specific to this kind, made by specific_parameter().
   std::vector<LightParameter> own;
-  /// Sets position, area, radiance and power. The function is null if other code makes the records
-  /// of the kind.
+  /// Sets position, area, radiance and power of a light record. The function is null if other code
+  /// makes the records of the kind.
   void (*make)(LightBuild&, const Light&, LightBuildContext&) = nullptr;
   /// Sets bounds for the light tree, which are initialized to `light.p` and the intensity power /
   /// pi. The function is null if the light tree does not contain the kind.
   void (*bound)(LightCluster&, const LightRecord& light, double power) = nullptr;
-  /// Returns the shape of a record. The function is null if rays cannot hit this kind of light.
+  /// Returns the shape of a light record. The function is null if rays cannot hit this kind of
+  /// light.
   LightShape (*shape)(const LightRecord&) = nullptr;
   /// For LightShape::kCustom: a slightly enlarged bounding box, and the distance to the hit along d
   /// in units of |d|, or 0 if the ray does not hit the light. `o` is relative to light.p. Tests one
@@ -65,7 +66,7 @@ struct LightKindInfo {
   bool has(uint32_t trait) const { return (traits & trait) != 0; }
 };
 
-/// Returns all kinds, indexed by LightKind.
+/// Returns the descriptions of all light kinds, indexed by LightKind.
 std::span<const LightKindInfo> light_kinds();
 inline const LightKindInfo& info_of(LightKind kind) {
   return light_kinds()[static_cast<size_t>(kind)];

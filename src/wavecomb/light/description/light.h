@@ -105,9 +105,9 @@ enum class MaterialSync : uint32_t {
   kNoResponse,
 };
 
-/// A light as the stage describes it, in its local space. As in UsdLux, rects and disks lie in the
-/// xy plane and emit along -z, distant lights emit along -z, and domes have their pole at +y and
-/// the orientation of UsdLuxDomeLight.
+/// Description of a light in its local space, as authored in the stage. As in UsdLux, rects and
+/// disks lie in the xy plane and emit along -z, distant lights emit along -z, and domes have their
+/// pole at +y and the orientation of UsdLuxDomeLight.
 struct Light {
   std::string name;
   LightKind kind{};  ///< a rect by default

@@ -77,15 +77,15 @@ struct LightSet {
   double total_power = 0;  ///< estimated power on which selection probabilities are based, W
 
   size_t size() const { return record_count + triangles.size(); }
-  /// Returns the index of the first triangle among all lights.
+  /// Returns the light index of the first triangle.
   uint32_t first_triangle() const { return record_count; }
   /// Returns the probability of selecting light `i` by power.
   float selection_pdf(size_t i) const {
     return i < record_count ? records[i].selection_pdf : triangles[i - record_count].selection_pdf;
   }
 
-  /// Returns the device view of these lights. Contract: it points into this set, which must not
-  /// move.
+  /// Returns the device view of these lights. Contract: the view points into this set, which must
+  /// not be moved.
   LightView view(const MaterialView& materials) const;
 };
 
@@ -102,7 +102,7 @@ void check_light_count(uint64_t count);
 /// Time at which the light tree is built.
 enum class TreeTime { kNow, kWhenChosen };
 
-/// Function that returns emissive triangle i. It is called from several threads at once.
+/// Function that returns emissive triangle i. The function is called from several threads at once.
 using TriangleSource = std::function<EmissiveTriangle(size_t i)>;
 
 /// Lights of a scene, and how to build their sampling structures.

@@ -56,12 +56,12 @@ struct LightParameter {
   /// Bounds of a number or of each component of a colour; all values are finite.
   double least = -std::numeric_limits<double>::infinity();
   double most = std::numeric_limits<double>::infinity();
-  double slider_max = 1;  ///< upper end of a slider if there is no `most`
+  double slider_max = 1;  ///< upper end of the parameter's slider if `most` is infinite
   std::vector<const char*> choices;
   /// Lights with this trait have the parameter, in addition to the light kinds that list its name.
   uint32_t trait = 0;
-  bool is_common = false;    ///< all lights have the parameter
-  bool is_specific = false;  ///< specific to one kind of light
+  bool is_common = false;    ///< whether all lights have the parameter
+  bool is_specific = false;  ///< whether the parameter is specific to one kind of light
   uint32_t kinds = 0;        ///< bit k is set if lights of LightKind k have the parameter
 
   LightValue (*read)(const Light&) = nullptr;

@@ -94,7 +94,7 @@ inline KindSample<F> sample_dome_light(const LightView& view, const LightReader<
   return result;
 }
 
-/// Image position of a direction in dome space.
+/// Image position and polar angle of a direction in dome space.
 template <typename F>
 struct ImageDirection {
   F sin_theta;

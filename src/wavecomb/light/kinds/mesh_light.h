@@ -50,10 +50,10 @@ inline Color<F> factor_of_hit(const F& diffuse, const F& specular, const Mask<F>
 template <typename F>
 struct MeshLightRay {
   Vec3<F> dir;
-  UInt<F> link;      ///< link class of the surface that the ray left
+  UInt<F> link;      ///< light linking class of the surface at which the ray starts
   Mask<F> is_delta;  ///< delta bounces and camera rays, which light sampling cannot produce
   bool from_camera;
-  Color<F> diffuse;  ///< diffuse fraction of the bounce, by colour
+  Color<F> diffuse;  ///< diffuse fraction of the bounce for each colour
 };
 
 /// Returns the radiance, without MIS weight, that a path receives along `ray` from meshes with mesh

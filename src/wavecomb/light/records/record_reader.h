@@ -77,7 +77,7 @@ template <typename F>
 struct LightQuery {
   const LightView& view;
   const UInt<F>& index;         ///< index of the sampled light in each lane
-  const LightReader<F>& light;  ///< record of the light
+  const LightReader<F>& light;  ///< reader of the light's record
   const Vec3<F>& from;
   const F &u, &v;
   const Mask<F>& lanes;
@@ -181,7 +181,7 @@ inline F area_to_solid_angle(const F& d2, const F& cos_light, const F& area) {
   return select(valid & is_finite(pdf), pdf, F(0.f));
 }
 
-/// Unit vector along d, and its length. The vector is finite even if d is 0.
+/// Unit vector along d, and the length of d. The vector is finite even if d is 0.
 template <typename F>
 struct Direction {
   Vec3<F> wi;

@@ -37,10 +37,10 @@ struct EscapedRay {
   F bsdf_pdf{0.f};          ///< density of the bounce, per sr
   Mask<F> is_delta{false};  ///< delta bounce or camera ray, which light sampling cannot produce
   bool from_camera = false;
-  UInt<F> link{0u};          ///< link class of the surface that the ray left
+  UInt<F> link{0u};          ///< light linking class of the surface at which the ray starts
   F ratio{0.f};              ///< PathState::ratio, by which the MIS weight includes light paths
   F time{0.5f};              ///< shutter time in [0, 1]
-  Color<F> diffuse{F(0.f)};  ///< diffuse fraction of the bounce, by colour
+  Color<F> diffuse{F(0.f)};  ///< diffuse fraction of the bounce for each colour
 };
 
 /// Returns radiance times MIS weight of infinite light `light` for an escaped ray, which is one

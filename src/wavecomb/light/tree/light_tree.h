@@ -17,7 +17,7 @@ struct LightSet;
 struct LightTree {
   /// Nodes in depth-first order; their number is one less than the number of lights in the tree.
   std::vector<LightTreeNode> nodes;
-  std::vector<uint32_t> trails;  ///< LightTreeView::trails for all lights
+  std::vector<uint32_t> trails;  ///< trail of each light (LightTreeView::trails)
   std::vector<uint32_t> infinite_ends;
   std::vector<float> infinite_pdf;
   /// 0 for the first node, or kTreeLeaf | index of the only light; kNoLight if no light of the tree

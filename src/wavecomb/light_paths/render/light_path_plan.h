@@ -37,7 +37,7 @@ class LightPathPlan {
   static uint32_t pass_samples(const Settings& settings, uint32_t samples);
   /// Adds the sums for light paths to an empty film.
   void allocate(Film& film) const;
-  /// Creates the data that the waves of the render read. `grid` is from LightPathPasses.
+  /// Creates the light path data that all waves of the render read. `grid` is from LightPathPasses.
   LightPathContext context(const MergeGrid* grid) const;
   LightPathShare share() const { return share_; }
   /// From this call on, light splats hold variance (LightPathContext::camera_squares) instead of
@@ -51,7 +51,8 @@ class LightPathPlan {
   const Settings& settings_;
   LightPathShare share_;
   LightSplatFilter filter_;
-  std::vector<std::string> lights_without_paths_;  ///< if other lights emit light paths
+  /// Names of the lights that emit no light paths, if other lights do.
+  std::vector<std::string> lights_without_paths_;
 };
 
 /// Returns the number of samples of each light path at the end of a pass.

@@ -86,7 +86,7 @@ NODES |= {
 
 @_node("atan2")
 def _atan2(n: NodeCall) -> Value:
-    # MaterialX 1.38 names the inputs in1 and in2.
+    # MaterialX 1.38 names the two inputs in1 and in2.
     y, x = n.given("iny") or n.given("in1"), n.given("inx") or n.given("in2")
     return n.make.op("atan2", y or 0.0, x or 1.0)
 
