@@ -28,7 +28,7 @@ ISAS ?= portable
 MINUTES ?= 10
 SEED ?= 1
 JOBS ?= $(shell nproc 2> /dev/null || echo 2)
-# Allows one build at a time per directory, also from different make processes.
+# Lock that allows only one build at a time per build directory, even from different make processes.
 LOCK := $(if $(shell command -v flock),flock build/.lock)
 SETUP_LOCK := $(if $(LOCK),$(LOCK)-setup)
 ASAN_LOCK := $(if $(LOCK),$(LOCK)-asan)
@@ -172,7 +172,8 @@ build-test-tools: build
 test-py: build-test-tools build/.setup-test ## Python and statistical tests
 	@$(MAKE) --no-print-directory run-py
 
-# These targets have no prerequisites: they run as parts of make test, which builds the programs.
+# The test targets below have no prerequisites, because they run as parts of make test, which builds
+# the test programs.
 run-py:
 	$(VENV)/python -m pytest -q -n $(JOBS)
 

@@ -26,7 +26,7 @@ void def_materials(nanobind::class_<wavecomb::SceneBuilder>& builder);
 void def_meshes(nanobind::class_<wavecomb::SceneBuilder>& builder);
 void def_volumes(nanobind::class_<wavecomb::SceneBuilder>& builder);
 
-/// Converts a texture use from the dict format of SceneBuilder.add_material.
+/// Converts the dict with which SceneBuilder.add_material describes a texture lookup.
 wavecomb::TextureUse texture_use(const nanobind::dict& d);
 
 /// Adds a value graph from the arguments of SceneBuilder.add_graph.

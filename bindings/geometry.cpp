@@ -110,8 +110,8 @@ SurfaceDesc describe(const SceneBuilder& builder, const nb::dict& d) {
   return desc;
 }
 
-/// Converts a vector to an array of shape (-1, columns), or to one axis if `columns` is 0. Moves
-/// the data without copying.
+/// Converts a vector to a NumPy array of shape (-1, columns), or to a one-dimensional array if
+/// `columns` is 0. Moves the data without copying.
 template <typename T>
 nb::object array_of(std::vector<T>&& values, size_t columns) {
   auto* held = new std::vector<T>(std::move(values));

@@ -88,7 +88,8 @@ class LiveSnapshot {
   nb::dict settings_;
 };
 
-/// Returns an array of the film's size that owns its values; single-channel arrays have two axes.
+/// Returns a NumPy array of the film's size that owns its values; arrays of one channel have two
+/// axes.
 template <typename T>
 nb::object image(const Film& film, std::vector<T> values, size_t channels) {
   auto* own = new std::vector<T>(std::move(values));

@@ -75,7 +75,8 @@ list(APPEND cold ${refiner} "${PROJECT_SOURCE_DIR}/src/wavecomb/light_paths/setu
 list(REMOVE_ITEM core_sources ${cold})
 file(GLOB_RECURSE core_headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/*.h"
   "${PROJECT_SOURCE_DIR}/src/wavecomb/*.inl")
-# For the core only. -Wconversion would also warn about int to float, which is common in kernels.
+# Warnings for the core only. -Wconversion would also warn about conversions of int to float, which
+# are common in kernels.
 set(core_warnings -Wfloat-conversion)
 
 # Third-party headers that nearly every unit includes. Parsing these headers takes half of the
@@ -105,7 +106,7 @@ function(wavecomb_kernel_units var kind set width)
         AND (NOT set STREQUAL "first" OR index EQUAL 0))
       set(unit "${PROJECT_BINARY_DIR}/lanes/${kind}_${member}_${width}.cpp")
       configure_file("${template}" "${unit}" @ONLY)
-      # With WAVECOMB_BATCH there is a unit for each program and width.
+      # With WAVECOMB_BATCH, there is one translation unit for each shading program and lane width.
       set_source_files_properties("${unit}" PROPERTIES UNITY_GROUP "${program}")
       list(APPEND units "${unit}")
     endif()

@@ -75,7 +75,7 @@ else()
   set(WAVECOMB_TBB_IS_WHEEL FALSE)
 endif()
 
-# Uses Far and Sdc of OpenSubdiv, not its evaluators or OpenGL.
+# Wavecomb uses the modules Far and Sdc of OpenSubdiv, not its evaluators or OpenGL.
 list(APPEND CMAKE_MODULE_PATH "${PROJECT_SOURCE_DIR}/cmake")
 find_package(OpenSubdiv 3.4 MODULE QUIET)
 if(NOT OpenSubdiv_FOUND)

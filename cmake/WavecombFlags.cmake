@@ -23,7 +23,8 @@ target_compile_options(wavecomb_common INTERFACE
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-maybe-uninitialized;-Wno-uninitialized;-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>
   $<$<BOOL:${WAVECOMB_WERROR}>:-Werror>)
 # Checks of every reference and of every scope double the compile time of kernels and containers,
-# and quadruple that of packets. WAVECOMB_SANITIZE=all, as in `make test-long`, enables them.
+# and quadruple the compile time of packets. WAVECOMB_SANITIZE=all, as in `make test-long`, enables
+# them.
 if(WAVECOMB_SANITIZE)
   if(WAVECOMB_SANITIZE STREQUAL "thread")
     set(_sanitize -fsanitize=thread -fno-omit-frame-pointer)

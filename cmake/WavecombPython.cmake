@@ -11,8 +11,8 @@ execute_process(COMMAND "${Python_EXECUTABLE}" -m nanobind --cmake_dir
 find_package(nanobind CONFIG REQUIRED)
 
 # A stable-ABI module serves every Python from 3.10, with nanobind in the wheel nanobind-backend.
-# With libc++ this works on macOS only (see nb_defs.h). Elsewhere nanobind is linked statically, for
-# the current Python version only.
+# With libc++, a stable-ABI module works on macOS only (see nb_defs.h). Elsewhere nanobind is linked
+# statically, for the current Python version only.
 check_cxx_source_compiles("#include <version>
 #ifndef _LIBCPP_VERSION
 #error no

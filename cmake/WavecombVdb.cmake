@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Adds the Python module wavecomb._vdb, which reads volumes with OpenVDB, in the install component
-# `python`. It does not depend on the core, so one module serves all instruction sets.
+# `python`. The module does not depend on the core, so one module serves all instruction sets.
 message(STATUS "OpenVDB ${OpenVDB_VERSION} (${OpenVDB_LIBRARY})")
 
 file(GLOB _vdb_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/bindings/vdb/*.cpp")

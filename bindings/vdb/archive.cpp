@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Reader of .vdb files. It uses OpenVDB with a stream that throws at the end of the file, because
-/// openvdb::io::File continues past the end and reads zeros.
+/// Reader of .vdb files. The reader uses OpenVDB with a stream that throws at the end of the file,
+/// because openvdb::io::File continues past the end and reads zeros.
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/Compression.h>
 #include <openvdb/io/GridDescriptor.h>
@@ -19,7 +19,7 @@
 namespace openvdb {
 OPENVDB_USE_VERSION_NAMESPACE
 namespace OPENVDB_VERSION_NAME {
-// Declared here because openvdb/openvdb.h also includes grids of points.
+// openvdb::initialize is declared here, because openvdb/openvdb.h also includes grids of points.
 void initialize();
 }  // namespace OPENVDB_VERSION_NAME
 }  // namespace openvdb
@@ -92,7 +92,7 @@ class Archive final : public GridFile, private vio::Archive {
   openvdb::GridBase::Ptr begin(const Entry& entry);
   const Entry& instance_parent(const Entry& entry) const;
   /// Reads a grid; returns null if OpenVDB does not know the grid's type. Throws TooLarge after
-  /// reading its topology, before memory for its values is allocated.
+  /// reading the grid's topology, before memory for its values is allocated.
   openvdb::GridBase::Ptr read_part(const Entry& entry, Part part, uint64_t max_bytes);
 
   std::ifstream stream_;

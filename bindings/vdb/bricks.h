@@ -72,7 +72,7 @@ inline uint64_t bricks_of_tile(uint64_t edge) {
   return along * along * along;
 }
 
-/// Returns one line that says that `what` needs more memory than allowed.
+/// Returns a one-line message that `what` needs more memory than allowed.
 std::string limit_message(const std::string& what, uint64_t bytes, uint64_t max_bytes);
 
 /// Throws TooLarge if the given number of bricks takes more than `max_bytes`.

@@ -162,7 +162,8 @@ class NanoTreeTraversal {
   const Root* root_ = nullptr;
 };
 
-/// Grid of one value type, whose leaves are read by a function for their build type.
+/// NanoVDB grid of a given value type, whose leaf nodes are read by a function for the grid's build
+/// type.
 template <typename Value>
 class NanoGrid {
  public:

@@ -34,7 +34,7 @@ struct WrittenGrid {
   /// Boxes are written before the bricks. Brick voxels of value +0 leave the voxels of a box
   /// unchanged.
   std::vector<FilledBox> boxes;
-  /// Stores nodes of one value as tiles.
+  /// Whether nodes in which all voxels have the same value are stored as tiles.
   bool has_tiles = false;
 };
 

@@ -201,7 +201,7 @@ class Run:
             batch = _Batch([self._tiles.popleft() for _ in range(count)])
         else:
             return False
-        # Two clients of one scheduler must use the same key for the same work.
+        # Two clients of a Dask scheduler must use the same key for the same work.
         tiles = [(task.image, task.tile, self._checks[task.image]) for task in batch.tiles]
         name = hashed([self._common[0], self._job.id, self._machine, tiles, batch.image,
                        batch.attempt, self._checks.get(batch.image)])  # fmt: skip
@@ -273,7 +273,7 @@ class Run:
             self._out.failed.append((self._job.title(image, tile), line))
         self._again([t for t in batch.tiles if t not in done and (t.image, t.tile) not in bad])
         if done:
-            # Uses the last batch, because the first ones include the time to open the stage.
+            # Use the last batch, because the times of the first batches include opening the stage.
             self._seconds = result["seconds"] / len(done)
 
     def _note_done(self, task: Task) -> None:

@@ -7,8 +7,8 @@
 namespace wavecomb {
 
 /// Traces rays in a plain loop around rtcIntersect and rtcOccluded without filters, and stores only
-/// the number of hits. The BVH is built like that of a render, by the same code from the same
-/// arrays. Surfaces with partial presence are treated as opaque. For benchmarks.
+/// the number of hits. The BVH equals the BVH of a render: it is built by the same code from the
+/// same arrays. Surfaces with partial presence are treated as opaque. For benchmarks.
 ///
 /// Contract: reads the Scene's arrays without copies and shares its ownership; tracing is
 /// thread-safe. Ray columns must be padded by one packet, as in SoaBlock.

@@ -61,7 +61,7 @@ struct PresenceKeys {
 enum class HitRule : uint8_t {
   kCanonical,  ///< the same hit for all packets and orders (docs/decisions/canonical-hits.md)
   kList,       ///< like kCanonical, but small static scenes use triangle_list.h; the default
-  kEmbree,     ///< whichever hit Embree keeps, without filters; for BareTraversal only
+  kEmbree,     ///< the hit that Embree keeps without filters; for BareTraversal only
 };
 
 /// Two-level bounding volume hierarchy. Each group of meshes is built once and instanced any number

@@ -37,7 +37,8 @@ bool is_met_by_embree_ids(const QueryContext& context, const PresenceQuery& at);
 /// Filter function of geometries with hits that may be rejected; see filtered_meshes(). The
 /// geometry's user pointer holds the mesh index.
 void presence_filter(const RTCFilterFunctionNArguments* args);
-/// Filter function of queries: keeps the closest hit independently of the order of tests.
+/// Filter function of closest-hit queries, which keeps the closest hit independently of the order
+/// of tests.
 void closest_filter(const RTCFilterFunctionNArguments* args);
 
 /// Converts a bounding box to Embree's type.

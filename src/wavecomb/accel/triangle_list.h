@@ -24,7 +24,8 @@ namespace wavecomb {
 /// Contract: immutable; reads the scene's materials through the view passed to each call.
 class TriangleList {
  public:
-  /// With more triangles, a BVH is faster (docs/decisions/small-scene-traversal.md).
+  /// Maximum number of triangles; with more triangles, a BVH is faster
+  /// (docs/decisions/small-scene-traversal.md).
   static constexpr uint32_t kMaxTriangles = 96;
   static constexpr uint32_t kMaxVertices = 128;  ///< maximum number of distinct vertex positions
   /// Maximum number of lights that are not parallelograms.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// AOV values of paths. Both integrators own a PathAovs with one row for each path slot and report
-/// the events of a path to it:
+/// AOV values of paths. Both integrators own a PathAovs object with one row for each path slot, and
+/// call its member functions for the events of a path:
 ///
 ///   begin      a camera ray starts (first_hits.h)
 ///   hit_light, hit_surface   the camera ray has its first hit
@@ -43,7 +43,7 @@ inline void for_each_vertex_value(const VertexAovs<F>& v, const PathState<F>& /*
 
 /// AOV rows of the paths of a wave.
 ///
-/// Contract: owned by one wave, or one reference integrator. Slots must be below the capacity.
+/// Contract: owned by a single wave or reference integrator. Slots must be below the capacity.
 class PathAovs : public PathFirstHits, public PathCostRows {
  public:
   PathAovs() = default;
@@ -131,7 +131,8 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   void survive(uint32_t depth, const UInt<F>& slot, const F& q, const Mask<F>& active) const {
     if (!bounces_ || depth == 0) return;
     BounceRow<F> row = load_row<BounceRow, F>(bounces_.rows, slot, active);
-    row.survived += q - 1.f;  // add_bounce() has already counted the bounce with probability 1.
+    // add_bounce() has already counted the bounce with survival probability 1.
+    row.survived += q - 1.f;
     store_row<BounceRow, F>(bounces_.rows, slot, row, active);
   }
 

@@ -2,7 +2,7 @@
 /// Radiance of paths by light path expressions (core/path_expressions/path_expression.h). The
 /// functions run only if the render has light path expressions.
 ///
-/// A path carries an automaton state for each of its three colours. At a scattering event whose
+/// A path stores an automaton state for each of its three colours. At a scattering event whose
 /// diffuse fraction in a colour is s, the automaton takes the diffuse event for that colour with
 /// probability s, and the glossy event otherwise; all three colours use the same random number.
 /// Later contributions are added in full to the expressions that match the state, so that
@@ -84,14 +84,14 @@ struct ColourStates {
 
 /// Light path expression states and sums of the paths of a wave.
 ///
-/// Contract: owned by a PathAovs object. Slots must be below the capacity, and those of the active
-/// lanes distinct.
+/// Contract: owned by a PathAovs object. Slots must be below the capacity, and the slots of the
+/// active lanes must be distinct.
 class PathExpressions {
  public:
   PathExpressions() = default;
-  /// `end_of_light` holds path_end of each light, followed by those of other surfaces and of
-  /// volumes. `multipliers` holds the diffuse and specular multiplier of each light; empty means
-  /// that all are 1.
+  /// `end_of_light` holds the path end (path_end()) of each light, followed by the path ends of
+  /// other surfaces and of volumes. `multipliers` holds the diffuse and specular multiplier of each
+  /// light; empty means that all are 1.
   PathExpressions(size_t capacity, const PathAutomaton& automaton,
                   const std::vector<uint32_t>& end_of_light, const std::vector<float>& multipliers)
       : automaton_(&automaton),
@@ -199,7 +199,8 @@ class PathExpressions {
                const Mask<F>& active) const {
     return ColourStates::next<F>(automaton_->next.data(), state, event, lobe, active);
   }
-  /// Adds light of one colour to the expressions whose bits are set in `matched`.
+  /// Adds one colour component of a contribution to the expressions whose bits are set in
+  /// `matched`.
   template <typename F>
   void add_matched(const UInt<F>& slot, uint32_t colour, const UInt<F>& matched, const F& value,
                    const Mask<F>& active) const {

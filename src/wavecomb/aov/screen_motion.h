@@ -26,9 +26,9 @@ inline Vec2<F> project_to_image(const CameraSetup& camera, const Vec3<F>& p, con
   return {F(x - camera.x0) * (1.f / camera.step_x), F(camera.y1 - y) * (1.f / camera.step_y)};
 }
 
-/// Returns the motion from the image position of `first` at shutter open to that of `last` at
-/// shutter close, in pixels, x to the right and y up. Returns 0 if one of them has no image
-/// position.
+/// Returns the motion from the image position of point `first` at shutter open to the image
+/// position of point `last` at shutter close, in pixels, x to the right and y up. Returns 0 if one
+/// of the points has no image position.
 template <typename F>
 inline Vec2<F> screen_motion(const CameraSetup& camera, const Vec3<F>& first, const Vec3<F>& last,
                              const Mask<F>& active) {

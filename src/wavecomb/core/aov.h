@@ -2,7 +2,7 @@
 /// Arbitrary output variables (AOVs): layers that a render can store beside the beauty, as a table
 /// (docs/aovs.md).
 ///
-/// To add one, add a row at the end of WAVECOMB_AOVS and a line that provides its value
+/// To add an AOV, add a row at the end of WAVECOMB_AOVS and a line that provides its value
 /// (aov/path_aovs.h). Film storage, layer, checkpoint block, and the names in Python, on the
 /// command line and in the window follow from the row.
 #pragma once
@@ -47,7 +47,7 @@ enum class AovContent : uint8_t {
   kDirection,  ///< unit vector
   kId,         ///< index of an object or material, or hashes of names
   kExact,      ///< number that lossy compression would make useless
-  kValue,      ///< any other number, which the window displays in false colours
+  kValue,      ///< number of another kind, which the window displays in false colours
 };
 
 /// Rows X(enumerator, name, channels, letters, content, kind, source, title). The order of the rows

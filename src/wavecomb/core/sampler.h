@@ -2,9 +2,9 @@
 /// Counter-based random numbers: each sample value is a function of (pixel, sample, set, seed)
 /// only, so that it does not depend on scheduling.
 ///
-/// Uses hash-based Owen-scrambled Sobol points, four dimensions at a time; sets are padded by
-/// independent shuffles (Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4) 2020). Direction
-/// numbers are from Joe and Kuo, 2008.
+/// The sampler uses hash-based Owen-scrambled Sobol points, four dimensions at a time; sets are
+/// padded by independent shuffles (Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4) 2020).
+/// Direction numbers are from Joe and Kuo, 2008.
 #pragma once
 
 #include "wavecomb/core/encoding/hash.h"
@@ -82,7 +82,8 @@ inline constexpr uint32_t kSobol3[kIndexBits] = {
     0x1,   0x3,   0x4,    0xa,    0x1f,   0x2e,   0x45,    0xc9,    0x11b,   0x2a4,
     0x79a, 0xb67, 0x101e, 0x302d, 0x4041, 0xa0c3, 0x1f104, 0x2e28a, 0x457df, 0xc9bae};
 
-/// Multiplication with a generator matrix over GF(2), four bits of the index at a time.
+/// Multiplies the index by a generator matrix over GF(2), processing four bits of the index at a
+/// time.
 class NibbleTables {
  public:
   static constexpr int kNibbles = kIndexBits / 4;

@@ -109,8 +109,8 @@ struct Settings {
   bool cosine_sampling = false;
   IntegratorKind integrator = IntegratorKind::kWavefront;
   Transport transport = Transport::kPath;
-  /// Aim light paths where earlier ones, traced before the first pass, contributed to the image
-  /// (light_paths/render/light_aiming.h).
+  /// Aim light paths at regions where training light paths, traced before the first pass,
+  /// contributed to the image (light_paths/render/light_aiming.h).
   bool light_aim = true;
   /// Merge radius in pixels, within which light paths end at points that the camera sees by
   /// specular reflection or refraction (light_paths/merge_grid.h). 0 means no merging.
@@ -185,7 +185,7 @@ struct Settings {
 };
 
 /// Setting that light paths cannot be combined with, and the value to use instead; `what` is empty
-/// if there is none.
+/// if there is no such setting.
 struct LightPathConflict {
   std::string what, instead;
 };

@@ -59,7 +59,7 @@ class TaskOrder {
   char begun_ = 0, ended_ = 0;
 };
 
-/// Annotation for tasks of one worker, which run one after another; `worker` identifies it.
+/// Annotation for tasks of one worker, which run one after another; `worker` identifies the worker.
 class WorkerOrder {
  public:
 #if defined(__SANITIZE_THREAD__)

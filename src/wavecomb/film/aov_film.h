@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Storage for the AOVs (arbitrary output variables) of a render. Only requested AOVs take memory.
-/// Each AOV's row in core/aov.h defines how its samples are combined; the caller supplies the
-/// sample values.
+/// Storage for the AOVs (arbitrary output variables) of a render. Memory is allocated only for
+/// requested AOVs. Each AOV's row in core/aov.h defines how its samples are combined; the caller
+/// supplies the sample values.
 #pragma once
 
 #include <array>
@@ -129,8 +129,8 @@ class AovFilm {
   size_t bytes() const;
   /// Returns the deep image and frees its sums; empty if the render has no deep image.
   DeepLayer take_deep(const std::vector<uint32_t>& samples);
-  /// Calls block(name, values) for each vector of sums, for checkpoints. The sums of the deep image
-  /// are not included; use DeepFilm::packed().
+  /// Calls block(name, values) for each vector of sums, to write or read checkpoints. The sums of
+  /// the deep image are not included; use DeepFilm::packed().
   template <typename Block>
   void for_each_block(const Block& block) {
     for (const AovRow& row : kAovs) {

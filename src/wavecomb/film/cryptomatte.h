@@ -72,7 +72,7 @@ struct CryptoTables {
 };
 
 /// Returns (name, id) pairs, sorted by name, for the names of `level` whose ids are in `ids`. `ids`
-/// must be sorted. Names whose hashes collide are all included.
+/// must be sorted. If the hashes of several names collide, all these names are included.
 std::vector<std::pair<std::string, uint32_t>> crypto_manifest(const Scene& scene, Aov level,
                                                               const std::vector<uint32_t>& ids);
 

@@ -107,7 +107,7 @@ class Film {
   std::vector<float> depth() const;
   /// Returns the sample count of each pixel.
   std::vector<uint32_t> samples() const;
-  /// Returns the variance of each pixel's mean, rgb, under the assumption of independent samples.
+  /// Returns the variance (rgb) of each pixel's mean, under the assumption of independent samples.
   /// The variance is infinite for pixels with fewer than two samples; the result is empty if the
   /// film has no error sums.
   std::vector<float> variance() const;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Procedural noise as defined by MaterialX: gradient noise (Perlin, "Improving Noise", 2002) on
 /// Bob Jenkins' lookup3 hash of the lattice, cell noise, and distances to jittered points (Worley,
-/// "A Cellular Texture Basis Function", 1996). Scales and gradients are those of Open Shading
-/// Language, which MaterialX's code generators share.
+/// "A Cellular Texture Basis Function", 1996). The scales and gradients are the same as in Open
+/// Shading Language and in MaterialX's code generators.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -21,7 +21,8 @@ inline U rotate_left(const U& x, uint32_t k) {
   return (x << k) | (x >> (32 - k));
 }
 
-/// Jenkins' lookup3 hash of N words: mixes the first three, then the remaining one.
+/// Returns Jenkins' lookup3 hash of N words; the hash first mixes up to three words, then the
+/// fourth.
 template <typename U, size_t N>
 inline U hash(const U (&words)[N]) {
   static_assert(N >= 1 && N <= 4);
@@ -73,7 +74,7 @@ inline F signed_by(const F& x, const UInt<F>& hash, uint32_t bit) {
   return bits_float<F>(float_bits<F>(x) ^ ((hash >> bit) << 31));
 }
 
-/// Scalar product with one of 8 gradients (+-1, +-2), (+-2, +-1).
+/// Scalar product with one of the 8 gradients (+-1, +-2) and (+-2, +-1).
 template <typename F>
 inline F gradient(const UInt<F>& h, const F (&p)[2]) {
   const Mask<F> swap = Mask<F>((h & 4u) != UInt<F>(0u));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Definitions for run.h; include only where the templates are instantiated.
+/// Definitions of the function templates in run.h; include this file only where they are
+/// instantiated.
 #pragma once
 
 #include "wavecomb/graph/noise.h"

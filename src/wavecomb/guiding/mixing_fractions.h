@@ -9,7 +9,7 @@
 
 namespace wavecomb {
 
-/// Candidate fractions of bounces that the BSDF samples; the last one means no guiding.
+/// Candidate fractions of bounces that the BSDF samples; the last fraction, 1, means no guiding.
 inline constexpr std::array<float, 8> kBsdfShares = {0.25f, 0.35f, 0.45f, 0.55f,
                                                      0.65f, 0.75f, 0.85f, 1.f};
 

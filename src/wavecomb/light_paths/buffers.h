@@ -25,7 +25,7 @@ enum class LightVertexUse : uint8_t {
 /// Buffers type of a joint transport (path/joint_transport.h). All members are empty in renders
 /// without light paths.
 ///
-/// Contract: owned by one wave, or one reference integrator. Slots must be below `capacity`.
+/// Contract: owned by a single wave or reference integrator. Slots must be below `capacity`.
 struct LightPathBuffers {
   LightPathBuffers(size_t capacity, const LightPathContext& context, const AovLayout& layout,
                    const AovTables* tables)

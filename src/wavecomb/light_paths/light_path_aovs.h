@@ -65,7 +65,7 @@ struct LightSplat {
 
 /// AOV values of the light paths of a wave.
 ///
-/// Contract: owned by one wave, or one reference integrator. Slots must be below the capacity.
+/// Contract: owned by a single wave or reference integrator. Slots must be below the capacity.
 class LightPathAovs {
  public:
   LightPathAovs() = default;

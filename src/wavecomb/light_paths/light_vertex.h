@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Shading of one vertex of a light path. The wave and the reference integrator share it.
+/// Shading of one vertex of a light path. The wavefront and the reference integrator use the same
+/// code.
 ///
-/// A light path carries flux. Let w be the direction to the camera, l the direction to the light, g
-/// the geometric normal, and f the BSDF as on camera paths (f(w, l) |cos l|, evaluated from w's
-/// side, with radiance scaled by the indices of refraction). A bounce from l to w with density p<-
-/// changes the flux T by
+/// The throughput of a light path is a flux. Let w be the direction to the camera, l the direction
+/// to the light, g the geometric normal, and f the BSDF as on camera paths (f(w, l) |cos l|,
+/// evaluated from w's side, with radiance scaled by the indices of refraction). A bounce from l to
+/// w with density p<- changes the flux T by
 ///   T <- T f(w, l) |cos l| / p<-  |g w| / |g l|
 /// (E. Veach, "Robust Monte Carlo Methods", 1997, section 5.3: shading normals and refraction of
 /// adjoint BSDFs). The contribution of the vertex to a pixel, with the camera density G
@@ -50,7 +51,7 @@ namespace detail {
 
 /// Lower bound for the density of camera paths relative to light paths.
 inline constexpr float kMinRatio = 1e-9f;
-/// Least cosine between the normals of a merge point and of a vertex that is merged with it.
+/// Minimum cosine between the normals of a merge point and of a vertex that is merged with it.
 inline constexpr float kMinNormalCosine = 0.7f;
 
 /// Shading point of a light path, with the direction from which light arrives.

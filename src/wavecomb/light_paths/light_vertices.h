@@ -32,7 +32,8 @@ struct LightVertexRow {
 template <typename F>
 struct ConnectionRow {
   Vec3<F> from;  ///< origin of the ray to the light path's vertex
-  F pdf;         ///< solid angle density of the camera path's bounce in that direction
+  /// Solid angle density of a bounce of the camera path towards the light path's vertex.
+  F pdf;
   /// Contribution to the pixel for unit radiance from the light path's vertex, times the number of
   /// candidate vertices; black without a connection.
   Color<F> light;
@@ -42,7 +43,7 @@ struct ConnectionRow {
 
 /// Stored vertices and connections of the paths of a wave.
 ///
-/// Contract: owned by one wave, or one reference integrator. Each slot has a row of each kind.
+/// Contract: owned by a single wave or reference integrator. Each slot has a row of each kind.
 class LightVertices {
  public:
   LightVertices() = default;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Light paths of a render: support by the scene, unit and filter of light splats
-/// (docs/light-paths.md).
+/// Setup of light paths for a render: check that the scene supports them, and unit and filter of
+/// light splats (docs/light-paths.md).
 #pragma once
 
 #include <cmath>

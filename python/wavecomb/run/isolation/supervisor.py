@@ -264,7 +264,8 @@ def become_child(given: str) -> None:
     _is_child = True
     found = json.loads(given)
     channel = socket.socket(fileno=found["channel"])
-    # The kernel attaches this process's id in the parent's namespace.
+    # Send a message, to which the kernel attaches the id of this process in the PID namespace of
+    # the parent.
     channel.sendall(b"h")
     # Wait until the parent has added this process to its control group.
     channel.recv(1)

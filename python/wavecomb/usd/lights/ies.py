@@ -87,7 +87,8 @@ def parse_ies(text: str) -> IesProfile:
 
 
 def _numbers(text: str) -> Iterator[float]:
-    # Converts one number at a time, since a list of all numbers takes 20 times the text's memory.
+    # Convert one number at a time, since a list of all numbers takes 20 times the memory of the
+    # text.
     for match in _WORDS.finditer(text):
         word = match[0]
         try:

@@ -112,7 +112,8 @@ inline void scatter(void* base, const T& value, const UInt<T>& index, const Mask
 
 /// Stores the active lanes of `value` contiguously at `p`, in lane order; returns their number.
 ///
-/// Contract: `p` has room for a whole packet, since values past the active ones are unspecified.
+/// Contract: `p` has room for a whole packet, since unspecified values follow the values of the
+/// active lanes.
 template <typename T>
 inline uint32_t compress_store(void* p, const T& value, const Mask<T>& active) {
   const uint32_t bits = lane_bits<T>(active);
@@ -164,8 +165,8 @@ inline U lookup16(const uint32_t* table, const U& index) {
   }
 }
 
-/// Returns table[index] of 256 floats in each lane; index < 256. Uses permutations of registers
-/// with AVX-512, which take a third of the time of a gather (Zen 4).
+/// Returns table[index] of 256 floats in each lane; index < 256. With AVX-512, the function
+/// permutes registers, which takes a third of the time of a gather on Zen 4.
 template <typename F>
 inline F lookup256(const float* table, const UInt<F>& index) {
 #if defined(__AVX512F__)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lane types; part of core/lanes/lanes.h. This is the only file that includes Dr.Jit.
+/// Lane types; part of core/lanes/lanes.h. Only core/lanes/types.h includes Dr.Jit.
 #pragma once
 
 #include <drjit/packet.h>

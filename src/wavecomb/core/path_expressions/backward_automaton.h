@@ -3,11 +3,10 @@
 ///
 /// The events between a vertex and the light act on a PathAutomaton as a function f: it maps the
 /// state of a camera path before these events to the set of matched expressions. A light path
-/// carries the index of f. An event x that precedes the others on the camera side changes f to
-///   f'(q) = f(next(q, x)).
-/// The functions that are reachable from the functions of all ends form the minimal automaton of
-/// the reversed expressions (J. Brzozowski, "Canonical regular expressions and minimal state graphs
-/// for definite events", 1962).
+/// stores the index of f. A further event x on the camera side of these events changes f to f'(q) =
+/// f(next(q, x)). The functions that are reachable from the functions of all ends form the minimal
+/// automaton of the reversed expressions (J. Brzozowski, "Canonical regular expressions and minimal
+/// state graphs for definite events", 1962).
 #pragma once
 
 #include <cstdint>

@@ -3,9 +3,9 @@
 /// layer (docs/light-path-expressions.md), and the automaton built from all expressions of a
 /// render.
 ///
-/// A path consists of the camera, scattering events, and the emitter. Kernels do not see the text:
-/// a path carries an automaton state, which each event advances. When light reaches the path, a
-/// table gives the expressions that match, by state and emitter.
+/// A path consists of the camera, scattering events, and the emitter. Kernels do not use the text
+/// of expressions: a path stores an automaton state, which each event changes. When light reaches
+/// the path, a table gives the expressions that match, by state and emitter.
 #pragma once
 
 #include <cstdint>

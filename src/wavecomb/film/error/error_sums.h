@@ -28,7 +28,7 @@ struct ErrorSums {
     return n / (2 * kHalfBlock) * kHalfBlock + (rest < kHalfBlock ? rest : kHalfBlock);
   }
 
-  /// Adds sample number `index`; `sum` is the sum of all earlier samples.
+  /// Adds the sample with number `index` of a pixel; `sum` is the sum of all earlier samples.
   void add(const float* rgb, uint32_t index, const double (&sum)[3]) {
     const double before = index == 0 ? 0.0 : 1.0 / index, after = 1.0 / (index + 1.0);
     const bool in_half = index / kHalfBlock % 2 == 0;

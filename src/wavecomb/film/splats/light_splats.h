@@ -175,7 +175,7 @@ class LightSplatLayer {
   size_t bytes() const {
     return sums_.bytes() + half_.bytes() + samples_.size() * sizeof(uint32_t);
   }
-  /// Calls block(name, values) for each vector of sums, for checkpoints.
+  /// Calls block(name, values) for each vector of sums, to write or read checkpoints.
   template <typename Block>
   void for_each_block(const Block& block) {
     if (empty()) return;

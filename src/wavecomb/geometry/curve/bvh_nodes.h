@@ -30,7 +30,8 @@ class CurveBvhNodes {
   using Task = std::function<void()>;
   using RunBoth = std::function<void(const Task&, const Task&)>;
 
-  /// Builds the nodes. `run_both`: runs parallel tasks; the default runs them one after another.
+  /// Builds the nodes. `run_both` runs two tasks, possibly in parallel; the default runs them one
+  /// after another.
   explicit CurveBvhNodes(
       const Mesh& mesh, const RunBoth& run_both = [](const Task& a, const Task& b) {
         a();

@@ -150,9 +150,9 @@ class SegmentTest {
   }
 
   /// Returns a step in u towards the entry or exit of a tube. The ray intersects the sphere of
-  /// parameter u at z(u) -+ sqrt(h(u)), h = r^2 - x^2 - y^2. It enters the tube where z - sqrt(h)
-  /// is minimal (side -1) and leaves it where z + sqrt(h) is maximal (side 1). If curve and radius
-  /// are linear around u, the condition at u + w is
+  /// parameter u at z(u) -+ sqrt(h(u)), h = r^2 - x^2 - y^2. The ray enters the tube where z -
+  /// sqrt(h) is minimal (side -1) and leaves the tube where z + sqrt(h) is maximal (side 1). If
+  /// curve and radius are linear around u, the condition at u + w is
   ///   A w + B = -side z' sqrt(h),  A = r'^2 - x'^2 - y'^2,  B = r r' - x x' - y y'.
   /// This linear approximation is a cone with spherical ends; at w = 0 the condition is exact.
   double step(double u, int side) const {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Intersection of rays with curves and points.
 ///
-/// Tests one ray at a time in double precision, so that hits do not depend on other rays
+/// Rays are tested one at a time in double precision, so that hits do not depend on other rays
 /// (docs/decisions/curves.md).
 #pragma once
 

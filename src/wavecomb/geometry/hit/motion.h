@@ -36,7 +36,7 @@ struct MatrixPair {
   std::array<F, 16> a, b;
   F part;
 
-  /// `first`, `segments`: the StepRange of each active lane, which must move.
+  /// `first` and `segments` are the StepRange of each active lane, whose instance must move.
   MatrixPair(const MatrixStep* steps, const UInt<F>& first, const UInt<F>& segments, const F& time,
              const Mask<F>& active) {
     const StepInterpolation<F> at(time, segments);

@@ -34,8 +34,8 @@ WAVECOMB_INLINE Vec3<F> facing_normal(const Vec3<F>& dir, const Vec3<F>& ng, con
 /// Returns `n`, which faces the viewer, bent until its mirror direction r = 2 (w . n) n - w leaves
 /// the surface. If r . g is below t = min(0.9 w . g, 0.01), r is raised to r . g = t, and n becomes
 /// the half vector of w and the lifted r (A. Keller et al., "The Iray Light Transport Simulation
-/// and Rendering System", 2017, appendix A.3). This avoids black rims on glossy surfaces with a
-/// normal map.
+/// and Rendering System", 2017, appendix A.3). The adjustment avoids black rims on glossy surfaces
+/// with a normal map.
 template <typename F>
 WAVECOMB_INLINE Vec3<F> reflecting_normal(const Vec3<F>& dir, const Vec3<F>& ng, const Vec3<F>& n) {
   constexpr float kHeight = 0.01f, kMinCosine = 1e-4f;

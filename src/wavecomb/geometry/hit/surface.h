@@ -93,7 +93,7 @@ WAVECOMB_INLINE void set_smooth_normal(const SceneView& scene, const MeshHit<F>&
   }
 }
 
-/// Sets uv, dpdu, uv_per_length and handedness.
+/// Sets the members uv, dpdu, uv_per_length and handedness of a shading point.
 template <typename F>
 WAVECOMB_INLINE void set_triangle_uv(const SceneView& scene, const MeshHit<F>& hit,
                                      const MeshReader<F>& mesh, const InstanceMaps<F>& maps,
@@ -106,7 +106,7 @@ WAVECOMB_INLINE void set_triangle_uv(const SceneView& scene, const MeshHit<F>& h
   s.uv_per_length = sqrt(F(abs(det) / at.safe_area2));
   const Mask<F> mirrored = det < 0.f;
   s.handedness = select(mirrored, F(-maps.side), maps.side);
-  // dp/du = (d2.v e1 - d1.v e2) / det. Only the direction of this vector is used.
+  // dp/du = (d2.v e1 - d1.v e2) / det. Only the direction of dp/du is used.
   const Vec3<F> across = at.e1 * d2.y - at.e2 * d1.y;
   Vec3<F> tangent = select<F>(mirrored, -across, across);
   // Pass a copy of the vertex indices, so that the original values can stay in registers.

@@ -28,7 +28,8 @@ struct Surface {
   Vec3<F> ng;    ///< unit geometric normal, pointing outwards by the winding order
   Vec3<F> ns;    ///< unit shading normal on the same side as ng
   Vec3<F> dpdu;  ///< tangent along u, of any length; zero if uv was not requested
-  /// 1 if v runs along ng x dpdu; -1 if it runs the other way, as in a mirrored texture.
+  /// 1 if v increases along ng x dpdu; -1 if v increases in the opposite direction, as in a
+  /// mirrored texture.
   F handedness;
   Vec2<F> uv;
   F uv_per_length;  ///< sqrt(uv area / world-space area) of the triangle

@@ -17,7 +17,7 @@ struct UvTriangle {
 
   UvTriangle(const Vec2<F>& a, const Vec2<F>& b, const Vec2<F>& c)
       : t0(a), d1{b.x - a.x, b.y - a.y}, d2{c.x - a.x, c.y - a.y} {}
-  /// Returns the value at barycentrics (b1, b2) of vertices 1 and 2.
+  /// Returns the texture coordinates at barycentrics (b1, b2) of vertices 1 and 2.
   Vec2<F> at(const F& b1, const F& b2) const {
     return {fma(d2.x, b2, fma(d1.x, b1, t0.x)), fma(d2.y, b2, fma(d1.y, b1, t0.y))};
   }

@@ -18,7 +18,8 @@ inline constexpr uint32_t kInheritMaterial = 0xffffffffu;
 enum class Attribute : uint8_t {
   kNone,
   kVertex,  ///< one value per vertex, addressed by the triangle's indices
-  /// One value per corner: 3 per triangle in order; 2 per curve segment, for its ends; 1 per point.
+  /// One value per corner: 3 values per triangle in the order of its vertices, 2 values per curve
+  /// segment for its ends, or 1 value per point.
   kCorner,
 };
 
@@ -118,8 +119,8 @@ struct Mesh {
   bool deforms() const { return steps > 1; }
 };
 
-/// Packed mesh: addresses and flags, 16 32-bit words. For splats `normals` points to
-/// GaussianSplatRow and `uvs` to the harmonics.
+/// Packed mesh: addresses and flags, 16 32-bit words. For splats, `normals` is the address of the
+/// GaussianSplatRow array, and `uvs` the address of the spherical harmonics.
 struct alignas(64) MeshRecord {
   uint64_t positions, indices, normals, uvs, face_materials;
   uint32_t material;

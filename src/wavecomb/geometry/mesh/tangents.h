@@ -3,10 +3,10 @@
 ///
 /// Tangents follow MikkTSpace, for which normal maps are baked (M. Mikkelsen, "Simulation of
 /// Wrinkled Surfaces Revisited", 2008). Corners of a vertex with the same texture coordinates,
-/// normal and texture orientation share one tangent. It is the mean of the tangents of their
-/// triangles, each projected to the plane of the normal and weighted by the triangle's angle at the
-/// corner. Tangents are therefore split at texture seams, where the texture is mirrored, and at
-/// hard edges.
+/// normal and texture orientation share one tangent. The shared tangent is the mean of the tangents
+/// of the corners' triangles, each projected to the plane of the normal and weighted by the
+/// triangle's angle at the corner. Tangents are therefore split at texture seams, where the texture
+/// is mirrored, and at hard edges.
 #pragma once
 
 #include <cstdint>
@@ -28,8 +28,8 @@ struct MeshTangents {
   bool at_corners = false;  ///< whether some vertex has more than one tangent
 };
 
-/// Makes the tangents of a mesh with normals and texture coordinates. Runs in parallel; the result
-/// does not depend on the number of threads.
+/// Makes the tangents of a mesh with normals and texture coordinates. The function runs in
+/// parallel; the result does not depend on the number of threads.
 MeshTangents make_tangents(const Mesh& mesh);
 
 /// Packed reference to the tangents of a mesh.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Fast path for common meshes: all triangles or all quads, indices in range, points at moderate
-/// coordinates. Other meshes take the general path, which reports what is wrong.
+/// coordinates. All other meshes use the general code path, which reports errors.
 #pragma once
 
 #include <array>

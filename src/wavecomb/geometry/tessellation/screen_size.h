@@ -10,7 +10,7 @@ namespace wavecomb {
 
 /// Camera for which a subdivision level is chosen.
 struct ScreenView {
-  /// World to camera space, for row vectors; the camera looks along -z.
+  /// Transform from world to camera space, for row vectors; the camera looks along -z.
   std::array<double, 16> to_camera;
   /// Whether the projection is orthographic, or shows all directions.
   bool is_parallel = false, is_all_round = false;

@@ -338,7 +338,7 @@ SurfaceMesh make_surface(const SurfaceDesc& desc) {
     uint32_t count = 0;
     work.sectors = surface.normal_sectors(work.faces, count);
     normal_count = count;
-    // Threads share the evaluation of points; one of them evaluates the texture coordinates.
+    // One thread evaluates the texture coordinates, while the other threads evaluate the points.
     parallel_bands(2, 1, [&](size_t task, size_t) {
       if (task == 0) {
         Spread uvs = spread(desc.uvs, surface, work.faces);

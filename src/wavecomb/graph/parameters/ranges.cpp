@@ -35,7 +35,7 @@ ValueRange at_ends(const Function& f, const ValueRange& a, const ValueRange& b,
   return r;
 }
 
-// min and max as in core/lanes/lanes.h, which return `b` if either operand is NaN.
+// Ranges of min and max of core/lanes/lanes.h, which return `b` if either operand is NaN.
 ValueRange min_of(const ValueRange& a, const ValueRange& b) {
   const ValueRange r{std::min(a.low, b.low), std::min(a.high, b.high), b.nan};
   return a.nan ? hull(r, b) : r;

@@ -49,7 +49,7 @@ struct TrainingPlan {
 
 /// Converts finished paths to training samples.
 ///
-/// Contract: workers may call ended() concurrently, each for different paths.
+/// Contract: workers may call ended() concurrently for different paths.
 class BounceReader final : public HistoryReader {
  public:
   /// Maximum number of vertices of a path that become training samples.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The guiding field: incident light by region of space and direction, learned from training
+/// The guiding field: incident light by region of space and by direction, estimated from training
 /// bounces.
 ///
 /// The cells form an octree over the bounds of the scene. A cell with more than kCellRecords
@@ -47,7 +47,8 @@ struct GuidingFieldStatistics {
   uint64_t records = 0;  ///< number of bounces that contribute light
   uint32_t cells = 0, regions = 0, guided_regions = 0;
   /// Mean probability that the field samples a bounce, and ratio of the second moments of the
-  /// mixture and of the BSDF alone. Both are weighted by the contribution of bounces to the image.
+  /// mixture and of the BSDF alone. Both values are weighted by the contribution of bounces to the
+  /// image.
   double guided_share = 0, moment_ratio = 1;
 };
 
@@ -64,7 +65,7 @@ class GuidingField {
   /// the field takes at most `max_bytes` or cannot shrink further.
   GuidingField(const GuidingGrid& grid, std::span<const TrainingRecord> records, size_t materials,
                bool first, bool guides, size_t max_bytes);
-  /// Restores a field that was saved for a scene with this number of materials. Throws Error if
+  /// Restores a field that was saved for a scene with `materials` materials. Throws Error if
   /// `parts` are inconsistent.
   GuidingField(const GuidingGrid& grid, GuidingFieldArrays parts,
                const GuidingFieldStatistics& facts, size_t materials);

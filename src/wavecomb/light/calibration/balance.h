@@ -31,8 +31,8 @@ namespace wavecomb {
 class LightBalance {
  public:
   /// `shares` are the selection probabilities (> 0) of the parts of the lights (LightParts) with
-  /// which the samples are taken. `cells` is the number of groups of similar vertices, each of
-  /// which has its own M and N.
+  /// which the samples are taken. `cells` is the number of groups of similar vertices, for each of
+  /// which M and N are estimated separately.
   LightBalance(std::span<const double> shares, size_t cells);
 
   /// Adds a light sample in part `part` at a vertex in group `cell`. `value` is the contribution of

@@ -76,8 +76,8 @@ class RowMeans {
 
 /// Writes cumulative counts of the given weights. Each entry of positive weight, and the last
 /// entry, gets one count; the remaining counts are distributed by weight. So every entry of
-/// positive weight can be selected, entries of weight 0 cannot except for the last one, and no
-/// cumulative count reaches 65536. Returns the sum of the weights.
+/// positive weight can be selected, no entry of weight 0 except the last entry can be selected, and
+/// no cumulative count reaches 65536. Returns the sum of the weights.
 double accumulate(std::span<const double> weights, uint16_t* cumulative) {
   const size_t n = weights.size();
   double sum = 0;

@@ -50,16 +50,17 @@ struct LightKindInfo {
   /// Sets position, area, radiance and power of a light record. The function is null if other code
   /// makes the records of the kind.
   void (*make)(LightBuild&, const Light&, LightBuildContext&) = nullptr;
-  /// Sets bounds for the light tree, which are initialized to `light.p` and the intensity power /
-  /// pi. The function is null if the light tree does not contain the kind.
+  /// Sets the light's bounds for the light tree; the caller initializes the bounds to the point
+  /// `light.p` and the intensity power / pi. The function is null if the light tree does not
+  /// contain the kind.
   void (*bound)(LightCluster&, const LightRecord& light, double power) = nullptr;
   /// Returns the shape of a light record. The function is null if rays cannot hit this kind of
   /// light.
   LightShape (*shape)(const LightRecord&) = nullptr;
   /// For LightShape::kCustom: a slightly enlarged bounding box, and the distance to the hit along d
-  /// in units of |d|, or 0 if the ray does not hit the light. `o` is relative to light.p. Tests one
-  /// ray at a time in double precision, so that a hit does not depend on the other rays of its
-  /// packet.
+  /// in units of |d|, or 0 if the ray does not hit the light. `o` is relative to light.p. Rays are
+  /// tested one at a time in double precision, so that a hit does not depend on the other rays of
+  /// its packet.
   Bounds (*box)(const LightRecord&) = nullptr;
   double (*intersect)(const LightRecord&, const double* o, const double* d) = nullptr;
 

@@ -59,8 +59,8 @@ struct ShadowAttributes {
 
 /// Light filter that modifies the emission of a light (light/filters/filter.h).
 struct LightFilter {
-  /// Maps the filter's space to the world. Its barn-door window is the plane z = -distance; a
-  /// distance of 0 or less means no window.
+  /// Maps the filter's space to the world. The filter's barn-door window is the plane z =
+  /// -distance; a distance of 0 or less means no window.
   Affine to_world;
   float distance = 0;
   /// Edges (a, b, c) of the barn-door window: at (x, y), each edge transmits the fraction
@@ -75,7 +75,7 @@ struct LightFilter {
   /// far_start to 0 at far_end. A ramp whose end is not beyond its start is off.
   float near_start = 0, near_end = 0, far_start = 0, far_end = 0;
   float density = 1;  ///< strength of the filter: 0 leaves light unchanged, 1 applies it fully
-  uint32_t next = kNoFilter;  ///< next filter of the chain, which was added before this one
+  uint32_t next = kNoFilter;  ///< next filter of the chain, which was added before this filter
 
   bool fades() const { return near_end > near_start || far_end > far_start; }
 };

@@ -144,7 +144,7 @@ struct LightInputs {
 ///
 /// Throws Error for more than kMaxLights lights.
 ///
-/// Contract: the checks are those of light/description/light_table.h.
+/// Contract: lights have passed the checks of light/description/light_table.h.
 LightSet build_lights(const LightInputs& inputs);
 
 /// Builds the sampling density of a latlong texture times `color`: piecewise constant on a grid of

@@ -120,7 +120,7 @@ struct IesRecord {
   uint32_t vertical, vertical_count, horizontal, horizontal_count;
 };
 
-/// Packed triangle of an emissive mesh, in world space, which emits on both sides. A scene may have
+/// Packed triangle of an emissive mesh, in world space; it emits from both sides. A scene may have
 /// millions of these records, which are read in random order, so each record fills one cache line.
 struct alignas(64) TriangleLight {
   float p[3], u[3], v[3];  ///< vertex 0 and the edges from it
@@ -173,8 +173,8 @@ struct Distribution2D {
   /// `height` rows of `width` cumulative values, each starting at 0, then the marginal distribution
   /// of `height` values. Each row starts a cache line.
   std::vector<Line> cumulative;
-  /// First value of each cache line, one coarse line for each row and one for the marginal
-  /// distribution.
+  /// Coarse cache lines, with the first value of each line of `cumulative`: one for each row, and
+  /// one for the marginal distribution.
   std::vector<Line> coarse;
 };
 
@@ -236,7 +236,7 @@ struct LightTreeView {
   float effective_lights = 0;
 };
 
-/// Packed light linking (light/description/linking.h). Its pointers are null if no light is linked.
+/// Packed light linking (light/description/linking.h). The pointers are null if no light is linked.
 struct LinkView {
   const uint32_t* classes = nullptr;
   const uint32_t* members = nullptr;

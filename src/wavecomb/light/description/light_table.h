@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Table of light parameters: one row for each member of Light and Shaping, and for the parameters
-/// specific to one kind. Range checks, the scene fingerprint, Python keywords, sandbox calls and
-/// the fields of the window are derived from it. To add a parameter, add a member, a row here, and
-/// its use; for a parameter of a single light kind, add a row to that kind (LightKindInfo::own) and
-/// the use of the parameter.
+/// Table of light parameters: one row for each member of Light and Shaping, and for each parameter
+/// that is specific to a light kind. Range checks, the scene fingerprint, Python keywords, sandbox
+/// calls and the fields of the window are derived from it. To add a parameter, add a member, a row
+/// here, and its use; for a parameter of a single light kind, add a row to that kind
+/// (LightKindInfo::own) and the use of the parameter.
 #pragma once
 
 #include <cstddef>
@@ -40,7 +40,7 @@ inline constexpr uint32_t kTextured = 16;     ///< supports a texture
 /// The light surrounds the scene at infinite distance.
 inline constexpr uint32_t kInfinite = 32;
 inline constexpr uint32_t kFiltered = 64;  ///< supports light filters
-/// The radiance of lights with this trait is the background of light path expressions.
+/// The light's radiance is the background in light path expressions.
 inline constexpr uint32_t kBackground = 128;
 }  // namespace light_trait
 
@@ -122,8 +122,8 @@ struct LightReferences {
   size_t textures = 0, profiles = 0, sets = 0, filters = 0;
 };
 
-/// Throws Error with one line that names the light if a value is not finite or out of range, if an
-/// id refers to an object that was never added, or if the kind has no transform.
+/// Throws Error with a one-line message that names the light if a value is not finite or out of
+/// range, if an id refers to an object that was never added, or if the kind has no transform.
 void check_light(const Light& light, const LightReferences& references);
 /// Checks a mesh light in the same way as check_light().
 void check_mesh_light(const Light& light, const LightReferences& references);

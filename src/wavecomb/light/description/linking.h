@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Light and shadow linking: the sets of objects that collections of lights select.
+/// Light and shadow linking: the sets of objects that the UsdLux collections of lights select.
 #pragma once
 
 #include <cstdint>

@@ -12,7 +12,7 @@
 
 namespace wavecomb {
 
-/// Start of a light path. `flux` is the flux that the path carries. `density` is
+/// Start of a light path. `flux` is the initial flux of the path. `density` is
 /// KindEmission::density times the probability of selecting the light; MIS weights use 1 /
 /// `density`.
 template <typename F>
@@ -32,9 +32,10 @@ struct EmissionNumbers {
 };
 
 /// Density with which camera paths sample a light from the first surface that a light path hits.
-/// `density` is the solid angle density of a light sample. For a point light it is the probability
-/// of selecting the light times the squared distance d^2, since 1 / d^2 takes the place of its
-/// solid angle. For a distant light without an angle it is the probability of selecting the light.
+/// `density` is the solid angle density of a light sample. For a point light, `density` is the
+/// probability of selecting the light times the squared distance d^2, since 1 / d^2 replaces the
+/// solid angle. For a distant light without an angle, `density` is the probability of selecting the
+/// light.
 template <typename F>
 struct CameraPathDensity {
   F density;

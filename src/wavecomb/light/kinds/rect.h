@@ -43,7 +43,7 @@ inline constexpr float kMinRectSolidAngle = 2e-3f;
 /// along the edges, and z points towards the rectangle, which is [x0, x1] x [y0, y1] at distance z.
 ///
 /// The solid angle is the sum over the corners of +-atan(x y / (z d)), d = sqrt(x^2 + y^2 + z^2).
-/// This equals the paper's sum of angles minus 2 pi, in which each angle is pi / 2 + asin(b c),
+/// This sum equals the paper's sum of angles minus 2 pi, in which each angle is pi / 2 + asin(b c),
 /// with b and c the z components of the normals of the planes through two adjacent edges. Each
 /// angle is the argument of the complex number z d + i x y, so that the difference of the two
 /// angles along an edge x, which is less than pi, is the argument of
@@ -94,7 +94,7 @@ inline SphericalRect<F> make_spherical_rect(const LightReader<F>& light, const V
 }
 
 /// Maps (u, v) of the unit square to a point on the rectangle, in fractions of its width and
-/// height. This is the paper's algorithm 2, with z0 = -z and f = g / sin.
+/// height. The function implements algorithm 2 of the paper, with z0 = -z and f = g / sin.
 template <typename F>
 inline Vec2<F> sample_spherical_rect(const SphericalRect<F>& r, const F& u, const F& v) {
   const auto [sin_a, cos_a] = sincos_2pi(F(fma(u, r.solid_angle, r.begin) * kInv2Pi));

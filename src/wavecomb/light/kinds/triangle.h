@@ -35,8 +35,8 @@ struct TriangleReader : TriangleRow<F> {
 ///
 /// Opacity is stochastic: a bounce hits the triangle with a probability equal to the opacity, and
 /// then receives the full emission. A light sample, whose shadow ray ends before the triangle,
-/// receives the emission times the opacity. Both estimate the integral of opacity * emission, so
-/// that MIS weights depend only on the densities of the directions.
+/// receives the emission times the opacity. Both techniques estimate the integral of opacity *
+/// emission, so that MIS weights depend only on the densities of the directions.
 template <typename F>
 [[gnu::noinline]] Color<F> varying_radiance(const LightView& view, const UInt<F>& material,
                                             const UInt<F>& index, const Vec2<F>& b,

@@ -18,7 +18,7 @@
 namespace wavecomb {
 
 /// Direction towards a light. `pdf` is a solid angle density that includes the selection of the
-/// light. For delta lights it is the selection probability, and is_delta is set. `weight` is
+/// light. For delta lights, `pdf` is the selection probability, and is_delta is set. `weight` is
 /// radiance / pdf (for delta lights, irradiance at normal incidence / pdf), so that the estimator
 /// is f_cos * weight * MIS weight.
 template <typename F>
@@ -28,7 +28,8 @@ struct LightSample {
   Color<F> weight;
   F pdf;
   Mask<F> is_delta;
-  Mask<F> valid;  ///< whether light arrives; if false, weight and pdf are 0 and wi is finite
+  /// Whether light arrives at the point; if false, weight and pdf are 0 and wi is finite.
+  Mask<F> valid;
   UInt<F> light;  ///< the selected light, or kNoLight
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Bodies of light_sample.h, for the compile units that instantiate them.
+/// Definitions of the function templates in light_sample.h, for the translation units that
+/// instantiate them.
 #pragma once
 
 #include "wavecomb/light/filters/filter.h"

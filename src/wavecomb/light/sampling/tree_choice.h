@@ -38,8 +38,9 @@ namespace detail {
 inline constexpr float kCosineSlack = 4e-3f;
 /// Lower bound of the squared distance to a cluster, in units of its squared radius. The published
 /// value of this bound is 1, which treats all lights around a point as distant. On the street of
-/// benchmarks/light_selection.py, a bound of 0.5 gives a quarter less error than 1 with 1,000
-/// lights, a third less with 10,000, and the same with 100. Values below 0.25 increase the error.
+/// benchmarks/light_selection.py, a bound of 0.5 gives a quarter less error than a bound of 1 with
+/// 1,000 lights, a third less with 10,000 lights, and the same error with 100 lights. Values below
+/// 0.25 increase the error.
 inline constexpr float kMinDistanceRatio = 0.5f;
 
 /// Cosine and sine of an angle from 0 to pi.

@@ -6,8 +6,8 @@
 
 namespace wavecomb {
 
-/// A cone of directions about a unit axis. If `two_sided` is set, it includes the cone about the
-/// opposite axis.
+/// A cone of directions about a unit axis. If `two_sided` is set, the cone about the opposite axis
+/// is also included.
 struct DirectionCone {
   double axis[3] = {0, 0, 1};
   double angle = 0;  ///< half of the opening angle in radians
@@ -43,7 +43,8 @@ DirectionCone unite(const DirectionCone& a, const DirectionCone& b);
 /// Returns bounds that contain both bounds, without setting `next`.
 LightCluster unite(const LightCluster& a, const LightCluster& b);
 
-/// Returns the bounds of one light of the given power in W. Its `intensity` is in W / sr.
+/// Returns the bounds of one light of the given power in W. The `intensity` of the bounds is in W /
+/// sr.
 LightCluster bound_light(const LightRecord& light, double power);
 LightCluster bound_light(const TriangleLight& light, double power);
 

@@ -42,9 +42,9 @@ bool prefers_tree(float effective_lights);
 /// Builds the light tree over the finite lights of `set` whose power is above 0; `powers` holds the
 /// powers of all lights in W. Binned splits minimize the surface area orientation heuristic (SAOH),
 /// down to single lights, after A. Conty Estevez and C. Kulla, "Importance Sampling of Many Lights
-/// with Adaptive Tree Splitting", 2018, section 4. Runs in parallel; the result does not depend on
-/// the number of threads. Infinite lights are selected by power as in build_power_table(), with one
-/// random number in a hundred distributed evenly among all lights.
+/// with Adaptive Tree Splitting", 2018, section 4. The function runs in parallel; the result does
+/// not depend on the number of threads. Infinite lights are selected by power as in
+/// build_power_table(), with one random number in a hundred distributed evenly among all lights.
 LightTree build_light_tree(const LightSet& set, std::span<const double> powers);
 
 /// Returns whether lights are selected by tree. A scene without finite lights has no tree. kAuto

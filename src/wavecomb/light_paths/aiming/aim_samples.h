@@ -12,7 +12,8 @@ namespace wavecomb {
 
 /// Training samples, one for each light path, indexed by light path number.
 ///
-/// Contract: only the wave that traces a path writes its row, and no two waves trace the same path.
+/// Contract: only the wave that traces a light path writes the path's row, and no two waves trace
+/// the same path.
 class AimSamples {
  public:
   explicit AimSamples(size_t paths) : rows_(paths) {}

@@ -72,7 +72,8 @@ struct SampleRange {
   Split split;
 };
 
-/// Returns the index of the split cell, of kSplits along `axis` of `box`, that contains `at`.
+/// Returns the index of the cell that contains `at`, if `box` is divided into kSplits cells along
+/// `axis`.
 uint32_t split_cell(const SampleBounds& box, size_t axis, float at) {
   const float wide = box.hi[axis] - box.lo[axis];
   const float share = wide > 0 ? (at - box.lo[axis]) / wide : 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Light paths in the camera paths of the reference integrator (NoJointTracer in
-/// reference/path_tracer.h).
+/// Connections and merge points of light paths for camera paths of the reference integrator (the
+/// counterpart of NoJointTracer in reference/path_tracer.h).
 #pragma once
 
 #include <optional>

@@ -35,7 +35,8 @@ struct TransportChoice {
   Transport transport = Transport::kPath;
   LightPathShare share;  ///< for Transport::kLight
   std::string why;       ///< reason as a clause, for messages about the choice
-  double gain = 0;  ///< predicted efficiency over a render without light paths; 0 if not measured
+  /// Predicted efficiency relative to a render without light paths; 0 if not measured.
+  double gain = 0;
   double seconds = 0;
 };
 
