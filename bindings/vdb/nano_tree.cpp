@@ -28,8 +28,7 @@ class Buffer {
 
   uint64_t size() const { return size_; }
 
-  /// Returns `count` structures at an offset. Throws BrokenFile if the structures exceed the
-  /// buffer.
+  /// Returns `count` structures at an offset. Throws BrokenFile if the buffer is too small.
   template <typename T>
   const T* at(uint64_t offset, uint64_t count = 1) const {
     if (offset > size_ || offset % alignof(T) != 0 || count > (size_ - offset) / sizeof(T))
@@ -162,8 +161,7 @@ class NanoTreeTraversal {
   const Root* root_ = nullptr;
 };
 
-/// NanoVDB grid of a given value type, whose leaf nodes are read by a function for the grid's build
-/// type.
+/// Grid of a given value type. A function for the grid's build type reads its leaf nodes.
 template <typename Value>
 class NanoGrid {
  public:

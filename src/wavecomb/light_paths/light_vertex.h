@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Shading of one vertex of a light path. The wavefront and the reference integrator use the same
-/// code.
+/// Shading of one vertex of a light path, for both integrators.
 ///
 /// The throughput of a light path is a flux. Let w be the direction to the camera, l the direction
 /// to the light, g the geometric normal, and f the BSDF as on camera paths (f(w, l) |cos l|,
@@ -60,10 +59,9 @@ struct LightPathPoint {
   const Interaction& at;
   const LightPathState<F>& from;  ///< state of the light path before the vertex
   Frame<F> frame;
-  /// Local direction towards the light, along the ray of a connection (light_paths/connection.h)
-  Vec3<F> l;
-  F inverse_cos;          ///< 1 / |g l|
-  Color<F> flux;          ///< flux that arrives at the vertex
+  Vec3<F> l;      ///< local direction to the light, as for connections (light_paths/connection.h)
+  F inverse_cos;  ///< 1 / |g l|
+  Color<F> flux;  ///< flux that arrives at the vertex
   F connection_density;   ///< F, see above
   F sampled;              ///< p_light at the first vertex; 0 at later vertices
   Mask<F> by_light_only;  ///< lanes with a light that bounces cannot hit
@@ -155,8 +153,7 @@ WAVECOMB_INLINE Viewer<F> viewer_at(const Vertex<F, kFeatures>& v, const PathPoi
   return out;
 }
 
-/// Sets up the shadow ray towards the viewer at `to`; `light` is the contribution if the ray is
-/// unoccluded.
+/// Sets up the shadow ray towards the viewer at `to`, for the contribution `light`.
 template <typename F, typename PathPoint>
 WAVECOMB_INLINE void set_visibility_ray(const PathPoint& path_point, const Viewer<F>& viewer,
                                         const Vec3<F>& to, const Color<F>& light,

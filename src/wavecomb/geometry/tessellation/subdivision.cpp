@@ -90,9 +90,8 @@ struct Subdivision::Refiner {
   Scheme scheme;
   Sdc::Options options;
   bool manifold = true;
-  /// Indices of the visible faces of the last level, in order; empty if there are no holes, so that
-  /// all faces are visible.
   bool has_holes = false;
+  /// Visible faces of the last level, in order; empty without holes, if all faces are visible.
   std::vector<int> drawn;
 
   int level() const { return far->GetMaxLevel(); }
@@ -305,8 +304,7 @@ std::vector<uint32_t> Subdivision::normal_sectors(const RefinedFaces& faces,
   std::vector<int> sector;
   const auto number = [&](int v) {
     const Far::ConstIndexArray around = last.GetVertexFaces(v), edges = last.GetVertexEdges(v);
-    // Faces around a vertex that share a smooth edge belong to one sector, which is identified by
-    // the lowest of their numbers.
+    // Faces that share a smooth edge form a sector, whose number is the lowest of their numbers.
     sector.resize(static_cast<size_t>(around.size()));
     std::iota(sector.begin(), sector.end(), 0);
     for (const int e : edges) {
