@@ -30,7 +30,7 @@
 /// camera paths relative to light paths. Its unweighted contribution is c (1 + x), and the sample
 /// of a camera path has the second moment
 ///   E[sum over light paths of (c (1 + x))^2 / x].
-/// The light that light paths find accounts for the fraction v of it, c^2 (1 + x) / x.
+/// The light that light paths find accounts for the fraction v of this moment, c^2 (1 + x) / x.
 #pragma once
 
 #include <array>

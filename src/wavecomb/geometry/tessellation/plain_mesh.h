@@ -15,7 +15,7 @@ namespace wavecomb {
 using PointBounds = std::array<std::array<float, 3>, 2>;
 
 /// Transforms points in double precision: x' = x m00 + y m10 + z m20 + m30. All products but the
-/// first use fma, so that the results equal those of a NumPy matrix product.
+/// first use fma, as a BLAS matrix product does.
 ///
 /// `points`, `out`: 3 per point. `matrix`: 4 x 4, for row vectors.
 void bake_points(std::span<const float> points, std::span<const double, 16> matrix,
