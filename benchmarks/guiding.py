@@ -106,7 +106,7 @@ def measure(
     for name in options.ways:
         stack = np.array(pictures[name])
         pixels = np.sort((stack.var(axis=0, ddof=1) / (mean**2 + 0.01)).mean(axis=-1).ravel())
-        # Error of each round, for the spread of the ratios.
+        # Error times seconds of each round, from which the spread of the ratios is computed.
         rounds = [
             float(((one - mean) ** 2 / (mean**2 + 0.01)).mean()) * took
             for one, took in zip(stack, seconds[name], strict=True)

@@ -93,7 +93,8 @@ def measure(texture_mb: float, args: argparse.Namespace) -> dict[str, Any]:
     times: dict[str, list[dict[str, float]]] = {}
     picture: np.ndarray | None = None
     spread = 0.0
-    render(stage, args, lanes=0, policy="program")  # fills caches and the allocator
+    # Warm-up: fills the caches and the allocator's pools.
+    render(stage, args, lanes=0, policy="program")
     for turn in range(args.rounds):
         cases = [(width, policy) for width in LANES for policy in settings()["policy"].choices]
         for width, policy in shuffle.sample(cases, len(cases)):

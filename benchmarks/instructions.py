@@ -81,7 +81,7 @@ def self_by_library(file: Path) -> dict[str, int]:
             if not found[1]:
                 library = names[found[2]]
         elif line.startswith("calls="):
-            is_call = True  # the next line has the callee's cost
+            is_call = True  # the next line of a Callgrind file has the callee's cost
         elif line[:1] in "0123456789+-*" and line:
             if not is_call:
                 total[library] = total.get(library, 0) + int(line.split()[1])

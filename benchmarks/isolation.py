@@ -79,7 +79,8 @@ def main() -> None:
         stages = list(options.stages)
         if options.prims:
             path = Path(folder, f"{options.prims}-prims.usdc")
-            # In a separate process: its memory would count for processes started later.
+            # Write the file in a separate process, because this process's peak memory would be
+            # inherited by processes started later.
             writer = multiprocessing.get_context("spawn").Process(
                 target=many_prims, args=(path, options.prims)
             )

@@ -30,7 +30,8 @@ STAGES = ("cornell", "mixed", "dragon")
 TIMES = ("python", "imports", "load", "build", "first_sample", "render", "first_picture", "process")
 MEMORY = ("imports_mb", "peak_mb", "parts_mb", "ratio")
 
-# Program of one turn. Times are of CLOCK_MONOTONIC, which processes share.
+# Program that a child process runs in each round. It measures times with CLOCK_MONOTONIC, which all
+# processes share.
 CHILD = """
 import time
 start = time.monotonic()
@@ -72,7 +73,7 @@ def turn(stage: Path, size: int, threads: int) -> dict[str, Any]:
             check=True,
             capture_output=True,
             text=True,
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # the value that the command line sets
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # as the wavecomb command sets it
         )
         end = time.monotonic()
     got = json.loads(run.stdout)
@@ -83,7 +84,8 @@ def turn(stage: Path, size: int, threads: int) -> dict[str, Any]:
     record["imports_mb"] = got["imports_bytes"] / 1e6
     record["peak_mb"] = got["peak_bytes"] / 1e6
     record["parts_mb"] = parts / 1e6
-    # Peak of loading and rendering. The image file library is loaded later if no image is read.
+    # Ratio of the peak memory of loading and rendering to the sum of the reported parts. The image
+    # file library is loaded later if no image is read.
     record["ratio"] = (got["render_peak_bytes"] - got["imports_bytes"]) / parts
     record["memory_bytes"] = got["memory_bytes"]
     return record

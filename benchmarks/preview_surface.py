@@ -141,7 +141,7 @@ def mitsuba_albedos(
         },
     }  # fmt: skip
     out = {}
-    step = 8  # one call for each direction
+    step = 8  # use every eighth direction, as each takes a separate Mitsuba call
     wi = directions.wi[::step, ::step].reshape(-1, 3)
     for name, inputs in models.items():
         bsdf = mi.load_dict({"type": name.split()[1], **inputs})

@@ -2,7 +2,7 @@
 /// Builds a mesh in Embree alone for benchmarks/subdivision.py, as Embree's subdivision surface or
 /// as triangles.
 ///
-///      subdivision_embree FILE RATE     RATE 0: the faces are triangles
+///      subdivision_embree FILE RATE     RATE: subdivision level, or 0 for a triangle mesh
 ///
 /// FILE: counts of points, faces and corners (int32), points (3 float), face sizes, corners
 /// (int32).
@@ -73,7 +73,7 @@ int main(int argc, char** argv) {
   if (file == nullptr || std::fread(sizes, 4, 3, file) != 3) return 2;
   const auto n = static_cast<size_t>(sizes[0]), faces = static_cast<size_t>(sizes[1]),
              corners = static_cast<size_t>(sizes[2]);
-  std::vector<float> points(3 * n + 4);  // Embree reads 16 bytes at the last one
+  std::vector<float> points(3 * n + 4);  // Embree reads 16 bytes at the last point
   std::vector<unsigned> counts(faces), indices(corners);
   if (std::fread(points.data(), 12, n, file) != n ||
       std::fread(counts.data(), 4, faces, file) != faces ||

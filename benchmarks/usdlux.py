@@ -141,7 +141,7 @@ def render(
         camera=camera,
         lights=lights,
         session_layer=lambert,
-        subdivision="off",  # OpenUSD's reference implementation draws cages
+        subdivision="off",  # OpenUSD's reference implementation renders unsubdivided meshes
     )
     return np.stack(
         [

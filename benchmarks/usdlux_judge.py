@@ -83,7 +83,8 @@ def judge(batches: Array, reference: Array, size: int = BLOCK) -> Verdict:
     ours = batches.mean(0)
     own = batches.var(0, ddof=1) / len(batches)  # variance of the mean, per pixel
     residual = reference - ours
-    steps = np.diff(residual, axis=1) ** 2 / 2  # variance of both images, if there is only noise
+    # Variance of the images' difference, if they differ only by noise.
+    steps = np.diff(residual, axis=1) ** 2 / 2
     both = blocks_of(np.concatenate([steps, steps[:, -1:]], axis=1), size)
     variance = np.maximum(both, blocks_of(own, size)) / size**2
     mine, theirs = blocks_of(ours, size), blocks_of(reference, size)

@@ -26,7 +26,7 @@ void def_materials(nanobind::class_<wavecomb::SceneBuilder>& builder);
 void def_meshes(nanobind::class_<wavecomb::SceneBuilder>& builder);
 void def_volumes(nanobind::class_<wavecomb::SceneBuilder>& builder);
 
-/// Converts a texture use from the dict format of SceneBuilder.add_material.
+/// Converts the dict with which SceneBuilder.add_material describes a texture lookup.
 wavecomb::TextureUse texture_use(const nanobind::dict& d);
 
 /// Adds a value graph from the arguments of SceneBuilder.add_graph.
@@ -36,7 +36,7 @@ uint32_t add_graph(wavecomb::SceneBuilder& builder, const nanobind::bytes& ops,
                    const std::vector<std::pair<uint32_t, uint32_t>>& outputs,
                    const std::vector<std::string>& attributes);
 
-/// Builds the mesh of each description. Returns a list of dicts, or of error messages (str) for
-/// descriptions that fail.
+/// Builds a mesh from each description dict. Returns a list of dicts, or of error messages (str)
+/// for descriptions that fail.
 nanobind::list make_surfaces(const wavecomb::SceneBuilder& builder,
                              const nanobind::list& descriptions, uint32_t threads);

@@ -17,5 +17,6 @@ void set_camera(
 /// Returns all camera parameters by name, and to_world.
 nanobind::dict camera_dict(const wavecomb::Scene& scene);
 
-/// Returns a copy of the scene's camera with changed values. Throws Error that names the value.
+/// Returns a copy of the scene's camera with changed values. Throws Error that names the invalid
+/// value.
 wavecomb::Camera edited_camera(const wavecomb::Scene& scene, const nanobind::dict& values);

@@ -25,7 +25,7 @@ namespace {
 template <typename T>
 using Array = nb::ndarray<const T, nb::c_contig, nb::device::cpu>;
 
-/// Returns an array of a description, which keeps it alive, or an empty span if the key is missing.
+/// Returns the array `d[key]`, which `d` keeps alive, or an empty span if the key is missing.
 template <typename T>
 std::span<const T> span_of(const nb::dict& d, const char* key) {
   if (!d.contains(key) || d[key].is_none()) return {};
@@ -110,8 +110,8 @@ SurfaceDesc describe(const SceneBuilder& builder, const nb::dict& d) {
   return desc;
 }
 
-/// Converts a vector to an array of shape (-1, columns), or to one axis if `columns` is 0. Moves
-/// the data without copying.
+/// Converts a vector to a NumPy array of shape (-1, columns), or to a one-dimensional array if
+/// `columns` is 0. Moves the data without copying.
 template <typename T>
 nb::object array_of(std::vector<T>&& values, size_t columns) {
   auto* held = new std::vector<T>(std::move(values));

@@ -51,7 +51,8 @@ Graph make_graph(const nb::bytes& ops, const std::vector<float>& constants, cons
 
 using Points = nb::ndarray<const float, nb::shape<-1, 30>, nb::c_contig, nb::device::cpu>;
 
-/// Runs a program at points in packets of type `F`. The last point is repeated to fill lanes.
+/// Runs a value graph's program at points in packets of type `F`. The last point is repeated to
+/// fill lanes.
 template <typename F>
 void run(const GraphSet& set, const TextureView* textures, const Points& points, float* out) {
   const GraphView view = set.view();
@@ -95,7 +96,7 @@ nb::ndarray<nb::numpy, float, nb::ndim<2>> run_points(const nb::bytes& ops,
                                                       const Names& attributes, const Points& points,
                                                       uint32_t lanes) {
   Graph graph = make_graph(ops, constants, images, outputs, attributes);
-  // All images are replaced by a texture of one white texel.
+  // Replace all images by a texture of one white texel.
   for (GraphImage& image : graph.images) image.texture = 0;
   check_graph(graph, "a graph to run", 1, ~uint32_t{0});
   GraphSet set;

@@ -102,7 +102,7 @@ nb::object to_python(const LightParameter& p, const LightValue& value) {
       value);
 }
 
-/// Returns the names of the rows for which `is_known` holds, for error messages.
+/// Returns the names of the light parameters for which `is_known` returns true, for error messages.
 template <typename Known>
 std::string names(const Known& is_known) {
   std::string list;

@@ -30,10 +30,11 @@ uint32_t add_light_filter(wavecomb::SceneBuilder& builder, const Transform& tran
                           const std::array<float, 4>& decay, float density,
                           std::optional<uint32_t> next);
 
-/// Returns the parameters of a light by name, without references to sets and transforms. Throws
-/// Error if the index is out of range.
+/// Returns the parameters of a light by name, without references to geometry sets and without
+/// transforms. Throws Error if the index is out of range.
 nanobind::dict light_dict(const wavecomb::Scene& scene, uint32_t light);
 
-/// Returns a copy of a light with changed values. Throws Error that names the light and the value.
+/// Returns a copy of a light with changed values. Throws Error that names the light and the invalid
+/// value.
 wavecomb::Light edited_light(const wavecomb::Scene& scene, uint32_t light,
                              const nanobind::dict& values);

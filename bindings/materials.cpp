@@ -89,7 +89,7 @@ uint32_t add_texture(SceneBuilder& builder,
   desc.srgb = srgb;
   desc.wrap_s = wrap(wrap_s);
   desc.wrap_t = wrap(wrap_t);
-  const nb::gil_scoped_release release;  // other threads may read images meanwhile
+  const nb::gil_scoped_release release;  // lets other Python threads read images meanwhile
   return builder.add_texture(desc);
 }
 

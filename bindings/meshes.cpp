@@ -47,8 +47,8 @@ Attribute attribute_of(const std::optional<Array<float>>& values, size_t k, cons
   throw Error("mesh '" + name + "' has attributes that are neither per vertex nor per corner");
 }
 
-/// Converts attributes by name; each is a pair of rate and array (values, components). Adds the
-/// arrays to `owners`.
+/// Converts a dict of attributes; each value is a pair of rate and array (values, components). Adds
+/// the arrays to `owners`.
 std::vector<MeshAttribute> attributes_of(SceneBuilder& builder, const nb::dict& attributes,
                                          nb::list& owners) {
   std::vector<MeshAttribute> out;
@@ -181,8 +181,8 @@ void replace_mesh(SceneBuilder& builder, uint32_t id, const Array<float>& positi
                                      material, attributes, ""));
 }
 
-/// Creates the common part of curves and points; the caller sets primitive, segments and normals.
-/// Adds the arrays to `owners`.
+/// Creates a mesh with the data that curves and points have in common; the caller sets primitive,
+/// segments and normals. Adds the arrays to `owners`.
 Mesh curved_mesh(SceneBuilder& builder, const Array<float>& positions, const Array<float>& radii,
                  const std::optional<Array<float>>& uvs,
                  const std::optional<Array<uint32_t>>& face_materials, uint32_t material,

@@ -10,8 +10,9 @@ namespace nb = nanobind;
 
 NB_MODULE(_core, m) {
   m.doc() = "The native core of Wavecomb.";
-  // Objects that are alive at interpreter exit, such as a window's last image or one held by an
-  // exception, are harmless; the warnings would also list objects of other modules.
+  // Disable nanobind's leak warnings: objects that are alive at interpreter exit, such as a
+  // window's last image or an object held by an exception, are harmless, and the warnings would
+  // also list objects of other modules.
   nb::set_leak_warnings(false);
   nb::exception<wavecomb::Error>(m, "Error", PyExc_ValueError);
   bind_volumes(m);

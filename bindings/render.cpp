@@ -110,7 +110,8 @@ class PythonPolicy final : public SchedulingPolicy {
     std::copy(values.begin(), values.end(), own);
     return owned<const T>(own, values.size());
   }
-  /// Converts the result of order() to bool. Throws Error for other types.
+  /// Converts the result of order(), which must be a Python or NumPy bool. Throws Error for values
+  /// of another type.
   bool truth(const nb::object& result) const {
     const auto type = nb::cast<std::string>(result.type().attr("__name__"));
     if (type != "bool" && type != "bool_")
@@ -155,7 +156,7 @@ auto image(nb::handle owner, const std::vector<T>& values, const RenderedImage& 
   return nb::ndarray<nb::numpy, const T>(values.data(), channels == 1 ? 2 : 3, shape, owner);
 }
 
-/// Returns a layer of the image, or None if it was not requested.
+/// Returns a layer of the image, or None if the layer was not requested.
 template <typename T>
 nb::object layer(nb::handle owner, std::vector<T> RenderedImage::* values, size_t channels) {
   const RenderedImage& p = nb::cast<const Result&>(owner).image;
@@ -180,7 +181,7 @@ nb::object deep_pair(nb::handle owner) {
                         nb::ndarray<nb::numpy, const float>(p.deep.values.data(), 2, shape, owner));
 }
 
-/// Returns the rows of WAVECOMB_AOVS.
+/// Returns the table of AOVs (WAVECOMB_AOVS) as a list of dicts.
 nb::list aov_table() {
   static constexpr const char* kKinds[] = {"mean",     "mean_of_hits", "nearest",
                                            "coverage", "groups",       "expressions",
@@ -191,7 +192,8 @@ nb::list aov_table() {
   static_assert(std::size(kContents) == static_cast<size_t>(AovContent::kValue) + 1);
   nb::list rows;
   for (const AovRow& aov : kAovs) {
-    // Expressions are requested by text, and deep images are separate files.
+    // Skip light path expressions, which are requested by their text, and deep images, which are
+    // separate files.
     if (aov.kind == AovKind::kExpressions || aov.kind == AovKind::kDeep) continue;
     nb::dict row;
     row["name"] = aov.name;

@@ -21,7 +21,8 @@ struct Result {
   wavecomb::RenderStatistics statistics;
   wavecomb::CostProfile profile;
   nanobind::dict settings;
-  std::vector<std::byte> learned;  ///< wavecomb::packed_training(); empty without training
+  /// Training data from wavecomb::packed_training(); empty without training.
+  std::vector<std::byte> learned;
 };
 
 /// Arguments of render(); an argument that was not given is None.

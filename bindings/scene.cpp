@@ -63,7 +63,7 @@ uint32_t add_ies(SceneBuilder& builder, std::vector<float> vertical, std::vector
   return builder.add_ies(std::move(profile));
 }
 
-/// Returns the lower and upper corner.
+/// Returns the lower and upper corner of a bounding box.
 std::pair<Color3, Color3> corners(const Bounds& b) {
   return {Color3{b.lo.x, b.lo.y, b.lo.z}, Color3{b.hi.x, b.hi.y, b.hi.z}};
 }

@@ -29,7 +29,8 @@ namespace {
 template <typename Class, typename Value>
 using Members = std::vector<std::pair<const char*, Value Class::*>>;
 
-// Expand to an input only if it has the type of the list.
+// Macros that list the OpenPBR inputs of one type, number or colour, and expand to nothing for
+// inputs of another type.
 #define WAVECOMB_NUMBER_Number(name) {#name, &OpenPbr::name},
 #define WAVECOMB_NUMBER_Colour(name)
 #define WAVECOMB_NUMBER_Derived(name)

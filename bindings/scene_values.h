@@ -21,14 +21,15 @@ wavecomb::Affine affine(const T* m) {
   a.t = {at(3, 0), at(3, 1), at(3, 2)};
   return a;
 }
-/// Converts a 4 x 4 array of float32 or float64 in USD convention. Throws Error for other arrays.
+/// Converts a 4 x 4 array of float32 or float64 in USD convention. Throws Error for arrays of
+/// another shape or type.
 wavecomb::Affine affine(
     const nanobind::ndarray<nanobind::c_contig, nanobind::device::cpu, nanobind::ro>& m);
 
 /// Reads the parameters of program "openpbr" by name. Throws Error for unknown names.
 wavecomb::OpenPbr openpbr_of(const std::string& material, const nanobind::dict& values);
 
-/// Throws Error unless i < count.
+/// Throws Error unless index `i` is less than `count`.
 void check_index(const char* kind, uint32_t i, size_t count);
 
 /// Returns the index of a name among `choices`, or nullopt if it is not a string or unknown.
@@ -54,7 +55,7 @@ nanobind::list program_rows();
 nanobind::dict material_dict(const wavecomb::Scene& scene, uint32_t material);
 
 /// Converts the arguments of Renderer.edit(). Values that are not given stay unchanged. Throws
-/// Error that names the object and the value.
+/// Error that names the object and the invalid value.
 wavecomb::SceneEdit scene_edit(const wavecomb::Scene& scene, const nanobind::object& camera,
                                const nanobind::dict& materials, const nanobind::dict& lights,
                                const nanobind::dict& moves);

@@ -46,7 +46,7 @@ NamedExpression to_expression(const std::string& aov) {
   return {rest.substr(0, equals), rest.substr(equals + 1)};
 }
 
-/// Sets the AOVs by name. "light_groups" selects all light groups, "light_NAME" one.
+/// Sets the AOVs by name. "light_groups" selects all light groups, "light_NAME" the group NAME.
 void set_aovs(Settings& s, const std::vector<std::string>& names) {
   AovSet set{0};
   std::vector<std::string> groups;

@@ -12,7 +12,8 @@ using namespace wavecomb;
 
 namespace {
 
-/// Returns lists by depth: rays, shadow rays, records, and number of paths that ended there.
+/// Returns lists indexed by path depth: rays, shadow rays, shading records, and number of paths
+/// that ended at that depth.
 nb::dict depths_dict(const RenderStatistics& s) {
   nb::dict d;
   std::vector<uint64_t> ended;
@@ -41,7 +42,8 @@ nb::list materials_list(const RenderStatistics& s) {
   return out;
 }
 
-/// Returns sums over the materials of each program that shaded any record.
+/// Returns shading statistics summed over the materials of each shading program, without programs
+/// that shaded nothing.
 nb::dict programs_dict(const RenderStatistics& s) {
   struct Sum {
     uint64_t records = 0, timed = 0;

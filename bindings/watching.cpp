@@ -88,7 +88,8 @@ class LiveSnapshot {
   nb::dict settings_;
 };
 
-/// Returns an array of the film's size that owns its values; single-channel arrays have two axes.
+/// Returns a NumPy array of the film's size that owns its values; arrays of one channel have two
+/// axes.
 template <typename T>
 nb::object image(const Film& film, std::vector<T> values, size_t channels) {
   auto* own = new std::vector<T>(std::move(values));
@@ -123,7 +124,8 @@ Request request_of(const nb::object& answer) {
               "'; it must be None, \"snapshot\" or \"stop\"");
 }
 
-/// Returns the bytes of one entry of a checkpoint state. Throws Error unless there are `size`.
+/// Returns the bytes of one entry of a checkpoint state. Throws Error unless the entry has `size`
+/// bytes.
 Bytes bytes_of(const nb::dict& state, const std::string& key, size_t size) {
   if (!state.contains(key.c_str()))
     throw Error("the checkpoint has no '" + key + "'; it is from another build");
@@ -180,7 +182,7 @@ std::function<std::vector<std::byte>(Film&, PassState&)> resumed_from(const nb::
     const auto active = nb::cast<Bytes>(state["pass.active"]);
     if (active.size() != 0) bytes_of(state, "pass.active", film.pixel_count());
     pass.active.assign(active.data(), active.data() + active.size());
-    // Checkpoints of older versions lack these entries if the feature did not exist.
+    // Checkpoints of older versions lack the entries of features that did not exist yet.
     if (state.contains("pass.light_target")) {
       const Bytes light = bytes_of(state, "pass.light_target", sizeof(uint32_t));
       std::memcpy(&pass.light_target, light.data(), sizeof(uint32_t));

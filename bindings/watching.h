@@ -10,11 +10,12 @@
 #include "wavecomb/scene/scene.h"
 
 /// Returns options with callbacks to Python's `progress(done, total)` and `watcher`, either of
-/// which may be None. `settings`: for the statistics of snapshots. The callbacks acquire the GIL;
-/// all three arguments must outlive the render.
+/// which may be None. The statistics of snapshots include `settings`. The callbacks acquire the
+/// GIL; all three arguments must outlive the render.
 wavecomb::RenderOptions watched_by(const nanobind::object& progress,
                                    const nanobind::object& watcher, const nanobind::dict& settings);
-/// Returns RenderOptions::learned of the render that `state` is from, or nothing.
+/// Returns the training data (RenderOptions::learned) of the render that produced the checkpoint
+/// `state`, or an empty vector.
 std::vector<std::byte> learned_in(const nanobind::dict& state);
 /// Returns RenderOptions::resume for `state`, the result of an earlier Snapshot.state().
 std::function<std::vector<std::byte>(wavecomb::Film&, wavecomb::PassState&)> resumed_from(

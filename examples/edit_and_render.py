@@ -16,7 +16,7 @@ renderer.render(spp=16).save("blue.png")
 
 (name,) = renderer.lights
 aside = np.array(renderer.scene.light(0)["transform"])
-aside[3, 0] += 120.0  # translation is in the last row, as in USD
+aside[3, 0] += 120.0  # the last row of a matrix is its translation, as in USD
 renderer.edit(lights={name: {"transform": aside, "color": (20.0, 16.0, 9.0)}})
 
 lifted = np.eye(4)

@@ -27,7 +27,7 @@ struct Mode {
   const char* device = nullptr;  ///< configuration string of the Embree device
   RTCBuildQuality quality = RTC_BUILD_QUALITY_MEDIUM;
   bool merged = false;          ///< all meshes in one geometry
-  bool only_triangles = false;  ///< requests no other features
+  bool only_triangles = false;  ///< requests only triangle support from Embree
   bool coherent = false;
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cost of value graphs per record: the parameters of program "openpbr" as constants, and driven by
 // a graph of 20 operations (an image, gradient noise, sums, mixes and sines of three components).
-// Packets have lanes of one material or of four.
+// The lanes of a packet have one material or four different materials.
 #include <random>
 
 #include "scene_testing.h"

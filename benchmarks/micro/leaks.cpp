@@ -55,8 +55,9 @@ void leaks(double millions) {
   struct Room {
     const char* name;
     Soup soup;
-    double share = 1;  ///< fraction of the rays; Embree is slow where boxes of long triangles
-                       ///< overlap
+    /// Fraction of the rays to trace; below 1 where long triangles with overlapping bounds make
+    /// Embree slow.
+    double share = 1;
   };
   const Room rooms[] = {{"box", soup_of(box({-1, -1, -1}, {1, 1, 1}))},
                         {"box, turned", turned(soup_of(box({-1, -1, -1}, {1, 1, 1})))},
@@ -95,7 +96,8 @@ void leaks(double millions) {
           point(false, p);
           point(aimed, q);
           for (int k = 0; k < 3; ++k) {
-            p[k] *= 0.9f * uniform();  // convex and around 0: the point is inside
+            // The room is convex and contains the origin, so the point is inside.
+            p[k] *= 0.9f * uniform();
             rays.column[k][i] = p[k];
             rays.column[3 + k][i] = q[k] - p[k];
           }

@@ -14,7 +14,7 @@ using namespace light_testing;
 
 constexpr size_t kSamples = 4096;
 
-/// Four lights of a kind, or two of every kind for kLightKindCount.
+/// Makes four lights of a kind, or two lights of every kind if `kind` is kLightKindCount.
 Lights make_lights(uint32_t kind) {
   std::vector<Light> lights;
   std::vector<EmissiveTriangle> triangles;
@@ -51,7 +51,7 @@ void light(benchmark::State& state, uint32_t kind) {
   std::vector<float> columns[6];
   for (auto& column : columns)
     for (size_t i = 0; i < kSamples; ++i) column.push_back(std::min(uniform(random), 0.9999f));
-  // Multiples of 2^-24, as samplers return them.
+  // Random numbers that are multiples of 2^-24, as samplers return them.
   for (float& pick : columns[3]) pick = std::floor(pick * 0x1p24f) * 0x1p-24f;
   for (auto _ : state) {
     F sum(0.f);

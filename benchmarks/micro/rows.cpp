@@ -12,8 +12,8 @@
 namespace wavecomb::micro {
 namespace {
 
-constexpr uint32_t kRecords = 4096;  // as in a wave: 256 KB at 16 words, which fits the
-                                     // second-level cache
+// As many as in a wave; 16-word records take 256 KB, which fits the second-level cache.
+constexpr uint32_t kRecords = 4096;
 
 struct Records {
   std::vector<float> words;

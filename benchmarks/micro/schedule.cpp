@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cost of ordering a queue: sorting keys, and moving records compared with reading them by index.
-// Times are per record.
+// The reported times are per record.
 
 #include <algorithm>
 #include <numeric>
@@ -78,7 +78,7 @@ void fill(ShadingQueue& queue, size_t n) {
   queue.ordered = sorter.sort(n, queue.sorted_indices);
 }
 
-constexpr size_t kWords = 8;  ///< size of a record's row, as in waves
+constexpr size_t kWords = 8;  ///< 32-bit words per record, as in a wave
 
 /// Reads every record's row and ids once, in lanes, like a very inexpensive shader.
 float read_all(const ShadingQueue& queue) {

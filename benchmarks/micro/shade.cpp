@@ -104,7 +104,7 @@ void shade(benchmark::State& state, ProgramId program, const Look& look, float f
   count_items(state, "record", kRecords);
 }
 
-/// Whether a program supports the features of a look.
+/// Returns whether a shading program supports a material's textures and layers.
 bool has(ProgramId program, const Look& look) {
   const bool layered = program == ProgramId::kPrincipled || program == ProgramId::kOpenPbr;
   // Program "emissive" has no base colour.
@@ -118,7 +118,7 @@ const bool registered = [] {
       for (const float fill : {1.f, 0.35f})
         for_each_width([&]<size_t W>() {
           const auto program = static_cast<ProgramId>(p);
-          // A single lane is always full.
+          // A packet of one lane is always full.
           if (!has(program, look) || (fill < 1 && W == 1)) return;
           const std::string name = "shade/" + std::string(kProgramNames[p]) + look.name +
                                    (fill < 1 ? "/full:35%" : "/full:100%") + lanes_label(W);

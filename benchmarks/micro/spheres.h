@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The scene in which rays are timed.
+/// Test scene of the traversal benchmarks.
 #pragma once
 
 #include "scene_testing.h"

@@ -20,7 +20,7 @@ struct Queries {
 };
 
 /// Makes a texture of edge x edge texels of 8 bits, sRGB: edge^2 * 4 bytes at the finest level.
-/// Caches the texture made last.
+/// Returns the previous texture if it has the same size.
 const Texture& texture_of(uint32_t edge) {
   static std::unique_ptr<Texture> made;
   if (made && made->view().levels[0].width == edge) return *made;

@@ -12,7 +12,7 @@ namespace {
 
 using namespace scene_testing;
 
-/// A box of about 20 triangles, or one that contains a million.
+/// Makes a box scene of about 20 triangles, or of about a million triangles if `large`.
 ScenePtr make_scene(bool large) {
   return large ? spheres(256) : cornell();
 }

@@ -128,7 +128,7 @@ class CyclesScene:
         cycles.caustics_reflective = cycles.caustics_refractive = True
         cycles.blur_glossy = 0.0
         cycles.pixel_filter_type = "BOX"
-        # Wavecomb's n scattering vertices are n - 1 bounces here.
+        # Wavecomb's limit of n scattering vertices corresponds to n - 1 bounces in Cycles.
         bounces = settings.max_depth - 1
         cycles.max_bounces = bounces
         cycles.diffuse_bounces = cycles.glossy_bounces = bounces
@@ -152,7 +152,8 @@ class CyclesScene:
         if camera.get("lens_radius", 0.0) > 0.0:
             data.dof.use_dof = True
             data.dof.focus_distance = camera["focus_distance"]
-            # f-number from the radius; Blender's focal length is in mm, its scene in metres.
+            # Compute the f-number from the lens radius; Blender's focal length is in mm, the lens
+            # radius in metres.
             data.dof.aperture_fstop = data.lens * 1e-3 / (2.0 * camera["lens_radius"])
         self.scene.camera = self._object("camera", data, camera["transform"])
 
@@ -183,7 +184,8 @@ class CyclesScene:
         frame = dome["transform"][:3, :3]
         frame = frame / np.linalg.norm(frame, axis=1)[:, None]
         direction = nodes.add("ShaderNodeTexCoord").outputs["Generated"]
-        # The rows of the frame are the dome's axes, so the matrix maps world to dome.
+        # The rows of `frame` are the axes of the dome light, so this matrix maps world directions
+        # to dome directions.
         turned = nodes.add("ShaderNodeMapping", Vector=direction)
         turn = BlenderMatrix((_DOME @ frame).tolist())
         turned.inputs["Rotation"].default_value = turn.to_euler("XYZ")
@@ -210,13 +212,14 @@ class CyclesScene:
                 data.shape = "DISK"
                 data.size = 2.0 * light["radius"]
                 area = np.pi * light["radius"] ** 2 * size[0] * size[1]
-            # Power of a one-sided Lambertian emitter: pi A L.
+            # The power of a one-sided Lambertian emitter of area A and radiance L is pi A L.
             power = np.pi * radiance * (1.0 if light.get("normalize") else area)
         elif kind == "sphere":
             radius = light["radius"] * abs(np.linalg.det(rows[:3, :3])) ** (1 / 3)
             data.shadow_soft_size = radius
             area = 4.0 * np.pi * radius**2
-            # A point's colour is radiant intensity: 4 pi I. A sphere's power is pi A L.
+            # The colour of a point light is its radiant intensity I, so its power is 4 pi I. A
+            # sphere light of area A and radiance L has the power pi A L.
             scale = (
                 4.0 * np.pi if radius == 0 else np.pi * (1.0 if light.get("normalize") else area)
             )

@@ -183,7 +183,8 @@ class MitsubaScene:
         if camera.get("projection") == "orthographic":
             if camera.get("lens_radius", 0.0) > 0:
                 raise NotImplementedError("an orthographic camera with a lens")
-            # Mitsuba's window is from -1 to 1, so the transform contains its size.
+            # Mitsuba's orthographic window extends from -1 to 1, so the transform scales it to its
+            # size.
             del sensor["fov"], sensor["fov_axis"]
             window = np.diag([half_x, half_x, 1.0, 1.0])
             sensor["type"] = "orthographic"

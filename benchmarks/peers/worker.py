@@ -76,7 +76,7 @@ def open_mitsuba(args: argparse.Namespace, options: dict[str, Any]) -> Opened:
     scene = MitsubaScene(mi, load(args.recorded), settings)
 
     def render(spp: int, seed: int) -> tuple[Any, int, int | None]:
-        picture = scene.render(spp, seed)  # waits for the result
+        picture = scene.render(spp, seed)  # returns only once the image is complete
         return picture, scene.scene.sensors()[0].sampler().sample_count(), None
 
     return render, {"version": mi.__version__, "settings": {"variant": variant, **vars(settings)}}
@@ -109,7 +109,7 @@ def main() -> None:
     parser.add_argument("--max-depth", type=int, required=True)
     args = parser.parse_args()
     out = os.fdopen(os.dup(1), "w", buffering=1)
-    os.dup2(2, 1)  # output of libraries goes to the log
+    os.dup2(2, 1)  # libraries that print to stdout write to stderr instead
     started = time.perf_counter()
     render, facts = OPENERS[args.kind](args, args.options)
     facts["load_s"] = time.perf_counter() - started

@@ -100,7 +100,8 @@ class _Translator:
     def _ass(self, nodes: dict[str, dict[str, list[str]]]) -> None:
         placed = _matrix(nodes.get("usd", {}))
         camera = UsdGeom.Camera.Define(self.stage, "/ass_camera")
-        # The file is only translated, so the camera moves the opposite way.
+        # The Arnold file moves the scene; the USD stage moves the camera by the inverse transform
+        # instead.
         camera.AddTransformOp().Set(_matrix(nodes["persp_camera"]) * placed.GetInverse())
         half = math.tan(math.radians(float(nodes["persp_camera"]["fov"][0])) / 2)
         camera.CreateFocalLengthAttr(10.0)
@@ -163,7 +164,7 @@ class _Translator:
         if kind == "arnold:checkerboard":
             file = self.test.stage.with_name(f"{self.test.stage.stem}_checker.exr")
             colours = [list(image.GetInput(name).Get()) for name in ("color1", "color2")]
-            # Arnold has the second colour at uv 0.
+            # Arnold's checkerboard has its second colour at uv 0.
             write_checker(file, colours[1], colours[0])
             uv, repeats = "uv", float(image.GetInput("u_frequency").Get())
             space = "raw"

@@ -154,7 +154,7 @@ class _Translator:
     def _emitter(self, number: int) -> None:
         kind, props = self.scene.kind(number), self.scene.props(number)
         if kind == "area":
-            return  # a shape refers to this light
+            return  # an area light is converted with the shape that refers to it
         if missing := self.scene.missing_file(number):
             raise Inexpressible(f"{missing}, which lights the scene, is not among the assets")
         if kind == "constant":

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Python module wavecomb._cpu: instruction sets of this CPU. Compiled for the compiler's baseline,
-/// so that it can run on any CPU before a library for a specific one is loaded.
+/// Python module wavecomb._cpu: instruction sets of this CPU. The module is compiled for the
+/// compiler's baseline, so that it runs on any CPU before a library for a specific instruction set
+/// is loaded.
 #include <Python.h>
 
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Reader of .vdb files. It uses OpenVDB with a stream that throws at the end of the file, because
-/// openvdb::io::File continues past the end and reads zeros.
+/// Reader of .vdb files. The reader uses OpenVDB with a stream that throws at the end of the file,
+/// because openvdb::io::File continues past the end and reads zeros.
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/Compression.h>
 #include <openvdb/io/GridDescriptor.h>
@@ -19,7 +19,7 @@
 namespace openvdb {
 OPENVDB_USE_VERSION_NAMESPACE
 namespace OPENVDB_VERSION_NAME {
-// Declared here because openvdb/openvdb.h also includes grids of points.
+// openvdb::initialize is declared here, because openvdb/openvdb.h also includes grids of points.
 void initialize();
 }  // namespace OPENVDB_VERSION_NAME
 }  // namespace openvdb
@@ -70,7 +70,7 @@ class Archive final : public GridFile, private vio::Archive {
   }
 
  private:
-  /// Returns the result of `read`. Converts exceptions of OpenVDB to BrokenFile.
+  /// Calls read() and returns its result. Converts exceptions of OpenVDB to BrokenFile.
   template <typename Read>
   static auto guarded(Read&& read) {
     try {
@@ -84,18 +84,19 @@ class Archive final : public GridFile, private vio::Archive {
 
   static std::string one_line(const char* text);
   void read_entries(int64_t size);
-  /// Sets the stream properties that OpenVDB reads, and discards those of the previous grid.
+  /// Sets the stream properties that OpenVDB reads, and discards the properties of the previous
+  /// grid.
   void tag_stream();
-  /// Creates a grid with its metadata and transform, and leaves the stream at its tree. Returns
-  /// null if OpenVDB does not know its type.
+  /// Creates a grid with its metadata and transform. The next read from the stream yields the
+  /// grid's tree. Returns null if OpenVDB does not know the grid's type.
   openvdb::GridBase::Ptr begin(const Entry& entry);
   const Entry& instance_parent(const Entry& entry) const;
-  /// Reads a grid; returns null if OpenVDB does not know its type. Throws TooLarge after reading
-  /// its topology, before memory for its values is allocated.
+  /// Reads a grid; returns null if OpenVDB does not know the grid's type. Throws TooLarge after
+  /// reading the grid's topology, before memory for its values is allocated.
   openvdb::GridBase::Ptr read_part(const Entry& entry, Part part, uint64_t max_bytes);
 
   std::ifstream stream_;
-  /// The stream holds the address of this object.
+  /// The stream holds a pointer to this metadata object.
   vio::StreamMetadata::Ptr metadata_;
   std::vector<Entry> entries_;
 };

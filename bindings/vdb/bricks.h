@@ -30,7 +30,7 @@ struct BrickFormat {
 struct BrickFacts {
   uint64_t not_finite = 0;
   uint64_t negative = 0;
-  /// Extremes of the finite values and of 0.
+  /// Smallest and largest finite value; the range always includes 0.
   float least = 0.0f;
   float greatest = 0.0f;
   /// Number of bricks that held only zeros and were left out.
@@ -58,11 +58,11 @@ struct Bricks {
 
 /// Options for making bricks.
 struct BrickOptions {
-  /// Upper limit of the memory of the bricks.
+  /// Upper limit of the bricks' memory in bytes.
   uint64_t max_bytes = 0;
-  /// Inactive voxels that hold the background value become 0.
+  /// Whether inactive voxels that hold the background value are set to 0.
   bool background_is_zero = false;
-  /// Bricks that hold only zeros are left out.
+  /// Whether bricks that hold only zeros are left out.
   bool drops_empty = false;
 };
 
@@ -72,28 +72,28 @@ inline uint64_t bricks_of_tile(uint64_t edge) {
   return along * along * along;
 }
 
-/// Returns one line that says that `what` needs more memory than allowed.
+/// Returns a one-line message that `what` needs more memory than allowed.
 std::string limit_message(const std::string& what, uint64_t bytes, uint64_t max_bytes);
 
-/// Throws TooLarge if this many bricks take more than `max_bytes`.
+/// Throws TooLarge if the given number of bricks takes more than `max_bytes`.
 void check_size(uint64_t bricks, const BrickFormat& format, uint64_t max_bytes);
 
 /// Converts floats that are exactly representable in 16 bits.
 void to_halves(const float* values, size_t count, uint16_t* halves);
 
-/// Fills bricks one after another. Values are converted to float before they arrive.
+/// Fills bricks one after another. The caller converts values to float.
 class BrickWriter {
  public:
   using Origin = std::array<int32_t, 3>;
 
-  /// Allocates memory for `most` bricks. Throws TooLarge, std::bad_alloc.
+  /// Allocates memory for at most `most` bricks. Throws TooLarge, std::bad_alloc.
   BrickWriter(uint64_t most, const BrickFormat& format, const BrickOptions& options);
 
   /// Buffer for the values of the next brick, x slowest, channels fastest.
   float* scratch() { return scratch_; }
-  /// Appends the brick in scratch().
+  /// Appends the brick whose values are in the buffer scratch().
   void add(const Origin& origin);
-  /// Appends the bricks of a tile of one value (`channels` components).
+  /// Appends the bricks of a tile, whose voxels all have the same value (`channels` components).
   void add_tile(const Origin& first, int32_t edge, const float* value);
 
   Bricks take() { return std::move(bricks_); }

@@ -18,7 +18,7 @@ namespace {
 /// Maximum size increase of incompressible data.
 constexpr uint64_t kOverhead = 1024;
 
-/// Reads the next chunk, of `bytes` bytes when unpacked. Skips it if `data` is null.
+/// Reads the next chunk, of `bytes` bytes when unpacked. Skips the chunk if `data` is null.
 template <typename Unpack>
 void read_chunk(std::istream& is, char* data, size_t bytes, Unpack&& unpack) {
   int64_t size = 0;

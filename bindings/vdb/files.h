@@ -21,13 +21,14 @@ class GridFile {
 
   virtual size_t size() const = 0;
   virtual Head head(size_t number) const = 0;
-  /// Describes a grid. Returns false if the library does not know its type.
+  /// Describes a grid. Returns false if the library does not know the grid's type.
   virtual bool describe(size_t number, GridFacts& facts) = 0;
-  /// Reads a grid's values. Throws BrokenFile if its type is not supported, and TooLarge.
+  /// Reads a grid's values. Throws BrokenFile if the grid's type is not supported, and TooLarge if
+  /// the bricks exceed options.max_bytes.
   virtual Bricks read(size_t number, const BrickOptions& options, GridFacts& facts) = 0;
 };
 
-/// Opens a file. The format is detected from its first bytes, not its name.
+/// Opens a file. Detects the format from the file's first bytes, not from its name.
 std::unique_ptr<GridFile> open_file(const std::string& path);
 
 /// Opens a .vdb file (archive.cpp).

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Description of a grid in a file, and errors of reading one. Independent of OpenVDB and NanoVDB.
+/// Description of a grid in a file, and errors of reading a grid. Independent of OpenVDB and
+/// NanoVDB.
 #pragma once
 
 #include <array>
@@ -18,12 +19,13 @@ struct BrokenFile : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Error: reading needs more memory than allowed. The message is one line that says how much.
+/// Error: reading needs more memory than allowed. The message states in one line how much memory is
+/// needed.
 struct TooLarge : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Row of a file's table of grids.
+/// Entry of a file's table of grids.
 struct Head {
   std::string name;
   /// Position of the grid among the grids of the same name, in the order of the file.
@@ -49,7 +51,7 @@ struct IndexBox {
 struct GridFacts {
   /// Whether bricks can be made from a grid of this type.
   bool is_read = false;
-  /// "fog volume", "level set", "staggered" or "unknown".
+  /// Grid class: "fog volume", "level set", "staggered" or "unknown".
   std::string kind;
   /// Row-major matrix of p' = p M; empty if the transform is not affine.
   std::optional<std::array<double, 16>> index_to_object;

@@ -40,7 +40,7 @@ nb::tuple tuple_of(const std::array<int32_t, 3>& xyz) {
   return nb::make_tuple(xyz[0], xyz[1], xyz[2]);
 }
 
-/// Adds the entries that grids() and bricks() have in common.
+/// Adds the dict entries that the Python functions grids() and bricks() both return.
 void add_facts(nb::dict& d, const vdb::GridFacts& facts) {
   d["kind"] = facts.kind;
   d["index_to_object"] = rows_of(facts.index_to_object);

@@ -82,7 +82,7 @@ struct NanoEntry {
   uint32_t type = 0;
   /// Compression: 0 is none, 1 zlib, 2 Blosc.
   uint16_t codec = 0;
-  /// Size in bytes in memory, and in the file from `offset`.
+  /// Unpacked size of the grid in bytes, its size in the file, and its offset in the file.
   uint64_t size = 0, file_size = 0, offset = 0;
 };
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Reader of .nvdb files: segments of grids in NanoVDB's memory layout, plain or compressed.
 ///
-/// NanoVDB follows offsets in a file without checks. Only the memory layouts of NanoVDB's
-/// structures are used here, and each offset is checked before use.
+/// NanoVDB follows offsets in a file without checks. The reader uses only the memory layouts of
+/// NanoVDB's structures, and checks each offset before use.
 #pragma once
 
 #include <memory>
@@ -12,7 +12,7 @@
 
 namespace vdb {
 
-/// Returns whether a file begins with NanoVDB's magic number; false if it cannot be opened.
+/// Returns whether a file begins with NanoVDB's magic number; false if the file cannot be opened.
 bool is_nano_file(const std::string& path);
 
 /// Opens a .nvdb file and reads its table of grids. Reading a grid throws TooLarge also if its

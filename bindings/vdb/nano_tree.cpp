@@ -28,7 +28,7 @@ class Buffer {
 
   uint64_t size() const { return size_; }
 
-  /// Returns `count` structures at an offset. Throws BrokenFile if they exceed the buffer.
+  /// Returns `count` structures at an offset. Throws BrokenFile if the buffer is too small.
   template <typename T>
   const T* at(uint64_t offset, uint64_t count = 1) const {
     if (offset > size_ || offset % alignof(T) != 0 || count > (size_ - offset) / sizeof(T))
@@ -55,7 +55,7 @@ void put(const Value& value, float* to) {
 using Origin = BrickWriter::Origin;
 constexpr int32_t kRootEdge = 4096;
 
-/// Returns a leaf. Throws BrokenFile if it exceeds the buffer.
+/// Returns the leaf node at an offset. Throws BrokenFile if the node exceeds the buffer.
 template <typename Build>
 const auto* leaf_at(const Buffer& buffer, uint64_t at) {
   using Leaf = typename nanovdb::NanoLeaf<Build>::DataType;
@@ -68,9 +68,9 @@ const auto* leaf_at(const Buffer& buffer, uint64_t at) {
   return leaf;
 }
 
-/// Traversal of a grid's nodes from the root. Depends on the type of values only, not on the
-/// quantisation of leaves, so it is instantiated once for both. The number of visited nodes is
-/// limited to those that fit in the buffer, which bounds the cost of a cycle of offsets.
+/// Traversal of a grid's nodes from the root. Depends only on the value type, so that quantised and
+/// plain leaves share one instantiation. The number of visited nodes is limited to those that fit
+/// in the buffer, which bounds the cost of a cycle of offsets.
 template <typename Value>
 class NanoTreeTraversal {
  public:
@@ -161,11 +161,11 @@ class NanoTreeTraversal {
   const Root* root_ = nullptr;
 };
 
-/// Grid of one value type, whose leaves are read by a function for their build type.
+/// Grid of a given value type. A function for the grid's build type reads its leaf nodes.
 template <typename Value>
 class NanoGrid {
  public:
-  /// Voxels of a leaf. `is_outside`: inactive and equal to the background.
+  /// Voxels of a leaf. `is_outside` is true for inactive voxels that hold the background value.
   struct LeafValues {
     std::array<float, kChannels<Value> * kBrickVoxels> values;
     std::array<bool, kBrickVoxels> is_on, is_outside;
@@ -189,7 +189,7 @@ class NanoGrid {
   NanoGrid(const Buffer& buffer, const LeafKind& kind)
       : buffer_(buffer), kind_(kind), tree_(buffer, kind.bytes) {}
 
-  /// Sets background, and number and bounds of active voxels.
+  /// Sets the background value, and the number and bounds of active voxels.
   void describe(GridFacts& facts) const {
     facts.background.resize(kChannels<Value>);
     put(tree_.background(), facts.background.data());
@@ -300,8 +300,8 @@ const nanovdb::GridData& head_of(const Buffer& whole, uint32_t type) {
   return *data;
 }
 
-/// Calls `use` with the value and leaf types of a nanovdb::GridType. Returns false if it is not
-/// supported.
+/// Calls `use` with the value and leaf types of a nanovdb::GridType. Returns false if the GridType
+/// is not supported.
 template <typename Use>
 bool with_build(uint32_t type, Use&& use) {
   switch (static_cast<nanovdb::GridType>(type)) {
@@ -390,7 +390,7 @@ Bricks nano_bricks(const unsigned char*, uint64_t, uint32_t, const BrickOptions&
 #endif
 
 const char* nano_type_word(uint32_t type) {
-  // Indexed by nanovdb::GridType.
+  // Names of value types, indexed by nanovdb::GridType.
   constexpr const char* kWords[] = {
       "unknown", "float", "double", "int16", "int32", "int64", "vec3s", "vec3d", "mask",  "half",
       "uint32",  "bool",  "rgba8",  "fp4",   "fp8",   "fp16",  "fpn",   "vec4s", "vec4d", "index"};

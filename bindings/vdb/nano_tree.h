@@ -14,11 +14,12 @@ uint32_t nano_major_version();
 /// Returns whether grids of a nanovdb::GridType are supported.
 bool is_nano_type_read(uint32_t type);
 
-/// Returns OpenVDB's word for a nanovdb::GridType, such as "float" or "vec3s", or "fp8".
+/// Returns OpenVDB's name of the value type of a nanovdb::GridType, such as "float", "vec3s" or
+/// "fp8".
 const char* nano_type_word(uint32_t type);
 
-/// Describes a grid. Like nano_bricks(), takes `size` bytes aligned to 32 and the grid type from
-/// the file's table, reads nothing outside these bytes, and throws BrokenFile.
+/// Describes a grid of `size` bytes, which must be aligned to 32; `type` is the grid type from the
+/// file's table. Reads nothing outside these bytes. Throws BrokenFile for invalid data.
 GridFacts nano_facts(const unsigned char* bytes, uint64_t size, uint32_t type);
 
 /// Makes bricks of a grid. Throws TooLarge, std::bad_alloc.

@@ -30,7 +30,7 @@ Origin origin_of(const openvdb::Coord& xyz) {
 }
 
 /// Calls `use` with the grid as its concrete type. Returns false if bricks are not supported for
-/// it. Each supported type costs about one second of compile time.
+/// grids of this type. Each supported type costs about one second of compile time.
 template <typename Use>
 bool with_grid(const openvdb::GridBase& grid, Use&& use) {
   const auto as = [&]<typename Value>() {
@@ -59,7 +59,7 @@ void visit_node(const Node& node, OnTile&& on_tile, OnChild&& on_child) {
   }
 }
 
-/// Traverses a tree from its root: active tiles of all levels, and leaves.
+/// Traverses a tree from its root and visits active tiles of all levels and leaves.
 template <typename Tree, typename OnTile, typename OnLeaf>
 void walk(const Tree& tree, OnTile&& on_tile, OnLeaf&& on_leaf) {
   using Upper = typename Tree::RootNodeType::ChildNodeType;

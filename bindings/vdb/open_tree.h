@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// OpenVDB grids: description and bricks. Only this unit and writing.cpp instantiate OpenVDB's tree
-/// templates. It traverses nodes, because value iterators take ten times as long to compile.
+/// OpenVDB grids: description and bricks. Only open_tree.cpp and writing.cpp instantiate OpenVDB's
+/// tree templates. The functions traverse tree nodes, because OpenVDB's value iterators take ten
+/// times as long to compile.
 #pragma once
 
 #include <openvdb/Grid.h>

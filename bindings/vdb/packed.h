@@ -6,7 +6,8 @@
 #include <cstdint>
 #include <cstring>
 
-// Declared here because the headers of these libraries, which OpenVDB links, may not be installed.
+// Functions of Blosc and zlib, declared here because the headers of these two libraries, which
+// OpenVDB links, may not be installed.
 extern "C" {
 int blosc_decompress_ctx(const void* from, void* to, size_t size, int threads);
 int uncompress(unsigned char* to, unsigned long* size, const unsigned char* from,
@@ -15,8 +16,8 @@ int uncompress(unsigned char* to, unsigned long* size, const unsigned char* from
 
 namespace vdb {
 
-/// Unpacks a Blosc buffer, whose 16-byte header contains its sizes. Returns false unless it yields
-/// `bytes` bytes.
+/// Unpacks a Blosc buffer, whose 16-byte header contains its sizes. Returns false unless the
+/// unpacked size is `bytes` bytes.
 inline bool unpack_blosc(const unsigned char* packed, uint64_t length, char* to, size_t bytes) {
   constexpr uint64_t kHead = 16;
   uint32_t unpacked_size = 0, packed_size = 0;
@@ -27,7 +28,7 @@ inline bool unpack_blosc(const unsigned char* packed, uint64_t length, char* to,
   return blosc_decompress_ctx(packed, to, bytes, 1) == static_cast<int>(bytes);
 }
 
-/// Unpacks zlib data. Returns false unless it yields `bytes` bytes.
+/// Unpacks zlib data. Returns false unless the unpacked size is `bytes` bytes.
 inline bool unpack_zip(const unsigned char* packed, uint64_t length, char* to, size_t bytes) {
   unsigned long found = bytes;
   return uncompress(reinterpret_cast<unsigned char*>(to), &found, packed, length) == 0 &&

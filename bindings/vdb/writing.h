@@ -31,9 +31,10 @@ struct WrittenGrid {
   const float* values = nullptr;
   /// Rows of p' = p M, which has an inverse.
   std::array<double, 16> index_to_object{};
-  /// Filled before bricks are added, whose voxels of +0 leave them unchanged.
+  /// Boxes are written before the bricks. Brick voxels of value +0 leave the voxels of a box
+  /// unchanged.
   std::vector<FilledBox> boxes;
-  /// Stores nodes of one value as tiles.
+  /// Whether nodes in which all voxels have the same value are stored as tiles.
   bool has_tiles = false;
 };
 

@@ -15,7 +15,7 @@
 namespace wc = wavecomb;
 
 int main() try {
-  // A unit sphere of 64 x 32 quads, two triangles each. Its normals equal its positions.
+  // A unit sphere of 64 x 32 quads, two triangles each. The sphere's normals equal its positions.
   constexpr uint32_t kAround = 64, kUp = 32;
   std::vector<float> points;
   std::vector<uint32_t> triangles;
@@ -39,7 +39,7 @@ int main() try {
   grey.program = wc::ProgramId::kDiffuse;
   grey.base_color = {0.6f, 0.6f, 0.6f};
   const uint32_t red_id = builder.add_material(red), grey_id = builder.add_material(grey);
-  // Arrays are not copied. They must live as long as the scene.
+  // The scene does not copy the arrays, which must exist as long as the scene.
   builder.add_to_group(0, builder.add_mesh({.name = "sphere",
                                             .positions = points,
                                             .indices = triangles,

@@ -79,7 +79,7 @@ def __getattr__(name: str) -> Any:
     elif name == "cryptomatte":
         from wavecomb.image import cryptomatte as value
     elif name == "scenes":
-        # A from-import would call this function again.
+        # `from wavecomb import scenes` would call this function again.
         from importlib import import_module
 
         value = import_module("wavecomb.scenes")

@@ -81,7 +81,7 @@ class PackageFinder:
         own = os.path.join(PACKAGE, "__init__.py")
         origin = None if found is None else found.origin
         if origin is not None and os.path.realpath(origin) == os.path.realpath(own):
-            # An editable installation knows further locations of the package.
+            # The import spec of an editable installation lists further folders of the package.
             return found
         return spec_from_file_location(name, own, submodule_search_locations=[PACKAGE])
 
@@ -102,7 +102,8 @@ def _lead_group() -> None:
 
     with contextlib.suppress(OSError):
         os.setpgid(0, 0)
-    # Outside of the terminal's foreground group, writing must not stop the process.
+    # Ignore SIGTTOU, so that writing to the terminal from outside its foreground process group does
+    # not stop the process.
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
 
 

@@ -155,7 +155,8 @@ class Finder:
                 return None
         if file is None or not file.endswith(tuple(EXTENSION_SUFFIXES)):
             return None
-        # The module and its classes are named after this name, not after the folder.
+        # Load the module under its usual name, so that the names of its classes do not contain the
+        # instruction set.
         return spec_from_file_location(name, file, loader=CoreLoader(name, file))
 
 

@@ -122,7 +122,7 @@ def through_view(rgb: NDArray[Any], view: str, display: str | None = None) -> ND
         )
     _, usual, linear = current
     source = oiio.ImageBuf(np.ascontiguousarray(rgb, dtype=np.float32))
-    # Use only this thread: the render uses all cores, and OpenImageIO's thread pool was seen to
+    # Use one thread, because the render uses all cores, and because OpenImageIO's thread pool can
     # deadlock.
     shown = oiio.ImageBufAlgo.ociodisplay(
         source, display or usual, view, linear, colorconfig=_name(), nthreads=1

@@ -72,7 +72,7 @@ def mapped(path: str, pairs: Iterable[Pair]) -> str:
         return path
     named, lies = (folder.rstrip("/") for folder in best)
     rest = path[len(named) :]
-    # Do not map a path twice.
+    # Do not map a path that has already been mapped.
     return path if named == "" and _is_in(path, lies) else (lies + rest) or "/"
 
 

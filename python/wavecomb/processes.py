@@ -75,7 +75,7 @@ def _is_fit(place: str) -> bool:
         return False
     try:
         return os.path.realpath(place) != os.path.realpath(os.getcwd())
-    # The working folder was removed.
+    # os.getcwd() fails if the working folder was removed.
     except OSError:
         return True
 

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 _CONTROL = re.compile(
-    "[\x00-\x08\x0b-\x1f\x7f-\x9f"  # control characters: C0 without tab and newline, delete, C1
+    # Control characters: the C0 set without tab and newline, delete, and the C1 set.
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f"
     "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff"  # text direction and separators
     "\ud800-\udfff]"  # bytes of file names that are not UTF-8
 )

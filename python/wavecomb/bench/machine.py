@@ -158,7 +158,7 @@ def spin(threads: int) -> float:
     block = bytes(SPIN_BYTES)
 
     def work() -> None:
-        hashlib.sha256(block).digest()  # releases Python's lock, so that threads run in parallel
+        hashlib.sha256(block).digest()  # hashlib releases the GIL, so that threads run in parallel
 
     def once() -> float:
         crowd = [threading.Thread(target=work) for _ in range(threads)]

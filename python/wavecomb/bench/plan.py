@@ -65,7 +65,8 @@ class Config:
         width, height = self.settings["size"]
         names = ("size", *expectation())
         of = {key: self.settings[key] for key in names if key in self.settings}
-        family = self.renderer.split("-")[0]  # variants of a renderer converge to the same image
+        # Variants of a renderer share a golden image, since they converge to the same image.
+        family = self.renderer.split("-")[0]
         stage = self.stage if self.renderer == WAVECOMB else f"{self.stage}-{family}"
         return f"{stage}-{width}x{height}-{digest(of)}"
 

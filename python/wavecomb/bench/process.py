@@ -215,7 +215,8 @@ def run_lines(command: Sequence[str], text: str, *, fds: tuple[int, ...] = ()) -
         out, err = process.communicate(text)
     except BaseException:
         with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)  # also kills child processes
+            # Also ends the child processes of the process group.
+            os.killpg(process.pid, signal.SIGKILL)
         process.wait()
         raise
     wall = time.perf_counter() - clock

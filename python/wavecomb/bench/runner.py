@@ -185,8 +185,8 @@ class Sitting:
             if not path.exists():
                 self._prepares("stage", config.stage)
                 generate(config.source, path)
-        # The last renderer of a family makes its golden image: Mitsuba's llvm, not its scalar
-        # variant.
+        # The renderer whose name is last in alphabetical order makes the golden image of its
+        # family: the llvm variant of Mitsuba, not its scalar variant.
         by_name = sorted(configs, key=lambda config: config.renderer, reverse=True)
         goldens = {self.jobs.golden(c): c for c in by_name if c.golden}
         for path, config in goldens.items():

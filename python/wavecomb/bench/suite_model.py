@@ -139,7 +139,7 @@ def with_folder(suite: Suite, folder: Path) -> Suite:
 def naming_folder(suite: Suite, folder: Path) -> Suite:
     """Applies ``with_folder``, and records the folder in the suite's text for later reference."""
     more = with_folder(suite, folder)
-    # A JSON string is also a valid basic string of TOML.
+    # Write the path as a JSON string, which is also a valid basic string of TOML.
     key = f"stages_folder = {json.dumps(folder.resolve().as_posix(), ensure_ascii=False)}\n"
     return replace(more, text=key + suite.text)
 

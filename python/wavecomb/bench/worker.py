@@ -29,7 +29,8 @@ Job = dict[str, Any]
 def main() -> None:
     """Performs the job and prints the answer, which states the error if the render fails."""
     job = json.load(sys.stdin)
-    # Libraries may print to stdout. Redirect it to stderr, so that the answer is its only line.
+    # Libraries may print to stdout. Redirect stdout to stderr, so that the answer is the only line
+    # on the original stdout.
     answer = os.dup(1)
     os.dup2(2, 1)
     if job.get("cpus"):

@@ -235,7 +235,7 @@ class Job:
 
             def picture_in(result: Any, stats: dict[str, Any]) -> Picture:
                 of_all = {**stats, "settings": settings}
-                del of_all["seconds"]  # the render time is not known yet
+                del of_all["seconds"]  # the final render time is not known yet
                 return picture_of(result, of_all, scene=loaded.scene, aovs=self.aovs)
 
             def stopped_part(part: Any) -> Picture:

@@ -81,7 +81,7 @@ def render_command(part: str | None, **values: Any) -> None:
                 shot = FrameShot(shared, frame, product=product, size=size)
             prepared.opened = None
             done = job.run(shot, prepared.resumed)
-            del shot  # frees the scene, which is not needed to write files
+            del shot  # free the scene, which is not needed for writing files
             if done.stopped is not None and not done.samples:
                 click.echo("stopped before the first sample; nothing was written", err=True)
                 raise click.exceptions.Exit(128 + done.stopped)

@@ -201,7 +201,7 @@ class Run:
             batch = _Batch([self._tiles.popleft() for _ in range(count)])
         else:
             return False
-        # Two clients of one scheduler must use the same key for the same work.
+        # Two clients of a Dask scheduler must use the same key for the same work.
         tiles = [(task.image, task.tile, self._checks[task.image]) for task in batch.tiles]
         name = hashed([self._common[0], self._job.id, self._machine, tiles, batch.image,
                        batch.attempt, self._checks.get(batch.image)])  # fmt: skip
@@ -240,7 +240,9 @@ class Run:
                 self._take_image(batch.image, result)
         elif future.status == "error":
             self._take_error(batch, future.exception())
-        else:  # lost or cancelled by another client, or its worker ended before sending the result
+        # The task was lost or cancelled by another client, or its worker ended before sending the
+        # result.
+        else:
             self._cluster.client.cancel([future])
             self._cluster.check(False)
             self._put_back(batch)
@@ -254,7 +256,7 @@ class Run:
         """
         result = None
         if future.status == "finished":
-            with contextlib.suppress(Exception):  # _take reads the error from the status
+            with contextlib.suppress(Exception):  # _take() reports the error of a failed task
                 result = future.result()
         self._ended.put((future, result))
 
@@ -271,7 +273,7 @@ class Run:
             self._out.failed.append((self._job.title(image, tile), line))
         self._again([t for t in batch.tiles if t not in done and (t.image, t.tile) not in bad])
         if done:
-            # Uses the last batch, because the first ones include the time to open the stage.
+            # Use the last batch, because the times of the first batches include opening the stage.
             self._seconds = result["seconds"] / len(done)
 
     def _note_done(self, task: Task) -> None:
@@ -386,7 +388,7 @@ def run(
         try:
             at_work.work(left)
         except (OSError, RuntimeError, TimeoutError) as error:
-            cluster.check(False)  # check raises a clearer error if the scheduler is gone
+            cluster.check(False)  # check() raises a clearer error if the scheduler has ended
             raise WavecombError(f"{cluster.what}: {' '.join(str(error).split())}") from error
         outcome.stopped = outcome.stopped or is_stopped()
     return outcome

@@ -250,7 +250,7 @@ class _SlurmWorkers(Cluster):
             there = len(_ask("squeue", "--noheader", "--array", "--jobs", ids).split("\n")) - 1
         except WavecombError as error:
             if "Invalid job id" not in str(error):
-                return  # the next call of check queries Slurm again
+                return  # ignore other errors: the next call of check() queries Slurm again
             there = 0
         if there >= self._count:
             return

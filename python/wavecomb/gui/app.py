@@ -86,8 +86,8 @@ def run(
     # Python handles signals only while its interpreter runs, so a timer wakes it regularly.
     beat = QTimer(window)
     beat.start(200)
-    # USD also reports problems during edits and when panels read the stage. Adds the messages of
-    # USD to the notes.
+    # USD also reports problems during edits and when panels read the stage. The timer therefore
+    # adds USD's messages to the notes regularly.
     listening = DiagnosticListener()
     beat.timeout.connect(lambda: window.session.note_words(listening.take()))
     window.show()

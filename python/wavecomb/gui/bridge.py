@@ -43,7 +43,7 @@ class Mailbox:
 
     def wake(self) -> None:
         """Wakes the thread that reads the queue."""
-        # A full socket buffer already wakes the reading thread.
+        # Ignore a full socket buffer: its unread bytes already wake the reading thread.
         with contextlib.suppress(OSError):
             self._writer.send(b"\0")
 
@@ -105,7 +105,8 @@ class Bridge(QObject):
             try:
                 receive(letter[1])
             except BaseException:
-                self._mailbox.wake()  # Delivers the remaining messages later.
+                # Wake the mailbox, so that it delivers the remaining messages later.
+                self._mailbox.wake()
                 raise
 
 

@@ -60,7 +60,8 @@ class Command(QObject):
         self._process = process
         self._out = self._err = self._text = self._last = ""
         self._stopping = False
-        # Qt starts the process from the main thread, which exists as long as the window.
+        # Start the process from the main thread, which exists as long as the window, because the
+        # kernel ends a child process when the thread that started it ends.
         flags = ["-u", "-X", "utf8"]
         words = processes.command(module, *arguments, parent=os.getpid(), flags=flags)
         process.start(words[0], words[1:])

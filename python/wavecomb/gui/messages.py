@@ -135,7 +135,7 @@ def install_hooks(tell: Callable[[str], None]) -> Callable[[], None]:
         Returns a function that removes the hooks.
     """
     reporter = _Reporter(tell)
-    caught = reporter.caught  # The hooks must not hold a Qt object.
+    caught = reporter.caught  # The exception hooks must not hold a reference to a Qt object.
     before, before_threads = sys.excepthook, threading.excepthook
 
     def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:

@@ -104,7 +104,7 @@ def merge(paths: Sequence[str | os.PathLike[str]]) -> MergedImage:
     shapes: dict[str, tuple[int, ...]] = {}
     for source in sources:
         layers = read_layers(source.name)
-        # The denoised layer would have to be computed from the merged image.
+        # Drop the denoised layer, which would have to be computed anew from the merged image.
         layers.pop("denoised", None)
         _check_shapes(source, layers, shapes)
         _check_layers(first.name, sums, source.name, layers, pairs)
@@ -157,7 +157,7 @@ def _check_fit(first: _Source, other: _Source) -> None:
         if key == "overscan":
             # Overscan is checked below together with the image size.
             continue
-        # Files of an earlier build lack settings that did not exist then.
+        # Files of an earlier version lack settings that did not exist yet.
         a, b = (one.settings.get(key, rows[key].default) for one in (first, other))
         if a != b:
             refuse(key, a, b)
@@ -168,7 +168,7 @@ def _check_fit(first: _Source, other: _Source) -> None:
     if _overscan(first) != _overscan(other):
         refuse("overscan", _overscan(first), _overscan(other))
     scenes: list[Any] = [source.attributes.get("wavecomb:scene") for source in (first, other)]
-    # The attribute of a damaged file may be an array.
+    # In a damaged file, the attribute wavecomb:scene may be an array.
     if not np.array_equal(*scenes):
         raise WavecombError(
             f"{other.name}: its stage is not that of {first.name}: other prims, lights, materials, "
@@ -288,7 +288,7 @@ def _merge_ranks(weighted: list[NDArray[Any]], samples: NDArray[np.float64]) -> 
         ids = np.ascontiguousarray(row[:, 0::2]).view(np.uint32)
         same = ids[:, :, None] == ids[:, None, :]
         counts = (same * row[:, None, 1::2].astype(np.float64)).sum(axis=2)
-        # The first rank of equal ids holds their total.
+        # The first of several equal ids holds their total count.
         repeated = (same & np.tri(ids.shape[1], k=-1, dtype=bool)).any(axis=2)
         counts[repeated] = 0
         order = np.lexsort((ids, -counts), axis=1)[:, :ranks]

@@ -128,7 +128,7 @@ class DisplayOptions:
         if not (self.layer and not is_light(name)) and pixels.shape[2] >= 3:
             space = str(read_metadata(file).get("wavecomb:working_space", "rec709"))
             return self.of_light(to_rec709(pixels[:, :, :3], space))
-        # Grey images have only R or Y.
+        # Grey images have only one channel, R or Y.
         if not self.layer:
             return self.of_light(np.repeat(pixels[:, :, :1], 3, axis=2))
         return show_layer(pixels if pixels.shape[2] > 1 else pixels[:, :, 0], name).pixels

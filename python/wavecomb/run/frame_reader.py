@@ -84,7 +84,7 @@ class FrameReader:
             WavecombError: The stage cannot be rendered.
         """
         self._before = None
-        # These options applied when the stage was opened.
+        # The stage was opened with these options, so do not apply them again.
         here = replace(options, mask=(), payloads=(), session_layer=None, variants=None)
         self._before = load_stage(self._stage, here, cache=self._cache, **how)
         return self._before
@@ -109,7 +109,8 @@ class FrameReader:
         if not self._cache.varying.is_view_only and before.frame != number:
             return None
         if before.leaves_out_levels:
-            # Another view needs other mip levels of textures.
+            # Some mip levels were left out for the previous view, and a different view may need
+            # them.
             return None
         report = LoadReport()
         settings = view_settings(self._stage, options, report)
@@ -122,7 +123,8 @@ class FrameReader:
             return CameraUpdate(None, before.camera_path, before.shutter, before.render, number)
         origin = find_origin(self._stage, when, settings.camera, settings.purposes)
         if origin != before.origin:
-            # With another origin, the scene would have to be built anew.
+            # All coordinates are relative to the scene origin, so a different origin requires a new
+            # scene.
             return None
         to_world = np.array(UsdGeom.XformCache(when).GetLocalToWorldTransform(settings.camera))
         to_world = to_scene_space(to_world, origin)

@@ -222,7 +222,7 @@ class ProgressBar(Silent):
         from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
         width = bar_width(console.width)
-        # The fixed width is that of the title, the bar and the percentage, each with a space.
+        # The fixed width is the width of the title, the bar and the percentage, each with a space.
         self._space = console.width - (len(title) + 1) - (width + 1) - 5
         self._bar = Progress(
             TextColumn(title, markup=False),

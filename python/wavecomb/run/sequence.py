@@ -78,13 +78,13 @@ class Frames:
         """
         started = time.perf_counter()
         options = LoadOptions.of(self._options, {**changes, "frame": frame})
-        # Different renders of a stage with catchers see different prims.
+        # If a stage has shadow catchers, its separate renders contain different sets of prims.
         is_same = self._renderer is not None and options.catch == self._caught
         self._caught = options.catch
         loaded = self._with_camera(options) if is_same else None
         if loaded is None:
-            # Release the old structures first, since two sets of acceleration structures would
-            # double the memory.
+            # Release the old acceleration structures before building new ones, since both together
+            # would double the memory.
             self._renderer, self._loaded = None, None
             loaded = self._reader.read(options, progress=progress)
         seconds = time.perf_counter() - started + self._opening_s

@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 DEFAULT_SIZE = (600, 600)
 MAX_EDGE = 65536
 MAX_SPP = 1 << 24
-# Adaptive renders: sums and layers of errors, and buffers to estimate them.
+# Memory of adaptive renders: sums and layers of errors, and buffers for estimating errors.
 _ERROR_BYTES_PER_PIXEL = 100
-# Firefly reweighting: its cascades and the unbiased layer.
+# Memory of firefly reweighting: brightness cascades and the unbiased layer.
 _CASCADE_BYTES_PER_PIXEL = 96 + 12
-# Light splats: sums for the beauty and for each layer that receives splats.
+# Memory of light splats, for the beauty and for each layer that receives splats.
 _SPLAT_BYTES_PER_PIXEL = 48
-# Merging of light paths: the visible point and its entries in the grid.
+# Memory of merging light paths: the visible point of a pixel and its entries in the hash grid.
 _VISIBLE_BYTES_PER_PIXEL = 64 + 48
-# Upper bound of deep images: sums in the film and samples in the image.
+# Upper bound of the memory of deep images: sums in the film and samples in the image.
 _DEEP_BYTES_PER_PIXEL = 1 + 4
 _DEEP_BYTES_PER_SAMPLE = 40 + 24
 
@@ -140,7 +140,7 @@ def image_bytes(settings: Settings, aovs: Sequence[str], light_groups: int = 1) 
     may_have_splats = settings.transport != "auto" or settings.quality != "plain"
     if settings.transport != "path" and may_have_splats:
         sums = 1 + has_error_layers(settings) + aov_names.splat_layers(aovs, light_groups)
-        # Each pixel also stores the samples of its light path.
+        # Each pixel also stores the sample count of its light path.
         each += _SPLAT_BYTES_PER_PIXEL * sums + 4
         each += _VISIBLE_BYTES_PER_PIXEL * (settings.merge_radius > 0)
     if aov_names.DEEP in settings.aovs:

@@ -182,7 +182,7 @@ def image_metadata(stats: Mapping[str, Any]) -> dict[str, Any]:
     if stats.get("settings"):
         metadata["wavecomb:settings"] = json.dumps(plain(stats["settings"]), sort_keys=True)
     if "seconds" in stats:
-        # The render time is that of all runs of a resumed render.
+        # The render time is the sum over all runs of a resumed render.
         seconds = stats["seconds"]
         rendered = seconds.get("render", 0.0) + seconds.get("resumed", 0.0)
         metadata["wavecomb:render_seconds"] = float(rendered)

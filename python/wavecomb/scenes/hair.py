@@ -260,7 +260,7 @@ def hair_strands(rng: np.random.Generator, count: int) -> FloatArray:
 def build_head(writer: StageWriter, options: SceneOptions) -> None:
     """Builds a smooth head, without a detailed face, and its hair."""
     rng = np.random.default_rng([options.seed, 22])
-    # Skin under a thin film of oil. Mean free paths are in decimetres.
+    # The skin is covered by a thin film of oil. Mean free paths are in decimetres.
     skin = {"specular_roughness": 0.48, "specular_ior": 1.4, "coat_weight": 0.25,
             "coat_roughness": 0.3, "coat_ior": 1.45}  # fmt: skip
     below_surface(writer, "Head", (0.76, 0.5, 0.38), (0.037, 0.014, 0.007), **skin)

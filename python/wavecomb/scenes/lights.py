@@ -93,7 +93,8 @@ def _light(
     light.CreateColorAttr(Gf.Vec3f(*(float(v) / peak for v in radiance)))
     xform = UsdGeom.XformCommonAPI(light)
     xform.SetTranslate(tuple(float(v) for v in place))
-    # UsdLux lights emit along their -Z axis. Windows are turned into the street, lamps down.
+    # UsdLux lights emit along their -Z axis. Window lights are rotated to face the street, lamps to
+    # face down.
     if kind == "Window":
         xform.SetRotate((0.0, 90.0 if place[0] > 0 else -90.0, 0.0))
     elif kind == "Lamp":
@@ -113,7 +114,8 @@ def _mesh(
     half = np.array([0.25, 0.4, 0.03]) if kind == "Sign" else np.array([0.04, 0.0, 0.6])
     half = half * size
     area = 8.0 * (half[0] * half[1] + half[1] * half[2] + half[0] * half[2])
-    # Both sides of a triangle emit, but the inner sides of a box illuminate nothing.
+    # Emissive triangles emit from both sides, but the inner sides of a closed box illuminate
+    # nothing.
     wanted = power / (np.pi * area * (1.0 if kind == "Sign" else 0.5))
     step = round(2.0 * np.log2(wanted))
     hue = int(rng.integers(_SIGN_COLOURS))

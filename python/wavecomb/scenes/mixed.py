@@ -101,7 +101,7 @@ def _frame(writer: StageWriter, mirror: np.ndarray) -> None:
         start, end = mirror[index], mirror[(index + 1) % 4]
         along = (end - start) / np.linalg.norm(end - start)
         out = np.cross(along, normal)
-        # The long bars cover the corners, because coincident faces would be visible at random.
+        # The long bars of the frame also cover its corners, to avoid coincident faces.
         cover = bar if index % 2 == 0 else 0.0
         a, b = start - along * cover, end + along * cover
         section = [
@@ -156,7 +156,7 @@ def _build(writer: StageWriter, options: SceneOptions, with_teapots: bool) -> No
                 _TEAPOT_SCALE * scale,
             )
         else:
-            # Heads are turned towards the camera, most of them to the right.
+            # The dragons' heads are turned towards the camera, most of them to the right.
             turn = -38.0 + rng.uniform(-40.0, 40.0) - (104.0 if rng.random() < 0.35 else 0.0)
             writer.instance(
                 f"/World/Objects/Dragon_{index:02d}", dragon, dragon_hand.pop(), place, turn, scale

@@ -44,7 +44,8 @@ struct Packet<16> {
   static constexpr auto occluded = &rtcOccluded16;
 };
 
-/// Returns a pointer to the first element: members of single rays are scalars, of packets arrays.
+/// Returns a pointer to the first element of an Embree ray member, which is a scalar for single
+/// rays and an array for packets.
 template <typename T>
 T* first(T& x) {
   return &x;
@@ -54,7 +55,7 @@ T* first(T (&x)[N]) {
   return x;
 }
 
-/// Sets the members that Embree does not modify during a query.
+/// Sets the ray members that Embree does not modify during a query.
 template <uint32_t W, typename Ray>
 void prepare(Ray& ray) {
   for (uint32_t i = 0; i < W; ++i) {
@@ -89,7 +90,7 @@ void query(Arguments& args, bool coherent) {
 }
 
 /// Calls trace(base, n, valid) for each packet of rays; n < W only in the last packet. Returns the
-/// sum of the results.
+/// sum of the results of trace().
 template <uint32_t W, typename Trace>
 size_t for_each_packet(size_t size, Trace&& trace) {
   alignas(64) int valid[W];

@@ -70,16 +70,18 @@ bool is_mostly_hair(const Scene& scene) {
 
 }  // namespace
 
-/// Shared BVH plus the view of one scene, whose materials decide about presence.
+/// BVH, which edited scenes share, and the view of one scene, whose materials determine the opacity
+/// of surfaces.
 struct EmbreeAccelerator::Impl {
   std::shared_ptr<const Scene> scene;
   std::shared_ptr<const EmbreeHierarchy> hierarchy;
   SceneView view;
   RTCScene top;
-  uint32_t first_world, first_light;         ///< as in EmbreeHierarchy
-  uint32_t native;                           ///< rays in the widest native packet
-  std::unique_ptr<const TriangleList> list;  ///< replaces the BVH in small scenes; otherwise null
-  bool is_hair;                              ///< Whether most primitives are curve segments.
+  uint32_t first_world, first_light;  ///< as in EmbreeHierarchy
+  uint32_t native;                    ///< number of rays in the widest native packet
+  /// List that replaces the BVH in small scenes; null in other scenes.
+  std::unique_ptr<const TriangleList> list;
+  bool is_hair;  ///< whether most primitives are curve segments
 
   Impl(std::shared_ptr<const Scene> of, std::shared_ptr<const EmbreeHierarchy> built)
       : scene(std::move(of)),
@@ -92,7 +94,7 @@ struct EmbreeAccelerator::Impl {
         list(hierarchy->rule() == HitRule::kList ? TriangleList::make(*scene) : nullptr),
         is_hair(is_mostly_hair(*scene)) {}
 
-  /// Hits of a packet as Embree reports them: one value per ray.
+  /// Hits of a packet as Embree reports them: arrays with one value per ray.
   struct PacketHits {
     const float* t;  ///< QueryContext::t
     const float *u, *v;

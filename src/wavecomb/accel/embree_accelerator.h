@@ -14,15 +14,15 @@ namespace wavecomb {
 /// Rays to trace, in SoA layout. Directions are unit vectors; tnear is 0.
 struct RaySpan {
   const float *ox, *oy, *oz, *dx, *dy, *dz;
-  const float* tfar;     ///< maximum distance of each ray; null means unlimited
+  const float* tfar;     ///< maximum distance of each ray; null means no limit
   const uint32_t* slot;  ///< path slots for PresenceKeys; null means that the ray index is the slot
   size_t size;
-  const float* time = nullptr;  ///< shutter time in [0, 1]; null means 0
+  const float* time = nullptr;  ///< shutter time of each ray in [0, 1]; null means 0
 };
 
-/// Output columns for hits. Barycentric u, v are as in HitBuffer. `inst` is an index into
-/// SceneView::instances and `geom` a geometry within its group; or `inst` is kLightShape and `geom`
-/// the index of the light record, or `inst` is kNoHit.
+/// Output columns for hits. The barycentrics u and v are defined as in HitBuffer. `inst` is an
+/// index into SceneView::instances and `geom` a geometry within its group; or `inst` is kLightShape
+/// and `geom` the index of the light record, or `inst` is kNoHit.
 struct HitSpan {
   float *t, *u, *v;
   uint32_t *prim, *geom, *inst;
@@ -38,21 +38,22 @@ inline U object_of(const U& inst, const U& mesh) {
 }
 
 /// Per-path data that decides whether a surface with partial presence stops a ray. The random
-/// numbers are keyed by the path, so that traversal order has no effect. Arrays are indexed by
-/// slot.
+/// numbers are keyed by the path, so that traversal order has no effect. The arrays are indexed by
+/// path slot.
 struct PresenceKeys {
   const uint32_t* pixel_hash = nullptr;
   const uint32_t* sample = nullptr;
-  uint32_t stride = 1;  ///< distance between slots, in 32-bit words
+  uint32_t stride = 1;  ///< distance between the values of consecutive slots, in 32-bit words
   /// Differs for each depth and for shadow rays, so that crossings are independent.
   uint32_t salt = 0;
   /// For shadow rays with light linking: 1 + index of the set of geometry that casts shadows, or 0
-  /// for all geometry. Null without light linking.
+  /// for all geometry. The pointer is null without light linking.
   const uint32_t* shadow_set = nullptr;
   uint32_t shadow_stride = 0;
   uint32_t ray_kind = kVisibleToCamera;  ///< a RayVisibility flag
-  /// object_of() of the only object that each ray can hit, with the stride of the hashes. Rays that
-  /// are restricted to one object hit no lights. Null means that rays hit all objects.
+  /// The only object that each ray can hit, as a value of object_of(), with the same stride as
+  /// pixel_hash. Rays that are restricted to one object hit no lights. A null pointer means that
+  /// rays hit all objects.
   const uint32_t* object = nullptr;
 };
 
@@ -60,7 +61,7 @@ struct PresenceKeys {
 enum class HitRule : uint8_t {
   kCanonical,  ///< the same hit for all packets and orders (docs/decisions/canonical-hits.md)
   kList,       ///< like kCanonical, but small static scenes use triangle_list.h; the default
-  kEmbree,     ///< whichever hit Embree keeps, without filters; for BareTraversal only
+  kEmbree,     ///< the hit that Embree keeps without filters; for BareTraversal only
 };
 
 /// Two-level bounding volume hierarchy. Each group of meshes is built once and instanced any number
@@ -70,14 +71,14 @@ enum class HitRule : uint8_t {
 /// thread-safe.
 class EmbreeAccelerator {
  public:
-  /// Builds with up to `threads` threads; 0 uses all. Throws Error if Embree fails, for example if
-  /// out of memory.
+  /// Builds the acceleration structure with up to `threads` threads; 0 means all threads. Throws
+  /// Error if Embree fails, for example if out of memory.
   EmbreeAccelerator(std::shared_ptr<const Scene> scene, uint32_t threads,
                     HitRule rule = HitRule::kList);
-  /// Creates an accelerator for a scene edited from that of `origin`. Shares the BVH, or the groups
-  /// whose meshes are unchanged. Groups are rebuilt if the presence filtering or hair status of a
-  /// mesh changes; then, or if
-  /// an object moves or the shape or position of a light changes, the top level is rebuilt.
+  /// Creates an accelerator for an edited version of the scene of `origin`. Shares the BVH with
+  /// `origin`, or the groups whose meshes are unchanged. Groups are rebuilt if the presence
+  /// filtering or hair status of a mesh changes; then, or if an object moves or the shape or
+  /// position of a light changes, the top level is rebuilt.
   EmbreeAccelerator(std::shared_ptr<const Scene> edited, const EmbreeAccelerator& origin,
                     uint32_t threads);
   ~EmbreeAccelerator();
@@ -95,11 +96,11 @@ class EmbreeAccelerator {
 
   /// Returns whether a triangle list replaces the BVH.
   bool has_list() const;
-  /// Memory of the BVH in bytes.
+  /// Returns the memory of the BVH in bytes.
   size_t bytes() const;
-  /// Widest packet that Embree traces natively on this CPU.
+  /// Returns the width of the widest packet that Embree traces natively on this CPU.
   uint32_t native_width() const;
-  /// Top-level RTCScene. Accelerators that share the BVH return the same one.
+  /// Top-level RTCScene. Accelerators that share the BVH return the same RTCScene.
   RTCSceneTy* embree_scene() const;
 
  private:

@@ -18,7 +18,7 @@ const CurveGeometry& curves_of(const void* user) {
 
 /// Calls found(i, primitive, hit) for each ray of a packet and each primitive of the BVH node, with
 /// the first hit that is present for the ray's path, or with any hit, depending on `query`.
-/// wants(slot): whether the ray may hit these curves at all.
+/// wants(slot) returns whether the ray of a path slot may hit these curves at all.
 template <bool kBare, typename Arguments, typename Wants, typename Found>
 void for_hits(const Arguments& args, RTCRayN* rays, CurveQuery query, const Wants& wants,
               const Found& found) {
@@ -102,7 +102,8 @@ void intersect_curves(const RTCIntersectFunctionNArguments* args) {
   for_hits<false>(*args, RTCRayHitN_RayN(args->rayhit, n), CurveQuery::kFirst, wants, found);
 }
 
-/// Embree callback without a tie rule. Queries of BareTraversal have no QueryContext.
+/// Embree callback for queries of BareTraversal, which have no QueryContext: keeps the closest hit
+/// without a rule for ties.
 void intersect_curves_bare(const RTCIntersectFunctionNArguments* args) {
   for_hits<true>(
       *args, RTCRayHitN_RayN(args->rayhit, args->N), CurveQuery::kFirst, wants_all,

@@ -17,8 +17,8 @@ struct CurveGeometry {
   uint32_t id;       ///< mesh index
   bool is_filtered;  ///< whether presence, visibility or light linking may reject hits
   bool is_fibre;     ///< whether rays hit the curves from outside only
-  /// Curve BVH nodes that are Embree's primitives. The pointer is null for points and deforming
-  /// curves, whose primitives are passed individually.
+  /// Curve BVH nodes, each of which is a primitive for Embree. Null for points and deforming
+  /// curves: each point or curve segment is then a primitive.
   std::unique_ptr<const CurveBvhNodes> nodes;
 };
 

@@ -12,9 +12,9 @@ namespace {
 
 /// Makes the closest hit independent of the order in which triangles are tested. If two hits are
 /// equally far up to rounding (on shared edges, or where surfaces intersect or coincide), Embree
-/// keeps the one tested last, and in a packet that order depends on the other rays. This filter
-/// keeps the smaller distance, and for equal distances the smaller id. It sets tfar slightly beyond
-/// the closest hit (kSlack), so that traversal tests all candidates.
+/// keeps the hit tested last, and in a packet the order of tests depends on the other rays. This
+/// filter keeps the smaller distance, and for equal distances the smaller id. The filter sets tfar
+/// slightly beyond the closest hit (kSlack), so that traversal tests all candidates.
 template <unsigned N>
 inline void keep_closest(const RTCFilterFunctionNArguments* args) {
   auto* best = reinterpret_cast<QueryContext*>(args->context);

@@ -17,12 +17,13 @@
 namespace wavecomb {
 
 /// Embree device. Hierarchies of one device may share geometries, so they are built one at a time;
-/// other hierarchies may be traced meanwhile.
+/// rays may be traced in finished hierarchies meanwhile.
 struct EmbreeDevice {
   RTCDevice handle = rtcNewDevice(nullptr);
   std::atomic<int64_t> bytes{0};
   std::mutex building;
-  TaskOrder order;  ///< for ThreadSanitizer, since Embree's tasks call the memory monitor
+  /// Annotations for ThreadSanitizer, since Embree's tasks call the memory monitor.
+  TaskOrder order;
 
   EmbreeDevice() {
     if (!handle) throw Error("the ray tracer could not start; is this CPU older than SSE2?");

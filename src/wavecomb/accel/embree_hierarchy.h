@@ -18,9 +18,9 @@ struct EmbreeDevice;
 
 /// Embree geometries of meshes, scenes of groups, and the top-level scene with light shapes.
 ///
-/// Contract: immutable. Keeps the mesh arrays alive. The hierarchy depends on materials only by the
-/// choice of meshes that need the presence filter; the filter reads the materials of the traced
-/// scene.
+/// Contract: immutable. The hierarchy keeps the mesh arrays alive. The hierarchy depends on
+/// materials only by the choice of meshes that need the presence filter; the filter reads the
+/// materials of the traced scene.
 class EmbreeHierarchy {
  public:
   /// `origin`: hierarchy of a scene with the same meshes, whose device, geometries and groups are
@@ -31,16 +31,16 @@ class EmbreeHierarchy {
   EmbreeHierarchy(const EmbreeHierarchy&) = delete;
   EmbreeHierarchy& operator=(const EmbreeHierarchy&) = delete;
 
-  /// Returns whether a hierarchy built for `scene`, which must have the same geometry, would be
-  /// equal.
+  /// Returns whether this hierarchy can be used for `scene`, which must have the same geometry.
   bool fits(const Scene& scene) const;
 
   HitRule rule() const { return rule_; }
   RTCDevice device() const;
   RTCScene top() const { return top_; }
-  uint32_t first_world() const { return first_world_; }  ///< geometry id of the world's first mesh
-  uint32_t first_light() const { return first_light_; }  ///< geometry id of light record 0
-  /// Memory of all hierarchies of the device, in bytes.
+  /// Embree geometry id of the world's first mesh.
+  uint32_t first_world() const { return first_world_; }
+  uint32_t first_light() const { return first_light_; }  ///< Embree geometry id of light record 0
+  /// Returns the memory of all hierarchies of the device in bytes.
   size_t bytes() const;
 
  private:
@@ -54,8 +54,8 @@ class EmbreeHierarchy {
   std::shared_ptr<const SceneGeometry> geometry_;
   HitRule rule_;
   std::shared_ptr<EmbreeDevice> device_;
-  std::vector<uint8_t> filtered_;      ///< indexed by mesh: see filtered_meshes()
-  std::vector<uint8_t> fibres_;        ///< indexed by mesh: see fibre_meshes()
+  std::vector<uint8_t> filtered_;      ///< result of filtered_meshes(), indexed by mesh
+  std::vector<uint8_t> fibres_;        ///< result of fibre_meshes(), indexed by mesh
   std::vector<LightGeometry> shapes_;  ///< by light record
   RTCScene top_ = nullptr;
   std::vector<RTCScene> group_scenes_;

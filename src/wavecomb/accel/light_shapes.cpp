@@ -33,7 +33,7 @@ double intersect_parallelogram(const LightRecord& light, const double (&o)[3],
   return dot(v, ou) / det;
 }
 
-/// Returns the bounds of a light without its motion.
+/// Returns the bounds of a light in its rest pose.
 Bounds box_at_mid_shutter(const LightGeometry& shape) {
   const LightRecord& l = shape.light;
   if (shape.kind->box) return shape.kind->box(l);

@@ -12,7 +12,8 @@ namespace wavecomb {
 /// Geometry of a light, without its emission.
 struct LightGeometry {
   LightShape shape = LightShape::kNone;
-  LightRecord light{};                  ///< only kind, p, u, v and radius are set
+  /// Light record, of which only kind, p, u, v and radius are set.
+  LightRecord light{};
   const LightKindInfo* kind = nullptr;  ///< null for kNone
   LightMotion motion{};                 ///< motion of the light, if any; moving lights use
                                         ///< LightShape::kCustom
@@ -21,16 +22,16 @@ struct LightGeometry {
   bool operator==(const LightGeometry& other) const;
 };
 
-/// Returns the shapes by light record; kNone if rays do not hit the light.
+/// Returns the shape of each light record; kNone if rays do not hit the light.
 std::vector<LightGeometry> light_shapes(const Scene& scene);
 
 /// Returns conservative bounds of a custom shape over its whole motion.
 Bounds custom_shape_bounds(const LightGeometry& shape);
 
 /// Returns the distance along `dir` to a custom shape in units of |dir|, or 0 if it is not in
-/// front. Tests one ray at a time in double precision, so that hits do not depend on other rays:
-/// Embree's spheres and discs round differently in packets and single rays. `time`: shutter time in
-/// [0, 1].
+/// front. The test handles one ray at a time in double precision, so that hits do not depend on
+/// other rays: Embree's spheres and discs round differently in packets and single rays. `time`:
+/// shutter time in [0, 1].
 float intersect_custom_shape(const LightGeometry& shape, const float (&origin)[3],
                              const float (&dir)[3], float time);
 

@@ -24,8 +24,8 @@ void mark_invisible(const Scene& scene, std::vector<uint8_t>& filtered) {
   }
 }
 
-/// Returns whether a surface with this opacity is present, by the random number of path and
-/// primitive.
+/// Returns whether a surface of the given opacity is present, by a random number keyed by the path
+/// and the primitive.
 bool is_present_sample(float opacity, const PresenceQuery& at, const PresenceKeys& keys) {
   if (opacity >= 1.f) return true;
   if (!(opacity > 0.f)) return false;
@@ -74,7 +74,7 @@ std::vector<uint8_t> fibre_meshes(const Scene& scene) {
   const auto is_other = [&](uint32_t m) {
     return !has_trait(materials[m].program, program_trait::kFibre);
   };
-  // Materials that meshes without one inherit from their instances; the world is instance 0.
+  // Meshes without a material inherit the material of their instance; the world is instance 0.
   std::vector<uint8_t> group_inherits(geometry.groups.size(), 0), mesh_inherits(fibres.size(), 0);
   for (size_t i = 0; i < geometry.instance_records.size(); ++i)
     if (is_other(geometry.instance_records[i].material))

@@ -17,7 +17,7 @@ namespace {
 
 constexpr float kUnbounded = std::numeric_limits<float>::infinity();
 
-/// Stores the first `n` lanes, or all if there are fewer.
+/// Stores the first `n` lanes, or all lanes if the packet has fewer than `n`.
 template <typename T>
 void store_first(void* p, const T& value, size_t n) {
   if (n >= kWidth<T>) {
@@ -46,16 +46,17 @@ struct ListTracer {
   /// Intersection of rays with a triangle's plane relative to its edges.
   template <typename F>
   struct Crossing {
-    F b, c;      ///< barycentrics of the second and third vertex, times `sum`
+    F b, c;      ///< barycentric coordinates of the second and third vertex, times `sum`
     F sum;       ///< twice the signed area of the triangle projected along the ray
     Mask<F> in;  ///< inside the triangle
   };
 
-  /// Rays [base, base + width), with data that all triangle tests share.
+  /// Packet of the rays [base, base + width), with data that all triangle tests use.
   template <typename F>
   struct Packet {
     Vec3<F> o, d;
-    std::array<F, TriangleList::kMaxVertices> x, y;  ///< vertex coordinates in each ray's frame
+    /// Coordinates of the vertices in each ray's frame.
+    std::array<F, TriangleList::kMaxVertices> x, y;
 
     Packet(const TriangleList& list, const RaySpan& rays, size_t base)
         : o(load<F>(rays.ox + base), load<F>(rays.oy + base), load<F>(rays.oz + base)),
@@ -211,7 +212,7 @@ struct ListTracer {
 
 namespace {
 
-/// Calls trace(F*) with the lane type F for `width`.
+/// Calls trace() with the lane type for `width` lanes, passed as a null pointer of that type.
 template <typename Trace>
 void in_lanes(uint32_t width, const Trace& trace) {
   switch (width) {

@@ -13,26 +13,28 @@ namespace wavecomb {
 
 /// Geometry of a small static scene as a flat list in world space.
 ///
-/// Below about a hundred triangles, a BVH costs more than it saves. Here each lane holds one ray,
-/// and all lanes test the same triangle. Triangles are transformed to a frame with z along the ray,
-/// where the edge functions of two adjacent triangles are exact negatives (Woop, Benthin and Wald,
-/// "Watertight Ray/Triangle Intersection", JCGT 2(1) 2013; a rotation replaces their shear, so that
-/// no lane has to choose an axis). The hit distance is that to the triangle's plane. No operation
-/// depends on other rays, and the first triangle of the list wins ties, so hits are canonical
-/// without a filter.
+/// Below about a hundred triangles, a BVH costs more than it saves. TriangleList instead holds one
+/// ray in each lane, and all lanes test the same triangle. Triangles are transformed to a frame
+/// with z along the ray, where the edge functions of two adjacent triangles are exact negatives
+/// (Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1) 2013; TriangleList
+/// replaces the paper's shear by a rotation, so that no lane has to choose an axis). The hit
+/// distance is the distance to the triangle's plane. No operation depends on other rays, and the
+/// first triangle of the list wins ties, so hits are canonical without a filter.
 ///
 /// Contract: immutable; reads the scene's materials through the view passed to each call.
 class TriangleList {
  public:
-  /// With more triangles, a BVH is faster (docs/decisions/small-scene-traversal.md).
+  /// Maximum number of triangles; with more triangles, a BVH is faster
+  /// (docs/decisions/small-scene-traversal.md).
   static constexpr uint32_t kMaxTriangles = 96;
-  static constexpr uint32_t kMaxVertices = 128;  ///< distinct positions
-  static constexpr uint32_t kMaxShapes = 4;      ///< lights that are not parallelograms
+  static constexpr uint32_t kMaxVertices = 128;  ///< maximum number of distinct vertex positions
+  /// Maximum number of lights that are not parallelograms.
+  static constexpr uint32_t kMaxShapes = 4;
 
   /// Returns null if the scene exceeds these limits or has motion, curves or points.
   static std::unique_ptr<const TriangleList> make(const Scene& scene);
 
-  /// Like the functions of EmbreeAccelerator; `width` is 1, 4, 8 or 16.
+  /// Find the same hits as the functions of EmbreeAccelerator; `width` is 1, 4, 8 or 16.
   void intersect(const SceneView& scene, const RaySpan& rays, const HitSpan& hits, uint32_t width,
                  const PresenceKeys& keys) const;
   void occluded(const SceneView& scene, const RaySpan& rays, uint32_t* occluded, uint32_t width,
@@ -43,7 +45,7 @@ class TriangleList {
     float n[3], p[3];
     uint16_t vertex[3];
     bool filtered;       ///< whether hits must pass accepts_hit()
-    bool in_same_plane;  ///< whether n and p equal those of the previous triangle
+    bool in_same_plane;  ///< whether n and p equal n and p of the previous triangle
     uint32_t mesh;
   };
   struct Vertex {
@@ -54,7 +56,7 @@ class TriangleList {
     LightGeometry light_geometry;
     float centre[3], radius;
   };
-  /// Ids of hits by entry: triangles, then light shapes, then one entry for a miss.
+  /// Ids of hits, indexed by list entry: triangles, then light shapes, then one entry for a miss.
   struct Ids {
     std::vector<uint32_t> prim, geom, inst;
   };

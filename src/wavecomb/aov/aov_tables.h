@@ -16,7 +16,7 @@ namespace wavecomb {
 
 class Scene;
 
-/// Light group that has no layer.
+/// Index that means that a light group has no layer.
 inline constexpr uint32_t kNoGroup = 0xffffffffu;
 
 /// AOV tables of a render. The tables are built once and read by all waves.
@@ -25,13 +25,17 @@ struct AovTables {
   CryptoTables crypto;
   /// Index of each light's group among the film's groups, or kNoGroup.
   std::vector<uint32_t> film_group;
-  uint32_t group_of_rest = kNoGroup;  ///< index of the group of emission without a light
-  /// Names of the film's light groups, followed by those of its expressions.
+  /// Index of the light group for emission that belongs to no light.
+  uint32_t group_of_rest = kNoGroup;
+  /// Names of the film's light groups, followed by the names of its expressions.
   std::vector<std::string> layer_names;
-  PathAutomaton automaton;             ///< automaton of the light path expressions
-  BackwardAutomaton backward;          ///< automaton for light paths, if the render has any
-  std::vector<uint32_t> end_of_light;  ///< parameter of PathExpressions; empty if unused
-  std::vector<float> multipliers;      ///< parameter of PathExpressions; empty if unused
+  PathAutomaton automaton;  ///< automaton of the light path expressions
+  /// Automaton for light paths, if the render traces light paths.
+  BackwardAutomaton backward;
+  /// Argument `end_of_light` of PathExpressions; empty without expressions.
+  std::vector<uint32_t> end_of_light;
+  /// Argument `multipliers` of PathExpressions; empty if unused.
+  std::vector<float> multipliers;
   /// Whether the cost AOV holds modelled costs, which are reproducible, instead of measured time.
   bool models_cost = false;
   bool connects = false;  ///< whether camera paths connect to light paths

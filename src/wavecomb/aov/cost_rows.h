@@ -9,13 +9,14 @@
 
 namespace wavecomb {
 
-/// Modelled cost of a ray in nanoseconds, about the time to trace a ray among a million triangles.
+/// Modelled cost of a ray in nanoseconds, about the time to trace a ray in a scene of a million
+/// triangles.
 inline constexpr float kModelRayNs = 250;
 
 /// Cost of each path.
 ///
-/// Contract: used only as a base of PathAovs. Slots must be below the capacity, which is 0 without
-/// a cost AOV.
+/// Contract: used only as a base class of PathAovs. Slots must be below the capacity, which is 0
+/// without a cost AOV.
 class PathCostRows {
  public:
   PathCostRows() = default;
@@ -26,7 +27,8 @@ class PathCostRows {
   /// Returns whether costs come from the model instead of being measured.
   bool models_cost() const { return wants_cost() && models_; }
   bool wants_time() const { return wants_cost() && !models_cost(); }
-  /// Adds a modelled cost in nanoseconds. Calls for one path come in the order of its vertices.
+  /// Adds a modelled cost in nanoseconds to a path. The caller adds the costs of a path in the
+  /// order of its vertices.
   void add_cost(size_t slot, float ns) const { cost_ns_.rows[slot] += ns; }
   /// Adds the modelled cost of a ray to each path in slots slot(0) ... slot(n - 1), if costs are
   /// modelled.
@@ -38,7 +40,7 @@ class PathCostRows {
     return wants_time() ? PhaseClock::Clock::now() : PhaseClock::Clock::time_point();
   }
   /// Adds the time since `start` in equal parts to the paths in slots slot(0) ... slot(n - 1), if
-  /// times are measured. The time of a path is therefore the mean of its batch.
+  /// times are measured. The measured time of a path is therefore the mean over its batch.
   template <typename Slot>
   void spread_time(size_t n, PhaseClock::Clock::time_point start, const Slot& slot) const {
     if (!wants_time() || n == 0) return;
@@ -52,7 +54,7 @@ class PathCostRows {
   size_t cost_bytes() const { return cost_ns_.bytes(); }
   void clear_costs(size_t slots) const { cost_ns_.zero(slots); }
 
-  SlotRows cost_ns_;  ///< one word for each slot
+  SlotRows cost_ns_;  ///< cost in nanoseconds of each path slot
 
  private:
   bool models_ = false;

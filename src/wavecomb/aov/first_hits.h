@@ -12,11 +12,12 @@ namespace wavecomb {
 
 /// AOV rows of camera rays and their first hits.
 ///
-/// Contract: used only as a base of PathAovs. Slots must be below the capacity.
+/// Contract: used only as a base class of PathAovs. Slots must be below the capacity.
 class PathFirstHits {
  public:
   PathFirstHits() = default;
-  /// Allocates the rows that `set` needs. `tables` may be null if nothing in `set` needs them.
+  /// Allocates the rows for the AOVs in `set`. `tables` may be null if no AOV in `set` needs
+  /// tables.
   PathFirstHits(size_t capacity, const AovSet& set, const AovTables* tables)
       : names_(tables), transmits_(set.has(Aov::kTransmittance)) {
     const auto rows = [&](SlotRows& block, bool wanted, size_t words) {
@@ -30,7 +31,7 @@ class PathFirstHits {
     rows(alpha_, set.has(Aov::kAlpha), 1);
   }
 
-  /// Starts camera rays with the sample values `r`.
+  /// Records the start of camera rays; `r` are their sample values.
   template <typename F>
   void begin(const CameraSetup& camera, const Sample4<F>& r, const UInt<F>& slot,
              const Mask<F>& active) const {
@@ -39,7 +40,7 @@ class PathFirstHits {
 
   bool wants_hits() const { return hits_ || depth_ || end_; }
   bool wants_alpha() const { return bool(alpha_); }
-  /// Sets alpha to 1 for the active lanes' paths.
+  /// Sets alpha to 1 for the paths in the active lanes.
   template <typename F>
   void cover(const UInt<F>& slot, const Mask<F>& active) const {
     wavecomb::scatter<F>(alpha_.rows, F(1.f), slot, active);
@@ -80,8 +81,8 @@ class PathFirstHits {
     scatter_words<F>(motion_.rows, pixels, slot * 2u, active);
   }
 
-  /// Records a camera ray that a volume stops at `p`. Volumes have no position, depth and instance
-  /// AOVs.
+  /// Records a camera ray that scatters in a volume at `p`. Hits in volumes do not set the AOVs
+  /// position, depth and instance.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void hit_volume(const CameraSetup& camera, const UInt<F>& slot,
                                                const Vec3<F>& p, const F& time,
@@ -112,7 +113,7 @@ class PathFirstHits {
       n += block->bytes();
     return n;
   }
-  /// Clears the slots below `slots`.
+  /// Clears the rows of the first `slots` path slots.
   void clear_hits(size_t slots) const {
     alpha_.zero(slots);
     motion_.zero(slots);
@@ -128,11 +129,11 @@ class PathFirstHits {
   SlotRows depth_, end_, hits_;
   SlotRows motion_;  ///< in pixels, x and y
   SlotRows centre_;  ///< squared distance of the sample from the pixel's centre, in pixels
-  SlotRows alpha_;   ///< 1 if the camera ray hit something opaque
+  SlotRows alpha_;   ///< alpha: 1 if the camera ray hit something opaque
 
  private:
-  /// Stores the depth of the ray's end, and whether a volume stopped it, in the first two words of
-  /// RayEndRow.
+  /// Stores the depth at which a camera ray ends, and whether a volume stopped the ray, in the
+  /// first two words of RayEndRow.
   template <typename F>
   void scatter_ray_end(const UInt<F>& slot, const F& depth, const F& in_volume,
                        const Mask<F>& active) const {

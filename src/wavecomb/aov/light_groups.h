@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Contributions by light group. Runs only if the render has light groups.
+/// Contributions by light group. The functions run only if the render has light groups.
 #pragma once
 
 #include "wavecomb/aov/aov_tables.h"
@@ -7,8 +7,8 @@
 
 namespace wavecomb {
 
-/// Returns the film indices of the groups of the lanes' lights; kNoGroup for groups without a layer
-/// and for kNoLight.
+/// Returns for each lane the film's index of its light's group; kNoGroup if the group has no layer
+/// or the light is kNoLight.
 template <typename F>
 inline UInt<F> film_group(const uint32_t* kept, const UInt<F>& light, const Mask<F>& active) {
   using U = UInt<F>;
@@ -17,8 +17,8 @@ inline UInt<F> film_group(const uint32_t* kept, const UInt<F>& light, const Mask
 }
 
 /// Splits the result of environment_emission by light: calls add(light, colour) for each infinite
-/// light with is_wanted(light). All terms are clamped by the same factor as their sum, so that they
-/// add up to it. The body is in path/steps/escape.h.
+/// light with is_wanted(light). The lights' contributions are clamped by the same factor as their
+/// sum, so that they add up to the sum. The function is defined in path/steps/escape.h.
 template <typename F, typename IsWanted, typename Add>
 void split_environment(const SceneView& scene, const ShadeSettings& settings, uint32_t depth,
                        const PathState<F>& path, const Mask<F>& active, const IsWanted& is_wanted,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// AOV values of paths. Both integrators own a PathAovs with one row for each path slot and report
-/// the events of a path to it:
+/// AOV values of paths. Both integrators own a PathAovs object with one row for each path slot, and
+/// call its member functions for the events of a path:
 ///
 ///   begin      a camera ray starts (first_hits.h)
 ///   hit_light, hit_surface   the camera ray has its first hit
@@ -9,9 +9,9 @@
 ///   end_depth  the radiance includes the emission at vertex `depth`, but not its light sample
 ///   resolve    the path's values are added to the film
 ///
-/// Rows exist only for the requested AOVs. Splitting the radiance into emission, direct and
-/// indirect light costs nothing in shading, since copies of it before the light samples of the
-/// first two vertices are enough.
+/// The rows of a path contain only the requested AOVs. Splitting the radiance into emission, direct
+/// and indirect light costs nothing in shading, since it needs only copies of the radiance before
+/// the light samples of the first two vertices.
 #pragma once
 
 #include <array>
@@ -32,7 +32,7 @@
 namespace wavecomb {
 
 /// Calls put(aov, value) for each AOV of the first vertex whose source is kVertex. `value` has the
-/// channels of the AOV, and `path` is the state that arrived.
+/// channels of the AOV, and `path` is the path's state before the vertex.
 template <typename F, typename Put>
 inline void for_each_vertex_value(const VertexAovs<F>& v, const PathState<F>& /*path*/,
                                   const Put& put) {
@@ -43,12 +43,12 @@ inline void for_each_vertex_value(const VertexAovs<F>& v, const PathState<F>& /*
 
 /// AOV rows of the paths of a wave.
 ///
-/// Contract: owned by one wave, or one reference integrator. Slots must be below the capacity.
+/// Contract: owned by a single wave or reference integrator. Slots must be below the capacity.
 class PathAovs : public PathFirstHits, public PathCostRows {
  public:
   PathAovs() = default;
-  /// Allocates the rows that `layout` needs. `tables` may be null if nothing in `layout` needs
-  /// them.
+  /// Allocates the rows for the AOVs in `layout`. `tables` may be null if no AOV in `layout` needs
+  /// tables.
   PathAovs(size_t capacity, const AovLayout& layout, const AovTables* tables)
       : PathFirstHits(capacity, layout.set, tables),
         PathCostRows(layout.set.has(Aov::kCost) ? capacity : 0, tables && tables->models_cost),
@@ -84,7 +84,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
 
   // ---- before the first ray ---------------------------------------------------------------------
 
-  /// Clears the slots below `slots`.
+  /// Clears the rows of the first `slots` path slots.
   void clear(size_t slots) {
     for (const Block* block :
          {&vertex_, &guides_, &groups_, &light_samples_, &bounces_, &early_connections_})
@@ -112,7 +112,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     return (depth == 0 && vertex_) || guides_ || wants_lights() || bounces_;
   }
 
-  /// Records a shaded vertex. `path` is the state that arrived there.
+  /// Records a shaded vertex. `path` is the path's state before the vertex.
   template <typename F>
   void vertex(uint32_t depth, const UInt<F>& slot, const VertexAovs<F>& v, const PathState<F>& path,
               const Mask<F>& active) const {
@@ -131,13 +131,14 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   void survive(uint32_t depth, const UInt<F>& slot, const F& q, const Mask<F>& active) const {
     if (!bounces_ || depth == 0) return;
     BounceRow<F> row = load_row<BounceRow, F>(bounces_.rows, slot, active);
-    row.survived += q - 1.f;  // add_bounce() has already counted the bounce with probability 1.
+    // add_bounce() has already counted the bounce with survival probability 1.
+    row.survived += q - 1.f;
     store_row<BounceRow, F>(bounces_.rows, slot, row, active);
   }
 
   // ---- light ------------------------------------------------------------------------------------
 
-  /// Returns whether contributions must be reported by light.
+  /// Returns whether callers must report contributions separately for each light.
   bool wants_lights() const { return groups_ || expressions_; }
   /// Returns the index of the stored light group of each lane's light, or kNoGroup.
   template <typename F>
@@ -154,13 +155,14 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     if (groups_) add<F>(slot, group_of<F>(light, active), c, active);
     if (expressions_) expressions_.add<F>(slot, light, c, active);
   }
-  /// Adds emission of volumes.
+  /// Adds the emission of volumes to paths.
   template <typename F>
   void add_volume_emission(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
     if (groups_) add<F>(slot, UInt<F>(tables_->group_of_rest), c, active);
     if (expressions_) expressions_.add_volume_emission<F>(slot, c, active);
   }
-  /// Adds the contribution `c` of the light sample of the last vertex, from a light of `group`.
+  /// Adds the contribution `c` of the light sample at the last vertex; the sampled light is in
+  /// light group `group`.
   template <typename F>
   void add_direct(const UInt<F>& slot, const UInt<F>& group, const Color<F>& c,
                   const Mask<F>& active) const {
@@ -204,13 +206,13 @@ class PathAovs : public PathFirstHits, public PathCostRows {
         });
   }
 
-  /// Copies the radiance of the paths in slots below `slots`. It includes the emission at the
-  /// vertex at `depth`, but not its light sample.
+  /// Copies the radiance of the paths in the first `slots` slots. The radiance must include the
+  /// emission at the vertex at `depth`, but not the vertex's light sample.
   void end_depth(uint32_t depth, const float* radiance, size_t slots) const {
     if (depth < parts_.size() && parts_[depth])
       std::memcpy(parts_[depth].rows, radiance, slots * kRadianceWords * sizeof(float));
   }
-  /// Copies the radiance for `depth` and all later vertices, after the paths have ended.
+  /// Copies the radiance of ended paths as the radiance at `depth` and at all later vertices.
   void end_path(uint32_t depth, const float* radiance, size_t slots) const {
     for (; depth < parts_.size(); ++depth) end_depth(depth, radiance, slots);
   }
@@ -232,13 +234,13 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   /// `radiance` holds the RadianceRow of each slot.
   void resolve(AovFilm& film, size_t pixel, size_t begin, size_t end, const float* radiance) const;
 
-  // For tests: rows of light groups, or null.
+  // Returns the rows of light groups, or null; for tests.
   const float* group_rows() const { return groups_.rows; }
 
  private:
   using Block = SlotRows;
 
-  /// Slots of the paths of one pixel.
+  /// Range of the slots with paths of one pixel.
   struct SlotRange {
     uint32_t begin, end;
     template <typename Each>
@@ -246,15 +248,15 @@ class PathAovs : public PathFirstHits, public PathCostRows {
       for (uint32_t slot = begin; slot < end; ++slot) each(slot);
     }
   };
-  // Parts of resolve(): how camera rays end; values of vertices and first hits; radiance by source;
-  // bounces and costs.
+  // Steps of resolve(), which add to the film: ends of camera rays; values of vertices and first
+  // hits; radiance by source; bounces and costs.
   void resolve_ends(AovFilm& film, size_t pixel, const SlotRange& slots,
                     const float* radiance) const;
   void resolve_vertices(AovFilm& film, size_t pixel, const SlotRange& slots) const;
   void resolve_light(AovFilm& film, size_t pixel, const SlotRange& slots,
                      const float* radiance) const;
   void resolve_work(AovFilm& film, size_t pixel, const SlotRange& slots) const;
-  /// Calls put(aov, words) for each stored AOV of vertices of this kind. `words` holds its first
+  /// Calls put(aov, words) for each stored vertex AOV of a kind. `words` points to the AOV's first
   /// word in the row of slot 0.
   template <typename Put>
   void for_each_vertex_aov(AovKind kind, const Put& put) const;
@@ -264,7 +266,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
             &groups_, &guides_,   &light_samples_, &bounces_};
   }
 
-  /// Marks an AOV without words in vertex_.
+  /// Value in vertex_at_ for AOVs that vertex_ does not store.
   static constexpr uint32_t kNoWords = 0xffffffffu;
   static constexpr std::array<uint32_t, kAovCount> no_words() {
     std::array<uint32_t, kAovCount> at{};
@@ -284,7 +286,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
                            {g.albedo, g.normal, select(v.is_clear, F(0.f), F(1.f))}, updates);
   }
 
-  /// Adds the bounce of a vertex, if it has one.
+  /// Counts the bounce of a vertex, if the vertex has a bounce.
   template <typename F>
   void add_bounce(const UInt<F>& slot, const VertexAovs<F>& v, const Mask<F>& active) const {
     const Mask<F> has_survival = active & (v.survival >= 0.f);
@@ -299,11 +301,11 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   AovLayout layout_;
   const AovTables* tables_ = nullptr;
   Block vertex_;
-  /// First word of each AOV in a row of vertex_, or kNoWords.
+  /// Index of each AOV's first word in a row of vertex_, or kNoWords.
   std::array<uint32_t, kAovCount> vertex_at_ = no_words();
   std::array<Block, 2> parts_;  ///< radiance before the light samples of vertices 0 and 1
-  /// Contributions of connections at first vertices. These contributions are indirect light,
-  /// although they are added between the two copies in parts_.
+  /// Contributions of connections at the first vertices of camera paths. These contributions are
+  /// indirect light, although they are added between the two radiance copies in parts_.
   Block early_connections_;
   Block groups_;  ///< radiance by light group; the groups of a slot are adjacent
   Block guides_, bounces_;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Radiance of paths by light path expressions (core/path_expressions/path_expression.h). Runs only
-/// if the render has expressions.
+/// Radiance of paths by light path expressions (core/path_expressions/path_expression.h). The
+/// functions run only if the render has light path expressions.
 ///
-/// A path carries an automaton state for each of its three colours. At a scattering with diffuse
-/// fraction s of a colour, that colour continues as diffuse with probability s and as glossy
-/// otherwise; all three colours use the same random number. Later contributions are added as a
-/// whole to the expressions of the state, so that the layers of a partition add up to the beauty
-/// and each layer has the correct mean. Light samples are split by s directly, without a random
-/// choice. Emission that a bounce hits is also split directly if the light has different diffuse
-/// and specular multipliers.
+/// A path stores an automaton state for each of its three colours. At a scattering event whose
+/// diffuse fraction in a colour is s, the automaton takes the diffuse event for that colour with
+/// probability s, and the glossy event otherwise; all three colours use the same random number.
+/// Later contributions are added in full to the expressions that match the state, so that
+/// complementary layers add up to the beauty and each layer has the correct mean. Light samples are
+/// split in proportion to s, without a random choice. Emission that a bounce hits is also split
+/// directly if the light has different diffuse and specular multipliers.
 #pragma once
 
 #include <array>
@@ -23,15 +23,16 @@
 
 namespace wavecomb {
 
-/// State of a path for light path expressions.
+/// Row with the state of a path for light path expressions.
 template <typename F>
 struct ExpressionRow {
-  UInt<F> states;  ///< states of the three colours, ten bits each
-  // Current light sample: states before its scattering, event, path end, and diffuse fraction.
+  UInt<F> states;  ///< automaton states of the three colours, ten bits each
+  // Current light sample: automaton states before the scattering, scattering event, path end, and
+  // diffuse fraction.
   UInt<F> light_states, light_event, light_end;
   Color<F> light_diffuse;
-  // Last bounce, for lights with multipliers: states before it, its event plus 1 (0 for a specular
-  // bounce and before the first bounce), and its diffuse fraction.
+  // Last bounce, for lights with multipliers: automaton states before the bounce, its event plus 1
+  // (0 for a specular bounce and before the first bounce), and its diffuse fraction.
   UInt<F> from_states, bounce;
   Color<F> bounce_diffuse;
   WAVECOMB_FIELDS(states, light_states, light_event, light_end, light_diffuse, from_states, bounce,
@@ -55,8 +56,8 @@ struct ColourStates {
   static UInt<F> of(const UInt<F>& states, uint32_t colour) {
     return (states >> (kBits * colour)) & kMask;
   }
-  /// Returns the state after a scattering, by the automaton's table `next`. Scatterings in volumes
-  /// and subsurface bodies have no diffuse or glossy lobes.
+  /// Returns the automaton state after a scattering event, from the automaton's table `next`.
+  /// Scatterings in volumes and subsurface bodies have no diffuse or glossy lobes.
   template <typename F>
   static UInt<F> next(const uint32_t* table, const UInt<F>& state, const UInt<F>& event,
                       const UInt<F>& lobe, const Mask<F>& active) {
@@ -66,7 +67,7 @@ struct ColourStates {
         state * PathAutomaton::kNextWords + event + select(Mask<U>(event < volume), lobe, U(0u));
     return gather<U>(table, at, Mask<U>(active));
   }
-  /// Returns the states after a bounce. `u` in [0, 1) chooses the lobe of each colour.
+  /// Returns the automaton states after a bounce. `u` in [0, 1) chooses the lobe of each colour.
   template <typename F>
   static UInt<F> after(const uint32_t* table, const UInt<F>& states,
                        const ScatteringEvent<F>& bounce, const F& u, const Mask<F>& active) {
@@ -83,14 +84,14 @@ struct ColourStates {
 
 /// Light path expression states and sums of the paths of a wave.
 ///
-/// Contract: owned by one PathAovs. Slots must be below the capacity, and those of the active
-/// lanes distinct.
+/// Contract: owned by a PathAovs object. Slots must be below the capacity, and the slots of the
+/// active lanes must be distinct.
 class PathExpressions {
  public:
   PathExpressions() = default;
-  /// `end_of_light` holds path_end of each light, followed by those of other surfaces and of
-  /// volumes. `multipliers` holds the diffuse and specular multiplier of each light; empty means
-  /// that all are 1.
+  /// `end_of_light` holds the path end (path_end()) of each light, followed by the path ends of
+  /// other surfaces and of volumes. `multipliers` holds the diffuse and specular multiplier of each
+  /// light; empty means that all are 1.
   PathExpressions(size_t capacity, const PathAutomaton& automaton,
                   const std::vector<uint32_t>& end_of_light, const std::vector<float>& multipliers)
       : automaton_(&automaton),
@@ -106,7 +107,7 @@ class PathExpressions {
   /// Returns the radiance of the path in `slot`: rgb for each expression.
   const float* sums(size_t slot) const { return sums_.floats(0) + slot * words_; }
 
-  /// Clears the slots below `slots`.
+  /// Clears the rows of the first `slots` path slots.
   void clear(size_t slots) {
     if (!*this) return;
     std::memset(rows_.floats(0), 0, slots * kRowWords<ExpressionRow> * sizeof(float));
@@ -138,8 +139,8 @@ class PathExpressions {
     add_to<F>(slot, states, UInt<F>(end_of_light_[lights_ + 1]), c, active);
   }
 
-  /// Records a shaded vertex, whose scatterings `v` classifies. `has_shadow` marks the lanes with a
-  /// light sample.
+  /// Records a shaded vertex; `v` contains the classification of its scattering events.
+  /// `has_shadow` marks the lanes with a light sample.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void scatter(uint32_t depth, const UInt<F>& slot,
                                             const SampleKey<F>& key, const VertexAovs<F>& v,
@@ -192,13 +193,14 @@ class PathExpressions {
   UInt<F> states(const UInt<F>& slot, const Mask<F>& active) const {
     return load_row<ExpressionRow, F>(rows_.floats(0), slot, active).states;
   }
-  /// Returns the state after a scattering.
+  /// Returns the automaton state after a scattering event.
   template <typename F>
   UInt<F> next(const UInt<F>& state, const UInt<F>& event, const UInt<F>& lobe,
                const Mask<F>& active) const {
     return ColourStates::next<F>(automaton_->next.data(), state, event, lobe, active);
   }
-  /// Adds light of one colour to the expressions whose bits are set in `matched`.
+  /// Adds one colour component of a contribution to the expressions whose bits are set in
+  /// `matched`.
   template <typename F>
   void add_matched(const UInt<F>& slot, uint32_t colour, const UInt<F>& matched, const F& value,
                    const Mask<F>& active) const {
@@ -242,7 +244,7 @@ class PathExpressions {
     add_part(kGlossyEvent, c - diffuse);
     return here;
   }
-  /// Returns the states of all three colours after a scattering.
+  /// Returns the automaton states of all three colours after a scattering event.
   template <typename F>
   UInt<F> next_of_all(const UInt<F>& states, const UInt<F>& event, const UInt<F>& lobe,
                       const Mask<F>& active) const {

@@ -10,7 +10,7 @@
 
 namespace wavecomb {
 
-/// First hit of a camera ray, before shading. Indices are kNoHitId if there is none.
+/// First hit of a camera ray, before shading. Indices are kNoHitId if the ray hit nothing.
 template <typename F>
 struct FirstHitRow {
   Vec3<F> position;
@@ -30,14 +30,14 @@ struct VolumeHit {
 /// Geometry and material that a camera ray hits first.
 template <typename F>
 struct FirstSurface {
-  UInt<F> inst, geom;  ///< geom: geometry within the instance's group
+  UInt<F> inst, geom;  ///< instance, and index of the geometry within its group
   UInt<F> material;
 };
 
 /// End of a camera ray.
 template <typename F>
 struct RayEndRow {
-  F depth;           ///< infinite if the ray hits nothing
+  F depth;           ///< depth of the end point; infinite if the ray hits nothing
   F in_volume;       ///< 1 if a volume stopped the ray, else 0
   Color<F> through;  ///< transmittance of the volumes before the hit; 0 if they stopped the ray
   WAVECOMB_FIELDS(depth, in_volume, through)
@@ -59,7 +59,7 @@ template <typename F>
 struct GuideRow {
   Color<F> albedo;
   Vec3<F> normal;
-  F is_final;  ///< 1 after a vertex that is not clear
+  F is_final;  ///< 1 if the path had a vertex that is not clear
   WAVECOMB_FIELDS(albedo, normal, is_final)
 };
 

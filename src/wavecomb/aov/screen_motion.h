@@ -26,9 +26,9 @@ inline Vec2<F> project_to_image(const CameraSetup& camera, const Vec3<F>& p, con
   return {F(x - camera.x0) * (1.f / camera.step_x), F(camera.y1 - y) * (1.f / camera.step_y)};
 }
 
-/// Returns the motion from the image position of `first` at shutter open to that of `last` at
-/// shutter close, in pixels, x to the right and y up. Returns 0 if one of them has no image
-/// position.
+/// Returns the motion from the image position of point `first` at shutter open to the image
+/// position of point `last` at shutter close, in pixels, x to the right and y up. Returns 0 if one
+/// of the points has no image position.
 template <typename F>
 inline Vec2<F> screen_motion(const CameraSetup& camera, const Vec3<F>& first, const Vec3<F>& last,
                              const Mask<F>& active) {
@@ -39,7 +39,8 @@ inline Vec2<F> screen_motion(const CameraSetup& camera, const Vec3<F>& first, co
   return {select(valid, x, F(0.f)), select(valid, y, F(0.f))};
 }
 
-/// Returns the motion of the point that is at `p` on lights `light` at `time`.
+/// Returns the screen motion of the points that are at `p` on lights `light` at shutter time
+/// `time`.
 template <typename F>
 inline Vec2<F> screen_motion_of_light(const LightView& lights, const CameraSetup& camera,
                                       const UInt<F>& light, const Vec3<F>& p, const F& time,

@@ -2,7 +2,7 @@
 /// Arbitrary output variables (AOVs): layers that a render can store beside the beauty, as a table
 /// (docs/aovs.md).
 ///
-/// To add one, add a row at the end of WAVECOMB_AOVS and a line that provides its value
+/// To add an AOV, add a row at the end of WAVECOMB_AOVS and a line that provides its value
 /// (aov/path_aovs.h). Film storage, layer, checkpoint block, and the names in Python, on the
 /// command line and in the window follow from the row.
 #pragma once
@@ -31,7 +31,7 @@ enum class AovKind : uint8_t {
 /// Point in a path's evaluation at which an AOV's value is known.
 enum class AovSource : uint8_t {
   kHit,     ///< The value is known at the hit of the camera ray, before shading.
-  kVertex,  ///< The value is known after shading the first vertex.
+  kVertex,  ///< The value is known after the first vertex has been shaded.
   kGuide,   ///< The value is known after the last vertex that provides denoiser features.
   kLight,   ///< The value changes whenever light contributes to the path.
   kMis,     ///< The value changes whenever light contributes, separated by sampling technique.
@@ -42,16 +42,16 @@ enum class AovSource : uint8_t {
 /// Meaning of the numbers in a layer, which determines how files store the layer and how the window
 /// displays it.
 enum class AovContent : uint8_t {
-  kLight,      ///< radiance: displayed with exposure and tone mapping
+  kLight,      ///< radiance, which is displayed with exposure and tone mapping
   kColour,     ///< reflectance or transmittance, 0 to 1
   kDirection,  ///< unit vector
   kId,         ///< index of an object or material, or hashes of names
   kExact,      ///< number that lossy compression would make useless
-  kValue,      ///< any other number, which the window displays in false colours
+  kValue,      ///< number of another kind, which the window displays in false colours
 };
 
 /// Rows X(enumerator, name, channels, letters, content, kind, source, title). The order of the rows
-/// determines the bits of the AOVs. `channels` is 0 for AOVs that are not numeric or have several
+/// determines the bit of each AOV. `channels` is 0 for AOVs that are not numeric or have several
 /// layers. `letters` are the names of the channels in files, or "" if the channels have no names.
 /// `title` is the label of the layer in the window; "" hides the layer in the window.
 // clang-format off
@@ -188,8 +188,9 @@ inline constexpr uint32_t kMaxDeepSamples = 64;
 
 /// Limits on the deep samples of a pixel.
 struct DeepLimits {
-  uint32_t most = 16;       ///< maximum number of deep samples per pixel
-  float tolerance = 0.01f;  ///< samples closer than this fraction of their depth are merged
+  uint32_t most = 16;  ///< maximum number of deep samples per pixel
+  /// Deep samples whose distance is below this fraction of their depth are merged.
+  float tolerance = 0.01f;
 };
 
 /// AOVs that a film stores, with their sizes.

@@ -6,8 +6,8 @@
 
 namespace wavecomb {
 
-/// Orthonormal basis (s, t, n), right-handed unless constructed otherwise. Local directions have z
-/// along n.
+/// Orthonormal basis (s, t, n), right-handed unless make_frame() is called with handedness -1.
+/// Local directions have z along n.
 template <typename F>
 struct Frame {
   Vec3<F> s, t, n;

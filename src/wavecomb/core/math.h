@@ -54,7 +54,7 @@ template <LaneValue F>
 inline F atan2(const F& y, const F& x) {
   const F ax = abs(x), ay = abs(y);
   const F hi = max(ax, ay), lo = min(ax, ay);
-  // t = lo / hi, or (t - 1) / (t + 1) if t is above tan(pi / 8).
+  // Argument of the polynomial: t = lo / hi, or (t - 1) / (t + 1) if t is above tan(pi / 8).
   const Mask<F> reduce = lo > F(hi * 0.4142135623730950f);
   const F over = select(reduce, F(lo - hi), lo), under = select(reduce, F(lo + hi), hi);
   const F r = over / select(hi > 0.f, under, F(1.f));

@@ -2,9 +2,9 @@
 /// Counter-based random numbers: each sample value is a function of (pixel, sample, set, seed)
 /// only, so that it does not depend on scheduling.
 ///
-/// Uses hash-based Owen-scrambled Sobol points, four dimensions at a time; sets are padded by
-/// independent shuffles (Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4) 2020). Direction
-/// numbers are from Joe and Kuo, 2008.
+/// The sampler uses hash-based Owen-scrambled Sobol points, four dimensions at a time; sets are
+/// padded by independent shuffles (Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4) 2020).
+/// Direction numbers are from Joe and Kuo, 2008.
 #pragma once
 
 #include "wavecomb/core/encoding/hash.h"
@@ -40,17 +40,17 @@ inline constexpr uint32_t kTimeSet = 0xffffffffu;
 /// Sample sets that a path uses at each vertex. Each step of a vertex has a named sample set, so
 /// that adding or removing a step does not change the random numbers of other steps.
 enum class VertexSet : uint32_t {
-  kLight,     ///< light sampling (choice, u, v) and Russian roulette
+  kLight,     ///< light sampling (selection of a light, u, v) and Russian roulette
   kBsdf,      ///< BSDF sampling: lobe, u, v
   kFlight,    ///< sampling along the ray segment to the vertex (path/media.h)
   kShadow,    ///< transmittance along the vertex's shadow ray
   kEmission,  ///< start of a light path, at depth 0: choice of the light, and time
 };
-/// Upper limit of depths with distinct sets.
+/// Upper limit of path depths that have distinct sample sets.
 inline constexpr uint32_t kSetDepths = 1u << 23;
 
-/// Returns the index of a sample set at a depth of the path. The indices of the first two sets of
-/// vertices alternate from 1 on; each other set has a separate block of indices.
+/// Returns the index of a sample set at a depth of the path. The indices of the first two vertex
+/// sets alternate with depth, starting at 1; each other vertex set has a separate block of indices.
 inline constexpr uint32_t vertex_set(VertexSet name, uint32_t depth) {
   const auto i = static_cast<uint32_t>(name);
   return i < 2 ? 1 + i + 2 * depth : (i << 24) + depth;
@@ -58,8 +58,8 @@ inline constexpr uint32_t vertex_set(VertexSet name, uint32_t depth) {
 
 namespace detail {
 
-/// Laine-Karras permutation: bit k of the result depends only on bits 0..k, so that on reversed
-/// bits it is an Owen scramble (constants from Burley 2020, section 4).
+/// Laine-Karras permutation: bit k of the result depends only on bits 0..k, so that it is an Owen
+/// scramble of bit-reversed values (constants from Burley 2020, section 4).
 template <typename U>
 WAVECOMB_INLINE U laine_karras(U x, const U& seed) {
   x += seed;
@@ -82,7 +82,8 @@ inline constexpr uint32_t kSobol3[kIndexBits] = {
     0x1,   0x3,   0x4,    0xa,    0x1f,   0x2e,   0x45,    0xc9,    0x11b,   0x2a4,
     0x79a, 0xb67, 0x101e, 0x302d, 0x4041, 0xa0c3, 0x1f104, 0x2e28a, 0x457df, 0xc9bae};
 
-/// Multiplication with a generator matrix over GF(2), four bits of the index at a time.
+/// Multiplies the index by a generator matrix over GF(2), processing four bits of the index at a
+/// time.
 class NibbleTables {
  public:
   static constexpr int kNibbles = kIndexBits / 4;

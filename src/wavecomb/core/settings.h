@@ -23,14 +23,14 @@ constexpr float default_filter_width(FilterKind kind) {
 }
 
 enum class IntegratorKind : uint8_t { kWavefront, kReference };
-/// Whether pilot renders before the first pass decide about path guiding and light paths, as far as
-/// Settings::guiding and Settings::transport leave it open (kAuto). kPlain: no pilot renders; there
-/// is neither.
+/// Whether pilot renders before the first pass decide about path guiding and light paths, if
+/// Settings::guiding or Settings::transport is kAuto. kPlain: no pilot renders; kAuto then means
+/// neither path guiding nor light paths.
 enum class Quality : uint8_t { kAuto, kPlain };
 /// Where paths start. kPath: at the camera. kLight: also one light path per camera path, combined
 /// by multiple importance sampling (docs/light-paths.md). kAuto: kLight if a pilot render predicts
-/// a gain (light_paths/render/transport_choice.h). kBdpt: as kLight, and vertices of both are
-/// connected.
+/// a gain (light_paths/render/transport_choice.h). kBdpt: as kLight, and vertices of camera paths
+/// are also connected to vertices of light paths.
 enum class Transport : uint8_t { kPath, kLight, kAuto, kBdpt };
 /// Treatment of samples that are too bright and too rare to be reliable: keep them, or reduce their
 /// weight (film/cascades.h).
@@ -62,7 +62,7 @@ enum class Guiding : uint8_t { kAuto, kOn, kOff };
 /// Whether records are moved into shading order. kAuto: off, which is faster.
 enum class Materialize : uint8_t { kAuto, kOn, kOff };
 
-/// Largest width or height, and largest number of pixels.
+/// Maximum width or height of an image, and maximum number of pixels.
 inline constexpr uint32_t kMaxSize = 65535;
 inline constexpr uint32_t kMaxPixels = 1u << 28;
 
@@ -79,7 +79,7 @@ struct Region {
   size_t index(uint32_t x, uint32_t y) const { return size_t{y - y0} * width() + (x - x0); }
 };
 
-/// Settings of a render. The image depends only on members above the line.
+/// Settings of a render. The image depends only on the members above the separator line.
 struct Settings {
   uint32_t width = 600, height = 600;  ///< pixels
   uint32_t spp = 64;                   ///< samples per pixel, 1 to 2^20
@@ -87,7 +87,8 @@ struct Settings {
   uint32_t seed = 0;
   SamplerKind sampler = SamplerKind::kSobol;
   FilterKind filter = FilterKind::kBlackmanHarris;
-  std::optional<float> filter_width;  ///< full width in pixels; default_filter_width() if not set
+  /// Full width of the pixel filter in pixels; default_filter_width() if not set.
+  std::optional<float> filter_width;
   RouletteKind roulette = RouletteKind::kAuto;
   uint32_t roulette_depth = 2;  ///< first vertex at which roulette may terminate a path
   /// Costs affect the image only through cost-aware roulette; kMeasured then makes it vary from run
@@ -103,20 +104,22 @@ struct Settings {
   /// (medium/volume/equiangular.h).
   bool equiangular = false;
   Quality quality = Quality::kAuto;
-  uint32_t learn_memory_mb = 64;  ///< memory limit of learned data
-  /// Sample every non-delta bounce by cosine.
+  uint32_t learn_memory_mb = 64;  ///< memory limit of training data
+  /// Sample every non-delta bounce from a cosine lobe.
   bool cosine_sampling = false;
   IntegratorKind integrator = IntegratorKind::kWavefront;
   Transport transport = Transport::kPath;
-  /// Aim light paths where earlier ones, traced before the first pass, contributed to the image
-  /// (light_paths/render/light_aiming.h).
+  /// Aim light paths at regions where training light paths, traced before the first pass,
+  /// contributed to the image (light_paths/render/light_aiming.h).
   bool light_aim = true;
   /// Merge radius in pixels, within which light paths end at points that the camera sees by
   /// specular reflection or refraction (light_paths/merge_grid.h). 0 means no merging.
   float merge_radius = 0;
   Firefly firefly = Firefly::kKeep;
-  AovSet aovs;                                    ///< AOVs to store; they do not affect the beauty
-  std::vector<std::string> light_groups;          ///< names for Aov::kLightGroups; empty means all
+  /// AOVs to store; the beauty does not depend on them.
+  AovSet aovs;
+  /// Names of the light groups to store for Aov::kLightGroups; empty means all.
+  std::vector<std::string> light_groups;
   std::vector<NamedExpression> expressions;       ///< for Aov::kExpressions
   uint32_t deep_samples = DeepLimits{}.most;      ///< maximum samples of a deep pixel
   float deep_tolerance = DeepLimits{}.tolerance;  ///< depth tolerance of deep images
@@ -124,34 +127,39 @@ struct Settings {
   /// value. 0 means off.
   float adaptive = 0;
   /// Adaptive sampling: stop when the image's mean relative error is at most this value. 0 means
-  /// off. Cannot be combined with `adaptive`.
+  /// off. This setting cannot be combined with `adaptive`.
   float noise = 0;
   uint32_t min_spp = 16;  ///< adaptive sampling: samples before the first error estimate
-  /// Distribution of samples if spp or a time limit gives their total number.
+  /// Distribution of samples over pixels in renders whose total sample count is set by spp or a
+  /// time limit.
   Allocate allocate = Allocate::kEven;
-  /// Time limit of rendering in seconds; 0 means none. The image then has the samples done so far.
+  /// Time limit of rendering in seconds; 0 means none. After the time limit, the image has the
+  /// samples done so far.
   float time_limit = 0;
   /// Make domes and distant lights transparent to the camera, for compositing.
   bool alpha = false;
   bool error = false;  ///< whether to store error and variance estimates even if no setting needs
                        ///< them
-  /// Pixels to render; others get no samples. If not set, all pixels are rendered. Pixels are the
-  /// same as in the whole image, except in adaptive renders, which estimate errors within the
-  /// region only.
+  /// Pixels to render; other pixels get no samples. If not set, all pixels are rendered. Rendered
+  /// pixels have the same values as in a render of the whole image, except in adaptive renders,
+  /// which estimate errors within the region only.
   std::optional<Region> region;
   /// Pixels along each edge beyond the camera window; included in width and height.
   uint32_t overscan = 0;
   bool crop = false;  ///< restrict the film and the image to the region
   // ---- below: how the image is computed; never changes it ----
-  uint32_t threads = 0;    ///< number of threads; 0 means all that the process may use
+  uint32_t threads = 0;    ///< number of threads; 0 means all threads that the process may use
   uint32_t wave_size = 0;  ///< paths per wave, 64 to 2^20; 0 means the default
-  uint32_t lanes = 0;      ///< lanes of kernels: 1, 4, 8 or 16; 0 means the widest that was built
-  /// Packets are faster; both find bit-identical hits (docs/decisions/canonical-hits.md).
+  /// Lane width of kernels: 1, 4, 8 or 16; 0 means the largest width in the build.
+  uint32_t lanes = 0;
+  /// Packets are faster than single rays and find bit-identical hits
+  /// (docs/decisions/canonical-hits.md).
   Traversal traversal = Traversal::kPackets;
   std::string policy = "code";
-  Materialize materialize = Materialize::kAuto;  ///< kAuto: gather by index, which is faster
-  RayOrder ray_order = RayOrder::kAuto;          ///< for bounce rays
-  RayOrder shadow_order = RayOrder::kAuto;       ///< for shadow rays
+  /// KAuto: do not move records, but read them by index, which is faster.
+  Materialize materialize = Materialize::kAuto;
+  RayOrder ray_order = RayOrder::kAuto;     ///< for bounce rays
+  RayOrder shadow_order = RayOrder::kAuto;  ///< for shadow rays
   /// Render passes of 1, 1, 2, 4, ... samples per pixel, so that the whole image appears soon.
   bool progressive = false;
   float cost_weight = 0.3f;  ///< weight of a pass in the moving average of costs, 0 to 1
@@ -177,7 +185,7 @@ struct Settings {
 };
 
 /// Setting that light paths cannot be combined with, and the value to use instead; `what` is empty
-/// if there is none.
+/// if there is no such setting.
 struct LightPathConflict {
   std::string what, instead;
 };
@@ -188,7 +196,8 @@ LightPathConflict light_path_conflict(const Settings& settings);
     const Settings& settings) {
   return light_path_conflict(settings);
 }
-/// Returns the Error for such a setting; `settings` must use light paths.
+/// Returns the Error for a setting that light paths cannot be combined with; `settings` must use
+/// light paths.
 Error light_path_error(const Settings& settings, const LightPathConflict& conflict);
 
 }  // namespace wavecomb

@@ -43,7 +43,7 @@ void write(Settings& settings, const SettingValue& value) {
     settings.*kMember = static_cast<T>(std::get<int64_t>(value));
 }
 
-/// Returns a row of the settings table without limits.
+/// Returns a row of the settings table for a setting without limits.
 template <auto kMember>
 SettingInfo row(const char* name, const char* label, const char* help) {
   SettingInfo info;
@@ -63,8 +63,8 @@ SettingInfo number(const char* name, const char* label, double least, double mos
   info.zero = zero;
   return info;
 }
-/// Returns the row of a number whose default depends on other settings; `used` returns the value
-/// that a render uses.
+/// Returns the table row of a numeric setting whose default depends on other settings; `used`
+/// returns the value that a render uses.
 template <auto kMember>
 SettingInfo number_or_unset(const char* name, const char* label, double least, double most,
                             const char* help, SettingValue (*used)(const Settings&)) {
@@ -107,13 +107,13 @@ SettingInfo with_steps(SettingInfo info, std::vector<double> steps, const char* 
   return info;
 }
 
-/// Marks the row of a setting that changes the expectation of the image.
+/// Marks a setting as changing the expected value of the image.
 SettingInfo in_expectation(SettingInfo info) {
   info.changes_expectation = true;
   return info;
 }
 
-/// Marks the row of a setting that leaves the bits of the image unchanged at equal samples.
+/// Marks a setting as leaving the image bit-identical at equal sample counts.
 SettingInfo same_bits(SettingInfo info) {
   info.changes_bits = false;
   return info;

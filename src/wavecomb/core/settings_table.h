@@ -25,22 +25,23 @@ struct SettingChoice {
   const char* help;  ///< one sentence
 };
 
-/// Subject of a setting: definition of the image, amount of work, or order of computation.
+/// Group of a setting: it defines the image, the amount of work, or the order of computation.
 enum class SettingGroup : uint8_t { kImage, kWork, kOrder };
 
 /// Row of the settings table.
 ///
-/// Contract: a row lives as long as the program.
+/// Contract: a row exists as long as the program runs.
 struct SettingInfo {
-  const char* name = "";   ///< attribute name; options use - for _
+  const char* name = "";   ///< attribute name; command line options contain - instead of _
   const char* label = "";  ///< label in a form
   const char* help = "";   ///< one sentence
   /// Whether the image depends on the setting; otherwise the setting affects only how the image is
   /// computed.
   bool changes_image = true;
-  /// Whether the bits of the beauty image depend on the setting, at equal samples of each pixel.
+  /// Whether the setting changes the bits of the beauty image if each pixel has the same sample
+  /// count.
   bool changes_bits = true;
-  /// Whether the expectation of the image depends on the setting, that is, the limit for many
+  /// Whether the setting changes the expected value of the image, that is, its limit for many
   /// samples. Settings without this flag change only noise, work, or the layers that describe noise
   /// and work.
   bool changes_expectation = false;

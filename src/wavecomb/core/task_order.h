@@ -11,9 +11,9 @@
 
 namespace wavecomb {
 
-/// Annotations of one parallel loop: code before the loop happens before its tasks, and they happen
-/// before join(). The tasks of a loop are not ordered among each other. TaskOrder does nothing in
-/// builds without ThreadSanitizer.
+/// Annotations of one parallel loop: code before the loop happens before the loop's tasks, and the
+/// tasks happen before join(). The tasks of a loop are not ordered among each other. TaskOrder does
+/// nothing in builds without ThreadSanitizer.
 ///
 ///     const TaskOrder order;
 ///     tbb::parallel_for(size_t{0}, n, order.around([&](size_t i) { ... }));
@@ -24,7 +24,7 @@ class TaskOrder {
   TaskOrder(const TaskOrder&) = delete;
   TaskOrder& operator=(const TaskOrder&) = delete;
 
-  /// Wraps `body` as a task of the loop.
+  /// Wraps `body`, the loop's body, as an annotated task.
   ///
   /// Contract: this object and `body` outlive the task.
   template <typename Body>
@@ -59,7 +59,7 @@ class TaskOrder {
   char begun_ = 0, ended_ = 0;
 };
 
-/// Annotation for tasks of one worker, which run one after another; `worker` identifies it.
+/// Annotation for tasks of one worker, which run one after another; `worker` identifies the worker.
 class WorkerOrder {
  public:
 #if defined(__SANITIZE_THREAD__)

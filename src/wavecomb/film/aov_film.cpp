@@ -15,7 +15,7 @@ constexpr const char* kLightPrefix = "light_";
 /// Prefix of the layer names of light path expressions.
 constexpr const char* kExpressionPrefix = "lpe_";
 
-/// Returns a layer whose pixel i is filled by `write(i, pointer)`.
+/// Returns a layer; write(i, pointer) writes the values of pixel i.
 template <typename Write>
 AovLayer make_layer(std::string name, uint32_t channels, size_t pixels, const Write& write) {
   AovLayer layer{std::move(name), channels, std::vector<float>(pixels * channels)};

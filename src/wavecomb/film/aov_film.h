@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Storage for the AOVs (arbitrary output variables) of a render. Only requested AOVs take memory.
-/// The AOV's row in core/aov.h says how samples are combined; the caller supplies their values.
+/// Storage for the AOVs (arbitrary output variables) of a render. Memory is allocated only for
+/// requested AOVs. Each AOV's row in core/aov.h defines how its samples are combined; the caller
+/// supplies the sample values.
 #pragma once
 
 #include <array>
@@ -42,8 +43,8 @@ class AovFilm {
 
   /// Cryptomatte levels: object, material, asset.
   static constexpr uint32_t kCryptoLevels = 3;
-  /// Number of ids written per pixel; CryptoPixel counts up to kIds. An RGBA layer holds two, so
-  /// files have three layers per level.
+  /// Number of ids written per pixel; CryptoPixel counts up to kIds. An RGBA layer holds two ids
+  /// with their coverage, so files have three layers per level.
   static constexpr uint32_t kCryptoRanks = 6;
 
   const AovLayout& layout() const { return layout_; }
@@ -81,8 +82,8 @@ class AovFilm {
     for (uint32_t c = 0; c < row_of(aov).channels && !all.empty(); ++c)
       all[pixel * row_of(aov).channels + c] = values[c];
   }
-  /// Adds a sample to the Cryptomatte levels. `object`: index of ObjectNames; either id may be
-  /// kNoHitId.
+  /// Adds a sample to the Cryptomatte levels. `object` is an index of ObjectNames; `object` and
+  /// `material` may be kNoHitId.
   void add_ids(size_t pixel, uint32_t object, uint32_t material, const CryptoTables& tables) {
     if (object != kNoHitId) {
       if (!crypto_[0].empty()) crypto_[0][pixel].add(tables.object_id[object]);
@@ -92,7 +93,7 @@ class AovFilm {
       crypto_[1][pixel].add(tables.material_id[material]);
   }
 
-  /// Sums of the deep image; empty if the render has none.
+  /// Sums of the deep image; empty if the render has no deep image.
   DeepFilm& deep() { return deep_; }
 
   // ---- light splats (contributions of light paths) ----------------------------------------------
@@ -122,14 +123,14 @@ class AovFilm {
   /// Returns the layer of an AOV and frees its sums.
   AovLayer take(Aov aov, const std::vector<uint32_t>& samples);
   /// Returns all stored layers that were not taken. Each AOV's sums are freed as soon as its layer
-  /// is complete. Layers of light groups are named "light_NAME", those of expressions "lpe_NAME".
+  /// is complete. Layers of light groups are named "light_NAME", layers of expressions "lpe_NAME".
   std::vector<AovLayer> finish(const std::vector<uint32_t>& samples,
                                const std::vector<std::string>& multi_layer_names) &&;
   size_t bytes() const;
-  /// Returns the deep image and frees its sums; empty if the render has none.
+  /// Returns the deep image and frees its sums; empty if the render has no deep image.
   DeepLayer take_deep(const std::vector<uint32_t>& samples);
-  /// Calls block(name, values) for each vector of sums, for checkpoints. The sums of the deep image
-  /// are not included; use DeepFilm::packed().
+  /// Calls block(name, values) for each vector of sums, to write or read checkpoints. The sums of
+  /// the deep image are not included; use DeepFilm::packed().
   template <typename Block>
   void for_each_block(const Block& block) {
     for (const AovRow& row : kAovs) {
@@ -147,14 +148,15 @@ class AovFilm {
   static uint32_t level_index(Aov level) {
     return aov_index(level) - aov_index(Aov::kCryptoObject);
   }
-  /// Number of values per pixel in the sums of an AOV.
+  /// Returns the number of values per pixel in the sums of an AOV.
   size_t words_of(const AovRow& row) const {
     if (row.kind == AovKind::kGroups) return 3 * layout_.light_groups;
     if (row.kind == AovKind::kMedian) return MedianSketch::kWords;
     return row.kind == AovKind::kExpressions ? 3 * layout_.expressions : row.channels;
   }
   AovLayer crypto_layer(Aov level, const std::vector<uint32_t>& samples) const;
-  /// Returns layer `which` of the light groups or of the expressions.
+  /// Returns layer `which` of the AOV with all light groups, or of the AOV with all light path
+  /// expressions.
   AovLayer multi_layer(Aov aov, uint32_t which, std::string name,
                        const std::vector<uint32_t>& samples) const;
   /// Calls layer(aov, which, name) for each stored light group and expression.
@@ -172,7 +174,7 @@ class AovFilm {
   AovLayout layout_;
   LightSplatLayout light_splat_layout_;
   size_t pixels_ = 0;
-  // Indexed by aov_index(aov); empty if the AOV is not stored.
+  // Pixel values of each AOV, indexed by aov_index(aov); empty if the AOV is not stored.
   std::array<std::vector<double>, kAovCount> sums_;
   std::array<std::vector<float>, kAovCount> nearest_;
   std::array<std::vector<CryptoPixel>, kCryptoLevels> crypto_;
@@ -180,7 +182,7 @@ class AovFilm {
                            ///< light splats
   LightSplatScale light_splat_scale_;
   DeepFilm deep_;
-  std::vector<uint32_t> hits_;  ///< number of samples that hit something
+  std::vector<uint32_t> hits_;  ///< number of samples per pixel that hit something
   std::vector<float> centre2_;  ///< squared distance of the nearest sample to the centre, pixels^2
 };
 

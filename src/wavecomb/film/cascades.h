@@ -11,9 +11,9 @@
 /// estimates the number of samples of similar brightness. C_i is the mean of c_i over the 3 x 3
 /// neighbourhood of pixels. A layer is trusted if it has enough samples, or if one of its samples
 /// changes the result little:
-///   r_i = max(((C_i < 1 ? C_i : c_i) - 1) / kappa,   n I_i / (tau B_i)),   clamped to [0, 1],
-/// where I_i is the mean brightness of all layers below i in the 3 x 3 neighbourhood. The removed
-/// energy,
+///   r_i = max((k_i - 1) / kappa,   n I_i / (tau B_i)),   clamped to [0, 1],
+/// where k_i is C_i if C_i < 1 and c_i otherwise, and I_i is the mean brightness of all layers
+/// below i in the 3 x 3 neighbourhood. The removed energy,
 ///   sum_i (1 - r_i) S_i / n,
 /// tends to 0 as n grows. Layer 0 is always kept in full.
 #pragma once
@@ -48,7 +48,7 @@ class Cascades {
   /// cascades are stored. `samples`: sample count of each pixel.
   std::vector<float> excess(const std::vector<uint32_t>& samples) const;
   size_t bytes() const { return sums_.size() * sizeof(Sum); }
-  /// Calls block(name, values) for the sums, for checkpoints.
+  /// Calls block(name, values) for the cascade sums, to write or read checkpoints.
   template <typename Block>
   void for_each_block(const Block& block) {
     block("cascades", sums_);
@@ -57,11 +57,11 @@ class Cascades {
  private:
   using Layer = std::array<float, 3>;
   using Sum = std::array<Layer, kLayers>;
-  /// Luminance of each layer, of one pixel or summed over several.
+  /// Luminance of each layer, for one pixel or summed over several pixels.
   using Levels = std::array<float, kLayers>;
 
-  /// Returns r_i of `layer` from the layers of the pixel (`own`) and the sums over its
-  /// neighbourhood (`around`, of `pixels` pixels with `samples_around` samples).
+  /// Returns the reliability r_i of `layer`. `own` holds the layers of the pixel, `around` their
+  /// sums over its neighbourhood of `pixels` pixels with `samples_around` samples.
   float kept_fraction(const Levels& own, const Levels& around, float pixels, float samples,
                       float samples_around, uint32_t layer) const;
 

@@ -27,15 +27,16 @@ uint32_t crypto_id(std::string_view name);
 
 /// Ids seen in one pixel with their sample counts, in bounded memory.
 ///
-/// Counts are exact while there are at most kIds ids. A further id replaces the one with the fewest
-/// samples and inherits its count (A. Metwally, D. Agrawal, A. El Abbadi, "Efficient Computation of
-/// Frequent and Top-k Elements in Data Streams", 2005). Hence counts always add up to the number of
-/// samples that hit something, no count is too small, and every id with more than 1 / kIds of the
-/// samples is present.
+/// Sample counts are exact while a pixel has at most kIds ids. A further id replaces the id with
+/// the fewest samples and inherits its count (A. Metwally, D. Agrawal, A. El Abbadi, "Efficient
+/// Computation of Frequent and Top-k Elements in Data Streams", 2005). Hence counts always add up
+/// to the number of samples that hit something, no count is too small, and every id with more than
+/// 1 / kIds of the samples is present.
 struct CryptoPixel {
   static constexpr uint32_t kIds = 8;
   uint32_t id[kIds] = {};
-  uint32_t count[kIds] = {};  ///< 0 marks a free entry; free entries come last
+  /// Sample count of each id; 0 marks a free entry, and free entries come last.
+  uint32_t count[kIds] = {};
 
   void add(uint32_t new_id) {
     uint32_t least = 0;
@@ -56,11 +57,13 @@ struct CryptoPixel {
   }
 };
 
-/// Cryptomatte ids of the indices that kernels use. Built once per render and only if requested.
+/// Cryptomatte ids of the object and material indices that kernels use. The tables are built once
+/// per render, if Cryptomatte is requested.
 struct CryptoTables {
-  std::vector<uint32_t> first_object;  ///< by instance: object = first_object[instance] + geometry
-  uint32_t first_light = 0;            ///< object index of light record 0
-  uint32_t first_volume = 0;           ///< object index of volume 0
+  /// Indexed by instance; object index = first_object[instance] + geometry.
+  std::vector<uint32_t> first_object;
+  uint32_t first_light = 0;                   ///< object index of light record 0
+  uint32_t first_volume = 0;                  ///< object index of volume 0
   std::vector<uint32_t> object_id, asset_id;  ///< by object index
   std::vector<uint32_t> material_id;          ///< by material index
 
@@ -69,7 +72,7 @@ struct CryptoTables {
 };
 
 /// Returns (name, id) pairs, sorted by name, for the names of `level` whose ids are in `ids`. `ids`
-/// must be sorted. Names whose hashes collide are all included.
+/// must be sorted. If the hashes of several names collide, all these names are included.
 std::vector<std::pair<std::string, uint32_t>> crypto_manifest(const Scene& scene, Aov level,
                                                               const std::vector<uint32_t>& ids);
 

@@ -39,7 +39,7 @@ DeepFilm::DeepFilm(size_t pixels, const DeepLimits& limits)
 void DeepFilm::add(size_t pixel, float z, bool in_volume, const float* rgb) {
   const DeepBin sample{rgb[0], rgb[1], rgb[2], z, z, 1, in_volume ? 1u : 0u};
   const uint32_t n = used_[pixel];
-  uint32_t at = 0;  // the first bin whose far end is not before z
+  uint32_t at = 0;  // index of the first bin whose far end is at z or beyond
   while (at < n && bin(pixel, at).back < z) ++at;
   const auto spread_with = [&](uint32_t i) {
     if (i >= n) return std::numeric_limits<float>::infinity();

@@ -11,8 +11,8 @@
 /// N, the flat colour of everything that covers the pixel; the composited alpha is the covered
 /// fraction.
 ///
-/// Memory is bounded by `most` bins per pixel. If a sample would exceed that, the two neighbouring
-/// bins with the smallest joint extent relative to their depth are merged.
+/// Memory is bounded by `most` bins per pixel. If a sample would exceed this limit, the two
+/// neighbouring bins whose joint depth range is smallest relative to its depth are merged.
 #pragma once
 
 #include <cstddef>
@@ -30,13 +30,13 @@ namespace wavecomb {
 /// Samples of a pixel within one depth range.
 struct DeepBin {
   double r = 0, g = 0, b = 0;  ///< sum of radiance
-  float front = 0, back = 0;   ///< least and greatest depth
+  float front = 0, back = 0;   ///< smallest and largest depth of the bin's samples
   uint32_t count = 0;          ///< number of samples
   uint32_t in_volume = 0;      ///< number of samples that scattered in a volume
 };
 
 /// Allocator of zeroed memory that uses calloc, so that untouched pages take no physical memory.
-/// For types whose default value is all zero bytes.
+/// Suitable only for types whose default value is all zero bytes.
 template <typename T>
 struct ZeroedMemory {
   using value_type = T;
@@ -61,7 +61,8 @@ struct DeepLayer {
   /// Channels of a sample: R, G, B, A, Z, ZBack. Colours are premultiplied.
   static constexpr size_t kChannels = 6;
   std::vector<uint32_t> counts;  ///< number of samples of each pixel
-  std::vector<float> values;     ///< kChannels values per sample; nearest samples first
+  /// KChannels values per sample; the samples of a pixel are in order of increasing depth.
+  std::vector<float> values;
   bool empty() const { return counts.empty(); }
 };
 
@@ -76,15 +77,15 @@ class DeepFilm {
   DeepFilm(size_t pixels, const DeepLimits& limits);
 
   bool empty() const { return used_.empty(); }
-  /// Adds a sample of depth z >= 0. `rgb`: radiance of the path. `in_volume`: the camera ray
-  /// scattered in a volume.
+  /// Adds a sample of depth z >= 0. `rgb` is the radiance of the path. `in_volume` is true if the
+  /// camera ray scattered in a volume.
   void add(size_t pixel, float z, bool in_volume, const float* rgb);
   /// Returns the deep samples of all pixels. `samples`: sample count of each pixel.
   DeepLayer layer(const std::vector<uint32_t>& samples) const;
-  /// Returns the state for checkpoints: one byte per pixel with its number of bins, then the bins
-  /// in use, pixel by pixel.
+  /// Returns the state of the deep image for checkpoints: one byte per pixel with its number of
+  /// bins, then the bins in use, pixel by pixel.
   std::vector<std::byte> packed() const;
-  /// Restores the state from packed() bytes. Throws Error if they do not fit this image.
+  /// Restores the state from packed() bytes. Throws Error if the bytes do not fit this image.
   void unpack(std::span<const std::byte> bytes);
   /// Upper bound of the memory use in bytes.
   size_t bytes() const { return used_.size() * (1 + limits_.most * sizeof(DeepBin)); }
@@ -95,8 +96,9 @@ class DeepFilm {
   void insert(size_t pixel, uint32_t at, const DeepBin& added);
 
   DeepLimits limits_;
-  std::vector<uint8_t> used_;  ///< number of bins in use, by pixel
-  /// Bin 0 of all pixels, then bin 1 and so on. Higher bins that few pixels reach stay unmapped.
+  std::vector<uint8_t> used_;  ///< number of bins in use for each pixel
+  /// Bin 0 of all pixels, then bin 1 of all pixels, and so on, so that the memory of bins that no
+  /// pixel uses stays unmapped.
   std::vector<DeepBin, ZeroedMemory<DeepBin>> bins_;
 };
 

@@ -17,11 +17,12 @@
 
 namespace wavecomb {
 
-/// Sums of samples per pixel, in double precision so that 65,536 samples stay exact to float.
+/// Sums of samples per pixel, in double precision, so that the mean of 65,536 samples is exact to
+/// float precision.
 ///
 /// Contract: at most one thread writes to a pixel at a time and adds its samples in sample order;
 /// different pixels may be written concurrently. Light splats may be added by any thread in any
-/// order. Row 0 is the top of the window; coordinates (x, y) are those of the whole image.
+/// order. Row 0 is the top of the window; coordinates (x, y) refer to the whole image.
 class Film {
  public:
   /// Creates a film for the pixels of `window`. `with_error`: also stores sums for error and
@@ -31,7 +32,7 @@ class Film {
   Film(uint32_t width, uint32_t height, const AovLayout& aovs, bool with_error = false)
       : Film(Region{0, 0, width, height}, aovs, with_error) {}
 
-  /// Sums of one pixel.
+  /// Sums of the samples of one pixel.
   struct Pixel {
     double r = 0, g = 0, b = 0;
     uint32_t samples = 0;
@@ -39,23 +40,23 @@ class Film {
 
   uint32_t width() const { return window_.width(); }
   uint32_t height() const { return window_.height(); }
-  /// Pixels of the image that this film covers.
+  /// Returns the rectangle of pixels that this film covers.
   const Region& window() const { return window_; }
   bool has_error() const { return !errors_.empty(); }
   Pixel& pixel(uint32_t x, uint32_t y) { return pixels_[index(x, y)]; }
   ErrorSums& error(uint32_t x, uint32_t y) { return errors_[index(x, y)]; }
-  /// Allocates sums for light splats in units of `unit`, for `paths` light path indices of which
-  /// each stands for `scale` light paths per sample. The beauty then is the sum of pixel means and
-  /// splat means; AOVs get splat sums as well.
+  /// Allocates sums for light splats in units of `unit`, for `paths` light path indices, each of
+  /// which represents `scale` light paths per sample. The beauty is then the sum of pixel means and
+  /// splat means. AOVs that include light splats also get splat sums.
   void allocate_light_splats(FixedPoint unit, size_t paths = 0, double scale = 1) {
     splats_ = LightSplatLayer(pixels_.size(), unit, paths, scale, has_error());
     aovs_.allocate_light_splats(unit);
   }
-  /// Allocates a row of `words` floats per pixel, which a joint transport keeps between the camera
-  /// paths and its own paths of a pass.
+  /// Allocates a row of `words` floats per pixel, in which a transport that combines camera and
+  /// light paths keeps data between the camera paths and the light paths of a pass.
   void allocate_joint_rows(size_t words) { joint_rows_.assign(pixels_.size() * words, 0.f); }
   std::span<const float> joint_rows() const { return joint_rows_; }
-  /// Sets the row of pixel `i`.
+  /// Sets the joint transport's row of pixel `i`.
   void set_joint_row(size_t i, std::span<const float> row) {
     std::copy(row.begin(), row.end(), joint_rows_.data() + i * row.size());
   }
@@ -79,14 +80,14 @@ class Film {
   void update_splat_aovs();
   LightSplatLayer& splats() { return splats_; }
   const LightSplatLayer& splats() const { return splats_; }
-  /// Row-major index of an image pixel within the window.
+  /// Returns the row-major index of an image pixel within the window.
   size_t index(uint32_t x, uint32_t y) const { return window_.index(x, y); }
   const Pixel& pixel(size_t i) const { return pixels_[i]; }
   const ErrorSums& error(size_t i) const { return errors_[i]; }
   size_t pixel_count() const { return pixels_.size(); }
   AovFilm& aovs() { return aovs_; }
   const AovFilm& aovs() const { return aovs_; }
-  /// Memory use in bytes.
+  /// Returns the memory use in bytes.
   size_t bytes() const {
     return pixels_.size() * sizeof(Pixel) + aovs_.bytes() + errors_.size() * sizeof(ErrorSums) +
            splats_.bytes() + cascades_.bytes() + joint_rows_.size() * sizeof(float);
@@ -106,28 +107,30 @@ class Film {
   std::vector<float> depth() const;
   /// Returns the sample count of each pixel.
   std::vector<uint32_t> samples() const;
-  /// Returns the variance of each pixel's mean, rgb, under the assumption of independent samples.
-  /// Infinite for pixels with fewer than two samples; empty without error sums.
+  /// Returns the variance (rgb) of each pixel's mean, under the assumption of independent samples.
+  /// The variance is infinite for pixels with fewer than two samples; the result is empty if the
+  /// film has no error sums.
   std::vector<float> variance() const;
 
-  /// Named memory block of the film's state. Copying all blocks to a film of the same size and
-  /// layout restores it from a checkpoint. Deep samples are not included.
+  /// Named memory block of the film's state. To restore a film from a checkpoint, copy all blocks
+  /// to a film of the same size and layout. Deep samples are not included.
   struct Block {
     std::string name;
     std::span<std::byte> bytes;
   };
   std::vector<Block> blocks();
 
-  /// Final layers of a render; empty if not stored.
+  /// Final layers of a render. Layers that are not stored are empty.
   struct Layers {
     std::vector<float> beauty, albedo, normal, depth, variance;
     std::vector<uint32_t> samples;
-    std::vector<AovLayer> aovs;  ///< AovFilm::finish, plus "unbiased" if beauty is reweighted
+    /// Layers of AovFilm::finish, and the layer "unbiased" if fireflies are reduced.
+    std::vector<AovLayer> aovs;
     DeepLayer deep;
   };
-  /// Returns all layers and ends the film. Sums are freed as soon as they are used, because sums
-  /// and layers together are the peak memory of small scenes. `multi_layer_names`: see
-  /// AovFilm::layer.
+  /// Returns all layers; the film cannot be used afterwards. Sums are freed as soon as they have
+  /// been used, because sums and layers together are the peak memory of small scenes.
+  /// `multi_layer_names`: see AovFilm::layer.
   Layers finish(const std::vector<std::string>& multi_layer_names) &&;
 
  private:

@@ -44,7 +44,8 @@ FilterTable::FilterTable(FilterKind kind, float width)
     offsets_[bin] = static_cast<float>(((step + within) / kSteps - 0.5) * width);
   }
   offsets_[kBins + 1] = offsets_[kBins];
-  // Tabulate the density of the interpolated offsets, which differs from the filter in its tails.
+  // Tabulate the density of the interpolated offsets, which differs from the filter's density in
+  // the tails.
   uint32_t from = 0;
   const auto share_below = [&](double x) {
     while (from + 1 < kBins && double{offsets_[from + 1]} <= x) ++from;

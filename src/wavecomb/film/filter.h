@@ -15,18 +15,18 @@ class FilterTable {
  public:
   static constexpr uint32_t kBins = 1024;
 
-  /// Tabulates a filter of full width `width` pixels. Gaussian: sigma = width / 6. Blackman-Harris:
-  /// 4-term window.
+  /// Tabulates a filter of full width `width` pixels. The Gaussian has sigma = width / 6;
+  /// Blackman-Harris is the 4-term window.
   FilterTable(FilterKind kind, float width);
 
-  /// Returns kBins + 2 offsets in pixels; entry i is for u = i / kBins. The last offset is
-  /// repeated.
+  /// Returns the inverse cumulative distribution: kBins + 2 offsets in pixels, where entry i
+  /// belongs to the sample value u = i / kBins. The last offset is stored twice.
   const float* offsets() const { return offsets_.data(); }
 
-  /// Half the filter's full width in pixels.
+  /// Returns half of the filter's full width in pixels.
   float radius() const { return radius_; }
   /// Returns the density per pixel of the sampled offsets at `x` pixels from the pixel centre. This
-  /// value is the weight of light that arrives at that offset.
+  /// density is the filter weight of light that arrives at this offset.
   float density(float x) const {
     const float at = (x + radius_) * density_scale_;
     return at >= 0 && at < float{kBins} ? density_[static_cast<size_t>(at)] : 0.f;

@@ -11,9 +11,9 @@ namespace wavecomb {
 
 /// Estimate of the median of a stream of values with five markers (P^2: Jain and Chlamtac, "The P2
 /// Algorithm for Dynamic Calculation of Quantiles and Histograms Without Storing Observations",
-/// 1985). Values d are positive or infinite. The markers track d / (d + s), which is at most 1,
-/// where s is the first finite value. The state is kWords doubles, all 0 initially, owned by the
-/// caller.
+/// 1985). The values d are positive or infinite. The markers estimate quantiles of d / (d + s),
+/// which is at most 1; s is the first finite value. The caller owns the state of kWords doubles,
+/// which must be 0 initially.
 ///
 /// Contract: the result depends only on the values and their order.
 class MedianSketch {

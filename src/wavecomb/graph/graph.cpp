@@ -10,7 +10,8 @@
 namespace wavecomb {
 namespace {
 
-/// Number of operands, number of components read from operand 0, and number of results.
+/// Properties of an operation: number of operands, number of components read from operand 0, and
+/// number of results.
 struct Shape {
   uint32_t operands, first_width, results;
 };

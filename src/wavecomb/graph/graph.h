@@ -3,7 +3,7 @@
 ///
 /// A register holds one float per SIMD lane; a vector of 2 to 4 components occupies consecutive
 /// registers. Python compiles the shader networks of a stage to such programs
-/// (wavecomb/usd/graphs/values.py); this folder only runs them.
+/// (wavecomb/usd/graphs/values.py); the C++ code in graph/ only runs the programs.
 #pragma once
 
 #include <cstdint>
@@ -14,12 +14,12 @@
 
 namespace wavecomb {
 
-/// Operations, which work per component unless noted. a, b and c are the operands. The order must
-/// match `graph_codes` in the bindings.
+/// Operations of value graphs, which work on each component unless noted. The comments call the
+/// operands a, b and c. The order of the operations must match `graph_codes` in the bindings.
 enum class GraphCode : uint8_t {
-  kCopy,   ///< result component k is operand k
+  kCopy,   ///< component k of the result is operand k
   kInput,  ///< GraphInput `number`
-  kImage,  ///< image `number` at uv coordinates a: r, g, b, alpha
+  kImage,  ///< r, g, b and alpha of image `number` at texture coordinates a
   kAdd,
   kSubtract,
   kMultiply,
@@ -33,8 +33,8 @@ enum class GraphCode : uint8_t {
   kEqual,       ///< 1 if a = b, else 0
   kMix,         ///< a + (b - a) c
   kClamp,       ///< a clamped to [b, c]
-  kSelect,      ///< the result is b if a is not 0, else c
-  kSmoothstep,  ///< smooth step of a from b to c
+  kSelect,      ///< b if a is not 0, else c
+  kSmoothstep,  ///< smoothstep of a between b and c
   kAbs,
   kFloor,
   kSign,
@@ -48,21 +48,24 @@ enum class GraphCode : uint8_t {
   kCross,
   kRgbToHsv,
   kHsvToRgb,
-  kNoise2,  ///< gradient noise at a; `width` uncorrelated values
+  kNoise2,  ///< gradient noise at point a, as `width` uncorrelated values
   kNoise3,
-  kFractal3,  ///< fractal noise at a; `number` octaves, lacunarity b, diminish c
-  kCell2,     ///< cell noise at a; `width` values
+  kFractal3,  ///< fractal noise at point a with `number` octaves, lacunarity b and diminish c
+  kCell2,     ///< cell noise at point a, as `width` values
   kCell3,
-  kWorley2,  ///< Worley noise at a with jitter b: the `width` smallest distances, or the value of
-             ///< the nearest cell if `number` is 1
+  /// Worley noise at point a with jitter b: the `width` smallest distances, or the value of the
+  /// nearest cell if `number` is 1.
+  kWorley2,
   kWorley3,
-  kAttribute,  ///< attribute `number` of the mesh; a if it has none with `width` components
+  /// Attribute `number` of the mesh; operand a if the mesh has no such attribute of `width`
+  /// components.
+  kAttribute,
 };
 inline constexpr uint32_t kGraphCodeCount = 39;
 
 /// Inputs that a hit provides to graphs.
 enum class GraphInput : uint8_t {
-  kUv,             ///< texture coordinates, 2 components; all others have 3
+  kUv,             ///< texture coordinates, with 2 components; all other inputs have 3
   kPosition,       ///< position in world space
   kLocalPosition,  ///< position in the space of the instanced group of meshes
   kNormal,         ///< unit shading normal in world space
@@ -83,7 +86,8 @@ inline constexpr uint32_t graph_input_bit(GraphInput i) {
 
 inline constexpr uint32_t kMaxGraphRegisters = 128;
 inline constexpr uint32_t kMaxGraphOps = 4096;
-/// Bit of an operand that marks an index of a constant; without it, the operand is a register.
+/// Bit of an operand index that is set if the index refers to a constant, and clear if it refers to
+/// a register.
 inline constexpr uint16_t kGraphConstant = 1u << 15;
 inline constexpr uint32_t kNoGraph = 0xffffffffu;
 
@@ -94,7 +98,9 @@ struct GraphOp {
   uint8_t steps;  ///< if bit k is set, operand k is a vector; otherwise one value serves all
                   ///< components
   uint8_t pad = 0;
-  uint16_t to;  ///< first register written; must not overlap registers that are read
+  /// First register to write; the written registers must not overlap registers that the operation
+  /// reads.
+  uint16_t to;
   uint16_t from[4];
   uint16_t number;
 };
@@ -103,10 +109,12 @@ static_assert(sizeof(GraphOp) == 16);
 /// Image that a program reads.
 struct GraphImage {
   uint32_t texture;
-  float stretch;  ///< scale from lengths in mesh uv to lengths in image coordinates
+  /// Scale from distances in mesh texture coordinates to distances in image coordinates.
+  float stretch;
 };
 
-/// Output of a program: index of the parameter it drives, and operand that holds its value.
+/// Output of a program: index of the parameter that it drives, and operand with the parameter's
+/// value.
 struct GraphOutput {
   uint16_t parameter, from;
 };
@@ -117,8 +125,10 @@ struct Graph {
   std::vector<float> constants;
   std::vector<GraphImage> images;
   std::vector<GraphOutput> outputs;
-  std::vector<std::string> attributes;  ///< attribute names; kAttribute operations index them
-  /// Returns whether an output drives any of `count` components from `first` on.
+  /// Names of the attributes that kAttribute operations read by index.
+  std::vector<std::string> attributes;
+  /// Returns whether an output drives any of the `count` parameter components from index `first`
+  /// on.
   bool drives(uint32_t first, uint32_t count = 1) const {
     for (const GraphOutput& o : outputs)
       if (o.parameter >= first && o.parameter < first + count) return true;
@@ -126,7 +136,7 @@ struct Graph {
   }
 };
 
-/// Ranges of a program in the arrays of GraphSet.
+/// Index ranges of a program in the arrays of GraphSet.
 struct GraphProgram {
   uint32_t first_op, op_count, first_constant, first_image, first_output, output_count;
 };
@@ -138,7 +148,7 @@ struct GraphView {
   const float* constants = nullptr;
   const GraphImage* images = nullptr;
   const GraphOutput* outputs = nullptr;
-  uint32_t inputs = 0;  ///< graph_input_bit of all inputs that any program reads
+  uint32_t inputs = 0;  ///< bits (graph_input_bit) of all inputs that any program reads
   AttributeView attributes{};
 };
 
@@ -151,12 +161,13 @@ struct GraphSet {
   std::vector<GraphOutput> outputs;
   uint32_t inputs = 0;
 
-  /// Adds a program that passed check_graph; its attribute numbers must be those of the scene.
+  /// Adds a program that passed check_graph(). Its attribute operations must use the scene's
+  /// attribute ids.
   void add(const Graph& graph);
   /// Returns whether program `graph`, which may be kNoGraph, drives component `parameter`.
   bool drives(uint32_t graph, uint32_t parameter) const;
-  /// Returns whether program `graph`, which may be kNoGraph, reads an input of `bits`
-  /// (graph_input_bit).
+  /// Returns whether program `graph`, which may be kNoGraph, reads any of the inputs in `bits`, a
+  /// combination of graph_input_bit() values.
   bool reads(uint32_t graph, uint32_t bits) const;
   GraphView view() const {
     if (programs.empty()) return {};
@@ -168,8 +179,8 @@ struct GraphSet {
 /// Returns the inputs that a program reads, as bits of graph_input_bit.
 uint32_t graph_inputs(const Graph& graph);
 
-/// Throws Error if a program reads or writes out of range. `name`: the owner of the graph, for the
-/// message. `parameters`: number of components that outputs may drive.
+/// Throws Error if a program reads or writes out of range. `name` is the owner of the graph, for
+/// error messages. `parameters` is the number of parameter components that outputs may drive.
 void check_graph(const Graph& graph, const std::string& name, size_t texture_count,
                  uint32_t parameters);
 

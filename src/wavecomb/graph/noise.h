@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Procedural noise as defined by MaterialX: gradient noise (Perlin, "Improving Noise", 2002) on
 /// Bob Jenkins' lookup3 hash of the lattice, cell noise, and distances to jittered points (Worley,
-/// "A Cellular Texture Basis Function", 1996). Scales and gradients are those of Open Shading
-/// Language, which MaterialX's code generators share.
+/// "A Cellular Texture Basis Function", 1996). The scales and gradients are the same as in Open
+/// Shading Language and in MaterialX's code generators.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -10,7 +10,7 @@
 
 namespace wavecomb::noise {
 
-/// Clamps x so that its floor and neighbouring cells fit an integer; NaN becomes 0.
+/// Clamps x so that its floor and the indices of neighbouring cells fit an integer; NaN becomes 0.
 template <typename F>
 inline F bounded(const F& x) {
   return clamp(select(x == x, x, F(0.f)), F(-1e9f), F(1e9f));
@@ -21,7 +21,8 @@ inline U rotate_left(const U& x, uint32_t k) {
   return (x << k) | (x >> (32 - k));
 }
 
-/// Jenkins' lookup3 hash of N words: mixes the first three, then the remaining one.
+/// Returns Jenkins' lookup3 hash of N words; the hash first mixes up to three words, then the
+/// fourth.
 template <typename U, size_t N>
 inline U hash(const U (&words)[N]) {
   static_assert(N >= 1 && N <= 4);
@@ -56,7 +57,8 @@ inline U hash(const U (&words)[N]) {
 /// Converts 32 bits to a float in [0, 1].
 template <typename F>
 inline F unit_of(const UInt<F>& bits) {
-  // Converts two 16-bit halves exactly, which avoids an unsigned conversion.
+  // Convert the two 16-bit halves separately, which is exact and avoids a slow conversion of
+  // unsigned integers.
   const F high = F(Int<F>(bits >> 16)), low = F(Int<F>(bits & 0xffffu));
   return fma(high, F(65536.f), low) * (1.f / 4294967296.f);
 }
@@ -72,14 +74,14 @@ inline F signed_by(const F& x, const UInt<F>& hash, uint32_t bit) {
   return bits_float<F>(float_bits<F>(x) ^ ((hash >> bit) << 31));
 }
 
-/// Scalar product with one of 8 gradients (+-1, +-2), (+-2, +-1).
+/// Scalar product with one of the 8 gradients (+-1, +-2) and (+-2, +-1).
 template <typename F>
 inline F gradient(const UInt<F>& h, const F (&p)[2]) {
   const Mask<F> swap = Mask<F>((h & 4u) != UInt<F>(0u));
   const F u = select(swap, p[1], p[0]), v = select(swap, p[0], p[1]);
   return signed_by<F>(u, h, 0) + signed_by<F>(F(2.f * v), h, 1);
 }
-/// Scalar product with one of 12 gradients, towards the edges of a cube.
+/// Scalar product with one of 12 gradients, which point to the edge midpoints of a cube.
 template <typename F>
 inline F gradient(const UInt<F>& hash, const F (&p)[3]) {
   using U = UInt<F>;
@@ -90,8 +92,8 @@ inline F gradient(const UInt<F>& hash, const F (&p)[3]) {
   return signed_by<F>(u, h, 0) + signed_by<F>(v, h, 1);
 }
 
-/// Evaluates gradient noise in N dimensions, range about [-1, 1]. Writes K uncorrelated values (1
-/// or 3).
+/// Evaluates gradient noise in N dimensions, range about [-1, 1]. Writes K (1 or 3) uncorrelated
+/// noise values.
 template <size_t K, typename F, size_t N>
 inline void perlin(const F (&p)[N], F* out) {
   using U = UInt<F>;
@@ -147,13 +149,14 @@ inline F cell(const F (&p)[N], uint32_t k) {
   return unit_of<F>(hash(at));
 }
 
-/// Distances to the three nearest feature points, ascending, and the value of the nearest one's
-/// cell.
+/// Distances to the three nearest feature points in ascending order, and the hashed value of the
+/// cell with the nearest feature point.
 template <typename F>
 struct Worley {
   F nearest[3], cell;
 };
-/// Evaluates Worley noise in N dimensions. A `jitter` of 0 puts the points at the cell centres.
+/// Evaluates Worley noise in N dimensions. A `jitter` of 0 puts the feature points at the cell
+/// centres.
 template <typename F, size_t N>
 inline Worley<F> worley(const F (&p)[N], const F& jitter) {
   using U = UInt<F>;
@@ -169,7 +172,7 @@ inline Worley<F> worley(const F (&p)[N], const F& jitter) {
   for (F& x : to_nearest) x = F(0.f);
   constexpr uint32_t kCells = N == 2 ? 9 : 27;
   for (uint32_t c = 0; c < kCells; ++c) {
-    // The first axis varies slowest, as in MaterialX's loops.
+    // Visit cells with the first axis varying slowest, as MaterialX does.
     const uint32_t digits[3] = {N == 2 ? c / 3 : c / 9, N == 2 ? c % 3 : c / 3 % 3, c % 3};
     U at[N + 1];
     for (size_t i = 0; i < N; ++i) at[i] = base[i] + U(digits[i]) - U(1u);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Evaluation of value graphs at hits. Definitions are in run.inl.
+/// Evaluation of value graphs at hits. The functions are defined in run.inl.
 #pragma once
 
 #include "wavecomb/graph/graph.h"
@@ -13,7 +13,7 @@ namespace wavecomb {
 template <typename F>
 struct GraphPoint {
   Vec2<F> uv{F(0.f), F(0.f)};
-  Footprint<F> footprint = F(0.f);  ///< ray footprint in uv
+  Footprint<F> footprint = F(0.f);  ///< ray footprint in texture coordinates
   Vec3<F> position = Vec3<F>(F(0.f)), local_position = Vec3<F>(F(0.f));
   Vec3<F> normal{F(0.f), F(0.f), F(1.f)}, local_normal{F(0.f), F(0.f), F(1.f)};
   Vec3<F> tangent{F(1.f), F(0.f), F(0.f)};
@@ -21,18 +21,18 @@ struct GraphPoint {
   Vec3<F> view{F(0.f), F(0.f), F(1.f)};
   Vec3<F> normal_x{F(1.f), F(0.f), F(0.f)}, normal_y{F(0.f), F(1.f), F(0.f)},
       normal_z{F(0.f), F(0.f), F(1.f)};
-  MeshPosition<F> mesh_position;  ///< position on the mesh, for attributes
+  MeshPosition<F> mesh_position;  ///< position on the mesh, at which attributes are interpolated
 };
 
-/// Runs `program` for all active lanes at `at`. `registers` has room for kMaxGraphRegisters values
-/// and receives the results. The result of a lane depends on its own point only. `textures`:
-/// textures of the scene that images refer to.
+/// Runs `program` for all active lanes with the inputs `at`. `registers` has room for
+/// kMaxGraphRegisters values and receives the results. The result of a lane depends only on that
+/// lane's point. `textures` holds the scene's textures, which the graph's images refer to.
 template <typename F>
 [[gnu::noinline]] void run_graph(const GraphView& view, const GraphProgram& program,
                                  const TextureView* textures, const GraphPoint<F>& at,
                                  const Mask<F>& active, F* registers);
 
-/// Returns the value of an output after run_graph.
+/// Returns the value of an output after a call of run_graph().
 template <typename F>
 inline F graph_output(const GraphView& view, const GraphProgram& program, const GraphOutput& output,
                       const F* registers) {

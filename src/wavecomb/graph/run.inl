@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Definitions for run.h; include only where the templates are instantiated.
+/// Definitions of the function templates in run.h; include this file only where they are
+/// instantiated.
 #pragma once
 
 #include "wavecomb/graph/noise.h"
@@ -51,12 +52,13 @@ inline Vec3<F> rgb_to_hsv(const Vec3<F>& c) {
   const F saturation = select(top > 0.f, F(range / select(top > 0.f, top, F(1.f))), F(0.f));
   return {select(grey, F(0.f), hue), saturation, top};
 }
-/// Inverse of rgb_to_hsv; hue wraps around.
+/// Converts hue, saturation and value to RGB: the inverse of rgb_to_hsv(). Hues outside [0, 1) wrap
+/// around.
 template <typename F>
 inline Vec3<F> hsv_to_rgb(const Vec3<F>& c) {
   const F turns = noise::bounded<F>(c.x), hue = (turns - floor(turns)) * 6.f;
   const auto channel = [&](float shift) {
-    // The ramp is 1 over two sixths of the hue circle, 0 over two sixths, and linear in between.
+    // `ramp` is 1 over two sixths of the hue circle, 0 over two sixths, and linear in between.
     const F k = hue + shift, wrapped = select(k >= 6.f, F(k - 6.f), k);
     const F ramp = clamp(min(wrapped, F(4.f - wrapped)), F(0.f), F(1.f));
     return F(c.z * fma(-c.y, ramp, F(1.f)));
@@ -114,7 +116,7 @@ inline F power(const F& x, const F& y) {
   return select(y == 0.f, F(1.f), wavecomb::pow(x, y));
 }
 
-/// Computes `width` noise values: three from one hash, and a fourth at an offset position.
+/// Computes `width` noise values: up to three from one hash, and a fourth at an offset position.
 template <typename F, size_t N>
 inline void noise_values(const F (&p)[N], uint32_t width, F* out) {
   if (width == 1) {
@@ -160,7 +162,7 @@ inline void fractal_values(const F (&p)[3], uint32_t width, uint32_t count, cons
 }
 
 /// Operation of a graph with its operands and results. An operation reads its operands while it
-/// writes results, so check_graph forbids overlap.
+/// writes results, so check_graph() requires that their registers do not overlap.
 template <typename F>
 struct GraphStep {
   const GraphOp& code;
@@ -195,7 +197,8 @@ struct GraphStep {
   }
 };
 
-/// Runs arithmetic on components. Returns false for operations that are not arithmetic.
+/// Runs an arithmetic operation on each component. Returns false for operations that are not
+/// arithmetic.
 template <typename F>
 WAVECOMB_INLINE bool run_arithmetic(const GraphStep<F>& op) {
   switch (static_cast<GraphCode>(op.code.code)) {
@@ -276,7 +279,7 @@ WAVECOMB_INLINE bool run_arithmetic(const GraphStep<F>& op) {
   }
 }
 
-/// Runs procedural patterns. Returns false for operations that are not procedural patterns.
+/// Runs procedural patterns. Returns false if the operation is not a procedural pattern.
 template <typename F>
 WAVECOMB_INLINE bool run_pattern(const GraphStep<F>& op) {
   switch (static_cast<GraphCode>(op.code.code)) {

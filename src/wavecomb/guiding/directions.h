@@ -31,7 +31,7 @@ inline Vec3<F> octahedral_direction(const F& u, const F& v) {
 template <typename F>
 inline Vec2<F> octahedral_point(const Vec3<F>& w) {
   const F r = safe_sqrt(F(1.f - abs(w.z)));
-  // phi divided by pi / 2, in [0, 1]
+  // angle phi within its quadrant, divided by pi / 2, in [0, 1]
   const F turn = atan2(abs(w.y), abs(w.x)) * (2.f * kInvPi);
   F b = turn * r, a = r - b;
   const Mask<F> below = w.z < 0.f;

@@ -11,7 +11,8 @@ namespace wavecomb {
 namespace {
 
 constexpr uint32_t kMaxRows = 16, kPathsOfTile = 64;
-/// Resolution of sums, and largest luminance that counts, both relative to the median.
+/// Resolution of sums, and limit to which luminances are clamped, both relative to the median
+/// luminance.
 constexpr double kStep = 0x1p-20, kMaxOfMedian = 64;
 
 }  // namespace
@@ -44,7 +45,7 @@ ImageTiles::ImageTiles(const Settings& settings, std::span<const uint32_t> pixel
   const auto mean = [&](const Tile& t) {
     return t.count == 0 ? 0 : kStep * static_cast<double>(t.sum) / static_cast<double>(t.count);
   };
-  // Regularises the division as relMSE does, since few paths can miss the light of a tile.
+  // Regularise the division as in relMSE, since the few paths of a tile may miss its light.
   const double least = 0.05 * mean(all) * mean(all);
   for (const Tile& tile : tiles) {
     const double m = mean(tile);
@@ -65,7 +66,7 @@ void ImageTiles::apply(GuidingView& view) const {
   if (!is_lit()) return;
   view.tiles = table_.data();
   view.tile_rows = rows_;
-  // Uses a slightly smaller factor, so that rounding never leads beyond the last tile.
+  // Use a slightly smaller factor, so that rounding never leads to an index beyond the last tile.
   view.tiles_of_x = static_cast<float>(rows_) / static_cast<float>(width_) * (1 - 0x1p-20f);
   view.tiles_of_y = static_cast<float>(rows_) / static_cast<float>(height_) * (1 - 0x1p-20f);
 }

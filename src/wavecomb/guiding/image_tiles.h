@@ -11,34 +11,35 @@
 
 namespace wavecomb {
 
-/// Brightness of the whole image in at most 16 x 16 tiles of at least 64 paths. Sums are integers,
-/// so the result does not depend on the order of the paths.
+/// Brightness of the whole image in at most 16 x 16 tiles, each with at least 64 paths. Sums are
+/// integers, so the result does not depend on the order of the paths.
 class ImageTiles {
  public:
-  /// Path i belongs to pixel pixels[i] (x | y << 16) and has the radiance luminance[i].
+  /// Path i belongs to pixel pixels[i] (x | y << 16), and its radiance has the luminance
+  /// luminance[i].
   ImageTiles(const Settings& settings, std::span<const uint32_t> pixels,
              std::span<const float> luminance);
-  /// Restores tiles from inverse_scales() of an image of this size. Throws Error if the size does
-  /// not match.
+  /// Restores tiles from inverse_scales() of an image of this size. Throws Error if the number of
+  /// tiles does not match the image size.
   ImageTiles(const Settings& settings, std::vector<double> inverse_scales);
 
   uint32_t count() const { return rows_ * rows_; }
-  /// Returns the tile of a pixel.
+  /// Returns the index of a pixel's tile.
   uint32_t of(uint32_t pixel) const;
-  /// Whether any path contributed light.
+  /// Returns whether any path contributed light.
   bool is_lit() const { return !inverse_.empty(); }
   /// Returns one over the brightness of the image at a pixel: the mean over its tile, with each
   /// path clamped to 64 times the median. Contract: is_lit().
   double inverse_scale(uint32_t pixel) const { return inverse_[of(pixel)]; }
   /// Inverse brightness by tile, row by row; empty if no path contributed light.
   const std::vector<double>& inverse_scales() const { return inverse_; }
-  /// Writes the tiles to `view`, if any path contributed light.
+  /// Sets the tiles of `view`, if any path contributed light.
   void apply(GuidingView& view) const;
 
  private:
   uint32_t width_, height_, rows_ = 1;
   std::vector<double> inverse_;
-  std::vector<float> table_;  ///< inverse_ in single precision
+  std::vector<float> table_;  ///< the values of inverse_ in single precision
 };
 
 }  // namespace wavecomb

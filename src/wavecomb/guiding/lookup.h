@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Lookup and sampling of the guiding field. The definitions are in lookup.inl.
 ///
-/// The BSDF samples a bounce with probability a, the guiding field with 1 - a. Either way the
-/// density of the direction is that of the mixture:
+/// The BSDF samples a bounce with probability a, the guiding field with 1 - a. In both cases, the
+/// density of the direction is the density of the mixture:
 ///   p(wi) = a p_bsdf(wi) + (1 - a) p_guide(wi)
 /// (one-sample model with the balance heuristic, Veach 1997, 9.2.4; path guiding: Vorba et al.
 /// 2014, Mueller et al. 2017). p_guide is constant in each of kGuidingBins bins of equal solid
@@ -18,14 +18,15 @@ namespace wavecomb {
 /// Result of a lookup: the region of a vertex in the guiding field.
 template <typename F>
 struct GuidingLookup {
-  UInt<F> axis{0u};  ///< direction that the surface faces, see guiding_axis
+  UInt<F> axis{0u};  ///< axis direction that the surface faces; see guiding_axis()
   UInt<F> region{kNoGuidingRegion};
-  Vec3<F> offset{F(0.f), F(0.f), F(0.f)};  ///< position relative to the region's sphere, see
-                                           ///< sphere_offset
-  F bsdf_share{1.f};                       ///< a; 1 means: not guided
-  F survival{0.f};                         ///< GuidingView::survival
-  Mask<F> known{false};                    ///< lanes with a region
-  Mask<F> guided{false};                   ///< lanes with a < 1
+  /// Position relative to the region's sphere; see sphere_offset()
+  Vec3<F> offset{F(0.f), F(0.f), F(0.f)};
+  /// The probability a; 1 means that the bounce is not guided.
+  F bsdf_share{1.f};
+  F survival{0.f};        ///< GuidingView::survival
+  Mask<F> known{false};   ///< lanes with a region
+  Mask<F> guided{false};  ///< lanes with a < 1
 };
 
 /// Returns the axis direction closest to `n`: 2 i, or 2 i + 1 if component i is negative.
@@ -46,7 +47,8 @@ template <typename F>
                                                    const UInt<F>& axis, const UInt<F>& material,
                                                    const Mask<F>& active);
 
-/// Density, per solid angle, with which sample_guiding returns the world-space unit vector w.
+/// Returns the density per solid angle with which sample_guiding() samples the world-space unit
+/// vector w.
 template <typename F>
 [[gnu::noinline]] F guiding_pdf(const GuidingView& guide, const GuidingLookup<F>& guiding,
                                 const Vec3<F>& w, const Mask<F>& active);
@@ -56,7 +58,8 @@ template <typename F>
 [[gnu::noinline]] Vec3<F> sample_guiding(const GuidingView& guide, const GuidingLookup<F>& guiding,
                                          const F& u, const F& v, const Mask<F>& active);
 
-/// Returns 1 / (brightness of the image around pixel (x, y)), or 0 if it is not known.
+/// Returns one over the brightness of the image around pixel (x, y), or 0 if the brightness is not
+/// known.
 template <typename F>
 inline F pixel_importance(const GuidingView& guide, const F& x, const F& y, const Mask<F>& active) {
   using U = UInt<F>;

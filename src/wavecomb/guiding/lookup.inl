@@ -60,7 +60,7 @@ inline GuidingBin<F> find_guiding_bin(const uint32_t* tables, const UInt<F>& fir
   return {bin, word};
 }
 
-/// Position of a sample value (u x 65536) within its bin, in [0, 1).
+/// Returns the position of a sample value (u x 65536) within its bin, in [0, 1).
 template <typename F>
 inline F position_in_bin(const F& numbers, const UInt<F>& word) {
   const F start = F(Int<F>(word & 0xffffu)), count = F(Int<F>(word >> 16));

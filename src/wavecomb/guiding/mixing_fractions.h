@@ -9,12 +9,12 @@
 
 namespace wavecomb {
 
-/// Candidate fractions of bounces that the BSDF samples; the last one means no guiding.
+/// Candidate fractions of bounces that the BSDF samples; the last fraction, 1, means no guiding.
 inline constexpr std::array<float, 8> kBsdfShares = {0.25f, 0.35f, 0.45f, 0.55f,
                                                      0.65f, 0.75f, 0.85f, 1.f};
 
 /// Computes p / (a p_bsdf + (1 - a) p_guide) of a bounce for each a in kBsdfShares; 0 if the bounce
-/// has no density of a guiding field.
+/// was not recorded with the density of a guiding field.
 using ShareRatios = std::array<float, kBsdfShares.size()>;
 ShareRatios share_ratios(const TrainingRecord& r);
 
@@ -23,17 +23,18 @@ struct ShareMoments {
   std::array<double, kBsdfShares.size()> sums{};
   double count = 0;
 
-  /// Adds a bounce with its clamped value; a bounce without densities of a field is ignored.
+  /// Adds a bounce with its clamped value. Ignores a bounce without the density of a guiding field.
   void add(const ShareRatios& ratios, double value) {
     if (!(ratios[0] > 0)) return;
     const double squared = value * value;
     for (size_t i = 0; i < sums.size(); ++i) sums[i] += squared * double{ratios[i]};
     count += 1;
   }
-  /// Adds the moments of `other`, multiplied by `factor`.
+  /// Adds the moments and the count of `other`, multiplied by `factor`.
   void add(const ShareMoments& other, double factor);
-  /// Returns the index of the best fraction. That is no guiding, unless another fraction reduces
-  /// the second moment below kWorthwhile of it.
+  /// Returns the index of the best fraction in kBsdfShares. Returns the index that means no guiding
+  /// unless another fraction reduces the second moment below kWorthwhile times the moment without
+  /// guiding.
   size_t best() const;
   static constexpr double kWorthwhile = 0.95;
 };

@@ -6,12 +6,13 @@
 /// the shading point and y the point seen along w, both relative to the centre and in units of the
 /// radius:
 ///   y = o + s w,   |y| = 1,   s = c - o.w,   c = sqrt((o.w)^2 + 1 - |o|^2) = y.w,
-/// y is the direction from the centre. A density p over y becomes p s^2 / c over w: an area element
-/// of the sphere subtends its area from the centre and c / s^2 of it from o. For |o| < 1 the map
-/// from w to y is one-to-one.
+/// where y is also the direction from the centre. A density p over y is the density p s^2 / c over
+/// w, since an area element dA of the unit sphere subtends the solid angle dA from the centre and
+/// (c / s^2) dA from o. For |o| < 1 the map from w to y is one-to-one.
 ///
 /// L. Ruppert, S. Herholz, H. P. A. Lensch, "Robust Fitting of Parallax-Aware Mixtures for Path
-/// Guiding", SIGGRAPH 2020, move the means of lobes this way; bins need the map of all directions.
+/// Guiding", SIGGRAPH 2020, move the means of lobes in this way; a distribution in bins needs the
+/// map for all directions.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -21,14 +22,15 @@ namespace wavecomb {
 
 /// Sphere on which the incident light of a region is assumed to lie.
 struct ParallaxSphere {
-  float centre[3] = {};        ///< centre of the region's positions
-  float inverse_distance = 0;  ///< 1 / radius; 0 means no parallax compensation
+  float centre[3] = {};        ///< mean position of the region's training bounces
+  float inverse_distance = 0;  ///< one over the sphere's radius; 0 means no parallax compensation
 };
 
 /// Maximum distance of a shading point from the centre, in radii.
 inline constexpr float kMaxOffset = 0.7f;
 
-/// Position relative to the centre of the sphere, in radii, clamped to length kMaxOffset.
+/// Returns the position of a shading point relative to the centre of the sphere, in radii, clamped
+/// to length kMaxOffset.
 template <typename F>
 inline Vec3<F> sphere_offset(const Vec3<F>& p, const Vec3<F>& centre, const F& inverse_distance) {
   const auto along = [&](const F& x, const F& m) {
@@ -39,8 +41,8 @@ inline Vec3<F> sphere_offset(const Vec3<F>& p, const Vec3<F>& centre, const F& i
   return o * safe_sqrt(F(most / max(dot(o, o), F(most))));
 }
 
-/// Direction from the centre, and the factor from a density over such directions to a density over
-/// directions from the shading point.
+/// Direction from the centre of the sphere, and the factor that converts a density over such
+/// directions to a density over directions from the shading point.
 template <typename F>
 struct CentreDirection {
   Vec3<F> w;

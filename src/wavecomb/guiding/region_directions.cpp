@@ -12,11 +12,13 @@
 namespace wavecomb {
 namespace {
 
-/// Candidates for the inverse radius, relative to the inverse of the harmonic mean distance.
+/// Candidates for the inverse radius of the parallax sphere, relative to the inverse of the
+/// harmonic mean hit distance.
 constexpr std::array<float, 4> kInverseDistances = {0.f, 0.5f, 1.f, 1.5f};
-/// Number of bounces with which the candidates are compared.
+/// Number of bounces with which the candidate radii are compared.
 constexpr size_t kTried = 2048;
-/// Standard deviation of the blur in radians, and its cutoff in standard deviations.
+/// Standard deviation in radians of the blur of direction bins, and its cutoff in standard
+/// deviations.
 constexpr double kBlur = 0.09, kBlurReach = 3;
 
 Vec3<float> vector_of(const float (&v)[3]) {
@@ -35,7 +37,7 @@ uint32_t bin_of(const TrainingRecord& r, const ParallaxSphere& sphere) {
 }
 
 /// Computes the mean position of the bounces and the mean inverse distance of their hits, weighted
-/// by contribution. No bounce has a weight above `cut`.
+/// by contribution. Weights are clamped to `cut`.
 ParallaxSphere sphere_of(Bounces bounces, double cut) {
   double centre[3] = {}, inverse_distance = 0, weight = 0;
   for (const TrainingRecord* r : bounces) {
@@ -66,7 +68,8 @@ double farthest(Bounces bounces, const ParallaxSphere& sphere) {
   return std::sqrt(most);
 }
 
-/// For each bin, the bins that receive its weight after the blur, with their fractions.
+/// For each direction bin, the bins over which the blur distributes its weight, with their
+/// fractions.
 using Blur = std::array<std::vector<std::pair<uint32_t, double>>, kGuidingBins>;
 
 Blur make_blur() {

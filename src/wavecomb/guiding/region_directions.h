@@ -18,21 +18,21 @@ using DirectionBins = std::array<double, kGuidingBins>;
 /// Returns the unit vector at the centre of a bin.
 Vec3<float> bin_direction(uint32_t bin);
 
-/// Training bounces of one region; not owned.
+/// Training bounces of one region, which the caller owns.
 using Bounces = std::span<const TrainingRecord* const>;
 
-/// Fits the sphere on which the incident light of a region is assumed to lie. Its centre is the
-/// mean position of the bounces. Its radius is the candidate whose direction bins have the largest
-/// sum of squares, that is, the most concentrated distribution. Candidates are multiples of the
-/// mean hit distance, because an opening is nearer than what is seen through it. The value of each
-/// bounce is clamped to `cut`.
+/// Fits the sphere on which the incident light of a region is assumed to lie. The sphere's centre
+/// is the mean position of the bounces. The sphere's radius is the candidate whose direction bins
+/// have the largest sum of squares, that is, the most concentrated distribution. Candidates are
+/// multiples of the mean hit distance, because an opening such as a window is nearer than the
+/// surfaces that rays hit behind it. The value of each bounce is clamped to `cut`.
 ParallaxSphere fit_sphere(Bounces bounces, double cut);
 
-/// Returns `count` of the bounces at equal index intervals, or all if there are fewer.
+/// Returns `count` of the bounces, at equal index intervals, or all bounces if there are fewer.
 std::vector<const TrainingRecord*> subset_of_bounces(Bounces bounces, size_t count);
 
-/// Sums the values of bounces, clamped to `cut`, by their direction as seen from the centre of
-/// `sphere`.
+/// Sums the values of bounces, clamped to `cut`, in bins by their direction as seen from the centre
+/// of `sphere`.
 DirectionBins direction_bins(Bounces bounces, const ParallaxSphere& sphere, double cut);
 
 /// Blurs the bins by about 5 degrees, since a few hundred bounces per region leave gaps.

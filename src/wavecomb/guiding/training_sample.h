@@ -8,11 +8,12 @@ namespace wavecomb {
 
 /// A training bounce that contributes light.
 struct TrainingRecord {
-  float p[3];              ///< position of the vertex
-  float wi[3];             ///< sampled direction
-  float inverse_distance;  ///< 1 / distance to the next hit; 0: no hit; negative: unknown
+  float p[3];   ///< position of the vertex
+  float wi[3];  ///< sampled direction
+  /// One over the distance to the next hit; 0 without a hit, negative if unknown.
+  float inverse_distance;
   uint32_t material;
-  uint8_t axis;  ///< guiding_axis of the surface
+  uint8_t axis;  ///< guiding_axis() of the surface
   /// Radiance that returned along wi, times f |cos| over pdf: a one-sample estimate of the integral
   /// of f L |cos| over directions, with L the incident radiance.
   float value;

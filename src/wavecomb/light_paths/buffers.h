@@ -14,17 +14,18 @@
 
 namespace wavecomb {
 
-/// Purpose of shading the vertices of light paths.
+/// Purpose for which the vertices of light paths are shaded.
 enum class LightVertexUse : uint8_t {
   kToCamera,  ///< connect the vertices to the camera
   kStore,     ///< connect the vertices to the camera and store them
   kConnect,   ///< connect the stored vertices to the camera paths in the same slots
 };
 
-/// Light paths of a worker, and their couplings to its camera paths: the Buffers of a joint
-/// transport (path/joint_transport.h). Everything is empty in renders without light paths.
+/// Buffers for the light paths of a worker, and for their connections to its camera paths: the
+/// Buffers type of a joint transport (path/joint_transport.h). All members are empty in renders
+/// without light paths.
 ///
-/// Contract: owned by one wave, or one reference integrator. Slots must be below `capacity`.
+/// Contract: owned by a single wave or reference integrator. Slots must be below `capacity`.
 struct LightPathBuffers {
   LightPathBuffers(size_t capacity, const LightPathContext& context, const AovLayout& layout,
                    const AovTables* tables)
@@ -36,18 +37,18 @@ struct LightPathBuffers {
         ratio_block_(context.is_active() ? SoaBlock(1, capacity) : SoaBlock()) {
     if (context.is_active()) ratios = ratio_block_.floats(0);
   }
-  static constexpr size_t kSplats = 4096;  ///< size of the buffer of light splats
+  static constexpr size_t kSplats = 4096;  ///< capacity of the buffer of light splats
 
   LightSplatList splats;
   LightVertices vertices;       ///< stored vertices of light paths
-  MergePointRows merge_points;  ///< of camera paths
+  MergePointRows merge_points;  ///< merge points of camera paths
   LightPathAovs aovs;
   LightVertexUse use = LightVertexUse::kToCamera;
-  /// By slot of a camera path: the ratio R of the path (PathState::ratio), or -1 if the path awaits
-  /// a merge.
+  /// Ratio R of the camera path in each slot (PathState::ratio), or -1 if the path still needs a
+  /// vertex for merging.
   float* ratios = nullptr;
 
-  /// Starts the ratio R of the camera paths in `slot` at their first hits: N / G (join.h).
+  /// Initialises the ratio R of the camera paths in `slot` at their first hits to N / G (join.h).
   template <typename F>
   [[gnu::noinline, gnu::cold]] void begin_ratios(const LightPathContext& context,
                                                  const CameraSetup& camera, const UInt<F>& slot,

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Connection of a vertex to a point, such as a vertex of a light path.
 ///
-/// Bounces and light samples of camera paths leave a surface from one of two origins o_s, depending
-/// on their side (path/steps/light_connection.h). A vertex of a light path at p' arrives at p
-/// instead of o_s. The light path uses the ray from o_s to p', like a bounce of a camera path that
-/// hits p', since light paths start at p' without its terminator offset.
+/// Bounces and light samples of camera paths leave a surface point p from one of two origins o_s,
+/// depending on their side (path/steps/light_connection.h). A light path from p', however, arrives
+/// at p and not at o_s. To match the bounce of a camera path that hits p', the connection uses the
+/// ray from o_s to p', where rays of light paths start without the terminator offset.
 #pragma once
 
 #include "wavecomb/core/vec.h"

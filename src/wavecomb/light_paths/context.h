@@ -11,12 +11,12 @@ namespace wavecomb {
 class AimSamples;
 class MergeGrid;
 
-/// Light paths of a render: the Context of a joint transport (path/joint_transport.h). The default
-/// is a render without light paths.
+/// Light paths of a render: the Context of a joint transport (path/joint_transport.h). A
+/// default-constructed context means a render without light paths.
 struct LightPathContext {
   LightPathContext() = default;
   /// `paths_per_sample` is the number of light paths per camera path, averaged over the image.
-  /// `grid` holds the points to merge light paths with, or is null.
+  /// `grid` holds the points with which light paths are merged, or is null.
   LightPathContext(const Settings& settings, const LightSplatFilter& filter, float paths_per_sample,
                    const MergeGrid* grid)
       : filter(&filter),
@@ -28,15 +28,17 @@ struct LightPathContext {
 
   const LightSplatFilter* filter = nullptr;  ///< density of connections to the camera; null without
                                              ///< light paths
-  const MergeGrid* grid = nullptr;           ///< points to merge with; null without merging
+  /// Points with which light paths are merged; null without merging.
+  const MergeGrid* grid = nullptr;
   /// Receives the contributions of light paths instead of the film if it is not null.
   AimSamples* aim_samples = nullptr;
   bool connects = false;  ///< whether vertices of camera paths connect to vertices of light paths
-  float share = 1;        ///< 1 / N, where N is the number of light paths in the image per sample
-  float merge_scale = 0;  ///< merge radius divided by the width of the path's ray cone
-  /// Not 0 in some pilot renders: light splats then carry, instead of light, the variance that this
-  /// light would add to a sample of a pixel if camera paths had to find it, divided by this
-  /// brightness (light_vertex.h). 0 means that splats carry light.
+  /// 1 / N, where N is the number of light paths for each sample of all pixels.
+  float share = 1;
+  float merge_scale = 0;  ///< ratio of the merge radius to the width of the path's ray cone
+  /// If not 0, as in some pilot renders, light splats hold variance instead of light: the variance
+  /// that the light would add to a sample of a pixel if camera paths had to find it, divided by
+  /// this brightness (light_vertex.h). 0 means that splats hold light.
   float camera_squares = 0;
 
   /// Returns whether the render has light paths.

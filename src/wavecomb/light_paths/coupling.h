@@ -9,9 +9,9 @@
 
 namespace wavecomb {
 
-/// Couples a packet of vertices of camera paths to light paths: R in MIS weights, connections with
-/// vertices of light paths, and points to merge light paths with. Does nothing in renders without
-/// light paths.
+/// Couples a packet of camera path vertices to light paths: includes the ratio R in MIS weights,
+/// offers connections to vertices of light paths, and stores points for merging with light paths.
+/// Does nothing in renders without light paths.
 template <typename F>
 class LightPathCoupling {
  public:
@@ -101,14 +101,15 @@ class LightPathCoupling {
  private:
   const LightPathContext& context_;
   const LightPathBuffers& buffers_;
-  JointVertex<F> joint_;  ///< R at the vertex
-  /// Lanes whose bounces so far were all deltas, and that wait for a vertex to merge at.
+  JointVertex<F> joint_;  ///< ratio R at the vertex
+  /// Lanes whose bounces so far were all deltas, so that light paths may be merged at the next
+  /// vertex with a non-delta lobe.
   Mask<F> awaits_merge_;
-  ConnectionOffer<F> offer_;        ///< if vertices connect
-  MergePointOffer<F> merge_point_;  ///< merge point of the vertices, if light paths merge
+  ConnectionOffer<F> offer_;        ///< offered connection, if camera paths connect to light paths
+  MergePointOffer<F> merge_point_;  ///< merge point of the vertex, if light paths are merged
 };
 
-/// Light paths as a joint transport.
+/// Joint transport with light paths (path/joint_transport.h).
 struct LightPaths {
   using Context = LightPathContext;
   using Buffers = LightPathBuffers;

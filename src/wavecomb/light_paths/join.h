@@ -4,29 +4,31 @@
 ///
 /// Three techniques sample a path x_0 (lens) x_1 .. x_n x_L (light): the bounces of a camera path,
 /// the light sample at x_n, and a light path that is connected to the camera at x_1. Let w_i be the
-/// direction from x_i towards the camera and l_i towards the light, g the geometric normal, p->_i
-/// the density of the bounce w_i -> l_i and p<-_i the density of l_i -> w_i, all over solid angle.
-/// The density of the third technique divided by that of the first is
+/// direction from x_i towards the camera and l_i the direction towards the light, g the geometric
+/// normal, p->_i the density of the bounce from w_i to l_i and p<-_i the density of the bounce from
+/// l_i to w_i, all over solid angle. The density of the third technique divided by that of the
+/// first is
 ///   R = N / G  prod_{i=1..n} |g l_i| / (|g w_i| p->_i)  prod_{i=2..n} p<-_i   times  D,
 /// where G is the density of camera paths (camera_connection.h), N the number of light paths in the
 /// image for each sample of a pixel, and D the density of the light (light/emission/emission.h).
-/// Each vertex multiplies its factors into R. At a delta lobe the ratio of densities is the ratio
-/// of the solid angles,
-///   p<- / p-> = |w z| / (|l z| eta^2),   z the shading normal, eta that of w -> l.
-/// R is 0 if light paths cannot make the connection: x_1 is specular, its shading normal is
+/// At each vertex, R is multiplied by the vertex's factors. At a delta lobe the ratio of densities
+/// is the ratio of the solid angles,
+///   p<- / p-> = |w z| / (|l z| eta^2),
+/// where z is the shading normal, and eta the relative index of refraction from w to l. R is 0 if
+/// light paths cannot be connected to the camera, because x_1 is specular, its shading normal is
 /// adjusted to the viewer, or it lies on a fibre.
 ///
 /// With connections between vertices, R is the sum over the third technique and all connections of
-/// x_i to x_i+1. Such a connection has
+/// x_i to x_i+1. For such a connection,
 ///   E_i = d^2 / p->_i   (d is the distance)
-/// in place of p<-_i+1 and of all earlier factors of R:
+/// replaces p<-_i+1 and all earlier factors of R:
 ///   R_n = |g l_n| / (|g w_n| p->_n) (R_n-1 p<-_n + E_n-1).
 /// E is 0 if one of the two vertices scatters as a delta, if light paths cannot reach x_i+1, or if
 /// the viewer is inside an absorbing material.
 ///
 /// With merging, camera paths whose bounces were all deltas have a different third technique: a
-/// light path that ends within r of x_k, the first vertex with a non-delta lobe. Its R starts with
-/// pi r^2 in place of 1 / (G |g w_k|). A delta bounce at x_k sets R to 0.
+/// light path that ends within r of x_k, the first vertex with a non-delta lobe. For this
+/// technique, R starts with pi r^2 in place of 1 / (G |g w_k|). A delta bounce at x_k sets R to 0.
 #pragma once
 
 #include "wavecomb/light/emission/emission.h"
@@ -42,7 +44,8 @@ namespace wavecomb {
 
 inline constexpr float kMaxRatio = 1e30f;
 
-/// Returns the lanes whose delta transmission is not symmetric, as in layered materials.
+/// Returns the lanes whose delta transmission has different densities in the two directions, as in
+/// layered materials.
 template <typename Bsdf, typename F>
 inline Mask<F> is_asymmetric(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>& wi) {
   if constexpr (requires { bsdf.is_layered(); })
@@ -51,20 +54,20 @@ inline Mask<F> is_asymmetric(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>&
     return Mask<F>(false);
 }
 
-/// R at a vertex of a camera path. `ratio` is R up to the previous bounce, or 0 if light paths
-/// cannot reach the vertex.
+/// Ratio R at a vertex of a camera path. `ratio` is R up to the previous bounce, or 0 if light
+/// paths cannot reach the vertex.
 template <typename F>
 struct JointVertex {
   F ratio;
   F inverse_cos;       ///< 1 / |g w|
-  F connection_ratio;  ///< E of the connection between the previous vertex and this one
+  F connection_ratio;  ///< E of the connection between the previous vertex and this vertex
   Mask<F> merges;      ///< lanes where light paths may be merged (merge_point.h)
   F radius2;           ///< squared merge radius
   bool connects;       ///< LightPathContext::connects
 
-  /// Returns R including this vertex for a direction `world` to the light (`local` in the frame),
-  /// as if light samples or bounces had density 1 there: R p<- |g l| / |g w|. Lanes outside
-  /// `wanted` are undefined.
+  /// Returns R including this vertex, R p<- |g l| / |g w|, for a direction `world` to the light
+  /// (`local` in the frame), not yet divided by the density of the light sample or bounce in this
+  /// direction. The result is undefined in lanes outside `wanted`.
   template <typename Bsdf, uint32_t kFeatures, typename Interaction>
   WAVECOMB_INLINE F towards(const Vertex<F, kFeatures>& v, const Interaction& at, const Vec3<F>& wo,
                             const Vec3<F>& world, const Vec3<F>& local,
@@ -82,7 +85,7 @@ struct JointVertex {
   }
 };
 
-/// Computes the state of R at the vertex, before its bounce. `awaits_merge` holds the lanes whose
+/// Computes the state of R at a vertex, before its bounce. `awaits_merge` holds the lanes whose
 /// bounces so far were all deltas.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
 WAVECOMB_INLINE JointVertex<F> joint_vertex(const LightPathContext& context,
@@ -103,8 +106,8 @@ WAVECOMB_INLINE JointVertex<F> joint_vertex(const LightPathContext& context,
     connection_ratio =
         select(can_connect, F(F(v.t * v.t) / select(can_connect, v.path.pdf, F(1.f))), F(0.f));
   }
-  // For a viewer inside an absorbing material, light paths do not know the length of the absorbing
-  // segment.
+  // If the viewer is inside an absorbing material, R is 0, since light paths do not know the length
+  // of the absorbing segment.
   if (Bsdf::kAbsorbs && v.depth == 0) reached = reached & (view_cosine < 0.f);
   JointVertex<F> joint{select(reached, v.path.ratio, zero),
                        F(1.f / select(view_cosine != 0.f, abs(view_cosine), F(1.f))),
@@ -128,10 +131,10 @@ WAVECOMB_INLINE JointVertex<F> joint_vertex(const LightPathContext& context,
 }
 
 /// Returns the MIS weight of the light sample `to_light` against bounces with density `p_bounce`
-/// and light paths. `wi` is its direction in the frame of the vertex. If R includes this vertex
-/// with p_light in place of p_bounce,
+/// and light paths. `wi` is the sample's direction in the frame of the vertex. If R includes this
+/// vertex with p_light in place of p_bounce, the weight is
 ///   w = 1 / (1 + p_bounce / p_light + R D / p_light);
-/// for a point light the last term has p_light d^2 in place of p_light.
+/// for a point light, the last term contains p_light d^2 in place of p_light.
 template <typename Context, typename F>
 WAVECOMB_INLINE F joint_light_weight(const Context& c, const JointVertex<F>& joint,
                                      const LightConnection<F>& to_light, const Vec3<F>& wi,
@@ -152,10 +155,11 @@ WAVECOMB_INLINE F joint_light_weight(const Context& c, const JointVertex<F>& joi
   return 1.f / F(F(1.f + by_bounce) + min(by_path, F(kMaxRatio)));
 }
 
-/// Computes the connection that the vertex offers to a vertex of a light path. With w the direction
-/// to that vertex, the offer has the factors on the camera's side of the contribution
+/// Computes the connection that the vertex offers to a vertex of a light path. Let w be the
+/// direction to the light path's vertex. The offer contains the factors of the camera path in the
+/// contribution
 ///   T f(w, l) |cos| |g w| / |g l| T_light f_light  v / d^2
-/// and of its weight v (light_vertex.h). Uses no random numbers.
+/// and in its MIS weight v (light_vertex.h). The function uses no random numbers.
 template <typename Context, typename F>
 WAVECOMB_INLINE void offer_connection(const Context& context, const JointVertex<F>& joint,
                                       ConnectionOffer<F>& offer) {
@@ -177,8 +181,9 @@ WAVECOMB_INLINE void offer_connection(const Context& context, const JointVertex<
         classify_event<std::remove_cvref_t<decltype(at.bsdf)>, F>(at.bsdf, context.wo, wi);
 }
 
-/// Returns R after the bounce `b` along `world`. `awaits_merge` holds the lanes whose bounces
-/// before it were all deltas, and receives those whose bounces including it were.
+/// Returns R after the bounce `b` along `world`. On input, `awaits_merge` holds the lanes whose
+/// earlier bounces were all deltas; on output, the lanes whose bounces including `b` were all
+/// deltas.
 template <typename Context, typename F>
 WAVECOMB_INLINE F next_ratio(const Context& c, const JointVertex<F>& joint, bool merges,
                              const Vec3<F>& world, const BsdfSample<F>& b, Mask<F>& awaits_merge) {

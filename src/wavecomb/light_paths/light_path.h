@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Start of light paths. Light paths are numbered like the pixels of the image, and a pass traces
-/// the same number of samples of each. Random numbers depend only on the path's number and the
-/// sample, not on the schedule.
+/// the same number of samples of each light path. Random numbers depend only on the path's number
+/// and the sample, not on the schedule.
 #pragma once
 
 #include "wavecomb/core/sampler.h"
@@ -17,8 +17,9 @@
 
 namespace wavecomb {
 
-/// Start of a light path. `eta_scale` is one over its largest flux, so that roulette, which
-/// multiplies the two, sees the remaining fraction of the flux.
+/// Start of a light path. `eta_scale` is one over the largest component of the initial flux, so
+/// that roulette, which multiplies `eta_scale` by the flux, uses the remaining fraction of the
+/// flux.
 template <typename F>
 struct LightPath {
   SampleKey<F> key;
@@ -27,7 +28,7 @@ struct LightPath {
   F weight;  ///< 1 / D
   F eta_scale;
 
-  /// Returns the state of the path on its first ray.
+  /// Returns the state of the light path on its first ray.
   PathState<F> start() const {
     return {.dir = emission.d, .throughput = flux, .eta_scale = eta_scale, .o = emission.o};
   }
@@ -40,9 +41,9 @@ inline U light_path_number(const Settings& settings, const U& pixel) {
   return (pixel >> 16) * settings.width + (pixel & 0xffffu);
 }
 
-/// Returns the sampler key of a light path. All light paths of a sample are points of one sequence,
-/// so that together they are well distributed over lights and directions. The low bits of the
-/// path's number are the index in the sequence.
+/// Returns the sampler key of a light path. All light paths of one sample index are points of a
+/// single sequence, so that they are well distributed over lights and directions. The low bits of
+/// the path's number are its index in the sequence.
 template <typename F>
 inline SampleKey<F> light_path_key(const Settings& settings, const UInt<F>& pixel,
                                    const UInt<F>& sample) {
@@ -74,7 +75,7 @@ inline LightPath<F> begin_light_path(const LightView& lights, const Settings& se
   return path;
 }
 
-/// Parameters of the render that vertices of light paths need.
+/// Parameters of a render for shading vertices of light paths.
 struct LightPathSetup {
   const LightPathContext& paths;
   const CameraSetup& camera;
@@ -89,8 +90,8 @@ inline ShadeSettings light_shade_settings(const Settings& settings) {
   return s;
 }
 
-/// Returns the shutter time of the light path of a pixel and sample. With connections, the time is
-/// that of the camera path.
+/// Returns the shutter time of the light path of a pixel and sample. With connections, the light
+/// path has the time of the camera path that connects to it.
 template <typename F>
 inline F light_path_time(const Settings& settings, const SampleKey<F>& key, const UInt<F>& pixel,
                          const UInt<F>& sample) {
@@ -98,8 +99,8 @@ inline F light_path_time(const Settings& settings, const SampleKey<F>& key, cons
                       settings.connects() ? make_sample_key<F>(pixel, sample, settings.seed) : key);
 }
 
-/// Returns the state of a light path at the end of its ray of length `t`. The ray cone is that of a
-/// camera ray to the hit, so that textures are filtered as the camera sees them.
+/// Returns the state of a light path at the end of its ray of length `t`. The ray cone equals that
+/// of a camera ray to the hit, so that textures are filtered at the camera's resolution.
 template <typename F>
 inline PathState<F> light_path_state(const CameraSetup& camera, const LightPathRow<F>& row,
                                      const F& t, const F& time, const Mask<F>& active) {
@@ -113,17 +114,19 @@ inline PathState<F> light_path_state(const CameraSetup& camera, const LightPathR
           .o = row.o};
 }
 
-/// Result of shading a vertex of a light path. `v.direct` is the contribution to the pixels.
+/// Result of shading a vertex of a light path. `v.direct` is the contribution of the vertex to the
+/// pixels.
 template <typename F>
 struct LightVertexResult {
   VertexResult<F> v;
-  LightPathState<F> next;  ///< beside v.next
-  F x, y;                  ///< film position in pixels, if there is a shadow ray
-  Vec3<F> p;               ///< position of the vertex
-  Mask<F> is_candidate;    ///< whether vertices of camera paths may connect to the vertex
+  LightPathState<F> next;  ///< state of the light path after the bounce, in addition to v.next
+  /// Film position in pixels of the contribution, if there is a shadow ray.
+  F x, y;
+  Vec3<F> p;             ///< position of the light path's vertex
+  Mask<F> is_candidate;  ///< whether vertices of camera paths may connect to the vertex
 };
 
-/// Vertices of camera paths to connect vertices of light paths to, instead of the camera.
+/// Vertices of camera paths to which vertices of light paths connect, instead of to the camera.
 template <typename F>
 struct ConnectionTarget {
   ConnectionRow<F> row;

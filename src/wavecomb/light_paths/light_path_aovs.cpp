@@ -6,9 +6,9 @@
 namespace wavecomb {
 namespace {
 
-/// Parts of a light splat, by light path expression.
+/// Parts of a light splat that belong to each light path expression.
 struct LightSplatParts {
-  uint32_t found = 0;  ///< bit mask of the expressions with a part
+  uint32_t found = 0;  ///< bit mask of the expressions that have a part
   std::array<Color<float>, PathAutomaton::kMaxExpressions> light{};
 
   void add(uint32_t matched, uint32_t colour, float value) {
@@ -21,8 +21,8 @@ struct LightSplatParts {
   }
 };
 
-/// Splits a light splat by expression. The light path, in the states of `row`, ends at the camera
-/// without further scattering.
+/// Splits a light splat by expression. The light path has the automaton states of `row` and ends at
+/// the camera without further scattering.
 LightSplatParts split_light_splat(const BackwardAutomaton& automaton,
                                   const LightPathStateRow<float>& row, const Color<float>& c) {
   LightSplatParts parts;

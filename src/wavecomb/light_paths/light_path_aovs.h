@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-/// AOV values of light paths, and the state that they need: the light that emitted the path (in its
-/// PathRow), the number of scatterings and, for light path expressions, a state of
+/// AOV values of light paths, and the state from which they are computed: the light that emitted
+/// the path (in its PathRow), the number of scatterings and, for light path expressions, a state of
 /// BackwardAutomaton for each colour.
 ///
-/// Lobes are classified as on camera paths (path_expressions.h). A bounce continues as diffuse with
-/// a probability equal to the diffuse fraction; all colours use the same random number of the
-/// vertex. A contribution to the camera is split by the fraction itself. A connection is split at
-/// both vertices.
+/// Lobes are classified as on camera paths (path_expressions.h). A bounce counts as diffuse with a
+/// probability equal to its diffuse fraction, otherwise as glossy; all colours use the same random
+/// number of the vertex. A contribution to the camera is split between diffuse and glossy in
+/// proportion to the fraction. A connection is split at both vertices.
 ///
 ///   begin     a path starts at a light
 ///   shade     a vertex was shaded
@@ -34,16 +34,17 @@ namespace wavecomb {
 /// State of a light path for light path expressions.
 template <typename F>
 struct LightPathStateRow {
-  UInt<F> states;  ///< states of the three colours, in the layout of ExpressionRow
-  // Vertex that was shaded last: the states before it, and its scattering towards the camera.
+  UInt<F> states;  ///< automaton states of the three colours, in the layout of ExpressionRow
+  // Last shaded vertex: the automaton states before the vertex, and its scattering towards the
+  // camera.
   UInt<F> splat_states, splat_event;
   Color<F> splat_diffuse;
   WAVECOMB_FIELDS(states, splat_states, splat_event, splat_diffuse)
 };
 
-/// Connection of a stored vertex of a light path with a vertex of a camera path. Both have the
-/// states before the vertex and the classification of its scattering along the connection; fields
-/// of the camera path start with `camera_`.
+/// Connection of a stored vertex of a light path with a vertex of a camera path. For both vertices,
+/// the row contains the automaton states before the vertex and the classification of the scattering
+/// along the connection. The names of the camera path's fields start with `camera_`.
 template <typename F>
 struct ConnectionStateRow {
   UInt<F> states, event;
@@ -55,20 +56,20 @@ struct ConnectionStateRow {
 
 /// Contribution of a vertex of a light path to the film.
 struct LightSplat {
-  uint32_t slot;   ///< slot of the path
+  uint32_t slot;   ///< slot of the light path
   uint32_t depth;  ///< depth of the vertex
-  uint32_t light;  ///< light that the path left
-  float x, y;      ///< position on the film, pixels
+  uint32_t light;  ///< light at which the path started
+  float x, y;      ///< position on the film in pixels
   Color<float> c;
 };
 
 /// AOV values of the light paths of a wave.
 ///
-/// Contract: owned by one wave, or one reference integrator. Slots must be below the capacity.
+/// Contract: owned by a single wave or reference integrator. Slots must be below the capacity.
 class LightPathAovs {
  public:
   LightPathAovs() = default;
-  /// `tables` may be null if nothing in `layout` needs them.
+  /// `tables` may be null if no AOV in `layout` needs tables.
   LightPathAovs(size_t capacity, const AovLayout& layout, const AovTables* tables, bool connects)
       : layout_(layout), tables_(tables) {
     if (layout.expressions == 0) return;
@@ -79,11 +80,11 @@ class LightPathAovs {
 
   /// Returns whether any AOV layer needs contributions of light paths.
   explicit operator bool() const { return layout_.count > 0; }
-  /// Returns whether vertices must classify their scatterings.
+  /// Returns whether the scattering events of vertices must be classified.
   bool wants_events() const { return backward_ != nullptr; }
   size_t bytes() const { return states_.bytes() + connections_.bytes(); }
 
-  /// Starts paths at lights `light`.
+  /// Initialises the AOV state of light paths that start at lights `light`.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void begin(const UInt<F>& slot, const UInt<F>& light,
                                           const Mask<F>& active) const {
@@ -97,7 +98,7 @@ class LightPathAovs {
                                     active);
   }
 
-  /// Records a shaded vertex, whose scatterings `v` classifies.
+  /// Records a shaded vertex; `v` contains the classification of its scattering events.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void shade(uint32_t depth, const UInt<F>& slot,
                                           const SampleKey<F>& key, const VertexAovs<F>& v,
@@ -112,15 +113,15 @@ class LightPathAovs {
         active);
   }
 
-  /// Marks the vertex that was shaded last as the one to connect to.
+  /// Marks the last shaded vertex as the vertex to which camera paths connect.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void mark_stored(const UInt<F>& slot, const Mask<F>& active) const {
     const UInt<F> states = load_row<LightPathStateRow, F>(states_.rows, slot, active).splat_states;
     scatter_field<F>(connections_.rows, &ConnectionStateRow<float>::states, slot, states, active);
   }
 
-  /// Records the vertices of camera paths that offer a connection. `states` are their states before
-  /// the vertex.
+  /// Records vertices of camera paths that offer a connection. `states` are the automaton states of
+  /// the camera paths before these vertices.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void offer(const UInt<F>& slot, const UInt<F>& states,
                                           const ScatteringEvent<F>& scattering,
@@ -132,7 +133,8 @@ class LightPathAovs {
     store_row<ConnectionStateRow, F>(connections_.rows, slot, row, active);
   }
 
-  /// Records the scattering at the stored vertices of light paths, shaded for the connection.
+  /// Records the scattering events at the stored vertices of light paths that were shaded for a
+  /// connection.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void record_connection(const UInt<F>& slot,
                                                       const ScatteringEvent<F>& scattering,
@@ -143,7 +145,7 @@ class LightPathAovs {
     store_row<ConnectionStateRow, F>(connections_.rows, slot, row, active);
   }
 
-  /// Adds the contribution `c` of connections to the expressions of camera paths.
+  /// Adds the contribution `c` of connections to the light path expressions of camera paths.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void connect(const PathExpressions& to, const UInt<F>& slot,
                                             const Color<F>& c, const Mask<F>& active) const {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// State that light paths carry from vertex to vertex.
+/// State that light paths keep from vertex to vertex.
 #pragma once
 
 #include <cstddef>
@@ -13,15 +13,16 @@ namespace wavecomb {
 /// State of a light path at a vertex, in addition to its PathState.
 template <typename F>
 struct LightPathState {
-  F mis_sum{0.f};     ///< the sum S of the MIS weight (light_vertex.h)
-  F bounce_pdf{0.f};  ///< density of the previous bounce; 0 if its vertex cannot be connected
-  UInt<F> light{0u};  ///< light that the path left
+  F mis_sum{0.f};  ///< the sum S of the MIS weight (light_vertex.h)
+  /// Density of the previous bounce; 0 if the bounce's vertex cannot be connected.
+  F bounce_pdf{0.f};
+  UInt<F> light{0u};  ///< light at which the path started
 };
 
-/// Light path between two vertices, in the same slots as camera paths.
+/// Row of a light path between two vertices, in the same slots as rows of camera paths.
 template <typename F>
 struct LightPathRow {
-  Vec3<F> o, d;         ///< the ray to trace
+  Vec3<F> o, d;         ///< origin and direction of the ray to trace
   Color<F> throughput;  ///< flux
   F mis_sum;            ///< LightPathState::mis_sum
   F eta_scale;
@@ -34,13 +35,14 @@ struct LightPathRow {
   LightPathState<F> light_state() const { return {mis_sum, bounce_pdf, light}; }
 };
 
-// Stages that trace rays and draw random numbers treat both kinds of paths alike.
+// Wave stages that trace rays and use random numbers read camera paths and light paths in the same
+// way.
 static_assert(kFieldWords<LightPathRow> == kFieldWords<PathRow>);
 static_assert(offsetof(LightPathRow<float>, throughput) == offsetof(PathRow<float>, throughput) &&
               offsetof(LightPathRow<float>, eta_scale) == offsetof(PathRow<float>, eta_scale) &&
               offsetof(LightPathRow<float>, key) == offsetof(PathRow<float>, key));
 
-/// Returns the row of a light path whose next ray is that of `next`.
+/// Returns the row of a light path with the next ray and throughput of `next`.
 template <typename F>
 WAVECOMB_INLINE LightPathRow<F> light_path_row(const PathState<F>& next,
                                                const LightPathState<F>& light,

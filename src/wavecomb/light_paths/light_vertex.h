@@ -1,24 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Shading of one vertex of a light path. The wave and the reference integrator share it.
+/// Shading of one vertex of a light path, for both integrators.
 ///
-/// A light path carries flux. Let w be the direction to the camera, l the direction to the light, g
-/// the geometric normal, and f the BSDF as on camera paths (f(w, l) |cos l|, evaluated from w's
-/// side, with radiance scaled by the indices of refraction). A bounce l -> w with density p<-
-/// changes the flux T by
+/// The throughput of a light path is a flux. Let w be the direction to the camera, l the direction
+/// to the light, g the geometric normal, and f the BSDF as on camera paths (f(w, l) |cos l|,
+/// evaluated from w's side, with radiance scaled by the indices of refraction). A bounce from l to
+/// w with density p<- changes the flux T by
 ///   T <- T f(w, l) |cos l| / p<-  |g w| / |g l|
 /// (E. Veach, "Robust Monte Carlo Methods", 1997, section 5.3: shading normals and refraction of
 /// adjoint BSDFs). The contribution of the vertex to a pixel, with the camera density G
 /// (camera_connection.h), is
 ///   T f(w, l) |cos l|  |g w| / |g l|  G  v,   v = 1 / (1 + S (p-> + p_light) |g w| / |g l| G / N).
-/// S is 1 / D at the light, and each vertex multiplies it:
-///   S <- S p-> |g w| / (|g l| p<-);   the first one with p-> + p_light in place of p->.
-/// S is the density of the camera's techniques (join.h) relative to this one.
+/// S is 1 / D at the light, and each vertex updates it:
+///   S <- S p-> |g w| / (|g l| p<-);
+/// the first vertex uses p-> + p_light in place of p->. S is the density of the techniques of
+/// camera paths (join.h) relative to the density of the light path.
 ///
-/// With connections between vertices, S also sums over the connections closer to the light, and
-/// both formulas have (S p-> + F) in place of S p->, with
-///   F = d^2 / p<-   of the bounce that led here over the distance d, or 0 if it was a delta.
-/// A connection to a vertex of a camera path with throughput T', BSDF f' and density p->' of a
-/// bounce towards this vertex contributes
+/// With connections between vertices, S also includes the connections at vertices closer to the
+/// light, and both formulas contain (S p-> + F) in place of S p->, where
+///   F = d^2 / p<-
+/// for the bounce that led to this vertex over the distance d, or 0 if it was a delta. A connection
+/// to a vertex of a camera path with throughput T', BSDF f' and density p->' of a bounce towards
+/// this vertex contributes
 ///   T' f' |cos|  T f(w, l) |cos l|  |g w| / |g l|  v / d^2,
 ///   v = 1 / (1 + r p<- / d^2 + (S (p-> + p_light) + F) |g w| / |g l|  p->' / d^2),
 /// where r is JointVertex::towards of the camera path's vertex: R p<- |g l'| / |g w'|.
@@ -28,7 +30,7 @@
 /// camera paths relative to light paths. Its unweighted contribution is c (1 + x), and the sample
 /// of a camera path has the second moment
 ///   E[sum over light paths of (c (1 + x))^2 / x].
-/// The fraction v of it that belongs to light paths is c^2 (1 + x) / x.
+/// The light that light paths find accounts for the fraction v of this moment, c^2 (1 + x) / x.
 #pragma once
 
 #include <array>
@@ -48,20 +50,20 @@ namespace detail {
 
 /// Lower bound for the density of camera paths relative to light paths.
 inline constexpr float kMinRatio = 1e-9f;
-/// Least cosine between the normals of a merge point and of a vertex that is merged with it.
+/// Minimum cosine between the normals of a merge point and of a vertex that is merged with it.
 inline constexpr float kMinNormalCosine = 0.7f;
 
-/// Shading point of a light path, with the direction that the light arrives from.
+/// Shading point of a light path, with the direction from which light arrives.
 template <typename Bsdf, typename F, typename Interaction>
 struct LightPathPoint {
   const Interaction& at;
-  const LightPathState<F>& from;  ///< state of the path on arrival
+  const LightPathState<F>& from;  ///< state of the light path before the vertex
   Frame<F> frame;
-  Vec3<F> l;  ///< local direction to the light, computed as a connection (light_paths/connection.h)
-  F inverse_cos;          ///< 1 / |g l|
-  Color<F> flux;          ///< flux that arrives
+  Vec3<F> l;      ///< local direction to the light, as for connections (light_paths/connection.h)
+  F inverse_cos;  ///< 1 / |g l|
+  Color<F> flux;  ///< flux that arrives at the vertex
   F connection_density;   ///< F, see above
-  F sampled;              ///< p_light at the first vertex, else 0
+  F sampled;              ///< p_light at the first vertex; 0 at later vertices
   Mask<F> by_light_only;  ///< lanes with a light that bounces cannot hit
   Mask<F> active;
 
@@ -85,7 +87,7 @@ WAVECOMB_INLINE LightPathPoint<Bsdf, F, Interaction> light_path_point(const Vert
                                                                       const Mask<F>& is_first) {
   const Vec3<F> back = -v.path.dir;
   const F cosine = abs(dot(at.s.ng, back));
-  // Direction to the origin of the flux, as a bounce of a camera path would reach it.
+  // Direction to the previous vertex, along the ray of a camera path's bounce that would hit it.
   Connection<F> c = connect_to_point<F>(at, v.path.o);
   const Mask<F> from_infinite =
       is_first & Mask<F>(from.light < UInt<F>(v.scene.lights.infinite_count));
@@ -113,7 +115,7 @@ WAVECOMB_INLINE LightPathPoint<Bsdf, F, Interaction> light_path_point(const Vert
           pack_normal<F>(select<F>(path_point.l.z < 0.f, -path_point.frame.n, path_point.frame.n));
     const CameraPathDensity<F> reach =
         camera_path_density<F>(v.scene.lights, from.light, receiver, c.d, distance, first);
-    // Vertices that have only delta lobes do not sample lights.
+    // Camera paths take no light samples at vertices that have only delta lobes.
     path_point.sampled = select(first & at.bsdf.has_non_delta(), reach.density, F(0.f));
     path_point.by_light_only = first & reach.is_delta;
   }
@@ -128,7 +130,7 @@ WAVECOMB_INLINE LightPathPoint<Bsdf, F, Interaction> light_path_point(const Vert
 }
 
 /// Viewer of a vertex: the direction from the vertex to the viewer, and whether the vertex scatters
-/// towards it.
+/// light towards the viewer.
 template <typename F>
 struct Viewer {
   Vec3<F> w, local;
@@ -151,7 +153,7 @@ WAVECOMB_INLINE Viewer<F> viewer_at(const Vertex<F, kFeatures>& v, const PathPoi
   return out;
 }
 
-/// Sets up the shadow ray towards the viewer at `to`, which carries the contribution `light`.
+/// Sets up the shadow ray towards the viewer at `to`, for the contribution `light`.
 template <typename F, typename PathPoint>
 WAVECOMB_INLINE void set_visibility_ray(const PathPoint& path_point, const Viewer<F>& viewer,
                                         const Vec3<F>& to, const Color<F>& light,
@@ -175,9 +177,9 @@ WAVECOMB_INLINE void record_scattering(const Vertex<F, kFeatures>& v, const Path
         path_point.at.bsdf, viewer.local, path_point.l);
 }
 
-/// Returns the value of a light splat: its contribution `light` or, with camera_squares, its
-/// addition to the variance of camera paths. `relative_density` is the density of camera paths
-/// relative to light paths.
+/// Returns the value of a light splat: the contribution `light` or, if camera_squares is set, the
+/// variance that the light would add to a sample of a camera path. `relative_density` is the
+/// density of camera paths relative to light paths.
 template <typename F>
 WAVECOMB_INLINE Color<F> splat_value(const LightPathSetup& setup, const Color<F>& light,
                                      const F& relative_density) {
@@ -218,8 +220,8 @@ WAVECOMB_INLINE void connect_vertex_to_camera(const Vertex<F, kFeatures>& v,
   record_scattering<F>(v, path_point, viewer);
 }
 
-/// Merges the path with nearby points that the camera sees in mirrors and through glass
-/// (merge_point.h). Each lane handles one point at a time.
+/// Merges light paths with nearby points that the camera sees in mirrors and through glass
+/// (merge_point.h). Each lane processes one point after the other.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename PathPoint>
 WAVECOMB_INLINE void merge(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
                            const PathPoint& path_point) {
@@ -276,7 +278,7 @@ WAVECOMB_INLINE void merge(const Vertex<F, kFeatures>& v, const LightPathSetup& 
   }
 }
 
-/// Connects the vertex to a vertex of a camera path.
+/// Connects the light path's vertex to a vertex of a camera path.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename PathPoint>
 WAVECOMB_INLINE void connect(const Vertex<F, kFeatures>& v, const PathPoint& path_point,
                              const ConnectionRow<F>& target, VertexResult<F>& out) {
@@ -298,7 +300,7 @@ WAVECOMB_INLINE void connect(const Vertex<F, kFeatures>& v, const PathPoint& pat
   record_scattering<F>(v, path_point, viewer);
 }
 
-/// Samples the bounce and the next ray.
+/// Samples the bounce of a light path and its next ray.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename PathPoint>
 WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
                                   const PathPoint& path_point, const Sample4<F>& r,
@@ -350,11 +352,11 @@ WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const LightPath
 
 /// Runs the steps of a vertex of the active lanes' light paths, with shading program `Bsdf`.
 /// `v.hit.time` is the shutter time of the path, and `v.path.cone_width` is the width of a camera
-/// ray's cone at the hit; `from` is the rest of its state. If `v.aovs` wants events, classifies the
-/// scattering towards the viewer
-/// (`light_scattering`) and of the bounce (`bounce`). With a null `target`, the vertex is connected
-/// to the camera and the path continues; otherwise it is connected to the camera path's vertices in
-/// `target`, and `v.depth` has no meaning.
+/// ray's cone at the hit; `from` is the rest of the path's state. If `v.aovs` needs scattering
+/// events, classifies the scattering towards the viewer (`light_scattering`) and the bounce
+/// (`bounce`). With a null `target`, the vertex is connected to the camera and the path continues;
+/// otherwise the vertex is connected to the camera path's vertices in `target`, and `v.depth` is
+/// not used.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE LightVertexResult<F> light_path_steps(const Vertex<F, kFeatures>& v,
                                                       const LightPathState<F>& from,

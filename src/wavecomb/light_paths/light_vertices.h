@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Vertices of light paths that camera paths connect to (docs/light-paths.md).
+/// Vertices of light paths to which camera paths connect (docs/light-paths.md).
 ///
 /// Each camera path is paired with the light path of the same pixel number and sample. One vertex
 /// of the light path is stored, chosen uniformly, and every vertex of the camera path connects to
@@ -17,8 +17,8 @@
 
 namespace wavecomb {
 
-/// Stored vertex of a light path, in addition to the LightPathRow that led there and its
-/// ShadingRecord.
+/// Stored vertex of a light path, in addition to the vertex's ShadingRecord and the LightPathRow of
+/// the ray that hit it.
 template <typename F>
 struct LightVertexRow {
   Vec3<F> p;
@@ -27,14 +27,15 @@ struct LightVertexRow {
   WAVECOMB_FIELDS(p, vertices, depth, material)
 };
 
-/// Connection that a vertex of a camera path offers to the light path's vertex, one row for each
-/// slot.
+/// Connection that a vertex of a camera path offers to the stored vertex of a light path; each slot
+/// has one row.
 template <typename F>
 struct ConnectionRow {
-  Vec3<F> from;  ///< origin of the ray to that vertex
-  F pdf;         ///< solid angle density of the camera path's bounce in that direction
-  /// Contribution for unit radiance from that vertex, times the number of candidate vertices; black
-  /// without a connection.
+  Vec3<F> from;  ///< origin of the ray to the light path's vertex
+  /// Solid angle density of a bounce of the camera path towards the light path's vertex.
+  F pdf;
+  /// Contribution to the pixel for unit radiance from the light path's vertex, times the number of
+  /// candidate vertices; black without a connection.
   Color<F> light;
   F ratio;  ///< JointVertex::towards
   WAVECOMB_FIELDS(from, pdf, light, ratio)
@@ -42,7 +43,7 @@ struct ConnectionRow {
 
 /// Stored vertices and connections of the paths of a wave.
 ///
-/// Contract: owned by one wave, or one reference integrator. Each slot has a row of each kind.
+/// Contract: owned by a single wave or reference integrator. Each slot has a row of each kind.
 class LightVertices {
  public:
   LightVertices() = default;
@@ -58,15 +59,15 @@ class LightVertices {
 
   explicit operator bool() const { return paths != nullptr; }
   size_t bytes() const { return rows_.bytes(); }
-  /// Clears the vertices of slots below `slots`.
+  /// Clears the stored vertices of the first `slots` slots.
   void clear(size_t slots) const {
     std::memset(chosen, 0, slots * kRowWords<LightVertexRow> * sizeof(float));
   }
 
-  float* paths = nullptr;        ///< LightPathRow that arrived at the vertex
-  float* records = nullptr;      ///< ShadingRecord
-  float* chosen = nullptr;       ///< LightVertexRow
-  float* connections = nullptr;  ///< ConnectionRow
+  float* paths = nullptr;        ///< LightPathRow of the ray that hit the vertex, for each slot
+  float* records = nullptr;      ///< ShadingRecord of each slot
+  float* chosen = nullptr;       ///< LightVertexRow of each slot
+  float* connections = nullptr;  ///< ConnectionRow of each slot
 
  private:
   static constexpr size_t kWords = kRowWords<LightPathRow> + kRowWords<ShadingRecord> +
@@ -74,9 +75,9 @@ class LightVertices {
   SoaBlock rows_;
 };
 
-/// Stores the vertex at `p` in the lanes of `is_candidate` that the path's hash selects: of n
-/// vertices so far, the last one replaces the stored one with probability 1 / n. Returns the lanes
-/// whose vertex was stored.
+/// Stores the vertex at `p` in the lanes of `is_candidate` that a hash of the path selects: the
+/// n-th candidate vertex replaces the stored vertex with probability 1 / n (reservoir sampling).
+/// Returns the lanes whose vertex was stored.
 template <typename F>
 inline Mask<F> store_light_vertex(const LightVertices& to, uint32_t depth,
                                   const LightPathRow<F>& path, const ShadingRecord<F>& record,
@@ -102,16 +103,19 @@ inline Mask<F> store_light_vertex(const LightVertices& to, uint32_t depth,
 /// Connection that a vertex of a camera path offers to a vertex of a light path.
 template <typename F>
 struct ConnectionOffer {
-  Vec3<F> to;      ///< position of the light path's vertex
-  F vertices;      ///< LightVertexRow::vertices
-  Mask<F> wanted;  ///< whether such a vertex exists and the path would not exceed the maximum depth
-  ConnectionRow<F> row;  ///< output; black where `wanted` is false
-  /// Output, if light path expressions are active; undefined where `wanted` is false.
+  Vec3<F> to;  ///< position of the light path's vertex
+  F vertices;  ///< LightVertexRow::vertices
+  /// Whether a light path vertex is stored, and the connected path would not exceed the maximum
+  /// depth.
+  Mask<F> wanted;
+  ConnectionRow<F> row;  ///< output: the connection; black where `wanted` is false
+  /// Output: scattering event of the camera path's vertex, if light path expressions are active;
+  /// undefined where `wanted` is false.
   ScatteringEvent<F> scattering{};
 };
 
-/// Returns the offer of camera paths in `slot`, at `depth`, to the light path vertices chosen for
-/// these slots. Its contribution is still black.
+/// Returns an offer from the vertices at `depth` of the camera paths in `slot` to the light path
+/// vertices stored for these slots. The offer's contribution is still black.
 template <typename F>
 inline ConnectionOffer<F> offer_for(const LightVertices& from, const UInt<F>& slot, uint32_t depth,
                                     uint32_t max_depth, const Mask<F>& active) {

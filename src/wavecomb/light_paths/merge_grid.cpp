@@ -13,7 +13,7 @@
 namespace wavecomb {
 namespace {
 
-/// Range of the binary exponents of radii, and exponent of the cell size relative to the radius.
+/// Range of the binary exponents of merge radii, and exponent of the ratio of cell size to radius.
 /// The sphere of a point overlaps at most two cells along each axis.
 constexpr int kMinExponent = -60, kMaxExponent = 60, kCellExponent = 2;
 constexpr size_t kChunk = 8192;
@@ -23,7 +23,7 @@ int exponent_of(float radius) {
 }
 
 int32_t cell_of(float x, float inverse_size) {
-  // Coordinates beyond this limit share one cell.
+  // All coordinates beyond this limit are in the same cell.
   constexpr float kMax = 1e9f;
   return static_cast<int32_t>(std::floor(std::clamp(x * inverse_size, -kMax, kMax)));
 }
@@ -48,7 +48,7 @@ void MergeGrid::build(std::span<const float> points) {
   points_ = points.data();
   const size_t count = points.size() / kMergePointWords;
   const size_t chunks = (count + kChunk - 1) / kChunk;
-  // Calls use(point, bucket) once for each bucket of each point.
+  // Calls use(point, bucket) once for each hash bucket that a point belongs to.
   const auto for_each = [&](const auto& use) {
     parallel_for(chunks, [&](size_t chunk) {
       for (size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
@@ -82,13 +82,14 @@ void MergeGrid::build(std::span<const float> points) {
   levels_.clear();
   for (size_t e = 0; e < has.size(); ++e)
     if (has[e] != 0) levels_.push_back(static_cast<int>(e) + kMinExponent);
-  // The number of buckets is a power of two. The last entry is the end of the last bucket.
+  // The number of hash buckets is a power of two. The last entry of starts_ is the end of the last
+  // bucket.
   starts_.assign(std::bit_ceil(std::max<size_t>(64, 2 * point_count)) + 1, 0);
   const auto counter = [&](uint32_t b) { return std::atomic_ref(starts_[b]); };
   for_each([&](uint32_t, uint32_t b) { counter(b).fetch_add(1, std::memory_order_relaxed); });
   std::inclusive_scan(starts_.begin(), starts_.end(), starts_.begin());
   entries_.resize(starts_.back());
-  // Fills each bucket from its end to its start. The order within a bucket does not matter.
+  // Fill each hash bucket from its end to its start. The order within a bucket does not matter.
   for_each([&](uint32_t point, uint32_t b) {
     entries_[counter(b).fetch_sub(1, std::memory_order_relaxed) - 1] = point;
   });
@@ -100,7 +101,7 @@ bool MergeGrid::Search::next(uint32_t& pixel) {
       pixel = grid_->entries_[begin_++];
       const float* row = grid_->points_ + size_t{pixel} * kMergePointWords;
       const float dx = at_[0] - row[0], dy = at_[1] - row[1], dz = at_[2] - row[2];
-      // A bucket also holds points of other cells and levels with the same hash.
+      // A hash bucket also holds points of other cells and other radius levels with the same hash.
       if (dx * dx + dy * dy + dz * dz < row[3] * row[3] &&
           exponent_of(row[3]) == grid_->levels_[level_ - 1])
         return true;

@@ -13,21 +13,22 @@
 namespace wavecomb {
 
 /// Hash grid of merge points. Each point is stored in the cells that the sphere of its radius
-/// overlaps. The cell size depends on the radius.
+/// overlaps. The cell size depends on the radius of the point.
 ///
 /// Contract: build() must not run during searches.
 class MergeGrid {
  public:
-  /// Builds the grid. `points` holds one row for each pixel and must outlive the grid.
+  /// Builds the grid. `points` holds a MergePoint row for each pixel and must outlive the grid.
   void build(std::span<const float> points);
   const float* points() const { return points_; }
 
-  /// Iterates over the points within whose radius a position lies.
+  /// Iterates over the merge points whose radius exceeds their distance to a given position.
   class Search {
    public:
     Search() = default;
     Search(const MergeGrid& grid, float x, float y, float z) : grid_(&grid), at_{x, y, z} {}
-    /// Advances to the next point and returns its pixel in `pixel`. Returns false at the end.
+    /// Advances to the next point and returns its pixel in `pixel`. Returns false if there is no
+    /// further point.
     bool next(uint32_t& pixel);
 
    private:
@@ -42,13 +43,13 @@ class MergeGrid {
   uint32_t bucket(int exponent, const int32_t (&cell)[3]) const;
 
   const float* points_ = nullptr;
-  std::vector<int> levels_;  ///< exponents of the radii that occur
+  std::vector<int> levels_;  ///< binary exponents of the radii of all points
   std::vector<uint32_t> starts_, entries_;
 };
 
-/// Targets of merging light paths.
+/// Merge points, and the film to which merged light paths contribute.
 struct Merger {
-  const MergeGrid* grid;  ///< null if there are no points
+  const MergeGrid* grid;  ///< null if there are no merge points
   LightSplatList* splats;
   Film* film;
 };

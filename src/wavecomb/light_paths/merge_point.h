@@ -4,13 +4,13 @@
 ///
 /// A camera path whose bounces so far were all deltas (at least one) stores a point at its first
 /// vertex with a non-delta lobe. A light path cannot connect to the camera through a mirror.
-/// Instead, a light path with a vertex within r of the point is treated as if it ended there, where
-/// r is given in pixels as seen at the point. These are the visible points of progressive photon
+/// Instead, a light path with a vertex within a distance r of the point is treated as if it ended
+/// at the point; r is given in pixels. Merge points are the visible points of progressive photon
 /// mapping (T. Hachisuka et al., "Progressive Photon Mapping", 2008). The light of merge points is
 /// splatted to their pixels in integer sums, whose order does not matter.
 ///
-/// A pass has one sample for each pixel, which stores at most one point. The light paths of the
-/// pass are traced after all camera paths.
+/// With merging, a pass has one sample for each pixel, which stores at most one point. The light
+/// paths of the pass are traced after all its camera paths.
 #pragma once
 
 #include <cstring>
@@ -22,14 +22,14 @@
 
 namespace wavecomb {
 
-/// Merge point, as a row.
+/// Row of a merge point.
 template <typename F>
 struct MergePoint {
   Vec3<F> p;
-  F radius;        ///< 0 if there is no point
+  F radius;        ///< merge radius; 0 if there is no point
   Vec3<F> w;       ///< unit vector towards the viewer
   UInt<F> normal;  ///< pack_normal() of the geometric normal
-  Color<F> light;  ///< pixel value for unit radiance along w, before exposure
+  Color<F> light;  ///< contribution to the pixel for unit radiance along w, before exposure
   UInt<F> depth;   ///< number of vertices of the camera path before the point
   WAVECOMB_FIELDS(p, radius, w, normal, light, depth)
 };
@@ -39,12 +39,12 @@ inline constexpr size_t kMergePointWords = kRowWords<MergePoint>;
 template <typename F>
 struct MergePointOffer {
   MergePoint<F> row;
-  Mask<F> stored{false};  ///< lanes that store a point
+  Mask<F> stored{false};  ///< lanes that store a merge point
 };
 
-/// Merge points of the paths of a wave.
+/// Merge points of the camera paths of a wave.
 ///
-/// Contract: owned by one wave, or one reference integrator. Each slot has one row.
+/// Contract: owned by a single wave or reference integrator. Each slot has one row.
 class MergePointRows {
  public:
   MergePointRows() = default;
@@ -56,7 +56,7 @@ class MergePointRows {
 
   explicit operator bool() const { return rows != nullptr; }
   size_t bytes() const { return block_.bytes(); }
-  /// Clears the points of slots below `slots`.
+  /// Clears the merge points of the first `slots` slots.
   void clear(size_t slots) const { std::memset(rows, 0, slots * kMergePointWords * sizeof(float)); }
   std::span<const float> row(size_t slot) const {
     return {rows + slot * kMergePointWords, kMergePointWords};

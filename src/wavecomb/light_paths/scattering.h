@@ -7,8 +7,9 @@
 
 namespace wavecomb {
 
-/// Classifies the scattering from `l` to `w` at a vertex of a light path, or of a connection at a
-/// vertex of a camera path. All lobes count fully, since such lights have no multipliers.
+/// Classifies the scattering from `l` to `w` at a vertex of a light path, or at a vertex of a
+/// camera path for a connection. All lobes have weight 1, since lights that emit light paths have
+/// no multipliers.
 template <typename Bsdf, typename F>
 [[gnu::noinline, gnu::cold]] ScatteringEvent<F> classify_event(const Bsdf bsdf, const Vec3<F> w,
                                                                const Vec3<F> l) {

@@ -11,7 +11,7 @@
 namespace wavecomb {
 namespace {
 
-/// Scale of the sphere around all surfaces, slightly above 1.
+/// Factor, slightly above 1, by which the bounding sphere of all surfaces is enlarged.
 constexpr float kRadiusMargin = 1.001f;
 
 Bounds shape_bounds(const LightGeometry& shape) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Interface of the BSDF of a shading program. Directions are unit vectors in local space: z is the
-/// shading normal, and wo and wi point away from the surface.
+/// Interface of the BSDF of a shading program ("program" below). Directions are unit vectors in
+/// local space: z is the shading normal, and wo and wi point away from the surface.
 ///
 /// A program is a class template `Bsdf<F>` with
 ///
@@ -16,9 +16,8 @@
 ///   BsdfEval<F> eval(wo, wi) const;
 ///   Color<F> diffuse_f_cos(wo, wi) const;   the diffuse part of eval
 ///   BsdfSample<F> sample(wo, u_lobe, u, v) const;    sample values in [0, 1)
-///   Mask<F> is_layered() const;             optional: lanes whose transmission through a delta
-///   lobe
-///                                           differs between the two directions
+///   Mask<F> is_layered() const;             optional: lanes whose delta transmission differs
+///                                           between the two directions
 ///
 /// delta_probability, eval, diffuse_f_cos and sample also accept the result of view(wo) in place of
 /// wo.
@@ -36,16 +35,16 @@
 
 namespace wavecomb {
 
-/// Compile-time properties of a program. A program derives from this struct and overrides members
-/// that differ.
+/// Compile-time properties of a shading program. The class of a program derives from BsdfTraits and
+/// overrides the members whose values differ.
 struct BsdfTraits {
-  static constexpr bool kEmits = false;          ///< whether materials of the program may emit
-  static constexpr bool kAbsorbs = false;        ///< whether the program attenuates rays inside:
-                                                 ///< Params::transmittance
-  static constexpr bool kHasNonDelta = true;     ///< whether the program has lobes that light
-                                                 ///< samples can evaluate
-  static constexpr bool kTransmits = false;      ///< whether non-delta lobes may lead to the other
-                                                 ///< side
+  static constexpr bool kEmits = false;  ///< whether materials of the program may emit
+  /// Whether the program attenuates rays inside objects (Params::transmittance)
+  static constexpr bool kAbsorbs = false;
+  static constexpr bool kHasNonDelta = true;  ///< whether the program has lobes that light
+                                              ///< samples can evaluate
+  /// Whether non-delta lobes may transmit to the other side of the surface.
+  static constexpr bool kTransmits = false;
   static constexpr bool kHasSubsurface = false;  ///< whether the program has subsurface random
                                                  ///< walks and `enters(wo, wi)`
   static constexpr bool kHasTerminator = true;   ///< whether the program offsets rays at the shadow
@@ -54,27 +53,29 @@ struct BsdfTraits {
                                                  ///< textures or graphs
   static constexpr bool kReadsIor = false;       ///< whether the program reads the index of
                                                  ///< refraction
-  static constexpr bool kOnSurface = true;       ///< whether the program shades surface hits; other
-                                                 ///< programs define their own `interact`
+  /// Whether the program shades surface hits; programs of media have an interact() function
+  /// instead.
+  static constexpr bool kOnSurface = true;
   static constexpr bool kOnGaussianSplats = false;  ///< whether the program provides the emission
                                                     ///< of Gaussian splats
-  /// Whether the BSDF describes scattering by a whole fibre: x of the local frame lies along the
-  /// fibre (geometry/hit/fibre_frame.h), and surfaces have no back side. Such a BSDF is not
-  /// reciprocal, so light paths exclude it.
+  /// Whether the program scatters like a whole fibre: the x axis of the local frame lies along the
+  /// fibre (geometry/hit/fibre_frame.h), and the surface does not have two sides. Such a BSDF is
+  /// not reciprocal, so light paths exclude it.
   static constexpr bool kOnFibre = false;
 
-  /// Values that depend on wo only, as input of the functions below: wo itself by default.
+  /// Returns the values that depend only on wo, which functions such as eval() take as input. By
+  /// default, returns wo itself.
   template <typename Wo>
   static const Wo& view(const Wo& wo) {
     return wo;
   }
-  /// Lanes whose light samples may lie on the other side of the surface, for programs that
-  /// transmit. A variant returns the same lanes as the full program.
+  /// Returns the lanes whose light samples may lie on the other side of the surface, for programs
+  /// that transmit. A program variant returns the same lanes as the full program.
   static bool passes_light() { return true; }
 };
 
-/// f(wo, wi) |cos theta_i|, and the solid-angle density with which sample() would choose wi. Value
-/// and pdf exclude delta lobes.
+/// f(wo, wi) |cos theta_i|, and the solid-angle density with which sample() would choose wi. Both
+/// values exclude delta lobes.
 template <typename F>
 struct BsdfEval {
   Color<F> f_cos;
@@ -82,7 +83,7 @@ struct BsdfEval {
 };
 
 /// A sampled direction with weight = f |cos theta_i| / pdf. Lanes without a valid sample have
-/// weight 0 and pdf 0. For a delta lobe, pdf is the probability of choosing it.
+/// weight 0 and pdf 0. For a delta lobe, pdf is the probability of choosing the lobe.
 template <typename F>
 struct BsdfSample {
   Vec3<F> wi;
@@ -90,16 +91,15 @@ struct BsdfSample {
   F pdf;
   Mask<F> is_delta;
   /// Relative index of refraction across the surface (eta_t / eta_i); 1 for reflection and for
-  /// straight transmission. Russian roulette uses this index to remove the radiance scaling of
-  /// refraction from the throughput.
+  /// straight transmission. Throughput includes the radiance scaling of refraction, which Russian
+  /// roulette removes by this factor.
   F eta;
   /// Perceptual roughness of the chosen lobe (1 for diffuse), for ray cones.
   F roughness;
 };
 
-/// Base class of BSDFs that precompute values for a viewing direction wo (`view(wo)`). Adds
-/// overloads that take wo and compute these values; BSDFs import the overloads with
-/// using-declarations.
+/// Base class of programs whose view holds more than wo. Adds overloads that take wo and compute
+/// the view; programs import them with using-declarations.
 template <typename Bsdf, typename F>
 struct ViewedBsdf : BsdfTraits {
   F delta_probability(const Vec3<F>& wo) const { return self().delta_probability(self().view(wo)); }
@@ -144,7 +144,7 @@ struct ShadingParams {
   UInt<F> flags;
 };
 
-/// Material inputs plus the program-specific parameters, in the order of the program's table row
+/// Inputs plus the program-specific parameters, in the order of their row
 /// (material/description/programs.h).
 template <typename F>
 struct SpecificShadingParams : ShadingParams<F> {

@@ -182,7 +182,7 @@ def _welch(a: NDArray[np.float64], b: NDArray[np.float64]) -> tuple[Estimate, fl
     n = min(len(a), len(b))
     if n < 2:
         return Estimate(value, math.nan, math.nan, n), 1.0
-    if max(np.ptp(log_a), np.ptp(log_b)) == 0.0:  # runs without spread give an exact ratio
+    if max(np.ptp(log_a), np.ptp(log_b)) == 0.0:  # if no run times vary, the ratio is exact
         return Estimate(value, value, value, n), 1.0 if value == 1.0 else 0.0
     test = stats.ttest_ind(log_b, log_a, equal_var=False)
     interval = test.confidence_interval(LEVEL)

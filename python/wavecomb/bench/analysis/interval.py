@@ -112,7 +112,7 @@ def bca(of_rows: Callable[..., Array], n: int, *, widened: bool) -> tuple[Array,
     options = {"vectorized": True, "axis": -1, "confidence_level": level}
     rows = (np.arange(n),)
     with warnings.catch_warnings(), np.errstate(invalid="ignore", divide="ignore"):
-        warnings.simplefilter("ignore")  # some statistics do not vary over the resamples
+        warnings.simplefilter("ignore")  # SciPy warns if a statistic is the same for all resamples
         rng = np.random.default_rng(SEED)
         found = stats.bootstrap(rows, of_rows, n_resamples=RESAMPLES, rng=rng, **options)
         plain = stats.bootstrap(
@@ -157,7 +157,7 @@ def paired_p(a: Array, b: Array) -> float:
     """
     stats = needed("scipy.stats", "the analysis")
     with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the test divides by zero if all differences are equal
+        warnings.simplefilter("ignore")  # the t-test divides by zero if all differences are equal
         difference = np.round(np.log(a) - np.log(b), 12)
         found = stats.ttest_1samp(difference[np.isfinite(difference)], 0.0)
     return float(np.nan_to_num(found.pvalue, nan=1.0))

@@ -334,7 +334,8 @@ def difference_figure(
         for text, pixels in pictures
     ]
     limit = float(np.quantile(np.abs([values for _, values in maps]), 0.99)) or 1e-6
-    columns = min(3, max(2, len(maps)))  # a single map would fill the page
+    # At least two columns, since a single map would fill the page width.
+    columns = min(3, max(2, len(maps)))
     lines = -(-len(maps) // columns)
     height, width = reference.shape
     made, axes = figure(

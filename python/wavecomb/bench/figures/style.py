@@ -200,7 +200,8 @@ def svg(drawn: CaptionedFigure) -> str:
     # Verdana has the same widths as DejaVu Sans, and is available where DejaVu Sans is not.
     text = text.replace("'DejaVu Sans'", "'DejaVu Sans', Verdana, sans-serif")
     text = re.sub(r'\b(id="|url\(#|href="#)', rf"\g<1>{drawn.name}-", text)
-    # The page determines the width, and the view box keeps the aspect ratio.
+    # Remove the height of the SVG image: the page determines its width, and its view box the aspect
+    # ratio.
     return re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1)
 
 

@@ -134,7 +134,7 @@ def _curves(out: Writer, key: str, runs: pd.DataFrame) -> None:
 
     factor = str(runs["factor"].iloc[0])
     if factor and runs["factor_value"].notna().all():
-        # The name of such a stage ends with the value of its varied option.
+        # The name of a stage with a varied option ends with the value of that option.
         bases = runs["stage"].map(lambda stage: stage.partition(f"-{factor}-")[0])
         curves(bases, "factor_value", factor.replace("_", " "), "curve")
         return

@@ -61,7 +61,7 @@ def suite_infos() -> list[SuiteInfo]:
         try:
             found.append(suite_info(name))
         except WavecombError:
-            continue  # The suite needs a property of the machine that is unknown here.
+            continue  # The suite depends on a property of the machine that cannot be determined.
     return sorted(found, key=lambda info: info.seconds * info.repetitions)
 
 

@@ -66,7 +66,8 @@ class BenchPanel(TakesFiles, QWidget):
         self.suite.event.connect(self._take)
         self.suite.said.connect(self._log_line)
         self.suite.finished.connect(self._end_suite)
-        self.helper = Command(self)  # Process that makes the estimate and the report.
+        # Process that estimates the duration of a suite and writes its report.
+        self.helper = Command(self)
         self.helper.finished.connect(self._end_helper)
         self.choice = SuiteChoice(self)
         self.choice.failed.connect(self._fail)
@@ -211,7 +212,8 @@ class BenchPanel(TakesFiles, QWidget):
 
     def _end_suite(self, code: int, text: str, error: str) -> None:
         self._measuring = False
-        if self._session.state != "stopped":  # In this state the user stopped the viewport.
+        # "stopped" means that the user stopped the viewport's render.
+        if self._session.state != "stopped":
             self._session.resume()
         self._enable(True)
         self.bar.setRange(0, max(self._runs, 1))

@@ -154,7 +154,8 @@ class Jobs(QObject):
             self.numbers.emit(self._numbers)
         self._want_map()
         if self._ask is not None and self._ask.figures() not in self._flip:
-            self._want_flip(self._ask, high_range=False)  # The images have changed meanwhile.
+            # The images have changed since the last request.
+            self._want_flip(self._ask, high_range=False)
 
     def _with_flip(self, ask: Ask, found: Numbers) -> Numbers:
         values = self._flip[ask.figures()]

@@ -79,7 +79,8 @@ class LiveSettings(QWidget):
         control.setObjectName(f"{row.field}{self._source.name}")
         control.setAccessibleName(f"{row.label} of {self._source.name}")
         if isinstance(control, ChoiceBox):
-            control.setMinimumContentsLength(7)  # Three columns must fit side by side.
+            # Limit the width, so that three columns fit side by side.
+            control.setMinimumContentsLength(7)
         else:
             control.setGroupSeparatorShown(False)
         self._widgets[row.field] = control

@@ -85,7 +85,7 @@ class Autosave(QObject):
             if not self._waits:
                 self.discard()
             return
-        self._waits = False  # New edits replace the edits not restored.
+        self._waits = False  # New edits replace saved edits that were not restored.
         with contextlib.suppress(WavecombError, OSError):
             save_edits(self._edits.edits.stage, self._file)
 

@@ -30,7 +30,7 @@ def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:
     base = Path(root.realPath)
     try:
         name = os.path.relpath(base, folder)
-    except ValueError:  # On Windows, the drives may differ.
+    except ValueError:  # On Windows, there is no relative path between different drives.
         name = str(base)
     name = Path(name).as_posix()
     layer.subLayerPaths = [name if name.startswith(("../", "/")) else f"./{name}"]

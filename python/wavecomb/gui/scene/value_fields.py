@@ -160,7 +160,7 @@ class NumberField(Field):
         self.row.addWidget(self.spin)
         self.finish()
         self._place(self.spin.value())
-        # The range of the values alone would make the field wider.
+        # Set a fixed width, because Qt would size the field for the largest possible value.
         widest = max(f"{bounds.soft_high:.{bounds.decimals}f}", "-0.000", key=len)
         text = self.spin.fontMetrics().horizontalAdvance(widest)
         self.spin.setFixedWidth(max(text + theme.em(2.2), theme.em(5)))
@@ -230,8 +230,8 @@ class ColourField(Field):
         numbers = QHBoxLayout()
         numbers.setSpacing(theme.em(0.2))
         self.spins = [_Spin(bounds, f"{name}, {part}") for part in ("red", "green", "blue")]
-        # Exact values of the three components. The boxes show rounded values; only typed values
-        # replace the exact ones.
+        # Exact values of the three components. The boxes show rounded values; the exact values
+        # change only if the user types new values.
         self._parts = [0.0, 0.0, 0.0]
         for part, spin in enumerate(self.spins):
             spin.setButtonSymbols(QDoubleSpinBox.ButtonSymbols.NoButtons)

@@ -67,16 +67,16 @@ class Rounds(QObject):
         self._version = -1  # Marks the following change of settings as made by this object.
         version = session.version
         if not session.change(**self._steps[self._done]):
-            return  # The failed signal ends the sequence.
+            return  # The signal `failed` ends the sequence of renders.
         if session.version == version:
-            session.restart()  # The settings are already the current ones.
+            session.restart()  # The render already has these settings, so start it again.
         self._version = session.version
         self._timer.start(LIMIT_MS)
 
     def _look(self, frame: Frame) -> None:
         ours = self.running and frame.version == self._version
         if ours and frame.final and frame.scale == 1 and not frame.status.get("cancelled"):
-            self._version = -1  # Ignores denoised versions of the same frame.
+            self._version = -1  # Ignore later denoised versions of the same frame.
             self._timer.start(0)
 
     def _next(self) -> None:

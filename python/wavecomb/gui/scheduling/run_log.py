@@ -84,7 +84,7 @@ class Run:
         look = take_look(stats)
         self.stats = stats
         if look.seconds <= self.last.seconds:
-            return  # No time has passed since the previous look.
+            return  # No time has passed since the previous snapshot of the statistics.
         self.looks.append(look)
         if len(self.looks) > MAX_LOOKS:
             self.looks = [*self.looks[:-1:2], look]
@@ -176,7 +176,7 @@ class RunLog:
             series.runs.append(Run())
         elif not series.run.continues(look):
             if series.run.finished and look.samples == series.run.last.samples:
-                return series  # These are repeated statistics of a finished run.
+                return series  # The finished run has reported its final statistics once more.
             self._end_run()
             if series not in self.series:
                 self.series.append(series)

@@ -106,7 +106,7 @@ def rate(run: Run, counter: str) -> Rate:
     if n < 2 or value <= 0.0:
         return Rate(value, 0.0, n, last.seconds)
     total = sum(b.seconds - a.seconds for a, b in pairs)
-    # Intervals have weights proportional to their duration.
+    # The variance weights each time interval in proportion to its duration.
     squares = sum(
         (getattr(b, counter) - getattr(a, counter) - value * (b.seconds - a.seconds)) ** 2
         / (b.seconds - a.seconds)
@@ -159,8 +159,8 @@ def compare_runs(run: Run, base: Run) -> Ratio:
     ends = [samples * k / n for k in range(n + 1)]
     mine = [time_of(run, b) - time_of(run, a) for a, b in pairwise(ends)]
     theirs = [time_of(base, b) - time_of(base, a) for a, b in pairwise(ends)]
-    # The estimator is sum(theirs) / sum(mine). The variance of the ratio is that of theirs - value
-    # * mine.
+    # The ratio is estimated by value = sum(theirs) / sum(mine). Its variance follows from the
+    # variance of theirs - value * mine.
     rest = [b - value * a for a, b in zip(mine, theirs, strict=True)]
     error = math.sqrt(sum(r * r for r in rest) * n / (n - 1)) / sum(mine)
     half = t975(n - 1) * error / value

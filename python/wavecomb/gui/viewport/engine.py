@@ -136,7 +136,7 @@ class Engine:
         """Stops the current task; its image stays visible."""
         with self._condition:
             if self._task is not None:
-                self._task.moving = True  # applies its edits, for which a reduced image is enough
+                self._task.moving = True  # a reduced image suffices to apply the task's edits
             self._end_running()
 
     def _end_running(self) -> None:

@@ -74,7 +74,8 @@ class Gizmo(QObject):
 
     @property
     def _view(self) -> PictureView:
-        return cast("PictureView", self.parent())  # An attribute would make a cycle of references.
+        # A view stored in an attribute would form a reference cycle.
+        return cast("PictureView", self.parent())
 
     def set_mode(self, mode: str) -> None:
         """Shows the handles of a mode, or hides the handles if that mode is already active."""

@@ -133,14 +133,15 @@ class Live(QObject):
         self._pending = Edit()
         self._moving = False
         self._awaiting = False
-        self._is_reduced = False  # Whether the current task asks only for a reduced image.
+        self._is_reduced = False  # Whether the current task renders only a reduced image.
         self._submitted = 0.0
-        self._denoised = self._denoising = 0  # samples of the images that were denoised last
+        # Sample counts of the last denoised image and of the image being denoised.
+        self._denoised = self._denoising = 0
         self._settle = QTimer(self)
         self._settle.setSingleShot(True)
         self._settle.setInterval(SETTLE_MS)
         self._settle.timeout.connect(self.settle)
-        # The render thread only holds the News object, which is not a Qt object.
+        # The render thread must not hold Qt objects, so it reports to a News object.
         self._news = News(port(self._receive))
         self._engine = Engine(self._news)
         self._denoiser = Worker("denoise", self)
@@ -216,7 +217,8 @@ class Live(QObject):
         if self._moving:
             self._moving = False
             if self._pending or not (self._awaiting and self._is_reduced):
-                self._flush()  # otherwise after the reduced image, which is being rendered
+                # Otherwise _flush() follows the reduced image, which is being rendered.
+                self._flush()
 
     def restart(self) -> None:
         """Restarts the render from the first sample."""
@@ -262,7 +264,8 @@ class Live(QObject):
 
     def _submit(self, task: Task) -> None:
         self.version = task.version = next(self._numbers)
-        # During a movement, the previous image may still be on its way to the screen.
+        # While the camera moves, accept the previous image, which may not have reached the screen
+        # yet.
         last = self.last_frame.version if self.last_frame is not None else self.version
         self.oldest = last if task.moving else self.version
         self._is_reduced = task.moving
@@ -294,7 +297,7 @@ class Live(QObject):
 
     def _take_statistics(self, news: tuple[dict[str, Any], int]) -> None:
         statistics, version = news
-        if version == self.version:  # statistics of an older version do not describe this one
+        if version == self.version:  # ignore statistics of an older version of the settings
             self.statistics.emit(statistics)
 
     def _warn(self, key: object, line: str) -> None:
@@ -311,7 +314,8 @@ class Live(QObject):
         self._awaiting = False
         last = self.last_frame
         if last is not None and (last.version, last.scale) == (frame.version, frame.scale):
-            # Without a result, the reduced image stays until the frame looks better.
+            # Until a denoised image of this version exists, show the reduced denoised image, as
+            # long as the frame has few samples.
             if self._denoised or frame.samples_done <= LATE * frame.width * frame.height:
                 frame = replace(frame, denoised=last.denoised)
         else:

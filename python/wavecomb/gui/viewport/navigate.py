@@ -193,7 +193,7 @@ def opposite(pose: Pose, pivot: Vector, up_axis: str) -> Pose:
 def _framed(pose: Pose, axes: Matrix, points: Matrix, aspect: float) -> Pose:
     low, high = points.min(axis=0), points.max(axis=0)
     centre = 0.5 * (low + high)
-    if pose.projection == "latlong":  # such a camera sees everything from the centre
+    if pose.projection == "latlong":  # a latlong camera at the centre sees all points
         return _placed(pose, axes, centre)
     x0, x1, y0, y1 = pose.fitted(round(1000 * aspect), 1000)
     half = 0.5 * (x1 - x0), 0.5 * (y1 - y0)
@@ -207,7 +207,7 @@ def _framed(pose: Pose, axes: Matrix, points: Matrix, aspect: float) -> Pose:
     else:
         place = fit(points, axes, half)
         distance = depth = float((place - centre) @ axes[2])
-    # A camera with an off-axis window looks past the centre, so shift it.
+    # The centre of an off-axis camera window is not on the viewing axis, so shift the camera.
     shift = -0.5 * (x0 + x1) * depth * axes[0] - 0.5 * (y0 + y1) * depth * axes[1]
     framed = _placed(pose, axes, place + shift)
     near = min(framed.value("near_clip"), 1e-3 * distance)

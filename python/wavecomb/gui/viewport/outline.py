@@ -74,7 +74,8 @@ class Outline(QObject):
 
     @property
     def _view(self) -> PictureView:
-        return cast("PictureView", self.parent())  # An attribute would make a cycle of references.
+        # A view stored in an attribute would form a reference cycle.
+        return cast("PictureView", self.parent())
 
     def close(self) -> None:
         """Ends the thread of the outline."""

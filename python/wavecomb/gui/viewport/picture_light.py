@@ -103,7 +103,8 @@ class PictureLight(QWidget):
         self, key: Any, place: Any, settings: dict[str, Any], version: int, mark: str
     ) -> None:
         verdict = self.book.add(key, place, mark, settings)
-        # A first image with more samples does not invalidate a verdict for fewer samples.
+        # If there is nothing to compare the new image with, keep the verdict of an earlier image
+        # with fewer samples.
         weaker = verdict.kind == "first" and self.verdict.kind in ("same", "different")
         if verdict.kind == "different" or (version == self._session.version and not weaker):
             self._show(verdict)

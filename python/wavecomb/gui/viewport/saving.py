@@ -72,7 +72,7 @@ def save_frame(
     if frame.scale != 1:
         raise WavecombError("there is only a preview so far: save again a little later")
     if frame.setup.denoise:
-        # The shown denoised image may belong to an earlier pass.
+        # The displayed denoised image may belong to an earlier pass.
         frame = replace(frame, denoised=denoised_frame(frame)[1])
     picture = picture_of_frame(frame, scene, loaded)
     as_rendered = look.layer in ("beauty", "denoised") and look.view in (LINEAR, NEUTRAL)

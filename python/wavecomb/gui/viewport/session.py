@@ -191,7 +191,7 @@ class Session(Live):
     def _take_stage(self, number: int, found: Read) -> None:
         request, usd, loaded = self._request_wanted, found.usd, found.stage
         if self._closed or request is None or number != self._reading:
-            return  # A newer request is being loaded.
+            return  # A newer request to load a stage has replaced this one.
         again = request.usd is not None
         if not again or request.fresh:
             self.material_edits.clear()

@@ -55,7 +55,7 @@ class Watch:
         pause = max(10.0 * (now - start), 0.1 if now - self._begun < 5.0 else 0.4)
         self._next = now + min(pause, 1.0)
         if self._engine.paused:
-            if not said:  # The pause began while the frame was made.
+            if not said:  # The render was paused while this frame was made.
                 self._send(snapshot)
             self._stand_still()
 

@@ -107,7 +107,7 @@ def flip(
     test, reference = (np.ascontiguousarray(p, np.float32) for p in kept)
     if np.array_equal(test, reference):
         return np.zeros(test.shape[:2], np.float32)
-    # The library would terminate the process.
+    # For a black reference, the FLIP library would terminate the process.
     if high_range and not reference.any():
         raise ValueError("HDR-FLIP takes its exposures from the reference, which is black")
     values, _, _ = evaluator.evaluate(

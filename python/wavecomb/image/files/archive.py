@@ -51,8 +51,8 @@ def read_archive(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:
                 }
         except ArchiveError:
             raise
-        # RecursionError: nested JSON. NotImplementedError, RuntimeError: unsupported kinds of zip
-        # files.
+        # Deeply nested JSON raises RecursionError; unsupported kinds of zip files raise
+        # NotImplementedError or RuntimeError.
         except (
             ValueError, KeyError, TypeError, AttributeError, EOFError, OSError, OverflowError,
             MemoryError, RuntimeError, SyntaxError, struct.error, zipfile.BadZipFile, zlib.error,

@@ -55,7 +55,7 @@ class PrivateFolder:
                 raise
             if _try_lock(self._lock) is not False and _is_linked(self._lock):
                 return
-            # ``remove_abandoned`` removed the file before it was locked.
+            # ``remove_abandoned`` removed the lock file before this process locked it.
             os.close(self._lock)
 
     def close(self) -> None:

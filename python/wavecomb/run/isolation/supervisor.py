@@ -264,7 +264,8 @@ def become_child(given: str) -> None:
     _is_child = True
     found = json.loads(given)
     channel = socket.socket(fileno=found["channel"])
-    # The kernel attaches this process's id in the parent's namespace.
+    # Send a message, to which the kernel attaches the id of this process in the PID namespace of
+    # the parent.
     channel.sendall(b"h")
     # Wait until the parent has added this process to its control group.
     channel.recv(1)
@@ -280,7 +281,8 @@ def become_child(given: str) -> None:
 
 def _become_expendable(parent: int, page: int, words: int) -> None:
     os.setpgid(0, 0)
-    # Outside of the terminal's foreground group, writing must not stop the process.
+    # Ignore SIGTTOU, so that writing to the terminal from outside its foreground process group does
+    # not stop the process.
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
     end_with_parent(parent)
     progress_notes.start(page)
@@ -324,7 +326,7 @@ def _wait(process: int, child: Callable[[], int]) -> tuple[int, set[int]]:
             continue
         target = child() or process
         with contextlib.suppress(ProcessLookupError):
-            # Ctrl-Z stops both processes; SIGCONT continues both.
+            # Ctrl-Z stops both the parent and the sandboxed process; SIGCONT continues both.
             if number == signal.SIGTSTP:
                 os.kill(target, signal.SIGSTOP)
                 os.kill(os.getpid(), signal.SIGSTOP)

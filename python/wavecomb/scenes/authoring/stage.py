@@ -372,8 +372,8 @@ class StageWriter:
             focal_mm: Focal length in mm; the aperture follows from it and the angle of view.
         """
         camera = UsdGeom.Camera.Define(self.stage, "/World/Camera")
-        # USD's camera units are tenths of a scene unit. Only the ratio of focal length to aperture
-        # matters.
+        # USD's camera units are tenths of a scene unit. Since only the ratio of focal length to
+        # aperture matters, the unit does not have to be exact.
         aperture = 2.0 * focal_mm * math.tan(math.radians(0.5 * fov_degrees))
         camera.CreateFocalLengthAttr(focal_mm)
         camera.CreateHorizontalApertureAttr(aperture)

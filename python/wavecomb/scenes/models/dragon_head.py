@@ -89,7 +89,7 @@ _TONGUE = (
     (0.2, -0.14, 0.0, 0.08, 0.03), (0.45, -0.21, 0.0, 0.07, 0.025),
     (0.7, -0.24, 0.02, 0.05, 0.02), (0.95, -0.14, 0.03, 0.005, 0.004),
 )  # fmt: skip
-# Parts that exist on both sides, with z pointing away from the middle.
+# Add the parts that exist on both sides of the head, with z pointing away from the middle.
 _BROW = (
     (0.56, 0.09, 0.09, 0.02, 0.02), (0.45, 0.20, 0.17, 0.045, 0.04),
     (0.33, 0.235, 0.215, 0.055, 0.045), (0.20, 0.24, 0.25, 0.05, 0.045),
@@ -134,7 +134,7 @@ def head_tubes() -> list[Tube]:
         *_head_side(1.0),
         *_head_side(-1.0),
     ]
-    # A crest between the horns and a horn on the nose.
+    # Add a crest between the horns, and a horn on the nose.
     for k in range(4):
         x, h = 0.26 - 0.11 * k, 0.13 + 0.035 * k
         path = [x - 0.05, 0.30 + h * 0.5, 0], [x - 0.2, 0.3 + h, 0]
@@ -175,7 +175,7 @@ def _head_side(side: float) -> list[Tube]:
         y, z = -0.37 + 0.38 * (0.86 - x), 0.06 + 0.12 * (0.86 - x)
         bend, tip = at(x + 0.01, y + 0.6 * length, z + 0.008), at(x - 0.01, y + length, z)
         parts.append(spike(at(x, y, z), bend, tip, radius=radius, up=(1, 0, 0)))
-    # Mane: two fans of tufts behind the cheek, the outer one shorter.
+    # The mane consists of two fans of tufts behind the cheek, of which the outer fan is shorter.
     for k in range(7):
         a = np.radians(-62.0 + 22.0 * k)
         y, z = 0.22 * np.sin(a), 0.20 * np.cos(a)
@@ -188,7 +188,7 @@ def _head_side(side: float) -> list[Tube]:
         ]
         up, fold = (0, np.cos(a), -side * np.sin(a)), fluted(8, 0.09)
         parts.append(spike(*path, radius=0.075, flat=0.45, up=up, relief=fold, bulge=1.15))
-    # Beard along the jaw.
+    # Add the dragon's beard along the jaw.
     for k in range(4):
         x = 0.08 + 0.17 * k
         y = -0.20 - 0.40 * max(x - 0.12, 0.0)

@@ -48,7 +48,7 @@ def load_dragon(path: Path) -> Mesh:
     if not path.is_file():
         raise SceneError(f"{path}: no such mesh file")
     try:
-        with np.errstate(invalid="ignore"):  # _check reports an index that is not a number
+        with np.errstate(invalid="ignore"):  # _check() reports NaN indices
             raw = _read(path)
         _check(raw)
     except (OSError, EOFError, zlib.error, UnicodeDecodeError, OverflowError) as error:

@@ -208,7 +208,7 @@ def pillow(width: float, depth: float, thickness: float, cells: int = 20) -> Mes
     sides = []
     for sign in (1.0, -1.0):
         points = np.round(np.stack([*flat, sign * swell], 2), _WELD_DIGITS)
-        # Rows run up and columns right, so their cross product points away from +z.
+        # Grid rows run along +y and columns along +x, so the grid's default normals point along -z.
         sides.append(grid_mesh(points, uv, np.zeros(points.shape), reverse=sign > 0.0))
     both = merge(sides)
     return replace(both, normals=smooth_normals(both.points, both.faces))

@@ -27,8 +27,8 @@ from wavecomb.scenes.models.mesh import (
 _CIRCLE = 0.56
 """Newell's rounded Bezier constant of a quarter circle (the exact value would be 0.5523)."""
 
-# Bodies of revolution: rows of (radius, height). A patch has four rows and shares one with the
-# next.
+# Bezier control points (radius, height) of the bodies of revolution. A patch has four points and
+# shares its last point with the next patch.
 _RIM = np.array(
     [[1.4, 2.4], [1.3375, 2.53125], [1.4375, 2.53125], [1.5, 2.4]],
 )
@@ -43,7 +43,8 @@ _KNOB_ROW = 1
 _KNOB_CIRCLE = 0.5625
 """Circle constant of the widest row of the lid's knob, published as 0.45 / 0.8 instead of 0.56."""
 
-# Swept parts: rows of (x and z of one side, x and z of the other side, half width in y).
+# Control points of handle and spout, which are swept along a curve: x and z of one side, x and z of
+# the other side, half width in y.
 _HANDLE = np.array(
     [
         [-1.6, 2.025, -1.5, 2.25, 0.3],
@@ -109,7 +110,8 @@ def _swept(rows: FloatArray) -> FloatArray:
         for sign in (1.0, -1.0):
             y = np.stack([zero, sign * half, sign * half, zero], axis=1)
             patch = np.stack([x, y, z], axis=2)
-            # One half is reversed, so that both have the same orientation and form a full turn.
+            # One half of the tube is reversed, so that both halves have the same orientation and
+            # form a full turn.
             patches.append(patch[:, ::-1] if sign < 0.0 else patch)
     return np.array(patches) + 0.0
 

@@ -96,7 +96,7 @@ def _partition(writer: StageWriter, near: float, far: float) -> None:
     count = len(outline)
     front = np.column_stack([np.zeros(count), outline])
     back = front - [PARTITION, 0.0, 0.0]
-    # The outline is clockwise as seen from +x.
+    # The partition's outline is clockwise as seen from +x.
     polygons = [list(range(count))[::-1], list(range(count, 2 * count))]
     polygons += [[k, (k + 1) % count, count + (k + 1) % count, count + k] for k in range(count)]
     points = np.concatenate([front, back])
@@ -127,7 +127,7 @@ def _skirting(writer: StageWriter) -> None:
 
 def _door_frame(writer: StageWriter) -> None:
     """Adds the lining of the doorway, casings on both sides, and a door stop."""
-    deep = 0.006  # protrusion from the wall beyond the lining, in metres
+    deep = 0.006  # distance in metres by which the door casings project from the wall
     parts: list[Part] = []
 
     def board(low: tuple[float, ...], high: tuple[float, ...]) -> None:

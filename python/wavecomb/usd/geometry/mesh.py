@@ -280,7 +280,7 @@ class MeshReader:
             return authored
         edges = None
         if "creaseIndices" in names:
-            # If the mesh is subdivided, reading its cage reports invalid creases.
+            # If the mesh is subdivided, the reader of its subdivision cage reports invalid creases.
             report = LoadReport() if self.subdivide else self.report
             edges = sharp_edges(prim, topology.point_count, self.time, report)
         return smooth_normals(points, topology, edges)

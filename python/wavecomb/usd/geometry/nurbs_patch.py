@@ -265,7 +265,7 @@ def _surface(
     length = np.sqrt(np.einsum("ij,ij->i", normals, normals))
     flat = ~(length > 1e-6 * length.max(initial=0.0))
     normals = normals / np.where(flat, 1.0, length)[:, None] * (-1.0 if flip else 1.0)
-    # At poles one of the derivatives is 0.
+    # At poles of the surface, one of the derivatives is 0, so compute smooth normals there.
     if flat.any():
         around = smooth_normals(place.astype(np.float32), topology)[flat]
         normals[flat] = _together(place[flat], around, 1e-6 * float(np.abs(place).max()))

@@ -44,7 +44,7 @@ def as_array(value: Any) -> NDArray[Any] | None:
     """Returns a VtArray, vector or number as (k, c), without a copy if possible."""
     if value is None:
         return None
-    # The points of nearly all meshes have this array type.
+    # Handle Vec3fArray first, since the points of nearly all meshes have this type.
     if type(value) is Vt.Vec3fArray:
         return np.asarray(value)
     try:

@@ -16,7 +16,8 @@ from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.time_codes import frame_number
 
 if TYPE_CHECKING:
-    from pxr import UsdSkel  # takes 8 ms; functions import it for stages with skeletons
+    # The import takes 8 ms, so only functions that read skeletons import UsdSkel.
+    from pxr import UsdSkel
 
     from wavecomb.usd.geometry.shutter import Track
 

@@ -234,8 +234,8 @@ class Strands:
             if self.periodic:
                 return np.asarray(values[start + i % size], np.float64)
             out = np.asarray(values[start + np.clip(i, 0, size - 1)], np.float64)
-            # Pinned curves get a reflected point before the first and after the last one, so that
-            # they reach their end points.
+            # Pinned curves get a reflected point before their first and after their last point, so
+            # that they reach their end points.
             for outside, end, inner in ((i < 0, 0, 1), (i >= size, size - 1, size - 2)):
                 where = np.flatnonzero(outside)
                 if len(where):
@@ -269,7 +269,7 @@ class Strands:
         end = base + step * self.segments
         out[end] = points[step][last]
         if lead:
-            # Both strands get the same point, bit for bit.
+            # Start and end of a closed curve get bit-identical points.
             out[end] = points[0][first]
             out[base - 1] = points[step - 1][last]
             out[end + 1] = points[1][first]

@@ -207,7 +207,7 @@ class SubdivisionSurfaces:
         levels = Counter(surface.level for surface in self._all if surface.cage.scheme != "none")
         waiting = deque(surface for surface in self._all if surface.level or surface.moves)
         if self.cache is None:
-            # Releases unrefined cages now and the rest after refinement.
+            # Release unrefined cages now, and all other cages after refinement.
             self._all = []
         while waiting:
             self._refine(self._next_batch(waiting))

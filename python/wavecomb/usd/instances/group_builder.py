@@ -144,7 +144,8 @@ class GroupBuilder:
         prims = found.binding_prims()
         if scope.alias is not None:
             prims = [self._proxy(prim, scope.alias) for prim in prims]
-        # Uses one object per material, since tables find it faster by identity than by path.
+        # Use one Python object per material, since dict lookups are faster by identity than by
+        # path.
         known = self._known
         bound = found.bind(
             None if material is None else known.setdefault(material.GetPath(), material)

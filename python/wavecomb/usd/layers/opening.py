@@ -84,7 +84,7 @@ def _fifos() -> Iterator[tuple[str, str]]:
         try:
             named = [layer.ComputeAbsolutePath(n) for n in layer.GetCompositionAssetDependencies()]
             name = layer.realPath or layer.identifier
-        # The thread that composes the stage has released the layer.
+        # The layer has expired, because the thread that composes the stage has released it.
         except Exception:
             continue
         for path in named:
@@ -97,7 +97,7 @@ def _release(path: str, layer: str, found: _BlockingFifo) -> None:
     if progress_notes.is_expendable():
         time_limit.end_process(line)
         return
-    # Opening fails if there is no reader, which means that USD is not waiting for this FIFO.
+    # Opening the FIFO fails if it has no reader, that is, if USD is not waiting for it.
     with contextlib.suppress(OSError):
         os.close(os.open(path, os.O_WRONLY | os.O_NONBLOCK))
         found.line = found.line or line
@@ -164,8 +164,9 @@ def open_render_settings(
         kept = {path for path in map(_prim_path, paths) if path is not None}
         mask = Usd.StagePopulationMask(sorted(kept))
         stage = Usd.Stage.OpenMasked(root, session, mask, Usd.Stage.LoadAll)
-        # Settings name products, products name vars, and both name cameras. ExpandPopulationMask is
-        # not used, since it can deadlock with predicates written in Python.
+        # RenderSettings prims refer to products, products refer to RenderVar prims, and settings
+        # and products refer to cameras, so two passes are needed. ExpandPopulationMask is not used,
+        # since it can deadlock with predicates written in Python.
         for _ in range(2):
             named = {path for path in _named_by(stage) if not mask.Includes(path)}
             if not named:

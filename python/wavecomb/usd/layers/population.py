@@ -110,7 +110,7 @@ def _targets(prim: Usd.Prim) -> Iterator[Sdf.Path]:
     for relation in prim.GetAuthoredRelationships():
         if relation.GetName().startswith(_FOLLOWED):
             for target in relation.GetTargets():
-                # Collections are skipped: being a member of one does not make a prim necessary.
+                # Skip collections: membership in a collection does not make a prim necessary.
                 if target.IsPrimPath():
                     yield target
     for attribute in prim.GetAuthoredAttributes():

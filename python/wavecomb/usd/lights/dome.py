@@ -182,7 +182,8 @@ def _cross(x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats, Any, Any]:
     along_y = ~along_x & (ay > az)
     along_z = ~along_x & ~along_y
     faces = (
-        # Columns: mask, column, row, right, up.
+        # For each face of the cube map: mask of its directions, column and row in the image,
+        # coordinate to the right, coordinate upwards.
         (along_z & (z > 0), 1, 1, -x, y),
         (along_y & (y > 0), 1, 0, -x, -z),
         (along_y & (y <= 0), 1, 2, -x, z),

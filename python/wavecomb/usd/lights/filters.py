@@ -174,8 +174,8 @@ class FilterReader:
                 for end in ends.get(flap, ("top", "bottom"))
             )
             edge = inputs.number(f"barndoor_{flap}_edge", 0.0)
-            # Coordinates in the square: across is the direction in which the door moves, along is
-            # its edge.
+            # Coordinates in the filter's square: `across` is the direction in which the barn door
+            # moves, `along` the direction of its edge.
             across, along = (
                 ((0.0, -0.5 / size, 0.5), (0.5 / size, 0.0, 0.5))
                 if flap in ends
@@ -297,7 +297,7 @@ def _before(prim: Usd.Prim, light: Usd.Prim, time: Usd.TimeCode) -> NDArray[np.f
     local = UsdGeom.Xformable(prim).GetLocalTransformation(time)
     own = np.array(local, np.float64) @ np.array(cache.GetParentToWorldTransform(prim), np.float64)
     forward = np.eye(4)
-    # The core places filter windows at z = -1.
+    # Move the filter to z = 0, since the core places filter windows at z = -1.
     forward[3, 2] = 1.0
     return np.asarray(forward @ own @ np.linalg.pinv(there), np.float64)
 

@@ -87,7 +87,8 @@ def parse_ies(text: str) -> IesProfile:
 
 
 def _numbers(text: str) -> Iterator[float]:
-    # Converts one number at a time, since a list of all numbers takes 20 times the text's memory.
+    # Convert one number at a time, since a list of all numbers takes 20 times the memory of the
+    # text.
     for match in _WORDS.finditer(text):
         word = match[0]
         try:
@@ -124,12 +125,12 @@ def _expand_c(vertical: Floats, horizontal: Floats, candela: Floats) -> IesProfi
 
     def mirrored(about: float) -> None:
         nonlocal horizontal, candela
-        # This mirrors all vertical planes except the plane of symmetry itself.
+        # Mirror all vertical planes except the plane of symmetry itself.
         inner = slice(-2, None, -1)
         horizontal = np.append(horizontal, 2 * about - horizontal[inner])
         candela = np.append(candela, candela[inner], axis=0)
 
-    # Intensities at phi and 180 - phi are equal.
+    # With this symmetry, intensities at the angles phi and 180 - phi are equal.
     if (first, last) == (90, 270):
         both = np.append(horizontal, (180 - horizontal) % 360)
         horizontal, rows = np.unique(both, return_index=True)

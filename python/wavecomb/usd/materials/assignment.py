@@ -83,7 +83,8 @@ class Assigner:
             return BoundMaterials(self.table.add(surface))
         primvars = _Primvars(draw, mesh, self.time, self.report)
         sets = self.uv_names(draw)
-        # The mesh's texture coordinates are the first UV set that exists.
+        # If materials read several UV sets, the mesh's texture coordinates are the first of these
+        # sets that the mesh has.
         if len(sets) > 1:
             primvars.own_uv = next((n for n in sets if primvars.find(n, 2) is not None), "")
         if surface is None or surface.stand_in:
@@ -111,7 +112,8 @@ class Assigner:
         self, draw: DrawItem, material: UsdShade.Material, surface: Surface
     ) -> Surface:
         values: dict[str, Any] = {}
-        # A primvar may name another primvar; reading twice resolves one such level.
+        # A primvar's value may be the name of another primvar; two passes resolve one level of such
+        # references.
         for _ in range(2):
             new = [name for name in surface.object_reads if name not in values]
             if not new:
@@ -222,7 +224,8 @@ class Assigner:
                 made = bound(surface, matrix, values, varying)
             except GraphTooLarge:
                 made = surface
-            # The key contains id(surface); storing the surface keeps that id from being reused.
+            # The key contains id(surface). Storing the surface keeps it alive, so that Python does
+            # not reuse the id.
             self._bound_graphs[key] = (surface, made)
         return self._bound_graphs[key][1]
 

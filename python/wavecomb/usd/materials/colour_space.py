@@ -84,7 +84,8 @@ def convert(pixels: NDArray[Any], source: str, working: str) -> NDArray[np.float
         if pixels.dtype == np.uint8:
             rows /= np.float32(255)
         buffer = oiio.ImageBuf(np.ascontiguousarray(rows[..., :3]))
-        # OpenImageIO's thread pool can deadlock here, so the conversion runs on this thread.
+        # OpenImageIO's thread pool can deadlock in this call, so the conversion runs on the calling
+        # thread.
         made = oiio.ImageBufAlgo.colorconvert(
             buffer, source, OCIO_NAMES[working], unpremult=False,
             colorconfig="ocio://default", nthreads=1,

@@ -175,7 +175,7 @@ class MaterialTable:
             if is_cloudy(surface):
                 self.scattering_interiors.append(surface.name)
             self._report.tally("materials")
-        # The key is an id; storing the object keeps that id from being reused.
+        # Store the material with its id, the key, so that Python does not reuse the id.
         self._by_object[id(material)] = material, surface
         return surface
 
@@ -248,7 +248,7 @@ class MaterialTable:
             if brightest > 0:
                 self._emitting.add(number)
                 self._emission[number] = (surface, 0.0)
-        # The key is an id; storing the surface keeps that id from being reused.
+        # Store the surface with its id, the key, so that Python does not reuse the id.
         self._surface_ids[id(surface)] = (surface, number)
         return number
 

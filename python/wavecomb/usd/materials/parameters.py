@@ -184,7 +184,7 @@ class _Tracer:
         self, parameter: str, value: Any, attribute: Usd.Attribute | None, space: str
     ) -> Parameter:
         """Returns a colour that cannot be edited because it is authored in another colour space."""
-        # The loader reports unknown colour spaces.
+        # The loader of the image reports unknown colour spaces.
         with contextlib.suppress(ValueError):
             value = linear_colour(value, attribute)
         return Parameter(parameter, value, reason=f"it is in the colour space {space}")
@@ -346,7 +346,7 @@ def surface_values(
     textures = cast(TextureTable, _NoTextures())
     try:
         surface = mtlx.surface(prim, time, textures, LoadReport(), shader, kind, values)
-    # The loader renders such a material in grey.
+    # A material that cannot be read is rendered in grey.
     except (Tf.ErrorException, RecursionError):
         return None
     if surface is None:

@@ -349,8 +349,8 @@ class ReadAhead:
         try:
             return future.result()
         finally:
-            # The future's exception refers to this stack frame; the cycle would keep the stage
-            # open.
+            # The future's exception refers to this stack frame, and this reference cycle would keep
+            # the stage open.
             del future
             self._start()
 

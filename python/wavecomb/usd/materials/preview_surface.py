@@ -263,7 +263,8 @@ class PreviewReader:
         wraps = [self._wrap(shader, name, image.wraps[i]) for i, name in enumerate(_WRAP_INPUTS)]
         matrix = self._coordinates(shader, parameter)
         if not any((*matrix[:2], *matrix[3:5])):
-            # All lookups read a single texel, into which the border colour must not be blended.
+            # The texture coordinates are constant, so all lookups read a single texel, and the
+            # border colour must not be blended into it.
             wraps = ["clamp", "clamp"]
         texture = self.textures.add(path, image, space, *wraps, is_colour=wide, missing=missing)
         self.textured[parameter] = _texture_use(texture, matrix, channel, scale, bias)
@@ -297,8 +298,8 @@ class PreviewReader:
         space = word(self._value(shader, "sourceColorSpace"))
         if space in ("raw", "sRGB"):
             return str(space)
-        # An authored auto uses the file's metadata; the stage's colour space precedes a default
-        # auto.
+        # An authored sourceColorSpace of "auto" uses the file's metadata. Without an authored
+        # value, the colour space of the stage applies if there is one.
         return "auto" if space == "auto" else space_of(file and file.attribute) or "auto"
 
     def _fallback(

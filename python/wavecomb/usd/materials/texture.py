@@ -330,7 +330,8 @@ class TextureTable:
         return pixels
 
     def _add(self, path: str, image: Image, space: str, wrap_s: str, wrap_t: str) -> int:
-        # Pixels are released once they are in the scene; a second use reads the file again.
+        # The pixels were released once they were in the scene; for a second use, the file is read
+        # again.
         here = image if image.is_here else read_image(path)
         pixels = self._as_stored(path, here, space, (wrap_s, wrap_t))
         if self.store is not None:
@@ -339,7 +340,7 @@ class TextureTable:
             return self._builder.add_texture(
                 pixels, srgb=space == CURVE, wrap_s=wrap_s, wrap_t=wrap_t, name=path
             )
-        # The texture store has no room for the texture.
+        # add_texture() raises ValueError if the texture store has no room.
         except ValueError as error:
             raise WavecombError(str(error)) from None
         finally:
@@ -351,7 +352,7 @@ class TextureTable:
     def mean(self, number: int) -> NDArray[np.float64]:
         """Returns a texture's linear mean (4,) by reading its file again; 1 if there is no file."""
         key = next((key for key, known in self._ids.items() if known == number), ())
-        # Keys of UDIM textures have three elements.
+        # The keys of UDIM textures have three elements.
         if len(key) == 3:
             means = [self.mean(tile) for _, tile in key[1]]
             return np.asarray(np.mean(means, axis=0)) if means else np.ones(4)

@@ -141,7 +141,7 @@ def flat_graph(identifier: str, primitives: Collection[str]) -> FlatGraph | None
         found = nodedef.getImplementation()
         if found is None or not found.isA(mx.NodeGraph):
             return None
-        # Copies the graph to a document that may be modified. Nested graphs that do not implement a
+        # Copy the graph to a document that may be modified. Nested graphs that do not implement a
         # definition keep their references to interface inputs.
         document = mx.createDocument()
         document.setDataLibrary(library())

@@ -94,7 +94,7 @@ def reload(stage: Usd.Stage) -> None:
     """Reloads changed files of a stage, including MaterialX files."""
     with _lock:
         kept = [t.layer for t in _translations.values() if t.layer is not None]
-    # USD would reload layers without a file as empty layers.
+    # Copy the contents of layers without a file, because Reload() would make them empty.
     copies = [(layer, Sdf.Layer.CreateAnonymous("kept.usda")) for layer in kept]
     for layer, copy in copies:
         copy.TransferContent(layer)

@@ -47,7 +47,8 @@ class Collections:
         collection = Usd.CollectionAPI(prim, name)
         try:
             query = collection.ComputeMembershipQuery()
-            # The rule map is empty for an expression and complete for relationships.
+            # The path rule map is empty if the collection is defined by an expression, and complete
+            # if it is defined by relationships.
             if _has_expression(collection) and not query.GetAsPathExpansionRuleMap():
                 return self._of_expression(collection, query)
         except Tf.ErrorException as error:
@@ -61,7 +62,8 @@ class Collections:
             if rule in _RULES
         }
         root = prim.GetAttribute(f"collection:{name}:includeRoot")
-        # Without the applied API schema, includeRoot has no fallback; for lights it is true.
+        # Without the applied API schema, includeRoot has no fallback value; for the collections of
+        # lights, the fallback is true.
         if not root or not root.HasAuthoredValue() or root.Get():
             found.setdefault("/", "expand")
         if all(rule != "exclude" for rule in found.values()) and found.get("/") == "expand":

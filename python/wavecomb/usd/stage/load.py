@@ -113,7 +113,7 @@ def load_stage(
             load = _Load(source, builder, chosen, report, reuse, store, editable)
             facts = load.run(cache, progress)
             textures = load.textures
-            # This closes the stage if this call opened it.
+            # Deleting `load` closes the stage if this call opened it.
             del load
         except UnicodeDecodeError:
             raise WavecombError(f"{file}: {NOT_TEXT}") from None
@@ -303,7 +303,8 @@ class _Load:
             bounds, points = box.ComputeAlignedRange(), None
             if not bounds.IsEmpty():
                 ends = np.array([bounds.GetMin(), bounds.GetMax()])
-                # Frames the ball inside the box, since the final view is never closer than that.
+                # Frame the inscribed ball of the bounding box, since the final camera is never
+                # closer.
                 points = ends.mean(axis=0) + (corners(ends) - ends.mean(axis=0)) / np.sqrt(3.0)
             view = frame_points(points, c.up_axis, settings.lens, c.options.size)
         limit = float(c.options.texture_limit or 0) * MEGABYTE

@@ -94,10 +94,10 @@ class LoadedStage:
         from wavecomb import _core
 
         kept = None
-        # Another thread may be using the result of the previous render.
+        # Another thread may be using the kept renderer, so the list may be empty.
         with contextlib.suppress(IndexError):
             kept = self._kept.pop()
-        # The scene may have been edited.
+        # A renderer of an earlier version of the scene cannot be used.
         is_new = kept is None or kept.scene is not self.scene
         renderer = _core.Renderer(self.scene, threads) if kept is None or is_new else kept
         try:

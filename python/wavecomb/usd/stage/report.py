@@ -210,7 +210,7 @@ def first_message(error: BaseException) -> str:
             if text:
                 return plain(text)
         return plain(str(error))
-    # USD quotes bytes of the file that are not valid UTF-8.
+    # USD's message may quote bytes of the file that are not valid UTF-8.
     except UnicodeDecodeError:
         return NOT_TEXT
 

@@ -119,7 +119,7 @@ class Traversal:
             elif prim.IsA(UsdGeom.PointInstancer):
                 kind = "instancer"
             elif name == "PortalLight":
-                # The dome light that refers to a portal reads the portal.
+                # Portals are read together with the dome light that refers to them.
                 kind = "xform"
             elif prim.IsA(UsdLux.BoundableLightBase) or prim.IsA(UsdLux.NonboundableLightBase):
                 kind = "unsupported light"
@@ -154,8 +154,8 @@ class Traversal:
         proxies = Usd.TraverseInstanceProxies(
             Usd.PrimDefaultPredicate if predicate is None else predicate
         )
-        # One prim to visit: prim, transform and animated transform of its parent, purpose,
-        # inherited primvars, predicate for its children, its parent, draw mode.
+        # Entry for a prim to visit: the prim, transform and animated transform of its parent,
+        # purpose, inherited primvars, predicate for its children, parent, draw mode.
         stack: list[
             tuple[Usd.Prim, Gf.Matrix4d, Track | None, str, Sequence[Any], Any, Parent | None, str]
         ]
@@ -175,7 +175,9 @@ class Traversal:
             if kind != "other":
                 listed = tuple(prim.GetAuthoredPropertyNames())
                 known = self._names.get(listed)
-                if known is None:  # Most prims share a set of property names.
+                # Cache by the list of property names, since most prims have the same list as
+                # another prim.
+                if known is None:
                     has_primvars = any(name.startswith("primvars:") for name in listed)
                     known = self._names[listed] = frozenset(listed), has_primvars
                 names, has_primvars = known

@@ -68,7 +68,7 @@ class VolumeReader:
         prim = draw.prim
         fields = read_fields(prim, self._time, self._report)
         if not fields and UsdVol.Volume(prim).GetFieldPaths():
-            # All fields of the volume are invalid, which has been reported.
+            # All fields of the volume are invalid, and read_fields() has reported them.
             return None
         properties = self._materials.of(draw.material, prim)
         if fields and not vdb.is_there():

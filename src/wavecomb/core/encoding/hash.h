@@ -17,9 +17,9 @@ inline U hash_u32(U x) {
   return x;
 }
 
-/// Hashes two 32-bit words, of which the second may be the same in all lanes. The hash is bijective
-/// in either argument while the other is fixed, so that no two pixels share random numbers for a
-/// given seed.
+/// Hashes two 32-bit words, of which the second may be the same in all lanes. For a fixed value of
+/// one argument, the hash is bijective in the other argument, so that no two pixels share random
+/// numbers for a given seed.
 template <typename U>
 inline U hash_u32(const U& a, const std::type_identity_t<U>& b) {
   return hash_u32<U>(hash_u32<U>(a) + b * 0x9e3779b9u);

@@ -62,8 +62,8 @@ inline F clamp(const F& x, const F& lo, const F& hi) {
   return min(max(x, lo), hi);
 }
 
-/// Returns a b + c, rounded once if the target has FMA and twice otherwise; the same for scalars
-/// and packets.
+/// Returns a b + c, rounded once if the target has FMA and twice otherwise. Scalars and packets
+/// give the same result.
 template <LaneValue F>
 inline F fma(const F& a, const std::type_identity_t<F>& b, const std::type_identity_t<F>& c) {
 #if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
@@ -126,7 +126,7 @@ inline F bits_float(const UInt<F>& x) {
     return drjit::reinterpret_array<F>(x);
 }
 
-/// Returns |x| with the sign bit of `sign`.
+/// Returns the magnitude of x with the sign bit of `sign`.
 template <LaneValue F>
 WAVECOMB_INLINE F copysign(const F& x, const F& sign) {
   return bits_float<F>((float_bits<F>(x) & 0x7fffffffu) | (float_bits<F>(sign) & 0x80000000u));
@@ -168,7 +168,7 @@ template <typename M>
 inline uint32_t mask_bits(const M& m) {
   if constexpr (requires { m.k; }) {
     return static_cast<uint32_t>(m.k) & ((1u << M::Size) - 1u);
-  } else if constexpr (requires { m.a1; }) {  // the packet consists of two halves
+  } else if constexpr (requires { m.a1; }) {  // Dr.Jit splits a wide packet into two halves
     return mask_bits(m.a1) | (mask_bits(m.a2) << M::Size1);
   } else {
 #if defined(__aarch64__)
@@ -183,7 +183,7 @@ inline uint32_t mask_bits(const M& m) {
 }
 }  // namespace detail
 
-/// Returns one bit per lane, with lane 0 as the lowest.
+/// Returns a mask as bits, one per lane, with lane 0 in the lowest bit.
 template <typename F>
 inline uint32_t lane_bits(const Mask<F>& m) {
   if constexpr (kIsScalar<F>)
@@ -198,7 +198,7 @@ inline uint32_t count(const Mask<F>& m) {
   return static_cast<uint32_t>(std::popcount(lane_bits<F>(m)));
 }
 
-/// Returns 0, 1, 2, ... in the lanes.
+/// Returns the lane index (0, 1, 2, ...) in each lane.
 template <typename F>
 inline UInt<F> lane_index() {
   if constexpr (kIsScalar<F>)

@@ -32,8 +32,8 @@ inline void store(void* p, const T& value) {
 }
 
 namespace detail {
-/// Copy of a packet's lanes in memory. Replaces Dr.Jit's entry(), which reads integer registers
-/// through a pointer that may not alias them; GCC 12 miscompiles this.
+/// Copy of a packet's lanes in memory. Replaces Dr.Jit's entry(), which violates strict aliasing
+/// when it reads integer registers, so that GCC 12 miscompiles it.
 template <typename T>
 struct InMemory {
   using Value = std::conditional_t<
@@ -50,7 +50,7 @@ struct InMemory {
 template <typename T, typename Index, typename M>
 inline T gather_words(const void* base, const Index& index, const M& active) {
 #if defined(__AVX2__)
-  if constexpr (requires { active.a1; })  // consists of two halves
+  if constexpr (requires { active.a1; })  // Dr.Jit splits a wide packet into two halves
     return T(gather_words<typename T::Array1>(base, drjit::low(index), active.a1),
              gather_words<typename T::Array2>(base, drjit::high(index), active.a2));
   else
@@ -112,7 +112,8 @@ inline void scatter(void* base, const T& value, const UInt<T>& index, const Mask
 
 /// Stores the active lanes of `value` contiguously at `p`, in lane order; returns their number.
 ///
-/// Contract: `p` has room for a whole packet, since values past the active ones are unspecified.
+/// Contract: `p` has room for a whole packet, since unspecified values follow the values of the
+/// active lanes.
 template <typename T>
 inline uint32_t compress_store(void* p, const T& value, const Mask<T>& active) {
   const uint32_t bits = lane_bits<T>(active);
@@ -164,8 +165,8 @@ inline U lookup16(const uint32_t* table, const U& index) {
   }
 }
 
-/// Returns table[index] of 256 floats in each lane; index < 256. Uses permutations of registers
-/// with AVX-512, which take a third of the time of a gather (Zen 4).
+/// Returns table[index] of 256 floats in each lane; index < 256. With AVX-512, the function
+/// permutes registers, which takes a third of the time of a gather on Zen 4.
 template <typename F>
 inline F lookup256(const float* table, const UInt<F>& index) {
 #if defined(__AVX512F__)

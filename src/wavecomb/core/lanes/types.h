@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lane types; part of core/lanes/lanes.h. This is the only file that includes Dr.Jit.
+/// Lane types; part of core/lanes/lanes.h. Only core/lanes/types.h includes Dr.Jit.
 #pragma once
 
 #include <drjit/packet.h>
@@ -12,8 +12,8 @@
 #include <type_traits>
 
 /// Forces inlining of kernels that are called once or twice per packet. Inlining keeps the results
-/// of kernels in registers and removes unused results. Compilers do not inline them on their own,
-/// because the caller is large.
+/// of kernels in registers and removes unused results. Without the attribute, compilers do not
+/// inline kernels, because their caller is large.
 #define WAVECOMB_INLINE inline __attribute__((always_inline))
 /// Forces inlining of a lambda.
 #define WAVECOMB_INLINE_LAMBDA __attribute__((always_inline))
@@ -55,7 +55,7 @@ struct Width<drjit::Packet<T, W>> {
   static constexpr size_t value = W;
   using U64 = drjit::Packet<uint64_t, W>;
 };
-// Half of a packet that is wider than a register.
+// Types for half of a packet that is wider than a register.
 template <typename T, size_t W>
 struct Width<drjit::Array<T, W>> : Width<drjit::Packet<T, W>> {};
 }  // namespace detail
@@ -67,9 +67,9 @@ inline constexpr bool kIsScalar = kWidth<T> == 1;
 template <typename F>
 using UInt64 = typename detail::Width<F>::U64;
 
-/// Types of lane values. Argument-dependent lookup finds Dr.Jit's functions of the same name, in
-/// addition to the functions here. Dr.Jit's functions have no constraint, so this constraint makes
-/// the functions here the better match.
+/// Concept of the types of lane values. Argument-dependent lookup also finds Dr.Jit's functions of
+/// the same names. Dr.Jit's functions have no constraint, so this constraint makes Wavecomb's
+/// functions the better match.
 template <typename T>
 concept LaneValue = std::is_arithmetic_v<T> || drjit::is_array_v<T>;
 

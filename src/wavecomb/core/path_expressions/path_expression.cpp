@@ -14,7 +14,7 @@ namespace {
 constexpr uint32_t kMaxNfaStates = 2000;
 /// Maximum number of states of the deterministic automaton before minimisation.
 constexpr size_t kMaxSets = 4096;
-using StateSet = std::vector<uint32_t>;  ///< sorted in ascending order
+using StateSet = std::vector<uint32_t>;  ///< state numbers in ascending order
 
 /// Nondeterministic automaton of all expressions (Thompson 1968).
 class PathNfa {
@@ -106,7 +106,7 @@ class PathNfa {
   std::vector<uint32_t> finals_;
 };
 
-/// Row of the automaton before minimisation.
+/// Transition row of a state of the automaton before minimisation.
 struct PathStateRow {
   std::vector<uint32_t> next, matched;
   auto operator<=>(const PathStateRow&) const = default;

@@ -3,9 +3,9 @@
 /// layer (docs/light-path-expressions.md), and the automaton built from all expressions of a
 /// render.
 ///
-/// A path consists of the camera, scattering events, and the emitter. Kernels do not see the text:
-/// a path carries an automaton state, which each event advances. When light reaches the path, a
-/// table gives the expressions that match, by state and emitter.
+/// A path consists of the camera, scattering events, and the emitter. Kernels do not use the text
+/// of expressions: a path stores an automaton state, which each event changes. When light reaches
+/// the path, a table gives the expressions that match, by state and emitter.
 #pragma once
 
 #include <cstdint>
@@ -37,7 +37,7 @@ inline constexpr uint32_t kDiffuseEvent = 0, kGlossyEvent = 1, kSingularEvent = 
 /// Emitter at the end of a path: a light, a dome light, or an emissive object or volume.
 enum class PathEnd : uint32_t { kLight, kBackground, kObject, kVolume };
 inline constexpr uint32_t kPathEnds = 4;
-/// Returns the index of an end whose light belongs to group `key`.
+/// Returns the index of a path end whose light belongs to light group `key`.
 constexpr uint32_t path_end(PathEnd end, uint32_t key) {
   return kPathEnds * key + static_cast<uint32_t>(end);
 }
@@ -56,10 +56,11 @@ struct PathAutomaton {
   /// not a valid expression or uses an unknown key.
   PathAutomaton(std::span<const NamedExpression> expressions, std::span<const std::string> keys);
 
-  uint32_t expressions = 0;       ///< number of expressions
-  uint32_t ends = 0;              ///< number of path_end() indices
-  std::vector<uint32_t> next;     ///< [state][event], kNextWords per state
-  std::vector<uint32_t> matched;  ///< [state][end]: one bit per expression
+  uint32_t expressions = 0;  ///< number of expressions
+  uint32_t ends = 0;         ///< number of path ends, as indexed by path_end()
+  /// Transition table [state][event], with kNextWords words per state.
+  std::vector<uint32_t> next;
+  std::vector<uint32_t> matched;  ///< matched expressions [state][end], with one bit per expression
   uint32_t states() const { return static_cast<uint32_t>(next.size() / kNextWords); }
 };
 

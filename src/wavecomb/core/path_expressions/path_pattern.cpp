@@ -207,7 +207,7 @@ class ExpressionParser {
   /// Parses the part of an event after '<': type of event, type of scattering, and light group.
   PathSymbols event() {
     PathSymbols s = parse_position(".CLOBERTVW");
-    // Ends of paths have no scattering type, so <L.> equals L.
+    // Path ends have no scattering type, so the expression <L.> is equivalent to L.
     if (peek() != '>' && peek() != '\'') {
       const PathSymbols scattered = parse_position(".DGS");
       PathSymbols scattering;

@@ -24,7 +24,7 @@
 #include "wavecomb/core/rows/rows.h"
 #include "wavecomb/core/vec3.h"
 
-/// Lists all fields of a row in order.
+/// Macro that lists all fields of a row in order.
 #define WAVECOMB_FIELDS(...)                      \
   WAVECOMB_INLINE constexpr auto fields() {       \
     return std::tie(__VA_ARGS__);                 \
@@ -111,7 +111,7 @@ WAVECOMB_INLINE void for_each_word(T& value, const One& one) {
 
 }  // namespace detail
 
-/// Number of words in the fields of a row.
+/// Number of 32-bit words in the fields of a row.
 template <template <typename> class Row>
 inline constexpr size_t kFieldWords = detail::WordsOf<Row<float>>::value;
 /// Distance between the starts of two consecutive rows, in 32-bit words.
@@ -119,7 +119,7 @@ template <template <typename> class Row>
 inline constexpr size_t kRowWords = std::bit_ceil(kFieldWords<Row>);
 
 /// Returns the word index of a member in a row or record: word_of(&Row<float>::slot). Compilers
-/// reduce word_of() to a constant.
+/// evaluate word_of() to a constant.
 template <typename Record, typename Member>
 WAVECOMB_INLINE uint32_t word_of(Member Record::* member) {
   static_assert(std::is_trivially_copyable_v<Record>);
@@ -128,7 +128,7 @@ WAVECOMB_INLINE uint32_t word_of(Member Record::* member) {
   return static_cast<uint32_t>((address(kRecord.*member) - address(kRecord)) / 4);
 }
 
-/// Returns the words of a row, by lane, for store_rows. Words beyond the fields are 0.
+/// Returns the words of a row, by lane, for store_rows. Words after the last field are 0.
 template <template <typename> class Row, typename F>
 WAVECOMB_INLINE std::array<F, kRowWords<Row>> words_of_row(const Row<F>& row) {
   static_assert(sizeof(Row<float>) == 4 * kFieldWords<Row>, "WAVECOMB_FIELDS lists all fields");
@@ -158,7 +158,7 @@ struct IsHead<std::tuple<H&...>, std::tuple<R&...>> {
 
 }  // namespace detail
 
-/// True if the first fields of Row are those of Head.
+/// Whether the row type Row begins with the fields of the row type Head.
 template <template <typename> class Head, template <typename> class Row>
 inline constexpr bool kIsHead =
     detail::IsHead<decltype(std::declval<Head<float>&>().fields()),

@@ -20,7 +20,8 @@ template <typename F>
 struct RecordReader {
   const void* base;
   UInt<F> first_word;
-  const std::byte* shared;  ///< record of all active lanes, or null if they differ
+  /// The record that all active lanes read, or null if they read different records.
+  const std::byte* shared;
   Mask<F> active;
 
   /// Reads a member of the record: reader[&MaterialRecord::roughness].
@@ -42,7 +43,7 @@ struct RecordReader {
   F at(float (Record::*member)[N], size_t i) const {
     return word<F, float>(word_of(member) + static_cast<uint32_t>(i));
   }
-  /// Reads the row that is stored at the start of the record.
+  /// Reads a row of fields that is stored at the start of the record.
   template <template <typename> class Row>
   Row<F> row() const {
     Row<F> row;
@@ -63,7 +64,7 @@ struct RecordReader {
       return T(value);
     }
     if constexpr (kIsScalar<F>)
-      return T(0);  // a scalar lane without a shared record is inactive
+      return T(0);  // with a single lane, null means that the lane is inactive
     else
       return gather<T>(base, first_word + at, Mask<T>(active));
   }

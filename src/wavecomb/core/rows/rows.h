@@ -104,7 +104,7 @@ template <size_t Start, size_t W, size_t... I>
 WAVECOMB_INLINE Vector<sizeof...(I)> part(const Vector<W>& v, std::index_sequence<I...>) {
   return __builtin_shufflevector(v, v, (Start + I)...);
 }
-/// Stores the N-word parts of `v` from part J on; part j is stored to at[j * N].
+/// Splits `v` into parts of N words and stores part j to at[j * N], starting with part J.
 template <size_t N, size_t W, size_t J = 0>
 WAVECOMB_INLINE void store_parts(const Vector<W>& v, float* const* at) {
   const Vector<N> one = part<J * N, W>(v, std::make_index_sequence<N>());
@@ -122,7 +122,7 @@ WAVECOMB_INLINE std::array<F, N> rows_at(const float* const* at) {
   std::array<F, N> out;
   if constexpr (kIsScalar<F>) {
     std::memcpy(out.data(), at[0], 4 * N);
-  } else if constexpr (!InOneRegister<F>) {  // consists of two halves
+  } else if constexpr (!InOneRegister<F>) {  // Dr.Jit splits a wide packet into two halves
     const auto low = rows_at<N, typename F::Array1>(at);
     const auto high = rows_at<N, typename F::Array2>(at + F::Size1);
     unrolled<N>([&](auto k) WAVECOMB_INLINE_LAMBDA { out[k] = F(low[k], high[k]); });
@@ -137,7 +137,7 @@ WAVECOMB_INLINE std::array<F, N> rows_at(const float* const* at) {
     transpose_blocks<B, W>(r);
     unrolled<N>([&](auto k)
                     WAVECOMB_INLINE_LAMBDA { out[k].m = std::bit_cast<decltype(F::m)>(r[k]); });
-  } else {  // loads rows that are longer than a register W columns at a time
+  } else {  // loads W columns at a time, since the rows are longer than a register
     static_assert(N % W == 0);
     unrolled<N / W>([&](auto block) WAVECOMB_INLINE_LAMBDA {
       constexpr size_t c = block * W;
@@ -184,7 +184,7 @@ WAVECOMB_INLINE void rows_to(float* const* at, const std::array<F, N>& values) {
   }
 }
 
-/// Memory of zeros that inactive lanes read.
+/// Row of zeros that inactive lanes read.
 alignas(64) inline constexpr float kNoRow[16] = {};
 
 }  // namespace detail

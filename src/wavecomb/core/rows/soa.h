@@ -19,12 +19,13 @@ class SoaBlock {
 
   SoaBlock() = default;
   SoaBlock(size_t columns, size_t capacity)
-      // The padding has 16 more values, so that columns start in different cache sets.
+      // Pad each column by 16 further values, so that columns start in different cache sets.
       : stride_(((capacity + kPad) + 15) / 16 * 16 + 16),
         data_(static_cast<uint32_t*>(std::aligned_alloc(64, columns * stride_ * 4))),
         bytes_(columns * stride_ * 4) {
     if (!data_) throw std::bad_alloc();
-    // The owner touches the memory first.
+    // Zero the memory on the thread that uses it, so that its pages are allocated on that thread's
+    // NUMA node.
     for (size_t i = 0; i < columns * stride_; ++i) data_.get()[i] = 0;
   }
 

@@ -11,8 +11,8 @@ namespace {
 
 /// Error terms of one pixel, summed over rgb: `light` is the pixel mean, `difference` the absolute
 /// difference between the full mean and the half mean. `camera_paths2` and `light_splats2` are
-/// squared differences of the pixel's own samples and of light splats. `known` is false without two
-/// full halves.
+/// squared differences of the pixel's own samples and of light splats. `known` is false until both
+/// halves have at least one full block of samples.
 struct PixelError {
   double light = 0, difference = 0, camera_paths2 = 0, light_splats2 = 0;
   bool known = false;
@@ -22,10 +22,11 @@ PixelError pixel_error(const Film& film, size_t pixel) {
   const Film::Pixel& p = film.pixel(pixel);
   const ErrorSums& e = film.error(pixel);
   const uint32_t n = p.samples, in_half = ErrorSums::half_count(n);
-  // No estimate, since the second half has no full block of samples yet.
+  // There is no estimate until the second half has a full block of samples.
   if (n < 2 * ErrorSums::kHalfBlock) return {};
   const double sums[3] = {p.r, p.g, p.b};
-  // Var(I - A) = var (1 / half - 1 / n). The scale makes it var / n, the variance of the mean.
+  // For n samples of variance var, of which `half` are in A, Var(I - A) = var (1 / half - 1 / n).
+  // The scale turns this into var / n, the variance of the mean.
   const double scale = std::sqrt(static_cast<double>(in_half) / (n - in_half));
   PixelError out;
   std::array<double, 3> splats{}, light_splat_difference{};

@@ -16,18 +16,20 @@ inline constexpr uint32_t kErrorWindow = 2;
 
 /// Error estimates of an image.
 struct ErrorMap {
-  /// Error of each pixel: the mean over the window of e = sum over rgb |I - A| / sqrt(sum over rgb
-  ///   I) with I the mean of all samples and A the mean of one half of them (Dammertz, Hanika and
-  ///   Keller, "A Hierarchical Automatic Stopping Condition for Monte Carlo Global Illumination",
-  ///   WSCG 2010, equation 1). With light splats, I and A each include the splats, whose half is
-  ///   summed separately. For independent samples |I - A| is distributed like |I - truth|. The
-  ///   error is infinite if no pixel of the window has an estimate yet; pixels that are not finite
-  ///   count as 0.
+  /// Error of each pixel: the mean over the window of
+  ///   e = sum over rgb |I - A| / sqrt(sum over rgb I),
+  /// with I the mean of all samples and A the mean of one half of them (Dammertz, Hanika and
+  /// Keller, "A Hierarchical Automatic Stopping Condition for Monte Carlo Global Illumination",
+  /// WSCG 2010, equation 1). With light splats, I and A include the splats, and A includes only the
+  /// splats of one half. For independent samples |I - A| is distributed like |I - truth|. The error
+  /// is infinite if no pixel of the window has an estimate yet; pixels that are not finite count as
+  /// 0.
   std::vector<float> error;
-  /// sum |I - A| / sum I over all pixels and channels; infinite if no pixel has an estimate yet.
+  /// Mean relative error of the image, sum |I - A| / sum I over all pixels and channels; infinite
+  /// if no pixel has an estimate yet.
   double mean_relative = 0;
-  /// sum I / sum sqrt(sum over rgb I): the value of e in every pixel of an image whose mean
-  /// relative error is 1 and whose noise is evenly distributed.
+  /// sum I / sum sqrt(sum over rgb I), which is the value that the pixel error e would have in
+  /// every pixel if the mean relative error were 1 and the noise were evenly distributed.
   double even_error = 0;
 };
 
@@ -39,7 +41,8 @@ ErrorMap measure_error(const Film& film);
 struct NoiseParts {
   double own = 0, splats = 0;
 };
-/// Returns the noise of the pixels whose `active` flag is set, or of all if `active` is empty.
+/// Returns the noise of the pixels whose `active` flag is set, or of all pixels if `active` is
+/// empty.
 NoiseParts measure_noise_parts(const Film& film, std::span<const uint8_t> active);
 
 }  // namespace wavecomb

@@ -20,8 +20,8 @@ struct ImageWrap {
 
 /// Distributes a light splat over pixels. A splat at (x, y), in pixels from the upper left corner
 /// of the image, contributes to each pixel with the filter density at its offset from the pixel
-/// centre. This matches the density with which the pixel's own samples, all of weight 1, would lie
-/// there.
+/// centre. This weight equals the density with which filter importance sampling would place the
+/// pixel's own samples, all of weight 1, at the splat's position.
 class LightSplatFilter {
  public:
   /// `rendered`: pixels that receive light splats.
@@ -53,7 +53,7 @@ class LightSplatFilter {
   }
 
  private:
-  // Bounds of the splat positions whose filter footprint reaches a rendered pixel.
+  // Bounds of the splat positions whose filter footprint overlaps a rendered pixel.
   float left() const { return low(rendered_.x0); }
   float right() const { return high(rendered_.x1); }
   float low(uint32_t edge) const { return static_cast<float>(edge) + 0.5f - filter_.radius(); }
@@ -62,12 +62,14 @@ class LightSplatFilter {
   Mask<F> contains_row(const F& y) const {
     return (y >= low(rendered_.y0)) & (y < high(rendered_.y1));
   }
-  /// Shifts x by whole turns to within one turn to the right of left().
+  /// Shifts x by whole turns of the panorama into the interval from left() to one turn to the right
+  /// of it.
   template <typename F>
   F after_left(const F& x) const {
     return x - floor(F(F(x - left()) * (1.f / turn_.pixels))) * turn_.pixels;
   }
-  /// Whether a position reaches a rendered column after whole turns.
+  /// Returns whether the filter footprint of a position, shifted by whole turns of the panorama,
+  /// overlaps a rendered column.
   template <typename F>
   Mask<F> wraps_into_image(const F& x) const {
     return after_left<F>(x) < right();

@@ -9,10 +9,11 @@
 namespace wavecomb {
 
 /// Position of each layer among the splat sums of a pixel. A light path that reaches the camera has
-/// scattered at least once: once is direct light, more often is indirect light. It is never
-/// emission.
+/// scattered at least once, so a splat is direct light (one scattering) or indirect light (several
+/// scatterings), but never emission.
 struct LightSplatLayout {
-  static constexpr uint32_t kNotStored = 0xffffffffu;  ///< the layer is not stored
+  /// Position that means that the layer is not stored.
+  static constexpr uint32_t kNotStored = 0xffffffffu;
 
   uint32_t direct = kNotStored, indirect = kNotStored;
   uint32_t first_group = kNotStored, first_expression = kNotStored;
@@ -31,7 +32,8 @@ struct LightSplatLayout {
     first_expression = allocate(layout.set.has(Aov::kExpressions), layout.expressions);
   }
 
-  /// Returns the position of an AOV with one layer, or of layer `which` of an AOV with several.
+  /// Returns the position of an AOV with a single layer, or of layer `which` of an AOV with several
+  /// layers.
   uint32_t of(Aov aov, uint32_t which = 0) const {
     const uint32_t first = aov == Aov::kDirect        ? direct
                            : aov == Aov::kIndirect    ? indirect

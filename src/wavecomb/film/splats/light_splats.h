@@ -2,8 +2,8 @@
 /// Light splats: contributions of light paths, which may land on any pixel.
 ///
 /// Sums are integers, so that the result does not depend on order and any wave may add to any pixel
-/// at any time. Each wave collects its splats in its own LightSplatList; between wave stages, its
-/// worker adds them to the film's LightSplatLayer.
+/// at any time. Each wave collects its light splats in a LightSplatList. Between wave stages, the
+/// wave's worker adds the list to the film's LightSplatLayer.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +26,7 @@ class LightSplatList {
   struct LightSplat {
     uint32_t pixel;  ///< Film::index
     float r, g, b;
-    bool in_half = false;  ///< LightSplatLayer::is_in_half of the light path's sample
+    bool in_half = false;  ///< result of LightSplatLayer::is_in_half() for the light path's sample
   };
 
   LightSplatList() = default;
@@ -46,18 +46,18 @@ class LightSplatList {
   std::vector<LightSplat> splats_;
 };
 
-/// Fixed-point sums of light splats. A `sum_index` is an index into the sums.
+/// Fixed-point sums of light splats.
 ///
-/// The range of splat values exceeds the bits of one sum. Values of `kMinCoarse` units and more
-/// go to a second sum whose unit is 2^kCoarseExponent times as large.
+/// A single 64-bit sum cannot cover the range of splat values. Values of at least `kMinCoarse`
+/// units are added to a second sum whose unit is 2^kCoarseExponent times as large.
 ///
 /// Contract: add() may be called concurrently; all other members only while no thread adds.
 class LightSplatSums {
  public:
-  /// Red, green and blue in fine units, then red, green and blue in coarse units.
+  /// Sums of red, green and blue in fine units, then of red, green and blue in coarse units.
   using Sum = std::array<int64_t, 6>;
-  /// Ratio of coarse to fine unit as a power of two, and the least value, in fine units, that is
-  /// added to the coarse sum.
+  /// Logarithm to base 2 of the ratio of coarse to fine unit, and the smallest value, in fine
+  /// units, that is added to the coarse sum.
   static constexpr int kCoarseExponent = 20;
   static constexpr double kMinCoarse = 0x1p40;
 
@@ -67,7 +67,7 @@ class LightSplatSums {
 
   bool empty() const { return sums_.empty(); }
   size_t bytes() const { return sums_.size() * sizeof(Sum); }
-  /// Adds a value to a sum atomically.
+  /// Atomically adds a value to a sum.
   void add(size_t sum_index, float r, float g, float b) {
     const FixedPoint coarse{unit_.exponent + kCoarseExponent};
     Sum& sum = sums_[sum_index];
@@ -80,7 +80,7 @@ class LightSplatSums {
         plus(sum[c + 3], coarse.from(rgb[c]));
     }
   }
-  /// Returns the sum in the units of the added values.
+  /// Returns a sum as a floating-point number in the unit of the added values.
   double value(size_t sum_index, size_t channel) const {
     const FixedPoint coarse{unit_.exponent + kCoarseExponent};
     const Sum& sum = sums_[sum_index];
@@ -99,8 +99,8 @@ class LightSplatSums {
   std::vector<Sum> sums_;
 };
 
-/// Scale that turns sums of light splats into pixel values: `numbers` light paths per pixel sample
-/// over `paths` light paths traced.
+/// Scale that turns sums of light splats into pixel values: the number of light paths per pixel
+/// sample (`numbers`) divided by the number of light paths traced (`paths`).
 struct LightSplatScale {
   double numbers = 1, paths = 0;
 
@@ -120,8 +120,8 @@ class LightSplatLayer {
   using Sum = LightSplatSums::Sum;
 
   LightSplatLayer() = default;
-  /// `paths`: number of light path indices, each of which stands for `scale` light paths per
-  /// sample. `with_error`: also sums one half of the samples separately.
+  /// `paths`: number of light path indices, each of which represents `scale` light paths per
+  /// sample. If `with_error`, one half of the samples is also summed separately.
   LightSplatLayer(size_t pixels, FixedPoint unit, size_t paths = 0, double scale = 1,
                   bool with_error = false)
       : sums_(pixels, unit),
@@ -131,20 +131,20 @@ class LightSplatLayer {
 
   bool empty() const { return sums_.empty(); }
   bool has_error() const { return !half_.empty(); }
-  /// Adds the splats of `list`.
+  /// Adds the light splats of `list` to the sums.
   void add(const LightSplatList& list) {
     for (const LightSplatList::LightSplat& s : list.splats()) {
       sums_.add(s.pixel, s.r, s.g, s.b);
       if (s.in_half && has_error()) half_.add(s.pixel, s.r, s.g, s.b);
     }
   }
-  /// Adds `list`, which came from `paths` light paths.
+  /// Adds the light splats of `list`, which were collected from `paths` light paths.
   void add(const LightSplatList& list, uint32_t paths) {
     add(list);
     LightSplatSums::plus(paths_[0], paths);
   }
-  /// Returns whether a light path's sample belongs to the half. Every second sample belongs to the
-  /// half, since each sample of all light paths uses a separate sequence
+  /// Returns whether a sample of a light path is also summed in the half for error estimates. Every
+  /// second sample is, since each sample of all light paths uses a separate sequence
   /// (light_paths/light_path.h).
   static bool is_in_half(uint32_t sample) { return sample % 2 == 0; }
   /// Records that light path index `path` was traced for samples [first, first + count).
@@ -153,14 +153,15 @@ class LightSplatLayer {
     LightSplatSums::plus(paths_[0], count);
     if (has_error()) LightSplatSums::plus(paths_[1], (first + count + 1) / 2 - (first + 1) / 2);
   }
-  /// Number of samples traced, by light path index.
+  /// Returns the number of samples traced, by light path index.
   const std::vector<uint32_t>& samples() const { return samples_; }
-  /// Scale that turns the current sums into means.
+  /// Returns the scale that turns the current sums into means.
   LightSplatScale scale() const { return scale_of(paths_[0]); }
-  /// Returns the mean contribution of light paths to a pixel, rgb.
+  /// Returns the mean rgb contribution of light paths to a pixel.
   std::array<double, 3> mean(size_t pixel) const { return scale().of(sums_, pixel); }
-  /// Returns the mean minus the estimate of the half alone, scaled to the standard error of the
-  /// mean (the halves are independent). Zero if either half has no light paths.
+  /// Returns the mean of all samples minus the mean of the half, scaled so that its expected square
+  /// is the variance of the mean (the halves are independent). Returns zero if either half has no
+  /// light paths.
   std::array<double, 3> difference(size_t pixel) const {
     if (!has_error() || paths_[1] == 0 || paths_[1] == paths_[0]) return {};
     std::array<double, 3> out = mean(pixel);
@@ -174,7 +175,7 @@ class LightSplatLayer {
   size_t bytes() const {
     return sums_.bytes() + half_.bytes() + samples_.size() * sizeof(uint32_t);
   }
-  /// Calls block(name, values) for each vector of sums, for checkpoints.
+  /// Calls block(name, values) for each vector of sums, to write or read checkpoints.
   template <typename Block>
   void for_each_block(const Block& block) {
     if (empty()) return;
@@ -191,7 +192,8 @@ class LightSplatLayer {
   }
 
   LightSplatSums sums_, half_;
-  std::vector<int64_t> paths_ = std::vector<int64_t>(2);  ///< light paths: total, half
+  /// Numbers of light paths: in total, and in the half.
+  std::vector<int64_t> paths_ = std::vector<int64_t>(2);
   std::vector<uint32_t> samples_;
   double scale_ = 1;
 };

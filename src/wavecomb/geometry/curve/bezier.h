@@ -53,7 +53,7 @@ struct Bezier {
   V at(double u) const { return mix(p, u); }
   double radius(double u) const { return mix(r, u); }
   V along(double u) const { return slope(p, u); }
-  /// Derivative of the radius.
+  /// Derivative of the curve's radius with respect to u.
   double widening(double u) const { return slope(r, u); }
 
   template <typename T>
@@ -74,8 +74,8 @@ struct Bezier {
     c[1] = c[0] + (c[3] - c[0]) * (1.0 / 3);
     c[2] = c[0] + (c[3] - c[0]) * (2.0 / 3);
   }
-  /// Replaces c by its first or second half by De Casteljau's algorithm; gives the same results as
-  /// split().
+  /// Replaces curve c by its first or second half (De Casteljau's algorithm), with the same results
+  /// as split().
   template <typename T, typename S = double>
   static void keep_half(T* c, bool second, S half = 0.5) {
     const T a = (c[0] + c[1]) * half, m = (c[1] + c[2]) * half, b = (c[2] + c[3]) * half;

@@ -20,9 +20,10 @@ using NodeLanes = FloatP<CurveBvhNodes::kMaxSubSegments>;
 constexpr float kCells = 65535.f;
 /// Largest cell coordinate in use, which leaves room below kCells for rounding.
 constexpr float kLargestCell = 65000.f;
-constexpr float kSlender = 32.f;  ///< segments with a larger length / radius are split
+/// Segments whose length exceeds this multiple of their radius are split.
+constexpr float kSlender = 32.f;
 constexpr size_t kManySegments = size_t{1} << 20;
-constexpr float kNodeRounding = 4e-6f;  ///< relative error of float dot products
+constexpr float kNodeRounding = 4e-6f;  ///< bound of the relative error of dot products in float
 
 /// Capsule that contains a sub-segment: a line from a to b with a radius.
 struct SegmentCapsule {
@@ -30,7 +31,8 @@ struct SegmentCapsule {
   float radius = 0;
 };
 
-/// Number of nodes per segment; a sub-segment's number is kNodesPerSegment * segment + node.
+/// Number of sub-segment nodes per segment. The number of a sub-segment is kNodesPerSegment *
+/// segment + node.
 constexpr uint32_t kNodesPerSegment = SubSegment::kNodes;
 
 /// Returns the distance of a point from the line segment ab.
@@ -40,8 +42,8 @@ float distance_to_line(const Vec3<float>& p, const Vec3<float>& a, const Vec3<fl
   return length(Vec3<float>(v - c * at));
 }
 
-/// Returns the capsule of a sub-segment. Distance to a line is convex, so the distances of the
-/// control points bound the curve.
+/// Returns the capsule of a sub-segment. The distance to a line is a convex function, so the
+/// distances of the control points bound the distance of the curve.
 SegmentCapsule sub_segment_capsule(const Mesh& mesh, uint32_t number) {
   std::array<Vec3<float>, 4> p;
   std::array<float, 4> r;
@@ -66,8 +68,8 @@ SegmentCapsule sub_segment_capsule(const Mesh& mesh, uint32_t number) {
   return {p[0], p[3], *std::max_element(r.begin(), r.end()) + bend};
 }
 
-/// Returns how often to halve a segment. Shorter sub-segments give smaller node bounds and, if
-/// curved, thinner capsules, but each takes memory.
+/// Returns how many times to halve a segment. Shorter sub-segments have tighter bounds and, if the
+/// curve is bent, thinner capsules, but take more memory.
 uint32_t halvings(const Mesh& mesh, uint32_t segment, const SegmentCapsule& whole) {
   if (!(length(Vec3<float>(whole.b - whole.a)) > kSlender * whole.radius)) {
     const float r = mesh.radii[mesh.indices[segment] & kCurveFirstPoint];
@@ -76,7 +78,8 @@ uint32_t halvings(const Mesh& mesh, uint32_t segment, const SegmentCapsule& whol
   return mesh.indices.size() <= kManySegments ? 2 : 1;
 }
 
-/// A sub-segment, or the first one of a segment: twice the midpoint of its axis, and its number.
+/// Entry for a sub-segment, or for a whole segment by its first sub-segment: twice the midpoint of
+/// its axis, and its number.
 struct SubSegmentEntry {
   std::array<float, 3> middle;
   uint32_t number;
@@ -128,7 +131,8 @@ void partition_entries(std::span<SubSegmentEntry> entries, size_t full,
   second();
 }
 
-/// Returns the number of sub-segments of a segment, which equals the node index of its first one.
+/// Returns the number of sub-segments of a segment, which equals the node index of the first of
+/// them.
 uint32_t sub_segment_count(const SubSegmentEntry& segment) {
   return segment.number % kNodesPerSegment;
 }
@@ -254,7 +258,7 @@ uint32_t CurveBvhNodes::may_hit(uint32_t node, const CurveRay& ray, float tfar) 
   decode(0, cell_a.x, cell_b.x);
   decode(1, cell_a.y, cell_b.y);
   decode(2, cell_a.z, cell_b.z);
-  // Transforms the ends to ray space, where the ray is the z axis.
+  // Transforms the ends of the capsules to ray space, where the ray is the z axis.
   const auto to_ray_space = [&](uint32_t n, const Vec3<F>& cell) {
     const auto& e = ray.axis[n];
     const F start(e[0] * from[0] + e[1] * from[1] + e[2] * from[2]);

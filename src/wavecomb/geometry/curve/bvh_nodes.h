@@ -4,9 +4,9 @@
 /// Bounding boxes of hair segments are a hundred times longer than a strand is wide, so a ray
 /// misses nearly all segments whose boxes it hits, and each of these tests costs a cache miss.
 /// Embree therefore builds its BVH over nodes of nearby sub-segments: whole segments, or parts of
-/// slender ones. A node stores their capsules side by side, quantised to 16 bits, and tests a ray
-/// against all eight at once. intersect_curve() then tests those that may be hit. The node test is
-/// conservative, so it never changes the image.
+/// slender segments. A node stores their capsules side by side, quantised to 16 bits, and tests a
+/// ray against all eight at once. intersect_curve() then tests the sub-segments that may be hit.
+/// The node test is conservative, so it never changes the image.
 #pragma once
 
 #include <array>
@@ -23,14 +23,15 @@ class CurveBvhNodes {
  public:
   static constexpr uint32_t kMaxSubSegments = 8;  ///< maximum number of sub-segments per node
 
-  /// Returns whether nodes can be built for a mesh.
+  /// Returns whether curve BVH nodes can be built for a mesh.
   static bool supports(const Mesh& mesh) { return mesh.is_strands() && !mesh.deforms(); }
 
-  /// Function that runs two tasks, possibly in parallel.
+  /// Function that runs two given tasks, possibly in parallel.
   using Task = std::function<void()>;
   using RunBoth = std::function<void(const Task&, const Task&)>;
 
-  /// Builds the nodes. `run_both`: runs parallel tasks; the default runs them one after another.
+  /// Builds the nodes. `run_both` runs two tasks, possibly in parallel; the default runs them one
+  /// after another.
   explicit CurveBvhNodes(
       const Mesh& mesh, const RunBoth& run_both = [](const Task& a, const Task& b) {
         a();
@@ -46,7 +47,7 @@ class CurveBvhNodes {
   /// Returns a bit mask of the sub-segments of a node that a ray may hit with 0 < t <= tfar.
   uint32_t may_hit(uint32_t node, const CurveRay& ray, float tfar) const;
 
-  /// Returns the sub-segment of bit k of may_hit().
+  /// Returns the sub-segment that bit k of may_hit() stands for.
   SubSegment sub_segment(uint32_t node, uint32_t k) const {
     const uint32_t number = nodes_[node].number[k];
     return {number / SubSegment::kNodes, number % SubSegment::kNodes};
@@ -55,10 +56,10 @@ class CurveBvhNodes {
  private:
   static constexpr uint32_t kNone = 0xffffffffu;
 
-  /// Node with quantised capsules. The ends of sub-segment k are at low[axis] + step * cell. The
-  /// lower 16 bits of cells[axis][k] are the cell of the first end, the upper 16 bits that of the
-  /// second. The radius is step * radius[k]. number[k] is segment * SubSegment::kNodes + node, or
-  /// kNone.
+  /// Node with quantised capsules. The ends of sub-segment k have the coordinates low[axis] + step
+  /// * cell. The lower 16 bits of cells[axis][k] are the cell of the first end, the upper 16 bits
+  /// the cell of the second end. The radius is step * radius[k]. number[k] is segment *
+  /// SubSegment::kNodes + node, or kNone.
   struct alignas(32) Node {
     std::array<std::array<uint32_t, kMaxSubSegments>, 3> cells;
     std::array<uint32_t, kMaxSubSegments> number;

@@ -11,7 +11,7 @@ namespace wavecomb {
 /// Throws Error that begins with `name` if array sizes, control points or radii are invalid.
 void check_curves(const Mesh& mesh, const std::string& name);
 
-/// Returns the MeshFlags of a mesh of curves or points, except those of texture coordinates.
+/// Returns the MeshFlags of a mesh of curves or points, except the flags of texture coordinates.
 uint32_t curve_flags(const Mesh& mesh);
 
 }  // namespace wavecomb

@@ -20,7 +20,7 @@ uint32_t first_point(const Mesh& mesh, uint32_t prim) {
   return mesh.indices[prim] & kCurveFirstPoint;
 }
 
-/// Intersection of a ray with one segment.
+/// Intersection of a ray with one curve segment.
 class SegmentTest {
  public:
   SegmentTest(const Mesh& mesh, uint32_t prim, const PointsAt& points, const RaySpace& ray,
@@ -46,13 +46,15 @@ class SegmentTest {
     Bezier::line(normal_);
   }
 
-  /// Finds hits on the sub-segment of `node`. `outside`: skips hits from inside.
+  /// Finds hits on the sub-segment with index `node`. If `outside`, hits on the inside of the tube
+  /// are skipped.
   void run(bool outside, uint32_t node) {
     side_ = -1;
     // The search includes entry points behind the ray origin, since the ray may start inside the
     // tube.
     if (mesh_.is_ribbon() || outside) z_near_ = 0;
-    // From inside, the ray may leave the tube in another sub-segment, so search the whole segment.
+    // A ray that starts inside the tube may leave it in another sub-segment, so search the whole
+    // segment.
     if (mesh_.is_ribbon() || outside) return search_node(node);
     if (passes_by(curve_, *std::max_element(curve_.r, curve_.r + 4))) return;
     const int halvings = depth();
@@ -94,7 +96,8 @@ class SegmentTest {
     return (least > 0 && least * least > reach) || (most < 0 && most * most > reach);
   }
 
-  /// Searches the sub-segment of a SubSegment node, or an ancestor of it that is straight enough.
+  /// Searches for hits in the sub-segment with index `node`, or in a longer sub-segment that
+  /// contains it and is straight enough.
   void search_node(uint32_t node) {
     int halvings = depth();
     Bezier sub_segment = curve_;
@@ -134,7 +137,7 @@ class SegmentTest {
     search(b, middle, u1, halvings - 1);
   }
 
-  /// Tests all straight sub-segments below a sub-segment of a tube at once.
+  /// Splits a sub-segment of a tube into straight sub-segments and tests all of them at once.
   void search_sub_segments(const Bezier& sub_segment, double r, double u0, double u1,
                            int halvings) {
     uint32_t left = sub_segments_near(sub_segment, halvings, r, bulge_, z_near_, z_far_);
@@ -147,35 +150,38 @@ class SegmentTest {
   }
 
   /// Returns a step in u towards the entry or exit of a tube. The ray intersects the sphere of
-  /// parameter u at z(u) -+ sqrt(h(u)), h = r^2 - x^2 - y^2. It enters the tube where z - sqrt(h)
-  /// is minimal (side -1) and leaves it where z + sqrt(h) is maximal (side 1). If curve and radius
-  /// are linear around u,
-  ///   A w + B = -side z' sqrt(h),  A = r'^2 - x'^2 - y'^2,  B = r r' - x x' - y y',
-  /// at u + w. This describes a cone with spherical ends; w = 0 is the exact condition.
+  /// parameter u at z(u) -+ sqrt(h(u)), h = r^2 - x^2 - y^2. The ray enters the tube where z -
+  /// sqrt(h) is minimal (side -1) and leaves the tube where z + sqrt(h) is maximal (side 1). If
+  /// curve and radius are linear around u, the condition at u + w is
+  ///   A w + B = -side z' sqrt(h),  A = r'^2 - x'^2 - y'^2,  B = r r' - x x' - y y'.
+  /// This linear approximation is a cone with spherical ends; at w = 0 the condition is exact.
   double step(double u, int side) const {
     const V c = curve_.at(u), d = curve_.along(u);
     const double r = curve_.radius(u), dr = curve_.widening(u);
     const double a = dr * dr - d.x * d.x - d.y * d.y, b = r * dr - c.x * d.x - c.y * d.y;
     const double h = r * r - c.x * c.x - c.y * c.y, k = d.z * d.z - a;
-    if (!(k > 0)) return dr > 0 ? kFar : -kFar;  // one sphere contains the next
+    // Each sphere contains the next one, so there is no side.
+    if (!(k > 0)) return dr > 0 ? kFar : -kFar;
     const double discriminant = b * b - a * h;
     if (discriminant < 0) {
-      if (a < 0) return -b / a;              // a miss here; step to where the ray is closest
+      // The ray misses this cone; step to where it is closest.
+      if (a < 0) return -b / a;
       return side * d.z > 0 ? kFar : -kFar;  // the ray runs along the inside of the cone
     }
     const double q = -side * d.z * std::sqrt(discriminant / k);
-    // Two forms of the same root; choose the one without cancellation.
+    // Of two formulas for the root, choose the one without cancellation.
     double w = 0;
     if (q * b > 0)
       w = (b * b - d.z * d.z * h) / (k * (q + b));
     else if (a != 0)
       w = (q - b) / a;
-    // Roots on the other half of the cone, with negative radii, are not extrema.
+    // Roots where the radius is negative lie on the other half of the double cone and are not
+    // extrema.
     return r + dr * w >= 0 ? w : std::copysign(kFar, dr);
   }
 
-  /// Adds the extremum of `side` in [u0, u1] if the steps from both ends lead into the interval.
-  /// The curve's own ends may be extrema as well.
+  /// Adds the hit at the extremum of `side` in [u0, u1] if the steps from u0 and u1 both lead into
+  /// the interval. The ends of the whole curve may also be extrema.
   void intersect_tube(double u0, double u1, int side) {
     const double s0 = step(u0, side), s1 = step(u1, side);
     if (s0 > 0 && s1 < 0)
@@ -186,8 +192,8 @@ class SegmentTest {
       intersect_tube_at(1, side);
   }
 
-  /// Returns the root of step() between u0, where it is s0 > 0, and u1, where it is s1 < 0, by a
-  /// bracketed secant method.
+  /// Returns the root of step() between u0 and u1 by a bracketed secant method; step() is s0 > 0 at
+  /// u0 and s1 < 0 at u1.
   double extreme_between(double u0, double s0, double u1, double s1, int side) const {
     double before = s0 < -s1 ? u0 : u1, step_before = s0 < -s1 ? s0 : s1;
     double u = u0 + (u1 - u0) * (s0 / (s0 - s1));
@@ -201,7 +207,7 @@ class SegmentTest {
       before = u;
       step_before = s;
       u = next;
-      // Convergence is superlinear, so the next step would be negligible.
+      // The secant method converges superlinearly, so the next step would be negligible.
       if (std::abs(u - before) < kNear) break;
     }
     return u;
@@ -222,7 +228,7 @@ class SegmentTest {
       add_tube(z, u, ray_.back(n));
   }
 
-  /// Returns whether normal n of the end sphere points into the adjoining segment.
+  /// Returns whether the normal n of the tube's end sphere points into the adjoining segment.
   bool continues_at(const V& n, uint32_t flag, int end, uint32_t next) const {
     if ((mesh_.indices[prim_] & flag) == 0) return false;
     const V d = ray_.point(widen(points_.position(next))) - curve_.p[end];
@@ -251,8 +257,9 @@ class SegmentTest {
     add(z, along, atan2(n.y, n.x) * kInv2Pi);
   }
 
-  /// Signed offset of the ray across the ribbon. With b = c' x n, the ray hits the strip's plane at
-  /// u where x b_y = y b_x.
+  /// Signed offset of the ray from the ribbon's centre line c = (x, y, z) in the width direction b
+  /// = c' x n. The ray, which is the z axis, hits the ribbon at the parameter u where x b_y = y
+  /// b_x.
   double across(double u) const {
     const V c = curve_.at(u), b = cross_d(curve_.along(u), Bezier::mix(normal_, u));
     return c.x * b.y - c.y * b.x;
@@ -261,8 +268,8 @@ class SegmentTest {
   void intersect_ribbon(double u0, double u1) {
     const double f0 = across(u0), f1 = across(u1);
     if ((f0 < 0) != (f1 < 0)) return intersect_ribbon_between(u0, f0, u1, f1);
-    // A ribbon seen nearly edge-on may be hit twice. Tests whether the sign changes at the extremum
-    // of the parabola through the ends and the midpoint.
+    // A ribbon seen nearly edge-on may be hit twice. Test whether across() changes sign at the
+    // extremum of the parabola through its values at both ends and the midpoint.
     const double slope = f1 - f0, bend = 2 * (f0 + f1) - 4 * across(0.5 * (u0 + u1));
     const double at = bend != 0 ? 0.5 - 0.5 * slope / bend : -1;
     if (!(at > 0 && at < 1)) return;
@@ -272,11 +279,11 @@ class SegmentTest {
     intersect_ribbon_between(um, fm, u1, f1);
   }
 
-  /// Finds the hit between parameters where across() has different signs, by the Illinois method
-  /// (regula falsi).
+  /// Finds the hit between two parameters at which across() has different signs, by the Illinois
+  /// method (regula falsi).
   void intersect_ribbon_between(double u0, double f0, double u1, double f1) {
     double u = u0;
-    int kept = 0;  // which end of the bracket the last step kept: -1 or 1
+    int kept = 0;  // end of the bracket that the last step kept: -1 lower, 1 upper
     for (int i = 0; i < kRibbonSteps && u1 - u0 > 1e-15; ++i) {
       u = std::clamp((f1 * u0 - f0 * u1) / (f1 - f0), u0, u1);
       const double f = across(u);
@@ -300,17 +307,19 @@ class SegmentTest {
 
   void add(double z, float u, float v) {
     const CurveHit hit{static_cast<float>(z / ray_.length), u, v < 0 ? v + 1 : v};
-    // Adjacent sub-segments find the same hit.
+    // Skip a hit that the adjacent sub-segment has already found.
     for (const CurveHit& known : hits_)
       if (std::abs(known.u - u) < 1e-6f && std::abs(known.t - hit.t) <= 1e-6f * hit.t) return;
     if (hit.t > 0) hits_.add(hit);
   }
 
-  static constexpr double kStraight = 0.025;  ///< fraction of the radius
+  /// Maximum deviation from a straight line, as a fraction of the radius.
+  static constexpr double kStraight = 0.025;
   static constexpr int kMaxHalvings = 9, kRibbonHalvings = 3;
   static constexpr int kSteps = 40, kRibbonSteps = 100;
-  static constexpr double kNear = 1e-9;  ///< smaller steps no longer change the extremum
-  static constexpr double kFar = 2;      ///< a step beyond either end
+  /// Step size in u at which the search for an extremum ends.
+  static constexpr double kNear = 1e-9;
+  static constexpr double kFar = 2;  ///< step in u that leads beyond both ends of the segment
   /// Sine of the angle by which end caps overlap the joint with the next segment, to prevent gaps.
   static constexpr double kSeam = 1e-3;
 
@@ -325,9 +334,10 @@ class SegmentTest {
   Bezier curve_;
   V normal_[4];
   double bulge_ = 0;            ///< deviation of the final sub-segments from straight lines
-  double z_near_ = -kInfinity;  ///< least z of relevant entry points
-  int side_ = -1;               ///< extrema to find: -1 entries, 1 exits
-  bool may_be_inside_ = false;  ///< entered behind the ray origin or from the adjoining segment
+  double z_near_ = -kInfinity;  ///< smallest z of entry points that matter
+  int side_ = -1;               ///< extrema to find: -1 means entry points, 1 exit points
+  /// Whether the ray entered behind its origin or from the adjoining segment.
+  bool may_be_inside_ = false;
 };
 
 void intersect_sphere(const Mesh& mesh, uint32_t prim, const PointsAt& points, const RaySpace& ray,

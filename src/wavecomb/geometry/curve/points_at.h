@@ -11,7 +11,8 @@
 
 namespace wavecomb {
 
-/// Points and normals of a mesh at a given time; bit-identical to detail::MovingRows.
+/// Points and normals of a mesh at a given time; the values are bit-identical to those of
+/// detail::MovingRows, which shading uses.
 class PointsAt {
  public:
   PointsAt(const Mesh& mesh, float time) : mesh_(mesh), place_(time, mesh.steps - 1) {}

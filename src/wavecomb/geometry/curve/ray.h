@@ -23,7 +23,8 @@ struct CurveRay {
     }
   }
 
-  /// Returns whether origin and direction are bit-identical to those of this ray.
+  /// Returns whether the given origin and direction are bit-identical to the origin and direction
+  /// of this ray.
   bool is(const float (&from)[3], const float (&along)[3]) const {
     return std::memcmp(origin, from, sizeof(origin)) == 0 &&
            std::memcmp(dir, along, sizeof(dir)) == 0;
@@ -32,7 +33,7 @@ struct CurveRay {
   curve_math::RaySpace space;
   float origin[3], dir[3];
   float axis[3][3];
-  float length;  ///< length of the direction
+  float length;  ///< length of the ray direction
 };
 
 }  // namespace wavecomb

@@ -3,13 +3,14 @@
 /// hit, and shading reconstructs the surface from them.
 ///
 /// A tube is the union of spheres of radius r(u) around the points c(u) of its curve. A normal n of
-/// its side satisfies n . c' = -r' (there |p - c|^2 - r^2 is stationary in u); its ends are parts
-/// of the first and last sphere. In a hit (u, v), v is the angle around the curve in turns, and u
-/// the parameter of the sphere that is touched. On the ends, u continues beyond 0 and 1 by the
-/// angle in radians between the normal and the adjacent normal of the side.
+/// the tube's side satisfies n . c' = -r', since |p - c|^2 - r^2 is stationary in u at surface
+/// points p; the tube's ends are parts of the first and last sphere. In a hit (u, v), v is the
+/// angle around the curve in turns, and u the parameter of the sphere that is touched. On the
+/// spherical ends, u continues below 0 and above 1 by the angle in radians between the normal and
+/// the nearest normal of the tube's side.
 ///
 /// A ribbon is c(u) + s r(u) b(u), |s| <= 1, where b is the unit vector along c' x n and n the
-/// authored normal. A hit is u and v = (s + 1) / 2.
+/// authored normal. The coordinates of a hit are u and v = (s + 1) / 2.
 ///
 /// A hit on a sphere is given by its angles: u = phi / 2 pi around z, v = theta / pi from +z.
 #pragma once
@@ -28,7 +29,7 @@ struct CurveSegment {
   std::array<Vec3<F>, 4> p;
   std::array<F, 4> r;        ///< radii
   std::array<Vec3<F>, 4> n;  ///< normals, for ribbons
-  Mask<F> cubic;             ///< lanes with cubic segments; others are lines
+  Mask<F> cubic;             ///< lanes with cubic segments; the segments in other lanes are lines
 };
 
 /// Point c and radius r of a curve at a parameter, and their derivatives.
@@ -40,7 +41,7 @@ struct CurvePoint {
 
 namespace detail {
 
-/// Weights of control points and of their differences at u.
+/// Weights of the control points and of their differences at parameter u.
 template <typename F>
 struct CurveWeights {
   std::array<F, 4> value;
@@ -57,7 +58,8 @@ struct CurveWeights {
   T at(const std::array<T, 4>& x) const {
     return x[0] * value[0] + x[1] * value[1] + x[2] * value[2] + x[3] * value[3];
   }
-  /// Uses differences to keep the precision of slopes if control points are close together.
+  /// Returns the derivative at u. Differences of control points keep its precision if control
+  /// points are close together.
   template <typename T>
   T along(const std::array<T, 4>& x) const {
     return (x[1] - x[0]) * slope[0] + (x[2] - x[1]) * slope[1] + (x[3] - x[2]) * slope[2];
@@ -73,15 +75,16 @@ inline CurvePoint<F> curve_point(const CurveSegment<F>& s, const F& u) {
   return {weights.at(s.p), weights.along(s.p), weights.at(s.r), weights.along(s.r)};
 }
 
-/// Frame of a tube at u with z along the curve, and the angle between z and the side's normals.
+/// Frame of a tube at u with z along the curve, and the angle between z and the normals of the
+/// tube's side.
 template <typename F>
 struct TubeFrame {
   Frame<F> frame;
   F cos_side, sin_side;
 };
 
-/// Returns the tube frame. If control points coincide and the derivative is zero, the next control
-/// points give the direction.
+/// Returns the tube frame of a segment at u. If control points coincide and the derivative is zero,
+/// the next control points give the direction.
 template <typename F>
 inline TubeFrame<F> tube_frame(const CurveSegment<F>& s, const CurvePoint<F>& at) {
   Vec3<F> d = at.dc;

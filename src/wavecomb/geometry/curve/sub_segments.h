@@ -38,14 +38,14 @@ inline constexpr std::array<SubSegmentWeights, kLaneHalvings + 1> kSubSegmentWei
 }  // namespace detail
 
 /// Returns a bit mask of the final sub-segments that the ray may hit with z_near <= z <= z_far.
-/// `sub_segment`: sub-segment in ray space, which is halved `halvings` times; `r`: its maximum
-/// radius; `bulge`: deviation of the final sub-segments from straight lines. Computed in float with
-/// a margin for rounding, so that no hit is missed.
+/// `sub_segment`: sub-segment in ray space, which is halved `halvings` times; `r`: maximum radius
+/// of the sub-segment; `bulge`: deviation of the final sub-segments from straight lines. The test
+/// runs in float with a margin for rounding errors, so that no hit is missed.
 inline uint32_t sub_segments_near(const curve_math::Bezier& sub_segment, int halvings, double r,
                                   double bulge, double z_near, double z_far) {
   using F = FloatP<1 << kLaneHalvings>;
   using curve_math::V;
-  constexpr double kRounding = 4e-6;  // relative error of float dot products
+  constexpr double kRounding = 4e-6;  // bound of the relative error of dot products in float
   const detail::SubSegmentWeights& weights =
       detail::kSubSegmentWeights[static_cast<size_t>(halvings)];
   Vec3<F> a, b;

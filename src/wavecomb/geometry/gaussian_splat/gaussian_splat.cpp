@@ -12,8 +12,9 @@ namespace {
 using namespace curve_math;
 
 constexpr double kMaxDeviations = 3, kMinAlpha = 1.0 / 255;
-constexpr size_t kMaxGaussianSplats = 0xffffffffu / 48;  ///< harmonics use 32-bit offsets
-/// Bounds of scales, whose products must stay within the range of float.
+/// Spherical harmonics are addressed by 32-bit offsets.
+constexpr size_t kMaxGaussianSplats = 0xffffffffu / 48;
+/// Bounds of the scales of a Gaussian splat, whose products must stay within the range of float.
 constexpr float kMinScale = 1e-9f, kMaxScale = 1e9f;
 
 void need(const std::string& name, size_t has, size_t want, const char* what) {
@@ -60,7 +61,7 @@ std::vector<GaussianSplatRow> make_gaussian_splat_rows(std::span<const float> sc
     V axis[3];
     axes_of(&orientations[4 * i], name, axis);
     row.opacity = opacities[i];
-    // Invisible Gaussian splats get a row as well, so that indices stay the same.
+    // Invisible Gaussian splats also get a row, so that row indices equal splat indices.
     const double visible = 2 * std::log(std::max(opacities[i] / kMinAlpha, 1.0));
     const double cut = std::min(kMaxDeviations * kMaxDeviations, visible);
     row.cut = opacities[i] < static_cast<float>(kMinAlpha) ? -1.f : static_cast<float>(cut);

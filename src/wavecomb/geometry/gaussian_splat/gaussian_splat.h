@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Gaussian splats (Kerbl et al., "3D Gaussian Splatting", 2023): storage and intersection.
 ///
-/// W, the inverse of scale and orientation, transforms offsets from the centre to standard
-/// deviations. A ray o + t d hits a Gaussian splat where its response is greatest, at t = -(Wo .
-/// Wd) / |Wd|^2. The offset there is w = Wo + t Wd in standard deviations. The splat is present
-/// with probability
+/// The matrix W, the inverse of scale and orientation, transforms offsets from the splat's centre
+/// to units of standard deviations. A ray o + t d hits a Gaussian splat where its response is
+/// greatest, at t = -dot(W o, W d) / |W d|^2. The offset of this point is w = W o + t W d in
+/// standard deviations. The splat is present with probability
 ///   alpha = opacity exp(-|w|^2 / 2),
-/// and can be hit where |w| <= 3 and alpha >= 1/255. w is perpendicular to Wd; the hit's (u, v) are
-/// the components of w along the axes of gaussian_splat_frame().
+/// and can be hit where |w| <= 3 and alpha >= 1/255. w is perpendicular to W d; the hit's (u, v)
+/// are the components of w along the axes of gaussian_splat_frame().
 #pragma once
 
 #include <span>
@@ -47,15 +47,15 @@ inline float gaussian_splat_alpha(const GaussianSplatRow& row, float u, float v)
   return row.opacity * exp(-0.5f * (u * u + v * v));
 }
 
-/// Axes of hit coordinates: orthonormal and perpendicular to e, the unit ray direction in the space
-/// of standard deviations.
+/// Axes of the hit coordinates (u, v). The axes are orthonormal and perpendicular to e, the unit
+/// ray direction in units of standard deviations.
 template <typename F>
 struct GaussianSplatFrame {
   Vec3<F> x, y;
 };
 
-/// Returns the axes for e. They are discontinuous at an arbitrary pole that no coordinate axis
-/// matches.
+/// Returns the axes of hit coordinates for the ray direction e. The axes are discontinuous at a
+/// pole, which is chosen not to coincide with a coordinate axis.
 template <typename F>
 inline GaussianSplatFrame<F> gaussian_splat_frame(const Vec3<F>& e) {
   const Vec3<F> pole(F(0.36f), F(0.48f), F(0.8f));

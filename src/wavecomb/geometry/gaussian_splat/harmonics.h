@@ -17,8 +17,8 @@ constexpr uint32_t harmonic_degree(uint32_t k) {
 }
 
 /// Evaluates the real spherical harmonics Y_l^m(d) up to degree 3 at a unit vector d, ordered by
-/// degree l, then m = -l to l. Orthonormal over the sphere, with the Condon-Shortley phase (-1)^m,
-/// as in Kerbl et al. (2023).
+/// degree l, then m = -l to l. The harmonics are orthonormal over the sphere and include the
+/// Condon-Shortley phase (-1)^m, as in Kerbl et al. (2023).
 template <typename F>
 inline std::array<F, kMaxHarmonics> harmonics(const Vec3<F>& d) {
   const F xx = d.x * d.x, yy = d.y * d.y, zz = d.z * d.z;

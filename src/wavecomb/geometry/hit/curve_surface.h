@@ -6,9 +6,9 @@
 
 namespace wavecomb::detail {
 
-/// Computes the surface at hits on curves and points. Never inlined, so that scenes without curves
-/// do not pay for its registers. The normal of Gaussian splats is -`dir`, opposite to the ray.
-/// The function body is in curve_surface.inl.
+/// Computes the shading point at hits on curves and points. The function is never inlined, so that
+/// it does not increase the register use of kernels in scenes without curves. The normal of
+/// Gaussian splats is -`dir`, opposite to the ray. The function body is in curve_surface.inl.
 template <typename F>
 void setup_curved(const SceneView& scene, const MeshHit<F>& hit, const Vec3<F>& dir, bool with_uv,
                   const Mask<F>& active, Surface<F>& out);

@@ -13,8 +13,9 @@ namespace wavecomb::detail {
 template <typename F>
 struct CurvedPoint {
   Vec3<F> p, n, dpdu;  ///< n: unit outward normal
-  F size;              ///< bound of the terms that p was computed from, for rounding error
-  F du, dv;            ///< lengths of dp/du and dp/dv
+  /// Bound of the terms from which p was computed, for the rounding error of p.
+  F size;
+  F du, dv;  ///< lengths of dp/du and dp/dv
 };
 
 template <typename F>
@@ -36,7 +37,8 @@ inline CurvedPoint<F> tube_point(const CurveSegment<F>& s, const F& u, const F& 
   return {fma(n, at.r, at.c), n, at.dc, control_size(s), F(length(at.dc)), F(2.f * kPi * at.r)};
 }
 
-/// The derivative of b = B / |B| with B = c' x n is (B' - b (b . B')) / |B|.
+/// Returns the point of a ribbon at (u, v). The derivative of its unit width direction b = B / |B|
+/// with B = c' x n is (B' - b dot(b, B')) / |B|.
 template <typename F>
 inline CurvedPoint<F> ribbon_point(const CurveSegment<F>& s, const F& u, const F& v) {
   const CurvePoint<F> at = curve_point<F>(s, u);
@@ -81,7 +83,7 @@ inline void merge(Surface<F>& to, const Surface<F>& from, const Mask<F>& m) {
         select<F>(m, from.ns, to.ns)};
 }
 
-/// Sets texture coordinates, their change per length, and the tangent.
+/// Sets texture coordinates, their change per unit length, and the tangent.
 template <typename F>
 inline void set_uv(const MeshReader<F>& mesh, const InstanceMaps<F>& maps, const MeshHit<F>& hit,
                    const CurvedPoint<F>& c, const Mask<F>& active, const Mask<F>& strands,
@@ -100,16 +102,16 @@ inline void set_uv(const MeshReader<F>& mesh, const InstanceMaps<F>& maps, const
   s.uv_per_length = sqrt(density2);
 }
 
-/// Control points that a packet of hits reads, by lane.
+/// Control points that each lane of a packet of hits reads.
 template <typename F>
 struct ControlPoints {
   UInt<F> first;    ///< index of control point 0
-  Mask<F> strands;  ///< lanes with a second point, unlike spheres and splats
+  Mask<F> strands;  ///< lanes with curves, which have at least two control points
   Mask<F> ribbons;  ///< lanes with normals
 };
 
 /// Moves control points, ribbon normals and instance transforms to the time of the hits. Returns a
-/// bound of all terms of world positions.
+/// bound of all terms of world positions, for their rounding error.
 template <typename F>
 [[gnu::noinline, gnu::cold]] F move_segment(const SceneView& scene, const MeshHit<F>& hit,
                                             const ControlPoints<F>& from, const Mask<F>& active,

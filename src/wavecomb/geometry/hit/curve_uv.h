@@ -15,7 +15,8 @@ struct CurveUv {
 };
 
 /// Returns texture coordinates at hits. Authored coordinates are interpolated between the ends of a
-/// segment, and constant on points; otherwise they are the hit's own. `strands`: lanes with curves.
+/// segment, and constant on points. Without authored coordinates, the texture coordinates are the
+/// hit's (u, v). `strands`: lanes with curves.
 template <typename F>
 inline CurveUv<F> curve_uv(const MeshReader<F>& mesh, const UInt<F>& prim, const F& u, const F& v,
                            const Mask<F>& active, const Mask<F>& strands) {

@@ -10,9 +10,9 @@ namespace wavecomb {
 namespace detail {
 
 /// Returns the normal of the round fibre that a ribbon represents. The offset from the fibre axis
-/// is h = 2 v - 1 in half widths, for any orientation of the ribbon. With w the direction opposite
-/// to the ray, made perpendicular to the fibre, and e the ribbon's width direction, made
-/// perpendicular to fibre and w, n = sqrt(1 - h^2) w + h e.
+/// is h = 2 v - 1 in half widths, for any orientation of the ribbon. The normal is n = sqrt(1 -
+/// h^2) w + h e, where w is the direction opposite to the ray, made perpendicular to the fibre, and
+/// e the ribbon's width direction, made perpendicular to the fibre and w.
 template <typename F>
 inline Vec3<F> ribbon_fibre_normal(const Surface<F>& s, const Vec3<F>& dir, const F& v) {
   const F len2 = length_squared(s.dpdu);
@@ -29,8 +29,9 @@ inline Vec3<F> ribbon_fibre_normal(const Surface<F>& s, const Vec3<F>& dir, cons
 
 }  // namespace detail
 
-/// Returns the frame of a fibre: x along it, z its normal. Exact on tubes; other meshes are treated
-/// as tubes along u of their texture coordinates. `s.dpdu` must be set.
+/// Returns the frame of a fibre: x along the fibre, z along its normal. The frame is exact on
+/// tubes; other meshes are treated as tubes along the u direction of their texture coordinates.
+/// `s.dpdu` must be set.
 template <typename F>
 [[gnu::noinline]] Frame<F> fibre_frame(const SceneView& scene, const MeshHit<F>& hit,
                                        const Surface<F>& s, const Vec3<F>& dir,

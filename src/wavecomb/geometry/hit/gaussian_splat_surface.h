@@ -8,7 +8,8 @@
 
 namespace wavecomb::detail {
 
-/// Map from offsets to standard deviations of a Gaussian splat, as three matrix rows.
+/// Linear map from offsets to units of a Gaussian splat's standard deviations, as three matrix
+/// rows.
 template <typename F>
 struct GaussianSplatMap {
   Vec3<F> row[3];
@@ -20,7 +21,7 @@ struct GaussianSplatMap {
   Vec3<F> whiten(const Vec3<F>& v) const {
     return {dot(row[0], v), dot(row[1], v), dot(row[2], v)};
   }
-  /// Applies the inverse, computed from cross products of the rows.
+  /// Applies the inverse map, computed from cross products of the matrix rows.
   Vec3<F> unwhiten(const Vec3<F>& w) const {
     const Vec3<F> x = cross(row[1], row[2]), y = cross(row[2], row[0]), z = cross(row[0], row[1]);
     const F det = dot(row[0], x);
@@ -51,7 +52,8 @@ inline Vec3<F> gaussian_splat_offset(const GaussianSplatMap<F>& map, const Insta
 namespace wavecomb {
 
 /// Returns the factor by which a Gaussian splat multiplies its material's emission for rays along
-/// `dir`: 0.5 plus the sum of its harmonics, clamped to at least 0. The factor is 1 for other hits.
+/// `dir`: 0.5 plus the sum of its harmonics, clamped to at least 0. The factor is 1 for hits on
+/// other primitives.
 template <typename F>
 [[gnu::noinline, gnu::cold]] Color<F> gaussian_splat_radiance(const SceneView& scene,
                                                               const MeshHit<F>& hit,

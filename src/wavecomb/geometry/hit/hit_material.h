@@ -7,8 +7,9 @@
 
 namespace wavecomb {
 
-/// Returns the material of primitive `prim` of a mesh: that of the face if given, otherwise that of
-/// the mesh, otherwise that of the instance (`inherited`, InstanceRecord::material).
+/// Returns the material of primitive `prim` of a mesh: the material of the face if there is one,
+/// otherwise the material of the mesh, otherwise the material of the instance (`inherited`,
+/// InstanceRecord::material).
 template <typename F>
 inline UInt<F> hit_material(const SceneView& scene, const UInt<F>& inherited, const UInt<F>& mesh,
                             const UInt<F>& prim, const Mask<F>& active) {

@@ -15,14 +15,14 @@
 
 namespace wavecomb {
 
-/// Returns the time of a path in [0, 1), which all its rays share. The time depends on the sample
-/// key only.
+/// Returns the shutter time of a path in [0, 1), which all rays of the path share. The time depends
+/// only on the sample key.
 template <typename F>
 inline F path_time(SamplerKind sampler, const SampleKey<F>& key) {
   return sample_4d<F>(sampler, key, kTimeSet).x;
 }
 
-/// A transform for each lane: rows of A and the translation.
+/// Transform of each lane: the rows of A and the translation.
 template <typename F>
 struct MatrixLanes {
   Vec3<F> row[3], t;
@@ -30,13 +30,13 @@ struct MatrixLanes {
 
 namespace detail {
 
-/// Transforms of two consecutive steps and the weight between them.
+/// Transforms of two consecutive motion steps and the interpolation weight of the second.
 template <typename F>
 struct MatrixPair {
   std::array<F, 16> a, b;
   F part;
 
-  /// `first`, `segments`: the StepRange of each active lane, which must move.
+  /// `first` and `segments` are the StepRange of each active lane, whose instance must move.
   MatrixPair(const MatrixStep* steps, const UInt<F>& first, const UInt<F>& segments, const F& time,
              const Mask<F>& active) {
     const StepInterpolation<F> at(time, segments);
@@ -50,11 +50,11 @@ struct MatrixPair {
     return {{{at(0), at(1), at(2)}, {at(4), at(5), at(6)}, {at(8), at(9), at(10)}},
             {at(3), at(7), at(11)}};
   }
-  /// Returns the larger magnitude of word k of the two transforms.
+  /// Returns the larger magnitude of matrix entry k in the two transforms.
   F reach(size_t k) const { return max(abs(a[k]), abs(b[k])); }
 };
 
-/// One of the arrays of meshes whose values may differ between steps.
+/// Mesh array, such as positions, whose values may differ between motion steps.
 template <typename F>
 class MovingRows {
  public:
@@ -76,7 +76,8 @@ class MovingRows {
   }
 
   struct Value {
-    Vec3<F> v, reach;  ///< the value, and the larger magnitudes at the two steps
+    /// Interpolated value, and the larger magnitude of each component at the two steps.
+    Vec3<F> v, reach;
   };
   Value operator()(const UInt<F>& index, const Mask<F>& active) const {
     const auto rows = [&](const uint64_t* base) {
@@ -87,7 +88,8 @@ class MovingRows {
     };
     const Vec3<F> a = rows(before_), b = rows(after_);
     const auto larger = [](const F& x, const F& y) { return max(abs(x), abs(y)); };
-    // No fma, so that this gives the same bits as curve traversal in every build.
+    // Do not use fma, so that the result is bit-identical to that of curve traversal in every
+    // build.
     return {Vec3<F>(b - a) * part_ + a, {larger(a.x, b.x), larger(a.y, b.y), larger(a.z, b.z)}};
   }
 
@@ -98,25 +100,26 @@ class MovingRows {
 
 }  // namespace detail
 
-/// Transforms of the instances of hits at the times of the hits.
+/// Transforms of the hit instances at the times of the hits.
 template <typename F>
 struct MovedInstance {
   Mask<F> moves;
-  MatrixLanes<F> to_world;  ///< lanes whose instances move
+  MatrixLanes<F> to_world;  ///< transforms, valid in lanes whose instances move
   F side;                   ///< sign of the determinant of to_world
   F size;                   ///< bound of all terms of a world position, for the rounding error
 };
 
-/// Returns the transforms of moving instances. `maps` holds `row` and `t` of the instances at rest.
-/// `reach` bounds the magnitudes of local positions. Like the following functions it is not
-/// inlined, so that kernels of scenes without motion keep their size.
+/// Returns the transforms of moving instances. `maps` holds the linear part `row` and the
+/// translation `t` of instances that do not move. `reach` bounds the magnitudes of local positions.
+/// This function and the following functions are not inlined, so that kernels of scenes without
+/// motion stay small.
 template <typename F, typename Maps>
 [[gnu::noinline, gnu::cold]] MovedInstance<F> moved_instance(const SceneView& scene,
                                                              const UInt<F>& inst, const F& time,
                                                              const Maps& maps, const Vec3<F>& reach,
                                                              const Mask<F>& active);
 
-/// The triangle of a hit at the time of the hit, and the transform of its instance.
+/// Vertices of a hit triangle at the time of the hit, and the transform of its instance.
 template <typename F>
 struct MovedTriangle {
   Vec3<F> p[3];

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Definitions for motion.h, for the translation units that instantiate them.
+/// Definitions of the function templates in motion.h, for the translation units that instantiate
+/// them.
 #pragma once
 
 #include "wavecomb/geometry/hit/motion.h"

@@ -12,7 +12,7 @@
 namespace wavecomb {
 
 namespace detail {
-/// Returns 1 if a ray along `dir` hits the side to which `ng` points, else -1.
+/// Returns 1 if a ray along `dir` hits the side of the surface to which `ng` points, else -1.
 template <typename F>
 WAVECOMB_INLINE F incident_side(const Vec3<F>& dir, const Vec3<F>& ng) {
   return select(dot(dir, ng) < 0.f, F(1.f), F(-1.f));
@@ -32,9 +32,9 @@ WAVECOMB_INLINE Vec3<F> facing_normal(const Vec3<F>& dir, const Vec3<F>& ng, con
 }
 
 /// Returns `n`, which faces the viewer, bent until its mirror direction r = 2 (w . n) n - w leaves
-/// the surface. If r . g is below t = min(0.9 w . g, 0.01), r is lifted to that height, and n
-/// becomes the half vector of w and the lifted r (A. Keller et al., "The Iray Light Transport
-/// Simulation and Rendering System", 2017, appendix A.3). This avoids black rims on glossy surfaces
+/// the surface. If r . g is below t = min(0.9 w . g, 0.01), r is raised to r . g = t, and n becomes
+/// the half vector of w and the lifted r (A. Keller et al., "The Iray Light Transport Simulation
+/// and Rendering System", 2017, appendix A.3). The adjustment avoids black rims on glossy surfaces
 /// with a normal map.
 template <typename F>
 WAVECOMB_INLINE Vec3<F> reflecting_normal(const Vec3<F>& dir, const Vec3<F>& ng, const Vec3<F>& n) {
@@ -47,7 +47,7 @@ WAVECOMB_INLINE Vec3<F> reflecting_normal(const Vec3<F>& dir, const Vec3<F>& ng,
   const Mask<F> below = height < least;
   if (none(below)) return n;
   const Vec3<F> raised = normalize(fma(g, F(least - height), r));
-  // At grazing incidence the sum would cancel out.
+  // At grazing incidence, w and the raised direction would cancel out.
   const Vec3<F> between = select<F>(c < kMinCosine, g, w + raised);
   return select<F>(below, normalize(between) * towards, n);
 }

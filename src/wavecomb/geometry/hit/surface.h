@@ -17,17 +17,19 @@ namespace detail {
 /// Hit point on a triangle in object space.
 template <typename F>
 struct TrianglePoint {
-  UInt<F> corner;              ///< index of the first corner
+  UInt<F> corner;              ///< index of the triangle's first corner
   std::array<UInt<F>, 3> i;    ///< vertices
-  Vec3<F> p0, p1, p2, e1, e2;  ///< positions of the vertices, edges from the first
+  Vec3<F> p0, p1, p2, e1, e2;  ///< positions of the vertices, and edges from the first vertex
   Vec3<F> p;                   ///< hit point
   F b0, b1, b2;                ///< barycentrics
-  F safe_area2;                ///< twice the world area; 1 for degenerate triangles
+  /// Twice the triangle's area in world space; 1 for degenerate triangles.
+  F safe_area2;
 };
 
-/// Returns a bound of the rounding error: all terms of the interpolated point and, with a smaller
-/// weight, the triangle's corners, from which traversal subtracts the ray's origin. The bound
-/// covers all axes, since the products of traversal mix them.
+/// Returns a bound of the rounding error of a hit point, from the magnitudes of all terms of the
+/// interpolated point and, with a smaller weight, of the triangle's corners, from which traversal
+/// subtracts the ray's origin. The bound combines all axes, since the products in traversal mix
+/// them.
 template <typename F>
 WAVECOMB_INLINE F rounding_offset(const InstanceMaps<F>& maps, const TrianglePoint<F>& at) {
   const Vec3<F> q0 = abs3(at.p0), q1 = abs3(at.p1), q2 = abs3(at.p2);
@@ -45,7 +47,8 @@ struct SmoothLanes {
   bool with_terminator;
 };
 
-/// Sets ns from the normals of vertices or corners, and the terminator vector.
+/// Sets the shading normal ns from the normals of vertices or corners, and sets the terminator
+/// vector.
 template <bool kWithMotion, typename F>
 WAVECOMB_INLINE void set_smooth_normal(const SceneView& scene, const MeshHit<F>& hit,
                                        const MeshReader<F>& mesh, const InstanceMaps<F>& maps,
@@ -76,8 +79,8 @@ WAVECOMB_INLINE void set_smooth_normal(const SceneView& scene, const MeshHit<F>&
   s.ns = select<F>(valid, ns, s.ng);
 
   if (with_terminator) {
-    // Project p to the tangent planes at the vertices and interpolate, on the side of the normals
-    // only.
+    // Project p to the tangent planes at the three vertices and interpolate the projections,
+    // ignoring projections to the back side.
     const auto lift = [&](const Vec3<F>& q, const Vec3<F>& vertex_normal) {
       const F n2len = length_squared(vertex_normal);
       const F h = dot(Vec3<F>(at.p - q), vertex_normal) / select(n2len > 0.f, n2len, F(1.f));
@@ -90,7 +93,7 @@ WAVECOMB_INLINE void set_smooth_normal(const SceneView& scene, const MeshHit<F>&
   }
 }
 
-/// Sets uv, dpdu, uv_per_length and handedness.
+/// Sets the members uv, dpdu, uv_per_length and handedness of a shading point.
 template <typename F>
 WAVECOMB_INLINE void set_triangle_uv(const SceneView& scene, const MeshHit<F>& hit,
                                      const MeshReader<F>& mesh, const InstanceMaps<F>& maps,
@@ -103,10 +106,10 @@ WAVECOMB_INLINE void set_triangle_uv(const SceneView& scene, const MeshHit<F>& h
   s.uv_per_length = sqrt(F(abs(det) / at.safe_area2));
   const Mask<F> mirrored = det < 0.f;
   s.handedness = select(mirrored, F(-maps.side), maps.side);
-  // dp/du = (d2.v e1 - d1.v e2) / det. Only the direction of this vector is used.
+  // dp/du = (d2.v e1 - d1.v e2) / det. Only the direction of dp/du is used.
   const Vec3<F> across = at.e1 * d2.y - at.e2 * d1.y;
   Vec3<F> tangent = select<F>(mirrored, -across, across);
-  // Working on a copy lets the vertices stay in registers.
+  // Pass a copy of the vertex indices, so that the original values can stay in registers.
   if (scene.tangents)
     tangent = smooth_tangent<F>(scene, hit, {at.i[0], at.i[1], at.i[2]}, tangent, active);
   s.dpdu = maps.vector(tangent);
@@ -153,7 +156,8 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
 
   Surface<F> s;
   s.p = maps.point(p);
-  const Vec3<F> area_vector = maps.map_normal(cross(e1, e2));  // length: twice the world area
+  // Its length is twice the triangle's area in world space.
+  const Vec3<F> area_vector = maps.map_normal(cross(e1, e2));
   const F area2 = length(area_vector);
   const F safe_area2 = select(area2 > 0.f, area2, F(1.f));
   s.ng = select<F>(area2 > 0.f, area_vector * F(1.f / safe_area2), -dir);
@@ -171,7 +175,8 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
                                     .b2 = b2,
                                     .safe_area2 = safe_area2};
   s.offset = detail::rounding_offset<F>(maps, at);
-  // Interpolation between motion steps adds rounding errors of the size of both steps.
+  // Interpolation between motion steps adds rounding errors in proportion to the coordinates at
+  // both steps.
   if (kWithMotion && scene.has_motion) [[unlikely]]
     s.offset = max(s.offset, F(moved_size * 0x1.4p-20f));
 

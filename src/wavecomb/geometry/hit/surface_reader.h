@@ -18,7 +18,7 @@ template <typename F>
 struct MeshHit {
   UInt<F> inst, mesh, prim;
   F u, v;
-  F time{};  ///< time of the path, if the scene moves
+  F time{};  ///< shutter time of the path, used if the scene has motion
 };
 
 /// A shading point in world space.
@@ -28,19 +28,20 @@ struct Surface {
   Vec3<F> ng;    ///< unit geometric normal, pointing outwards by the winding order
   Vec3<F> ns;    ///< unit shading normal on the same side as ng
   Vec3<F> dpdu;  ///< tangent along u, of any length; zero if uv was not requested
-  /// 1 if v runs along ng x dpdu; -1 if it runs the other way, as in a mirrored texture.
+  /// 1 if v increases along ng x dpdu; -1 if v increases in the opposite direction, as in a
+  /// mirrored texture.
   F handedness;
   Vec2<F> uv;
-  F uv_per_length;  ///< sqrt(uv area / world area) of the triangle
+  F uv_per_length;  ///< sqrt(uv area / world-space area) of the triangle
   F offset;         ///< bound of the position error along ng
-  /// Vector along ng from p to the smooth surface that the vertex normals suggest.
+  /// Vector along ng from p to the smooth surface that the vertex normals imply (see surface.h).
   Vec3<F> terminator;
-  Vec3<F> unadjusted;  ///< ns before facing_normal adjusted it
+  Vec3<F> unadjusted;  ///< ns before facing_normal() adjusted it to the viewing direction
 };
 
 namespace detail {
 
-/// Access to the meshes of the lanes, row by row.
+/// Reader of the mesh arrays of each lane, row by row.
 template <typename F>
 class MeshReader {
  public:
@@ -56,7 +57,7 @@ class MeshReader {
     flags = gather_member<F>(meshes, &MeshRecord::flags, mesh, active);
   }
 
-  /// Returns row `index`, of N 32-bit words, of one of a mesh's arrays.
+  /// Returns row `index` of a mesh array whose rows have N 32-bit words.
   template <size_t N>
   WAVECOMB_INLINE std::array<F, N> row(uint64_t MeshRecord::* array, const UInt<F>& index,
                                        const Mask<F>& active) const {
@@ -84,7 +85,7 @@ class MeshReader {
     return {float_bits<F>(r[0]), float_bits<F>(r[1]), float_bits<F>(r[2])};
   }
 
-  /// Returns 32-bit word `index` of one of a mesh's arrays.
+  /// Returns 32-bit word `index` of a mesh array.
   UInt<F> word(uint64_t MeshRecord::* array, const UInt<F>& index, const Mask<F>& active) const {
     const InMemory<UInt<F>> at(index);
     InMemory<UInt<F>> out(UInt<F>(0u));
@@ -98,7 +99,7 @@ class MeshReader {
   UInt<F> flags;
 
  private:
-  /// Not inlined, since most packets are full.
+  /// Reads rows for partially filled packets; not inlined, since most packets are full.
   template <size_t N>
   [[gnu::noinline]] std::array<F, N> some_rows(uint64_t MeshRecord::* array, UInt<F> word,
                                                Mask<F> active) const {
@@ -107,15 +108,16 @@ class MeshReader {
         active);
   }
 
-  const MeshRecord* shared_ = nullptr;  ///< the mesh of all active lanes, if they share one
+  /// Mesh of all active lanes, if they have the same mesh; else null.
+  const MeshRecord* shared_ = nullptr;
   const MeshRecord* records_[kWidth<F>];
 };
 
-/// Transforms of the lanes' instances.
+/// Object-to-world transforms of the lanes' instances.
 template <typename F>
 struct InstanceMaps {
   Vec3<F> row[3], t;
-  F side;  ///< sign of the determinant of A
+  F side;  ///< sign of the determinant of the linear map
 
   WAVECOMB_INLINE InstanceMaps(const InstanceRecord* instances, const UInt<F>& inst,
                                const Mask<F>& active) {
@@ -129,7 +131,7 @@ struct InstanceMaps {
     }
   }
 
-  /// Replaces the transforms of instances that move.
+  /// Replaces the transforms of moving instances by their transforms at the hit's time.
   void set_instance(const MovedInstance<F>& to) {
     for (int i = 0; i < 3; ++i) row[i] = select<F>(to.moves, to.to_world.row[i], row[i]);
     t = select<F>(to.moves, to.to_world.t, t);
@@ -150,7 +152,7 @@ struct InstanceMaps {
            side;
   }
   /// Returns row j of the inverse of the linear map. A normal (a, b, c) in local space has the
-  /// world direction a row 0 + b row 1 + c row 2, up to its length.
+  /// direction a row(0) + b row(1) + c row(2) in world space.
   Vec3<F> inverse_row(int j) const {
     const Vec3<F> c[3] = {cross(row[1], row[2]), cross(row[2], row[0]), cross(row[0], row[1])};
     const F det = dot(row[0], c[0]), inverse = 1.f / select(det == 0.f, F(1.f), det);
@@ -159,7 +161,7 @@ struct InstanceMaps {
   }
 
  private:
-  /// Reads the transform from the words of an InstanceRecord.
+  /// Reads the transform from the 32-bit words of an InstanceRecord.
   template <typename Word>
   WAVECOMB_INLINE void take(const Word& word) {
     for (uint32_t i = 0; i < 3; ++i) row[i] = {word(4 * i), word(4 * i + 1), word(4 * i + 2)};

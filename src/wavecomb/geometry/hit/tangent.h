@@ -10,7 +10,8 @@
 
 namespace wavecomb::detail {
 
-/// Encoded tangents of the three corners of each lane, at the steps before and after its time.
+/// Encoded tangents of the triangle corners of each lane, at the motion steps before and after the
+/// lane's time.
 template <typename F>
 struct TangentCodes {
   InMemory<UInt<F>> before[3], after[3];
@@ -47,7 +48,7 @@ struct TangentCodes {
         for (size_t k = 0; k < 3; ++k) after[k].value[i] = before[k].value[i];
     }
   }
-  /// Returns the tangent of corner k.
+  /// Returns the tangent of triangle corner k.
   Vec3<F> tangent(size_t k) const {
     const Vec3<F> a = decode_direction<F>(load<UInt<F>>(before[k].value));
     if (!moves) return a;
@@ -57,8 +58,8 @@ struct TangentCodes {
 };
 
 /// Returns the tangent at hits in the mesh's local space, interpolated between the corners of the
-/// triangle, or `flat`, that of the triangle, if the mesh has none or they cancel out. Not inlined,
-/// so that kernels of scenes without such meshes keep their size.
+/// triangle, or the triangle's constant tangent `flat` if the mesh has no tangents or they cancel
+/// out. The function is not inlined, so that kernels of scenes without such meshes stay small.
 template <typename F>
 [[gnu::noinline]] Vec3<F> smooth_tangent(const SceneView& scene, const MeshHit<F>& hit,
                                          const std::array<UInt<F>, 3>& corners, const Vec3<F>& flat,

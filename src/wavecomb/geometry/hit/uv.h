@@ -9,15 +9,15 @@
 
 namespace wavecomb {
 
-/// Texture coordinates over a triangle: those of vertex 0, and the differences of the other
-/// vertices.
+/// Texture coordinates over a triangle: the coordinates of vertex 0, and the differences of the
+/// other two vertices from it.
 template <typename F>
 struct UvTriangle {
   Vec2<F> t0, d1, d2;
 
   UvTriangle(const Vec2<F>& a, const Vec2<F>& b, const Vec2<F>& c)
       : t0(a), d1{b.x - a.x, b.y - a.y}, d2{c.x - a.x, c.y - a.y} {}
-  /// Returns the value at barycentrics (b1, b2) of vertices 1 and 2.
+  /// Returns the texture coordinates at barycentrics (b1, b2) of vertices 1 and 2.
   Vec2<F> at(const F& b1, const F& b2) const {
     return {fma(d2.x, b2, fma(d1.x, b1, t0.x)), fma(d2.y, b2, fma(d1.y, b1, t0.y))};
   }
@@ -50,8 +50,8 @@ WAVECOMB_INLINE UvTriangle<F> uv_triangle(const MeshReader<F>& mesh,
 
 }  // namespace detail
 
-/// Returns the texture coordinates of a hit at (u, v) of primitive `prim`, the same as
-/// setup_surface computes.
+/// Returns the texture coordinates of a hit at (u, v) of primitive `prim`, as setup_surface()
+/// computes them.
 template <typename F>
 inline Vec2<F> hit_uv(const MeshRecord* meshes, const UInt<F>& mesh, const UInt<F>& prim,
                       const F& u, const F& v, const Mask<F>& active) {

@@ -13,8 +13,8 @@ uint64_t address(const void* p) {
   return reinterpret_cast<uint64_t>(p);
 }
 
-/// Returns the number of values of an attribute of that rate on a mesh; 0 if the mesh does not
-/// support the rate.
+/// Returns the number of values that an attribute of the given rate has on a mesh; 0 if the mesh
+/// does not support the rate.
 size_t value_count(const Mesh& mesh, AttributeRate rate) {
   const bool strands = mesh.is_strands();
   switch (rate) {
@@ -56,7 +56,7 @@ void make_attribute_records(SceneGeometry& geometry) {
   const std::vector<Mesh>& meshes = geometry.meshes;
   if (std::ranges::all_of(meshes, [](const Mesh& mesh) { return mesh.attributes.empty(); })) return;
   const AttributeRecord end{0, 0, kNoAttribute, AttributeRate::kConstant, 0, 0};
-  geometry.attribute_records.push_back(end);  // entry for meshes without attributes
+  geometry.attribute_records.push_back(end);  // empty list, for meshes without attributes
   geometry.mesh_attributes.resize(meshes.size());
   for (size_t m = 0; m < meshes.size(); ++m) {
     if (meshes[m].attributes.empty()) continue;

@@ -18,16 +18,17 @@ inline constexpr uint32_t kInheritMaterial = 0xffffffffu;
 enum class Attribute : uint8_t {
   kNone,
   kVertex,  ///< one value per vertex, addressed by the triangle's indices
-  /// One value per corner: 3 per triangle in order; 2 per curve segment, for its ends; 1 per point.
+  /// One value per corner: 3 values per triangle in the order of its vertices, 2 values per curve
+  /// segment for its ends, or 1 value per point.
   kCorner,
 };
 
-/// Values that vary over a mesh (a primvar), which materials read by the id of the name.
+/// Values that vary over a mesh (a primvar). Materials refer to an attribute by the id of its name.
 struct MeshAttribute {
-  uint32_t id = kNoAttribute;  ///< id of SceneBuilder::attribute
+  uint32_t id = kNoAttribute;  ///< id that SceneBuilder::attribute() returned
   AttributeRate rate = AttributeRate::kConstant;
-  uint32_t width = 1;             ///< `width` floats for each value, finite
-  std::span<const float> values;  ///< `width` for each value, finite
+  uint32_t width = 1;             ///< number of floats in each value
+  std::span<const float> values;  ///< `width` finite floats for each value
 };
 
 /// Type of the primitives of a mesh.
@@ -45,7 +46,7 @@ enum class Primitive : uint8_t {
 /// Shape and opacity of a Gaussian splat, made by geometry/gaussian_splat/gaussian_splat.h; centre
 /// and colour are stored separately.
 struct alignas(64) GaussianSplatRow {
-  float whiten[9];  ///< rows of the map from offsets to standard deviations
+  float whiten[9];  ///< rows of the matrix that maps offsets to units of standard deviations
   float opacity;    ///< opacity along a ray through the centre
   float cut;      ///< square of the cutoff in standard deviations, beyond which rays miss the splat
   float half[3];  ///< half extents of the bounding box about the centre
@@ -61,37 +62,42 @@ static_assert(sizeof(GaussianSplatRow) == 64);
 struct Mesh {
   std::string name;
   Primitive primitive = Primitive::kTriangle;
-  /// 3 floats per vertex, Bezier control point or point, step after step.
+  /// 3 floats per vertex, Bezier control point or point, for one motion step after another.
   std::span<const float> positions;
-  /// 3 per triangle, counter-clockwise as seen from outside; 1 per curve segment
-  /// (kCurveFirstPoint); empty for points.
+  /// Vertex indices: 3 per triangle, counter-clockwise as seen from outside. For curves, 1 value
+  /// per segment with the index of its first control point (kCurveFirstPoint). Empty for points.
   std::span<const uint32_t> indices;
-  /// 1 per control point or point, or the radius of the bounding sphere of each splat; empty for
+  /// Radius of each control point or point, or of the bounding sphere of each splat; empty for
   /// triangles.
   std::span<const float> radii;
-  /// 3 floats per vertex or corner, or per control point of ribbons, step after step; empty for
-  /// flat shading.
+  /// 3 floats per vertex or corner, or per control point of ribbons, for one motion step after
+  /// another; empty for flat shading.
   std::span<const float> normals;
   Attribute normals_at = Attribute::kNone;
-  std::span<const float> uvs;  ///< 2 floats per vertex or corner; empty: uv = barycentrics
+  std::span<const float> uvs;  ///< 2 floats per vertex or corner; if empty, uv are the barycentrics
   Attribute uvs_at = Attribute::kNone;
-  std::span<const uint32_t> face_materials;  ///< material of each primitive, or empty
-  uint32_t material = kInheritMaterial;      ///< used if face_materials is empty
-  uint32_t light_group = 0;                  ///< group of its emission: SceneBuilder::light_group
-  uint32_t mesh_light = 0xffffffffu;         ///< SceneBuilder::add_mesh_light, or kNoLight
+  /// Material of each primitive; empty if all have the same material.
+  std::span<const uint32_t> face_materials;
+  /// Material of all primitives, used if face_materials is empty.
+  uint32_t material = kInheritMaterial;
+  /// Light group of the mesh's emission (SceneBuilder::light_group)
+  uint32_t light_group = 0;
+  /// Index that SceneBuilder::add_mesh_light() returned, or kNoLight.
+  uint32_t mesh_light = 0xffffffffu;
   /// Length of the prefix of `name` that names the asset of the mesh; 0 if unknown.
   uint32_t asset_length = 0;
   std::span<const GaussianSplatRow> splats;  ///< 1 per splat
-  std::span<const float> harmonics;  ///< 3 (harmonics_degree + 1)^2 floats per splat: its colour
+  std::span<const float> harmonics;  ///< colour of each splat, as 3 (harmonics_degree + 1)^2 floats
   uint32_t harmonics_degree = 0;     ///< 0 to 3
-  std::vector<MeshAttribute> attributes;  ///< values at the first step, as for uvs
+  /// Values at the first motion step; like uvs, they do not move.
+  std::vector<MeshAttribute> attributes;
   /// Number of shapes at equally spaced shutter times; 1 if the mesh does not deform.
   uint32_t steps = 1;
   std::shared_ptr<const void> owner;
 
   bool is_curved() const { return primitive != Primitive::kTriangle; }
   bool is_strands() const { return is_curved() && !is_dots(); }
-  /// Returns whether each point is a primitive.
+  /// Returns whether each point of the mesh is a primitive.
   bool is_dots() const {
     return primitive == Primitive::kSphere || primitive == Primitive::kGaussianSplat;
   }
@@ -113,14 +119,15 @@ struct Mesh {
   bool deforms() const { return steps > 1; }
 };
 
-/// Packed mesh: addresses and flags, 16 32-bit words. For splats `normals` points to
-/// GaussianSplatRow and `uvs` to the harmonics.
+/// Packed mesh: addresses and flags, 16 32-bit words. For splats, `normals` is the address of the
+/// GaussianSplatRow array, and `uvs` the address of the spherical harmonics.
 struct alignas(64) MeshRecord {
   uint64_t positions, indices, normals, uvs, face_materials;
   uint32_t material;
   uint32_t flags;
-  float uv_density;  ///< sqrt(uv area / area) over all triangles, object space; 0 without uvs
-  uint32_t motion;   ///< index into MotionView::meshes
+  /// sqrt(uv area / object-space area), summed over all triangles; 0 without uvs.
+  float uv_density;
+  uint32_t motion;  ///< index of the mesh's motion in MotionView::meshes
   uint64_t radii;
 };
 static_assert(sizeof(MeshRecord) == 64);
@@ -137,7 +144,7 @@ enum MeshFlags : uint32_t {
   kIsDots = kIsSphere | kIsGaussianSplat,
   kIsCurved = kIsTube | kIsRibbon | kIsDots,
 };
-/// Shift of Mesh::harmonics_degree in MeshRecord::flags, 2 bits.
+/// Bit position of the two bits in MeshRecord::flags that hold Mesh::harmonics_degree.
 inline constexpr uint32_t kHarmonicsShift = 10;
 
 }  // namespace wavecomb

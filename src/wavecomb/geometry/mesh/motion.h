@@ -20,16 +20,17 @@ inline constexpr uint32_t kMaxSteps = 129;
 /// deform.
 struct MeshMotion {
   uint64_t positions = 0, normals = 0;  ///< bytes
-  uint32_t segments = 0;                ///< number of steps less one; 0 if the mesh does not deform
+  /// Number of motion steps minus one; 0 if the mesh does not deform.
+  uint32_t segments = 0;
   uint32_t pad = 0;
 };
 static_assert(sizeof(MeshMotion) == 24);
 
-/// Position of a time in [0, 1] among equally spaced steps, one more than `segments`.
+/// Position of a time in [0, 1] among `segments` + 1 equally spaced motion steps.
 template <typename F>
 struct StepInterpolation {
-  UInt<F> before;  ///< index of the step at or before the time
-  F part;          ///< interpolation weight of the following step
+  UInt<F> before;  ///< index of the last motion step that is not after the time
+  F part;          ///< interpolation weight of the next step
 
   StepInterpolation(const F& time, const UInt<F>& segments) {
     const F at = time * F(Int<F>(segments));
@@ -45,9 +46,10 @@ struct StepRange {
   bool moves() const { return segments > 0; }
 };
 
-/// Packed transform of one step.
+/// Packed transform of an instance at one motion step.
 struct alignas(64) MatrixStep {
-  float to_world[12] = {};  ///< rows of A, each followed by its translation
+  /// Rows of the 3 x 4 matrix: each row of A, followed by a component of the translation.
+  float to_world[12] = {};
   float pad[4] = {};
 
   MatrixStep() = default;
@@ -64,7 +66,7 @@ static_assert(sizeof(MatrixStep) == 64);
 /// Device view of a scene's motion.
 struct MotionView {
   const MeshMotion* meshes = nullptr;
-  const StepRange* instances = nullptr;  ///< indexed by instance; null where none moves
+  const StepRange* instances = nullptr;  ///< indexed by instance; null if no instance moves
   const MatrixStep* steps = nullptr;
 };
 
@@ -87,8 +89,8 @@ inline Affine at_step(std::span<const Affine> steps, uint32_t k, uint32_t n) {
                  static_cast<float>(offset % n) / static_cast<float>(n));
 }
 
-/// Returns the number of segments for the product of two motions: enough for the steps of both, up
-/// to a limit.
+/// Returns the number of time segments for the product of two motions, which is a common multiple
+/// of both numbers, up to a limit.
 uint32_t common_segments(uint32_t a, uint32_t b);
 
 }  // namespace wavecomb

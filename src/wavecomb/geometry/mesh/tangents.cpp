@@ -16,7 +16,8 @@ using V = Vec3<float>;
 /// Number of triangles whose tangents are computed before they are summed, which bounds the scratch
 /// memory, and number of triangles of a task.
 constexpr size_t kBatch = 65536, kChunk = 1024;
-/// A mean shorter than this fraction of its weights has no reliable direction.
+/// A mean tangent whose length is below this fraction of the sum of its weights has no reliable
+/// direction.
 constexpr float kMinMean = 1e-2f;
 
 V unit(const V& v) {
@@ -24,7 +25,7 @@ V unit(const V& v) {
   return len2 > 0 && std::isfinite(len2) ? v * (1 / std::sqrt(len2)) : V(0.f);
 }
 
-/// Corner-wise access to the arrays of a mesh.
+/// Reader of mesh arrays by triangle corner.
 class Corners {
  public:
   explicit Corners(const Mesh& mesh) : mesh_(mesh) {}
@@ -45,7 +46,7 @@ class Corners {
     const auto a = uv(3 * triangle), b = uv(3 * triangle + 1), c = uv(3 * triangle + 2);
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
   }
-  /// Returns the unit dp/du of a triangle, or zero.
+  /// Returns the normalised dp/du of a triangle, or zero if it has no direction.
   V tangent(size_t triangle, uint32_t step) const {
     const auto a = uv(3 * triangle), b = uv(3 * triangle + 1), c = uv(3 * triangle + 2);
     const V p = position(3 * triangle, step);
@@ -87,8 +88,8 @@ std::array<V, 3> contributions(const Corners& at, size_t triangle, uint32_t step
 
 /// Group of corners that share a tangent.
 struct Share {
-  uint32_t corner;  ///< the first corner of the group
-  uint32_t next;    ///< another group at the same vertex, or kNone
+  uint32_t corner;  ///< first corner of the group
+  uint32_t next;    ///< next group at the same vertex, or kNone
 };
 constexpr uint32_t kNone = 0xffffffffu;
 
@@ -100,7 +101,7 @@ std::vector<Share> share_corners(const Mesh& mesh, const Corners& at,
   const auto same = [&](size_t a, size_t b) {
     const V n = at.normal(a, 0), m = at.normal(b, 0);
     if (at.uv(a) != at.uv(b) || n.x != m.x || n.y != m.y || n.z != m.z) return false;
-    // A triangle without area in the texture has no orientation and matches both.
+    // A triangle without area in texture space has no orientation and matches both orientations.
     const float s = at.uv_area(a / 3), t = at.uv_area(b / 3);
     return s == 0 || t == 0 || (s < 0) == (t < 0);
   };
@@ -124,7 +125,7 @@ struct Sum {
   float weight = 0;
 };
 
-/// Returns the mean tangent of each group at one step.
+/// Returns the mean tangent of each corner group at one motion step.
 std::vector<Sum> add_up(const Mesh& mesh, const Corners& at, uint32_t step,
                         const std::vector<uint32_t>& of_corner, size_t share_count) {
   std::vector<Sum> sums(share_count);
@@ -159,7 +160,7 @@ std::vector<uint8_t> meshes_with_tangents(const SceneGeometry& geometry,
           return materials.wants_tangents[bound_material] != 0;
         });
   };
-  // Consecutive instances of the same group and material are visited once.
+  // Visit consecutive instances of the same group and material only once.
   visit(0, geometry.instance_records[0].material);
   uint32_t group = kNone, material = kNone;
   for (const Instance& i : geometry.instances) {

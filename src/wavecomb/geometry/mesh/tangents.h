@@ -3,10 +3,10 @@
 ///
 /// Tangents follow MikkTSpace, for which normal maps are baked (M. Mikkelsen, "Simulation of
 /// Wrinkled Surfaces Revisited", 2008). Corners of a vertex with the same texture coordinates,
-/// normal and texture orientation share one tangent. It is the mean of the tangents of their
-/// triangles, each projected to the plane of the normal and weighted by the triangle's angle at the
-/// corner. Tangents are therefore split at texture seams, where the texture is mirrored, and at
-/// hard edges.
+/// normal and texture orientation share one tangent. The shared tangent is the mean of the tangents
+/// of the corners' triangles, each projected to the plane of the normal and weighted by the
+/// triangle's angle at the corner. Tangents are therefore split at texture seams, where the texture
+/// is mirrored, and at hard edges.
 #pragma once
 
 #include <cstdint>
@@ -20,37 +20,38 @@ namespace wavecomb {
 struct SceneGeometry;
 struct SceneMaterials;
 
-/// Tangents of one mesh in its local space, encoded by core/encoding/octahedral.h. Tangents that
-/// cancel out and those of triangles without area in the texture are kNoDirection.
+/// Tangents of one mesh in its local space, encoded by core/encoding/octahedral.h. The code is
+/// kNoDirection where tangents cancel out and on triangles without area in texture space.
 struct MeshTangents {
-  std::vector<uint32_t> codes;  ///< one per vertex or corner, step after step
-  bool at_corners = false;      ///< whether some vertex has more than one tangent
+  /// One code per vertex or corner, for one motion step after another.
+  std::vector<uint32_t> codes;
+  bool at_corners = false;  ///< whether some vertex has more than one tangent
 };
 
-/// Makes the tangents of a mesh with normals and texture coordinates. Runs in parallel; the result
-/// does not depend on the number of threads.
+/// Makes the tangents of a mesh with normals and texture coordinates. The function runs in
+/// parallel; the result does not depend on the number of threads.
 MeshTangents make_tangents(const Mesh& mesh);
 
 /// Packed reference to the tangents of a mesh.
 struct TangentRecord {
-  uint64_t codes = 0;     ///< address, or 0 if the mesh has no tangents
-  uint32_t step = 0;      ///< number of codes of one step, for a mesh that deforms
-  uint32_t segments = 0;  ///< number of steps less one
+  uint64_t codes = 0;     ///< address of the tangent codes, or 0 if the mesh has no tangents
+  uint32_t step = 0;      ///< number of codes per motion step, for a mesh that deforms
+  uint32_t segments = 0;  ///< number of motion steps minus one
   uint32_t at_corners = 0;
   uint32_t pad = 0;
 };
 
-/// Tangents of the meshes with a material that needs them: one that is anisotropic, has a normal
-/// map, or reads tangents in a graph. Other meshes use no memory for tangents.
+/// Tangents of the meshes with a material that needs them: an anisotropic material, one with a
+/// normal map, or one whose graph reads tangents. Other meshes use no memory for tangents.
 struct SceneTangents {
-  /// Makes the tangents of a scene. `before`, or null, holds those of a scene with the same
-  /// geometry, which are reused where possible.
+  /// Makes the tangents of a scene. `before` holds the tangents of a scene with the same geometry,
+  /// which are reused where possible; it may be null.
   SceneTangents(const SceneGeometry& geometry, const SceneMaterials& materials,
                 const SceneTangents* before);
 
-  /// By mesh, null for none; empty if no mesh has tangents.
+  /// Tangents by mesh, null for meshes without tangents; empty if no mesh has tangents.
   std::vector<std::shared_ptr<const MeshTangents>> of_mesh;
-  std::vector<TangentRecord> records;  ///< indexed by mesh; empty if no mesh has tangents
+  std::vector<TangentRecord> records;  ///< record of each mesh; empty if no mesh has tangents
   uint64_t bytes() const;
 };
 

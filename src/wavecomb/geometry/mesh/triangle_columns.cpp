@@ -7,7 +7,8 @@
 namespace wavecomb {
 namespace {
 
-/// Lines run along (kSlopeX, kSlopeY, 1); coordinates perpendicular to them are x - kSlopeX z and y
+/// The lines have the direction (kSlopeX, kSlopeY, 1), so a line is identified by its coordinates x
+/// - kSlopeX z and y
 /// - kSlopeY z.
 constexpr float kSlopeX = 0.2371f, kSlopeY = 0.1549f;
 constexpr uint32_t kMaxCells = 512;  ///< number of grid cells along one side
@@ -45,7 +46,7 @@ TriangleColumns::TriangleColumns(const Mesh& mesh)
     for (uint32_t y = cell(y0, low_[1], per_unit_[1]); y <= above; ++y)
       for (uint32_t x = from; x <= to; ++x) visit(size_t{y} * side_ + x);
   };
-  // Use fewer cells if many triangles overlap many of them, as in a fan.
+  // Use fewer grid cells if many triangles overlap many cells, as in a triangle fan.
   for (;; side_ /= 2) {
     for (int k = 0; k < 2; ++k)
       per_unit_[k] = high_[k] > low_[k] ? static_cast<float>(side_) / (high_[k] - low_[k]) : 0.f;
@@ -72,7 +73,7 @@ int TriangleColumns::faces_left(const Vec3<float>& point, size_t& tests) const {
     const uint32_t* corner = &indices_[size_t{3} * triangles_[i]];
     const Vec3<float> a = vertex(corner[0]) - p, b = vertex(corner[1]) - p,
                       c = vertex(corner[2]) - p;
-    // Areas opposite the corners, projected along the line.
+    // Signed areas of the sub-triangles opposite the three corners, projected along the line.
     const float u = b.x * c.y - b.y * c.x, v = c.x * a.y - c.y * a.x, w = a.x * b.y - a.y * b.x;
     const float all = u + v + w;
     if (all == 0 || (u < 0) != (all < 0) || (v < 0) != (all < 0) || (w < 0) != (all < 0)) continue;

@@ -17,9 +17,9 @@ class TriangleColumns {
   /// Builds the grid. `mesh` must outlive it.
   explicit TriangleColumns(const Mesh& mesh);
 
-  /// Returns the number of faces through which the line from `p` leaves the mesh less the number
-  /// through which it enters: 1 inside a closed mesh that faces outwards, 0 outside. Adds the
-  /// number of tested triangles to `tests`.
+  /// Returns the number of faces through which the line from `p` leaves the mesh minus the number
+  /// of faces through which it enters: 1 inside a closed mesh that faces outwards, 0 outside. Adds
+  /// the number of tested triangles to `tests`.
   int faces_left(const Vec3<float>& p, size_t& tests) const;
 
  private:
@@ -30,7 +30,7 @@ class TriangleColumns {
   std::span<const uint32_t> indices_;
   uint32_t side_ = 1;  ///< number of cells along x and along y
   float low_[2] = {}, high_[2] = {}, per_unit_[2] = {};
-  /// Range of `triangles_` for each cell, and the total number at the end.
+  /// Index of each cell's first entry in `triangles_`, followed by the size of `triangles_`.
   std::vector<uint32_t> first_;
   std::vector<uint32_t> triangles_;  ///< triangle indices, cell by cell
 };

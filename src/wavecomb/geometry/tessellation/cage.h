@@ -11,9 +11,10 @@ namespace wavecomb {
 
 /// UsdGeomMesh::subdivisionScheme.
 enum class Scheme : uint8_t { kCatmullClark, kLoop, kBilinear };
-/// UsdGeomMesh::interpolateBoundary: none, edgeOnly, edgeAndCorner.
+/// Values of UsdGeomMesh::interpolateBoundary: none, edgeOnly, edgeAndCorner.
 enum class BoundaryRule : uint8_t { kNone, kEdgeOnly, kEdgeAndCorner };
-/// UsdGeomMesh::faceVaryingLinearInterpolation, from the least to the most that stays linear.
+/// Values of UsdGeomMesh::faceVaryingLinearInterpolation, in increasing order of what is
+/// interpolated linearly.
 enum class FaceVaryingRule : uint8_t {
   kNone,
   kCornersOnly,
@@ -33,16 +34,18 @@ struct FaceVaryingIndices {
 /// Control cage: polygons, creases and boundary rules. The caller owns the arrays; Subdivision
 /// reads them in its constructor only.
 struct Cage {
-  std::string name;  ///< used in error messages
+  std::string name;  ///< name of the surface in error messages
   Scheme scheme = Scheme::kCatmullClark;
   BoundaryRule boundary = BoundaryRule::kEdgeAndCorner;
   FaceVaryingRule face_varying = FaceVaryingRule::kCornersPlus1;
-  bool smooth_triangles = false;  ///< Catmull-Clark: triangleSubdivisionRule is "smooth"
+  /// Whether UsdGeomMesh::triangleSubdivisionRule is "smooth" (Catmull-Clark only)
+  bool smooth_triangles = false;
   uint32_t vertex_count = 0;
   std::span<const int32_t> face_sizes, corners;
   std::span<const int32_t> holes;
-  std::span<const int32_t> crease_edges;     ///< 2 points per edge
-  std::span<const float> crease_sharpness;   ///< one per edge; 10 or more means infinitely sharp
+  std::span<const int32_t> crease_edges;  ///< 2 points per edge
+  /// One value per edge; 10 or more means infinitely sharp.
+  std::span<const float> crease_sharpness;
   std::span<const int32_t> corner_vertices;  ///< sharp vertices
   std::span<const float> corner_sharpness;
   std::vector<FaceVaryingIndices> channels;
@@ -52,19 +55,19 @@ struct Cage {
 /// description of the first fault.
 void check_cage(const Cage& cage);
 
-/// Throws Error with both counts if they differ. `things`: plural noun for the message, such as
-/// "components of a primvar".
+/// Throws Error that states both counts if `found` differs from `needed`. `things`: plural noun for
+/// the message, such as "components of a primvar".
 void check_count(const char* things, size_t found, size_t needed);
 
-/// Face-varying values without duplicates: an index for each corner, and the values that they
-/// address, (count, width).
+/// Face-varying values without duplicates: a value index for each corner, and an array of the
+/// distinct values, of shape (count, width).
 struct Welded {
   std::vector<int32_t> indices;
   std::vector<float> values;
 };
 /// Merges equal values of corners that share a vertex, bit for bit. `corners` are vertex indices
-/// below `vertex_count`; `values` is (corners, width). Throws Error if indices or sizes are
-/// invalid.
+/// below `vertex_count`; `values` is (corners, width). Throws Error if vertex indices or array
+/// sizes are invalid.
 Welded weld_corners(std::span<const int32_t> corners, uint32_t vertex_count,
                     std::span<const float> values, uint32_t width);
 

@@ -60,12 +60,12 @@ class CornerTree {
     for (uint32_t& position : position_of_) position = rank[position];
   }
 
-  /// Number of different positions.
+  /// Returns the number of different corner positions.
   size_t position_count() const { return positions_.size(); }
-  /// Index of the position of a corner.
+  /// Returns the index of a corner's position.
   uint32_t position_of(uint32_t corner) const { return position_of_[corner]; }
 
-  /// Removes a corner. Returns whether it was the last one at its position.
+  /// Removes a corner. Returns whether it was the last remaining corner at its position.
   bool remove(uint32_t corner) {
     const uint32_t position = position_of_[corner];
     if (--counts_[position] > 0) return false;
@@ -74,9 +74,9 @@ class CornerTree {
   }
 
   /// Finds a position inside or on the counter-clockwise triangle a, b, c that still has corners
-  /// and is not a vertex of the triangle. Returns kNone if no such position exists. Of several, it
-  /// returns a pseudo-random one, which is seldom the next to be removed; its removal would require
-  /// another search. Adds the number of visited nodes to `steps`.
+  /// and is not a vertex of the triangle. Returns kNone if no such position exists. If there are
+  /// several, returns a pseudo-random one: it is unlikely to be removed soon, and each removal of a
+  /// blocking position requires another search. Adds the number of visited nodes to `steps`.
   uint32_t find(const Corner& a, const Corner& b, const Corner& c, uint64_t& steps) {
     const double lo_x = std::min({a.x, b.x, c.x}), hi_x = std::max({a.x, b.x, c.x});
     const double lo_y = std::min({a.y, b.y, c.y}), hi_y = std::max({a.y, b.y, c.y});
@@ -114,13 +114,14 @@ class CornerTree {
   struct Node {
     Corner lo, hi;
     uint32_t begin, end;     ///< range of positions
-    uint32_t alive;          ///< positions with remaining corners
-    uint32_t parent, child;  ///< first of two children; kNone: leaf
+    uint32_t alive;          ///< number of positions with remaining corners
+    uint32_t parent, child;  ///< index of the first of two children; kNone for a leaf
   };
   struct Edge {
     Corner from, to;
-    /// Whether the box lies entirely to the right of the edge. Floating-point rounding is
-    /// monotonic, so the result agrees with tests of the positions inside.
+    /// Returns whether the node's bounding box lies entirely to the right of the edge.
+    /// Floating-point rounding is monotonic, so the result agrees with tests of the positions
+    /// inside the box.
     bool off(const Node& n) const {
       return turn_of(from, to, {to.y > from.y ? n.lo.x : n.hi.x, to.x > from.x ? n.hi.y : n.lo.y}) <
              0;
@@ -159,7 +160,7 @@ class CornerTree {
 
   std::vector<Node> nodes_;
   std::vector<Corner> positions_;  ///< in leaf order
-  std::vector<uint32_t> counts_;   ///< remaining corners per position
+  std::vector<uint32_t> counts_;   ///< number of remaining corners at each position
   std::vector<uint32_t> leaf_of_, position_of_;
   uint32_t random_ = 1;
 };

@@ -11,8 +11,8 @@ namespace {
 
 constexpr uint32_t kNone = CornerTree::kNone;
 
-/// Set of integers below n that finds its next element fast. A hierarchy of bit sets: each upper
-/// bit says whether the 64-bit word below it is non-zero.
+/// Set of integers below n with a fast search for the next element. It is a hierarchy of bit sets,
+/// where each bit of an upper level states whether a 64-bit word of the level below is non-zero.
 class NumberSet {
  public:
   explicit NumberSet(size_t n) {
@@ -97,7 +97,8 @@ class Clipper {
   }
 
  private:
-  /// Entry in the list of corners that wait until a blocking position is free.
+  /// Entry in the list of corners that cannot be cut until the corners at a blocking position have
+  /// been removed.
   struct Blocked {
     uint32_t position = kNone, next = kNone, previous = kNone;
   };
@@ -157,7 +158,7 @@ class Clipper {
   std::vector<uint32_t> next_, previous_;
   std::vector<Blocked> blocked_;
   CornerTree tree_;
-  std::vector<uint32_t> first_;  ///< by position: first of the corners that it blocks
+  std::vector<uint32_t> first_;  ///< first corner that each position blocks
 };
 
 }  // namespace

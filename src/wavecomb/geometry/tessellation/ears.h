@@ -10,20 +10,21 @@ namespace wavecomb {
 
 /// Triangulation of a polygon.
 struct PolygonTriangulation {
-  std::vector<int64_t> corners;  ///< 3 per triangle, n - 2 triangles for n corners
-  uint64_t untested = 0;         ///< number of ears that were cut without a test, after the step
-                                 ///< limit
+  /// 3 corners per triangle; a polygon of n corners has n - 2 triangles.
+  std::vector<int64_t> corners;
+  uint64_t untested = 0;  ///< number of ears that were cut without a test, after the step
+                          ///< limit
 };
 
-/// Step limit of clip_ears, about a second. In the worst known cases a face of 100,000 corners
-/// takes two thirds of it and a face of 5,000 corners a fiftieth.
+/// Limit on the number of steps of clip_ears, which take about a second. In the worst known cases,
+/// a face of 100,000 corners takes two thirds of the limit and a face of 5,000 corners a fiftieth.
 inline constexpr uint64_t kMaxClippingSteps = uint64_t{1} << 26;
 
 /// Triangulates a polygon in the plane, counter-clockwise, by clipping ears from its first corner
 /// on (G. Meisters, "Polygons Have Ears", 1975). A corner is an ear if no other remaining corner
-/// lies in or on its triangle. Corners that coincide with a vertex of the triangle are excepted, as
-/// they occur at bridges to holes. If no ear is left, the polygon intersects itself, and the next
-/// corner is cut regardless.
+/// lies in or on its triangle. Corners that coincide with a vertex of the triangle do not count,
+/// since they occur where holes are joined to the outline. If no ear is left, the polygon
+/// intersects itself, and the next corner is cut regardless.
 ///
 /// A corner is tested again only after its neighbours changed or the corner that blocked it was
 /// removed. A k-d tree finds blocking corners. In the worst known cases, self-intersecting polygons

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Evaluation of OpenSubdiv's vertex masks in bands of vertices, on any number of threads.
 ///
-/// Far::PrimvarRefiner computes the same values, but a whole level per call on one thread. Masks
-/// and the order of additions are those of OpenSubdiv, so the results are bitwise equal. The
-/// topology is refined uniformly: every vertex has all its neighbours.
+/// OpenSubdiv's Far::PrimvarRefiner computes the same values, but a whole level per call on one
+/// thread. The functions here use the masks and the order of additions of OpenSubdiv, so their
+/// results are bitwise equal. They require uniform refinement, in which every vertex has all its
+/// neighbours.
 #pragma once
 
 #include <opensubdiv/far/topologyLevel.h>
@@ -39,7 +40,7 @@ class Mask {
  public:
   using Weight = float;
 
-  /// Reserves room for a vertex with `around` edges or faces, or for an edge with that many faces.
+  /// Reserves room for a vertex with `around` edges or faces, or for an edge with `around` faces.
   void fit(int around) {
     const size_t size = 1 + 2 * (static_cast<size_t>(around) + 2);
     if (weights_.size() < size) weights_.resize(size);
@@ -110,8 +111,8 @@ struct VertexAround {
   }
 };
 
-/// Runs f(i) for i from 0 to n - 1 in parallel bands. Each band gets a separate f, and with it its
-/// scratch memory, from `make()`.
+/// Runs f(i) for i from 0 to n - 1 in parallel bands. make() returns a separate f, with its own
+/// scratch memory, for each band.
 template <typename Make>
 void in_bands(int n, Make&& make) {
   parallel_bands(static_cast<size_t>(n), kBand, [&](size_t first, size_t last) {
@@ -126,20 +127,20 @@ inline int other_end(const Far::TopologyLevel& level, int edge, int vertex) {
   return ends[0] == vertex ? ends[1] : ends[0];
 }
 
-/// Returns the vertex of a face two corners after `corner`.
+/// Returns the vertex of a face that is two corners after `corner`.
 inline int opposite(const Far::TopologyLevel& level, int face, int corner) {
   const Far::ConstIndexArray points = level.GetFaceVertices(face);
   const int at = corner + 2;
   return points[at >= points.size() ? at - points.size() : at];
 }
 
-/// Refines values from a level to its child `next`.
+/// Refines values from a subdivision level to the next finer level `next`.
 template <Sdc::SchemeType kScheme, typename V>
 void refine(const Sdc::Options& options, const Far::TopologyLevel& level,
             const Far::TopologyLevel& next, const V* from, V* to) {
   const Sdc::Scheme<kScheme> scheme(options);
-  // Edge and vertex children read the values of face children; Loop has no face children. Loop has
-  // no face children.
+  // Compute the child vertices of faces first, since those of edges and vertices read them. Loop
+  // subdivision has no child vertices of faces.
   if constexpr (kScheme != Sdc::SCHEME_LOOP)
     in_bands(level.GetNumFaces(), [&] {
       return [&, weights = std::vector<float>()](int face) mutable {
@@ -197,7 +198,8 @@ void refine(const Sdc::Options& options, const Far::TopologyLevel& level,
 }
 
 /// Computes limit values of the vertices of the last level. Calls out(vertex, value, u, v), where u
-/// and v point to the derivatives; they are null unless kTangents, and at vertices without faces.
+/// and v point to the derivatives. u and v are null if kTangents is false, and at vertices without
+/// faces.
 template <Sdc::SchemeType kScheme, bool kTangents, typename V, typename Out>
 void limit(const Sdc::Options& options, const Far::TopologyLevel& level, const V* from, Out&& out) {
   const Sdc::Scheme<kScheme> scheme(options);

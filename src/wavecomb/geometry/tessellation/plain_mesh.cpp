@@ -55,7 +55,7 @@ uint32_t corners_of_faces(std::span<const int32_t> counts, std::span<const int32
   if (indices.size() != counts.size() * static_cast<size_t>(size)) return 0;
   bool is_plain = true;
   for (const int32_t count : counts) is_plain = is_plain && count == size;
-  uint32_t highest = 0;  // negative indices are large as unsigned
+  uint32_t highest = 0;  // negative indices become large unsigned numbers
   for (const int32_t index : indices) highest = std::max(highest, static_cast<uint32_t>(index));
   return is_plain && highest < point_count ? static_cast<uint32_t>(size) : 0;
 }

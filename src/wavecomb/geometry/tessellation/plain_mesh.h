@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Fast path for common meshes: all triangles or all quads, indices in range, points at moderate
-/// coordinates. Other meshes take the general path, which reports what is wrong.
+/// coordinates. All other meshes use the general code path, which reports errors.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ namespace wavecomb {
 using PointBounds = std::array<std::array<float, 3>, 2>;
 
 /// Transforms points in double precision: x' = x m00 + y m10 + z m20 + m30. All products but the
-/// first use fma, as a matrix product does.
+/// first use fma, as a BLAS matrix product does.
 ///
 /// `points`, `out`: 3 per point. `matrix`: 4 x 4, for row vectors.
 void bake_points(std::span<const float> points, std::span<const double, 16> matrix,
@@ -23,7 +23,7 @@ void bake_points(std::span<const float> points, std::span<const double, 16> matr
 
 /// Transforms normals by the inverse transpose, in double precision, and normalises them.
 ///
-/// `normals`, `out`: 3 per normal. `inverse`: inverse of the points' transform, 4 x 4, for row
+/// `normals`, `out`: 3 per normal. `inverse`: 4 x 4 inverse of the transform of the points, for row
 /// vectors.
 void bake_normals(std::span<const float> normals, std::span<const double, 16> inverse,
                   std::span<float> out);

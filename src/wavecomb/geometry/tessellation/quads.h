@@ -10,12 +10,13 @@ namespace wavecomb {
 
 /// Splits each quad into two triangles; returns their corners, 6 per quad.
 ///
-/// The diagonal is chosen so that the smaller of the two triangles is as large as possible, where
-/// areas are signed by the quad's normal. If both diagonals are equally good, it starts at the
-/// first corner.
+/// Chooses the diagonal for which the smaller of the two triangles is as large as possible; areas
+/// are signed by the quad's normal. If both diagonals are equally good, chooses the diagonal
+/// through the first corner.
 ///
-/// `points`: 3 per point. `indices`: point of each corner, which must be in range. `starts`: index
-/// of the first corner of each quad, whose other corners follow it; empty if all faces are quads.
+/// `points`: 3 per point. `indices`: point index of each corner, which must be in range. `starts`:
+/// index of the first corner of each quad, whose other corners follow it; empty if all faces are
+/// quads.
 std::vector<int64_t> split_quads(std::span<const float> points, std::span<const int32_t> indices,
                                  std::span<const int64_t> starts);
 

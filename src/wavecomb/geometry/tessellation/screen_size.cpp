@@ -10,9 +10,9 @@
 namespace wavecomb {
 namespace {
 
-/// Weight of edges outside the image.
+/// Weight of the mean length of edges outside the image.
 constexpr double kOutsideWeight = 0.125;
-/// Image bounds are enlarged by this factor.
+/// Factor by which the image bounds are enlarged.
 constexpr double kMargin = 1.1;
 
 Point transformed(const double* m, const Point& p) {
@@ -29,7 +29,7 @@ bool is_inside(const Point& p, const ScreenView& view) {
   return std::abs(x) <= kMargin * view.half[0] && std::abs(y) <= kMargin * view.half[1];
 }
 
-/// Length-weighted mean of lengths.
+/// Mean of edge lengths, weighted by length.
 struct Mean {
   double sum = 0, squares = 0;
   void add(double length) {
@@ -58,8 +58,8 @@ double edge_pixels(std::span<const float> points, std::span<const int32_t> face_
       const Point& b = projected[static_cast<size_t>(corners[at + (c + 1) % count])];
       const Point along = b - a, middle = (a + b) * 0.5;
       const double length = length_of(along);
-      // The distance is at least half the edge length, so edges that pass the camera have a finite
-      // size.
+      // Use at least half the edge length as the distance, so that edges that pass through the
+      // camera have a finite projected size.
       const double distance = view.is_parallel ? 1 : std::max(length_of(middle), 0.5 * length);
       if (!(distance > 0)) continue;
       const double pixels = view.pixels * length / distance;

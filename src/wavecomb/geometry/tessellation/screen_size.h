@@ -10,17 +10,17 @@ namespace wavecomb {
 
 /// Camera for which a subdivision level is chosen.
 struct ScreenView {
-  /// World to camera space, for row vectors; the camera looks along -z.
+  /// Transform from world to camera space, for row vectors; the camera looks along -z.
   std::array<double, 16> to_camera;
-  /// Orthographic projection, or a projection of all directions.
+  /// Whether the projection is orthographic, or shows all directions.
   bool is_parallel = false, is_all_round = false;
   double centre[2], half[2];  ///< centre and half-size of the camera window
-  double pixels;              ///< pixels per unit of the window
+  double pixels;              ///< pixels per unit of the camera window
 };
 
 /// Returns the length-weighted mean projected length of the edges of one instance, in pixels. Edges
 /// outside the image or behind the camera form a separate mean with weight 1/8, as reflections and
-/// shadows need less detail; the larger mean counts.
+/// shadows need less detail; returns the larger of the two means.
 ///
 /// `to_world`: 4 x 4, for row vectors. The points must be finite, and the corner indices in range.
 double edge_pixels(std::span<const float> points, std::span<const int32_t> face_sizes,

@@ -90,8 +90,8 @@ struct Subdivision::Refiner {
   Scheme scheme;
   Sdc::Options options;
   bool manifold = true;
-  /// Visible faces of the last level, in order. Empty without holes, when all are visible.
   bool has_holes = false;
+  /// Visible faces of the last level, in order; empty without holes, if all faces are visible.
   std::vector<int> drawn;
 
   int level() const { return far->GetMaxLevel(); }
@@ -104,7 +104,7 @@ struct Subdivision::Refiner {
     return face;
   }
 
-  /// Collects the visible faces.
+  /// Collects the visible faces of the last level.
   void find_visible_faces() {
     const Far::TopologyLevel& cage = far->GetLevel(0);
     for (int f = 0; f < cage.GetNumFaces() && !has_holes; ++f) has_holes = cage.IsFaceHole(f);
@@ -124,8 +124,8 @@ struct Subdivision::Refiner {
     });
   }
 
-  /// Refines values of the cage level by level with `step(level, from, to)`; `size(level)` is the
-  /// number of values.
+  /// Refines values of the cage level by level with `step(level, from, to)`; size(level) is the
+  /// number of values on a level.
   template <typename V, typename Size, typename Step>
   std::vector<V> refine(std::span<const float> values, Size&& size, Step&& step) const {
     const size_t width = sizeof(V) / sizeof(float);
@@ -142,7 +142,7 @@ struct Subdivision::Refiner {
     return here;
   }
 
-  /// Calls f with the scheme as a std::integral_constant.
+  /// Calls f with the subdivision scheme as a std::integral_constant.
   template <typename F>
   auto with_scheme(F&& f) const {
     switch (scheme) {
@@ -171,7 +171,7 @@ V* values_in(float* floats) {
   return reinterpret_cast<V*>(floats);
 }
 
-/// Unit normal from two derivatives; 0 if they are nearly parallel.
+/// Returns the unit normal of two surface derivatives, or 0 if they are nearly parallel.
 Point normal_of(const Values<3>& by_u, const Values<3>& by_v) {
   const Point u{by_u.v[0], by_u.v[1], by_u.v[2]}, v{by_v.v[0], by_v.v[1], by_v.v[2]};
   const Point normal = cross_of(u, v);
@@ -184,7 +184,7 @@ Point normal_of(const Values<3>& by_u, const Values<3>& by_v) {
 Subdivision::Subdivision(const Cage& cage, uint32_t level) {
   if (level < 1 || level > kMaxLevel) throw Error("the level of subdivision must be 1 to 10");
   check_cage(cage);
-  // OpenSubdiv counts with 32 bits, and each level multiplies the corners by four.
+  // OpenSubdiv's counts have 32 bits, and each level multiplies the number of corners by four.
   if ((cage.corners.size() >> (31 - 2 * level)) > 0)
     throw Error("too many faces for level " + std::to_string(level));
   catch_messages();
@@ -277,12 +277,12 @@ std::vector<uint32_t> Subdivision::normal_sectors(const RefinedFaces& faces,
   const auto sharp = [&](int e) {
     const Far::ConstIndexArray around = last.GetEdgeFaces(e);
     if (around.size() != 2 || last.GetEdgeSharpness(e) > 0) return true;
-    // A bilinear surface has an edge wherever the cage has one.
+    // A bilinear surface has a sharp edge wherever the cage has an edge.
     return refiner_->scheme == Scheme::kBilinear &&
            refiner_->base_of(around[0]) != refiner_->base_of(around[1]);
   };
-  // Vertices whose faces may be separated by sharp edges. Such vertices are few: all threads search
-  // for them, and one thread numbers them in order.
+  // Find the vertices whose faces may be separated by sharp edges. Few vertices are, so all threads
+  // search for them, and one thread numbers them in order.
   const size_t points = refiner_->vertices_of(refiner_->level());
   std::vector<std::vector<int>> cut((points + masks::kBand - 1) / masks::kBand);
   parallel_bands(points, masks::kBand, [&](size_t first, size_t end) {
@@ -293,7 +293,7 @@ std::vector<uint32_t> Subdivision::normal_sectors(const RefinedFaces& faces,
       if (cuts >= 2 && last.GetVertexFaces(v).size() >= 2) cut[first / masks::kBand].push_back(v);
     }
   });
-  // Index in `faces` of each face of the level.
+  // Index in `faces` of each face of the last level.
   std::vector<uint32_t> index;
   if (refiner_->has_holes) {
     index.assign(static_cast<size_t>(last.GetNumFaces()), ~0u);
@@ -304,7 +304,7 @@ std::vector<uint32_t> Subdivision::normal_sectors(const RefinedFaces& faces,
   std::vector<int> sector;
   const auto number = [&](int v) {
     const Far::ConstIndexArray around = last.GetVertexFaces(v), edges = last.GetVertexEdges(v);
-    // Faces that share a smooth edge belong to one sector, named by its lowest face.
+    // Faces that share a smooth edge form a sector, whose number is the lowest of their numbers.
     sector.resize(static_cast<size_t>(around.size()));
     std::iota(sector.begin(), sector.end(), 0);
     for (const int e : edges) {

@@ -13,21 +13,22 @@ namespace wavecomb {
 
 /// Visible faces of the finest level, with `size` corners each.
 struct RefinedFaces {
-  uint32_t size = 4;                   ///< 4, or 3 with Loop
-  uint32_t vertex_count = 0;           ///< vertices of the level, including those of holes
-  std::vector<uint32_t> corners;       ///< vertex of each corner
-  std::vector<uint32_t> base;          ///< cage face that each face came from
-  std::vector<uint32_t> first_values;  ///< index into channel 0 of each corner; empty without
-                                       ///< channels
+  uint32_t size = 4;  ///< 4, or 3 with Loop
+  /// Number of vertices of the level, including vertices of holes.
+  uint32_t vertex_count = 0;
+  std::vector<uint32_t> corners;  ///< vertex index of each corner
+  std::vector<uint32_t> base;     ///< index of the cage face of each face
+  /// Index of each corner's value in face-varying channel 0; empty without channels.
+  std::vector<uint32_t> first_values;
 
   size_t count() const { return base.size(); }
 };
 
-/// A uniformly refined cage. Values are evaluated on the limit surface.
+/// A uniformly refined cage. The member functions evaluate values on the limit surface.
 ///
 /// Contract: immutable; safe for concurrent use. Loops over faces and vertices use the threads of
-/// with_threads, and the results do not depend on their number. The constructor and face_varying
-/// spend OpenSubdiv's share of the work on one thread.
+/// with_threads(), and the results do not depend on the number of threads. In the constructor and
+/// face_varying(), OpenSubdiv's functions run on one thread.
 class Subdivision {
  public:
   static constexpr uint32_t kMaxLevel = 10;
@@ -38,33 +39,36 @@ class Subdivision {
   ~Subdivision();
   Subdivision(Subdivision&&) noexcept;
 
-  /// Whether at most two faces meet at each edge and one fan of faces at each vertex. Non-manifold
-  /// edges and vertices are kept sharp.
+  /// Returns whether at most two faces meet at each edge, and only one fan of faces at each vertex.
+  /// Non-manifold edges and vertices are kept sharp.
   bool is_manifold() const;
-  /// Number of vertices of the finest level.
+  /// Returns the number of vertices of the finest level.
   uint32_t vertex_count() const;
 
-  /// Returns the visible faces: without holes and without faces that have no limit
+  /// Returns the visible faces, that is, all faces except holes and faces without a limit surface
   /// (BoundaryRule::kNone).
   RefinedFaces faces() const;
-  /// Returns, for each corner of faces(), the index into the refined values of a channel.
+  /// Returns, for each corner of faces(), the index of its value among the refined values of a
+  /// face-varying channel.
   std::vector<uint32_t> face_varying_corners(uint32_t channel) const;
 
-  /// Returns the index of the normal for each corner of `faces`. It is the vertex index where the
-  /// surface is smooth; where sharp edges divide a vertex into sectors, they get indices from
-  /// vertex_count() on. Sets `count` to the number of normals.
+  /// Returns the index of the normal for each corner of `faces`. At smooth vertices, the normal has
+  /// the index of the vertex. If sharp edges divide the faces of a vertex into sectors, each
+  /// further sector has a normal whose index is vertex_count() or more. Sets `count` to the number
+  /// of normals.
   std::vector<uint32_t> normal_sectors(const RefinedFaces& faces, uint32_t& count) const;
 
-  /// Evaluates vertex primvars of the cage at the limit; returns (vertex_count, width). `width` is
-  /// 1 to 4. `normals`, allowed for width 3 only, receives unit normals of the limit surface,
-  /// (vertex_count, 3), with 0 where its derivatives are degenerate.
+  /// Evaluates a vertex primvar of the cage on the limit surface; returns an array of shape
+  /// (vertex_count, width). `width` is 1 to 4. `normals`, which must be null unless `width` is 3,
+  /// receives the unit normals of the limit surface, of shape (vertex_count, 3), or 0 where the
+  /// derivatives of the surface are degenerate.
   std::vector<float> vertex(std::span<const float> values, uint32_t width,
                             std::vector<float>* normals = nullptr) const;
-  /// Refines varying primvars, which are linear within each face of the cage; returns
-  /// (vertex_count, width).
+  /// Refines a varying primvar, which is linear within each face of the cage; returns an array of
+  /// shape (vertex_count, width).
   std::vector<float> varying(std::span<const float> values, uint32_t width) const;
-  /// Evaluates face-varying values of a channel at the limit; indices are
-  /// face_varying_corners(channel).
+  /// Evaluates the values of a face-varying channel on the limit surface;
+  /// face_varying_corners(channel) returns the value index of each corner.
   std::vector<float> face_varying(uint32_t channel, std::span<const float> values,
                                   uint32_t width) const;
 

@@ -16,20 +16,21 @@ namespace {
 /// Elements per task.
 constexpr size_t kBand = 16384;
 
-/// A surface before its triangulation. Corner arrays follow the order of `faces`.
+/// Refined surface before its triangulation. Arrays of corner values have the order of the corners
+/// of `faces`.
 struct Work {
   RefinedFaces faces;
   std::vector<float> positions;   ///< 3 per vertex
-  std::vector<uint32_t> sectors;  ///< index of the normal of each corner
+  std::vector<uint32_t> sectors;  ///< index of each corner's normal
   std::vector<float> normals;     ///< 3 per normal
   std::vector<float> uvs;         ///< 2 per texture coordinate
-  std::vector<uint32_t> uv_at;    ///< index into uvs of each corner; empty without texture
-                                  ///< coordinates
+  /// Index of each corner's texture coordinate in `uvs`; empty without texture coordinates.
+  std::vector<uint32_t> uv_at;
 };
 
-/// Determines which normals are computed as sums over faces. Returns their index in the list of
-/// sums, or ~0 if the limit normal is known. It is known if it is non-zero in `work.normals` and
-/// the vertex has a single normal.
+/// Determines which normals are computed as sums over faces. Returns for each normal its index in
+/// the list of sums, or ~0 if the limit normal is used: it is used if it is non-zero in
+/// `work.normals` and the vertex has a single normal.
 std::vector<uint32_t> sum_indices(const Work& work, size_t normal_count, size_t& sum_count) {
   const size_t known = work.normals.size() / 3, points = work.faces.vertex_count;
   std::vector<uint32_t> sum_of_normal(normal_count, ~0u);
@@ -44,8 +45,9 @@ std::vector<uint32_t> sum_indices(const Work& work, size_t normal_count, size_t&
   return sum_of_normal;
 }
 
-/// Calls f(corner, first, end) for all corners in order. Each thread handles a separate range
-/// [first, end) of the `count` accumulators, so sums do not depend on the number of threads.
+/// Calls f(corner, first, end) on each thread for all corners in order. Each thread handles a
+/// separate range [first, end) of the `count` accumulators, so sums do not depend on the number of
+/// threads.
 template <typename F>
 void each_corner(size_t corners, size_t count, F&& f) {
   const size_t share = std::max(kBand, (count + loop_threads() - 1) / loop_threads());
@@ -55,8 +57,8 @@ void each_corner(size_t corners, size_t count, F&& f) {
 }
 
 /// Computes normals. A vertex with a single normal keeps the limit normal in `work` if it is not 0.
-/// Other normals are the normalised sum of the area-weighted corner normals of the faces in their
-/// sector.
+/// All other normals are normalised sums of area-weighted corner normals over the faces of a sector
+/// (subdivision.h).
 void set_normals(Work& work, size_t normal_count) {
   size_t sum_count = 0;
   const std::vector<uint32_t> sum_of_normal = sum_indices(work, normal_count, sum_count);
@@ -136,12 +138,12 @@ double distance2(const std::vector<float>& positions, uint32_t a, uint32_t b) {
 }
 
 /// Writes the triangles, with a point for each combination of normal and texture coordinate. If not
-/// null, `origins` receives the corner of `work` that each triangle corner came from.
+/// null, `origins` receives for each triangle corner the index of its corner in `work`.
 void emit(const Work& work, bool reversed, SurfaceMesh& mesh, std::vector<uint32_t>* origins) {
   const uint32_t k = work.faces.size;
   const size_t corners = work.faces.corners.size();
   constexpr uint32_t kEnd = ~0u;
-  // Linked list per normal of the points created so far.
+  // For each normal, a linked list of the points created so far.
   std::vector<uint32_t> first(work.normals.size() / 3, kEnd), next, point, uv_of, normal_of;
   std::vector<uint32_t> ids(corners);
   for (size_t c = 0; c < corners; ++c) {
@@ -149,7 +151,7 @@ void emit(const Work& work, bool reversed, SurfaceMesh& mesh, std::vector<uint32
     uint32_t* link = &first[work.sectors[c]];
     while (*link != kEnd && uv_of[*link] != uv) link = &next[*link];
     if (*link == kEnd) {
-      // `link` may point into `next`, which is resized below.
+      // Write through `link` first: it may point into `next`, which is resized below.
       const auto id = static_cast<uint32_t>(point.size());
       *link = id;
       next.push_back(kEnd);
@@ -200,7 +202,7 @@ void emit(const Work& work, bool reversed, SurfaceMesh& mesh, std::vector<uint32
   });
 }
 
-/// Primvar on the refined faces: values and the index for each corner.
+/// Primvar on the refined faces: its values, and the value index of each corner.
 struct Spread {
   std::vector<float> values;
   std::vector<uint32_t> at;
@@ -222,7 +224,8 @@ Spread spread(const SurfacePrimvar& primvar, const Subdivision& surface,
   return {};
 }
 
-/// Spreads a primvar over polygons at level 0, which are triangulated already.
+/// Returns a primvar on the corners of polygons that are not subdivided, which are already
+/// triangulated.
 Spread spread_polygons(const SurfacePrimvar& primvar, const RefinedFaces& faces) {
   Spread out{{primvar.values.begin(), primvar.values.end()}, faces.corners};
   if (primvar.kind == PrimvarKind::kFaceVarying) std::iota(out.at.begin(), out.at.end(), 0u);
@@ -232,8 +235,8 @@ Spread spread_polygons(const SurfacePrimvar& primvar, const RefinedFaces& faces)
   return out;
 }
 
-/// Moves a primvar to the triangles. `origins` holds the corner of the refined faces for each
-/// triangle corner.
+/// Transfers a primvar from the refined faces to the triangles. `origins` holds for each triangle
+/// corner the index of its corner on the refined faces.
 SurfaceValues on_triangles(const Spread& spread, uint32_t width,
                            const std::vector<uint32_t>& origins, const SurfaceMesh& mesh) {
   SurfaceValues out;
@@ -335,7 +338,7 @@ SurfaceMesh make_surface(const SurfaceDesc& desc) {
     uint32_t count = 0;
     work.sectors = surface.normal_sectors(work.faces, count);
     normal_count = count;
-    // Threads share the evaluation of points; one of them evaluates the texture coordinates.
+    // One thread evaluates the texture coordinates, while the other threads evaluate the points.
     parallel_bands(2, 1, [&](size_t task, size_t) {
       if (task == 0) {
         Spread uvs = spread(desc.uvs, surface, work.faces);
@@ -351,7 +354,7 @@ SurfaceMesh make_surface(const SurfaceDesc& desc) {
       primvars[i] = spread(desc.primvars[i], surface, work.faces);
     });
   }
-  // The scope above has released OpenSubdiv's tables.
+  // Compute normals after the scope above has released OpenSubdiv's tables, to limit peak memory.
   if (desc.level > 0) set_normals(work, normal_count);
   if (!desc.displacements.empty()) {
     displace(work, desc);

@@ -25,39 +25,40 @@ struct Displacement {
 /// Interpolation of a primvar.
 enum class PrimvarKind : uint8_t { kNone, kVertex, kVarying, kFaceVarying };
 
-/// Values of a primvar on the cage, or on triangles at level 0.
+/// Values of a primvar on the cage, or on triangles if the surface is not subdivided (level 0).
 struct SurfacePrimvar {
   PrimvarKind kind = PrimvarKind::kNone;
-  /// (points, width), or (values of the channel, width). At level 0, face-varying values other than
-  /// uvs are (triangles, 3, width).
+  /// Array of shape (points, width), or for face-varying primvars (values of the channel, width).
+  /// At level 0, face-varying values other than uvs have the shape (triangles, 3, width).
   std::span<const float> values;
   uint32_t width = 1;
-  uint32_t channel = 0;  ///< index into Cage::channels if face-varying
+  uint32_t channel = 0;  ///< index into Cage::channels, for face-varying primvars
 };
 
-/// Input of make_surface. The caller owns the arrays.
+/// Input of make_surface(). The caller owns the arrays.
 struct SurfaceDesc {
   Cage cage;
-  std::span<const float> points;  ///< 3 per point of the cage
-  /// 0: no subdivision; displaces the triangles below.
+  std::span<const float> points;  ///< 3 coordinates per point of the cage
+  /// Subdivision level; 0 means that the triangles in `triangles` are displaced without
+  /// subdivision.
   uint32_t level = 1;
-  std::span<const uint32_t> triangles;         ///< level 0: 3 points per triangle
-  std::span<const uint32_t> triangle_faces;    ///< level 0: cage face of each triangle
-  std::span<const uint32_t> triangle_corners;  ///< level 0: 3 indices of face-varying values per
-                                               ///< triangle
+  std::span<const uint32_t> triangles;       ///< level 0 only: 3 point indices per triangle
+  std::span<const uint32_t> triangle_faces;  ///< level 0 only: cage face of each triangle
+  /// Level 0 only: 3 indices of face-varying values per triangle.
+  std::span<const uint32_t> triangle_corners;
   SurfacePrimvar uvs;
   std::vector<SurfacePrimvar> primvars;
   std::vector<Displacement> displacements;
-  /// For each face of the cage an index into displacements, or -1 for none. Empty: all faces use
-  /// the first displacement.
+  /// Index into `displacements` for each face of the cage, or -1 for no displacement. If empty, all
+  /// faces use the first displacement.
   std::span<const int32_t> face_displacement;
   /// Transform from cage to mesh space, for row vectors: p' = p M.
   std::array<double, 16> matrix{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
   bool left_handed = false;
 };
 
-/// Values of a primvar on triangles: (points, width), or with per_corner (triangles, 3, width)
-/// because corners at a point differ.
+/// Values of a primvar on triangles. The shape is (points, width), or (triangles, 3, width) if
+/// `per_corner` is true because corners of the same point have different values.
 struct SurfaceValues {
   std::vector<float> values;
   bool per_corner = false;
@@ -66,18 +67,18 @@ struct SurfaceValues {
 /// Triangle mesh with values per point. A vertex is duplicated, with bitwise equal positions, where
 /// normals or texture coordinates differ between faces.
 struct SurfaceMesh {
-  std::vector<float> positions, normals, uvs;  ///< 3, 3 and 2 per point; uvs may be empty
-  std::vector<uint32_t> triangles;             ///< 3 points per triangle, counter-clockwise seen
-                                               ///< from outside
-  std::vector<uint32_t> faces;                 ///< cage face of each triangle
-  std::vector<SurfaceValues> primvars;         ///< one for each of SurfaceDesc::primvars
+  std::vector<float> positions, normals, uvs;  ///< 3, 3 and 2 floats per point; uvs may be empty
+  /// 3 point indices per triangle, counter-clockwise as seen from outside.
+  std::vector<uint32_t> triangles;
+  std::vector<uint32_t> faces;          ///< index of the cage face of each triangle
+  std::vector<SurfaceValues> primvars;  ///< values of each primvar in SurfaceDesc::primvars
   bool is_manifold = true;
 };
 
-/// Triangulates the surface. Points lie on the limit surface and have its normals. Displaced points
-/// move along the limit normal by the mean displacement of the adjacent faces, so no gaps open at
-/// seams of texture coordinates or materials; their normals are those of the displaced triangles.
-/// Throws Error with a one-line description if the input is invalid.
+/// Triangulates the surface. Points lie on the limit surface and have the normals of the limit
+/// surface. Displaced points move along the limit normal by the mean displacement of the adjacent
+/// faces, so no gaps open at seams of texture coordinates or materials; their normals are computed
+/// from the displaced triangles. Throws Error with a one-line description if the input is invalid.
 SurfaceMesh make_surface(const SurfaceDesc& desc);
 
 }  // namespace wavecomb

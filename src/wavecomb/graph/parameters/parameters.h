@@ -17,8 +17,8 @@ struct GraphParameter {
   float low, high;
 };
 
-/// Textured inputs and ior first, then the additional inputs of "openpbr" in the order of
-/// OpenPbrRecord.
+/// Material parameters that graphs can drive: first the textured inputs and ior, then the
+/// additional inputs of program "openpbr" in the order of OpenPbrRecord.
 inline constexpr GraphParameter kGraphParameters[] = {{"base_color", 3, 0, 1},
                                                       {"specular_color", 3, 0, 1},
                                                       {"emission", 3, 0, 1e18f},
@@ -46,13 +46,13 @@ constexpr uint32_t graph_parameter(std::string_view name) {
   return first;
 }
 inline constexpr uint32_t kGraphOutputCount = graph_parameter("");
-/// Components below this index are members of ShadingParams.
+/// Parameter components below this index are members of ShadingParams.
 inline constexpr uint32_t kFirstOpenPbrOutput = graph_parameter("diffuse_roughness");
 inline constexpr uint32_t kEmissionOutput = graph_parameter("emission");
 inline constexpr uint32_t kOpacityOutput = graph_parameter("opacity");
 inline constexpr uint32_t kNormalOutput = graph_parameter("normal");
 
-/// Limits of each component.
+/// Limits of each parameter component.
 struct GraphRanges {
   float low[kGraphOutputCount], high[kGraphOutputCount];
   constexpr GraphRanges() : low{}, high{} {

@@ -19,8 +19,8 @@ bool bounded(const ValueRange& r) {
   return std::isfinite(r.low) && std::isfinite(r.high);
 }
 
-/// Returns the range of a function that is monotonic in each operand for all values of the others,
-/// like a sum or product. Rounding preserves order, so the extremes lie at the ends of the
+/// Returns the range of a function that, like a sum or product, is monotonic in each operand if the
+/// other operands are fixed. Rounding preserves order, so the extremes lie at the ends of the
 /// operands' ranges.
 template <typename Function>
 ValueRange at_ends(const Function& f, const ValueRange& a, const ValueRange& b,
@@ -30,12 +30,12 @@ ValueRange at_ends(const Function& f, const ValueRange& a, const ValueRange& b,
   for (const float x : {a.low, a.high})
     for (const float y : {b.low, b.high})
       for (const float z : {c.low, c.high}) r = hull(r, exactly(f(x, y, z)));
-  if (!bounded(r)) return {};  // an overflow may lead to NaN later
+  if (!bounded(r)) return {};  // an infinite intermediate result may become NaN later
   r.nan = a.nan || b.nan || c.nan;
   return r;
 }
 
-// min and max as in core/lanes/lanes.h, which return `b` if either operand is NaN.
+// Ranges of min and max of core/lanes/lanes.h, which return `b` if either operand is NaN.
 ValueRange min_of(const ValueRange& a, const ValueRange& b) {
   const ValueRange r{std::min(a.low, b.low), std::min(a.high, b.high), b.nan};
   return a.nan ? hull(r, b) : r;
@@ -64,7 +64,7 @@ ValueRange less_of(const ValueRange& a, const ValueRange& b) {
 }
 
 ValueRange divide_of(const ValueRange& a, const ValueRange& b) {
-  // A divisor that does not change sign makes the quotient monotonic.
+  // The quotient is monotonic only if the divisor does not change sign.
   if (b.low <= 0 && b.high >= 0) return {};
   return at_ends([](float x, float y, float) { return x / y; }, a, b);
 }

@@ -20,7 +20,8 @@ struct ValueRange {
 };
 
 /// For each component of GraphParameter, the range of values that a graph can write, clamped to the
-/// range of the parameter and never NaN; empty if the graph does not drive that component.
+/// range of the parameter and never NaN; an entry is empty if the graph does not drive the
+/// component.
 using DrivenRanges = std::array<std::optional<ValueRange>, kGraphOutputCount>;
 
 /// Computes the ranges of the outputs of graph program `graph` (kNoGraph for none) over all hits.

@@ -21,13 +21,14 @@ inline void for_each_graph(const UInt<F>& graph, const Mask<F>& active, const Fu
   }
 }
 
-/// Clamps a graph value to the range of component `i`.
+/// Clamps a graph value to the range of parameter component `i`.
 template <typename F>
 inline F valid_output(uint32_t i, const F& value) {
   return clamp(value, F(kGraphRanges.low[i]), F(kGraphRanges.high[i]));
 }
 
-/// Returns components first .. first + 2 where the lanes' graphs drive them, else those of `plain`.
+/// Returns parameter components first to first + 2: values of the lane's graph for the components
+/// that it drives, and values of `plain` for the rest.
 template <typename F>
 [[gnu::noinline]] Vec3<F> graph_value(const MaterialView& view, const UInt<F>& graph,
                                       uint32_t first, const GraphPoint<F>& at,

@@ -13,9 +13,9 @@
 namespace wavecomb {
 namespace {
 
-/// Returns one over the length of the bounce ray from vertex `i`. A value of 0 means that the
-/// bounce ray left the scene. A negative value means that the length is unknown, because the next
-/// vertex was not recorded.
+/// Returns one over the length of the bounce ray from vertex `i`. The value 0 means that the bounce
+/// ray left the scene. A negative value means that the length is unknown, because the next vertex
+/// was not recorded.
 float bounce_inverse_distance(const PathHistory& history, uint32_t slot, uint32_t i) {
   if (i + 1 == BounceReader::kVertices) return -1;
   if (i + 1 >= history.count(slot)) return 0;
@@ -75,8 +75,8 @@ void BounceReader::read(const PathHistory& history, uint32_t slot, const Color<f
             is_bright && !is_black_path ? double{contribution} : 0.0, 1,
             plan_.costs.vertex(v.material)};
     if (count + 1 >= plan_.roulette_depth) {
-      // Throughput over image brightness of a path that reached the vertex, divided by its survival
-      // probability.
+      // Throughput of a path that reached the vertex, divided by the image brightness and by the
+      // path's survival probability.
       const double share = double{arrived} * double{inverse_scale} / reached;
       step.survival = guiding.known
                           ? double{efficient_survival<float>(guiding, static_cast<float>(share))}

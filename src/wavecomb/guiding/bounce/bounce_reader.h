@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Collects training samples for path guiding, in path order whichever worker traced the path.
+/// Collects training samples for path guiding, in path order, independent of which worker traced a
+/// path.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,7 @@ namespace wavecomb {
 struct TrainingSamples {
   std::vector<TrainingRecord> records;  ///< bounces that contributed light, of all rounds
   std::vector<BounceSample> bounces;    ///< all bounces of the last round
-  // One per path of the last round:
+  // One element for each path of the last round:
   std::vector<float> luminances;
   std::vector<PathStatistics> paths;
 };
@@ -37,10 +38,10 @@ struct PathCosts {
 
 /// Parameters of a training round.
 struct TrainingPlan {
-  uint32_t first, samples;  ///< first sample and number of samples of each pixel
+  uint32_t first, samples;  ///< first sample index and number of samples of each pixel
   uint32_t max_depth;
   const GuidingGrid& grid;
-  GuidingView guide;        ///< field that guides the bounces, or empty
+  GuidingView guide;        ///< guiding field of the bounces; empty if bounces are not guided
   const ImageTiles* tiles;  ///< brightness of the image; null if unknown
   PathCosts costs;
   uint32_t roulette_depth;
@@ -48,7 +49,7 @@ struct TrainingPlan {
 
 /// Converts finished paths to training samples.
 ///
-/// Contract: workers may call ended() concurrently, each for different paths.
+/// Contract: workers may call ended() concurrently for different paths.
 class BounceReader final : public HistoryReader {
  public:
   /// Maximum number of vertices of a path that become training samples.
@@ -59,12 +60,12 @@ class BounceReader final : public HistoryReader {
 
   uint32_t most() const override { return kVertices; }
   void ended(const PathHistory& history, const float* radiance, const WaveTask& task) override;
-  /// Appends the training samples in path order.
+  /// Appends all training samples to `training_samples`, in path order.
   void append_to(TrainingSamples& training_samples) const;
 
  private:
-  /// Adds the training samples of the path in `slot`, which has index `path` and ended with the
-  /// radiance `end`. `inverse_scale` is one over the brightness of the image at its pixel.
+  /// Adds the training samples of the path in `slot`. The path has index `path` and the final
+  /// radiance `end`. `inverse_scale` is one over the brightness of the image at the path's pixel.
   void read(const PathHistory& history, uint32_t slot, const Color<float>& end, size_t path,
             float inverse_scale);
   void add_record(size_t path, const HistoryRow<float>& v, const GuidingLookup<float>& guiding,
@@ -72,8 +73,8 @@ class BounceReader final : public HistoryReader {
 
   std::span<const uint32_t> pixels_;
   const TrainingPlan& plan_;
-  std::vector<TrainingRecord> records_;  ///< kVertices for each path
-  std::vector<BounceSample> bounces_;    ///< kVertices for each path
+  std::vector<TrainingRecord> records_;  ///< kVertices records for each path
+  std::vector<BounceSample> bounces_;    ///< kVertices samples for each path
   std::vector<uint8_t> record_counts_, bounce_counts_;
   std::vector<float> luminance_;
   std::vector<PathStatistics> paths_;

@@ -3,11 +3,11 @@
 ///
 ///   p(wi) = a p_bsdf(wi) + (1 - a) p_guide(wi) [wi is on the side of wo]
 ///
-/// where a is GuidingLookup::bsdf_share, and p_bsdf is the density of unguided bounces: by the
-/// lobes of the BSDF, or by the cosine with cosine sampling (bounce_sampling.h). The guiding
-/// distribution covers only the viewer's side of a surface, so only the BSDF samples transmission.
-/// A delta lobe is selected with a times its own probability. MIS uses p for bounces and for light
-/// samples.
+/// where a is GuidingLookup::bsdf_share, and p_bsdf is the density of unguided bounces, which
+/// sample the lobes of the BSDF or, with cosine sampling, a cosine lobe (bounce_sampling.h). The
+/// guiding distribution covers only the viewer's side of a surface, so only the BSDF samples
+/// transmission. A delta lobe is selected with a times its selection probability in the BSDF. MIS
+/// uses p for bounces and for light samples.
 #pragma once
 
 #include "wavecomb/guiding/lookup.h"
@@ -17,7 +17,7 @@
 
 namespace wavecomb {
 
-/// Whether bounces of program `Bsdf` can be guided.
+/// Whether bounces of shading program `Bsdf` can be guided.
 template <typename Bsdf>
 inline constexpr bool kGuided = Bsdf::kHasNonDelta && Bsdf::kOnSurface;
 
@@ -39,8 +39,8 @@ WAVECOMB_INLINE GuidingLookup<F> guiding_lookup(const Vertex<F, kFeatures>& v,
   return {};
 }
 
-/// Returns the density of the mixture for a bounce along `world` (`wi` in the frame whose z axis is
-/// the normal), which the BSDF samples with density `p_bsdf`.
+/// Returns the density of the mixture for a bounce along `world`, which is `wi` in the frame whose
+/// z axis is the normal. `p_bsdf` is the density of the BSDF for this direction.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE F mixed_pdf(const Vertex<F, kFeatures>& v, const GuidingLookup<F>& guiding,
                             const Vec3<F>& world, const Vec3<F>& wi, const Vec3<F>& wo,
@@ -56,9 +56,9 @@ WAVECOMB_INLINE F mixed_pdf(const Vertex<F, kFeatures>& v, const GuidingLookup<F
   return p_bsdf;
 }
 
-/// Turns `b`, a bounce sampled from the BSDF, into a sample of the mixture. r.w selects the
-/// technique. The ray cone always uses the roughness of the sampled BSDF lobe. Writes the training
-/// data of the bounce to `out`.
+/// Turns `b`, a bounce sampled from the BSDF, into a sample of the mixture. r.w selects between
+/// BSDF and guiding distribution. The ray cone always uses the roughness of the sampled BSDF lobe.
+/// Writes the training data of the bounce to `out`.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Coupling>
 WAVECOMB_INLINE void guided_bounce(const VertexContext<Bsdf, F, kFeatures, Coupling>& c,
                                    const Sample4<F>& r, BsdfSample<F>& b, VertexResult<F>& out) {
@@ -73,7 +73,7 @@ WAVECOMB_INLINE void guided_bounce(const VertexContext<Bsdf, F, kFeatures, Coupl
     if (none(guided)) return;
     const F& a = guiding.bsdf_share;
     const Mask<F> by_guide = guided & (r.w >= a);
-    // f |cos|, and the density without guiding.
+    // f |cos| of the bounce direction, and its density without guiding.
     Color<F> f_cos = b.weight * b.pdf;
     F p_bsdf = b.pdf;
     if (any(by_guide)) {

@@ -15,19 +15,19 @@
 namespace wavecomb {
 namespace {
 
-/// Cells with more records than this are divided.
+/// Maximum number of records in a cell; cells with more records are divided.
 constexpr size_t kCellRecords = 2048;
 /// Minimum number of records for a region to get a separate distribution.
 constexpr double kMinRegionRecords = 64;
-/// Maximum number of records from which the directions of a cell are computed.
+/// Maximum number of records from which the direction distribution of a cell is computed.
 constexpr size_t kDirections = 8192;
-/// Weight of the parent cell's distribution and moments, in records.
+/// Weight of the parent cell's distribution and moments, as an equivalent number of records.
 constexpr double kPrior = 64;
-/// Minimum number of records of a material before it limits guiding.
+/// Minimum number of records of a material for which a minimum of bsdf_share is computed.
 constexpr double kMaterialRecords = 512;
-/// Factor on the survival probability of roulette. Moments from few training paths miss rare light,
-/// and a path that is terminated too often makes a bright pixel, while one that continues too often
-/// costs a few rays.
+/// Factor by which the survival probability of roulette is increased. Moments from few training
+/// paths miss rare light. Terminating such paths too often causes bright pixels, while continuing
+/// them too often costs only a few rays.
 constexpr double kSafety = 1.5;
 /// Fraction of bounces that the BSDF samples in the first round, before moments are known.
 constexpr float kFirstShare = 0.5f;
@@ -101,13 +101,14 @@ class GuidingFieldBuilder {
   }
 
  private:
-  /// Statistics of the records of one cell whose surfaces face one axis.
+  /// Statistics of the records of a cell on surfaces that face one axis direction.
   struct RegionPart {
-    DirectionBins density{};  ///< density by direction, whose sum is 1, or 0 if nothing is known
+    /// Weights of direction bins, which sum to 1, or are all 0 without data.
+    DirectionBins density{};
     double count = 0;
-    ParallaxSphere sphere;  ///< centre of the directions of `density`
+    ParallaxSphere sphere;  ///< sphere from whose centre the directions of `density` are measured
     ShareMoments moments;
-    uint32_t region = kNoGuidingRegion;  ///< once created
+    uint32_t region = kNoGuidingRegion;  ///< region of the guiding field, once created
   };
   using Cell = std::array<RegionPart, kGuidingAxes>;
 
@@ -124,15 +125,16 @@ class GuidingFieldBuilder {
         parts_.material_share[m] = kBsdfShares[moments[m].best()];
   }
 
-  /// Returns the clamp for values: sqrt(n) times the mean of n values, so that no single one
-  /// dominates.
+  /// Returns the limit to which values are clamped, so that no single value dominates: sqrt(n)
+  /// times the mean of n values.
   static double largest(std::span<const TrainingRecord> records) {
     double sum = 0;
     for (const TrainingRecord& r : records) sum += double{r.value};
     return records.empty() ? 0 : sum / std::sqrt(static_cast<double>(records.size()));
   }
 
-  /// Computes the statistics of records [begin, end), blended with those of the parent cell.
+  /// Computes the statistics of records [begin, end), blended with the statistics of the parent
+  /// cell.
   void read(uint32_t depth, size_t begin, size_t end) {
     Cell& cell = levels_[depth];
     const std::span here = std::span(records_).subspan(begin, end - begin);
@@ -165,7 +167,7 @@ class GuidingFieldBuilder {
   }
 
   /// Returns the region of a cell and axis. A cell with too few records uses the region of the
-  /// nearest ancestor with enough, or kNoGuidingRegion.
+  /// nearest ancestor with enough records, or kNoGuidingRegion if there is none.
   uint32_t region_of(uint32_t depth, uint32_t axis) {
     RegionPart& part = levels_[depth][axis];
     if (part.count < kMinRegionRecords)
@@ -184,7 +186,7 @@ class GuidingFieldBuilder {
   }
 
   /// Processes the octree node of `depth` whose Morton codes share the prefix of `code`. The
-  /// records of the cell are [begin, end).
+  /// records of the node are [begin, end).
   void divide(uint32_t depth, uint32_t code, size_t begin, size_t end) {
     read(depth, begin, end);
     if (end - begin <= cell_records_ || depth == kGuidingBits) {
@@ -230,7 +232,7 @@ class GuidingFieldBuilder {
     }
   }
 
-  /// Writes `entry` to all grid entries that the node covers.
+  /// Writes `entry` to all grid entries that the octree node covers.
   void fill(uint32_t depth, uint32_t code, uint32_t entry) {
     const uint32_t x = compact_bits_3(code), y = compact_bits_3(code >> 1),
                    z = compact_bits_3(code >> 2);
@@ -264,12 +266,13 @@ class GuidingFieldBuilder {
   GuidingField& field_;
   GuidingFieldArrays& parts_;  ///< parts of field_
   bool first_, guides_;
-  std::vector<TrainingRecord> records_;  ///< sorted by Morton code
+  std::vector<TrainingRecord> records_;  ///< training records, sorted by Morton code
   std::vector<ShareRatios> ratios_;      ///< ratios of records_; empty in the first round
   std::vector<uint32_t> codes_;
   size_t cell_records_ = kCellRecords;
   std::array<std::vector<const TrainingRecord*>, kGuidingAxes> by_axis_;  ///< scratch of read()
-  std::array<Cell, kGuidingBits + 1> levels_;  ///< path from the root to the node in divide()
+  /// Cells on the path from the root to the node that divide() processes.
+  std::array<Cell, kGuidingBits + 1> levels_;
   double contributing_ = 0, guided_ = 0, off_ = 0, on_ = 0;
 };
 
@@ -301,11 +304,12 @@ void GuidingField::compute_survival(std::span<const BounceSample> training_sampl
     double count = 0, squared = 0, cost = 0;
   };
   const size_t regions = parts_.bsdf_share.size();
-  std::vector<Sums> sums(regions + 1);  // the last one: all regions
+  std::vector<Sums> sums(regions + 1);  // the last element is for all regions
   parts_.survival.assign(regions, 0.f);
   const auto add = [](Sums& s, const BounceSample& sample) {
     s.count += 1;
-    // Not clamped as values are: a region whose light varies strongly should terminate few paths.
+    // Do not clamp second moments as field values are clamped, since a region whose light varies
+    // strongly should terminate few paths.
     if (std::isfinite(sample.squared)) s.squared += double{sample.squared};
     s.cost += double{sample.cost};
   };

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The guiding field: incident light by region of space and direction, learned from training
+/// The guiding field: incident light by region of space and by direction, estimated from training
 /// bounces.
 ///
-/// Cells are an octree over the bounds of the scene. A cell with more than kCellRecords
+/// The cells form an octree over the bounds of the scene. A cell with more than kCellRecords
 /// contributing bounces is divided. A region is the part of a cell whose surfaces face one axis
-/// direction. Its distribution is the mean value of its bounces by direction. With few bounces it
-/// is blended with the distribution q of the parent cell:
+/// direction. The distribution of a region is the mean value of its bounces by direction. If there
+/// are few bounces, it is blended with the distribution q of the parent cell:
 ///   p = (n p_own + kPrior q) / (n + kPrior)   for n bounces.
 ///
 /// The fraction a of a region's bounces that the BSDF samples minimises the second moment of the
@@ -30,52 +30,54 @@
 
 namespace wavecomb {
 
-/// Grid of 2^kGuidingBits steps per axis over the bounds of the scene.
+/// Grid that divides the bounds of the scene into 2^kGuidingBits steps per axis.
 struct GuidingGrid {
   float lo[3] = {}, scale[3] = {};
 
-  /// Takes the corners of the bounds, low <= high.
+  /// `low` and `high` are the corners of the bounds, with low <= high.
   GuidingGrid(const float (&low)[3], const float (&high)[3]);
 };
 
-/// Packs position and axis: the Morton code of the grid position of p, and in the lowest three bits
-/// the guiding_axis of the surface.
+/// Packs the position and surface axis of a bounce: the Morton code of the grid position of p, and
+/// in the lowest three bits the guiding_axis of the surface.
 uint64_t bounce_position_key(const GuidingGrid& grid, const Vec3<float>& p, uint32_t axis);
 
-/// Summary figures of a field.
+/// Statistics of a guiding field.
 struct GuidingFieldStatistics {
   uint64_t records = 0;  ///< number of bounces that contribute light
   uint32_t cells = 0, regions = 0, guided_regions = 0;
-  /// Mean probability that the field samples a bounce, and second moment of the mixture relative to
-  /// that of the BSDF alone. Both are weighted by the contribution of bounces to the image.
+  /// Mean probability that the field samples a bounce, and ratio of the second moments of the
+  /// mixture and of the BSDF alone. Both values are weighted by the contribution of bounces to the
+  /// image.
   double guided_share = 0, moment_ratio = 1;
 };
 
-/// A guiding field and the arrays that kernels read. Immutable except for compute_survival.
+/// A guiding field and the arrays that kernels read. The field is immutable except for
+/// compute_survival().
 class GuidingField {
  public:
-  /// Creates an empty field. Such a field guides nothing but defines the grid for
-  /// bounce_position_key.
+  /// Creates an empty field. An empty field does not guide bounces, but defines the grid of
+  /// bounce_position_key().
   explicit GuidingField(const GuidingGrid& grid) : grid_(grid) {}
-  /// Builds a field from training records. `materials` is the number of materials. `first` means:
-  /// the records hold no densities of a field yet, so each region is guided half of the time. With
-  /// `guides` false, all bounces are left to the BSDF. The cell size doubles until the field takes
-  /// at most `max_bytes` or cannot shrink further.
+  /// Builds a field from training records. `materials` is the number of materials. If `first`, the
+  /// records contain no densities of an earlier field, so the field samples half of the bounces in
+  /// each region. If `guides` is false, the BSDF samples all bounces. The cell size doubles until
+  /// the field takes at most `max_bytes` or cannot shrink further.
   GuidingField(const GuidingGrid& grid, std::span<const TrainingRecord> records, size_t materials,
                bool first, bool guides, size_t max_bytes);
-  /// Restores a field that was saved for a scene with this number of materials. Throws Error if
+  /// Restores a field that was saved for a scene with `materials` materials. Throws Error if
   /// `parts` are inconsistent.
   GuidingField(const GuidingGrid& grid, GuidingFieldArrays parts,
                const GuidingFieldStatistics& facts, size_t materials);
 
-  /// Computes the survival factor of each region from bounces with and without contribution
-  /// (guiding/roulette.h).
+  /// Computes GuidingView::survival of each region from all training bounces, whether or not they
+  /// contribute light (guiding/roulette.h).
   void compute_survival(std::span<const BounceSample> training_samples,
                         const PathStatistics& paths);
 
   /// Pointers to the arrays; valid while the field exists and compute_survival is not called.
   GuidingView view() const;
-  /// Memory of the arrays.
+  /// Returns the memory of the arrays in bytes.
   size_t bytes() const;
   const GuidingFieldStatistics& facts() const { return facts_; }
   const GuidingFieldArrays& parts() const { return parts_; }

@@ -11,8 +11,9 @@
 namespace wavecomb {
 namespace {
 
-/// Checks the grid: kGuidingTopCells entries followed by bricks. Each brick divides exactly one
-/// entry and is at most kGuidingLevels deep. All other entries refer to cells below `cells`.
+/// Returns whether the grid is valid: kGuidingTopCells entries followed by bricks. Each brick
+/// divides exactly one entry and is at most kGuidingLevels deep. All other entries refer to cells
+/// below `cells`.
 bool is_grid(std::span<const uint32_t> entries, size_t cells) {
   if (entries.size() < kGuidingTopCells ||
       (entries.size() - kGuidingTopCells) % kGuidingBrickCells != 0)
@@ -40,7 +41,8 @@ bool is_grid(std::span<const uint32_t> entries, size_t cells) {
   return true;
 }
 
-/// Checks that a cumulative row assigns all 65536 values and at least one to each bin.
+/// Returns whether a cumulative row assigns all 65536 sample values to bins, and at least one value
+/// to each bin.
 bool is_row(std::span<const uint32_t> words) {
   uint32_t start = 0;
   for (const uint32_t word : words) {
@@ -81,7 +83,8 @@ void check_guiding_arrays(const GuidingFieldArrays& parts, size_t materials) {
       std::all_of(parts.cells.begin(), parts.cells.end(),
                   [=](uint32_t r) { return r < regions || r == kNoGuidingRegion; }) &&
       is_grid(parts.entries, parts.cells.size() / kGuidingAxes) && are_rows(parts.tables) &&
-      // A material may have a minimum of 0, which means unknown; a region never has.
+      // The BSDF fraction of a region is positive; the minimum fraction of a material may be 0,
+      // which means that it is unknown.
       are_between(parts.bsdf_share, 0x1p-20f, 1.f) && are_between(parts.material_share, 0.f, 1.f);
   if (!is_field)
     throw Error("the saved guiding field does not fit this scene or is damaged; train a new one");

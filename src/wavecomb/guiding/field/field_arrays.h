@@ -10,7 +10,7 @@
 
 namespace wavecomb {
 
-/// Arrays of GuidingView, with the same names.
+/// Arrays to which GuidingView points.
 struct GuidingFieldArrays {
   std::vector<uint32_t> entries, cells, tables;
   std::vector<ParallaxSphere> spheres;
@@ -24,8 +24,8 @@ struct GuidingFieldArrays {
 };
 
 /// Validates arrays that come from a file, so that kernels neither read out of bounds nor divide by
-/// zero. Throws Error unless they form a field with at least one region for a scene with this
-/// number of materials.
+/// zero. Throws Error unless the arrays form a field with at least one region for a scene with
+/// `materials` materials.
 void check_guiding_arrays(const GuidingFieldArrays& parts, size_t materials);
 
 }  // namespace wavecomb

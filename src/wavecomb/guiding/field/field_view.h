@@ -16,8 +16,8 @@ namespace wavecomb {
 inline constexpr uint32_t kGuidingSide = 32;
 inline constexpr uint32_t kGuidingBins = kGuidingSide * kGuidingSide;
 /// Number of 32-bit words in the table of a region: one marginal row, then one conditional row for
-/// each of its bins. The low half of a word is the first of 65536 sample values of a bin, the high
-/// half is their number.
+/// each of its bins. The low half of a word is the first of the 65536 sample values that select a
+/// bin, the high half is the number of these values.
 inline constexpr uint32_t kGuidingWords = kGuidingSide + kGuidingBins;
 /// Number of axis directions that a surface can face: +x, -x, +y, -y, +z, -z.
 inline constexpr uint32_t kGuidingAxes = 6;
@@ -29,25 +29,26 @@ inline constexpr uint32_t kGuidingBits = kGuidingTopBits + kGuidingLevels * kGui
 static_assert(kGuidingBits == 10, "morton_3 has ten bits for each axis");
 inline constexpr uint32_t kGuidingTopCells = 1u << (3 * kGuidingTopBits);
 inline constexpr uint32_t kGuidingBrickCells = 1u << (3 * kGuidingBrickBits);
-/// Flag of grid entries that refer to a cell, whose index is in the remaining bits. Without the
-/// flag, an entry is the index of the first entry of a brick.
+/// Flag of grid entries that refer to a cell; the remaining bits are the index of the cell. Without
+/// the flag, an entry is the index of the first entry of a brick.
 inline constexpr uint32_t kGuidingCell = 0x80000000u;
 inline constexpr uint32_t kNoGuidingRegion = 0xffffffffu;
 
-/// Pointers to the arrays of the guiding field. A null `grid` means: no guiding.
+/// Pointers to the arrays of the guiding field. If `grid` is null, bounces are not guided.
 struct GuidingView {
-  const uint32_t* grid = nullptr;    ///< kGuidingTopCells entries, then bricks
-  const uint32_t* cells = nullptr;   ///< region or kNoGuidingRegion by kGuidingAxes * cell + axis
+  const uint32_t* grid = nullptr;  ///< grid: kGuidingTopCells entries, followed by bricks
+  /// Region, or kNoGuidingRegion, at index kGuidingAxes * cell + axis.
+  const uint32_t* cells = nullptr;
   const uint32_t* tables = nullptr;  ///< kGuidingWords per region
-  /// Per region: the sphere on which its incident light is assumed to lie.
+  /// Sphere of each region on which its incident light is assumed to lie.
   const ParallaxSphere* spheres = nullptr;
-  const float* bsdf_share = nullptr;  ///< per region: probability that the BSDF samples a bounce
-  /// Per region: survival probability of a path whose throughput equals the brightness of the
-  /// image, before it is clamped (guiding/roulette.h).
+  const float* bsdf_share = nullptr;  ///< probability in each region that the BSDF samples a bounce
+  /// Survival probability in each region, before clamping, of a path whose throughput equals the
+  /// brightness of the image (guiding/roulette.h).
   const float* survival = nullptr;
-  const float* material_share = nullptr;  ///< per material: minimum of bsdf_share
-  /// 1 / (brightness of the image) in tile_rows x tile_rows tiles; null if the brightness is not
-  /// known
+  const float* material_share = nullptr;  ///< minimum of bsdf_share for each material
+  /// One over the brightness of the image, in tile_rows x tile_rows tiles; null if the brightness
+  /// is not known.
   const float* tiles = nullptr;
   uint32_t tile_rows = 0;
   float tiles_of_x = 0, tiles_of_y = 0;  ///< tiles per pixel

@@ -8,7 +8,7 @@ namespace wavecomb {
 namespace {
 
 constexpr double kStep = 0x1p-20;  ///< resolution of sums
-/// Lower limit of probabilities in sums. With this limit, terms are at most 2^24, and a sum of 2^19
+/// Lower limit of selection probabilities in sums. It limits terms to 2^24, so that a sum of 2^19
 /// terms fits in 64 bits.
 constexpr double kMinShare = 0x1p-8;
 constexpr double kMaxMean = 64;  ///< limit of |N - M|
@@ -31,7 +31,7 @@ void LightBalance::add(size_t cell, size_t part, double value, double weight) {
   ++vertices_[cell];
   const double share = first_[part];
   if (!std::isfinite(value) || !(value > 0) || !(weight > 0) || !(share > 0)) return;
-  // value = a / (share + r), weight = share / (share + r).
+  // Solve value = a / (share + r) and weight = share / (share + r) for a and r (see balance.h).
   const double r = std::clamp(share * (1 / weight - 1), 0.0, 1e6);
   const double at_one = std::min(kMaxValue, value * (share + r) / (1 + r));
   samples_.push_back({static_cast<uint32_t>(cell), static_cast<uint32_t>(part),
@@ -41,7 +41,7 @@ void LightBalance::add(size_t cell, size_t part, double value, double weight) {
 std::vector<double> LightBalance::gains(std::span<const double> p) const {
   struct Term {
     double a, r, inverse;
-    int64_t bounces_less_lights;  ///< Estimate of N - M (see balance.h) from the sample.
+    int64_t bounces_less_lights;  ///< estimate of N - M (see balance.h) from the sample
   };
   const auto term = [&](const Sample& s) {
     const double share = std::max(p[s.part], kMinShare), a{s.a}, r{s.r};
@@ -52,8 +52,8 @@ std::vector<double> LightBalance::gains(std::span<const double> p) const {
   for (const Sample& s : samples_) cells[s.cell] += term(s).bounces_less_lights;
   for (const Sample& s : samples_) {
     const Term t = term(s);
-    // The estimate is the mean over the other vertices, since the sample itself would make it
-    // biased.
+    // Estimate N - M by the mean over the other vertices of the cell, since including the sample
+    // itself would make the estimate biased.
     const uint64_t others = vertices_[s.cell] - 1;
     double mean = 0;
     if (others > 0)

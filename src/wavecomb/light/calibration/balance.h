@@ -2,21 +2,21 @@
 /// Selection probabilities of lights from samples, with the multiple importance sampling of light
 /// samples and bounces taken into account.
 ///
-/// A vertex takes one light sample of density p q over directions (p the probability of the light,
-/// q the density of its sampling) and one bounce of density b, combined by the balance heuristic.
-/// Their variance is
+/// A vertex takes one light sample of density p q over directions, where p is the selection
+/// probability of the light and q the density of sampling a direction to it, and one bounce of
+/// density b. The balance heuristic combines them, with the variance
 ///
 ///   sum over lights of  integral g^2 / (p q + b)  -  M^2 - N^2,      g = f |cos| Le V,
 ///   M = sum of integral g p q / (p q + b),   N = sum of integral g b / (p q + b),
 ///
-/// where M and N are the expected contributions of light samples and of bounces. With probabilities
-/// that add up to 1, it is least where
+/// where M and N are the expected contributions of light samples and of bounces. For probabilities
+/// that add up to 1, the variance is least where
 ///
 ///   G = E_q[(a / (p + r))^2] - 2 (N - M) E_q[a r / (p + r)^2],   a = g / q, r = b / q,
 ///
-/// has the same value for all lights of nonzero probability. Then p is proportional to the square
-/// root of the second moment for a light that bounces do not find, and 0 for one that bounces find
-/// as well as light samples do.
+/// has the same value for all lights of nonzero probability p. Then p is proportional to the square
+/// root of the second moment for a light that bounces cannot hit, and 0 for a light that bounces
+/// sample as well as light samples do.
 #pragma once
 
 #include <array>
@@ -27,22 +27,23 @@
 namespace wavecomb {
 
 /// Samples of the light selection, and the selection probabilities that follow from them. Sums over
-/// samples are integers, so that they do not depend on the order.
+/// samples are integers, so that they do not depend on the order of samples.
 class LightBalance {
  public:
-  /// `shares` are the selection probabilities (> 0) of the parts while samples are taken. `cells`
-  /// is the number of groups of similar vertices, each of which has its own M and N.
+  /// `shares` are the selection probabilities (> 0) of the parts of the lights (LightParts) with
+  /// which the samples are taken. `cells` is the number of groups of similar vertices, for each of
+  /// which M and N are estimated separately.
   LightBalance(std::span<const double> shares, size_t cells);
 
-  /// Adds a selection of `part` at a vertex in `cell`. `value` is the contribution of the light
-  /// sample times its MIS weight, divided by the brightness of the image there, and `weight` is
-  /// that MIS weight. Ignores values that are not finite, and clamps to kMaxValue the value that
-  /// the sample would have at a selection probability of 1.
+  /// Adds a light sample in part `part` at a vertex in group `cell`. `value` is the contribution of
+  /// the light sample times its MIS weight, divided by the brightness of the image around its
+  /// pixel, and `weight` is the MIS weight. Ignores values that are not finite, and clamps to
+  /// kMaxValue the value that the sample would have at a selection probability of 1.
   void add(size_t cell, size_t part, double value, double weight);
 
-  /// Returns the selection probabilities of least variance. The fraction kFloor is distributed half
-  /// evenly and half by `power` (> 0, sum 1). Returns `power` if no part contributed. All
-  /// probabilities are above 0, and their sum is 1.
+  /// Returns the selection probabilities of least variance. A fraction kFloor of the probability is
+  /// distributed half evenly and half by `power` (> 0, sum 1). Returns `power` if no part
+  /// contributed. All probabilities are above 0, and their sum is 1.
   std::vector<double> shares(std::span<const double> power) const;
 
   static constexpr double kFloor = 0.1;
@@ -62,15 +63,16 @@ class LightBalance {
   std::vector<Sample> samples_;     ///< with a contribution
 };
 
-/// Odds between the two children of a light tree node, from samples of the lights below it.
+/// Calibration of the odds between the two children of a light tree node, from samples of the
+/// lights below the node.
 class NodeBalance {
  public:
   /// Adds a light sample below the node, which is below the right child if `right`. `probability`
-  /// is the selection probability of its child. `value` and `weight` are those of
-  /// LightBalance::add.
+  /// is the selection probability of the sampled child. `value` and `weight` have the same meaning
+  /// as in LightBalance::add().
   void add(bool right, double probability, double value, double weight);
-  /// Returns the factor on the odds of the right child for which the second moment is least: a
-  /// power of sqrt(2) in [1/8, 8], or 1 if there are too few samples.
+  /// Returns the factor on the odds of the right child that minimises the second moment: a power of
+  /// sqrt(2) in [1/8, 8], or 1 if there are too few samples.
   float odds() const;
 
  private:

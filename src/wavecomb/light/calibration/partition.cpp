@@ -13,7 +13,8 @@ namespace {
 
 constexpr uint32_t kNumbers = 1u << 24;
 
-/// Candidate for a part: a light record, or the triangles of an emissive mesh.
+/// Candidate for a part of the lights (LightParts): a light record, or the triangles of an emissive
+/// mesh.
 struct Candidate {
   double power;
   std::string name;
@@ -58,7 +59,7 @@ void add_meshes(const Scene& scene, LightParts& parts, std::vector<Candidate>& o
 }
 
 /// Makes one part of each candidate, in their order. If there are more candidates than `most`, the
-/// weakest together form the last part.
+/// candidates of lowest power together form the last part.
 void make_parts(const std::vector<Candidate>& candidates, size_t most, LightParts& parts) {
   std::vector<size_t> by_power(candidates.size());
   std::iota(by_power.begin(), by_power.end(), size_t{0});
@@ -98,8 +99,8 @@ void build_tree_tables(const LightSet& set, const LightTree& tree, const LightPa
     const uint32_t part = parts.of_record[i];
     if (part == kNoPart) continue;
     const double share = shares[part] * double{tree.infinite_pdf[i]} / parts.power[part];
-    // Leaves a probability of at least a thousandth to the tree, and one random value to each later
-    // light.
+    // Leave a probability of at least a thousandth to the light tree, and one of the 2^24 random
+    // values to each following infinite light.
     const uint32_t reserved =
         std::min(kNumbers / 1000, left - remaining_lights) + remaining_lights - 1;
     --remaining_lights;

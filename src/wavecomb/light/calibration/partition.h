@@ -16,25 +16,28 @@ inline constexpr uint32_t kNoPart = 0xffffffffu;
 
 /// Division of all lights that emit into parts. Selection by power: each infinite light, each
 /// finite light and each emissive mesh of an instance is a part, but if there are more than kMax,
-/// the weakest together form one part. Selection by tree: each infinite light is a part, and the
-/// tree is the last part.
+/// the lights of lowest power together form one part. Selection by tree: each infinite light is a
+/// part, and the tree is the last part.
 struct LightParts {
   static constexpr size_t kMax = 64;
   bool by_tree = false;
-  std::vector<double> power;        ///< selection probability by power of each part; the sum is 1
-  std::vector<std::string> names;   ///< names of lights and meshes, "tree", "N others"
-  std::vector<uint32_t> of_record;  ///< part by light record; kNoPart if never selected
-  std::vector<std::pair<uint32_t, uint32_t>> of_mesh;  ///< first light and part, ascending
+  /// Selection probability of each part in proportion to power; the sum is 1.
+  std::vector<double> power;
+  std::vector<std::string> names;  ///< names of lights and meshes, "tree", "N others"
+  /// Part of each light record; kNoPart if the light is never selected.
+  std::vector<uint32_t> of_record;
+  /// First light index and part of each emissive mesh, in ascending order.
+  std::vector<std::pair<uint32_t, uint32_t>> of_mesh;
 
   size_t size() const { return power.size(); }
-  /// Returns the part of a selected light.
+  /// Returns the part to which a selected light belongs.
   uint32_t of(uint32_t light) const;
 };
 
 /// Largest number of lights that are calibrated when selected by power. Each calibrated light needs
 /// 8 bytes in addition to its 64 bytes, and about 30 bytes more during calibration. Each light
-/// keeps at least one of the 2^24 random values, which leaves at least half of the values to
-/// distribute.
+/// keeps at least one of the 2^24 random values, and the limit leaves at least half of the values
+/// for calibration.
 inline constexpr size_t kMaxCalibratedLights = size_t{1} << 23;
 
 /// Divides the lights of a scene for selection by tree or by power. Returns no parts if there is
@@ -42,8 +45,8 @@ inline constexpr size_t kMaxCalibratedLights = size_t{1} << 23;
 /// or no light in the tree.
 LightParts divide_lights(const Scene& scene, bool by_tree);
 
-/// Changed odds at a light tree node: a factor on the odds of the right child over the left child,
-/// as given by their importance.
+/// Calibration of a light tree node: a factor on the odds of its right child against its left
+/// child, which otherwise follow from their importance.
 struct NodeTilt {
   uint32_t node;
   float odds;
@@ -51,26 +54,29 @@ struct NodeTilt {
 
 /// Calibrated light tables that replace those of a LightView.
 struct CalibratedLights {
-  std::vector<double> shares;  ///< by part, after rounding; empty if the tables of the view remain
-  std::vector<float> selection_pdf;  ///< by light; empty for selection by tree
+  /// Selection probability of each part, after rounding; empty if the view's tables are not
+  /// replaced.
+  std::vector<double> shares;
+  /// Selection probability of each light; empty for selection by tree.
+  std::vector<float> selection_pdf;
   std::vector<uint32_t> power_bins;
-  PowerTable power_table;  ///< table with a null pointer to the bins
+  PowerTable power_table;  ///< table for power_bins, with a null pointer to the bins
   std::vector<uint32_t> infinite_ends;
   std::vector<float> infinite_pdf;
   uint32_t tree_numbers = 0;
-  std::vector<LightTreeNode> nodes;  ///< empty if the nodes of the tree remain
+  /// Calibrated nodes of the light tree; empty if the tree is not changed.
+  std::vector<LightTreeNode> nodes;
 
-  /// Replaces the tables of `view`. Contract: afterwards the view points into this object.
+  /// Replaces the tables of `view`. Contract: after the call, `view` points into this object.
   void apply(LightView& view) const;
 };
 
 /// Builds light tables with other selection probabilities, any number of times.
 ///
-/// Contract: the arguments of the constructor outlive it.
+/// Contract: the arguments of the constructor outlive the builder.
 class LightTableBuilder {
  public:
-  /// `tree` is the tree of the set. The tree needs nodes only if tilts are passed to
-  /// build_tables().
+  /// `tree` is the light tree of `set`. It needs nodes only if tilts are passed to build_tables().
   LightTableBuilder(const LightSet& set, const LightTree& tree, const LightParts& parts);
 
   /// Builds tables in which part i has the selection probability shares[i] (> 0, sum 1), up to
@@ -79,7 +85,7 @@ class LightTableBuilder {
   CalibratedLights build_tables(std::span<const double> shares, std::span<const NodeTilt> tilts);
 
  private:
-  /// Lights [begin, end) of one part.
+  /// Range [begin, end) of light indices in one part.
   struct Range {
     size_t begin, end;
     uint32_t part;
@@ -89,7 +95,8 @@ class LightTableBuilder {
   const LightSet& set_;
   const LightTree& tree_;
   const LightParts& parts_;
-  // For selection by power: ranges, the selection probability of each light, and buffers.
+  // Data for selection by power: light ranges, the selection probability of each light, and
+  // buffers.
   std::vector<Range> ranges_;
   std::vector<float> by_power_;
   std::vector<double> weights_;

@@ -6,9 +6,9 @@
 
 namespace wavecomb {
 
-/// Target spheres of light paths (docs/light-paths.md, "Aiming"). A path starts from the
-/// distribution of its light with probability `even`, and uniformly through sphere k with
-/// probability share[k]. These probabilities sum to 1.
+/// Target spheres of light paths (docs/light-paths.md, "Aiming"). With probability `even`, a light
+/// path starts with the emission distribution of its light; with probability share[k], it starts
+/// uniformly towards sphere k. These probabilities sum to 1.
 struct LightAim {
   static constexpr uint32_t kMax = 16;
 

@@ -15,19 +15,20 @@ namespace {
 constexpr uint32_t kMaxWidth = 1024, kMaxDomeHeight = 512, kMaxRectHeight = 1024;
 /// Number of texel rows that are read in parallel.
 constexpr uint32_t kRows = 256;
-/// Calls `add(cell, part)` for each of `cells` cells that texel i of n overlaps. The parts of one
-/// cell sum to 1.
+/// Calls `add(cell, part)` for each of `cells` cells that texel i of n overlaps; `part` is the
+/// fraction of the cell that the texel covers.
 template <typename Add>
 void for_each_overlap(uint64_t i, uint64_t n, uint64_t cells, const Add& add) {
-  const uint64_t begin = i * cells, end = begin + cells;  // bounds in units of 1 / (n cells)
+  // Bounds of the texel in units of 1 / (n * cells)
+  const uint64_t begin = i * cells, end = begin + cells;
   for (uint64_t c = begin / n; c * n < end; ++c) {
     const uint64_t covered = std::min(end, (c + 1) * n) - std::max(begin, c * n);
     add(static_cast<size_t>(c), static_cast<double>(covered) / static_cast<double>(n));
   }
 }
 
-/// Returns the neighbour of texel i that a bilinear lookup reads, with `step` -1 or +1; `size` if
-/// that neighbour is black.
+/// Returns the index of the texel before (`step` -1) or after (`step` +1) texel i in a bilinear
+/// lookup; `size` if that texel is black.
 uint32_t neighbour(Wrap wrap, uint32_t i, int step, uint32_t size) {
   const bool off = step < 0 ? i == 0 : i + 1 == size;
   if (!off) return step < 0 ? i - 1 : i + 1;
@@ -36,7 +37,8 @@ uint32_t neighbour(Wrap wrap, uint32_t i, int step, uint32_t size) {
 }
 
 /// Luminance of rows of an image, averaged over columns of cells. A function that is linear between
-/// texel centres has the mean (a + 6 b + c) / 8 over texel b between a and c.
+/// texel centres has the mean (a + 6 b + c) / 8 over a texel of value b between texels of values a
+/// and c.
 class RowMeans {
  public:
   RowMeans(const TextureView& texture, const Vec3<float>& color, uint32_t cells)
@@ -74,8 +76,8 @@ class RowMeans {
 
 /// Writes cumulative counts of the given weights. Each entry of positive weight, and the last
 /// entry, gets one count; the remaining counts are distributed by weight. So every entry of
-/// positive weight can be selected, entries of weight 0 cannot except for the last one, and no
-/// cumulative count reaches 65536. Returns the sum of the weights.
+/// positive weight can be selected, no entry of weight 0 except the last entry can be selected, and
+/// no cumulative count reaches 65536. Returns the sum of the weights.
 double accumulate(std::span<const double> weights, uint16_t* cumulative) {
   const size_t n = weights.size();
   double sum = 0;
@@ -96,7 +98,7 @@ double accumulate(std::span<const double> weights, uint16_t* cumulative) {
   return sum;
 }
 
-/// Mean bilinear luminance over each cell of a grid, row 0 at the top.
+/// Mean of the bilinearly interpolated luminance over each cell of a grid; row 0 is at the top.
 struct Cells {
   uint32_t width, height;
   std::vector<double> mean;
@@ -106,14 +108,16 @@ struct Cells {
   }
 };
 
-/// Computes the cells; `wrap` determines the rows above the top and below the bottom.
+/// Computes the mean luminance of each cell; `wrap` determines the rows above the top and below the
+/// bottom of the image.
 Cells cell_means(const TextureView& texture, const Vec3<float>& color, uint32_t max_height,
                  Wrap wrap) {
   const uint32_t width = texture.levels[0].width, height = texture.levels[0].height;
   Cells cells{std::min(width, kMaxWidth), std::min(height, max_height), {}};
   cells.mean.assign(size_t{cells.width} * cells.height, 0.0);
   const RowMeans means(texture, color, cells.width);
-  std::vector<std::vector<double>> some(std::min(height, kRows));  // RowMeans of the next rows
+  // Means of the next rows of texels.
+  std::vector<std::vector<double>> some(std::min(height, kRows));
   const auto mean_of = [&](uint32_t y) {
     if (y % kRows == 0)
       parallel_for(std::min(kRows, height - y),
@@ -125,7 +129,8 @@ Cells cell_means(const TextureView& texture, const Vec3<float>& color, uint32_t 
     if (y == height) return std::vector<double>(cells.width, 0.0);
     return wrap == Wrap::kRepeat ? means(y) : edge;
   };
-  // Bilinear lookups blend adjacent rows, as in RowMeans.
+  // Bilinear lookups blend adjacent rows, so the mean over a row has the weights 1/8, 6/8, 1/8 of
+  // RowMeans.
   std::vector<double> row = mean_of(0), above = neighbour_row(-1, row), below;
   for (uint32_t y = 0; y < height; ++y) {
     below = y + 1 < height ? mean_of(y + 1) : neighbour_row(1, row);
@@ -140,8 +145,8 @@ Cells cell_means(const TextureView& texture, const Vec3<float>& color, uint32_t 
   return cells;
 }
 
-/// Makes the density of cells times `part(y)`, the measure of a row. The width of the density is 0
-/// if all cells are black.
+/// Makes a density proportional to the cell means times part(y), the measure of row y. The width of
+/// the density is 0 if all cells are black.
 template <typename Part>
 Distribution2D make_distribution(const Cells& cells, const Part& part) {
   using Line = Distribution2D::Line;
@@ -178,7 +183,8 @@ Distribution2D make_distribution(const Cells& cells, const Part& part) {
   return d;
 }
 
-/// Returns the sum over cells of probability^2 / `size(y)`, the measure of a cell in row y.
+/// Returns the sum over cells of probability^2 / size(y), where size(y) is the measure of a cell in
+/// row y.
 template <typename Size>
 double squares(const Distribution2D& d, const Size& size) {
   const auto value = [&](size_t row, uint32_t i) {
@@ -203,9 +209,10 @@ double squares(const Distribution2D& d, const Size& size) {
 }  // namespace
 
 Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<float>& color) {
-  // The row is clamped at the poles.
+  // Bilinear lookups of a dome image clamp the row at the poles.
   const Cells cells = cell_means(texture, color, kMaxDomeHeight, Wrap::kClamp);
-  // The measure of a row is the integral of the sine over it: cos(top) - cos(bottom).
+  // The measure of a row is the integral of the sine of the polar angle over the row, cos(top) -
+  // cos(bottom).
   return make_distribution(cells, [&](uint32_t y) {
     return std::cos(std::numbers::pi * y / cells.height) -
            std::cos(std::numbers::pi * (y + 1) / cells.height);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Interface that each kind of light implements for the scene. The kinds are defined in light/, a
-/// layer above the scene; light/kinds/kinds.cpp and light/kinds/mesh_light.cpp define these
-/// functions.
+/// layer above the scene; light/kinds/kinds.cpp and light/kinds/mesh_light.cpp define the functions
+/// declared here.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ namespace wavecomb {
 
 /// Inputs of a light kind for making records, and the set that receives its additional data.
 struct LightBuildContext {
-  LightSet& set;           ///< receives densities, portals and shapings
+  LightSet& set;           ///< set to which sampling densities, portals and shapings are added
   const LightSet* before;  ///< as in LightInputs
   double scene_radius;
   std::span<const TexturePtr> textures;
@@ -26,45 +26,48 @@ struct LightBuildContext {
   std::span<const LightFilter> filters;
 };
 
-/// A record under construction, and the power on which its selection probability is based, W.
+/// Light record under construction, and the power in W on which its selection probability is based.
 struct LightBuild {
   LightRecord record{};
   double power = 0;
 };
 
-/// Shape that rays can hit: none, the parallelogram p, u, v of the record, or the shape of `box`
-/// and `intersect`.
+/// Shape of a light that rays can hit: none, the parallelogram given by p, u and v of the record,
+/// or a custom shape given by the functions `box` and `intersect`.
 enum class LightShape : uint8_t { kNone, kParallelogram, kCustom };
 
-/// Description of a kind of light for the scene and the accelerator. The kernels of a kind are in
-/// its header.
+/// Description of a kind of light for the scene and the accelerator. The kernels of a light kind
+/// are in its header.
 struct LightKindInfo {
   const char* name = "";
   std::vector<const char*> prims;  ///< types of USD prims that are rendered as this kind
   uint32_t traits = 0;             ///< bits of light_trait
-  /// Names of the rows of light_table() that this kind uses in addition to those of its traits and
-  /// of all lights.
+  /// Names of the rows of light_table() that this kind uses in addition to the parameters of its
+  /// traits and of all lights.
   std::vector<const char*> parameters;
-  /// Rows of parameters specific to this kind, made by specific_parameter.
+  /// Table rows of parameters specific to this kind, made by specific_parameter().
   std::vector<LightParameter> own;
-  /// Sets position, area, radiance and power. The function is null if the records of the kind are
-  /// made elsewhere.
+  /// Sets position, area, radiance and power of a light record. The function is null if other code
+  /// makes the records of the kind.
   void (*make)(LightBuild&, const Light&, LightBuildContext&) = nullptr;
-  /// Sets bounds for the light tree, which are initialized to `light.p` and the intensity power /
-  /// pi. The function is null if the light tree does not contain the kind.
+  /// Sets the light's bounds for the light tree; the caller initializes the bounds to the point
+  /// `light.p` and the intensity power / pi. The function is null if the light tree does not
+  /// contain the kind.
   void (*bound)(LightCluster&, const LightRecord& light, double power) = nullptr;
-  /// Returns the shape of a record. The function is null if rays cannot hit this kind of light.
+  /// Returns the shape of a light record. The function is null if rays cannot hit this kind of
+  /// light.
   LightShape (*shape)(const LightRecord&) = nullptr;
   /// For LightShape::kCustom: a slightly enlarged bounding box, and the distance to the hit along d
-  /// in units of |d|, or 0 if there is none ahead. `o` is relative to light.p. Tests one ray at a
-  /// time in double precision, so that a hit does not depend on the other rays of its packet.
+  /// in units of |d|, or 0 if the ray does not hit the light. `o` is relative to light.p. Rays are
+  /// tested one at a time in double precision, so that a hit does not depend on the other rays of
+  /// its packet.
   Bounds (*box)(const LightRecord&) = nullptr;
   double (*intersect)(const LightRecord&, const double* o, const double* d) = nullptr;
 
   bool has(uint32_t trait) const { return (traits & trait) != 0; }
 };
 
-/// Returns all kinds, indexed by LightKind.
+/// Returns the descriptions of all light kinds, indexed by LightKind.
 std::span<const LightKindInfo> light_kinds();
 inline const LightKindInfo& info_of(LightKind kind) {
   return light_kinds()[static_cast<size_t>(kind)];
@@ -78,12 +81,12 @@ FilterRecord make_light_filter(const LightFilter& filter);
 /// Makes the record of a mesh light instance, with the values that its triangles share.
 LightRecord make_mesh_light(const MeshLightInstance& instance, LightBuildContext& context);
 
-/// A packed triangle and its power in W.
+/// Packed emissive triangle and its power in W.
 struct TriangleBuild {
   TriangleLight light{};
   double power = 0;
 };
-/// Packs a triangle, without setting the index of its texture coordinates.
+/// Packs an emissive triangle without setting the index of its texture coordinates.
 TriangleBuild make_triangle(const LightSet& set, const EmissiveTriangle& triangle);
 
 }  // namespace wavecomb

@@ -15,7 +15,7 @@ namespace wavecomb {
 
 /// Index of a kind of light in the list of light/kinds/kinds.h.
 enum class LightKind : uint8_t;
-/// Kind of the lights that belong to meshes, LightKind::kTriangle.
+/// Kind of mesh lights, equal to LightKind::kTriangle.
 inline constexpr LightKind kMeshLight = LightKind{6};
 /// Maximum number of parameters specific to one kind of light.
 inline constexpr size_t kMaxSpecificParameters = 4;
@@ -26,19 +26,20 @@ inline constexpr uint32_t kNoFilter = 0xffffffffu;
 inline constexpr uint32_t kPlainShadow = 0xffffffffu;
 inline constexpr uint32_t kNoPortals = 0xffffffffu;
 inline constexpr uint32_t kNoDistribution = 0xffffffffu;
-/// Set of all geometry, which needs no GeometrySet. kNoSet + 1 is 0.
+/// Id of the set of all geometry, for which there is no GeometrySet. kNoSet + 1 is 0.
 inline constexpr uint32_t kNoSet = 0xffffffffu;
 
-/// UsdLuxShapingAPI: dependence of the emission on direction. The axis of the light is its -z.
+/// UsdLuxShapingAPI: dependence of the emission on direction. The axis of the emission is the
+/// light's -z axis.
 struct Shaping {
   float focus = 0;  ///< exponent of the cosine between emission and axis; 0 or less means no focus
   Vec3<float> focus_tint{0, 0, 0};
   /// Half angle of the emission cone in degrees; 180 or more means no cone.
   float cone_angle = 180;
   float cone_softness = 0;    ///< fraction of the cone over which emission falls to 0
-  uint32_t ies = kNoIes;      ///< profile id of SceneBuilder::add_ies
+  uint32_t ies = kNoIes;      ///< profile id that SceneBuilder::add_ies() returned
   float ies_angle_scale = 0;  ///< scale of vertical angles as defined by UsdLux; 0 means no scaling
-  bool ies_normalize = false;  ///< divide by IesProfile::mean
+  bool ies_normalize = false;  ///< whether to divide the profile by IesProfile::mean()
 
   bool is_plain() const { return !(focus > 0) && !(cone_angle < 180) && ies == kNoIes; }
 };
@@ -46,32 +47,35 @@ struct Shaping {
 /// UsdLuxShadowAPI: adjustments of a light's shadows that are not physically based.
 struct ShadowAttributes {
   Vec3<float> color{0, 0, 0};  ///< fraction of the light that arrives in shadow
-  /// Maximum world-space distance of an occluder from the shaded surface; less than 0: unlimited.
+  /// Maximum world-space distance of an occluder from the shaded surface; a negative value means no
+  /// limit.
   float distance = -1;
-  float falloff = -1;  ///< length before `distance` over which shadows fade; 0 or less: no fade
-  float gamma = 1;     ///< exponent of the shadow strength where it fades
+  /// Length before `distance` over which shadows fade; 0 or less means no fade.
+  float falloff = -1;
+  float gamma = 1;  ///< exponent of the shadow strength where it fades
 
   bool is_plain() const { return color.x == 0 && color.y == 0 && color.z == 0 && distance < 0; }
 };
 
 /// Light filter that modifies the emission of a light (light/filters/filter.h).
 struct LightFilter {
-  /// Maps the filter's space to the world. Its barn-door window is the plane z = -distance; a
-  /// distance of 0 or less means no window.
+  /// Maps the filter's space to the world. The filter's barn-door window is the plane z =
+  /// -distance; a distance of 0 or less means no window.
   Affine to_world;
   float distance = 0;
-  /// Edges (a, b, c) of the window: at (x, y) each edge passes smoothstep(a x + b y + c) of the
-  /// light.
+  /// Edges (a, b, c) of the barn-door window: at (x, y), each edge transmits the fraction
+  /// smoothstep(a x + b y + c) of the light.
   std::array<Vec3<float>, 4> sides{
       {{0.f, 0.f, 1.f}, {0.f, 0.f, 1.f}, {0.f, 0.f, 1.f}, {0.f, 0.f, 1.f}}};
-  /// Gobo image on the window, looked up at u = picture_u . (x, y, 1), v = picture_v . (x, y, 1).
+  /// Gobo image on the window, looked up at u = dot(picture_u, (x, y, 1)), v = dot(picture_v, (x,
+  /// y, 1)).
   uint32_t texture = kNoTexture;
   Vec3<float> picture_u{1, 0, 0.5f}, picture_v{0, 1, 0.5f};
   /// Distance ramps: light rises from 0 at near_start to its full value at near_end, and falls from
   /// far_start to 0 at far_end. A ramp whose end is not beyond its start is off.
   float near_start = 0, near_end = 0, far_start = 0, far_end = 0;
   float density = 1;  ///< strength of the filter: 0 leaves light unchanged, 1 applies it fully
-  uint32_t next = kNoFilter;  ///< next filter of the chain, which was added before this one
+  uint32_t next = kNoFilter;  ///< next filter of the chain, which was added before this filter
 
   bool fades() const { return near_end > near_start || far_end > far_start; }
 };
@@ -80,27 +84,30 @@ struct LightFilter {
 /// in degrees, both ascending. The intensity is interpolated bilinearly and is 0 outside the
 /// vertical angles.
 struct IesProfile {
-  std::vector<float> vertical;    ///< angle from the axis, within [0, 180], two or more values
-  std::vector<float> horizontal;  ///< 0 to 360; a single value for a rotationally symmetric profile
-  std::vector<float> candela;     ///< [horizontal][vertical]
+  std::vector<float> vertical;  ///< angle from the axis, within [0, 180], two or more values
+  /// Angles around the axis from 0 to 360; a single angle for a rotationally symmetric profile.
+  std::vector<float> horizontal;
+  std::vector<float> candela;  ///< intensities, [horizontal][vertical]
 
   /// Returns the mean over the sphere of directions, or over a hemisphere if the vertical angles
-  /// span no more than one. The mean is exact for profiles that are linear in both angles.
+  /// span at most a hemisphere. The mean is exact for profiles that are linear in both angles.
   double mean() const;
   bool covers_sphere() const { return vertical.back() - vertical.front() > 95.7f; }
 };
 
-/// Relation between the light of a mesh and the emission of its material, which cameras and mirrors
-/// see (UsdLux light:materialSyncMode).
+/// Relation between the light of a mesh and the emission of its material, which camera and mirror
+/// rays see (UsdLux light:materialSyncMode).
 enum class MaterialSync : uint32_t {
   kGlowTintsLight,  ///< the light is the material's emission times the light's colour
   kIndependent,     ///< the light is the light's colour alone
-  kNoResponse,      ///< like kGlowTintsLight, but cameras and mirrors see the tinted emission
+  /// Like kGlowTintsLight, but camera and mirror rays also see the emission times the light's
+  /// colour.
+  kNoResponse,
 };
 
-/// A light as the stage describes it, in its local space. As in UsdLux, rects and disks lie in the
-/// xy plane and emit along -z, distant lights emit along -z, and domes have their pole at +y and
-/// the orientation of UsdLuxDomeLight.
+/// Description of a light in its local space, as authored in the stage. As in UsdLux, rects and
+/// disks lie in the xy plane and emit along -z, distant lights emit along -z, and domes have their
+/// pole at +y and the orientation of UsdLuxDomeLight.
 struct Light {
   std::string name;
   LightKind kind{};  ///< a rect by default
@@ -121,24 +128,25 @@ struct Light {
   bool normalize = false;
   /// Texture of a rect (u to the right, v up as seen from the front) or a dome (latlong).
   uint32_t texture = kNoTexture;
-  uint32_t group = 0;  ///< light group id of SceneBuilder::light_group
-  Shaping shaping;     ///< used by area lights and point lights
+  uint32_t group = 0;  ///< light group id that SceneBuilder::light_group() returned
+  Shaping shaping;     ///< directional emission, for area lights and point lights
   /// Factors of the light's contribution to the diffuse and the specular response of materials
   /// (UsdLux; not physically based).
   float diffuse = 1, specular = 1;
-  /// Ids of SceneBuilder::add_geometry_set: the objects that the light illuminates, and those that
-  /// cast shadows from it.
+  /// Ids that SceneBuilder::add_geometry_set() returned: the set of objects that the light
+  /// illuminates, and the set of objects that cast shadows from it.
   uint32_t light_link = kNoSet, shadow_link = kNoSet;
   ShadowAttributes shadow;
-  /// Id of SceneBuilder::add_light_filter; ignored for infinite lights.
+  /// Id that SceneBuilder::add_light_filter() returned; ignored for infinite lights.
   uint32_t filter = kNoFilter;
-  bool visible = true;  ///< whether camera and bounce rays can hit its shape
-  /// Portals of a dome: maps of the unit square in the xy plane to the openings towards which the
-  /// dome is sampled. The -z side of a portal receives the light.
+  bool visible = true;  ///< whether camera and bounce rays can hit the light's shape
+  /// Portals of a dome light: transforms from the unit square in the xy plane to the openings
+  /// towards which the dome is sampled. The -z side of a portal receives the light.
   std::vector<Affine> portals;
-  /// Values of the parameters specific to the kind (LightKindInfo::own), if given.
+  /// Values of the parameters specific to the light's kind (LightKindInfo::own), if given.
   std::array<std::optional<float>, kMaxSpecificParameters> own;
-  /// For mesh lights (kind kMeshLight), whose `to_world` maps to the space of the mesh's group.
+  /// Used by mesh lights (kind kMeshLight), whose `to_world` transforms to the space of the mesh's
+  /// group.
   MaterialSync sync = MaterialSync::kGlowTintsLight;
 };
 

@@ -15,7 +15,7 @@ namespace wavecomb {
 
 namespace {
 
-/// Makes a power finite and not negative, so that it can be compared with others.
+/// Makes the power of a light finite and not negative, so that powers can be compared.
 double valid_power(double power) {
   const bool is_valid = std::isfinite(power) && power > 0;
   return is_valid ? power : (power > 0 ? 1e300 : 0);
@@ -38,7 +38,7 @@ void pack_profiles(LightSet& set, std::span<const IesProfile> profiles) {
   }
 }
 
-/// Makes the triangles of `set` and writes their powers to `powers`.
+/// Packs the emissive triangles of `set` and writes their powers to `powers`.
 void make_triangles(LightSet& set, size_t count, const TriangleSource& source, double* powers) {
   constexpr size_t kChunk = 4096;
   const size_t chunks = (count + kChunk - 1) / kChunk;

@@ -19,7 +19,9 @@ struct MeshLightInstance {
   const Light* light;
   Affine to_world;  ///< transform of the mesh's group
   double area;      ///< total one-sided area of the triangles in world space
-  bool is_sampled;  ///< false if only paths that hit the mesh sample its emission
+  /// Whether light samples select the mesh; otherwise, only paths that hit the mesh sample its
+  /// emission.
+  bool is_sampled;
 };
 
 /// A triangle of an emissive mesh, in world space.
@@ -31,32 +33,34 @@ struct EmissiveTriangle {
   uint32_t instance = 0, mesh = 0, prim = 0;  ///< identifies the triangle
   /// Emitted radiance on both sides, W / (m^2 sr). Kernels ignore it if `material` is set.
   float radiance[3] = {0, 0, 0};
-  uint32_t mesh_light = kNoLight;  ///< index of its MeshLightInstance, or kNoLight
-  /// Presence of the triangle in [0, 1], which scales its sampled emission. If the opacity varies,
+  uint32_t mesh_light = kNoLight;  ///< index of the triangle's MeshLightInstance, or kNoLight
+  /// Opacity of the triangle in [0, 1], which scales its sampled emission. If the opacity varies,
   /// pass its expected value, which affects only light selection probabilities.
   float opacity = 1;
   bool opacity_varies = false;
   /// The expected luminance of the emission is luminance(radiance) * mean_scale. For a texture,
-  /// pass the mean of the texture (times scale, plus bias) in `radiance` and leave this at 1. This
-  /// factor affects only light selection probabilities.
+  /// pass the mean of the texture (times scale, plus bias) in `radiance` and leave mean_scale at 1.
+  /// mean_scale affects only light selection probabilities.
   float mean_scale = 1;
 };
 
 /// All lights of a scene, packed for kernels. Light indices count infinite lights first, then
-/// lights with a shape and point lights (together `records`), then triangles, each group in input
-/// order.
+/// lights with a shape and point lights (together `records`), then triangles; each of the three
+/// groups is in input order.
 struct LightSet {
   /// Records of mesh lights follow after `record_count`; they hold what the triangles of a mesh
   /// light share, and cannot be selected themselves.
   std::vector<LightRecord> records;
-  uint32_t record_count = 0;  ///< number of records without those of mesh lights
+  uint32_t record_count = 0;  ///< number of records, not counting records of mesh lights
   std::vector<TriangleLight> triangles;
   /// Texture coordinates of the triangles whose emission or opacity varies.
   std::vector<TriangleUvs> triangle_uvs;
   std::vector<uint32_t> mesh_lights;  ///< LightView::mesh_lights
-  std::vector<uint32_t> power_bins;   ///< empty if only the light tree is used for selection
-  PowerTable power_table;             ///< without its pointer
-  LightTree tree;                     ///< an outline without nodes if the tree is built later
+  /// Bins of `power_table`; empty if only the light tree is used for selection.
+  std::vector<uint32_t> power_bins;
+  /// Table for selection by power, with a null pointer to the bins.
+  PowerTable power_table;
+  LightTree tree;              ///< light tree; has no nodes yet if the tree is built later
   std::vector<double> powers;  ///< powers of all lights in W, kept if the tree is built later
   std::vector<Distribution2D> distributions;
   std::vector<LightRecord> portals;
@@ -64,7 +68,7 @@ struct LightSet {
   std::vector<ShapingRecord> shapings;
   std::vector<FilterRecord> filters;
   std::vector<ShadowRecord> shadows;
-  std::vector<LightMotion> motions;  ///< indexed by record; empty where no light moves
+  std::vector<LightMotion> motions;  ///< motion of each record's light; empty if no light moves
   std::vector<LightStep> motion_steps;
   std::vector<IesRecord> ies;
   std::vector<float> ies_numbers;
@@ -73,19 +77,19 @@ struct LightSet {
   double total_power = 0;  ///< estimated power on which selection probabilities are based, W
 
   size_t size() const { return record_count + triangles.size(); }
-  /// Returns the index of the first triangle among all lights.
+  /// Returns the light index of the first triangle.
   uint32_t first_triangle() const { return record_count; }
   /// Returns the probability of selecting light `i` by power.
   float selection_pdf(size_t i) const {
     return i < record_count ? records[i].selection_pdf : triangles[i - record_count].selection_pdf;
   }
 
-  /// Returns the device view of these lights. Contract: it points into this set, which must not
-  /// move.
+  /// Returns the device view of these lights. Contract: the view points into this set, which must
+  /// not be moved.
   LightView view(const MaterialView& materials) const;
 };
 
-/// Maximum number of lights for selection by power, whose random number has 24 bits. Scenes with
+/// Maximum number of lights for selection by power, which uses a 24-bit random number. Scenes with
 /// more lights use only the light tree.
 inline constexpr uint32_t kMaxPowerLights = (1u << 24) - 1;
 /// Maximum number of lights: kernels address triangle records of 16 32-bit words each with 32-bit
@@ -98,28 +102,29 @@ void check_light_count(uint64_t count);
 /// Time at which the light tree is built.
 enum class TreeTime { kNow, kWhenChosen };
 
-/// Function that returns emissive triangle i. It is called from several threads at once.
+/// Function that returns emissive triangle i. The function is called from several threads at once.
 using TriangleSource = std::function<EmissiveTriangle(size_t i)>;
 
 /// Lights of a scene, and how to build their sampling structures.
 struct LightInputs {
-  std::span<const Light> lights = {};  ///< lights, each of which has passed check_light
+  std::span<const Light> lights = {};  ///< lights that have passed check_light()
   size_t triangle_count = 0;
-  TriangleSource triangle = {};  ///< may be empty without triangles
-  /// Radius of the scene's bounding sphere; 0 or less counts as 1. The power of an infinite light
-  /// is the power that it sends through this sphere.
+  TriangleSource triangle = {};  ///< may be empty if triangle_count is 0
+  /// Radius of the scene's bounding sphere; 0 or less means 1. The power of an infinite light is
+  /// the power that it sends through the bounding sphere.
   float scene_radius = 0;
   std::span<const TexturePtr> textures = {};
-  /// Light set with the same textures, from which sampling densities of domes are reused where they
-  /// match; may be null.
+  /// Light set of an earlier version of the scene with the same textures, whose sampling densities
+  /// of unchanged dome lights are reused; may be null.
   const LightSet* before = nullptr;
   std::span<const IesProfile> profiles = {};
-  /// Mesh lights, each of which has passed check_mesh_light.
+  /// Mesh lights that have passed check_mesh_light().
   std::span<const MeshLightInstance> mesh_lights = {};
-  /// For more lights, no table for selection by power is built.
+  /// Maximum number of lights for which the table for selection by power is built.
   size_t max_power_lights = kMaxPowerLights;
-  /// The light tree takes as much memory as everything else together. With kWhenChosen the light
-  /// tree is built only if LightSelection::kAuto selects by tree.
+  /// Time at which the light tree is built; the tree takes as much memory as all other data of the
+  /// lights together. With kWhenChosen the light tree is built only if LightSelection::kAuto
+  /// selects by tree.
   TreeTime tree_time = TreeTime::kNow;
   std::span<const LightFilter> filters = {};
 };
@@ -135,11 +140,11 @@ struct LightInputs {
 /// A distant light of angle 0 gives the irradiance `color` at normal incidence. A sphere of radius
 /// 0 is a point light of radiant intensity `color`, or color / 4 with `normalize`, the limit of a
 /// normalized sphere of shrinking radius. Rects and disks emit to the side to which their transform
-/// maps -z, even if the transform mirrors. Negative colours count as 0.
+/// maps -z, even if the transform mirrors. Negative colours are treated as 0.
 ///
 /// Throws Error for more than kMaxLights lights.
 ///
-/// Contract: the checks are those of light/description/light_table.h.
+/// Contract: lights have passed the checks of light/description/light_table.h.
 LightSet build_lights(const LightInputs& inputs);
 
 /// Builds the sampling density of a latlong texture times `color`: piecewise constant on a grid of
@@ -157,11 +162,11 @@ Distribution2D build_rect_distribution(const TextureView& texture, const Vec3<fl
 double image_solid_angle(const Distribution2D& d);
 
 /// Builds the table that selects a light with probability proportional to its weight (>= 0). Lights
-/// before `first_triangle` are one group, the triangles another. `numbers` receives how many of the
-/// 2^24 random numbers select each light: none for weight 0, and at least a small number for every
-/// other light. If all weights are 0, no random number selects a light. There may be at most
-/// kMaxPowerLights lights. Alias tables in integers after M. Vose, "A Linear Algorithm for
-/// Generating Random Numbers with a Given Distribution", 1991.
+/// before index `first_triangle` and emissive triangles form two groups. `numbers` receives how
+/// many of the 2^24 random numbers select each light: none for weight 0, and at least a small
+/// number for every other light. If all weights are 0, no random number selects a light. There may
+/// be at most kMaxPowerLights lights. Alias tables in integers after M. Vose, "A Linear Algorithm
+/// for Generating Random Numbers with a Given Distribution", 1991.
 PowerTable build_power_table(std::span<const double> weights, size_t first_triangle,
                              std::vector<uint32_t>& bins, std::vector<uint32_t>& numbers);
 

@@ -21,11 +21,10 @@ struct InstanceRecord;
 ///   disk      p centre, u, v half axes, n, area
 ///   sphere    p centre, radius (0: a point light, radiance is then radiant intensity), area
 ///   cylinder  p centre of one end, u axis to the other end, radius, area
-///   distant   n unit direction in which light travels, one_minus_cos of its half angle (0: a
-///   single
-///             direction, radiance is then irradiance at normal incidence)
+///   distant   n unit direction in which light travels, one_minus_cos of the cone's half angle (0:
+///             a single direction, radiance is then irradiance at normal incidence)
 ///   dome      u, v, n: world axes of the dome's local x, y, z
-///   triangle  an instance of a mesh light: the values that its triangles share. radiance is the
+///   triangle  values that the triangles of a mesh light instance share: radiance, which is the
 ///             emitted radiance for kIndependent, else a factor of the material's emission; area
 struct alignas(64) LightRecord {
   float p[3], u[3], v[3], n[3];
@@ -33,7 +32,7 @@ struct alignas(64) LightRecord {
   float area;
   float radius;
   float one_minus_cos;
-  float selection_pdf;  ///< probability of selection by power
+  float selection_pdf;  ///< probability of selecting this light by power
   uint32_t kind;
   uint32_t texture;
   /// Index into LightView::distributions for a dome or rect with a texture; kNoDistribution for a
@@ -41,35 +40,36 @@ struct alignas(64) LightRecord {
   uint32_t distribution;
   uint32_t shaping;  ///< index into LightView::shapings, or kNoShaping
   float diffuse, specular;
-  /// Nonzero: light samples have MIS weight 1, and paths that hit the light by a bounce that light
-  /// sampling could have made contribute nothing. Set for lights whose shape rays cannot hit, and
-  /// for lights whose shadows differ from those that bounce rays see.
+  /// Nonzero for lights that only light samples find: light samples have MIS weight 1, and bounces
+  /// that hit the light contribute nothing, except delta bounces. Set for lights whose shape rays
+  /// cannot hit, and for lights whose shadows bounce rays cannot reproduce.
   uint32_t sampled_only;
   uint32_t hidden;  ///< 1 means that rays cannot hit the shape of the light
   uint32_t light_link, shadow_link;
   uint32_t sync;     ///< MaterialSync of a mesh light
   uint32_t portals;  ///< portals of a dome: index into LightView::portal_groups, or kNoPortals
-  /// |u|, |v|, and their inverses, each 0 for a vector of length 0.
+  /// Lengths |u| and |v|, and their inverses; all are 0 for a vector of length 0.
   float length_u, length_v, inverse_u, inverse_v;
   uint32_t shadow;  ///< index into LightView::shadows, or kPlainShadow
   uint32_t filter;  ///< index into LightView::filters, or kNoFilter
-  /// Nonzero: no light paths start here; only camera paths sample this light.
+  /// Nonzero if no light paths start at this light, so that only camera paths sample it.
   uint32_t camera_only;
 };
 static_assert(sizeof(LightRecord) == 192);
 
 /// Packed motion of a light record (light/description/motion.h): 8 32-bit words.
 struct alignas(32) LightMotion {
-  float origin[3] = {0, 0, 0};  ///< pivot of the rotation, at mid-shutter
-  uint32_t first = 0;           ///< index of its first LightStep
-  uint32_t segments = 0;        ///< number of steps less one; 0: the light does not move
+  float origin[3] = {0, 0, 0};  ///< position at mid-shutter of the pivot of the rotation
+  uint32_t first = 0;           ///< index of the light's first LightStep
+  uint32_t segments = 0;        ///< number of motion steps minus one; 0 if the light does not move
   uint32_t pad[3] = {0, 0, 0};
 };
 static_assert(sizeof(LightMotion) == 32);
-/// Pose of a moving light at one step.
+/// Pose of a moving light at one motion step.
 struct alignas(32) LightStep {
-  float turn[4] = {0, 0, 0, 1};   ///< rotation from mid-shutter, a unit quaternion x y z w
-  float position[3] = {0, 0, 0};  ///< position of the pivot
+  /// Rotation from the pose at mid-shutter, as a unit quaternion (x, y, z, w)
+  float turn[4] = {0, 0, 0, 1};
+  float position[3] = {0, 0, 0};  ///< position of the pivot at this step
   float pad = 0;
   bool operator==(const LightStep&) const = default;
 };
@@ -78,11 +78,12 @@ static_assert(sizeof(LightStep) == 32);
 /// Packed Shaping.
 struct alignas(64) ShapingRecord {
   float axis[3];  ///< unit vector in world space, the axis of the emission
-  /// Rows of the map from world directions to the light's local space.
+  /// Rows of the matrix from world directions to the light's local space.
   float to_light_x[3], to_light_y[3], to_light_z[3];
-  float focus;  ///< 0: none
+  float focus;  ///< exponent of UsdLux focus; 0 means no focus
   float tint[3];
-  float cone, cone_start;  ///< radians: where emission ends, and where it begins to fall off
+  /// Cone half angles in radians at which emission ends, and at which it begins to fall off.
+  float cone, cone_start;
   float ies_scale;
   float angle_scale;
   uint32_t ies;  ///< index into LightView::ies, or kNoIes
@@ -100,7 +101,7 @@ static_assert(sizeof(ShadowRecord) == 32);
 
 /// Packed LightFilter.
 struct alignas(64) FilterRecord {
-  /// Rows of the map from world space to the filter's space.
+  /// Rows and translation of the transform from world space to the filter's space.
   float row_x[3], row_y[3], row_z[3], origin[3];
   float side_0[3], side_1[3], side_2[3], side_3[3];
   float picture_u[3], picture_v[3];
@@ -114,30 +115,31 @@ static_assert(sizeof(FilterRecord) == 192);
 
 /// Offsets of an IesProfile in LightView::ies_numbers.
 struct IesRecord {
-  /// The candela values follow the horizontal angles.
+  /// Offsets and counts of the vertical and horizontal angles. The candela values follow the
+  /// horizontal angles.
   uint32_t vertical, vertical_count, horizontal, horizontal_count;
 };
 
-/// Packed triangle of an emissive mesh, in world space, which emits on both sides. There may be
-/// millions, read in random order, so each fills one cache line.
+/// Packed triangle of an emissive mesh, in world space; it emits from both sides. A scene may have
+/// millions of these records, which are read in random order, so each record fills one cache line.
 struct alignas(64) TriangleLight {
   float p[3], u[3], v[3];  ///< vertex 0 and the edges from it
   /// Radiance times opacity if both are constant. Otherwise three bit patterns: kEmission or
-  /// kOpacity, which says what varies; the material that determines it; and the index of its
+  /// kOpacity, which states what varies; the material that determines it; and the index of its
   /// TriangleUvs.
   float radiance[3];
-  float m[3];           ///< unit geometric normal times the area
-  float selection_pdf;  ///< probability of selection by power
-  /// The emission and opacity of the material vary.
+  float m[3];           ///< unit geometric normal times the triangle's area
+  float selection_pdf;  ///< probability of selecting this triangle by power
+  /// Marks triangles for which the emission, and possibly the opacity, of the material varies.
   static constexpr float kEmission = -1.f;
-  /// Only the opacity of the material varies. The opacity scales the radiance of a mesh light that
-  /// ignores the material's emission.
+  /// Marks triangles for which only the opacity of the material varies. The opacity scales the
+  /// radiance of a mesh light that ignores the material's emission.
   static constexpr float kOpacity = -2.f;
   bool varies() const { return radiance[0] < 0; }
 };
 static_assert(sizeof(TriangleLight) == 64);
 
-/// Identity and texture coordinates of a triangle whose emission or opacity varies.
+/// Mesh ids and texture coordinates of an emissive triangle whose emission or opacity varies.
 struct alignas(16) TriangleUvs {
   float uv0[2], uv1[2], uv2[2];
   uint32_t mesh, prim;
@@ -147,74 +149,79 @@ static_assert(sizeof(TriangleUvs) == 48);
 
 /// Piecewise constant density over [0,1]^2 for importance sampling of an image, as integer counts.
 /// Interval x of a row is selected with probability n / 65536, where n is the difference between
-/// its cumulative value and the next, so that probabilities are exact.
+/// cumulative values x + 1 and x, so that probabilities are exact.
 ///
 /// Inversion reads two cache lines: the coarse line of the row, which holds every 32nd value and
 /// stays in the cache, and one line of 32 values.
 struct Distribution2D {
   static constexpr uint32_t kCounts = 65536;
-  static constexpr uint32_t kLine = 32;            ///< values in a cache line
+  static constexpr uint32_t kLine = 32;            ///< number of values in a cache line
   static constexpr uint32_t kMax = kLine * kLine;  ///< maximum number of intervals in a row
-  /// Padding after the last value of a row. It is not less than any value, since kCounts itself is
+  /// Padding after the last value of a row. No stored value exceeds it, since kCounts itself is
   /// never stored.
   static constexpr uint16_t kPad = kCounts - 1;
   struct alignas(64) Line {
     uint16_t value[kLine];
   };
   uint32_t width = 0, height = 0;
-  uint32_t row_lines = 0;     ///< cache lines of a row of `cumulative`
-  double mean_luminance = 0;  ///< mean over the sphere (dome) or the square (rect)
+  uint32_t row_lines = 0;  ///< number of cache lines in a row of `cumulative`
+  /// Mean luminance over the sphere (dome light) or the square (rect light)
+  double mean_luminance = 0;
   /// 1 / (integral of the squared density over the square): 1 for a uniform image, near 0 if a few
   /// pixels dominate. Used for rects.
   float spread = 1;
   /// `height` rows of `width` cumulative values, each starting at 0, then the marginal distribution
   /// of `height` values. Each row starts a cache line.
   std::vector<Line> cumulative;
-  /// First value of each cache line, one coarse line for each row and one for the marginal
-  /// distribution.
+  /// Coarse cache lines, with the first value of each line of `cumulative`: one for each row, and
+  /// one for the marginal distribution.
   std::vector<Line> coarse;
 };
 
-/// Integer alias tables that map a random number k in [0, 2^24) to a light. Numbers below `split`
-/// select a record, the others a triangle, so that looking up one of a few strong lights does not
-/// touch the table of millions of triangles. Each bin of a table covers 2^shift random numbers.
+/// Integer alias tables that map a random number k in [0, 2^24) to a light. Random numbers below
+/// `split` select a record, the rest a triangle, so that looking up one of a few strong lights does
+/// not touch the table of millions of triangles. Each bin of a table covers 2^shift random numbers.
 struct PowerTable {
-  /// Bins of both groups. Random number r of the 2^shift of bin b selects light b of the group if r
-  /// < bin mod 2^shift, and light bin >> shift otherwise.
+  /// Bins of both groups, records and triangles. Of the 2^shift random numbers r of bin b, those
+  /// with r < bins[b] mod 2^shift select light b of the group, and the rest select light bins[b] >>
+  /// shift.
   const uint32_t* bins = nullptr;
   uint32_t split = 0;
   uint32_t shift[2] = {};
   uint32_t triangle_bins = 0;  ///< index of the first bin of the triangles
 };
 
-/// Packed child of a light tree node: bounds of the lights below it, in 8 32-bit words.
+/// Packed child of a light tree node: bounds of the child's lights, in 8 32-bit words.
 struct LightTreeChild {
   float centre[3];  ///< centre of the bounding sphere
   float radius;
-  /// Intensity along the normals of the lights below, as a fraction of that of the whole tree.
+  /// Intensity of the child's lights along their normals, as a fraction of the intensity of the
+  /// whole tree.
   float intensity;
-  /// Axis of the cone of normals, 16 bits for each component: 0 is -1, 65535 is 1.
+  /// The x and y components of the axis of the cone of normals, 16 bits each: 0 means -1, 65535
+  /// means 1.
   uint32_t axis_xy;
-  /// From the low bits: z of the axis (16 bits), sin(angle / 2) of the cone in steps of 1 / 255 (8
-  /// bits), sin(angle / 2) of the emission angle in steps of 1 / 127 (7 bits), and 1 bit for
-  /// two-sided emission.
+  /// Fields from the low bits up: z component of the axis (16 bits), sin(angle / 2) of the cone in
+  /// steps of 1 / 255 (8 bits), sin(angle / 2) of the emission angle in steps of 1 / 127 (7 bits),
+  /// and 1 bit for two-sided emission.
   uint32_t axis_z_cones;
-  uint32_t next;  ///< node, or kTreeLeaf | light
+  uint32_t next;  ///< index of the child node, or kTreeLeaf | light index
 };
 static_assert(sizeof(LightTreeChild) == 32);
 
-/// A node of a light tree, one cache line.
+/// Light tree node, which fills one cache line.
 struct alignas(64) LightTreeNode {
   LightTreeChild child[2];
 };
 static_assert(sizeof(LightTreeNode) == 64);
 
 inline constexpr uint32_t kTreeLeaf = 0x80000000u;
-/// Maximum depth of a light in the tree: a trail has one bit for each node above the light.
+/// Maximum depth of a light in the tree, since a trail (LightTreeView::trails) has one bit for each
+/// node above the light.
 inline constexpr uint32_t kMaxTreeDepth = 31;
 
 /// Light tree (light/sampling/tree_choice.h). Random numbers k in [0, 2^24) below `numbers` select
-/// a light of the tree; the others select the first infinite light i with k < infinite_ends[i].
+/// a light of the tree; other values select the first infinite light i with k < infinite_ends[i].
 struct LightTreeView {
   const LightTreeNode* nodes = nullptr;
   /// Path to each light: bit d selects the child of the node at depth d. kNoLight if the light is
@@ -224,12 +231,12 @@ struct LightTreeView {
   const float* infinite_pdf = nullptr;
   uint32_t root = kNoLight;
   uint32_t numbers = 0;
-  /// Number of lights of equal power that would be equally hard to select from: 1 / sum of the
-  /// squared fractions of the power of the tree. 0 if no light of the tree emits.
+  /// Effective number of lights: 1 / (sum over lights of the squared fraction of the tree's power),
+  /// which is the number of lights if all have equal power. 0 if no light of the tree emits.
   float effective_lights = 0;
 };
 
-/// Packed light linking (light/description/linking.h). Its pointers are null if no light is linked.
+/// Packed light linking (light/description/linking.h). The pointers are null if no light is linked.
 struct LinkView {
   const uint32_t* classes = nullptr;
   const uint32_t* members = nullptr;
@@ -239,8 +246,8 @@ struct LinkView {
 /// Portals of a dome, a range of LightView::portals.
 struct PortalGroup {
   uint32_t first, count;
-  /// Solid angle in sr of a uniform image with the same power and the same squared power: 4 pi for
-  /// a uniform dome, small if a sun dominates.
+  /// Effective solid angle of the dome's image in sr, 1 / (integral of its squared density): 4 pi
+  /// for a uniform image, small if a sun dominates.
   float image_solid_angle;
 };
 
@@ -251,33 +258,35 @@ struct LightView {
   const TriangleLight* triangles = nullptr;
   const TriangleUvs* triangle_uvs = nullptr;
   PowerTable power_table;
-  /// Selection probability of each light if `power_table` does not use those of the records; else
-  /// null.
+  /// Selection probability of each light if `power_table` was calibrated; null if the probabilities
+  /// in the records apply.
   const float* selection_pdf = nullptr;
   LightTreeView tree;
   bool by_tree = false;  ///< whether to select lights by `tree` instead of `power_table`
-  uint32_t count = 0;    ///< number of records and triangles
+  uint32_t count = 0;    ///< number of lights, that is, of records and triangles
   uint32_t first_triangle = 0;
   uint32_t infinite_count = 0;
   const Distribution2D* distributions = nullptr;
-  // Null if no dome has portals. Portals are stored like rects.
+  // Portals, stored like the records of rect lights; null if no dome has portals.
   const LightRecord* portals = nullptr;
   const PortalGroup* portal_groups = nullptr;
-  // Null if no light has shaping.
+  // Shaping and IES profiles; null if no light has shaping.
   const ShapingRecord* shapings = nullptr;
   const IesRecord* ies = nullptr;
   const float* ies_numbers = nullptr;
   const FilterRecord* filters = nullptr;  ///< null if no light has a filter
-  const LightMotion* motions = nullptr;   ///< indexed by record; null if no light moves
+  /// Motion of the light of each record; null if no light moves.
+  const LightMotion* motions = nullptr;
   const LightStep* motion_steps = nullptr;
-  const ShadowRecord* shadows = nullptr;  ///< null if all shadows are plain
+  const ShadowRecord* shadows = nullptr;  ///< null if no light has shadow attributes
   /// Record of the mesh light of each triangle, or kNoLight. Null if there are no mesh lights.
   const uint32_t* mesh_lights = nullptr;
-  bool has_effects = false;      ///< whether some record is sampled_only or has multipliers
-  bool has_multipliers = false;  ///< whether the diffuse or specular multiplier of some record is
-                                 ///< not 1
+  /// Whether any record is sampled_only or has a multiplier other than 1.
+  bool has_effects = false;
+  /// Whether any record has a diffuse or specular multiplier other than 1.
+  bool has_multipliers = false;
   LinkView links;
-  /// Textures, and the materials of triangles whose emission or opacity varies.
+  /// Textures of lights, and materials of triangles whose emission or opacity varies.
   MaterialView materials;
   /// Bounding sphere of all surfaces, the target of light paths from infinite lights, which start
   /// `reach` before its centre, outside all light shapes. Radius 0 means that no light paths start.
@@ -285,7 +294,7 @@ struct LightView {
   float radius = 0, reach = 0;
   bool emits_paths() const { return radius > 0; }
   const LightAim* aim = nullptr;  ///< target spheres of light paths; null without aiming
-  // Geometry for opacity graphs that read positions; null for a light set without geometry.
+  // Geometry for opacity graphs that read positions; null if the light set belongs to no scene.
   const MeshRecord* meshes = nullptr;
   const InstanceRecord* instances = nullptr;
 };

@@ -18,7 +18,7 @@ namespace {
 constexpr uint32_t kNone = 0xffffffffu;
 static_assert(kNoTexture == kNone && kNoIes == kNone && kNoSet == kNone && kNoFilter == kNone);
 
-/// Returns a member of a light, or a nested member.
+/// Returns the member of a light that a path of member pointers leads to.
 template <auto kFirst, auto... kRest, typename Object>
 auto& member(Object& object) {
   if constexpr (sizeof...(kRest) == 0)
@@ -61,7 +61,7 @@ constexpr LightValueKind kValueKind = std::is_same_v<T, float>         ? LightVa
                                       : std::is_enum_v<T> ? LightValueKind::kChoice
                                                           : LightValueKind::kTransforms;
 
-/// Makes the row of a parameter without limits.
+/// Makes the table row of a light parameter without limits.
 template <auto... kPath>
 LightParameter row(const char* name, const char* label, const char* input, const char* help) {
   LightParameter p;
@@ -75,7 +75,7 @@ LightParameter row(const char* name, const char* label, const char* input, const
   return p;
 }
 
-/// Limits a parameter to values of 0 or more.
+/// Limits a light parameter to values of 0 or more.
 LightParameter positive(LightParameter p, double slider_max) {
   p.least = 0;
   p.slider_max = slider_max;
@@ -93,8 +93,8 @@ LightParameter in(LightGroup group, LightParameter p) {
   p.group = group;
   return p;
 }
-/// Marks a row as a parameter of all lights, of lights with a trait, or (`in`) of kinds that name
-/// it.
+/// Mark a table row as a parameter of all lights, of the lights with a trait, or (function `in`) of
+/// the light kinds that list its name.
 LightParameter all(LightGroup group, LightParameter p) {
   p.is_common = true;
   return in(group, std::move(p));
@@ -109,7 +109,7 @@ LightParameter choice(LightParameter p, std::vector<const char*> choices) {
   return p;
 }
 
-/// Returns the parameters of shape and emission.
+/// Returns the light parameters of shape and emission.
 std::vector<LightParameter> shape_rows() {
   using L = Light;
   using enum LightGroup;
@@ -163,7 +163,7 @@ std::vector<LightParameter> shape_rows() {
   };
 }
 
-/// Returns the parameters of the dependence on direction.
+/// Returns the light parameters that define how emission depends on direction.
 std::vector<LightParameter> shaping_rows() {
   using S = Shaping;
   using enum LightGroup;
@@ -205,7 +205,7 @@ std::vector<LightParameter> shaping_rows() {
   };
 }
 
-/// Returns the parameters of linking and shadows.
+/// Returns the light parameters of linking and shadows.
 std::vector<LightParameter> shadow_rows() {
   using L = Light;
   using H = ShadowAttributes;
@@ -245,7 +245,7 @@ std::vector<LightParameter> shadow_rows() {
   };
 }
 
-/// Returns the parameters that refer to filters, motion, portals and materials.
+/// Returns the light parameters for filters, motion, portals and materials.
 std::vector<LightParameter> other_rows() {
   using L = Light;
   using enum LightGroup;

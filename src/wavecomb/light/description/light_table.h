@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Table of light parameters: one row for each member of Light and Shaping, and for the parameters
-/// specific to one kind. Range checks, the scene fingerprint, Python keywords, sandbox calls and
-/// the fields of the window are derived from it. To add a parameter, add a member, a row here, and
-/// its use; for one kind only, add a row to that kind (LightKindInfo::own) and its use.
+/// Table of light parameters: one row for each member of Light and Shaping, and for each parameter
+/// that is specific to a light kind. Range checks, the scene fingerprint, Python keywords, sandbox
+/// calls and the fields of the window are derived from it. To add a parameter, add a member, a row
+/// here, and its use; for a parameter of a single light kind, add a row to that kind
+/// (LightKindInfo::own) and the use of the parameter.
 #pragma once
 
 #include <cstddef>
@@ -17,36 +18,37 @@
 
 namespace wavecomb {
 
-/// Value of a light parameter. A choice is stored as its index, an unset id (kNoTexture, ...) as
-/// monostate.
+/// Value of a light parameter. A choice is stored as its index; an unset id (such as kNoTexture) is
+/// stored as monostate.
 using LightValue =
     std::variant<std::monostate, bool, uint32_t, float, Vec3<float>, std::vector<Affine>>;
 
 enum class LightValueKind : uint8_t { kNumber, kColour, kFlag, kChoice, kId, kTransforms };
-/// Type of object to which an id refers.
+/// Type of object to which a light parameter of type id refers.
 enum class LightRefers : uint8_t { kNothing, kTexture, kProfile, kSet, kGroup, kFilter };
-/// Group of parameters in a form.
+/// Group under which the light editor shows a parameter.
 enum class LightGroup : uint8_t { kEmission, kShape, kShaping, kResponse };
 
 /// Traits that kinds of lights share.
 namespace light_trait {
-/// A light with a transform, as opposed to the light of a mesh.
+/// The light has its own transform; mesh lights do not.
 inline constexpr uint32_t kHasTransform = 1;
 inline constexpr uint32_t kSized = 2;         ///< `normalize` has an effect
 inline constexpr uint32_t kShaped = 4;        ///< supports UsdLuxShapingAPI
-inline constexpr uint32_t kVisibleShape = 8;  ///< rays can hit its shape
+inline constexpr uint32_t kVisibleShape = 8;  ///< rays can hit the light's shape
 inline constexpr uint32_t kTextured = 16;     ///< supports a texture
-inline constexpr uint32_t kInfinite = 32;     ///< surrounds the scene at infinite distance
-inline constexpr uint32_t kFiltered = 64;     ///< supports light filters
-/// The radiance of lights with this trait is the background of light path expressions.
+/// The light surrounds the scene at infinite distance.
+inline constexpr uint32_t kInfinite = 32;
+inline constexpr uint32_t kFiltered = 64;  ///< supports light filters
+/// The light's radiance is the background in light path expressions.
 inline constexpr uint32_t kBackground = 128;
 }  // namespace light_trait
 
-/// Description of a light parameter. Contract: lives as long as the program.
+/// Description of a light parameter. Contract: a description exists as long as the program runs.
 struct LightParameter {
-  const char* name = "";   ///< keyword of add_light
-  const char* label = "";  ///< label in a form
-  const char* help = "";   ///< one sentence, with the unit
+  const char* name = "";   ///< keyword of SceneBuilder.add_light()
+  const char* label = "";  ///< label in the light editor
+  const char* help = "";   ///< help text: one sentence, with the unit
   const char* input = "";  ///< UsdLux name without "inputs:"; "" if UsdLux has no equivalent
   LightGroup group = LightGroup::kEmission;
   LightValueKind kind = LightValueKind::kNumber;
@@ -54,19 +56,19 @@ struct LightParameter {
   /// Bounds of a number or of each component of a colour; all values are finite.
   double least = -std::numeric_limits<double>::infinity();
   double most = std::numeric_limits<double>::infinity();
-  double slider_max = 1;  ///< upper end of a slider if there is no `most`
+  double slider_max = 1;  ///< upper end of the parameter's slider if `most` is infinite
   std::vector<const char*> choices;
-  /// Lights with this trait have the parameter, in addition to the kinds that name it.
+  /// Lights with this trait have the parameter, in addition to the light kinds that list its name.
   uint32_t trait = 0;
-  bool is_common = false;    ///< all lights have the parameter
-  bool is_specific = false;  ///< specific to one kind of light
-  uint32_t kinds = 0;        ///< bit k: lights of LightKind k have it
+  bool is_common = false;    ///< whether all lights have the parameter
+  bool is_specific = false;  ///< whether the parameter is specific to one kind of light
+  uint32_t kinds = 0;        ///< bit k is set if lights of LightKind k have the parameter
 
   LightValue (*read)(const Light&) = nullptr;
   void (*write)(Light&, const LightValue&) = nullptr;
 
   bool is_of(LightKind light) const { return (kinds >> static_cast<uint32_t>(light) & 1) != 0; }
-  /// Returns whether the value can be edited in a scene that is built.
+  /// Returns whether the value can be edited without building a new scene.
   bool can_change() const {
     return kind == LightValueKind::kNumber || kind == LightValueKind::kColour ||
            kind == LightValueKind::kFlag;
@@ -74,14 +76,14 @@ struct LightParameter {
   LightValue standard() const { return read(Light{}); }
 };
 
-/// Returns all parameters except kind, name and to_world, in the order in which fingerprints hash
-/// them. Parameters specific to one kind come last.
+/// Returns all light parameters except kind, name and to_world, in the order in which scene
+/// fingerprints hash them. Parameters specific to one kind come last.
 std::span<const LightParameter> light_table();
-/// Returns the row of a parameter, or null for an unknown name.
+/// Returns the table row of a light parameter, or null for an unknown name.
 const LightParameter* find_light_parameter(std::string_view name);
 
-/// Returns value `kIndex` of the parameters specific to a kind, at most kMaxSpecificParameters, for
-/// LightKindInfo::own.
+/// Returns the value of a light's kind-specific parameter `kIndex` (an index into
+/// LightKindInfo::own), or `standard` if it is not set.
 template <size_t kIndex>
 float specific_value(const Light& light, float standard) {
   static_assert(kIndex < kMaxSpecificParameters);
@@ -111,19 +113,19 @@ LightParameter specific_parameter(const char* name, const char* label, const cha
 /// Returns the name of a type of object, such as "texture"; "" for kNothing.
 const char* light_refers_name(LightRefers refers);
 const char* light_kind_name(LightKind kind);
-/// Returns the kind of that name, which must have a transform (not a mesh light). Throws Error for
-/// other names.
+/// Returns the light kind of a name, which must have a transform (mesh lights do not). Throws Error
+/// for other names.
 LightKind light_kind(std::string_view name);
 
-/// Numbers of objects to which lights can refer.
+/// Numbers of textures, profiles, sets and filters to which lights can refer.
 struct LightReferences {
   size_t textures = 0, profiles = 0, sets = 0, filters = 0;
 };
 
-/// Throws Error with one line that names the light if a value is not finite or out of range, if an
-/// id refers to an object that was never added, or if the kind has no transform.
+/// Throws Error with a one-line message that names the light if a value is not finite or out of
+/// range, if an id refers to an object that was never added, or if the kind has no transform.
 void check_light(const Light& light, const LightReferences& references);
-/// Applies the same checks to a mesh light.
+/// Checks a mesh light in the same way as check_light().
 void check_mesh_light(const Light& light, const LightReferences& references);
 
 }  // namespace wavecomb

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Light and shadow linking: the sets of objects that collections of lights select.
+/// Light and shadow linking: the sets of objects that the UsdLux collections of lights select.
 #pragma once
 
 #include <cstdint>
@@ -21,8 +21,9 @@ std::string without_numbers(std::string_view path);
 /// Rule of a collection for a path, as in UsdCollectionMembershipQuery.
 enum class PathRule : uint8_t { kExclude, kExplicit, kExpand };
 
-/// A set of objects, given by rules for prim paths. The rule of the nearest path among the object's
-/// own path and its ancestors decides; kExplicit applies to its own path only.
+/// Set of objects, defined by rules for prim paths. An object is in the set according to the rule
+/// for its path or, without a rule, for its nearest ancestor with a rule; kExplicit rules do not
+/// apply to descendants.
 struct GeometrySet {
   struct Entry {
     std::string path;
@@ -37,9 +38,10 @@ struct GeometrySet {
 struct SceneLinks {
   SceneLinks(const ObjectNames& names, std::span<const GeometrySet> sets);
 
-  std::vector<uint32_t> classes;  ///< class of each object in the numbering of ObjectNames, from 1
-  std::vector<uint32_t> members;  ///< for each class of objects, one bit for each set
-  uint32_t words = 0;             ///< 32-bit words of `members` for each class
+  /// Class number (from 1) of each object, in the order of ObjectNames.
+  std::vector<uint32_t> classes;
+  std::vector<uint32_t> members;  ///< membership of each class: one bit for each set
+  uint32_t words = 0;             ///< number of 32-bit words in `members` for each class
 
   LinkView view() const { return {classes.data(), members.data(), words}; }
 };

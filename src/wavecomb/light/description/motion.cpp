@@ -11,7 +11,7 @@
 namespace wavecomb {
 namespace {
 
-/// Number of poses between two steps at which bounds are computed.
+/// Number of poses between two motion steps at which bounds are computed.
 constexpr int kPosesPerStep = 8;
 
 using Matrix = double[3][3];
@@ -59,10 +59,11 @@ bool rotation_between(const Affine& from, const Affine& to, Matrix& x) {
   const double det = x[0][0] * (x[1][1] * x[2][2] - x[1][2] * x[2][1]) -
                      x[0][1] * (x[1][0] * x[2][2] - x[1][2] * x[2][0]) +
                      x[0][2] * (x[1][0] * x[2][1] - x[1][1] * x[2][0]);
-  return det > 0.5;  // A reflection is not a rotation.
+  return det > 0.5;  // Reject reflections, which are not rotations.
 }
 
-/// Writes the unit quaternion of a rotation, with the sign that is closer to `before`.
+/// Writes the unit quaternion of a rotation, with the sign for which it is closer to the quaternion
+/// `before`.
 void store_rotation(const Matrix& m, const float (&before)[4], float (&to)[4]) {
   double q[4];
   const double trace = m[0][0] + m[1][1] + m[2][2];
@@ -100,7 +101,7 @@ double dot3(const double* a, const double* b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/// Calls one(place) for poses at equal times over the whole motion.
+/// Calls one(pose) for poses at equally spaced times over the whole motion.
 template <typename Function>
 void for_each_pose(const LightMotion& motion, std::span<const LightStep> steps,
                    const Function& one) {
@@ -201,7 +202,7 @@ BoundingSphere swept_bounds(const LightMotion& motion, std::span<const LightStep
     all.centre[i] = 0.5 * (lo[i] + hi[i]);
     reach += (hi[i] - all.centre[i]) * (hi[i] - all.centre[i]);
   }
-  // Between two poses, the path deviates by less than their distance.
+  // Between two tested poses, the light deviates from them by less than their distance.
   all.radius = (at_rest.radius + std::sqrt(reach) + opening) * (1 + 1e-5);
   return all;
 }

@@ -4,8 +4,9 @@
 ///
 /// At a given time, the record is rotated by R about its pivot `origin`, which moves to `position`:
 ///   x = R (x_rest - origin) + place
-/// R is a unit quaternion, interpolated between the two steps around that time. The motion is
-/// rigid, so distances, solid angles and densities equal those of the record seen from x_rest.
+/// where `place` is the position of the pivot, and R is given by a unit quaternion; both are
+/// interpolated between the two motion steps around that time. The motion is rigid, so distances,
+/// solid angles and densities at x equal those of the light at rest, seen from x_rest.
 #pragma once
 
 #include <span>
@@ -23,7 +24,7 @@ void add_motions(LightSet& set, std::span<const Light> lights);
 /// Pose of a light at a time, in double precision; LightPose (light/sampling/moving.h) is its
 /// counterpart for kernels.
 struct PreciseLightPose {
-  double x[3], y[3], z[3];  ///< directions of its mid-shutter axes
+  double x[3], y[3], z[3];  ///< directions of the light's mid-shutter axes
   double position[3], origin[3];
 
   PreciseLightPose(const LightMotion& motion, std::span<const LightStep> steps, double time);
@@ -37,7 +38,7 @@ struct BoundingSphere {
   double centre[3];
   double radius;
 };
-/// Returns a ball that contains the ball `at_rest` in all poses of a moving light.
+/// Returns a ball that contains all positions of the ball `at_rest`, which moves with a light.
 BoundingSphere swept_bounds(const LightMotion& motion, std::span<const LightStep> steps,
                             const BoundingSphere& at_rest);
 /// Returns bounds of a light over its whole motion, from its bounds at mid-shutter.

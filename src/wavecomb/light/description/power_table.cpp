@@ -12,16 +12,16 @@ namespace {
 
 constexpr size_t kBand = size_t{1} << 16;
 
-/// Fills the alias bins of one group: light i gets numbers[i] of the 2^shift random numbers of each
-/// bin, all of which they use up. Processes bins from the last to the first. A bin that is not full
-/// takes the rest from the last bin with a surplus; if that bin then has a deficit, it is processed
-/// next.
+/// Fills the alias bins of one group: light i gets numbers[i] random numbers, where each bin has
+/// 2^shift random numbers and the sum of `numbers` fills all bins. Processes bins from the last to
+/// the first. A bin that is not full takes the rest from the last bin with a surplus; if that bin
+/// then has a deficit, it is processed next.
 void fill_bins(std::span<const uint32_t> numbers, uint32_t shift, std::span<uint32_t> bins) {
   const uint32_t size = 1u << shift;
   const auto number_of = [&](size_t bin) { return bin < numbers.size() ? numbers[bin] : 0u; };
   for (uint32_t b = 0; b < bins.size(); ++b) bins[b] = b << shift;  // all full
   size_t next = bins.size(), overfull = bins.size();
-  uint32_t left = size;  // random numbers that bin `overfull` has left
+  uint32_t left = size;  // number of random numbers left in bin `overfull`
   for (;;) {
     while (next > 0 && number_of(next - 1) >= size) --next;
     if (next == 0) return;
@@ -37,14 +37,14 @@ void fill_bins(std::span<const uint32_t> numbers, uint32_t shift, std::span<uint
   }
 }
 
-/// Distributes random numbers in `counts`: one to each light that emits, and `free` more by
-/// `shares`, which become their running sums.
+/// Distributes random numbers in `counts`: one to each light that emits, and `free` further numbers
+/// in proportion to `shares`. Replaces `shares` by their running sums.
 void count_numbers(std::span<const double> weights, std::span<double> shares, size_t free,
                    std::span<uint32_t> counts) {
   double running = 0;
   for (double& share : shares) share = running += share;
   const double all = running;
-  // Rounding the running sum makes the total exact.
+  // Round the running sum, so that the total is exact.
   const auto up_to = [&](double part) {
     return static_cast<uint32_t>(
         std::nearbyint(std::min(1.0, part / all) * static_cast<double>(free)));
@@ -75,8 +75,8 @@ PowerTable build_power_table(std::span<const double> weights, size_t first_trian
   const size_t emitting = count_emitting(weights),
                emitting_of[2] = {count_emitting(groups[0]), count_emitting(groups[1])};
   PowerTable table;
-  if (emitting == 0) {  // If no light emits, no random number selects a light, and any table will
-                        // do.
+  // If no light emits, no random number selects a light, and any valid table suffices.
+  if (emitting == 0) {
     table.split = first_triangle > 0 ? kNumbers : 0;
     table.shift[0] = table.shift[1] = 24;
     bins.assign(1, 0);
@@ -84,7 +84,7 @@ PowerTable build_power_table(std::span<const double> weights, size_t first_trian
   }
 
   // One random number in a hundred is distributed evenly, so that weak nearby lights are sampled.
-  // In addition, every light that emits gets one of the 2^24 numbers.
+  // In addition, every light that emits gets one of the 2^24 random numbers.
   constexpr double floor_share = 0.01;
   const double largest = *std::max_element(weights.begin(), weights.end());
   std::vector<double> shares(n);
@@ -104,8 +104,9 @@ PowerTable build_power_table(std::span<const double> weights, size_t first_trian
                                  : 0;
   });
 
-  // Each group gets a multiple of the numbers of its bins, and at least one bin per light. Few
-  // large bins stay in the cache; 1024 bins for all numbers give enough resolution.
+  // The number of random numbers of each group is a multiple of the bin size, and each group has at
+  // least one bin per light. Few large bins stay in the cache; 1024 bins for all numbers give
+  // enough resolution.
   const auto least = [&](size_t g, uint32_t shift) {
     const uint64_t units = (groups[g].size() + (size_t{1} << shift) - 1) >> shift;
     return emitting_of[g] > 0 ? units << shift : 0;

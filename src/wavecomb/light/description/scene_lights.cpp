@@ -15,21 +15,21 @@ uint32_t material_of(const Mesh& mesh, const InstanceRecord& instance, size_t fa
   return m == kInheritMaterial ? instance.material : m;
 }
 
-/// An instance of a mesh with faces that emit.
+/// Instance of a mesh with emissive faces.
 struct EmissiveMesh {
-  size_t first;  ///< light index of its first triangle, counted over all emissive meshes
+  size_t first;  ///< index of the mesh's first triangle among the triangles of all emissive meshes
   const Mesh* mesh;
   uint32_t mesh_id, instance_id;
   const InstanceRecord* instance;
   const Affine* to_world;
-  uint32_t mesh_light;  ///< index of its MeshLightInstance, or kNoLight
+  uint32_t mesh_light;  ///< index of the mesh's MeshLightInstance, or kNoLight
 };
 
 uint64_t bytes_of(const LightTree& tree) {
   return tree.nodes.size() * sizeof(tree.nodes[0]) + tree.trails.size() * sizeof(tree.trails[0]);
 }
 
-/// Returns the one-sided area of a mesh at mid-shutter after `to_world`.
+/// Returns the one-sided world-space area of a mesh at mid-shutter.
 double world_area(const Mesh& mesh, const Affine& to_world) {
   const std::span<const float> positions = mesh.positions.subspan(
       mesh.steps / 2 * (mesh.positions.size() / mesh.steps), mesh.positions.size() / mesh.steps);
@@ -55,8 +55,8 @@ double world_area(const Mesh& mesh, const Affine& to_world) {
   return sum;
 }
 
-/// Makes a light of face `face` of an emissive mesh: radiance 0 if the face does not emit, opacity
-/// 0 if it is absent.
+/// Makes the emissive triangle for face `face` of an emissive mesh. Its radiance is 0 if the face
+/// does not emit, and its opacity 0 if the face is fully transparent.
 EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMaterials& materials,
                                    const EmissiveMesh& source, size_t face) {
   const Mesh& mesh = *source.mesh;
@@ -83,7 +83,7 @@ EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMat
     uvs[k][1] = uv[1];
   }
   set_mean_emission(geometry, materials, m, t);
-  // A light that is not visible emits although no ray can hit its mesh.
+  // Ignore the opacity of invisible mesh lights, which emit although no ray can hit their mesh.
   if (mesh.mesh_light == kNoLight || geometry.mesh_lights[mesh.mesh_light].visible)
     set_mean_opacity(geometry, materials, m, t);
   if (m.has_texture(Input::kEmission) || m.emission_graph != kNoGraph || t.opacity_varies)
@@ -149,7 +149,8 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
                       .mesh_lights = light_instances,
                       .tree_time = TreeTime::kWhenChosen,
                       .filters = geometry.filters});
-  // Entries are still relative to the first triangle and the first mesh light; make them light ids.
+  // Entries are still relative to the first triangle and the first mesh light; convert them to
+  // light indices.
   for (std::vector<uint32_t>* table : {&emissive, &mesh_lights})
     for (uint32_t& entry : *table)
       if (entry != kNoLight) entry += set.first_triangle();

@@ -13,7 +13,7 @@ namespace {
 /// triangles whose estimated mean is 0.
 constexpr float kMinOpacity = 1.f / 16;
 
-/// Returns the mean of a texture as an input reads it.
+/// Returns the mean of the values that a material input reads from a texture.
 Vec3<float> mean_texture(const SceneGeometry& geometry, const TextureUse& use) {
   const float* mean = geometry.textures[use.texture]->mean();
   const auto value = [&](uint32_t c) {
@@ -23,8 +23,8 @@ Vec3<float> mean_texture(const SceneGeometry& geometry, const TextureUse& use) {
   return {value(0), value(1), value(2)};
 }
 
-/// Returns the mean over a few points of a triangle of f(outputs of `graph` from component `output`
-/// on).
+/// Returns the mean of f(x) over a few points of a triangle, where x holds three outputs of
+/// `graph`, starting at component `output`.
 template <typename Function>
 Vec3<float> mean_graph(const SceneGeometry& geometry, const SceneMaterials& materials,
                        uint32_t graph, uint32_t output, const Vec3<float>& plain,
@@ -38,7 +38,8 @@ Vec3<float> mean_graph(const SceneGeometry& geometry, const SceneMaterials& mate
     const float* p = &mesh.positions[size_t{3} * mesh.indices[size_t{3} * t.prim + k]];
     return Vec3<float>(p[0], p[1], p[2]);
   };
-  // Centres of four triangles of equal area, with texture footprints of about their size.
+  // Evaluate the graph at the centres of four sub-triangles of equal area, with texture footprints
+  // of about their size.
   constexpr float kPoints[4][2] = {
       {1.f / 3, 1.f / 3}, {1.f / 6, 1.f / 6}, {2.f / 3, 1.f / 6}, {1.f / 6, 2.f / 3}};
   const float width =
@@ -103,7 +104,7 @@ void set_mean_opacity(const SceneGeometry& geometry, const SceneMaterials& mater
   const auto unit = [](float x) { return std::clamp(x, 0.f, 1.f); };
   float opacity = unit(material.opacity);
   // With a threshold, opacity is 0 or 1 nearly everywhere, so the mean of the texture estimates the
-  // presence.
+  // covered fraction.
   if (material.has_texture(Input::kOpacity))
     opacity =
         unit(mean_texture(geometry, material.textures[static_cast<size_t>(Input::kOpacity)]).x);

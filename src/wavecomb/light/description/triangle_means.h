@@ -7,18 +7,19 @@
 namespace wavecomb {
 
 /// Returns whether light sampling can aim at the emission of a material: it can unless the graph
-/// reads inputs that are known only when a path hits the surface. Only paths that hit the surface
-/// find other emission.
+/// reads inputs that are known only when a path hits the surface. All other emission is found only
+/// by paths that hit the surface.
 bool can_aim_at(const Material& material, const GraphSet& graphs);
 
 /// Sets the radiance of a triangle with known corners to the emission of `material`: exact if it is
 /// constant, otherwise an estimate of its mean (from the mean of the whole texture, or from a few
-/// points of a graph). 0 if light sampling cannot aim at the material.
+/// points of a graph). Sets it to 0 if light sampling cannot aim at the material.
 void set_mean_emission(const SceneGeometry& geometry, const SceneMaterials& materials,
                        const Material& material, EmissiveTriangle& triangle);
 
-/// Sets the opacity of a triangle to that of `material`, exact if it is constant, otherwise an
-/// estimate of its mean: 1 if opacity is not presence, and never 0 if it varies.
+/// Sets the opacity of a triangle to the opacity of `material` if that is constant, otherwise to an
+/// estimate of its mean that is never 0. Sets it to 1 if the material's opacity does not make
+/// surfaces partially present.
 void set_mean_opacity(const SceneGeometry& geometry, const SceneMaterials& materials,
                       const Material& material, EmissiveTriangle& triangle);
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Aiming of light paths at spheres (light/description/aim.h; docs/light-paths.md).
 ///
-/// Aiming changes a light's emission density D to D g. Let a_0 be the fraction of paths that the
-/// light emits by its own distribution, and a_k the fraction aimed at sphere k of radius r_k:
+/// Aiming changes a light's emission density D to D g. Let a_0 be the fraction of paths that start
+/// with the light's emission distribution, and a_k the fraction aimed at sphere k of radius r_k:
 ///   infinite lights   g = a_0 + sum a_k [the line hits sphere k] R^2 / r_k^2
 ///   finite lights     g = a_0 + sum a_k [d hits sphere k] / (W_k p(d)),
 /// where R is the radius of the sphere around the scene, W_k the solid angle of sphere k as seen
-/// from the point on the light (4 pi inside the sphere), and p the light's own density of
-/// directions. Both ends of a path can compute the factor g, so g is part of all MIS weights.
+/// from the point on the light (4 pi inside the sphere), and p the density of directions without
+/// aiming. Both ends of a path can compute the factor g, so g is part of all MIS weights.
 #pragma once
 
 #include "wavecomb/core/frame.h"
@@ -17,8 +17,8 @@
 
 namespace wavecomb::detail {
 
-/// Returns 1 - cos of the half angle of a sphere of radius r whose centre is at the squared
-/// distance `distance2`; 2 inside the sphere.
+/// Returns 1 - cos of the half angle that a sphere of radius r subtends if its centre is at the
+/// squared distance `distance2`; 2 for points inside the sphere.
 template <typename F>
 inline F sphere_one_minus_cos(const F& radius, const F& distance2) {
   const F radius2 = radius * radius;
@@ -28,7 +28,7 @@ inline F sphere_one_minus_cos(const F& radius, const F& distance2) {
   return select(outside, F(sin2 / F(1.f + sqrt(rest))), F(2.f));
 }
 
-/// Returns g for lines through `p` along +-d, from infinite lights.
+/// Returns the factor g for paths of infinite lights along the line through `p` with direction +-d.
 template <typename F>
 [[gnu::noinline]] F aim_density_infinite(const LightView& view, const Vec3<F>& p,
                                          const Vec3<F>& d) {
@@ -44,8 +44,8 @@ template <typename F>
   return g;
 }
 
-/// Returns g for paths from the point `p` on a finite light along d. `own` is the light's own
-/// density of that direction.
+/// Returns the factor g for paths from the point `p` on a finite light along d. `own` is the
+/// density of that direction without aiming.
 template <typename F>
 [[gnu::noinline]] F aim_density_finite(const LightView& view, const Vec3<F>& p, const Vec3<F>& d,
                                        const F& own) {
@@ -71,7 +71,8 @@ inline F unaimed_direction_density(const LightReader<F>& light, const Vec3<F>& p
   return select(Kind::template is_delta<F>(light), F(kInv4Pi), by_cosine);
 }
 
-/// Returns g for paths from `light` that arrive at `from` along -dir over the distance t.
+/// Returns the factor g for paths from `light` that arrive at `from` along -dir over the distance
+/// t.
 template <typename Kind, typename F>
 inline F aim_of_kind(const LightView& view, const LightReader<F>& light, const Vec3<F>& from,
                      const Vec3<F>& dir, const F& t) {
@@ -83,10 +84,10 @@ inline F aim_of_kind(const LightView& view, const LightReader<F>& light, const V
   }
 }
 
-/// Spheres that the lanes select with a random number in [0, 1).
+/// Target sphere that each lane selects with a random number in [0, 1).
 template <typename F>
 struct AimChoice {
-  Mask<F> aims;  ///< lanes whose paths are aimed; the others use the light's own distribution
+  Mask<F> aims;  ///< lanes whose paths are aimed; other lanes use the light's emission distribution
   Vec3<F> centre;
   F radius;
 
@@ -102,7 +103,8 @@ struct AimChoice {
   }
 };
 
-/// Aims paths from infinite lights: replaces their origins. (u, v) is the sample for the origin.
+/// Aims paths from infinite lights by replacing their origins. (u, v) is the 2D sample for the
+/// origin.
 template <typename F>
 [[gnu::noinline]] void aim_origins(const LightView& view, const F& number, const F& u, const F& v,
                                    KindEmission<F>& e, const Mask<F>& lanes) {
@@ -117,7 +119,7 @@ template <typename F>
   e.density = e.density * aim_density_infinite<F>(view, e.p, e.d);
 }
 
-/// Aims paths from finite lights: replaces their directions. (s, t) is the sample for the
+/// Aims paths from finite lights by replacing their directions. (s, t) is the 2D sample for the
 /// direction. `sides` is 1, or 2 if the light emits on both sides.
 template <typename F>
 [[gnu::noinline]] void aim_directions(const LightView& view, const F& number, const F& s,

@@ -4,15 +4,15 @@
 ///
 /// Two kinds of lights emit no light paths, and only camera paths find them: lights with properties
 /// that light paths do not support, such as links, multipliers, decay or motion
-/// (LightRecord::camera_only), and mesh lights, whose visible emission differs from the light they
-/// cast. The function bodies are in emission.inl.
+/// (LightRecord::camera_only), and mesh lights whose visible emission differs from the light that
+/// they cast. The function bodies are in emission.inl.
 #pragma once
 
 #include "wavecomb/light/sampling/light_sample.h"
 
 namespace wavecomb {
 
-/// Start of a light path. `flux` is the flux that the path carries. `density` is
+/// Start of a light path. `flux` is the initial flux of the path. `density` is
 /// KindEmission::density times the probability of selecting the light; MIS weights use 1 /
 /// `density`.
 template <typename F>
@@ -24,25 +24,26 @@ struct Emission {
   Mask<F> valid;
 };
 
-/// Random numbers in [0, 1): for the light (a multiple of 2^-24), the point on it, the direction,
-/// and the sphere it is aimed at.
+/// Random numbers in [0, 1) for sampling a light path: for the selection of the light (a multiple
+/// of 2^-24), the point on the light, the direction, and the target sphere.
 template <typename F>
 struct EmissionNumbers {
   F light, u, v, s, t, aim;
 };
 
-/// Density with which camera paths find a light from the first surface that a light path hits.
-/// `density` is the solid angle density of a light sample. For a point light it is the probability
-/// of selecting the light times the squared distance d^2, since 1 / d^2 takes the place of its
-/// solid angle. For a distant light without an angle it is the probability of selecting the light.
+/// Density with which camera paths sample a light from the first surface that a light path hits.
+/// `density` is the solid angle density of a light sample. For a point light, `density` is the
+/// probability of selecting the light times the squared distance d^2, since 1 / d^2 replaces the
+/// solid angle. For a distant light without an angle, `density` is the probability of selecting the
+/// light.
 template <typename F>
 struct CameraPathDensity {
   F density;
   Mask<F> is_delta;  ///< whether no bounce can hit the light
 };
 
-/// Samples a light by its weight, and a path from it. The origin is offset from the light's own
-/// shape.
+/// Samples a light by its weight, and a path from this light. The origin is offset from the light's
+/// shape, so that rays do not hit it.
 template <typename F>
 Emission<F> sample_emission(const LightView& view, const EmissionNumbers<F>& r,
                             const Mask<F>& wanted);
@@ -53,8 +54,8 @@ template <typename F>
 F emission_density(const LightView& view, const UInt<F>& light, const Vec3<F>& from,
                    const Vec3<F>& dir, const F& t, const Mask<F>& wanted);
 
-/// Returns how light samples and bounces at `from` find `light`, which emitted a path that arrived
-/// along -dir over the distance t.
+/// Returns the density with which camera paths at `from` sample `light`, which emitted a path that
+/// arrived along -dir over the distance t.
 template <typename F>
 CameraPathDensity<F> camera_path_density(const LightView& view, const UInt<F>& light,
                                          const LightReceiver<F>& from, const Vec3<F>& dir,

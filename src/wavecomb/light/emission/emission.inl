@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Bodies of emission.h, for the compile units that instantiate them.
+/// Definitions of the function templates in emission.h, for the translation units that instantiate
+/// them.
 #pragma once
 
 #include "wavecomb/light/emission/aim.h"
@@ -29,14 +30,15 @@ inline Mask<F> emits_paths(const LightView& view, const UInt<F>& light, const Ma
 }
 
 /// Returns the probability with which sample_emission() selects a light. `recorded` is the
-/// selection_pdf in its record or row.
+/// selection_pdf in the light's record.
 template <typename F>
 inline F emission_selection_pdf(const LightView& view, const UInt<F>& light, const F& recorded,
                                 const Mask<F>& active) {
   return view.selection_pdf ? gather<F>(view.selection_pdf, light, active) : recorded;
 }
 
-/// Returns the magnitude of the terms that a point on a light is computed from.
+/// Returns the magnitude of the terms from which a point on a light is computed, for its rounding
+/// error.
 template <typename F>
 inline F size_of_terms(const Vec3<F>& p, const Vec3<F>& u, const Vec3<F>& v) {
   const auto most = [](const Vec3<F>& a) { return max(max(abs(a.x), abs(a.y)), abs(a.z)); };
@@ -73,7 +75,7 @@ template <typename F>
     const F density = e.density * detail::emission_selection_pdf<F>(view, light, recorded, lanes);
     const Mask<F> valid = lanes & (density > 0.f) & is_finite(density) & not_(is_black(e.radiance));
     const F inverse = 1.f / select(valid, density, F(1.f));
-    // Offsets the origin from the light by more than its rounding error.
+    // Offset the origin from the light by more than its rounding error.
     out.o = select<F>(valid, fma(e.n, F(size * 0x1p-20f), e.p), out.o);
     out.d = select<F>(valid, e.d, out.d);
     out.flux = select<F>(valid, e.radiance * inverse, out.flux);

@@ -10,8 +10,8 @@ namespace wavecomb {
 namespace record_builder {
 namespace {
 
-/// Stores the inverse of `to_world`: its rows and its translation. All entries are 0 if `to_world`
-/// is singular.
+/// Stores the rows and the translation of the inverse of `to_world`. All entries are 0 if
+/// `to_world` is singular.
 void store_inverse(FilterRecord& r, const Affine& to_world) {
   const Double3 axes[3] = {to_double(to_world.axis(0)), to_double(to_world.axis(1)),
                            to_double(to_world.axis(2))};
@@ -36,7 +36,7 @@ ShadowRecord make_shadow(const ShadowAttributes& attributes) {
   ShadowRecord r{};
   put(r.color, to_double(attributes.color));
   r.distance = attributes.distance < 0 ? kFarAway : attributes.distance;
-  // The falloff zone ends at the surface at the latest.
+  // Limit the falloff zone, so that it does not extend beyond the shaded surface.
   r.falloff =
       attributes.distance < 0 ? 0.f : std::clamp(attributes.falloff, 0.f, attributes.distance);
   r.inverse_gamma = 1 / std::max(attributes.gamma, 1e-3f);

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Light filters, which attenuate and tint the light that passes through them.
 ///
-/// Light leaves a point x on the light in direction e. In the filter's space it crosses the window,
-/// the plane z = -distance, at w = x + e (distance + x_z) / -e_z, and
+/// Light leaves a point x on the light in direction e. In the filter's space, the light crosses the
+/// window, the plane z = -distance, at w = x + e (distance + x_z) / -e_z. The radiance is
+/// multiplied by the factors
 ///   doors     product over four sides of smoothstep(a w_x + b w_y + c)
-///   picture   texel at (u . (w_x, w_y, 1), v . (w_x, w_y, 1))
+///   picture   texel at (dot(u, (w_x, w_y, 1)), dot(v, (w_x, w_y, 1)))
 ///   decay     clamped functions of the distance d to the illuminated point:
 ///             near (d - near_start) / (near_end - near_start),
 ///             far 1 - (d - far_start) / (far_end - far_start)
-/// multiply the radiance. Light that starts beyond the window or travels away from it is blocked. A
-/// filter of density k passes the fraction 1 - k of the light unchanged.
+/// Light that starts beyond the window or travels away from it is blocked. A filter of density k
+/// passes the fraction 1 - k of the light unchanged.
 #pragma once
 
 #include "wavecomb/core/rows/fields.h"
@@ -18,8 +19,8 @@
 
 namespace wavecomb::detail {
 
-/// Light that leaves a light: position and direction in world space, and distance to the
-/// illuminated point.
+/// Ray from a light: start position and direction in world space, and distance to the illuminated
+/// point.
 template <typename F>
 struct LeavingLight {
   Vec3<F> position, along;
@@ -32,7 +33,7 @@ struct FilterReader : RecordReader<F> {
   FilterReader(const LightView& view, const UInt<F>& filter, const Mask<F>& lanes)
       : RecordReader<F>(make_reader<FilterRecord, F>(view.filters, filter, lanes)) {}
 
-  /// Returns the transmittance at (x, y) of the window, including the picture.
+  /// Returns the transmittance at position (x, y) of the window, including the gobo image.
   Color<F> at_window(const TextureView* textures, const F& x, const F& y,
                      const Mask<F>& lanes) const {
     using R = FilterRecord;
@@ -86,8 +87,8 @@ struct FilterReader : RecordReader<F> {
   }
 };
 
-/// Returns the radiance after filter `filter` and all filters chained to it. kNoFilter leaves it
-/// unchanged.
+/// Returns the radiance after filter `filter` and all filters chained to it. kNoFilter leaves the
+/// radiance unchanged.
 template <typename F>
 [[gnu::noinline]] Color<F> filtered(const LightView& view, const UInt<F>& filter,
                                     const LeavingLight<F>& light, const Color<F>& radiance,

@@ -1,25 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 /// UsdLuxShadowAPI: shadows with a limited distance, and coloured shadows.
 ///
-/// A shadow whose nearest occluder is at distance t has the strength s(t) = ((D - t) / f)^gamma
-/// from D - f to D, 1 before and 0 beyond. Shadow rays end at L = D - f u^(1 / gamma), u uniform in
-/// [0, 1), so that P(L > t) = s(t). The mean of these random shadow rays is that shadow.
+/// For a shadow distance D and a falloff length f, an occluder at distance t casts a shadow of
+/// strength s(t) = ((D - t) / f)^gamma if t is between D - f and D, 1 if t is less, and 0 if t is
+/// greater. Shadow rays end at L = D - f u^(1 / gamma) with u uniform in [0, 1), so that P(L > t) =
+/// s(t), and the expected shadow has the strength s(t).
 ///
-/// Emission that a bounce hits cannot reproduce this, so only light samples find such lights.
+/// Bounces that hit a light cannot reproduce such shadows, so only light samples find lights with
+/// shadow attributes.
 #pragma once
 
 #include "wavecomb/light/records/record_reader.h"
 
 namespace wavecomb {
 
-/// Length of a light's shadow rays, and the fraction of its light that remains in its shadows.
+/// Length of a light's shadow rays, and the fraction of the light that remains in shadow.
 template <typename F>
 struct ShadowExtent {
   F distance;
   Color<F> color;
 };
 
-/// Returns the extent of the shadows of shadow record `shadow`. With kPlainShadow the extent is
+/// Returns the shadow extent for shadow record `shadow`. For kPlainShadow, the distance is
 /// unlimited, and shadows are black.
 template <typename F>
 [[gnu::noinline]] ShadowExtent<F> shadow_extent(const LightView& view, const UInt<F>& shadow,

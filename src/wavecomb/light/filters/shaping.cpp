@@ -11,7 +11,7 @@ void add_shaping(LightBuild& out, const Light& light, LightBuildContext& context
   const Double3 minus_z = unit(to_double(light.to_world.axis(2)) * -1.0);
   ShapingRecord r{};
   put(r.axis, minus_z);
-  // The rows of the inverse. A common factor of the rows has no effect.
+  // Compute the rows of the inverse matrix up to a common factor, which has no effect.
   const Double3 axes[3] = {to_double(light.to_world.axis(0)), to_double(light.to_world.axis(1)),
                            to_double(light.to_world.axis(2))};
   const double side = dot(axes[0], cross(axes[1], axes[2])) < 0 ? -1 : 1;
@@ -48,7 +48,9 @@ void add_shaping(LightBuild& out, const Light& light, LightBuildContext& context
     out.power *= mean * double{r.ies_scale} * (profile.covers_sphere() ? 1 : 0.5);
   }
   if (info_of(light.kind).has(light_trait::kInfinite))
-    out.power = power;  // In this case all of the light travels along the axis.
+    // For infinite lights, the cone and focus do not reduce the power, since all light travels
+    // along the axis.
+    out.power = power;
   out.record.shaping = static_cast<uint32_t>(context.set.shapings.size());
   context.set.shapings.push_back(r);
 }

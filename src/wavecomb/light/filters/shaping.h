@@ -2,12 +2,11 @@
 /// Directional shaping of a light's radiance: UsdLuxShapingAPI.
 ///
 /// Let e be the direction of emission and a the light's axis, both unit vectors, and let
-/// angle = acos(e . a). The factors
+/// angle = acos(e . a). The radiance is multiplied by the factors
 ///   focus   lerp(focusTint, 1, |e . a|^focus)
 ///   cone    1 - smoothstep(lerp(coneAngle, 0, softness), coneAngle, angle)
 ///   IES     candela at (theta, phi) of e in the light's space, with theta scaled by angleScale;
-///           scaled angles above 180 degrees use the value at 180, and those below 0 are dark
-/// multiply the radiance.
+///           scaled angles above 180 degrees use the value at 180, and angles below 0 are dark
 #pragma once
 
 #include "wavecomb/core/rows/fields.h"
@@ -15,8 +14,8 @@
 
 namespace wavecomb::detail {
 
-/// Returns the index of the last of n ascending numbers, starting at `first`, that is at most x,
-/// but at most n - 2.
+/// Returns the index, at most n - 2, of the last of n ascending numbers that is not greater than x.
+/// `first` is the index of the first number in `numbers`.
 template <typename F>
 inline UInt<F> interval_below(const float* numbers, const UInt<F>& first, const UInt<F>& n,
                               const F& x, const Mask<F>& active) {
@@ -78,7 +77,8 @@ inline F ies_candela(const LightView& view, const UInt<F>& ies, const F& theta, 
   return select(inside, F(fma(h.part, F(b - a), a)), F(0.f));
 }
 
-/// Returns the radiance along `emitted` after shaping `shaping`. kNoShaping leaves it unchanged.
+/// Returns the radiance in direction `emitted` after applying shaping record `shaping`. kNoShaping
+/// leaves the radiance unchanged.
 template <typename F>
 inline Color<F> shaped(const LightView& view, const UInt<F>& shaping, const Vec3<F>& emitted,
                        const Color<F>& radiance, const Mask<F>& lanes) {

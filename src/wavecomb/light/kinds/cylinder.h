@@ -6,12 +6,12 @@
 
 namespace wavecomb::detail {
 
-/// Cylinder as seen from a point outside, in the frame of its axis a, the unit vector e
-/// perpendicular to a towards the axis, and f. A direction
+/// Cylinder as seen from a point outside, in the orthonormal frame of its axis a, the unit vector e
+/// that points from the point perpendicularly to the axis, and f. A direction
 ///   cos(gamma) (cos(alpha) e + sin(alpha) f) + sin(gamma) a
-/// hits the near side of the infinite cylinder at the perpendicular distance s(alpha). The visible
-/// part of the finite cylinder at alpha is an interval of sin(gamma). Directions that are uniform
-/// in alpha and, for a given alpha, uniform in sin(gamma) therefore have the density 1 / (2
+/// hits the near side of the infinite cylinder at the perpendicular distance s(alpha). For a given
+/// alpha, the visible part of the finite cylinder is an interval of sin(gamma). Directions that are
+/// uniform in alpha and, for a given alpha, uniform in sin(gamma) therefore have the density 1 / (2
 /// alpha_max (sin(gamma_1) - sin(gamma_0))). The density would be uniform over the visible solid
 /// angle if the interval of sin(gamma) had the same size for all alpha.
 template <typename F>
@@ -19,7 +19,7 @@ struct CylinderFrame {
   Vec3<F> a, e, f;
   F distance;        ///< perpendicular distance to the axis
   F radius, length;  ///< of the cylinder
-  F begin;           ///< start of the cylinder along a, relative to the point
+  F begin;           ///< start of the cylinder along its axis a, relative to the point
   F alpha;           ///< largest visible alpha, in radians
   Mask<F> outside;
 };
@@ -51,8 +51,8 @@ inline F cylinder_across(const CylinderFrame<F>& c, const F& sin_alpha, const F&
   return max(fma(c.distance, cos_alpha, F(-half_chord)), F(0.f));
 }
 
-/// Visible interval of sin(gamma) = z / h, with h = sqrt(z^2 + s^2), at the perpendicular distance
-/// s.
+/// Visible interval of sin(gamma) = z / h for one alpha, where z is the position along the axis, s
+/// the perpendicular distance, and h = sqrt(z^2 + s^2).
 template <typename F>
 struct CylinderSpan {
   F begin, size;     ///< z_0 / h_0, and z_1 / h_1 - z_0 / h_0
@@ -60,9 +60,9 @@ struct CylinderSpan {
   Mask<F> one_side;  ///< whether both ends of the cylinder are ahead of the point, or both behind
                      ///< it
 };
-/// Computes the visible interval without differences of nearly equal numbers. If both ends are on
-/// one side, the numerator of the size, z_1 h_0 - z_0 h_1, equals s^2 (z_1^2 - z_0^2) / (z_1 h_0 +
-/// z_0 h_1), and the rest is s^2 / (h_0 (h_0 + |z_0|)).
+/// Computes the visible interval without cancellation. If both ends are on one side, the numerator
+/// of the size, z_1 h_0 - z_0 h_1, equals s^2 (z_1^2 - z_0^2) / (z_1 h_0 + z_0 h_1), and the rest
+/// is s^2 / (h_0 (h_0 + |z_0|)).
 template <typename F>
 inline CylinderSpan<F> cylinder_span(const CylinderFrame<F>& c, const F& s) {
   const F z0 = c.begin, z1 = c.begin + c.length;
@@ -83,9 +83,9 @@ template <typename F>
 struct CylinderSlope {
   F sin_gamma, cos_gamma;
 };
-/// Returns gamma at the fraction v of the span. Far along the cylinder all sines are within a
-/// millionth of 1. Their difference from 1 is therefore computed separately, since the distance
-/// depends on the cosine.
+/// Returns sin(gamma) and cos(gamma) at the fraction v of the span. Far along the cylinder, all
+/// sines are within a millionth of 1. Since the hit distance depends on the cosine, the difference
+/// of the sine from 1 is computed separately.
 template <typename F>
 inline CylinderSlope<F> cylinder_slope(const CylinderSpan<F>& span, const F& v) {
   const F step = v * span.size;
@@ -97,8 +97,8 @@ inline CylinderSlope<F> cylinder_slope(const CylinderSpan<F>& span, const F& v) 
           safe_sqrt(F(rest * F(2.f - rest)))};
 }
 
-/// Returns the solid angle density of a direction that hits the near side, where the span at its
-/// alpha has the size `size`.
+/// Returns the solid angle density of a direction that hits the near side; `size` is the size of
+/// the visible interval of sin(gamma) at the direction's alpha.
 template <typename F>
 inline F cylinder_pdf(const CylinderFrame<F>& c, const F& size) {
   const F area = 2.f * c.alpha * size;
@@ -123,8 +123,8 @@ inline KindSample<F> sample_cylinder(const LightReader<F>& light, const Vec3<F>&
           select(valid, cylinder_pdf<F>(c, span.size), F(0.f)), Mask<F>(false)};
 }
 
-/// Returns radiance and density for a ray from `origin` that hit the cylinder at distance t. The
-/// inside of a cylinder is dark.
+/// Returns radiance and sampling density for a ray from `origin` that hit the cylinder at distance
+/// t. The inside of a cylinder is dark.
 template <typename F>
 inline KindHit<F> hit_cylinder(const LightReader<F>& light, const Vec3<F>& origin,
                                const Vec3<F>& dir, const F& t) {
@@ -133,7 +133,7 @@ inline KindHit<F> hit_cylinder(const LightReader<F>& light, const Vec3<F>& origi
   const F flat2 = fma(x, x, F(y * y));
   const Mask<F> valid = c.outside & (flat2 > 0.f);
   const F inverse = 1.f / sqrt(select(valid, flat2, F(1.f)));
-  // The near side is hit before the ray reaches its closest point to the axis.
+  // A ray hits the near side before it reaches its closest point to the axis.
   const Mask<F> front = valid & (F(t * flat2) <= F(c.distance * x));
   const F s = cylinder_across<F>(c, F(y * inverse), F(x * inverse));
   const F size = cylinder_span<F>(c, s).size;
@@ -141,7 +141,7 @@ inline KindHit<F> hit_cylinder(const LightReader<F>& light, const Vec3<F>& origi
           select(front, cylinder_pdf<F>(c, size), F(0.f))};
 }
 
-/// Samples a path from a point uniform over the outer surface.
+/// Samples a light path that starts uniformly on the outer surface of the cylinder.
 template <typename F>
 inline KindEmission<F> emit_cylinder(const EmissionQuery<F>& q) {
   const LightReader<F>& light = q.light;

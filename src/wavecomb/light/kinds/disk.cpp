@@ -37,7 +37,7 @@ Bounds box(const LightRecord& light) {
   return box_around(light.p, light.p, half);
 }
 
-/// Solves o + t d = x u + y v with x^2 + y^2 <= 1. Returns t, or 0 without a hit.
+/// Solves o + t d = x u + y v with x^2 + y^2 <= 1. Returns the hit distance t, or 0 without a hit.
 double intersect(const LightRecord& light, const double* o, const double* d) {
   const Double3 u = to_double(light.u), v = to_double(light.v);
   const Double3 from{o[0], o[1], o[2]}, along{d[0], d[1], d[2]};

@@ -6,8 +6,8 @@
 
 namespace wavecomb::detail {
 
-/// Samples the point p + a u + b v with (a, b) uniform in the unit disk, so its density is 1 /
-/// area. The disk emits only towards n.
+/// Samples the point p + a u + b v with (a, b) uniform in the unit disk, so the area density of the
+/// point is 1 / area. The disk emits only towards n.
 template <typename F>
 inline KindSample<F> sample_disk(const LightReader<F>& light, const Vec3<F>& from, const F& u,
                                  const F& v) {
@@ -19,7 +19,7 @@ inline KindSample<F> sample_disk(const LightReader<F>& light, const Vec3<F>& fro
           area_to_solid_angle<F>(d.length2, cos_light, light.area()), Mask<F>(false)};
 }
 
-/// Returns radiance and density for a ray that hits the disk at distance t.
+/// Returns radiance and sampling density for a ray that hits the disk at distance t.
 template <typename F>
 inline KindHit<F> hit_disk(const LightReader<F>& light, const Vec3<F>& dir, const F& t) {
   const F cos_light = -dot(dir, light.n());
@@ -28,7 +28,7 @@ inline KindHit<F> hit_disk(const LightReader<F>& light, const Vec3<F>& dir, cons
           area_to_solid_angle<F>(F(t * t), cos_light, light.area())};
 }
 
-/// Samples a path from a point uniform over the disk.
+/// Samples a light path that starts uniformly on the disk.
 template <typename F>
 inline KindEmission<F> emit_disk(const EmissionQuery<F>& q) {
   const LightReader<F>& light = q.light;

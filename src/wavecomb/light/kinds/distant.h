@@ -7,7 +7,7 @@
 
 namespace wavecomb::detail {
 
-/// Returns the uniform density 1 / (2 pi (1 - cos)) over the cone.
+/// Returns the uniform density 1 / (2 pi (1 - cos)) over the light's cone of directions.
 template <typename F>
 inline F distant_pdf(const F& one_minus_cos) {
   const F pdf = kInv2Pi / select(one_minus_cos > 0.f, one_minus_cos, F(1.f));
@@ -26,8 +26,8 @@ inline KindSample<F> sample_distant(const LightReader<F>& light, const F& u, con
           select(is_delta, F(1.f), distant_pdf<F>(one_minus_cos)), is_delta};
 }
 
-/// Returns radiance and density for a ray that left the scene. For unit vectors 1 - cos(angle) =
-/// |dir - axis|^2 / 2, which is accurate for small angles, unlike 1 - dot(dir, axis).
+/// Returns radiance and sampling density for a ray that left the scene. For unit vectors 1 -
+/// cos(angle) = |dir - axis|^2 / 2, which is accurate for small angles, unlike 1 - dot(dir, axis).
 template <typename F>
 inline KindHit<F> hit_distant(const LightReader<F>& light, const Vec3<F>& dir) {
   const F one_minus_cos = light.one_minus_cos();
@@ -38,7 +38,7 @@ inline KindHit<F> hit_distant(const LightReader<F>& light, const Vec3<F>& dir) {
           select(inside, distant_pdf<F>(one_minus_cos), F(0.f))};
 }
 
-/// Returns KindEmission::density of paths along -dir. See hit_distant().
+/// Returns KindEmission::density of light paths along -dir. See hit_distant().
 template <typename F>
 inline F distant_emission_density(const LightView& view, const LightReader<F>& light,
                                   const Vec3<F>& dir) {
@@ -47,7 +47,7 @@ inline F distant_emission_density(const LightView& view, const LightReader<F>& l
   return infinite_emission_pdf<F>(view, direction_pdf);
 }
 
-/// Samples a path in a direction of the cone.
+/// Samples a light path with a direction in the light's cone.
 template <typename F>
 inline KindEmission<F> emit_distant(const EmissionQuery<F>& q) {
   const KindSample<F> direction = sample_distant<F>(q.light, q.s, q.t);

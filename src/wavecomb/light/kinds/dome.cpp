@@ -8,8 +8,8 @@ namespace {
 
 using namespace record_builder;
 
-/// Sets the world axes of the dome: rotation and mirroring, without scale. The pole has priority
-/// over the other axes.
+/// Sets the world axes of the dome from the rotation and mirroring of its transform, without its
+/// scale. If the axes are not orthogonal, the pole (y axis) keeps its direction.
 void set_axes(LightRecord& record, const Affine& m) {
   const Double3 y = unit(to_double(m.axis(1)));
   Double3 z = to_double(m.axis(2));
@@ -25,7 +25,7 @@ void set_axes(LightRecord& record, const Affine& m) {
   put(record.n, z);
 }
 
-/// Adds the sampling distribution of the image. Returns the mean luminance of the image.
+/// Adds the sampling distribution of the dome's image. Returns the image's mean luminance.
 double add_image(LightRecord& record, LightBuildContext& context) {
   Distribution2D d = density_of(record, context, &build_dome_distribution);
   const double mean = d.mean_luminance;

@@ -18,10 +18,11 @@
 
 namespace wavecomb::detail {
 
-/// 2 pi^2. A part ds dt of the image covers the solid angle 2 pi^2 sin(polar angle) ds dt.
+/// The constant 2 pi^2: an element ds dt of a latlong image covers the solid angle 2 pi^2 sin(polar
+/// angle) ds dt.
 inline constexpr float kTwoPiSquared = 19.739208802178716f;
 
-/// Converts directions from world space to dome space, and back.
+/// Convert directions from world space to dome space, and back.
 template <typename F>
 inline Vec3<F> to_dome(const LightReader<F>& light, const Vec3<F>& w) {
   return {dot(w, light.u()), dot(w, light.v()), dot(w, light.n())};
@@ -31,8 +32,8 @@ inline Vec3<F> from_dome(const LightReader<F>& light, const Vec3<F>& d) {
   return fma(light.u(), d.x, fma(light.v(), d.y, Vec3<F>(light.n() * d.z)));
 }
 
-/// Returns the radiance at image coordinates s and t, at the finest level. Lookups do not cross the
-/// poles in any wrap mode; in s, the texture's wrap mode applies (it should be kRepeat).
+/// Returns the radiance at image coordinates s and t, from the finest mip level. Lookups do not
+/// cross the poles in any wrap mode; in s, the texture's wrap mode applies (it should be kRepeat).
 template <typename F>
 inline Color<F> dome_radiance(const LightReader<F>& light, const TextureView& texture, const F& s,
                               const F& t, const Mask<F>& active) {
@@ -42,8 +43,8 @@ inline Color<F> dome_radiance(const LightReader<F>& light, const TextureView& te
   return light.radiance() * not_negative(Color<F>(texel.r, texel.g, texel.b));
 }
 
-/// Returns the solid angle density of a direction with the density `density` over the image. A part
-/// of the image is 2 pi^2 sin(polar angle) times as large on the sphere.
+/// Returns the solid angle density of a direction whose image point has the density `density` over
+/// the unit square: the density divided by 2 pi^2 sin(polar angle).
 template <typename F>
 inline F dome_pdf(const F& density, const F& sin_theta) {
   const F measure = sin_theta * kTwoPiSquared;
@@ -72,7 +73,7 @@ inline KindSample<F> sample_dome_constant(const LightReader<F>& light, const F& 
   return {square_to_sphere(u, v), F(kFarAway), light.radiance(), F(kInv4Pi), Mask<F>(false)};
 }
 
-/// Samples the domes of all lanes, one image after the other.
+/// Samples directions to the dome lights of all lanes, one image after the other.
 template <typename F>
 inline KindSample<F> sample_dome_light(const LightView& view, const LightReader<F>& light,
                                        const F& u, const F& v, const Mask<F>& active) {
@@ -93,7 +94,7 @@ inline KindSample<F> sample_dome_light(const LightView& view, const LightReader<
   return result;
 }
 
-/// Image position of a direction in dome space.
+/// Image position and polar angle of a direction in dome space.
 template <typename F>
 struct ImageDirection {
   F sin_theta;
@@ -104,7 +105,8 @@ struct ImageDirection {
         down(atan2(sin_theta, w.y) * kInvPi) {}
 };
 
-/// Returns radiance and density of the dome `record` for a ray that leaves the scene along `dir`.
+/// Returns radiance and sampling density of the dome `record` for a ray that leaves the scene along
+/// `dir`.
 template <typename F>
 inline KindHit<F> hit_dome(const LightView& view, const LightRecord& record, const Vec3<F>& dir,
                            const Mask<F>& active) {
@@ -127,7 +129,7 @@ inline KindHit<F> hit_dome_from(const LightView& view, const LightRecord& record
   return hit;
 }
 
-/// Samples domes `lights`, some of which have portals, as seen from `from`.
+/// Samples directions from `from` to domes `lights`, some of which have portals.
 template <typename F>
 [[gnu::noinline]] KindSample<F> sample_portal_dome(const LightView& view, const UInt<F>& lights,
                                                    const Vec3<F>& from, const F& u, const F& v,
@@ -165,7 +167,7 @@ template <typename F>
   return result;
 }
 
-/// Samples a direction from `from` to domes `lights`, whose records `light` reads.
+/// Samples directions from `from` to domes `lights`; `light` reads their records.
 template <typename F>
 inline KindSample<F> sample_dome(const LightView& view, const UInt<F>& lights,
                                  const LightReader<F>& light, const Vec3<F>& from, const F& u,
@@ -175,15 +177,16 @@ inline KindSample<F> sample_dome(const LightView& view, const UInt<F>& lights,
   return sample_dome_light<F>(view, light, u, v, active);
 }
 
-/// Samples a path in a direction by the distribution of the image. The path does not use portals.
+/// Samples a light path whose direction follows the distribution of the image. Portals are not
+/// used.
 template <typename F>
 inline KindEmission<F> emit_dome(const EmissionQuery<F>& q) {
   const KindSample<F> direction = sample_dome_light<F>(q.view, q.light, q.s, q.t, q.lanes);
   return emit_infinite<F>(q.view, -direction.wi, q.u, q.v, direction.radiance, direction.pdf);
 }
 
-/// Returns KindEmission::density of emit_dome() for paths along -dir. Evaluates one image after the
-/// other.
+/// Returns KindEmission::density of emit_dome() for light paths along -dir, evaluating one image
+/// after the other.
 template <typename F>
 inline F dome_emission_density(const LightHitQuery<F>& m) {
   F pdf(kInv4Pi);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Sampling of image points by a Distribution2D, and their density, for all lights with an image
-/// that maps to the unit square.
+/// Sampling of image points with a Distribution2D, and the density of these points, for all lights
+/// with an image that maps to the unit square.
 ///
-/// x is s, to the right; y points down from the top row, so it is 1 - t.
+/// The image coordinate x equals s and points to the right; y points down from the top row, so y =
+/// 1 - t.
 #pragma once
 
 #include <algorithm>
@@ -12,13 +13,15 @@
 
 namespace wavecomb::detail {
 
-/// Interval `index` of a row: its start, and its number of counts out of the row's 65536.
+/// Interval with index `index` of a row of a Distribution2D: its start, and its number of counts
+/// out of the row's 65536.
 template <typename F>
 struct Interval {
   UInt<F> index, begin, count;
 };
 
-/// Returns interval `index` of a row of n intervals. Reads two adjacent values as one word.
+/// Returns interval `index` of a row of n intervals. Reads the two adjacent cumulative values as
+/// one 32-bit word.
 template <typename F>
 inline Interval<F> interval_at(const Distribution2D& d, const UInt<F>& row, uint32_t n,
                                const UInt<F>& index, const Mask<F>& active) {
@@ -34,15 +37,16 @@ inline Interval<F> interval_at(const Distribution2D& d, const UInt<F>& row, uint
   return {index, begin, end - begin};
 }
 
-/// Returns the index of the last of `n` ascending values of a line that is at most x. The first
-/// value must be at most x. The loop compares all values, which takes one or two registers.
+/// Returns the index of the last of the `n` ascending values in a cache line that is at most x. The
+/// first value must be at most x. The loop compares all values of the line, which fit in one or two
+/// registers.
 inline uint32_t last_at_most(const Distribution2D::Line& line, uint32_t n, uint16_t x) {
   uint16_t at_most = 0;
   for (const uint16_t value : line.value) at_most = static_cast<uint16_t>(at_most + (value <= x));
   return std::min<uint32_t>(at_most, n) - 1;
 }
 
-/// Returns the interval that contains count x in [0, kCounts) of a row of n intervals.
+/// Returns the interval of a row of n intervals whose counts include x in [0, kCounts).
 template <typename F>
 inline Interval<F> find_interval(const Distribution2D& d, const UInt<F>& row, uint32_t n,
                                  const UInt<F>& x, const Mask<F>& active) {
@@ -65,8 +69,8 @@ inline Interval<F> find_interval(const Distribution2D& d, const UInt<F>& row, ui
   return {load<U>(index.value), load<U>(begin.value), load<U>(count.value)};
 }
 
-/// Returns the density over the unit square in a cell whose row and column have the given counts:
-/// the product of counts / 65536 * intervals of both.
+/// Returns the density over the unit square in a cell with the given counts of row and column: the
+/// product of count / 65536 * (number of intervals) for both.
 template <typename F>
 inline F image_pdf(const Distribution2D& d, const UInt<F>& row_count, const UInt<F>& column_count) {
   const float scale = static_cast<float>(d.width) * static_cast<float>(d.height) * 0x1p-32f;
@@ -76,12 +80,12 @@ inline F image_pdf(const Distribution2D& d, const UInt<F>& row_count, const UInt
 template <typename F>
 struct ImagePoint {
   F x, y;
-  F pdf;  ///< density over the unit square
+  F pdf;  ///< density of the point over the unit square
 };
 
 /// Samples an image point: first the row by the marginal distribution, then the column, both by
-/// inversion. u and v are multiples of 2^-24, or of 2^-20 / n with n up to 16, so that their counts
-/// are exact.
+/// inversion. u and v are multiples of 2^-24, or of 2^-20 / n with n up to 16, so that u and v
+/// times kCounts are exact.
 template <typename F>
 inline ImagePoint<F> sample_image(const Distribution2D& d, const F& u, const F& v,
                                   const Mask<F>& active) {
@@ -99,8 +103,8 @@ inline ImagePoint<F> sample_image(const Distribution2D& d, const F& u, const F& 
           image_pdf<F>(d, y.count, x.count)};
 }
 
-/// Returns the density of sample_image() at (x, y) of the unit square. Points outside use the
-/// nearest cell.
+/// Returns the density of sample_image() at point (x, y) of the unit square. Points outside the
+/// square use the nearest cell.
 template <typename F>
 inline F image_pdf_at(const Distribution2D& d, const F& x, const F& y, const Mask<F>& active) {
   const auto cell = [](const F& at, uint32_t size) {

@@ -2,9 +2,9 @@
 /// List of all kinds of lights. To add a kind, add a pair of files to this folder, include its
 /// header here, and append an entry to the list.
 ///
-/// A kind is a struct <Name>Kind that satisfies LightKindClass. It derives from InfiniteKind,
-/// FiniteKind or FlatKind (record_reader.h), which define what such kinds have in common. A kind
-/// that lacks a member does not compile.
+/// A light kind is a struct <Name>Kind that satisfies LightKindClass. It derives from InfiniteKind,
+/// FiniteKind or FlatKind (record_reader.h), which define common members. A light kind that lacks a
+/// member does not compile.
 #pragma once
 
 #include <concepts>
@@ -19,7 +19,8 @@
 #include "wavecomb/light/kinds/rect.h"
 #include "wavecomb/light/kinds/sphere.h"
 
-/// X(name), in the order of the kind numbers in records and fingerprints.
+/// List of light kinds as X(name), in the order of the kind numbers in records and scene
+/// fingerprints.
 #define WAVECOMB_LIGHT_KINDS(X) X(Rect) X(Disk) X(Sphere) X(Cylinder) X(Distant) X(Dome) X(Triangle)
 
 namespace wavecomb {
@@ -72,7 +73,8 @@ concept LightKindClass =
 WAVECOMB_LIGHT_KINDS(WAVECOMB_LIGHT_KIND)
 #undef WAVECOMB_LIGHT_KIND
 
-/// Calls `f` with an object of the class of `kind`, for example RectKind, and returns the result.
+/// Calls `f` with an object of the class that implements `kind`, for example RectKind, and returns
+/// the result.
 template <typename Function>
 WAVECOMB_INLINE decltype(auto) visit(LightKind kind, const Function& f) {
   switch (kind) {
@@ -84,7 +86,7 @@ WAVECOMB_INLINE decltype(auto) visit(LightKind kind, const Function& f) {
   }
   __builtin_unreachable();
 }
-/// For the kind number of a record.
+/// Calls `f` for the kind number of a light record.
 template <typename Function>
 WAVECOMB_INLINE decltype(auto) visit(uint32_t kind, const Function& f) {
   return visit(static_cast<LightKind>(kind), f);

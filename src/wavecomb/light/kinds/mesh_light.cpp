@@ -27,7 +27,8 @@ LightRecord make_mesh_light(const MeshLightInstance& instance, LightBuildContext
       record, to_double(light.color) * (!has_area ? 0 : (light.normalize ? 1 / instance.area : 1)));
   record.area = static_cast<float>(instance.area);
   record.sync = static_cast<uint32_t>(light.sync);
-  // Paths that hit the mesh do not receive light that is independent of its material.
+  // If the light is independent of the material, only light samples find it: paths that hit the
+  // mesh receive the material's emission instead.
   if (light.sync == MaterialSync::kIndependent) record.sampled_only = 1;
   if (!instance.is_sampled) record.sampled_only = 0;
   return record;

@@ -11,8 +11,8 @@ namespace wavecomb {
 
 namespace detail {
 
-/// Returns the radiance of samples `s` on triangles `light`, with tint and shaping of their mesh
-/// lights. Constant radiance was tinted when the scene was built.
+/// Returns the radiance of samples `s` on triangles `light`, with the tint and shaping of their
+/// mesh lights. Constant radiance was already tinted when the scene was built.
 template <typename F>
 inline Color<F> mesh_light_sample_radiance(const LightView& view, const UInt<F>& light,
                                            const TriangleReader<F>& triangle,
@@ -27,9 +27,10 @@ inline Color<F> mesh_light_sample_radiance(const LightView& view, const UInt<F>&
   return shaped<F>(view, reader.shaping(), -s.wi, radiance, known);
 }
 
-/// Returns the factor for emission that a path hits, for a light with these multipliers. `share` is
-/// the diffuse fraction of the path's last bounce; the rest is specular. Cameras see the light
-/// without these multipliers. `is_specular_view` marks paths that light sampling cannot produce.
+/// Returns the factor for emission that a path hits, for a light with multipliers `diffuse` and
+/// `specular`. `share` is the diffuse fraction of the path's last bounce; the rest is specular.
+/// Camera rays receive the emission without multipliers. `is_specular_view` marks paths that light
+/// sampling cannot produce.
 template <typename F>
 inline Color<F> factor_of_hit(const F& diffuse, const F& specular, const Mask<F>& sampled_only,
                               const Mask<F>& is_specular_view, bool from_camera,
@@ -49,14 +50,14 @@ inline Color<F> factor_of_hit(const F& diffuse, const F& specular, const Mask<F>
 template <typename F>
 struct MeshLightRay {
   Vec3<F> dir;
-  UInt<F> link;      ///< link class of the surface that the ray left
-  Mask<F> is_delta;  ///< delta bounces and camera rays, which no light sample matches
+  UInt<F> link;      ///< light linking class of the surface at which the ray starts
+  Mask<F> is_delta;  ///< delta bounces and camera rays, which light sampling cannot produce
   bool from_camera;
-  Color<F> diffuse;  ///< diffuse fraction of the bounce, by colour
+  Color<F> diffuse;  ///< diffuse fraction of the bounce for each colour
 };
 
-/// Returns the radiance that a path receives along `ray` from meshes with mesh light records
-/// `record` (kNoLight for other meshes), before MIS. `emission` is that of the material.
+/// Returns the radiance, without MIS weight, that a path receives along `ray` from meshes with mesh
+/// light records `record` (kNoLight for other meshes). `emission` is the emission of the material.
 template <typename F>
 inline Color<F> mesh_light_radiance(const LightView& view, const UInt<F>& record,
                                     const Color<F>& emission, const MeshLightRay<F>& ray,
@@ -86,8 +87,8 @@ inline Color<F> mesh_light_radiance(const LightView& view, const UInt<F>& record
   return select<F>(uses_light, radiance, emission);
 }
 
-/// Class of mesh lights, an entry of WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h). Records of mesh
-/// lights are never selected themselves; their triangles have separate rows.
+/// Class of mesh lights, an entry of WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h). Light sampling
+/// never selects records of mesh lights, but their triangles, which have separate records.
 struct TriangleKind : FlatKind {
   static LightKindInfo describe();
   template <typename F>

@@ -2,13 +2,14 @@
 /// Portals: rectangles, such as the windows of a room, that guide the sampling of a dome.
 ///
 /// Directions to the dome are sampled through the portals with probability a, uniformly in their
-/// total solid angle, and otherwise by the dome's image. The density of a direction is that of the
-/// mixture for both techniques,
+/// total solid angle, and otherwise by the dome's image. For both techniques, the density of a
+/// direction is the density of the mixture,
 ///     p = a (number of portals it passes) / (sum of solid angles) + (1 - a) p_image,
-/// so that light from outside the portals also counts. With w the solid angle of the portals and i
-/// PortalGroup::image_solid_angle, a = i / (i + w), clamped: the smaller of the two finds the light
-/// better. Points that see no portal from its back (the side that light leaves at), or only ones
-/// smaller than kMinRectSolidAngle, use the image alone.
+/// so that light from outside the portals is also sampled. Let w be the solid angle of the portals,
+/// and i the effective solid angle of the image (PortalGroup::image_solid_angle). Then a = i / (i +
+/// w), clamped, since the technique with the smaller solid angle samples the light better. Points
+/// that see no portal from the side at which light enters the room, or only portals smaller than
+/// kMinRectSolidAngle, use the image alone.
 #pragma once
 
 #include "wavecomb/light/kinds/rect.h"
@@ -17,7 +18,7 @@ namespace wavecomb::detail {
 
 inline constexpr float kMinPortalShare = 0.2f, kMaxPortalShare = 0.9f;
 
-/// Portals of one dome, as seen from the points `from`.
+/// Portals of a dome light, as seen from the points `from`.
 template <typename F>
 class Portals {
  public:
@@ -33,14 +34,14 @@ class Portals {
     });
   }
 
-  /// Returns the probability of sampling through the portals.
+  /// Returns the probability of sampling a direction through the portals.
   F share() const {
     const F a = clamp(F(image_ / F(total_ + image_)), F(kMinPortalShare), F(kMaxPortalShare));
     return select(total_ > 0.f, a, F(0.f));
   }
 
-  /// Samples directions through the portals, uniform in solid angle. The result is undefined if no
-  /// portal is visible.
+  /// Samples directions through the portals, uniformly in solid angle. The result is undefined if
+  /// no portal is visible.
   Vec3<F> sample(const F& u, const F& v) const {
     Vec3<F> wi(F(0.f), F(0.f), F(1.f));
     const F u_scaled = u * total_;
@@ -57,7 +58,8 @@ class Portals {
     return wi;
   }
 
-  /// Returns the density of the mixture. `through` marks lanes whose direction is from sample().
+  /// Returns the density of the mixture of portal and image sampling. `through` marks lanes whose
+  /// direction comes from sample().
   F pdf(const Vec3<F>& wi, const F& image_pdf, const Mask<F>& through) const {
     F hits(0.f);
     for_each([&](const SphericalRect<F>& r, const LightReader<F>&) {
@@ -68,7 +70,8 @@ class Portals {
           r.usable & (dz > 0.f) & (x >= r.x0) & (x <= r.x1) & (y >= r.y0) & (y <= r.y1);
       hits += select(inside, F(1.f), F(0.f));
     });
-    // Rounding may decide whether a direction at an edge passes the portal.
+    // A direction from sample() passes at least one portal, even if rounding at an edge says
+    // otherwise.
     hits = select(through, max(hits, F(1.f)), hits);
     const F share_ = share();
     const F by_portals = hits / select(total_ > 0.f, total_, F(1.f));
@@ -88,7 +91,7 @@ class Portals {
   uint32_t count_;
   Vec3<F> from_;
   Mask<F> active_;
-  F image_;  ///< PortalGroup::image_solid_angle
+  F image_;  ///< effective solid angle of the image (PortalGroup::image_solid_angle)
   F total_;  ///< total solid angle of the portals
 };
 

@@ -8,10 +8,11 @@ namespace {
 
 using namespace record_builder;
 
-/// Images whose distribution has at least this spread are sampled uniformly, which adds no noise.
+/// Images whose distribution has at least this spread are sampled uniformly, which increases noise
+/// only slightly.
 constexpr float kUniformSpread = 0.9f;
 
-/// Adds the sampling distribution of the image, and sets the power by its mean.
+/// Adds the sampling distribution of the light's image, and sets the power from the image's mean.
 void add_texture_distribution(LightBuild& out, LightBuildContext& context) {
   Distribution2D d = density_of(out.record, context, &build_rect_distribution);
   out.power = kPiD * double{out.record.area} * d.mean_luminance;
@@ -24,8 +25,8 @@ void add_texture_distribution(LightBuild& out, LightBuildContext& context) {
   }
 }
 
-/// Makes the record. Seen from the front, along +z with +y up, +x is to the left, so s runs along
-/// -x.
+/// Makes the light record. As seen from the front (looking along +z with +y up), +x points to the
+/// left, so the image coordinate s runs along -x.
 void make(LightBuild& out, const Light& light, LightBuildContext& context) {
   const Affine& m = light.to_world;
   const double w = std::fabs(double{light.width}), h = std::fabs(double{light.height});

@@ -2,14 +2,16 @@
 /// Rectangle lights, sampled uniformly by solid angle. Parallelograms (sheared rectangles) and
 /// rectangles of very small solid angle are sampled uniformly by area.
 ///
-/// With an image, a point is sampled by the image with probability a, and otherwise uniformly as
-/// above. The density of a direction is that of the mixture for both techniques,
+/// With an image, a point is sampled from the image's distribution with probability a, and
+/// otherwise uniformly as described above. For both techniques, the density of a direction is the
+/// density of the mixture,
 ///     p = a p_image d^2 / (A cos) + (1 - a) p_even,
-/// where p_image is the density over the unit square and A the area. Let i be the fraction of the
-/// square that the light of the image occupies (Distribution2D::spread), and g the fraction of the
-/// rectangle that dominates the view from the point, which is 1 if all of it is equally close. Then
-/// a = g / (g + i), clamped: the smaller of the two finds the light better, that is the image from
-/// far away and the solid angle close by.
+/// where p_image is the image density over the unit square, A the area, d the distance, cos the
+/// cosine at the light, and p_even the density without an image. Let i be the effective fraction of
+/// the image that emits light (Distribution2D::spread), and g the fraction of the rectangle that
+/// dominates its solid angle from the point, which is 1 if all of it is equally close. Then a = g /
+/// (g + i), clamped, since the technique with the smaller fraction samples the light better: the
+/// image from far away, and the solid angle nearby.
 #pragma once
 
 #include "wavecomb/light/kinds/image.h"
@@ -32,7 +34,8 @@ inline Color<F> rect_radiance(const LightReader<F>& light, const TextureView* te
   return select<F>(textured, color * not_negative(image), color);
 }
 
-/// Below this solid angle, area sampling is as good, and solid angles lose precision.
+/// Smallest solid angle for solid angle sampling. Below it, area sampling is as good, and computed
+/// solid angles lose precision.
 inline constexpr float kMinRectSolidAngle = 2e-3f;
 
 /// Rectangle as seen from a point (C. Urena, M. Fajardo, A. King, "An Area-Preserving
@@ -40,18 +43,19 @@ inline constexpr float kMinRectSolidAngle = 2e-3f;
 /// along the edges, and z points towards the rectangle, which is [x0, x1] x [y0, y1] at distance z.
 ///
 /// The solid angle is the sum over the corners of +-atan(x y / (z d)), d = sqrt(x^2 + y^2 + z^2).
-/// This equals the paper's sum of angles minus 2 pi, in which each angle is pi / 2 + asin(b c),
+/// This sum equals the paper's sum of angles minus 2 pi, in which each angle is pi / 2 + asin(b c),
 /// with b and c the z components of the normals of the planes through two adjacent edges. Each
 /// angle is the argument of the complex number z d + i x y, so that the difference of the two
 /// angles along an edge x, which is less than pi, is the argument of
 ///   z^2 d_0 d_1 + x^2 y_0 y_1 + i x z (y_1 d_0 - y_0 d_1).
-/// If that is out of range (lengths above 10^9 or below 10^-9), the rectangle is not usable.
+/// If this number is out of the range of float (lengths above 10^9 or below 10^-9), the rectangle
+/// is not usable.
 template <typename F>
 struct SphericalRect {
   Vec3<F> x, y, n;
   F inverse_width, inverse_height, x0, x1, y0, y1, z;
   F solid_angle;
-  F begin;  ///< k in the paper
+  F begin;  ///< the variable k of the paper
   /// 1 / sqrt(y0^2 + z^2), and the z components of the normals at the edges y0 and y1
   F near_y, b0, b1;
   Mask<F> usable;
@@ -70,7 +74,7 @@ inline SphericalRect<F> make_spherical_rect(const LightReader<F>& light, const V
   r.y0 = dot(corner, r.y);
   r.x1 = r.x0 + light[&LightRecord::length_u];
   r.y1 = r.y0 + light[&LightRecord::length_v];
-  r.z = -dot(corner, r.n);  // the front of the light is the side that n points to
+  r.z = -dot(corner, r.n);  // z > 0 on the front of the light, to which n points
   const F z2 = r.z * r.z, edge0 = fma(r.y0, r.y0, z2), edge1 = fma(r.y1, r.y1, z2);
   const auto between = [&](const F& x) {
     const F zd0 = r.z * sqrt(fma(x, x, edge0)), zd1 = r.z * sqrt(fma(x, x, edge1));
@@ -80,7 +84,7 @@ inline SphericalRect<F> make_spherical_rect(const LightReader<F>& light, const V
   const F right = between(r.x1), left = between(r.x0);
   r.solid_angle = right - left;
   r.begin = kPi + left;
-  const F least(1e-30f);  // This lower bound avoids 0 / 0 on the line of an edge.
+  const F least(1e-30f);  // This lower bound avoids 0 / 0 for points on the line through an edge.
   r.near_y = 1.f / sqrt(max(edge0, least));
   r.b0 = -r.y0 * r.near_y;
   r.b1 = r.y1 / sqrt(max(edge1, least));
@@ -89,8 +93,8 @@ inline SphericalRect<F> make_spherical_rect(const LightReader<F>& light, const V
   return r;
 }
 
-/// Maps (u, v) of the unit square to the rectangle, in fractions of its width and height. This is
-/// the paper's algorithm 2, with z0 = -z and f = g / sin.
+/// Maps (u, v) of the unit square to a point on the rectangle, in fractions of its width and
+/// height. The function implements algorithm 2 of the paper, with z0 = -z and f = g / sin.
 template <typename F>
 inline Vec2<F> sample_spherical_rect(const SphericalRect<F>& r, const F& u, const F& v) {
   const auto [sin_a, cos_a] = sincos_2pi(F(fma(u, r.solid_angle, r.begin) * kInv2Pi));
@@ -110,7 +114,8 @@ inline Vec2<F> sample_spherical_rect(const SphericalRect<F>& r, const F& u, cons
   return {share(F(x - r.x0), r.inverse_width), share(F(y - r.y0), r.inverse_height)};
 }
 
-/// Returns the solid angle density of a point on the rectangle; 0 if it is seen from behind.
+/// Returns the solid angle density of a point on the rectangle; 0 if the rectangle is seen from
+/// behind.
 template <typename F>
 inline F rect_pdf(const SphericalRect<F>& r, const F& distance2, const F& cos_light,
                   const F& area) {
@@ -121,10 +126,11 @@ inline F rect_pdf(const SphericalRect<F>& r, const F& distance2, const F& cos_li
   return select(r.usable, pdf, area_to_solid_angle<F>(distance2, cos_light, area));
 }
 
-/// Returns the probability of sampling a rectangle by its image, which has the given `spread`. It
-/// is a multiple of 1/16, so that both techniques get a whole number of the 2^24 values of u. The
-/// fraction g is bounded from below by solid angle / (area * largest solid angle per area, z /
-/// d^3).
+/// Returns the probability a of sampling a rectangle from its image, whose distribution has the
+/// given `spread`. The probability is a multiple of 1/16, so that both techniques get a whole
+/// number of the 2^24 values of u. The fraction g is estimated by its lower bound, solid angle /
+/// (area * largest solid angle per area), where the largest solid angle per area is z / d^3 at the
+/// closest point.
 template <typename F>
 inline F texture_share(const SphericalRect<F>& r, const F& area, float spread) {
   const F x = clamp(F(0.f), r.x0, r.x1), y = clamp(F(0.f), r.y0, r.y1);
@@ -136,14 +142,14 @@ inline F texture_share(const SphericalRect<F>& r, const F& area, float spread) {
   return select(r.usable, sixteenths, F(14.f)) * 0.0625f;
 }
 
-/// Returns the lanes whose rectangles are sampled by an image.
+/// Returns the lanes whose rectangles are sampled from an image.
 template <typename F>
 inline Mask<F> has_light_texture(const LightReader<F>& light, const Mask<F>& active) {
   return active & Mask<F>(light.texture() != UInt<F>(kNoTexture)) &
          Mask<F>(light[&LightRecord::distribution] != UInt<F>(kNoDistribution));
 }
 
-/// Calls `one(distribution, lanes)` for each image in the lanes.
+/// Calls one(distribution, lanes) for each distinct image of the lanes' lights.
 template <typename F, typename Function>
 inline void for_each_texture(const LightView& view, const LightReader<F>& light,
                              const Mask<F>& lanes, const Function& one) {
@@ -158,7 +164,7 @@ inline void for_each_texture(const LightView& view, const LightReader<F>& light,
   }
 }
 
-/// Samples the rectangle without its image: (u, v) to fractions of its edges.
+/// Maps (u, v) to a point on the rectangle, in fractions of its edges, ignoring its image.
 template <typename F>
 inline Vec2<F> sample_rect_uniformly(const SphericalRect<F>& r, const F& u, const F& v,
                                      const Mask<F>& active) {
@@ -167,8 +173,8 @@ inline Vec2<F> sample_rect_uniformly(const SphericalRect<F>& r, const F& u, cons
   return {select(r.usable, by_angle.x, u), select(r.usable, by_angle.y, v)};
 }
 
-/// Point on the rectangle in fractions of its edges. Without an image, `share` is 0 and
-/// `texture_pdf`, which is over the unit square, is ignored.
+/// Point on the rectangle in fractions of its edges. `share` is the probability of sampling from
+/// the image, or 0 without an image, and `texture_pdf` is the image density over the unit square.
 template <typename F>
 struct RectPoint {
   Vec2<F> at;
@@ -205,7 +211,8 @@ template <typename F>
   return point;
 }
 
-/// Returns the solid angle density of the mixture. `even` is the density without the image.
+/// Returns the solid angle density of the mixture of image and uniform sampling. `even` is the
+/// density of uniform sampling.
 template <typename F>
 inline F textured_rect_pdf(const F& share, const F& texture_pdf, const F& even, const F& distance2,
                            const F& cos_light, const F& area) {
@@ -252,7 +259,7 @@ inline Vec2<F> rect_uv(const LightReader<F>& light, const Vec3<F>& q) {
   return {clamp(a, F(0.f), F(1.f)), clamp(b, F(0.f), F(1.f))};
 }
 
-/// Returns radiance and density for a ray that hits the rectangle at distance t.
+/// Returns radiance and sampling density for a ray that hits the rectangle at distance t.
 template <typename F>
 inline KindHit<F> hit_rect(const LightView& view, const LightReader<F>& light,
                            const Vec3<F>& origin, const Vec3<F>& dir, const F& t,
@@ -273,7 +280,8 @@ inline KindHit<F> hit_rect(const LightView& view, const LightReader<F>& light,
   return {select<F>(front, radiance, Color<F>(F(0.f))), pdf};
 }
 
-/// Samples a path from a point on the rectangle, by the distribution of its image or uniformly.
+/// Samples a light path that starts at a point on the rectangle, sampled from its image or
+/// uniformly.
 template <typename F>
 inline KindEmission<F> emit_rect(const EmissionQuery<F>& q) {
   const LightReader<F>& light = q.light;

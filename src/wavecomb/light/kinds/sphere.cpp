@@ -43,8 +43,8 @@ Bounds box(const LightRecord& light) {
   return box_around(light.p, light.p, {light.radius, light.radius, light.radius});
 }
 
-/// Solves |o + t d|^2 = r^2. Returns the nearest positive root, which from inside is the far side,
-/// or 0.
+/// Solves |o + t d|^2 = r^2. Returns the smallest positive root, which is the far side if the
+/// origin is inside, or 0 without a hit.
 double intersect(const LightRecord& light, const double* o, const double* d) {
   const Double3 from{o[0], o[1], o[2]}, along{d[0], d[1], d[2]};
   const double radius = light.radius;

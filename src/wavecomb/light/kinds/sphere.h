@@ -7,16 +7,18 @@
 
 namespace wavecomb::detail {
 
-/// Cone of directions that a sphere subtends.
+/// Cone of directions from a point to a sphere.
 template <typename F>
 struct SphereCone {
   Vec3<F> axis;           ///< unit vector to the centre
-  F distance2, distance;  ///< to the centre
+  F distance2, distance;  ///< squared distance and distance to the centre
   F one_minus_cos;        ///< 1 - cos of the half angle, accurate for small angles
-  Mask<F> outside;        ///< whether the point is outside the sphere; from inside it is invisible
+  /// Whether the point is outside the sphere; the light emits only outwards.
+  Mask<F> outside;
 };
 
-/// Uses sin^2 = r^2 / d^2, and 1 - cos = sin^2 / (1 + cos) to avoid cancellation for small angles.
+/// Computes the cone from sin^2 = r^2 / d^2 and 1 - cos = sin^2 / (1 + cos), which avoids
+/// cancellation for small angles.
 template <typename F>
 inline SphereCone<F> make_sphere_cone(const LightReader<F>& light, const Vec3<F>& from) {
   const Direction<F> d = make_direction<F>(light.p() - from);
@@ -27,8 +29,8 @@ inline SphereCone<F> make_sphere_cone(const LightReader<F>& light, const Vec3<F>
   return {d.wi, d.length2, d.length, sin2 / (1.f + safe_sqrt(F(1.f - sin2))), outside};
 }
 
-/// Returns the uniform density 1 / (2 pi (1 - cos)) over the cone; 0 from inside, and if the sphere
-/// is too small.
+/// Returns the uniform density 1 / (2 pi (1 - cos)) over the cone; 0 for points inside the sphere,
+/// and if the sphere is too small.
 template <typename F>
 inline F sphere_cone_pdf(const SphereCone<F>& cone) {
   const Mask<F> valid = cone.outside & (cone.one_minus_cos > 0.f);
@@ -38,7 +40,7 @@ inline F sphere_cone_pdf(const SphereCone<F>& cone) {
 
 /// Samples a direction uniformly in the cone that the sphere subtends (P. Shirley, C. Wang, K.
 /// Zimmerman, "Monte Carlo Techniques for Direct Lighting Calculations", ACM TOG 15(1) 1996). For a
-/// point light (radius 0) it is the direction to the centre.
+/// point light (radius 0), returns the direction to the centre.
 template <typename F>
 inline KindSample<F> sample_sphere(const LightReader<F>& light, const Vec3<F>& from, const F& u,
                                    const F& v) {
@@ -48,7 +50,7 @@ inline KindSample<F> sample_sphere(const LightReader<F>& light, const Vec3<F>& f
 
   const Vec3<F> local = square_to_cone(u, v, cone.one_minus_cos);
   const Vec3<F> wi = make_frame(cone.axis).to_world(local);
-  // Distance of the near hit: d cos - sqrt(r^2 - d^2 sin^2).
+  // The distance to the near side of the sphere is d cos - sqrt(r^2 - d^2 sin^2).
   const F sin2 = fma(local.x, local.x, F(local.y * local.y));
   const F half_chord = safe_sqrt(F(radius * radius - cone.distance2 * sin2));
   const F near = max(fma(cone.distance, local.z, F(-half_chord)), F(0.f));
@@ -61,14 +63,15 @@ inline KindSample<F> sample_sphere(const LightReader<F>& light, const Vec3<F>& f
           select(is_point, point_pdf, sphere_cone_pdf<F>(cone)), is_point};
 }
 
-/// Returns radiance and density for a ray from `origin` that hit the sphere.
+/// Returns radiance and sampling density for a ray from `origin` that hit the sphere.
 template <typename F>
 inline KindHit<F> hit_sphere(const LightReader<F>& light, const Vec3<F>& origin) {
   const SphereCone<F> cone = make_sphere_cone<F>(light, origin);
   return {select<F>(cone.outside, light.radiance(), Color<F>(F(0.f))), sphere_cone_pdf<F>(cone)};
 }
 
-/// Samples a path from a point uniform over the sphere, or in any direction from a point light.
+/// Samples a light path that starts uniformly on the surface of the sphere, or with a uniform
+/// direction from a point light.
 template <typename F>
 inline KindEmission<F> emit_sphere(const EmissionQuery<F>& q) {
   const LightReader<F>& light = q.light;

@@ -21,7 +21,7 @@ struct TriangleRow {
 };
 static_assert(sizeof(TriangleLight) == 4 * kRowWords<TriangleRow>);
 
-/// Triangles of the lights in the active lanes.
+/// Reader of the triangle light records of the active lanes.
 template <typename F>
 struct TriangleReader : TriangleRow<F> {
   TriangleReader(const LightView& view, const UInt<F>& light, const Mask<F>& active)
@@ -33,10 +33,10 @@ struct TriangleReader : TriangleRow<F> {
 /// of `material` (1 outside the lanes `emits`) times its opacity. `index` refers to TriangleUvs.
 /// Textures are read at their finest level.
 ///
-/// Presence is stochastic: a bounce hits the triangle with a probability equal to the opacity, and
+/// Opacity is stochastic: a bounce hits the triangle with a probability equal to the opacity, and
 /// then receives the full emission. A light sample, whose shadow ray ends before the triangle,
-/// receives the mean. Both estimate the integral of opacity * emission, so that MIS weights depend
-/// only on the densities of the directions.
+/// receives the emission times the opacity. Both techniques estimate the integral of opacity *
+/// emission, so that MIS weights depend only on the densities of the directions.
 template <typename F>
 [[gnu::noinline]] Color<F> varying_radiance(const LightView& view, const UInt<F>& material,
                                             const UInt<F>& index, const Vec2<F>& b,
@@ -44,7 +44,8 @@ template <typename F>
                                             const Mask<F>& active) {
   constexpr uint32_t kWords = sizeof(TriangleUvs) / 4;
   const auto row = load_rows<8, F>(view.triangle_uvs, index * kWords, active);
-  // Interpolation starts with vertex 2, since the order of float sums matters.
+  // Add the term of vertex 2 before that of vertex 1, since a different order of the float sums
+  // would change the bits of images.
   const UvTriangle<F> corners({row[0], row[1]}, {row[4], row[5]}, {row[2], row[3]});
   const Vec2<F> uv = corners.at(b.y, b.x);
   const MeshPosition<F> mesh_position{float_bits<F>(row[6]), float_bits<F>(row[7]), b.x, b.y};
@@ -81,7 +82,8 @@ inline Color<F> triangle_radiance(const TriangleReader<F>& light, const LightVie
   const Mask<F> varies = active & (light.radiance.x < 0.f);
   if (none(varies)) [[likely]]
     return light.radiance;
-  // These are copies, so that the values that plain triangles use can stay in registers.
+  // Copy the arguments of the call, so that the original values, which plain triangles use, can
+  // stay in registers.
   const UInt<F> material = float_bits<F>(light.radiance.y), index = float_bits<F>(light.radiance.z);
   const Vec2<F> at = b;
   const Vec3<F> point = q;
@@ -90,7 +92,7 @@ inline Color<F> triangle_radiance(const TriangleReader<F>& light, const LightVie
                    light.radiance);
 }
 
-/// Samples a path from a point uniform over the triangle, on either side.
+/// Samples a light path that starts uniformly on either side of the triangle.
 template <typename F>
 inline KindEmission<F> emit_triangle(const TriangleReader<F>& light, const LightView& view,
                                      const F& u, const F& v, const F& s, const F& t,
@@ -107,7 +109,7 @@ inline KindEmission<F> emit_triangle(const TriangleReader<F>& light, const Light
                            F(0.5f * uniform_emission_density<F>(area)));
 }
 
-/// Samples a point q = p + b1 u + b2 v with density 1 / area.
+/// Samples a point q = p + b1 u + b2 v on the triangle with area density 1 / area.
 template <typename F>
 inline KindSample<F> sample_triangle(const TriangleReader<F>& light, const LightView& view,
                                      const Vec3<F>& from, const F& u, const F& v,
@@ -121,17 +123,18 @@ inline KindSample<F> sample_triangle(const TriangleReader<F>& light, const Light
   return {d.wi, d.length, radiance, pdf, Mask<F>(false)};
 }
 
-/// Solid angle density, and the probability of selecting the light by power.
+/// Solid angle density of sampling a triangle light, and the probability of selecting it by power.
 template <typename F>
 struct TriangleDensity {
   F solid_angle, selection_pdf;
 };
 
-/// Returns the densities for a hit at distance t along dir.
+/// Returns the solid angle density and selection probability of the triangle lights that rays along
+/// dir hit at distance t.
 template <typename F>
 inline TriangleDensity<F> triangle_pdf(const LightView& view, const UInt<F>& light,
                                        const Vec3<F>& dir, const F& t, const Mask<F>& active) {
-  // Reads the last four words of the row.
+  // Read only the last four words of the triangle's record.
   const auto r = load_rows<4, F>(
       view.triangles,
       (light - view.first_triangle) * (sizeof(TriangleLight) / 4) + word_of(&TriangleLight::m),

@@ -16,7 +16,8 @@ void finish_area(LightBuild& out, const Light& light, double area) {
 void finish_flat(LightBuild& out, const Light& light, const Double3& u, const Double3& v,
                  double area_factor) {
   const Double3 m = cross(u, v);
-  // Light leaves on the side that -z is mapped to, independent of the handedness of the transform.
+  // The light emits from the side to which the transform maps -z, whether or not the transform
+  // mirrors.
   const Double3 minus_z = to_double(light.to_world.axis(2)) * -1.0;
   Double3 n = unit(m);
   if (dot(n, minus_z) < 0) n = n * -1.0;

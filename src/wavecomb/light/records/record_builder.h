@@ -11,10 +11,10 @@ namespace wavecomb::record_builder {
 
 inline constexpr double kPiD = 3.14159265358979323846;
 
-/// Smaller areas are indistinguishable from 0 in float. Lights with areas below this limit are
-/// dark.
+/// Smallest area of an emitting light. Smaller areas are indistinguishable from 0 in float, so
+/// lights with smaller areas do not emit.
 inline constexpr double kMinArea = 1e-36;
-/// Largest radiance. Products of larger values would overflow.
+/// Largest radiance. With larger values, products of radiance could overflow.
 inline constexpr double kMaxRadiance = 1e30;
 
 struct Double3 {
@@ -39,7 +39,7 @@ inline double dot(const Double3& a, const Double3& b) {
 inline double length(const Double3& a) {
   return std::sqrt(dot(a, a));
 }
-/// Returns a / |a|, or +z for the zero vector.
+/// Returns a / |a|, or the unit vector +z if a is zero.
 inline Double3 unit(const Double3& a) {
   const double n = length(a);
   return n > 0 ? a * (1 / n) : Double3{0, 0, 1};
@@ -69,8 +69,8 @@ struct LightColour {
         mean(luminance(rgb.x, rgb.y, rgb.z)) {}
 };
 
-/// Sets radiance and power of a light with the given surface area. Lights without area emit
-/// nothing.
+/// Sets radiance and power of a light with the given surface area. Lights with zero area do not
+/// emit.
 void finish_area(LightBuild& out, const Light& light, double area);
 
 /// Sets area, emission directions, radiance and power of a planar light with the given edges or
@@ -78,13 +78,14 @@ void finish_area(LightBuild& out, const Light& light, double area);
 void finish_flat(LightBuild& out, const Light& light, const Double3& u, const Double3& v,
                  double area_factor);
 
-/// Returns the sampling distribution of a light with this texture and radiance: the one in
-/// making.before if it exists, else the result of `build`.
+/// Returns the sampling distribution for the texture and radiance of `light`: the distribution in
+/// context.before if it has one, otherwise the result of `build`.
 Distribution2D density_of(const LightRecord& light, const LightBuildContext& context,
                           Distribution2D (*build)(const TextureView&, const Vec3<float>&));
 
-/// Adds the shaping to a light, and scales its power by the fraction of light that the shaping
-/// passes. Each attribute contributes its mean over all directions, as if they were independent.
+/// Adds shaping to a light, and scales the light's power by the fraction of light that the shaping
+/// transmits. The fraction is the product of the means of all shaping attributes over directions,
+/// as if they were independent.
 void add_shaping(LightBuild& out, const Light& light, LightBuildContext& context);
 
 /// Returns the packed shadow attributes of a light.

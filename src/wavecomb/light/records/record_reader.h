@@ -16,7 +16,7 @@ inline constexpr float kFarAway = 1e30f;
 
 namespace detail {
 
-/// Fields of the light record in each lane.
+/// Reader of the light record of each lane.
 template <typename F>
 struct LightReader : RecordReader<F> {
   LightReader(const LightRecord* lights, const UInt<F>& light, const Mask<F>& active_)
@@ -38,8 +38,9 @@ struct LightReader : RecordReader<F> {
   UInt<F> shaping() const { return (*this)[&LightRecord::shaping]; }
 };
 
-/// Returns the record with the links and multipliers of light `light`: its own or, for a triangle,
-/// the record of its mesh light. Returns kNoLight for triangles that are not part of a mesh light.
+/// Returns the index of the record with the links and multipliers of light `light`: the light's
+/// record or, for a triangle, the record of its mesh light. Returns kNoLight for triangles that are
+/// not part of a mesh light.
 template <typename F>
 inline UInt<F> record_of(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
   using U = UInt<F>;
@@ -58,24 +59,25 @@ struct KindSample {
   Vec3<F> wi;  ///< unit direction to the light
   F distance;
   Color<F> radiance;  ///< for delta lights, the irradiance at normal incidence
-  F pdf;              ///< density over solid angle; 1 for delta lights; 0 without a sample
+  /// Density over solid angle; 1 for delta lights, 0 if there is no valid sample.
+  F pdf;
   Mask<F> is_delta;
 };
 
-/// Radiance and solid angle density for a ray that hit a light.
+/// Radiance and solid angle sampling density for a ray that hit a light.
 template <typename F>
 struct KindHit {
   Color<F> radiance;
   F pdf;
 };
 
-/// Parameters of a light sample: the light in lanes `lanes`, the point `from`, and the sample (u,
-/// v).
+/// Parameters of a light sample: the light of each lane in `lanes`, the illuminated point `from`,
+/// and the 2D sample (u, v).
 template <typename F>
 struct LightQuery {
   const LightView& view;
   const UInt<F>& index;         ///< index of the sampled light in each lane
-  const LightReader<F>& light;  ///< record of the light
+  const LightReader<F>& light;  ///< reader of the light's record
   const Vec3<F>& from;
   const F &u, &v;
   const Mask<F>& lanes;
@@ -91,7 +93,7 @@ struct LightHitQuery {
   const Mask<F>& lanes;
 };
 
-/// Rays from `from` along `dir` that leave the scene, evaluated for one infinite light.
+/// Rays from `from` along `dir` that leave the scene, and the infinite light to evaluate for them.
 template <typename F>
 struct LightEscape {
   const LightView& view;
@@ -100,8 +102,8 @@ struct LightEscape {
   const Mask<F>& lanes;
 };
 
-/// Parameters of a light path sample: the light in lanes `lanes`, the sample (u, v) for the origin
-/// and the sample (s, t) for the direction.
+/// Parameters of a light path sample: the light of each lane in `lanes`, the 2D sample (u, v) for
+/// the origin, and the 2D sample (s, t) for the direction.
 template <typename F>
 struct EmissionQuery {
   const LightView& view;
@@ -112,8 +114,8 @@ struct EmissionQuery {
 
 /// Origin and direction of a light path, without the probability of selecting the light.
 ///
-/// `density` is what the path's weight and MIS need (docs/light-paths.md): the density of the
-/// origin times that of the direction, divided by the cosine,
+/// `density` is used for the path's weight and for MIS (docs/light-paths.md). It is the density of
+/// the origin times the density of the direction, divided by the cosine:
 ///   p_A(p) p_w(d) / |cos|;   for a point light p_w(d);   for an infinite light p_w(d) / (pi R^2);
 ///   for a distant light without an angle 1 / (pi R^2),
 /// so that radiance (point light: intensity; distant light without an angle: irradiance) / density
@@ -121,28 +123,31 @@ struct EmissionQuery {
 template <typename F>
 struct KindEmission {
   Vec3<F> p, d;  ///< unit d
-  /// Unit normal of the light's surface, for the offset of the origin; 0 without a surface.
+  /// Unit normal of the light's surface, along which the origin is offset; 0 for lights without a
+  /// surface.
   Vec3<F> n;
   Color<F> radiance;
   F density;
 };
 
-/// Returns a path from `p` with cosine-distributed direction about the surface normal `n`.
+/// Returns a light path from `p` whose direction is cosine-distributed about the surface normal
+/// `n`.
 template <typename F>
 inline KindEmission<F> emit_by_cosine(const Vec3<F>& p, const Vec3<F>& n, const F& s, const F& t,
                                       const Color<F>& radiance, const F& density) {
   return {p, make_frame(n).to_world(square_to_cosine_hemisphere(s, t)), n, radiance, density};
 }
 
-/// Returns kInvPi / area, or 0 if that is out of range.
+/// Returns the emission density 1 / (pi area) of a light that is sampled uniformly by area, or 0 if
+/// the density is out of range.
 template <typename F>
 inline F uniform_emission_density(const F& area) {
   const F density = kInvPi / select(area > 0.f, area, F(1.f));
   return select((area > 0.f) & is_finite(density), density, F(0.f));
 }
 
-/// Returns a path along `d` through the sphere around the scene. The path starts on a disk of the
-/// sphere's radius in front of the scene, at a point sampled by (u, v).
+/// Returns a light path along `d` through the bounding sphere of the scene. The path starts on a
+/// disk of the sphere's radius in front of the scene, at a point sampled by (u, v).
 template <typename F>
 inline KindEmission<F> emit_infinite(const LightView& view, const Vec3<F>& d, const F& u,
                                      const F& v, const Color<F>& radiance, const F& direction_pdf) {
@@ -165,9 +170,9 @@ inline KindHit<F> dark() {
   return {Color<F>(F(0.f)), F(0.f)};
 }
 
-/// Returns the solid angle density for the area density 1 / area at squared distance `d2`, where
-/// the direction makes an angle with cosine `cos_light` with the light's normal. Returns 0 if the
-/// light is seen from behind or edge-on, is degenerate, or the density is out of range.
+/// Converts the area density 1 / area to a solid angle density at squared distance `d2`, where the
+/// direction makes an angle with cosine `cos_light` with the light's normal. Returns 0 if the light
+/// is seen from behind or edge-on, if its area is 0, or if the density is out of range.
 template <typename F>
 inline F area_to_solid_angle(const F& d2, const F& cos_light, const F& area) {
   const F projected = cos_light * area;
@@ -176,7 +181,7 @@ inline F area_to_solid_angle(const F& d2, const F& cos_light, const F& area) {
   return select(valid & is_finite(pdf), pdf, F(0.f));
 }
 
-/// Unit vector along d, and its length. The vector is finite even if d is 0.
+/// Unit vector along d, and the length of d. The vector is finite even if d is 0.
 template <typename F>
 struct Direction {
   Vec3<F> wi;
@@ -190,7 +195,7 @@ inline Direction<F> make_direction(const Vec3<F>& d) {
   return {d * F(1.f / safe), select(valid, length2, F(0.f)), select(valid, safe, F(0.f))};
 }
 
-/// Returns v as a unit vector, or 0 if it is 0.
+/// Returns v / |v|, or 0 if v is 0.
 template <typename F>
 inline Vec3<F> unit_or_zero(const Vec3<F>& v) {
   const F size = length(v);
@@ -206,8 +211,8 @@ inline Color<F> not_negative(const Color<F>& c) {
 
 struct LightKindInfo;
 
-/// Base of kinds that surround the scene at infinite distance. Light paths from them start on a
-/// disk in front of the scene.
+/// Base class of light kinds that surround the scene at infinite distance. Their light paths start
+/// on a disk in front of the scene.
 struct InfiniteKind {
   static constexpr bool kIsInfinite = true;
   template <typename F>
@@ -215,8 +220,8 @@ struct InfiniteKind {
     return detail::dark<F>();
   }
 };
-/// Base of kinds at a position in the scene. Light paths from them leave a surface with the normal
-/// emission_normal().
+/// Base class of light kinds at a finite position. Their light paths leave a surface with the
+/// normal emission_normal().
 struct FiniteKind {
   static constexpr bool kIsInfinite = false;
   template <typename F>
@@ -224,7 +229,7 @@ struct FiniteKind {
     return detail::dark<F>();
   }
 };
-/// Base of finite kinds with one normal, that of the record.
+/// Base class of planar light kinds, whose normal is stored in the record.
 struct FlatKind : FiniteKind {
   template <typename F>
   static Vec3<F> emission_normal(const detail::LightReader<F>& light, const Vec3<F>& /*p*/) {

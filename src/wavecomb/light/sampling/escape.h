@@ -35,16 +35,16 @@ template <typename F>
 struct EscapedRay {
   Vec3<F> from, dir;
   F bsdf_pdf{0.f};          ///< density of the bounce, per sr
-  Mask<F> is_delta{false};  ///< delta bounce or camera ray, which no light sample matches
+  Mask<F> is_delta{false};  ///< delta bounce or camera ray, which light sampling cannot produce
   bool from_camera = false;
-  UInt<F> link{0u};          ///< link class of the surface that the ray left
-  F ratio{0.f};              ///< PathState::ratio; adds light paths to the MIS weight
+  UInt<F> link{0u};          ///< light linking class of the surface at which the ray starts
+  F ratio{0.f};              ///< PathState::ratio, by which the MIS weight includes light paths
   F time{0.5f};              ///< shutter time in [0, 1]
-  Color<F> diffuse{F(0.f)};  ///< diffuse fraction of the bounce, by colour
+  Color<F> diffuse{F(0.f)};  ///< diffuse fraction of the bounce for each colour
 };
 
-/// Returns radiance times MIS weight of infinite light `light` for an escaped ray: one term of
-/// escaped_radiance.
+/// Returns radiance times MIS weight of infinite light `light` for an escaped ray, which is one
+/// term of escaped_radiance().
 template <typename F>
 inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light,
                                         const EscapedRay<F>& ray, const Mask<F>& active) {
@@ -75,7 +75,7 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light,
 }
 
 /// Returns the sum over all infinite lights of radiance times MIS weight for an escaped ray. The
-/// weight is the balance heuristic of the densities of bounce and light sampling, or 1 for delta
+/// MIS weight is the balance heuristic of bounce density and light sampling density, or 1 for delta
 /// bounces and camera rays.
 template <typename F>
 inline Color<F> escaped_radiance(const LightView& view, const EscapedRay<F>& ray,

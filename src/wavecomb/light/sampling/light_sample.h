@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Light sampling: selection of a light, sampling of a point on it, and their densities.
+/// Light sampling: selection of a light, sampling of a point on the light, and the densities of
+/// both.
 ///
-/// The direct light at p is estimated by f(wi) |cos| * LightSample::weight * MIS weight. The other
-/// MIS technique uses light_hit, triangle_light_pdf and escaped_radiance (escape.h), whose `pdf` is
-/// the density of sample_light for the same direction. Bodies are in light_sample.inl; the compile
-/// units of shared_kernels.h instantiate them.
+/// The direct light at p is estimated by f(wi) |cos| * LightSample::weight * MIS weight. For the
+/// other MIS technique, bounces that hit a light, light_hit(), triangle_light_pdf() and
+/// escaped_radiance() (escape.h) use the density of sample_light() for the same direction. The
+/// function bodies are in light_sample.inl; the translation units of shared_kernels.h instantiate
+/// them.
 #pragma once
 
 #include "wavecomb/core/vec.h"
@@ -16,7 +18,7 @@
 namespace wavecomb {
 
 /// Direction towards a light. `pdf` is a solid angle density that includes the selection of the
-/// light. For delta lights it is the selection probability, and is_delta is set. `weight` is
+/// light. For delta lights, `pdf` is the selection probability, and is_delta is set. `weight` is
 /// radiance / pdf (for delta lights, irradiance at normal incidence / pdf), so that the estimator
 /// is f_cos * weight * MIS weight.
 template <typename F>
@@ -26,7 +28,8 @@ struct LightSample {
   Color<F> weight;
   F pdf;
   Mask<F> is_delta;
-  Mask<F> valid;  ///< whether light arrives; if false, weight and pdf are 0 and wi is finite
+  /// Whether light arrives at the point; if false, weight and pdf are 0 and wi is finite.
+  Mask<F> valid;
   UInt<F> light;  ///< the selected light, or kNoLight
 };
 
@@ -42,8 +45,9 @@ template <typename F>
 UInt<F> select_light_index(const LightView& view, const LightReceiver<F>& to, const F& u_light,
                            const Mask<F>& active);
 
-/// Selects a light by power or by the light tree, and samples a point on it as seen from `to`. The
-/// random numbers are in [0, 1). u_light is a multiple of 2^-24, as samplers provide it.
+/// Selects a light by power or by the light tree, and samples a point on the light as seen from
+/// `to`. The random numbers u_light, u and v are in [0, 1). u_light is a multiple of 2^-24, as
+/// samplers provide it.
 template <typename F>
 LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to, const F& u_light,
                             const F& u, const F& v, const Mask<F>& wanted);
@@ -51,11 +55,12 @@ LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to, c
 template <typename F>
 struct LightHit {
   Color<F> radiance;
-  F pdf;  ///< density of sample_light() for this direction; 0 for delta lights
+  F pdf;  ///< density of sample_light() for the ray's direction; 0 for delta lights
 };
 
-/// Returns radiance and density of light `light` for the ray from.p + t along, which hit its shape
-/// at distance t. Kinds without a shape and inactive lanes return 0.
+/// Returns the radiance and sampling density of light `light` for the ray from.p + t along, which
+/// hit the light's shape at distance t. Returns 0 for light kinds without a shape and for inactive
+/// lanes.
 template <typename F>
 LightHit<F> light_hit(const LightView& view, const UInt<F>& light, const LightReceiver<F>& from,
                       const Vec3<F>& along, const F& t, const Mask<F>& hit_lanes);
@@ -66,8 +71,8 @@ template <typename F>
 F triangle_light_pdf(const LightView& view, const UInt<F>& light, const LightReceiver<F>& from,
                      const Vec3<F>& dir, const F& t, const Mask<F>& active);
 
-/// Factors for lights with diffuse and specular multipliers, and for lights that only light
-/// sampling finds. These factors are used only with LightView::has_effects.
+/// Factors for lights with diffuse and specular multipliers, and for lights that only light samples
+/// find (LightRecord::sampled_only). Used only if LightView::has_effects is set.
 template <typename F>
 struct LightEffect {
   F diffuse, specular;   ///< multipliers of the diffuse response and of the specular response
@@ -86,8 +91,8 @@ struct LightEffect {
     shadow = select(Mask<UInt<F>>(known), reader[&LightRecord::shadow], UInt<F>(kPlainShadow));
   }
 
-  /// Returns the factor for emission that a path hits. `share` is the diffuse fraction of its
-  /// bounce. A delta bounce counts as a specular bounce.
+  /// Returns the factor for emission that a path hits. `share` is the diffuse fraction of the
+  /// path's last bounce. A delta bounce counts as a specular bounce.
   Color<F> of_hit(const Mask<F>& bsdf_is_delta, bool from_camera, const Color<F>& share) const {
     return detail::factor_of_hit<F>(diffuse, specular, sampled_only, bsdf_is_delta, from_camera,
                                     share);
@@ -102,7 +107,7 @@ inline float infinite_selection_pdf(const LightView& view, uint32_t light) {
 
 /// Returns the balance heuristic weight of a bounce with density `p` (ignored for delta lobes)
 /// against light samples with density `light_pdf` and light paths, whose density is `others` times
-/// that of the bounce.
+/// `p`.
 template <typename F>
 inline F joint_bounce_weight(const F& p, const F& light_pdf, const Mask<F>& is_delta,
                              const F& others) {

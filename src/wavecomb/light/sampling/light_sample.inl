@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Bodies of light_sample.h, for the compile units that instantiate them.
+/// Definitions of the function templates in light_sample.h, for the translation units that
+/// instantiate them.
 #pragma once
 
 #include "wavecomb/light/filters/filter.h"
@@ -14,8 +15,8 @@ namespace wavecomb {
 
 namespace detail {
 
-/// Returns a light by the 24 bits of u_light (a multiple of 2^-24 in [0, 1)) and the PowerTable.
-/// All arithmetic is in integers, so that selection_pdf is exact.
+/// Returns the light that the PowerTable selects for u_light, a multiple of 2^-24 in [0, 1). All
+/// arithmetic is in integers, so that selection_pdf is exact.
 template <typename F>
 inline UInt<F> light_by_power(const LightView& view, const F& u_light, const Mask<F>& active) {
   using U = UInt<F>;
@@ -33,11 +34,11 @@ inline UInt<F> light_by_power(const LightView& view, const F& u_light, const Mas
   return select(rest < threshold, bin, other) + select(triangle, U(view.first_triangle), U(0u));
 }
 
-/// Selection of a light, by the light tree or by light weights.
+/// Light selected by the light tree or by power.
 template <typename F>
 struct SelectedLight {
   UInt<F> light;
-  F probability;   ///< selection probability, if it is not in the light's record
+  F probability;   ///< selection probability, unless it is stored in the light's record
   Mask<F> active;  ///< lanes with a light
   bool of_record;
 
@@ -57,8 +58,8 @@ struct SelectedLight {
   F pdf(const F& recorded) const { return of_record ? recorded : probability; }
 };
 
-/// Returns the probability with which sample_light() selects finite light `light`, whose record has
-/// the selection_pdf `recorded`.
+/// Returns the probability with which sample_light() selects finite light `light`; `recorded` is
+/// the selection_pdf in the light's record.
 template <typename F>
 inline F finite_selection_pdf(const LightView& view, const UInt<F>& light, const F& recorded,
                               const LightReceiver<F>& to, const Mask<F>& active) {
@@ -129,7 +130,8 @@ LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to, c
   const detail::LightReader<F> any_light(view.lights, index, others);
   detail::for_each_kind<F>(
       any_light[&LightRecord::kind], others, [&](LightKind kind, const Mask<F>& lanes) {
-        // Often a kind has only one light, so that all its lanes share a record.
+        // Read records by kind: often there is only one light of a kind, so that all its lanes
+        // share a record.
         const detail::LightReader<F> light(view.lights, index, lanes);
         Vec3<F> from = p;
         if (view.motions) [[unlikely]]

@@ -6,8 +6,8 @@
 
 namespace wavecomb {
 
-/// Returns the lanes in which surfaces of class `link` (0 without a surface, as for cameras) belong
-/// to geometry set `set` (kNoSet contains all).
+/// Returns the lanes in which surfaces of link class `link` (0 if there is no surface, for example
+/// at the camera) belong to geometry set `set`; kNoSet contains all geometry.
 template <typename F>
 inline Mask<F> is_linked(const LinkView& links, const UInt<F>& link, const UInt<F>& set,
                          const Mask<F>& active) {
@@ -19,7 +19,7 @@ inline Mask<F> is_linked(const LinkView& links, const UInt<F>& link, const UInt<
   return not_(restricted) | Mask<F>(((word >> (set & 31u)) & 1u) != U(0u));
 }
 
-/// Returns the lanes in which light `light` illuminates surfaces of class `link`. Emissive
+/// Returns the lanes in which light `light` illuminates surfaces of link class `link`. Emissive
 /// triangles without a light record illuminate all surfaces.
 template <typename F>
 inline Mask<F> illuminates(const LightView& view, const UInt<F>& link, const UInt<F>& light,
@@ -32,8 +32,8 @@ inline Mask<F> illuminates(const LightView& view, const UInt<F>& link, const UIn
   return not_(known) | is_linked<F>(view.links, link, set, known);
 }
 
-/// Returns, for shadow rays to light `light`, 1 + the set of geometry that blocks them, or 0 if all
-/// geometry does.
+/// Returns, for shadow rays to light `light`, 1 + the index of the set of geometry that blocks
+/// them, or 0 if all geometry blocks them.
 template <typename F>
 inline UInt<F> shadow_set(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
   using U = UInt<F>;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Lights that move while the shutter is open (light/description/motion.h has the formula). Points
-/// and directions at the light's time are transformed to its rest pose, everything is computed
-/// there, and directions are transformed back.
+/// and directions at the shutter time are transformed to the light's rest pose, samples and
+/// densities are computed there, and directions are transformed back.
 #pragma once
 
 #include "wavecomb/core/rows/rows.h"
@@ -14,7 +14,7 @@ namespace wavecomb {
 /// transform is exactly the identity.
 template <typename F>
 struct LightPose {
-  Vec3<F> x, y, z;  ///< directions of the rest pose's axes
+  Vec3<F> x, y, z;  ///< directions of the rest pose's axes at the given time
   Vec3<F> position, origin;
 
   Vec3<F> to_rest(const Vec3<F>& direction) const {
@@ -27,8 +27,8 @@ struct LightPose {
   Vec3<F> point_to_world(const Vec3<F>& p) const { return to_world(p - origin) + position; }
 };
 
-/// Returns the pose of light records `light` at `time`. The pose is used only with
-/// LightView::motions.
+/// Returns the pose of light records `light` at `time`. The pose is used only if LightView::motions
+/// is not null.
 template <typename F>
 [[gnu::noinline]] LightPose<F> light_pose(const LightView& view, const UInt<F>& light,
                                           const F& time, const Mask<F>& lanes) {

@@ -11,12 +11,13 @@ namespace wavecomb {
 template <typename F>
 struct LightReceiver {
   Vec3<F> p;
-  /// Packed normal (pack_normal) of the side that light must arrive at; 0 for both sides.
+  /// Packed normal (pack_normal) of the side at which light must arrive; 0 for both sides.
   UInt<F> normal;
-  UInt<F> seed;  ///< source of random bits below the precision of the selecting number
-  F time;        ///< shutter time if lights move; default mid-shutter
+  /// Seed for random bits below the precision of the random number that selects a light.
+  UInt<F> seed;
+  F time;  ///< shutter time, used if lights move; mid-shutter by default
 
-  /// Default: light may arrive from any side.
+  /// Creates a receiver at which light may arrive from any side.
   LightReceiver(const Vec3<F>& p_) : p(p_), normal(0u), seed(0u), time(0.5f) {}
   explicit LightReceiver(const Vec3<F>& p_, const UInt<F>& normal_)
       : p(p_), normal(normal_), seed(0u), time(0.5f) {}

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Selection of a light by a light tree, depending on the illuminated point.
+/// Selection of a light for an illuminated point by a light tree.
 ///
 /// A. Conty Estevez and C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree
 /// Splitting", 2018, section 5: the traversal starts at the root and selects a child by its
@@ -10,9 +10,10 @@
 /// where d is the distance from the point to the centre of the child's bounding sphere of radius r,
 /// and t_l and t_r are the least angles that the normals of its lights and the receiver's normal
 /// can make with the line between the point and any position in the sphere. I is 0 only if none of
-/// the child's lights can contribute. The probability of a light is the product over the path from
-/// the root, which the light's trail stores. Both MIS techniques compute this probability by the
-/// same steps.
+/// the child's lights can contribute. The probability of a light is the product of the
+/// probabilities of all choices on the path from the root to the light; the light's trail
+/// (LightTreeView::trails) stores this path. Both MIS techniques compute the probability in the
+/// same way.
 #pragma once
 
 #include "wavecomb/core/encoding/hash.h"
@@ -24,7 +25,7 @@
 
 namespace wavecomb {
 
-/// Selected light and its probability. A pdf of 0 means that no light was selected.
+/// Selected light and its selection probability. A pdf of 0 means that no light was selected.
 template <typename F>
 struct LightChoice {
   UInt<F> light;
@@ -33,13 +34,13 @@ struct LightChoice {
 
 namespace detail {
 
-/// Tolerance of cosines, for rounding and for the quantisation of packed normals.
+/// Tolerance of cosines for rounding errors and for the quantisation of packed normals.
 inline constexpr float kCosineSlack = 4e-3f;
 /// Lower bound of the squared distance to a cluster, in units of its squared radius. The published
 /// value of this bound is 1, which treats all lights around a point as distant. On the street of
-/// benchmarks/light_selection.py, a bound of 0.5 gives a quarter less error than 1 with 1,000
-/// lights, a third less with 10,000, and the same with 100. Values below 0.25 give more error
-/// again.
+/// benchmarks/light_selection.py, a bound of 0.5 gives a quarter less error than a bound of 1 with
+/// 1,000 lights, a third less with 10,000 lights, and the same error with 100 lights. Values below
+/// 0.25 increase the error.
 inline constexpr float kMinDistanceRatio = 0.5f;
 
 /// Cosine and sine of an angle from 0 to pi.
@@ -59,7 +60,7 @@ inline Angle<F> angle_of_cosine(const F& cosine) {
   return {c, safe_sqrt(fma(F(-c), c, F(1.f)))};
 }
 
-/// Returns I of the child whose 8 words start at r.
+/// Returns the importance I of the child whose 8 packed words start at r.
 template <typename F>
 inline F light_importance(const F* r, const Vec3<F>& p, const Vec3<F>& normal,
                           const Mask<F>& any_side) {
@@ -97,8 +98,8 @@ inline F light_importance(const F* r, const Vec3<F>& p, const Vec3<F>& normal,
   return select(can_contribute, max(importance, F(1e-37f)), F(0.f));
 }
 
-/// Descends from the root to a light. `goes_right(probability of the left child, lanes)` selects
-/// the children.
+/// Descends the light tree from its root to a light. `goes_right(probability of the left child,
+/// lanes)` selects the children.
 template <typename F, typename Choose>
 inline LightChoice<F> descend(const LightTreeView& tree, const LightReceiver<F>& to,
                               const Mask<F>& active, const Choose& goes_right) {
@@ -114,7 +115,7 @@ inline LightChoice<F> descend(const LightTreeView& tree, const LightReceiver<F>&
     const F right = light_importance<F>(r.data() + 8, to.p, normal, any_side);
     const F sum = left + right;
     F p_left = left / select(sum > 0.f, sum, F(1.f));
-    // Every child that can contribute keeps a minimum probability.
+    // Give each child that can contribute a minimum probability.
     const Mask<F> both = (left > 0.f) & (right > 0.f);
     p_left = select(both, clamp(p_left, F(0x1p-12f), F(1.f - 0x1p-12f)), p_left);
     const Mask<F> take_right = goes_right(p_left, descending);
@@ -129,9 +130,10 @@ inline LightChoice<F> descend(const LightTreeView& tree, const LightReceiver<F>&
 }
 
 /// Returns the light that u_light (a multiple of 2^-24 in [0, 1)) selects for `to`. Infinite lights
-/// have fixed intervals of u_light. Within the interval of the tree, the position is rescaled to
-/// [0, 1) for the first node, and what each choice leaves is rescaled for the next one. Bits below
-/// the precision of u_light are generated from `to.seed`.
+/// have fixed intervals of u_light. Within the interval of the tree, the position of u_light is
+/// rescaled to [0, 1) for the choice at the first node; after each choice, the position within the
+/// chosen interval is rescaled for the next node. Bits below the precision of u_light are generated
+/// from `to.seed`.
 template <typename F>
 [[gnu::noinline]] LightChoice<F> choose_by_tree(const LightView& view, const LightReceiver<F>& to,
                                                 const F& u_light, const Mask<F>& active) {

@@ -87,8 +87,8 @@ DirectionCone unite(const DirectionCone& a, const DirectionCone& b) {
   }
   const double all = wide.two_sided ? std::numbers::pi / 2 : std::numbers::pi;
   if (!(angle < all) || !(length2 > 1e-10)) {
-    // For opposite axes every rotation is equally long, so use all directions. Nearly equal axes
-    // keep the axis of the wider cone.
+    // If the axes are opposite, there is no unique axis between them, so use a cone of all
+    // directions. If the axes are nearly equal, keep the axis of the wider cone.
     wide.angle =
         cosine < 0 || angle >= all ? std::numbers::pi : std::max(wide.angle, other.angle + between);
     return wide;
@@ -121,7 +121,8 @@ LightCluster bound_light(const LightRecord& light, double power) {
 
 LightCluster bound_light(const TriangleLight& light, double power) {
   LightCluster c = bound_corners(light.p, light.u, light.v, false);
-  c.intensity = power / (2 * std::numbers::pi);  // intensity that is emitted on each side
+  // Intensity along the normal on each of the two sides.
+  c.intensity = power / (2 * std::numbers::pi);
   c.emission = std::numbers::pi / 2;
   c.normals.two_sided = true;
   const double m[3] = {double{light.m[0]}, double{light.m[1]}, double{light.m[2]}};

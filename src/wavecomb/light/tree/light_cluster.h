@@ -6,11 +6,11 @@
 
 namespace wavecomb {
 
-/// A cone of directions about a unit axis. If `two_sided` is set, it includes the cone about the
-/// opposite axis.
+/// A cone of directions about a unit axis. If `two_sided` is set, the cone about the opposite axis
+/// is also included.
 struct DirectionCone {
   double axis[3] = {0, 0, 1};
-  double angle = 0;  ///< half the opening angle, radians
+  double angle = 0;  ///< half of the opening angle in radians
   bool two_sided = false;
 };
 
@@ -20,12 +20,12 @@ struct LightCluster {
   float lo[3], hi[3];
   DirectionCone normals;
   double emission = 0;
-  /// Intensity emitted along the normals, relative to the sum over all lights of the tree.
+  /// Intensity emitted along the normals, relative to the total intensity of the tree.
   double intensity = 0;
-  uint32_t next = 0;  ///< node, or kTreeLeaf | light
+  uint32_t next = 0;  ///< index of the child node, or kTreeLeaf | light index
 };
 
-// Building blocks for the bounds of each kind of light.
+// Functions for computing the bounds of a light.
 /// Extends the box to contain a point.
 void include(LightCluster& cluster, const float (&p)[3]);
 /// Extends the box by `half` on each side.
@@ -35,19 +35,20 @@ LightCluster bound_corners(const float (&p)[3], const float (&u)[3], const float
                            bool opposite);
 /// Sets the emission bounds of a surface that emits over the hemisphere about n.
 void bound_normals(LightCluster& cluster, const float (&n)[3]);
-/// Sets the emission bounds of a closed round shape, which emits in all directions.
+/// Sets the emission bounds of a shape with normals in all directions, such as a sphere.
 void bound_round(LightCluster& cluster);
 
 /// Returns a cone that contains both cones (Conty Estevez and Kulla 2018, algorithm 1).
 DirectionCone unite(const DirectionCone& a, const DirectionCone& b);
-/// Returns the union of both bounds, without setting `next`.
+/// Returns bounds that contain both bounds, without setting `next`.
 LightCluster unite(const LightCluster& a, const LightCluster& b);
 
-/// Returns the bounds of one light of the given power in W. Its `intensity` is in W / sr.
+/// Returns the bounds of one light of the given power in W. The `intensity` of the bounds is in W /
+/// sr.
 LightCluster bound_light(const LightRecord& light, double power);
 LightCluster bound_light(const TriangleLight& light, double power);
 
-/// Packs a cluster for kernels, with conservative rounding.
+/// Packs the bounds of lights for kernels, with conservative rounding.
 LightTreeChild encode(const LightCluster& cluster);
 
 }  // namespace wavecomb

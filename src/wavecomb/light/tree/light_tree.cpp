@@ -28,12 +28,13 @@ using light_tree::most_of;
 
 constexpr uint32_t kNumbers = 1u << 24;
 constexpr size_t kBins = 12;
-/// Number of effective lights from which a tree reduces noise (docs/light-selection.md).
+/// Effective number of lights from which on a light tree reduces noise (docs/light-selection.md).
 constexpr float kMinForTree = 2;
-/// Maximum number of ranges built in parallel, and minimum number of lights of a range.
+/// Maximum number of subtrees that are built in parallel, and minimum number of lights in each of
+/// them.
 constexpr size_t kTasks = 64, kParallel = 4096;
 
-/// A range of items and its node, with the path to it from the root.
+/// Range of lights below a tree node, and the path from the root to this node.
 struct Range {
   size_t begin, end;
   uint32_t node_index;  ///< index in LightTree::nodes
@@ -46,12 +47,14 @@ class Builder {
   Builder(const LightSet& set, std::vector<Item> items, double total, LightTree& tree)
       : set_(set), items_(std::move(items)), scale_(1 / total), tree_(tree) {}
 
-  /// Splits from the root until there are enough tasks, builds these in parallel, and joins them.
+  /// Splits the tree from the root until there are enough subtrees, builds these in parallel, and
+  /// joins them.
   void run(std::span<const double> powers) {
     powers_ = powers;
     struct Top {
       Range range;
-      size_t below = 0;  ///< index of the first of its two children; 0 for a task
+      /// Index of the first of the range's two children; 0 if the range is built as a task.
+      size_t below = 0;
       LightCluster cluster;
     };
     std::vector<Top> tops{{{0, items_.size(), 0, 0, 0}, 0, {}}};
@@ -81,8 +84,8 @@ class Builder {
   }
 
  private:
-  /// Returns the halves of a range. Nodes are stored depth first, and a range of n items has n - 1
-  /// nodes.
+  /// Returns the ranges of the two children. Nodes are stored in depth-first order, and a range of
+  /// n lights has n - 1 nodes.
   static std::pair<Range, Range> children(const Range& r, size_t cut) {
     const auto left_nodes = static_cast<uint32_t>(cut - r.begin - 1);
     return {{r.begin, cut, r.node_index + 1, r.depth + 1, r.trail},
@@ -112,7 +115,8 @@ class Builder {
     return c;
   }
 
-  /// Moves the items of the left half to the front and returns the start of the right half.
+  /// Moves the lights of the left child to the front and returns the start of the right child's
+  /// range.
   size_t split(const Range& r) {
     const std::span<Item> items(items_.data() + r.begin, r.size());
     if (items.size() == 2) return r.begin + 1;
@@ -128,12 +132,12 @@ class Builder {
     const auto bins_of = [&](const Item& item) {
       const Float4 at = (item.middle() - lo) / extents * static_cast<float>(bins);
       const Float4 zero = {0, 0, 0, 0}, last = zero + static_cast<float>(bins - 1);
-      const Float4 up = at > zero ? at : zero;  // also maps NaN to 0
+      const Float4 up = at > zero ? at : zero;  // maps negative values and NaN to 0
       return __builtin_convertvector(least_of(last, up), Int4);
     };
     const bool has_room = r.depth + std::bit_width(items.size() - 1) < kMaxTreeDepth;
     if (!has_room || !std::isfinite(longest)) return halve(r, items, lo, hi);
-    // Fill the bins of all axes in one pass, which reads each item once.
+    // Fill the bins of all axes in a single pass over the lights.
     std::array<std::array<Bin, kBins>, 3> table;
     for (std::array<Bin, kBins>& of : table) std::fill_n(of.begin(), bins, Bin{});
     for (const Item& item : items) {
@@ -156,7 +160,8 @@ class Builder {
       for (size_t i = bins - 1; i > 0; --i) {
         sum.add(of[i]);
         if (sum.count == 0 || sum.count == items.size()) continue;
-        // The regularity factor of the paper penalizes thin bounds.
+        // Multiply by the regularity factor of Conty Estevez and Kulla, which penalizes thin
+        // bounds.
         const double all = (left[i - 1] + cost(sum, measure_)) * double{longest / extent};
         if (!(all < least)) continue;
         least = all;
@@ -171,8 +176,8 @@ class Builder {
     return r.begin + static_cast<size_t>(middle - items.begin());
   }
 
-  /// Splits at the median of the longest axis, for lights at the same position or a tree of large
-  /// depth.
+  /// Splits a range at the median of the longest axis. Used if lights have the same position, and
+  /// to limit the depth of the tree.
   static size_t halve(const Range& r, std::span<Item> items, const Float4& lo, const Float4& hi) {
     size_t axis = 0;
     for (size_t k = 1; k < 3; ++k)
@@ -214,7 +219,7 @@ Item make_item(const LightCluster& c, uint32_t light, double scale) {
   return item;
 }
 
-/// Distributes the 2^24 random numbers among the tree and the infinite lights that emit.
+/// Distributes the 2^24 random numbers among the light tree and the infinite lights that emit.
 void share_numbers(const LightSet& set, std::span<const double> powers, size_t emitting_in_tree,
                    LightTree& tree) {
   const size_t infinite = set.infinite_count;
@@ -232,8 +237,8 @@ void share_numbers(const LightSet& set, std::span<const double> powers, size_t e
     if (!(powers[i] > 0)) continue;
     const double share = (1 - floor_share) * (powers[i] / largest / total) +
                          floor_share / static_cast<double>(emitting);
-    // The tree keeps at least one number in a thousand, so that finite lights are sampled even
-    // under a bright dome.
+    // Reserve at least one random number in a thousand for the tree, so that finite lights are
+    // sampled even under a bright dome.
     const uint32_t most = left - (emitting_in_tree > 0 ? kNumbers / 1000 : 0);
     numbers[i] = std::min(most, 1 + static_cast<uint32_t>(share * (kNumbers - 1)));
     left -= numbers[i];
@@ -248,7 +253,7 @@ void share_numbers(const LightSet& set, std::span<const double> powers, size_t e
   }
 }
 
-/// Returns the sum of powers relative to the largest, and the largest power.
+/// Returns the sum of powers divided by the largest power, and the largest power.
 std::pair<double, double> total_power(std::span<const double> powers) {
   double total = 0, largest = 0;
   for (const double power : powers) largest = std::max(largest, power);

@@ -15,31 +15,36 @@ struct LightSet;
 
 /// Light tree over the finite lights that emit, and the selection probabilities of infinite lights.
 struct LightTree {
-  std::vector<LightTreeNode> nodes;  ///< depth first; one fewer than lights in the tree
-  std::vector<uint32_t> trails;      ///< LightTreeView::trails for all lights
+  /// Nodes in depth-first order; their number is one less than the number of lights in the tree.
+  std::vector<LightTreeNode> nodes;
+  std::vector<uint32_t> trails;  ///< trail of each light (LightTreeView::trails)
   std::vector<uint32_t> infinite_ends;
   std::vector<float> infinite_pdf;
-  uint32_t root = kNoLight;  ///< node 0, or the only light; kNoLight if no light of the tree emits
+  /// 0 for the first node, or kTreeLeaf | index of the only light; kNoLight if no light of the tree
+  /// emits.
+  uint32_t root = kNoLight;
   float effective_lights = 0;  ///< LightTreeView::effective_lights
-  uint32_t numbers = 0;        ///< how many of the 2^24 random numbers select a light of the tree
+  /// Number of the 2^24 random numbers that select a light of the tree.
+  uint32_t numbers = 0;
 
   /// Returns the device view. Contract: the device view points into this tree.
   LightTreeView view() const;
 };
 
-/// Computes everything of the tree of `set` that does not need its nodes: the selection
+/// Computes the parts of the light tree of `set` that do not require its nodes: the selection
 /// probabilities of infinite lights, and `effective_lights`. The result has no nodes and no trails.
 LightTree outline_light_tree(const LightSet& set, std::span<const double> powers);
 
-/// Returns whether LightSelection::kAuto uses a tree for this number of effective lights.
+/// Returns whether LightSelection::kAuto uses a light tree for the given effective number of
+/// lights.
 bool prefers_tree(float effective_lights);
 
-/// Builds the tree over the finite lights of `set` with `powers` (of all lights, W) above 0: binned
-/// splits that minimize the cost by bounds, orientation and power ("SAOH"), down to single lights,
-/// after A. Conty Estevez and C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree
-/// Splitting", 2018, section 4. Runs in parallel; the result does not depend on the number of
-/// threads. Infinite lights are selected by power as in build_power_table, with one random number
-/// in a hundred distributed evenly among all lights.
+/// Builds the light tree over the finite lights of `set` whose power is above 0; `powers` holds the
+/// powers of all lights in W. Binned splits minimize the surface area orientation heuristic (SAOH),
+/// down to single lights, after A. Conty Estevez and C. Kulla, "Importance Sampling of Many Lights
+/// with Adaptive Tree Splitting", 2018, section 4. The function runs in parallel; the result does
+/// not depend on the number of threads. Infinite lights are selected by power as in
+/// build_power_table(), with one random number in a hundred distributed evenly among all lights.
 LightTree build_light_tree(const LightSet& set, std::span<const double> powers);
 
 /// Returns whether lights are selected by tree. A scene without finite lights has no tree. kAuto

@@ -13,7 +13,7 @@
 
 namespace wavecomb::light_tree {
 
-/// Vectors of three components; the fourth is unused.
+/// SIMD vectors of three components; the fourth component is unused.
 using Float4 = float __attribute__((vector_size(16)));
 using Int4 = int32_t __attribute__((vector_size(16)));
 
@@ -24,13 +24,14 @@ inline Float4 most_of(const Float4& a, const Float4& b) {
   return a < b ? b : a;
 }
 
-/// A light of the tree as the split heuristic sees it.
+/// Properties of a light of the tree that the split heuristic uses.
 struct alignas(16) Item {
   float lo[3];
   uint32_t light;
   float hi[3];
   float intensity;
-  float axis[4];  ///< axis of its normals times (1 + cos of their cone) / 2; then 0
+  /// Axis of the light's normals times (1 + cos(cone angle)) / 2; the fourth component is 0.
+  float axis[4];
 
   float centre(size_t k) const { return 0.5f * lo[k] + 0.5f * hi[k]; }
   Float4 low() const {
@@ -51,7 +52,7 @@ struct alignas(16) Item {
 };
 static_assert(sizeof(Item) == 48);
 
-/// Sums over items from which a split is evaluated.
+/// Bin of lights: sums from which the cost of a split is computed.
 struct Bin {
   Float4 lo = {INFINITY, INFINITY, INFINITY, 0}, hi = {-INFINITY, -INFINITY, -INFINITY, 0};
   Float4 axis = {0, 0, 0, 0};
@@ -59,7 +60,8 @@ struct Bin {
   size_t count = 0;
 
   void add(const Item& item) {
-    // The normals of triangles have no sign, since both sides emit.
+    // Triangles emit from both sides, so the sign of their normals is irrelevant: flip normals to
+    // the same side as the sum.
     const Float4 other = item.normals(), product = axis * other;
     const int32_t flip = product[0] + product[1] + product[2] < 0 ? INT32_MIN : 0;
     merge(item.low(), item.high(),
@@ -91,7 +93,7 @@ inline double emission_measure(double angle) {
               2 * angle * std::sin(angle) + std::cos(angle));
 }
 
-/// Table of emission_measure by the cosine of the angle, from -1 to 1.
+/// Table of emission_measure(), indexed by the cosine of the angle from -1 to 1.
 class MeasureTable {
  public:
   MeasureTable() {
@@ -108,9 +110,10 @@ class MeasureTable {
   std::array<double, kSteps + 1> values_;
 };
 
-/// Returns the part of a split's cost that depends on one side: intensity x bound x orientation.
-/// The bound is a sphere, whose area is proportional to the square of the diagonal. The mean of
-/// vectors spread over a cone has the length (1 + cos) / 2.
+/// Returns the cost of one side of a split: intensity times bound times orientation. The bound is
+/// the area of a sphere, which is proportional to the square of the bounding box diagonal. The
+/// orientation follows from the mean of the normals, which for normals spread over a cone has the
+/// length (1 + cos) / 2.
 inline double cost(const Bin& bin, const MeasureTable& measure) {
   double diagonal2 = 0, sum2 = 0;
   for (size_t k = 0; k < 3; ++k) {

@@ -10,9 +10,10 @@
 
 namespace wavecomb {
 
-/// Training samples, one for each light path, by light path number.
+/// Training samples, one for each light path, indexed by light path number.
 ///
-/// Contract: only the wave that traces a path writes its row, and no two waves trace the same path.
+/// Contract: only the wave that traces a light path writes the path's row, and no two waves trace
+/// the same path.
 class AimSamples {
  public:
   explicit AimSamples(size_t paths) : rows_(paths) {}
@@ -21,7 +22,8 @@ class AimSamples {
   void begin(uint32_t path, const Vec3<float>& point) {
     rows_[path] = {point.x, point.y, point.z, 0.f};
   }
-  /// Adds the unblocked contribution of the path's vertex at `depth`, summed over all pixels.
+  /// Adds the unoccluded contribution of the vertex at `depth` of path `path` to the image, summed
+  /// over all pixels.
   void add(uint32_t path, uint32_t depth, const Vec3<float>& light) {
     if (depth > 0) rows_[path].contribution += luminance(light);
   }

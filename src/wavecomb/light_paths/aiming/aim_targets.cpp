@@ -12,11 +12,11 @@ namespace wavecomb {
 namespace {
 
 /// Fraction of light paths that start unaimed. Unaimed paths reach surfaces that no training path
-/// has hit and keep the weights of aimed paths bounded.
+/// has hit, and they bound the weights of aimed paths.
 constexpr float kEvenShare = 0.25f;
 /// Minimum number of training samples per sphere, and number of candidate split cells per axis.
 constexpr uint32_t kMinSamples = 4, kSplits = 16;
-/// Range of sphere radii, relative to the radius of the scene.
+/// Range of the radii of target spheres, relative to the radius of the scene.
 constexpr double kMinRadius = 0x1p-12, kMaxRadius = 1;
 /// Minimum likelihood gain of a split, relative to the total contribution.
 constexpr double kMinSplitGain = 0.01;
@@ -27,7 +27,7 @@ Position position_of(const AimSample& sample) {
   return {sample.x, sample.y, sample.z};
 }
 
-/// Bounding box, total contribution and number of a set of training samples.
+/// Bounding box, total contribution and number of samples of a set of training samples.
 struct SampleBounds {
   Position lo{}, hi{};
   double contribution = 0;
@@ -44,15 +44,16 @@ struct SampleBounds {
   void add(const SampleBounds& other) {
     if (other.count > 0) add(other.lo, other.hi, other.contribution, other.count);
   }
-  /// Radius of the sphere around the box, enlarged by 1 + 1 / sqrt(count) because few samples
-  /// underestimate the extent.
+  /// Returns the radius of the sphere around the bounding box, enlarged by 1 + 1 / sqrt(count),
+  /// because few samples underestimate the extent.
   double radius(double scene) const {
     double square = 0;
     for (size_t a = 0; a < 3; ++a) square += 0.25 * std::pow(double{hi[a]} - double{lo[a]}, 2);
     const double enlargement = 1 + 1 / std::sqrt(static_cast<double>(std::max(count, 1u)));
     return std::clamp(std::sqrt(square) * enlargement, kMinRadius * scene, kMaxRadius * scene);
   }
-  /// Log-likelihood of the set, up to a constant: W log(W / A) with A = r^2.
+  /// Returns the log-likelihood of the set, up to a constant: W log(W / A), with W the contribution
+  /// and A = r^2.
   double likelihood(double scene) const {
     return contribution > 0 ? contribution * (std::log(contribution) - 2 * std::log(radius(scene)))
                             : 0;
@@ -71,15 +72,16 @@ struct SampleRange {
   Split split;
 };
 
-/// Returns the index of the split cell, of kSplits along `axis` of `box`, that contains `at`.
+/// Returns the index of the cell that contains `at`, if `box` is divided into kSplits cells along
+/// `axis`.
 uint32_t split_cell(const SampleBounds& box, size_t axis, float at) {
   const float wide = box.hi[axis] - box.lo[axis];
   const float share = wide > 0 ? (at - box.lo[axis]) / wide : 0;
   return std::min(static_cast<uint32_t>(share * static_cast<float>(kSplits)), kSplits - 1);
 }
 
-/// Finds the axis-aligned split of `whole` that gains most likelihood; a gain of 0 means that there
-/// is none.
+/// Finds the axis-aligned split of `whole` that increases the likelihood most; a gain of 0 means
+/// that no split does.
 Split best_split(std::span<const AimSample> aim_samples, const SampleBounds& whole, double scene) {
   Split best;
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -89,7 +91,7 @@ Split best_split(std::span<const AimSample> aim_samples, const SampleBounds& who
       const Position p = position_of(sample);
       cells[split_cell(whole, axis, p[axis])].add(p, p, double{sample.contribution}, 1);
     }
-    std::array<SampleBounds, kSplits> above;  // sums of cells i and higher
+    std::array<SampleBounds, kSplits> above;  // element i sums cells i and higher
     SampleBounds sum;
     for (size_t i = kSplits; i-- > 0;) {
       sum.add(cells[i]);
@@ -116,7 +118,8 @@ SampleRange make_range(std::span<const AimSample> all, size_t begin, size_t end,
   return range;
 }
 
-/// Splits the samples greedily, the largest gain first, into at most LightAim::kMax pieces.
+/// Splits the samples greedily, the split with the largest gain first, into at most LightAim::kMax
+/// ranges.
 std::vector<SampleRange> split_greedily(std::vector<AimSample>& all, double scene) {
   std::vector<SampleRange> ranges{make_range(all, 0, all.size(), scene)};
   const double least = kMinSplitGain * ranges[0].bounds.contribution;

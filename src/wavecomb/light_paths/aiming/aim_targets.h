@@ -8,20 +8,20 @@
 
 namespace wavecomb {
 
-/// Training sample of a light path: its first hit, and the luminance that it contributes to the
-/// image from its second vertex on. The contribution of the first vertex is not counted, because
-/// light samples find it as well.
+/// Training sample of a light path: its first hit, and the luminance that its second and later
+/// vertices contribute to the image. The contribution of the first vertex does not count, because
+/// light samples of camera paths also find it.
 struct AimSample {
   float x = 0, y = 0, z = 0;
   float contribution = 0;
 };
 
 /// Fits spheres around the first hits of light paths that contribute to the image. Bounding boxes
-/// are split as long as that increases the likelihood, the largest gain first.
+/// are split as long as splits increase the likelihood, the split with the largest gain first.
 ///
 /// With W_k the contribution in box k and A_k = r_k^2, the mixture chooses sphere k with a
-/// probability proportional to W_k and is uniform within it. Compared with a single sphere, its
-/// log-likelihood is higher by
+/// probability proportional to W_k and is uniform within the sphere. The log-likelihood of the
+/// mixture exceeds that of a single sphere by
 ///   sum_k W_k log(W_k / A_k) - W log(W / A),
 /// which the splits maximise. `scene_radius` is the radius of the bounding sphere of all surfaces.
 /// Returns no spheres if fewer than four samples contribute.

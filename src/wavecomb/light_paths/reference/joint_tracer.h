@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Light paths in the camera paths of the reference integrator (NoJointTracer in
-/// reference/path_tracer.h).
+/// Connections and merge points of light paths for camera paths of the reference integrator (the
+/// counterpart of NoJointTracer in reference/path_tracer.h).
 #pragma once
 
 #include <optional>
@@ -10,7 +10,8 @@
 
 namespace wavecomb {
 
-/// Connects the vertices of camera paths to vertices of light paths, and stores merge points.
+/// Tracer that connects the vertices of camera paths to vertices of light paths, and stores merge
+/// points.
 class LightJointTracer {
   using F = float;
 
@@ -20,13 +21,13 @@ class LightJointTracer {
     if (context.joint.connects) tracer_.emplace(context, worker);
   }
 
-  /// Traces the light path whose vertices the camera path connects to.
+  /// Traces the light path to which the camera path of the same pixel and sample connects.
   void begin(uint32_t pixel, uint32_t sample) {
     if (light_.merge_points) light_.merge_points.clear(1);
     if (tracer_) tracer_->trace(pixel, sample, true);
   }
 
-  /// Connects the vertex to the chosen vertex of the light path.
+  /// Connects the current vertex of the camera path to the stored vertex of the light path.
   Color<F> use_vertex(uint32_t depth, SingleRays& rays) {
     const Color<F> none(0.f);
     if (!tracer_) return none;
@@ -62,7 +63,7 @@ class LightJointTracer {
             at.depth == 0};
   }
 
-  /// Shades the chosen vertex, at which the light path `from` has arrived.
+  /// Shades the stored vertex of the light path; `from` is the row of the ray that hit it.
   VertexResult<F> shade(uint32_t depth, const SingleRays& rays, const LightPathRow<F>& from,
                         const ConnectionTarget<F>& target) {
     const SceneView& scene = context_.scene;

@@ -11,7 +11,7 @@
 
 namespace wavecomb {
 
-/// Traces light paths one after the other and adds their contributions to the film.
+/// Tracer that traces light paths one after the other and adds their contributions to the film.
 class LightTracer {
   using F = float;
 
@@ -27,8 +27,8 @@ class LightTracer {
         counts_(worker.counts),
         rays_(context, worker.counts, worker.aovs) {}
 
-  /// Traces one light path. With `keeps`, stores one of its vertices for the camera path of the
-  /// same pixel and sample.
+  /// Traces one light path. If `keeps`, stores one of its vertices for the camera path of the same
+  /// pixel and sample.
   void trace(uint32_t pixel, uint32_t sample, bool keeps = false) {
     if (keeps) buffers_.vertices.clear(1);
     const SceneView& scene = context_.scene;
@@ -94,7 +94,7 @@ class LightTracer {
                                  .c = out.v.direct});
   }
 
-  /// Light path that arrives at its vertex number `depth`.
+  /// Light path on arrival at its vertex number `depth`.
   struct Arrival {
     uint32_t depth;
     LightPathRow<F> path;

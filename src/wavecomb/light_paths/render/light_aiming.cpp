@@ -16,12 +16,14 @@ namespace wavecomb {
 namespace {
 
 constexpr uint32_t kAimRounds = 4, kAimSeed = 0x9e3779b9u;
-/// Cells along each side of the image through which rays look for surface points.
+/// Number of grid cells along each side of the image; a camera ray through each cell finds a
+/// visible surface point.
 constexpr uint32_t kVisibleCells = 48;
-/// Paths of a round: one for every kAimShare pixels of the image, within these limits.
+/// Number of light paths of a training round: one for every kAimShare pixels of the image, within
+/// these limits.
 constexpr uint64_t kAimShare = 4, kMinAimPaths = 8192, kMaxAimPaths = 131'072;
 
-/// Returns spheres around the points that the camera sees. Their radii are doubled, to include
+/// Returns spheres around the points that the camera sees. The radii are doubled, to include
 /// objects that reflect or focus light onto these points.
 LightAim aim_at_visible(const Scene& scene, const EmbreeAccelerator& accel,
                         const Settings& settings, float scene_radius) {
@@ -35,8 +37,8 @@ LightAim aim_at_visible(const Scene& scene, const EmbreeAccelerator& accel,
   return aim;
 }
 
-/// Returns a plan with one sample of each of the first `count` light paths. Path numbers are coded
-/// as pixels, which may lie below the image if it is small.
+/// Returns a plan with one sample of each of the first `count` light paths. The plan specifies path
+/// numbers as pixels, which may lie below the image if the image is small.
 PassPlan first_paths(const Settings& settings, uint64_t count, uint32_t sample) {
   PassPlan plan;
   plan.pixels.reserve(count);
@@ -58,7 +60,7 @@ LightAiming learn_to_aim(const WaveContext& render, const Scene& scene, const Wa
   settings.crop = false;
   settings.aovs = {};
   settings.seed = kAimSeed;
-  // Roulette would multiply the contribution of survivors, which adds noise.
+  // Disable roulette, which would add noise by increasing the contribution of surviving paths.
   settings.roulette = RouletteKind::kOff;
   const FilterTable filter(settings.filter, settings.used_filter_width());
   const LightSplatFilter light_splat_filter =

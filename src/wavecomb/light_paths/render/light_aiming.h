@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Learns where to aim light paths, before the first pass.
+/// Training of the target spheres of light paths, before the first pass.
 ///
-/// Light paths are traced in rounds. The first round aims at the points that the camera sees, the
-/// others at the results of the round before. The paths of this pilot do not contribute to the
-/// image. The result does not depend on seed, region, samples, threads, waves or lanes, so that
-/// crops, resumed renders and merged renders aim alike.
+/// Light paths are traced in rounds. The first round aims at the points that the camera sees, each
+/// later round at the target spheres fitted in the previous round. The training paths do not
+/// contribute to the image. The result does not depend on seed, region, samples, threads, waves or
+/// lanes, so that crops, resumed renders and merged renders aim at the same spheres.
 #pragma once
 
 #include <cstdint>
@@ -17,25 +17,26 @@
 
 namespace wavecomb {
 
-/// Result of the pilot that learns where to aim, with statistics.
+/// Target spheres of light paths, and statistics of their training.
 struct LightAiming {
-  LightAim aim;        ///< paths are not aimed if it has no spheres
+  LightAim aim;        ///< target spheres; if there are none, light paths are not aimed
   uint64_t paths = 0;  ///< training paths
   double seconds = 0;
 };
 
-/// Learns for a render with `context`, whose lights are calibrated and send paths. Gives up if
-/// `stopped` returns true; the result is then invalid.
+/// Trains the target spheres for a render with `context`, whose lights must be calibrated and emit
+/// light paths. Stops early if `stopped` returns true; the result is then invalid.
 LightAiming learn_to_aim(const WaveContext& context, const Scene& scene, const WaveSetup& waves,
                          const std::function<bool()>& stopped);
 
-/// Pilot of light paths, which run_pilots() calls (render/joint_transport.h).
+/// Pilot of the light path transport, which run_pilots() calls (render/joint_transport.h).
 struct LightPathPilot {
   using Result = LightAiming;
-  /// Makes the lights of `context` emit light paths, if the render has any.
+  /// Makes the lights of `context` emit light paths, if the render uses light paths.
   static void prepare(const Scene& scene, WaveContext& context);
-  /// Learns to aim, unless `earlier` is the result of an earlier pilot, and aims the lights of
-  /// `context`, which must not outlive the result. Returns null if light paths are not aimed.
+  /// Trains target spheres, or uses `earlier`, the result of an earlier pilot, if it is not null.
+  /// Sets the target spheres of the lights of `context`, which must not outlive the result. Returns
+  /// null if light paths are not aimed.
   static std::shared_ptr<const LightAiming> run(const Scene& scene, const WaveSetup& waves,
                                                 const std::shared_ptr<const LightAiming>& earlier,
                                                 const std::function<bool()>& stopped,

@@ -22,7 +22,8 @@ LightPathPlan::LightPathPlan(const Scene& scene, const Settings& settings, Light
 }
 
 uint32_t LightPathPlan::pass_samples(const Settings& settings, uint32_t samples) {
-  // Light vertices are merged with the points seen by one sample of each pixel.
+  // With merging, a pass has one sample per pixel, since light paths are merged with the points of
+  // one sample of each pixel.
   return settings.merges() ? 1 : samples;
 }
 
@@ -53,7 +54,7 @@ LightPathPasses::LightPathPasses(const LightPathPlan& plan, const Settings& sett
   if (settings.merges()) grid_ = std::make_unique<MergeGrid>();
   // A render of a region also needs the light paths of the whole image.
   if (settings.joins_light()) order_ = morton_pixel_order({0, 0, settings.width, settings.height});
-  // Light paths that camera paths connect to are traced in the same wave as these.
+  // Light paths to which camera paths connect are traced in the waves of these camera paths.
   if (settings.connects())
     std::erase_if(order_, [region = settings.rendered()](uint32_t pixel) {
       return region.contains(pixel & 0xffffu, pixel >> 16);
@@ -62,7 +63,7 @@ LightPathPasses::LightPathPasses(const LightPathPlan& plan, const Settings& sett
 
 uint32_t light_samples_after(const NoiseParts& noise, uint32_t done, uint32_t before,
                              uint32_t after, uint32_t share, double active_share) {
-  if (done < 2) return std::max(done, share);  // the half buffers need two samples
+  if (done < 2) return std::max(done, share);  // the half buffers need at least two samples
   const double own = noise.own * before, splats = noise.splats * done;
   if (!(own > 0)) return splats > 0 ? std::max(done, share) : done;
   const double wanted = std::ceil(after * std::sqrt(splats * active_share / own));

@@ -22,26 +22,28 @@ namespace wavecomb {
 struct LightAiming;
 struct RenderStatistics;
 
-/// Light paths of a render plan. Empty if the settings ask for none.
+/// Plan of the light paths of a render; empty if the settings do not use light paths.
 ///
 /// Contract: scene and settings outlive the plan, and the plan outlives the contexts made from it.
 class LightPathPlan {
  public:
-  /// `filter` is the pixel filter of the camera. Throws Error if the scene does not support light
-  /// paths that the settings ask for.
+  /// `filter` is the pixel filter of the camera. Throws Error if the settings use light paths, but
+  /// the scene does not support them.
   LightPathPlan(const Scene& scene, const Settings& settings, LightPathShare share,
                 const CameraSetup& camera, const FilterTable& filter);
 
-  /// Returns the samples per pixel of a pass that would have `samples` without light paths.
+  /// Returns the samples per pixel of a pass, given the number `samples` that it would have without
+  /// light paths.
   static uint32_t pass_samples(const Settings& settings, uint32_t samples);
-  /// Adds the layers of light paths to an empty film.
+  /// Adds the sums for light paths to an empty film.
   void allocate(Film& film) const;
-  /// Creates the data that the waves of the render read. `grid` is from LightPathPasses.
+  /// Creates the light path data that all waves of the render read. `grid` is from LightPathPasses.
   LightPathContext context(const MergeGrid* grid) const;
   LightPathShare share() const { return share_; }
-  /// Makes light splats carry LightPathContext::camera_squares from now on.
+  /// From this call on, light splats hold variance (LightPathContext::camera_squares) instead of
+  /// light.
   void measure_squares(LightPathContext& context) const;
-  /// Adds the statistics of light paths. `aiming` is null if they are not aimed.
+  /// Adds the statistics of light paths. `aiming` is null if light paths are not aimed.
   void report(const LightAiming* aiming, RenderStatistics& statistics) const;
 
  private:
@@ -49,52 +51,55 @@ class LightPathPlan {
   const Settings& settings_;
   LightPathShare share_;
   LightSplatFilter filter_;
-  std::vector<std::string> lights_without_paths_;  ///< if other lights emit light paths
+  /// Names of the lights that emit no light paths, if other lights do.
+  std::vector<std::string> lights_without_paths_;
 };
 
 /// Returns the number of samples of each light path at the end of a pass.
 ///
 /// `done` is the number of samples of light paths so far. `before` and `after` are the samples of
-/// pixels at the start and the end of the pass. `share` is the largest number of samples of light
-/// paths, from the ratio of the two kinds of paths that the render uses. `active_share` is |A| / P
-/// below.
+/// pixels at the start and the end of the pass. `share` is the maximum number of samples of light
+/// paths, which follows from the render's ratio of light paths to camera paths. `active_share` is
+/// |A| / P below.
 ///
-/// A pass traces |A| (after - before) paths from the |A| active pixels, and P paths for each sample
-/// of the P light paths. With n samples of pixels, m of light paths and the variances V_c and V_l
-/// of one sample, the error V_c / n + V_l / m is least for a given cost where
+/// A pass traces |A| (after - before) camera paths for the |A| active pixels, and P paths for each
+/// sample of the P light paths. If V_c and V_l are the variances of one sample of camera paths and
+/// light paths, n samples of pixels and m samples of light paths have the error V_c / n + V_l / m.
+/// For a given cost, the error is least if
 ///   m / n = sqrt(V_l |A| / (V_c P)).
-/// Both variances are estimated from half buffers over the active pixels. `share` is the limit
-/// because more samples of one kind would need other MIS weights. Only earlier passes decide, so
-/// the image stays unbiased.
+/// Both variances are estimated from half buffers over the active pixels. The number is limited to
+/// `share`, because more light path samples would require different MIS weights. It depends only on
+/// earlier passes, so the image stays unbiased.
 uint32_t light_samples_after(const NoiseParts& noise, uint32_t done, uint32_t before,
                              uint32_t after, uint32_t share, double active_share);
 
-/// Light paths of the passes of a render. A pass traces them after its camera paths.
+/// Light paths of the passes of a render. Each pass traces light paths after its camera paths.
 ///
-/// Contract: one thread at a time.
+/// Contract: only one thread uses the object at a time.
 class LightPathPasses {
  public:
   explicit LightPathPasses(const LightPathPlan& plan, const Settings& settings);
 
-  /// Returns the points to merge light paths with, for LightPathPlan::context(), or null.
+  /// Returns the points with which light paths are merged, for LightPathPlan::context(), or null
+  /// without merging.
   const MergeGrid* grid() const { return grid_.get(); }
-  /// Returns the samples of each light path when pixels have `samples`.
+  /// Returns the number of samples of each light path if each pixel has `samples` samples.
   uint32_t samples(uint32_t samples) const { return share_.samples(samples); }
-  /// Returns the samples of each light path after a pass of an adaptive render. `done` and
-  /// `light_done` are the samples of pixels and of light paths before it, `pass` has its active
-  /// pixels, `active` of them, and their target.
+  /// Returns the number of samples of each light path after a pass of an adaptive render. `done`
+  /// and `light_done` are the samples of pixels and of light paths before the pass. `pass` holds
+  /// the pass's active pixels, whose number is `active`, and their target sample count.
   uint32_t adaptive_samples(const Film& film, const PassState& pass, uint32_t done,
                             uint32_t light_done, uint64_t active) const;
-  /// Plans the light paths that a pass still has to trace, up to `target` samples of each. Empty if
-  /// the render has none.
+  /// Plans the light paths that a pass still has to trace, up to `target` samples of each. The plan
+  /// is empty if the render has no light paths.
   PassPlan plan(const Film& film, uint32_t target) const;
-  /// Prepares the light paths of a pass, whose camera paths are finished.
+  /// Prepares the light paths of a pass after its camera paths are finished.
   void begin(const Film& film);
 
  private:
   const Settings& settings_;
   LightPathShare share_;
-  std::vector<uint32_t> order_;  ///< Morton order of light path numbers
+  std::vector<uint32_t> order_;  ///< light path numbers, as pixels in Morton order
   std::unique_ptr<MergeGrid> grid_;
 };
 

@@ -13,28 +13,29 @@
 namespace wavecomb {
 namespace {
 
-/// Samples per pixel of a pilot render, enough for the effects of the Sobol sequence and of
-/// roulette, and limits of its pixel count.
+/// Samples per pixel of a pilot render, which suffice to show the effects of Sobol sequences and of
+/// roulette, and limits of the pilot's pixel count.
 constexpr uint32_t kTransportSamples = 8;
 constexpr uint64_t kMinTransportPixels = 400, kMaxTransportPixels = 16'384;
-/// A pilot render takes one of every kTransportShare samples of the render. With five images, of
-/// which three cost two or three times as much as the others, pilots take about a hundredth of the
-/// render.
+/// A pilot render has the sample count of the render divided by kTransportShare. There are five
+/// pilot renders, three of which cost two or three times as much as the other two, so all of them
+/// take about a hundredth of the render time.
 constexpr uint64_t kTransportShare = 1000;
 constexpr std::array<uint32_t, 2> kTransportSeeds = {0x3c6ef372u, 0xa54ff53au};
-/// Costs in rays of a vertex: by kernels for camera paths only, and by kernels that support light
+/// Cost of shading a vertex, in units of one ray: for kernels without and with support of light
 /// paths.
 constexpr double kPathVertex = 0.7, kJointVertex = 0.8;
-/// With merging, additional costs in rays of a camera path (which may store a merge point) and of
-/// a light vertex.
+/// Additional costs with merging, in units of one ray: of a camera path, which may store a merge
+/// point, and of a light path vertex.
 constexpr double kMergedPath = 1, kMergedVertex = 1;
-/// Fraction of the noisiest pixels that a second estimate also leaves out. A single pixel may hold
-/// most of the noise of a small image, which makes results differ between pilot renders.
+/// Fraction of pixels, the noisiest ones, that a second noise estimate leaves out. A single pixel
+/// may have most of the noise of a small image, so that results differ between pilot renders.
 constexpr double kNoisiest = 0.01;
-/// Light that is rarely found makes nearly all pixels black and the others far too bright. Its
-/// squared error is limited to this many squares of the light at the pixel.
+/// Limit of the squared error of light that camera paths would have to find, in units of the
+/// squared light of the pixel. Light that is rarely found leaves nearly all pixels black and makes
+/// a few far too bright.
 constexpr double kMaxLost = 8;
-/// Least predicted gain in efficiency for light paths to be used.
+/// Minimum predicted gain in efficiency for which light paths are used.
 constexpr double kMinLightPathGain = 1.3;
 /// Roughness below which a lobe is sharp enough for visible caustics.
 constexpr float kSharpRoughness = 0.4f;
@@ -57,7 +58,7 @@ float brightness(const std::vector<float>& rgb, size_t pixel) {
   return luminance(Vec3<float>{rgb[3 * pixel], rgb[3 * pixel + 1], rgb[3 * pixel + 2]});
 }
 
-/// Returns 1 / (I^2 + 0.01 mean(I)^2) for each pixel, with I the mean of the images over 3 x 3
+/// Returns 1 / (I^2 + 0.01 mean(I)^2) for each pixel, where I is the mean of the images over 3 x 3
 /// pixels.
 std::vector<double> inverse_squares(const std::vector<double>& mean, uint32_t width) {
   const auto height = static_cast<uint32_t>(mean.size() / width);
@@ -78,7 +79,7 @@ std::vector<double> inverse_squares(const std::vector<double>& mean, uint32_t wi
   return out;
 }
 
-/// Rays and shading records of a pilot render.
+/// Numbers of rays and shading records of a pilot render.
 struct PilotWork {
   double rays = 0, records = 0;
 
@@ -92,7 +93,8 @@ PilotWork work_of(const std::array<TransportPilot, 2>& pilots) {
   }
   return work;
 }
-/// Returns the work of camera paths alone, extrapolated from two ratios of light paths.
+/// Returns the work of a render without light paths, extrapolated from pilot renders with two
+/// ratios of light paths.
 PilotWork work_without(const TransportPilots& pilots) {
   const PilotWork few = work_of(pilots.with[0]), many = work_of(pilots.with[1]);
   const double a = double{kCandidateShares[0].paths()}, b = double{kCandidateShares[1].paths()};
@@ -100,14 +102,14 @@ PilotWork work_without(const TransportPilots& pilots) {
   return {without_light_paths(few.rays, many.rays), without_light_paths(few.records, many.records)};
 }
 
-/// Squared relative noise by pixel.
+/// Squared relative noise of each pixel.
 using PixelNoise = std::vector<double>;
 
 double sum(const PixelNoise& noise) {
   return std::accumulate(noise.begin(), noise.end(), 0.0);
 }
 
-/// Returns the sum without the noisiest pixels.
+/// Returns the sum of the noise without the noisiest pixels (kNoisiest).
 double sum_of_most(PixelNoise noise) {
   const auto most =
       noise.end() - static_cast<ptrdiff_t>(kNoisiest * static_cast<double>(noise.size()));
@@ -115,7 +117,8 @@ double sum_of_most(PixelNoise noise) {
   return std::accumulate(noise.begin(), most, 0.0);
 }
 
-/// Returns whether a lobe of this roughness is sharp. If the roughness varies, it may be.
+/// Returns whether a lobe of the given roughness is sharp. Returns true if the roughness varies,
+/// since the lobe may be sharp.
 bool is_sharp(float roughness, bool varies) {
   return varies || roughness < kSharpRoughness;
 }

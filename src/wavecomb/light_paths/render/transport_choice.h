@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Choice of the transport for Transport::kAuto: whether and how many light paths a render traces.
 ///
-/// There are none if the settings or the scene do not support them, if no surface is transmissive
-/// or glossy, or if no light sends paths. Otherwise small images of the whole view are rendered
-/// before the first pass, two for each candidate ratio of light paths. (Each ratio needs its own
-/// images, because the MIS weights depend on the ratio, and the noise of both kinds of paths on the
-/// weights.) The noise without light paths cannot be measured in images of so few samples, since
-/// camera paths may not find a caustic at all. Light paths estimate it instead
+/// A render traces no light paths if the settings or the scene do not support them, if no surface
+/// is transmissive or glossy, or if no light emits light paths. Otherwise small images of the whole
+/// view are rendered before the first pass, two for each candidate ratio of light paths. (Each
+/// ratio needs its own images, because the MIS weights depend on the ratio, and the noise of both
+/// kinds of paths on the weights.) The noise without light paths cannot be measured in images of so
+/// few samples, since camera paths may not find a caustic at all. Light paths estimate it instead
 /// (light_paths/light_vertex.h). Let e_camera be the squared error of the light that camera paths
-/// contribute beside light paths, e_left the squared error of the remaining light if camera paths
-/// had to find it, and c the cost without light paths, from counts of rays and vertices at fixed
-/// costs. The gain in efficiency of a ratio with squared error e_s and cost c_s is
+/// contribute in a render with light paths, e_left the squared error of the remaining light if
+/// camera paths had to find it, and c the cost without light paths, from counts of rays and
+/// vertices at fixed costs. The gain in efficiency of a ratio with squared error e_s and cost c_s
+/// is
 ///   (e_camera + e_left) c / (e_s c_s).
 /// The choice does not depend on seed, region, threads, waves or lanes, so that crops, resumed
 /// renders and merged renders use the same transport. Samples of the pilot do not contribute to the
@@ -33,30 +34,32 @@ namespace wavecomb {
 struct TransportChoice {
   Transport transport = Transport::kPath;
   LightPathShare share;  ///< for Transport::kLight
-  std::string why;       ///< completes a sentence about the choice
-  double gain = 0;  ///< predicted efficiency over a render without light paths; 0 if not measured
+  std::string why;       ///< reason as a clause, for messages about the choice
+  /// Predicted efficiency relative to a render without light paths; 0 if not measured.
+  double gain = 0;
   double seconds = 0;
 };
 
 /// Result of a small pilot render.
 struct TransportPilot {
-  std::vector<float> beauty;          ///< rgb
-  std::vector<float> by_light_paths;  ///< the part of beauty from light paths; empty without them
-  uint64_t rays = 0, records = 0;     ///< traced rays and shading records
+  std::vector<float> beauty;  ///< rgb
+  /// Part of the beauty contributed by light paths; empty without light paths.
+  std::vector<float> by_light_paths;
+  uint64_t rays = 0, records = 0;  ///< numbers of traced rays and shading records
 };
 /// Renders a small image with the given ratio of light paths. If the last argument is true,
 /// by_light_paths holds the variance of RenderOptions::wants_camera_squares.
 using RenderPilot = std::function<TransportPilot(const Settings&, LightPathShare, bool)>;
 
-/// Candidate ratios of light paths. Near the better one, efficiency hardly depends on the ratio on
-/// stages with caustics, with and without merging.
+/// Candidate ratios of light paths. On stages with caustics, with or without merging, efficiency
+/// hardly depends on the ratio near the better candidate.
 inline constexpr std::array<LightPathShare, 2> kCandidateShares = {{{-3}, {0}}};
 
 /// Returns whether any material reflects or transmits light sharply enough for caustics.
 bool focuses_light(const Scene& scene);
 
-/// Chooses the transport for `settings` from small images made by `render`. Gives up if `stopped`
-/// returns true; the result is then invalid.
+/// Chooses the transport for `settings` from small images made by `render`. Stops early if
+/// `stopped` returns true; the result is then invalid.
 TransportChoice choose_transport(const Scene& scene, const Settings& settings,
                                  const RenderPilot& render, const std::function<bool()>& stopped);
 
@@ -64,18 +67,19 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings,
 
 /// Small pilot renders of `width` columns.
 struct TransportPilots {
-  std::array<TransportPilot, 2> with[kCandidateShares.size()];  ///< results by ratio of light
-                                                                ///< paths, with two seeds each
-  std::vector<double> variance;  ///< squared noise by pixel, per sample, of the light left to
-                                 ///< camera paths
+  /// Results for each ratio of light paths, with two seeds each.
+  std::array<TransportPilot, 2> with[kCandidateShares.size()];
+  /// Squared noise per sample of each pixel, for the light that only camera paths find.
+  std::vector<double> variance;
   uint32_t width = 0;
   bool merges = false;
 };
 struct TransportGain {
-  double gain = 0;  ///< best efficiency relative to a render without light paths
+  double gain = 0;  ///< efficiency of the best ratio, relative to a render without light paths
   LightPathShare share;
 };
-/// Returns the predicted gain for a render with `longer` times as many samples.
+/// Returns the predicted efficiency gain for a render with `longer` times as many samples as the
+/// pilots.
 TransportGain transport_gain(const TransportPilots& pilots, double longer);
 
 }  // namespace wavecomb

@@ -11,8 +11,8 @@
 
 namespace wavecomb {
 
-/// Fills the shading queue with the light path vertices that the records just shaded connect to,
-/// grouped by program.
+/// Fills the shading queue with the light path vertices to which the last shaded camera path
+/// vertices connect, grouped by shading program.
 template <typename F>
 void collect_connections(Wave& wave, const WaveContext& context, uint32_t depth) {
   using U = UInt<F>;
@@ -22,7 +22,7 @@ void collect_connections(Wave& wave, const WaveContext& context, uint32_t depth)
   const size_t shaded = queue.size;
   queue.clear();
   size_t n = 0;
-  // Overwrite the queue in place, which is safe because writes stay behind reads.
+  // Overwrite the queue in place, which is safe because each entry is read before it is written.
   for (size_t i = 0; i < shaded; i += kWidth<F>) {
     Mask<F> active = first_lanes<F>(shaded - i);
     const U slot = load<U>(queue.slot + i);
@@ -44,8 +44,8 @@ void collect_connections(Wave& wave, const WaveContext& context, uint32_t depth)
   wave.counts.add_records(depth, n);
 }
 
-/// Connects the shaded vertices of camera paths at `depth`. Does not change the list of their next
-/// rays.
+/// Connects the shaded vertices of camera paths at `depth`. Does not change the list of the camera
+/// paths' next rays.
 template <typename F>
 void connect(Wave& wave, const WaveContext& context, uint32_t depth) {
   using U = UInt<F>;

@@ -8,8 +8,8 @@
 
 namespace wavecomb {
 
-/// Fills the pool, with slots numbered as in generate(), and the ray queue with the paths for which
-/// a light was sampled.
+/// Starts light paths in the slots of the wave, which are numbered as in generate(), and fills the
+/// ray queue with the paths for which a light was sampled.
 template <typename F>
 void generate_light(Wave& wave, const WaveContext& context, const WaveTask& task) {
   using U = UInt<F>;

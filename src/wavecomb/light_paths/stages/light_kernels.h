@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Tables of the kernels for light paths, by program id. A separate unit compiles each kernel
-/// (wave/kernels/kernel_matrix.h); this header only declares them.
+/// Tables of the kernels for light paths, by program id. A separate translation unit compiles each
+/// kernel (wave/kernels/kernel_matrix.h); this header only declares them.
 #pragma once
 
 #include "wavecomb/light_paths/light_path.h"
@@ -33,10 +33,10 @@ constexpr auto light_vertex_kernels(ProgramList<Bsdf...>) {
 }
 }  // namespace detail
 
-/// Kernels for waves of any lane width, by variant.
+/// Light path kernels for waves of any lane width, by program variant.
 inline constexpr auto kShadeLightBatch =
     detail::light_batch_kernels<LightLanes>(Programs<LightLanes>{});
-/// Kernels for the reference integrator, by ProgramId.
+/// Light path kernels for the reference integrator, by ProgramId.
 template <typename F>
 inline constexpr auto kShadeLightVertex = detail::light_vertex_kernels<F>(Programs<F>{});
 

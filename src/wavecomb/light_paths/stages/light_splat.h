@@ -9,8 +9,8 @@
 
 namespace wavecomb {
 
-/// Adds a contribution of sample `sample` at position (x, y) of the film, in pixels, to the sums of
-/// the surrounding pixels. The sums are integers, so that the order does not matter.
+/// Adds a contribution of light path sample `sample` at film position (x, y), in pixels, to the
+/// sums of the surrounding pixels. The sums are integers, so that the order does not matter.
 inline void add_light_splat(const WaveContext& context, LightSplatList& list, uint32_t sample,
                             float x, float y, const Color<float>& c) {
   Film& film = *context.film;
@@ -21,7 +21,7 @@ inline void add_light_splat(const WaveContext& context, LightSplatList& list, ui
   });
 }
 
-/// Returns the number of the light path in a slot of a wave.
+/// Returns the light path number of the path in a slot of a wave.
 inline uint32_t light_path_in(const WaveContext& context, const WaveTask& task, uint32_t slot) {
   return light_path_number(*context.settings, task.pixels[slot / task.samples]);
 }
@@ -37,7 +37,7 @@ inline void record_first_hits(const Wave& wave, const WaveContext& context, cons
   }
 }
 
-/// Reports the finished light paths of a task to the film.
+/// Adds the finished light paths of a task to the film's count of light paths.
 inline void count_light_paths(const WaveContext& context, const WaveTask& task) {
   if (context.joint.aim_samples) return;
   for (uint32_t p = 0; p < task.pixel_count; ++p)
@@ -45,8 +45,8 @@ inline void count_light_paths(const WaveContext& context, const WaveTask& task) 
                                 task.first_sample, task.samples);
 }
 
-/// Tests which vertices the camera sees. Adds their contributions to the film or, in training, to
-/// the training samples.
+/// Tests which vertices of light paths the camera sees. Adds the contributions of visible vertices
+/// to the film or, in training, to the training samples.
 template <typename F>
 void splat(Wave& wave, const WaveContext& context, const WaveTask& task, uint32_t depth) {
   const ShadowQueue& q = wave.shadows;

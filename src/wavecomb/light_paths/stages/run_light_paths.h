@@ -52,10 +52,11 @@ void run_light_paths(Wave& wave, const WaveContext& context, const WaveTask& tas
   run_stages<F>(wave, context, task, LightPathStages<F>());
 }
 
-/// Stages that waves of camera paths run for light paths (NoJointStages in wave/run_wave.h).
+/// Additional wave stages of camera paths in renders with light paths (the counterpart of
+/// NoJointStages in wave/run_wave.h).
 template <typename F>
 struct LightPathJointStages {
-  /// Traces the light paths whose vertices the camera paths of the task connect to.
+  /// Traces the light paths to whose vertices the camera paths of the task connect.
   static void begin(Wave& wave, const WaveContext& context, const WaveTask& task) {
     LightPathBuffers& light = wave.joint;
     if (light.merge_points) light.merge_points.clear(task.path_count());
@@ -69,7 +70,7 @@ struct LightPathJointStages {
   static void use_vertices(Wave& wave, const WaveContext& context, uint32_t depth) {
     if (wave.joint.vertices) connect<F>(wave, context, depth);
   }
-  /// Stores the merge point of each pixel, which is the one of its last sample.
+  /// Stores the merge point of each pixel, which is the merge point of its last sample.
   static void end(const Wave& wave, const WaveContext& context, const WaveTask& task) {
     const MergePointRows& points = wave.joint.merge_points;
     if (!points) return;

@@ -86,7 +86,7 @@ NODES |= {
 
 @_node("atan2")
 def _atan2(n: NodeCall) -> Value:
-    # MaterialX 1.38 names the inputs in1 and in2.
+    # MaterialX 1.38 names the two inputs in1 and in2.
     y, x = n.given("iny") or n.given("in1"), n.given("inx") or n.given("in2")
     return n.make.op("atan2", y or 0.0, x or 1.0)
 
@@ -135,7 +135,7 @@ def _if(n: NodeCall) -> Value:
         condition = m.op("less", b, a)
     else:
         condition = m.sub(1.0, m.op("less", a, b))
-    # In this variant of the node, the result is the condition itself.
+    # In the boolean variant of the node, the result is the condition itself.
     if "_boolean" in n.identifier:
         return condition
     return m.op("select", condition, n.value("in1"), n.value("in2"))
@@ -153,7 +153,7 @@ def _same(n: NodeCall) -> Value:
 @_node("convert")
 def _convert(n: NodeCall) -> Value:
     """Converts between types: new components are 0 (the fourth is 1), and a number is repeated."""
-    words = n.identifier.split("_")  # such as ND_convert_color3_color4
+    words = n.identifier.split("_")  # identifiers are such as ND_convert_color3_color4
     return n.value("in", 0.0, WIDTHS.get(words[2], 0) if len(words) > 3 else 0)
 
 

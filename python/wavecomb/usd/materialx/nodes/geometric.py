@@ -154,7 +154,7 @@ def _transform(n: NodeCall) -> Value:
         return n.value("in", (0.0, 0.0, 1.0), 3)
     v = _transformed(n, (0.0, 0.0, 1.0 if is_normal else 0.0))
     if n.kind == NORMAL:
-        # Computes the normal that the transform maps to this vector.
+        # Compute the normal that the transform maps to the vector v.
         if not is_normal:
             v = _dots(m, _columns(m), weighted_sum(m, _columns(m), v))
         return _tangent_of_object(m, v)

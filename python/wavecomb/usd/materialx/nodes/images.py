@@ -160,7 +160,8 @@ class _Grid:
         base = m.op("floor", skewed)
         x, y = ((part,) for part in m.sub(skewed, base))
         z = m.sub(m.sub(1.0, x), y)
-        # The value is 1 in the upper triangle of a cell, where z is 0 or less.
+        # `upper` is 1 in the upper triangle of a grid cell, where z is 0 or less, and 0 in the
+        # lower triangle.
         upper = m.op("select", m.op("less", 0.0, z), 0.0, 1.0)
         lower = m.sub(1.0, upper)
         sign = m.sub(m.mul(upper, 2.0), 1.0)
@@ -227,7 +228,7 @@ def _hextiled_image(n: NodeCall) -> Value:
     m, grid = n.make, _Grid(n)
     copies = grid.copies()
     texels = _texels(n, grid, copies, is_raw=False)
-    # This input holds the value that replaces a missing file.
+    # A constant is the default value of the node, which replaces a missing file.
     if is_constant(texels[0]):
         return texels[0]
     luma, contrast = n.value("lumacoeffs", LUMA, 3), n.value("falloffcontrast", 0.5, 1)
@@ -254,7 +255,7 @@ def _hextiled_normal_map(n: NodeCall) -> Value:
         v = m.sub(m.mul(fit(texel, 3), 2.0), 1.0)
         if flips:
             v = v[:1] + m.sub(0.0, v[1:2]) + v[2:]
-        # The tangent frame is rotated by -turn, so that its vectors stay fixed to the copy.
+        # Rotate the tangent vectors by -turn, because the copy of the tile is rotated by turn.
         back = m.sub(0.0, copy.turn)
         across = _turned(m, m.mul(v[:2], strength), m.op("sin", back), m.op("cos", back))
         steep = m.op("max", m.op("abs", v[2:]), 1e-3)

@@ -370,5 +370,5 @@ class InstancedGraphs:
         prim = end.GetPrim()
         if UsdShade.Output.IsOutput(end) or not prim.IsInstanceProxy():
             return str(end.GetPath())
-        # A value inside the prototype is the same for all instances.
+        # All instances share the value inside the prototype.
         return str(prim.GetPrimInPrototype().GetPath().AppendProperty(end.GetName()))
