@@ -249,8 +249,7 @@ class LoadOptions:
     )  # fmt: skip
     catch: str = _row(
         "through",
-        "Which render of a stage with shadow catchers to load: the image, or the catchers with or "
-        "without other objects.",
+        "Render of a stage with shadow catchers: image, or catchers with or without other objects.",
         "choice",
         choices=CATCH,
     )

@@ -22,10 +22,9 @@ namespace wavecomb {
 ///
 /// Opaque and thin-walled surfaces are two-sided. Inside a transmissive solid there is no fuzz, and
 /// the coat does not reflect. Subsurface scattering is diffuse reflection, or, with random walks,
-/// enters through a diffuse lobe to the other side (medium/subsurface/random_walk.h).
-///
-/// A variant compiled for some of the features (material/description/variants.h) gives bitwise
-/// equal results for materials that use no others.
+/// enters through a diffuse lobe to the other side (medium/subsurface/random_walk.h). A variant for
+/// some of the features (material/description/variants.h) gives bitwise equal results for materials
+/// that use no others.
 template <typename F, uint32_t kParts>
 class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   using Viewed = ViewedBsdf<OpenPbrBsdf<F, kParts>, F>;
@@ -39,14 +38,12 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   static constexpr bool kReadsIor = true;
   static constexpr bool kEmits = (kParts & kEmissionPart) != 0;
   static constexpr bool kAbsorbs = (kParts & kTransmissionPart) != 0;
-  // All variants have kTransmits = true, because light selection in the light tree depends on it
-  // and must not differ between variants.
+  // True for all variants, because light selection in the light tree depends on kTransmits.
   static constexpr bool kTransmits = true;
   static constexpr bool kHasSubsurface = kBack;
   static constexpr bool kTextured = (kParts & (kTexturePart | kAnisotropyPart)) != 0;
   using Params = OpenPbrParams<F>;
-  /// Inputs that may read textures: all or none of them, because one textured input suffices to
-  /// align the tangent frame with the texture.
+  /// All inputs or none, because one textured input aligns the tangent frame with the texture.
   static constexpr uint32_t kInputs =
       !kTextured ? 0u
                  : input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |
@@ -128,12 +125,12 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     typename Base::View base;
     typename EonDiffuse<F>::Sampler eon;
     FuzzLobe<F> fuzz;
-    Color<F> glossy;        ///< transmission of the interface to the diffuse lobe
-    F fuzz_on, coat_on;     ///< weights of fuzz and coat on the viewer's side
-    F under_fuzz;           ///< transmission through the fuzz
-    F coat_compensation;    ///< scale of coat reflection for multiple scattering
-    Color<F> bare, coated;  ///< Transmission of the layers above the base is bare + coated *
-                            ///< coat_color^(1 / (2 mu_i)).
+    Color<F> glossy;      ///< transmission of the interface to the diffuse lobe
+    F fuzz_on, coat_on;   ///< weights of fuzz and coat on the viewer's side
+    F under_fuzz;         ///< transmission through the fuzz
+    F coat_compensation;  ///< scale of coat reflection for multiple scattering
+    /// Transmission of the layers above the base: bare + coated coat_color^(1 / (2 mu_i)).
+    Color<F> bare, coated;
     F p_diffuse, p_back, p_fuzz, p_coat, p_base;
   };
 
