@@ -62,7 +62,7 @@ class Verdict:
 
     @property
     def mean_is_open(self) -> bool:
-        """Whether the means differ by over 0.5 %, but by at most three standard errors more."""
+        """Whether the means differ by over 0.5 %, but the excess is within three standard errors."""
         return 0 < abs(self.difference) - MEAN_LIMIT <= 3 * self.noise
 
     @property

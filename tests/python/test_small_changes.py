@@ -251,7 +251,7 @@ def compiler() -> list[str]:
 
 
 def applied(tree: Path, change: Change) -> None:
-    """Makes a copy of the core with a change."""
+    """Copies the C++ sources and edits the copy."""
     shutil.copytree(ROOT / "src", tree / "src", dirs_exist_ok=True)
     for name, texts in change.items():
         path = tree / name

@@ -126,7 +126,7 @@ def test_hair(
     roughness: tuple[float, float],
     depth: int,
 ) -> None:
-    """A single fibre, smooth and rough, and scattering between fibres and a head."""
+    """Compares a smooth fibre, a rough fibre, and fibres on a head."""
     from mitsuba_bridge import MitsubaScene, PeerSettings
 
     points, radii = fibres(kind)

@@ -180,7 +180,7 @@ def _dry_run(sitting: object) -> None:
 @click.argument("folder", type=click.Path(), metavar="DIR")
 @option(
     "--markdown FILE.md", "path",
-    "Also write a Markdown page, with its figures in a folder FILE beside it.",
+    "Also write a Markdown page; its figures go to a folder beside it.",
 )  # fmt: skip
 def report_command(folder: str, markdown: str | None) -> None:
     """Write DIR/report.html and DIR/figures from the results in DIR."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cost profiles: shading time per record of each material, as initial values for later renders."""
+"""Cost profiles: time to shade a hit, by material, as initial values for later renders."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ namespace wavecomb {
 enum Part : uint32_t {
   kTexturePart = 1,        ///< The material reads textures or a value graph.
   kEmissionPart = 2,       ///< emission
-  kMetalPart = 4,          ///< The material has metallic above 0, or F0 by specular_color.
+  kMetalPart = 4,          ///< The material has a metallic weight above 0, or `specular_color` gives F0.
   kCoatPart = 8,           ///< clearcoat
   kTransmissionPart = 16,  ///< straight or refracted transmission
   // openpbr only:

@@ -130,7 +130,7 @@ struct FieldDrift {
 /// Packed volume. All lanes of a packet look up the same volume at a time, so records are read
 /// without gathers.
 struct VolumeRecord {
-  TransformedGrid density;         ///< without a table, density is 1 in a single cell
+  TransformedGrid density;         ///< without a density table, the density is 1 everywhere
   TransformedGrid color;           ///< without a table, the colour factor is 1 everywhere
   TransformedGrid emission_field;  ///< emission field; equals density if there is none
   float extinction[3], albedo[3], emission[3];

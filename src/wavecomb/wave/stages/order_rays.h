@@ -62,7 +62,7 @@ struct RayOrderChoice {
   double prepare_ns = 0;
 };
 
-/// Sorts the queue's slots by `order`; for kAuto the chooser decides. `rows` holds the rays of the
+/// Sorts the queue's slots by `order`; for kAuto `chooser` decides. `rows` holds the rays of the
 /// pool.
 template <typename F, typename Queue>
 RayOrderChoice order_rays(Wave& wave, const WaveContext& context, uint32_t depth, RayOrder order,

@@ -205,7 +205,7 @@ def identity(size: int) -> tuple[float, ...]:
 def _transform(n: NodeCall) -> Value:
     """Multiplies a row vector by a matrix; appends a 1 to a vector that is one component short.
 
-    A result that is too long is cut without dividing it by its last component.
+    Extra components of a result are dropped, without a perspective division.
     """
     size = 4 if n.identifier.endswith(("M4", "vector4")) else 3
     matrix = n.value("mat", identity(size), size * size)
