@@ -63,15 +63,6 @@ uint64_t samples_of(const Settings& settings) {
   return uint64_t{settings.width} * settings.height * settings.spp;
 }
 
-/// Returns the number of samples that the render is expected to take. With a time limit,
-/// Settings::spp may be out of reach.
-uint64_t expected_samples(const Settings& settings, uint32_t threads) {
-  const uint64_t samples = samples_of(settings);
-  if (!(settings.time_limit > 0)) return samples;
-  const double in_time = double{settings.time_limit} * threads * kSamplesPerSecond;
-  return in_time < static_cast<double>(samples) ? static_cast<uint64_t>(in_time) : samples;
-}
-
 /// Returns the number of training paths of a render with Guiding::kOn.
 uint64_t training_paths(const Settings& settings, uint32_t threads) {
   uint64_t paths = std::min(samples_of(settings) / kTrainingShare, kMaxTrainingPaths);
@@ -331,6 +322,13 @@ GuidingView view_of(const GuidingTraining& training) {
 GuidingGrid grid_of(const Scene& scene) {
   const Bounds& b = scene.bounds();
   return {{b.lo.x, b.lo.y, b.lo.z}, {b.hi.x, b.hi.y, b.hi.z}};
+}
+
+uint64_t expected_samples(const Settings& settings, uint32_t threads) {
+  const uint64_t samples = samples_of(settings);
+  if (!(settings.time_limit > 0)) return samples;
+  const double in_time = double{settings.time_limit} * threads * kSamplesPerSecond;
+  return in_time < static_cast<double>(samples) ? static_cast<uint64_t>(in_time) : samples;
 }
 
 bool needs_training(const Settings& settings) {
