@@ -11,7 +11,6 @@ import pytest
 from stopping import StopAt
 
 import wavecomb
-from wavecomb.farm.tiling import is_better_whole, settings_of_tiles
 from wavecomb.scenes import write_scene
 
 _core = pytest.importorskip("wavecomb._core")
@@ -112,11 +111,18 @@ def test_more_samples_do_not_change_the_transport_of_a_render(caustics: Any) -> 
         assert (more.samples == PART["spp"]).all()
 
 
-def test_tiles_do_without_pilots() -> None:
-    settings = _core.Settings().to_dict()
-    assert not is_better_whole(settings)
-    assert is_better_whole({**settings, "guiding": "on"})
-    assert settings_of_tiles(settings) == {**settings, "quality": "plain"}
+def test_short_time_limits_leave_no_time_for_pilots(caustics: Any) -> None:
+    stats = render(caustics, time_limit=0.1, threads=2).stats
+    assert stats["transport"]["chosen"] == "path"
+    assert "too few samples" in stats["transport"]["why"]
+    assert stats["guiding"] is None
+
+
+def test_late_pilots_give_up(caustics: Any) -> None:
+    """For 64 threads, more samples are expected than this machine renders in half a second."""
+    stats = render(caustics, time_limit=0.5, threads=64).stats
+    assert stats["transport"]["chosen"] == "path"
+    assert "too much of the time limit" in stats["transport"]["why"]
 
 
 def test_a_room_is_guided_if_paths_start_at_the_camera(tmp_path: Path) -> None:
