@@ -26,7 +26,7 @@ NOT_IN_PREVIEWS = (
 """Settings that keep their defaults in reduced images."""
 PREVIEW_DEPTH = 3
 
-_LIVE = {"quality": "plain"}
+_LIVE = {"guiding": "off", "transport": "path"}
 """Defaults that differ in live renders, whose first image should not wait for pilot renders."""
 
 

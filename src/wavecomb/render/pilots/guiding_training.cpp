@@ -27,7 +27,7 @@ constexpr std::array<uint64_t, 2> kAutoShares = {200, 40};
 constexpr uint64_t kMaxFirstPaths = 30'000, kMaxSecondPaths = 150'000;
 /// Camera samples and training paths per thread and second, assumed before the first round is
 /// timed, and the divisor of a time limit that gives the time for training.
-constexpr double kSamplesPerSecond = 100'000, kTrainingPathsPerSecond = 50'000, kTimeShare = 8;
+constexpr double kSamplesPerSecond = 250'000, kTrainingPathsPerSecond = 50'000, kTimeShare = 8;
 /// For Guiding::kAuto: divisors of the time limit after which training gives up, at first and once
 /// guiding is known to reduce noise.
 constexpr double kMaxTimeShare = 20, kMaxGuidedTimeShare = 4;
