@@ -76,7 +76,7 @@ VALIDATION = {
 STAGES = TUNING | VALIDATION
 
 WAYS: dict[str, dict[str, Any]] = {
-    "default": {"guiding": "auto", "transport": "auto"},
+    "default": {},
     "plain": {"guiding": "off", "transport": "path"},
     "guided": {"guiding": "on", "transport": "path"},
     "auto": {"guiding": "auto", "transport": "path"},

@@ -34,13 +34,13 @@ class WavecombSettings(bpy.types.PropertyGroup):
     )  # fmt: skip
     guiding: EnumProperty(  # type: ignore[valid-type]
         name="Path Guiding", description="Bounces also follow the learned incident light",
-        items=[(k, k.capitalize(), "") for k in ("off", "auto", "on")], default="off",
+        items=[(k, k.capitalize(), "") for k in ("auto", "on", "off")], default="auto",
     )  # fmt: skip
     transport: EnumProperty(  # type: ignore[valid-type]
         name="Caustics", description="Where paths start: at the camera, or also at the lights, "
-        "which finds caustics", default="path",
+        "which finds caustics", default="auto",
         items=[
-            ("path", "Camera Paths", ""), ("auto", "Automatic", ""),
+            ("auto", "Automatic", ""), ("path", "Camera Paths", ""),
             ("bdpt", "Bidirectional", ""), ("light", "Light Paths", ""),
         ],
     )  # fmt: skip

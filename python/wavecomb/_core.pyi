@@ -714,7 +714,7 @@ class Settings:
     quality: Literal["auto", "plain"]
     """Whether short pilot renders decide about path guiding and light paths. Default: auto."""
     transport: Literal["path", "light", "auto", "bdpt"]
-    """Whether paths start at the camera only or also at the lights. Default: path."""
+    """Whether paths start at the camera only or also at the lights. Default: auto."""
     light_aim: Literal["off", "on"]
     """How the starting points and directions of light paths are chosen. Default: on."""
     merge_radius: float
@@ -731,7 +731,7 @@ class Settings:
     equiangular: Literal["off", "on"]
     """How scattering distances in homogeneous volumes are sampled. Default: off."""
     guiding: Literal["auto", "on", "off"]
-    """Path guiding, which also samples bounces by learned incident light. Default: off."""
+    """Path guiding, which also samples bounces by learned incident light. Default: auto."""
     learn_memory: int
     """Memory limit of the path guiding field in MB. Default: 64."""
     adaptive: float

@@ -24,7 +24,8 @@ from parts import needs, not_here
 from wavecomb import farm
 from wavecomb.errors import WavecombError
 from wavecomb.farm.assembly import Outcome
-from wavecomb.farm.client import Run, _Batch
+from wavecomb.farm.batches import Batch
+from wavecomb.farm.client import Run
 from wavecomb.farm.clusters import Cluster
 from wavecomb.farm.folder import Folder
 from wavecomb.farm.job import Task
@@ -316,7 +317,7 @@ def test_a_full_disk_on_one_worker(stage: Path, tmp_path: Path) -> None:
     full = {"done": [], "failed": [], "full": "p.exr: cannot be written: No space left",
             "warnings": [], "seconds": 0.1, "worker": "one"}  # fmt: skip
     future = _Future(full)
-    run._flying[future] = _Batch([Task(0, 3)])
+    run._flying[future] = Batch([Task(0, 3)])
     client.amounts["one"] = 0
     run._fetch(future)
     run._take(*run._ended.get(timeout=1))

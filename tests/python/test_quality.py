@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pilot renders that decide about guiding and light paths; all parts of an image decide alike."""
+"""Quality "auto", the default: what it decides, and that all parts of an image decide alike."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ _core = pytest.importorskip("wavecomb._core")
 
 ENOUGH = {"width": 160, "height": 160, "spp": 128}
 """Just enough samples for all pilot renders."""
-LEFT_OPEN = {"guiding": "auto", "transport": "auto"}
-PART = {**ENOUGH, **LEFT_OPEN, "region": (60, 100, 76, 116), "crop": True}
+PART = {**ENOUGH, "region": (60, 100, 76, 116), "crop": True}
 
 
 @pytest.fixture(scope="module")
@@ -34,11 +33,18 @@ def render(scene: Any, **settings: Any) -> Any:
 
 @pytest.fixture(scope="module")
 def default(caustics: Any) -> Any:
-    """A part of an image for which pilot renders choose guiding and transport."""
+    """A part of an image by the defaults."""
     return render(caustics)
 
 
-def test_light_paths_are_used_for_caustics(caustics: Any, default: Any) -> None:
+def test_the_defaults_leave_the_decision_to_pilots() -> None:
+    settings = _core.Settings().to_dict()
+    assert {name: settings[name] for name in ("quality", "guiding", "transport")} == {
+        "quality": "auto", "guiding": "auto", "transport": "auto",
+    }  # fmt: skip
+
+
+def test_the_defaults_use_light_paths_for_caustics(caustics: Any, default: Any) -> None:
     choice = default.stats["transport"]
     assert choice["chosen"] == "light" and choice["gain"] > 1.3
     assert default.stats["guiding"] is None
@@ -103,6 +109,20 @@ def test_more_samples_do_not_change_the_transport_of_a_render(caustics: Any) -> 
         more = _core.render(caustics, _core.Settings(**PART), state=state)
         assert more.stats["transport"]["chosen"] == "path"
         assert (more.samples == PART["spp"]).all()
+
+
+def test_short_time_limits_leave_no_time_for_pilots(caustics: Any) -> None:
+    stats = render(caustics, time_limit=0.1, threads=2).stats
+    assert stats["transport"]["chosen"] == "path"
+    assert "too few samples" in stats["transport"]["why"]
+    assert stats["guiding"] is None
+
+
+def test_late_pilots_give_up(caustics: Any) -> None:
+    """For 64 threads, more samples are expected than this machine renders in half a second."""
+    stats = render(caustics, time_limit=0.5, threads=64).stats
+    assert stats["transport"]["chosen"] == "path"
+    assert "too much of the time limit" in stats["transport"]["why"]
 
 
 def test_a_room_is_guided_if_paths_start_at_the_camera(tmp_path: Path) -> None:

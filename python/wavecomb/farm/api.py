@@ -179,7 +179,7 @@ def render_task(folder: Folder, image: int, tile: str) -> list[str]:
     use_job_maps(job)
     check_files(job)
     renderer = Renderer(job, learned=folder.learned())
-    renderer.render(task, folder.part(task), machine, checks)
+    renderer.render(task, folder.part(task), machine, checks, plan=folder.plan(task.image))
     return list(renderer.warnings)
 
 

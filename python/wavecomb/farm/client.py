@@ -8,35 +8,23 @@ import queue
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from wavecomb.errors import WavecombError
 from wavecomb.farm.assembly import Outcome, is_finished, machine_of
+from wavecomb.farm.batches import Batch, batch_size
 from wavecomb.farm.clusters import Cluster, ClusterSpec, Workers, connected
 from wavecomb.farm.folder import Folder
 from wavecomb.farm.job import Task, hashed
 from wavecomb.farm.tile_file import has_tile
+from wavecomb.farm.tiling import has_pilots
 
 _TURN_S = 0.2
-_BATCH_S = 0.5
-"""Time that a batch of small tiles should take, in seconds."""
-_MIN_BATCHES = 4
-"""Smallest number of batches for each worker, so that workers end at about the same time."""
 _RETRY_S = 5.0
 """Time between rescheduling of tasks that wait for a worker, in seconds."""
 _NOBODY_S = 60.0
 """Time to wait for new workers when all are gone, in seconds."""
 _ASSEMBLY_PRIORITY = 1
-
-
-@dataclass
-class _Batch:
-    """Batch of tiles that one Dask task renders; without tiles, the assembly of an image."""
-
-    tiles: list[Task]
-    image: int = -1
-    attempt: int = 0
 
 
 class Run:
@@ -57,11 +45,12 @@ class Run:
         self._out = outcome
         self._show, self._warn, self._is_stopped = show, warn, is_stopped
         self._machine = ""
-        self._ready: deque[_Batch] = deque()
+        self._ready: deque[Batch] = deque()
         self._tiles: deque[Task] = deque()
         self._missing: dict[int, set[int]] = {}
+        self._unplanned: dict[int, list[Task]] = {}
         self._checks: dict[int, int] = {}
-        self._flying: dict[Any, _Batch] = {}
+        self._flying: dict[Any, Batch] = {}
         self._ended: queue.SimpleQueue[tuple[Any, dict[str, Any] | None]] = queue.SimpleQueue()
         self._attempts = 0
         self._seconds = 0.0
@@ -98,9 +87,14 @@ class Run:
             }  # fmt: skip
             self._missing[image] = missing
             self._out.tasks_done += len(tiles) - len(missing)
-            self._tiles.extend(Task(image, tile) for tile in sorted(missing))
+            wanted = [Task(image, tile) for tile in sorted(missing)]
+            if len(wanted) > 1 and self._job.learned is None and has_pilots(shot.settings):
+                self._unplanned[image] = wanted
+                self._ready.append(Batch([], image, is_plan=True))
+            else:
+                self._tiles.extend(wanted)
             if not missing:
-                self._ready.append(_Batch([], image))
+                self._ready.append(Batch([], image))
         self._loop()
 
     def _wait_for_workers(self) -> bool:
@@ -192,39 +186,31 @@ class Run:
 
     def _submit(self) -> bool:
         """Submits the next batch; returns False if no batch is left."""
-        from wavecomb.farm.tasks import assemble_image, render_tiles
-
         if self._ready:
             batch = self._ready.popleft()
         elif self._tiles:
-            count = min(self._batch_size(), len(self._tiles))
-            batch = _Batch([self._tiles.popleft() for _ in range(count)])
+            waiting = len(self._tiles)
+            count = min(batch_size(self._seconds, waiting, self._capacity()), waiting)
+            batch = Batch([self._tiles.popleft() for _ in range(count)])
         else:
             return False
+        work, kind, what = batch.work(self._checks)
         # Two clients of a Dask scheduler must use the same key for the same work.
-        tiles = [(task.image, task.tile, self._checks[task.image]) for task in batch.tiles]
-        name = hashed([self._common[0], self._job.id, self._machine, tiles, batch.image,
-                       batch.attempt, self._checks.get(batch.image)])  # fmt: skip
-        what: Any = tiles if tiles else batch.image
+        name = hashed([self._common[0], self._job.id, self._machine, what if batch.tiles else [],
+                       batch.image, batch.attempt, self._checks.get(batch.image)])  # fmt: skip
         future = self._cluster.client.submit(
-            render_tiles if tiles else assemble_image, *self._common, self._machine, what,
-            key=f"wavecomb-{'tiles' if tiles else 'assembly'}-{name[:32]}",
+            work, *self._common, self._machine, what, key=f"wavecomb-{kind}-{name[:32]}",
             resources={self._machine: 1}, retries=self._job.tries - 1, pure=False,
-            priority=0 if tiles else _ASSEMBLY_PRIORITY,
+            priority=0 if batch.tiles else _ASSEMBLY_PRIORITY,
         )  # fmt: skip
         self._flying[future] = batch
         future.add_done_callback(self._fetch)
         return True
 
-    def _batch_size(self) -> int:
-        wanted = _BATCH_S / self._seconds if self._seconds else 1
-        most = len(self._tiles) / (_MIN_BATCHES * max(1, self._capacity()))
-        return max(1, int(min(wanted, most)))
-
     def _again(self, tiles: list[Task]) -> None:
         """Queues tiles to be rendered again, one per batch, before all others."""
         self._attempts += 1
-        self._ready.extendleft(_Batch([task], attempt=self._attempts) for task in reversed(tiles))
+        self._ready.extendleft(Batch([task], attempt=self._attempts) for task in reversed(tiles))
 
     def _take(self, future: Any, result: dict[str, Any] | None) -> None:
         """Handles the result or the failure of a batch."""
@@ -236,6 +222,8 @@ class Run:
                 self._leave_out(result["worker"], result["full"])
             if batch.tiles:
                 self._take_tiles(batch, result)
+            elif batch.is_plan:
+                self._take_plan(batch, result)
             else:
                 self._take_image(batch.image, result)
         elif future.status == "error":
@@ -260,11 +248,21 @@ class Run:
                 result = future.result()
         self._ended.put((future, result))
 
-    def _take_tiles(self, batch: _Batch, result: dict[str, Any]) -> None:
-        for line in result["warnings"]:
+    def _warn_once(self, lines: list[str]) -> None:
+        for line in lines:
             if line not in self._warned:
                 self._warned.add(line)
                 self._warn(line)
+
+    def _take_plan(self, batch: Batch, result: dict[str, Any]) -> None:
+        self._warn_once(result["warnings"])
+        if result["full"]:
+            self._put_back(batch)
+        else:
+            self._tiles.extend(self._unplanned.pop(batch.image))
+
+    def _take_tiles(self, batch: Batch, result: dict[str, Any]) -> None:
+        self._warn_once(result["warnings"])
         done = [Task(image, tile) for image, tile in result["done"]]
         for task in done:
             self._note_done(task)
@@ -284,11 +282,11 @@ class Run:
         self._progressed = True
         self._out.tasks_done += 1
         if not missing:
-            self._ready.append(_Batch([], task.image, self._attempts))
+            self._ready.append(Batch([], task.image, self._attempts))
 
     def _take_image(self, image: int, result: dict[str, Any]) -> None:
         if result["full"]:
-            self._put_back(_Batch([], image))
+            self._put_back(Batch([], image))
             return
         if not result["again"]:
             self._out.images_done += 1
@@ -299,14 +297,16 @@ class Run:
         self._out.tasks_done -= len(result["again"])
         self._again([Task(image, tile) for tile in result["again"]])
 
-    def _take_error(self, batch: _Batch, error: BaseException | None) -> None:
+    def _take_error(self, batch: Batch, error: BaseException | None) -> None:
         from distributed import KilledWorker
 
         if isinstance(error, KilledWorker):
             line = f"its worker ended {self._job.tries} times: a crash, or too little memory"
         else:
             line = " ".join(str(error).split()) or type(error).__name__
-        if len(batch.tiles) > 1:  # the other tiles of the batch may still succeed
+        if batch.is_plan:  # the tiles report what is wrong, or succeed without a plan
+            self._tiles.extend(self._unplanned.pop(batch.image))
+        elif len(batch.tiles) > 1:  # the other tiles of the batch may still succeed
             self._again(batch.tiles)
         elif batch.tiles:
             one = batch.tiles[0]
@@ -314,12 +314,13 @@ class Run:
         else:
             self._out.failed.append((self._job.title(batch.image), line))
 
-    def _put_back(self, batch: _Batch) -> None:
+    def _put_back(self, batch: Batch) -> None:
         if batch.tiles:
             self._again(batch.tiles)
         else:
             self._attempts += 1
-            self._ready.appendleft(_Batch([], batch.image, self._attempts))
+            again = Batch([], batch.image, self._attempts, batch.is_plan)
+            self._ready.appendleft(again)
 
     def _leave_out(self, worker: str, why: str) -> None:
         """Withdraws queued tasks from a worker whose disk is full."""

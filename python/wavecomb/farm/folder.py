@@ -2,8 +2,9 @@
 """Folder of a farm job.
 
 The folder holds ``job.json``, ``parts/IMAGE/TILE.exr`` for each rendered tile of an unfinished
-image, and ``images/IMAGE.json`` for each finished image. The files of the job's folder are the only
-record of progress.
+image, ``parts/IMAGE/plan.learned`` for results of the image's pilot renders, and
+``images/IMAGE.json`` for each finished image. The files of the job's folder are the only record of
+progress.
 """
 
 from __future__ import annotations
@@ -71,6 +72,10 @@ class Folder:
     def part(self, task: Task) -> Path:
         """Returns the file of a rendered tile."""
         return self.parts(task.image) / f"{task.tile:06d}.exr"
+
+    def plan(self, image: int) -> Path:
+        """Returns the file with the results of an image's pilot renders, for all of its tiles."""
+        return self.parts(image) / "plan.learned"
 
     def parts(self, image: int) -> Path:
         """Returns the folder of an image's rendered tiles."""

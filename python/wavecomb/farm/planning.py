@@ -61,8 +61,7 @@ def complete(
             check_tiles(shot.settings, tiles)
     if tiles is None:
         whole = any(
-            needs_whole(shot.settings) or is_better_whole(shot.settings, learned is not None)
-            for shot in job.shots
+            needs_whole(shot.settings) or is_better_whole(shot.settings) for shot in job.shots
         )
         regions = [shot.region for shot in job.shots]
         tiles = choose_tiles(regions, len(job.images), workers or _UNKNOWN_WORKERS, whole)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 _ABSENT = re.compile(r"(texture|MaterialX file|IES profile) .* cannot be read|cannot open layer")
 """Pattern of warnings about missing files of the stage."""
 _MAX_NAMED = 3
+_PLAN = "wavecomb-plan"
 
 
 class Stopped(Exception):
@@ -64,6 +65,7 @@ class Renderer:
         self._reporter = reporter
         self._loading = loading
         self._is_stopped = is_stopped
+        self._plan: tuple[int, bytes] | None = None
         self._open: tuple[int, Frames] | None = None
         self._loaded: tuple[tuple[int, float | None], LoadedStage] | None = None
 
@@ -78,6 +80,7 @@ class Renderer:
         machine: str,
         checks: int = 0,
         *,
+        plan: Path | None = None,
         with_job: bool = False,
         replacing: Any = None,
     ) -> dict[str, Any]:
@@ -88,6 +91,8 @@ class Renderer:
             path: File of the tile.
             machine: Class of this machine.
             checks: Number of error checks that a border must allow for; 0 chooses a likely number.
+            plan: File that ``plan`` has written for the image. Without the file, the tile repeats
+                the pilot renders, with the same results.
             with_job: Whether the file also stores the job.
             replacing: As in ``save_tile``.
 
@@ -103,7 +108,9 @@ class Renderer:
         shot, tile = self.job.shot(task.image), self.job.rectangles(task.image)[task.tile]
         settings, rendered, checks = self._settings(task.image, shot, tile, checks)
         check_memory(settings, shot.aovs)
-        picture, frames = self._render(task, shot, settings)
+        key = self.job.image_key(task.image, machine)
+        learned = self._learned or self._planned(task.image, plan, key)
+        picture, frames = self._render(task, shot, settings, learned)
         save_tile(
             path, picture, key=self.job.tile_key(task, machine), number=task.tile, tile=tile,
             rendered=rendered, machine=machine, checks=checks,
@@ -112,6 +119,43 @@ class Renderer:
             replacing=replacing or replacing_quickly,
         )  # fmt: skip
         return {"samples": picture.stats["counts"]["samples"]}
+
+    def plan(self, image: int, path: Path, machine: str) -> None:
+        """Writes the results of an image's pilot renders to a file, unless it exists.
+
+        Pilot renders depend on the whole image only, so rendering one pixel is sufficient.
+
+        Args:
+            image: Index of the image.
+            path: The file.
+            machine: Class of this machine.
+
+        Raises:
+            Stopped: ``is_stopped`` cancelled the render.
+            WavecombError: The stage or the settings cannot be rendered.
+        """
+        from wavecomb import _core
+
+        key = self.job.image_key(image, machine)
+        if load_plan(path, key) is not None:
+            return
+        shot = self.job.shot(image)
+        x, y = shot.region[:2]
+        pixel = {"region": (x, y, x + 1, y + 1), "crop": True, "threads": self._threads}
+        settings = _core.Settings(**{**shot.settings, **pixel})
+        picture, _ = self._render(Task(image, 0), shot, settings, None)
+        save_plan(path, key, picture.learned)
+
+    def _planned(self, image: int, path: Path | None, key: str) -> bytes | None:
+        """Returns the results of an image's pilot renders, or None if they are unknown."""
+        if path is None:
+            return None
+        if self._plan is None or self._plan[0] != image:
+            learned = load_plan(path, key)
+            if learned is None:
+                return None
+            self._plan = image, learned
+        return self._plan[1] or None
 
     def _settings(
         self, image: int, shot: Shot, tile: Rectangle, checks: int
@@ -126,7 +170,9 @@ class Renderer:
         rendered = grown(tile, border(shot.settings, checks), shot.region)
         return _core.Settings(**{**chosen, "region": rendered, "crop": True}), rendered, checks
 
-    def _render(self, task: Task, shot: Shot, settings: Settings) -> tuple[Picture, Frames]:
+    def _render(
+        self, task: Task, shot: Shot, settings: Settings, learned: bytes | None
+    ) -> tuple[Picture, Frames]:
         frames = self._frames(task, settings.threads)
         loaded = self._load(frames, task, shot)
         if loaded.catchers:
@@ -140,9 +186,7 @@ class Renderer:
             reporter=self._reporter, is_stopped=self._is_stopped,
             warn=lambda line: self.warnings.setdefault(line),
         )  # fmt: skip
-        result = frames.render(
-            settings, costs=self.job.costs, watcher=watcher, learned=self._learned
-        )
+        result = frames.render(settings, costs=self.job.costs, watcher=watcher, learned=learned)
         if result.cancelled:
             raise Stopped
         stats = {**frames.stats(result), "stage": self.job.stage}
@@ -194,6 +238,38 @@ class Renderer:
             return picture_of(frames.render(settings), picture.stats, aovs=shot.aovs)
 
         return without_samples(render, _core.Settings(**{**shot.settings, "threads": 1}), 2)
+
+
+def save_plan(path: Path, key: str, learned: bytes) -> None:
+    """Writes the results of an image's pilot renders.
+
+    Args:
+        path: The file.
+        key: ``Job.image_key`` of the image.
+        learned: The results; empty if there were no pilot renders.
+    """
+    import numpy as np
+
+    from wavecomb.image.files.archive import write_archive
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    header = {"kind": _PLAN, "key": key}
+    write_archive(path, header, {"learned": np.frombuffer(learned, np.uint8)})
+
+
+def load_plan(path: Path, key: str) -> bytes | None:
+    """Reads a file of ``save_plan``.
+
+    Returns None if the file is missing or damaged, or belongs to another image.
+    """
+    from wavecomb.image.files.archive import ArchiveError, read_archive
+
+    try:
+        header, arrays = read_archive(str(path))
+        found = header == {"kind": _PLAN, "key": key}
+        return bytes(arrays["learned"].tobytes()) if found else None
+    except (OSError, ArchiveError, KeyError):
+        return None
 
 
 def error_checks_for(shot: Shot, checks: int = 0) -> int:

@@ -155,7 +155,7 @@ def render_tiles(
             tile = of.job.rectangles(image)[number]
             try:
                 if not has_tile(path, key, tile, checks):
-                    renderer.render(task, path, machine, checks)
+                    renderer.render(task, path, machine, checks, plan=of.plan(image))
                 out["done"].append((image, number))
             except Stopped:
                 break
@@ -169,6 +169,33 @@ def render_tiles(
                 break
     out["warnings"] = list(renderer.warnings)
     out["seconds"] = time.monotonic() - started
+    return out
+
+
+def plan_image(folder: str, maps: list[Pair], job: str, machine: str, image: int) -> dict[str, Any]:
+    """Writes the results of an image's pilot renders; takes the arguments of ``render_tiles``.
+
+    Returns:
+        A dictionary: ``full``, why nothing can be written here, or ""; ``worker``, its address;
+        ``warnings``, lines.
+    """
+    from wavecomb.farm.rendering import Stopped
+
+    out: dict[str, Any] = {"full": "", "warnings": []}
+    out["worker"] = _begin()
+    with progress:
+        renderer, of = _renderer(folder, maps, job)
+        path = of.plan(image)
+        try:
+            renderer.plan(image, path, machine)
+        except Stopped:
+            pass
+        except OSError as error:
+            if not is_full(error, path):
+                raise
+            out["full"] = str(error)
+            _withdraw(machine)
+    out["warnings"] = list(renderer.warnings)
     return out
 
 

@@ -27,6 +27,9 @@ _CHECK_SAMPLES = 16
 _REACH = 4
 """Distance in pixels over which one error check has an effect: 2 for the mean of errors over
 neighbouring pixels, and 2 for spreading the marks of unfinished pixels."""
+_MIN_PILOT_SAMPLES = 2_000_000
+"""Number of samples of an image from which pilot renders may decide (kMinAutoSamples in
+render/pilots/guiding_training.cpp)."""
 _WINDOW = 2
 """Radius in pixels of the mean over neighbours that the ``error`` layer holds."""
 
@@ -194,18 +197,25 @@ def needs_whole(settings: Mapping[str, Any]) -> str:
     return ""
 
 
-def is_better_whole(settings: Mapping[str, Any], has_guiding_field: bool = False) -> bool:
+def is_better_whole(settings: Mapping[str, Any]) -> bool:
     """Returns whether each tile has a high cost in addition to its pixels.
 
-    A border, training of a guiding field, and tracing of all light paths have such a cost.
-    ``has_guiding_field`` says that the guiding field is already trained.
+    A border and tracing of all light paths have such a cost.
     """
-    learns = settings.get("guiding", "off") != "off" or settings.get("roulette") == "efficient"
-    return (
-        bool(settings.get("adaptive"))
-        or settings.get("transport") in ("light", "bdpt", "auto")
-        or (learns and not has_guiding_field)
-    )
+    return bool(settings.get("adaptive")) or settings.get("transport") in ("light", "bdpt")
+
+
+def has_pilots(settings: Mapping[str, Any]) -> bool:
+    """Returns whether renders with these settings may begin with pilot renders or training.
+
+    >>> has_pilots({"guiding": "on"})
+    True
+    """
+    if settings.get("guiding") == "on" or settings.get("roulette") == "efficient":
+        return True
+    samples = math.prod(int(settings.get(name, 0)) for name in ("width", "height", "spp"))
+    is_open = "auto" in (settings.get("guiding"), settings.get("transport"))
+    return is_open and settings.get("quality") == "auto" and samples >= _MIN_PILOT_SAMPLES
 
 
 def check_tiles(settings: Mapping[str, Any], tiles: tuple[int, int]) -> None:

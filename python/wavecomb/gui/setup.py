@@ -26,6 +26,9 @@ NOT_IN_PREVIEWS = (
 """Settings that keep their defaults in reduced images."""
 PREVIEW_DEPTH = 3
 
+_LIVE = {"guiding": "off", "transport": "path"}
+"""Defaults that differ in live renders, whose first image should not wait for pilot renders."""
+
 
 if TYPE_CHECKING:
 
@@ -38,7 +41,11 @@ if TYPE_CHECKING:
 else:
     _Rows = make_dataclass(
         "_Rows",
-        [(row.name, Any, row.default) for row in settings().values() if row.name not in NOT_LIVE],
+        [
+            (row.name, Any, _LIVE.get(row.name, row.default))
+            for row in settings().values()
+            if row.name not in NOT_LIVE
+        ],
         frozen=True,
     )
 

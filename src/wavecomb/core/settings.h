@@ -99,7 +99,7 @@ struct Settings {
   TextureFilter texture_filter = TextureFilter::kAuto;
   LightSelection light_selection = LightSelection::kAuto;
   LightWeights light_weights = LightWeights::kCalibrated;
-  Guiding guiding = Guiding::kOff;
+  Guiding guiding = Guiding::kAuto;
   /// Also use equiangular sampling of distances in homogeneous volumes
   /// (medium/volume/equiangular.h).
   bool equiangular = false;
@@ -108,7 +108,7 @@ struct Settings {
   /// Sample every non-delta bounce from a cosine lobe.
   bool cosine_sampling = false;
   IntegratorKind integrator = IntegratorKind::kWavefront;
-  Transport transport = Transport::kPath;
+  Transport transport = Transport::kAuto;
   /// Aim light paths at regions where training light paths, traced before the first pass,
   /// contributed to the image (light_paths/render/light_aiming.h).
   bool light_aim = true;

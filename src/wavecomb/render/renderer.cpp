@@ -2,6 +2,7 @@
 #include "wavecomb/render/renderer.h"
 
 #include <algorithm>
+#include <functional>
 #include <mutex>
 #include <utility>
 
@@ -41,13 +42,15 @@ struct WavefrontRenderer::Impl {
                        const std::optional<TransportChoice>& choice = {});
   /// Chooses the transport for `settings` with Transport::kAuto.
   TransportChoice choose(const Settings& settings, const RenderOptions& options, Watch& watch);
-  /// Renders a small image for choose_transport(). The pilot stops if the render watched by `outer`
-  /// is stopped.
+  /// Renders a small image for choose_transport(). Gives up if `stopped` returns true.
   TransportPilot render_pilot(const Settings& settings, LightPathShare share, bool wants_squares,
-                              const PilotShared& shared, const Watch& outer);
+                              const PilotShared& shared, const std::function<bool()>& stopped);
 };
 
 namespace {
+
+/// Largest fraction of a time limit that pilot renders for the transport may take.
+constexpr double kPilotShare = 0.05;
 
 /// Decides those settings that need no pilot render.
 Settings without_open_choices(Settings used) {
@@ -180,11 +183,11 @@ CostProfile WavefrontRenderer::cost_profile() const {
 
 TransportPilot WavefrontRenderer::Impl::render_pilot(const Settings& settings, LightPathShare share,
                                                      bool wants_squares, const PilotShared& shared,
-                                                     const Watch& outer) {
+                                                     const std::function<bool()>& stopped) {
   RenderOptions options;
   options.wants_camera_squares = wants_squares;
   options.progress = [&](const RenderStatus&) {
-    return outer.stopped() ? Request::kStop : Request::kContinue;
+    return stopped() ? Request::kStop : Request::kContinue;
   };
   Watch watch(options.interval_s);
   TransportPilot pilot;
@@ -229,12 +232,18 @@ TransportChoice WavefrontRenderer::Impl::choose(const Settings& settings,
   if (const auto kept = pilot_cache.transports.find(scene, settings)) return *kept;
   std::shared_ptr<const LightAiming> aiming;
   const PilotShared shared{&settings, &aiming};
+  const Clock::time_point start = Clock::now();
+  const auto stopped = [&] {
+    const bool is_late =
+        settings.time_limit > 0 && seconds_since(start) > kPilotShare * settings.time_limit;
+    return is_late || watch.stopped();
+  };
   const TransportChoice choice = choose_transport(
-      *scene, settings,
+      *scene, settings, expected_samples(settings, thread_count(settings)),
       [&](const Settings& s, LightPathShare share, bool squares) {
-        return render_pilot(s, share, squares, shared, watch);
+        return render_pilot(s, share, squares, shared, stopped);
       },
-      [&] { return watch.stopped(); });
+      stopped);
   if (!watch.stopped()) pilot_cache.transports.keep(scene, settings, choice);
   return choice;
 }

@@ -40,10 +40,9 @@ constexpr double kMinLightPathGain = 1.3;
 /// Roughness below which a lobe is sharp enough for visible caustics.
 constexpr float kSharpRoughness = 0.4f;
 
-/// Returns the width and height of a pilot render for a render with settings `s`, or 0 if the
-/// render has too few samples.
-std::array<uint32_t, 2> pilot_size(const Settings& s) {
-  const uint64_t samples = uint64_t{s.width} * s.height * s.spp;
+/// Returns the width and height of a pilot render for a render with settings `s`, or 0 if its
+/// number of samples is too small.
+std::array<uint32_t, 2> pilot_size(const Settings& s, uint64_t samples) {
   const uint64_t pixels = std::min({samples / kTransportShare / kTransportSamples,
                                     kMaxTransportPixels, uint64_t{s.width} * s.height});
   if (pixels < kMinTransportPixels) return {0, 0};
@@ -182,7 +181,7 @@ bool focuses_light(const Scene& scene) {
   });
 }
 
-TransportChoice choose_transport(const Scene& scene, const Settings& settings,
+TransportChoice choose_transport(const Scene& scene, const Settings& settings, uint64_t samples,
                                  const RenderPilot& render, const std::function<bool()>& stopped) {
   const Clock::time_point start = Clock::now();
   TransportChoice choice;
@@ -209,7 +208,7 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings,
     choice.why = "no light sends paths";
     return choice;
   }
-  const auto [width, height] = pilot_size(settings);
+  const auto [width, height] = pilot_size(settings, samples);
   if (width == 0) {
     choice.why = "too few samples to find out whether light paths pay";
     return choice;
@@ -241,12 +240,17 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings,
       small.seed = kTransportSeeds[i];
       if (!stopped()) pilots.with[k][i] = render(small, kCandidateShares[k], false);
     }
-  if (stopped()) return choice;
+  choice.seconds = seconds_since(start);
+  if (stopped()) {
+    choice.why = "a trial took too much of the time limit";
+    return choice;
+  }
   const double unit = scene_brightness(scene);
   for (size_t i = 0; i < squares.beauty.size() / 3; ++i)
     pilots.variance.push_back(unit * brightness(squares.by_light_paths, i));
-  const TransportGain found =
-      transport_gain(pilots, static_cast<double>(settings.spp) / kTransportSamples);
+  const double pixels = double{1} * settings.width * settings.height;
+  const double longer = static_cast<double>(samples) / pixels / kTransportSamples;
+  const TransportGain found = transport_gain(pilots, longer);
   choice.gain = found.gain;
   choice.why =
       "by a trial of " + std::to_string(width) + " x " + std::to_string(height) + " pixels";

@@ -58,9 +58,10 @@ inline constexpr std::array<LightPathShare, 2> kCandidateShares = {{{-3}, {0}}};
 /// Returns whether any material reflects or transmits light sharply enough for caustics.
 bool focuses_light(const Scene& scene);
 
-/// Chooses the transport for `settings` from small images made by `render`. Stops early if
-/// `stopped` returns true; the result is then invalid.
-TransportChoice choose_transport(const Scene& scene, const Settings& settings,
+/// Chooses the transport for `settings`, whose render is expected to take `samples` samples, from
+/// small images made by `render`. Gives up if `stopped` returns true, and then chooses
+/// Transport::kPath.
+TransportChoice choose_transport(const Scene& scene, const Settings& settings, uint64_t samples,
                                  const RenderPilot& render, const std::function<bool()>& stopped);
 
 // Exposed for tests.

@@ -28,7 +28,7 @@ constexpr std::array<uint64_t, 2> kAutoShares = {200, 40};
 constexpr uint64_t kMaxFirstPaths = 30'000, kMaxSecondPaths = 150'000;
 /// Camera samples and training paths per thread and second, assumed before the first round is
 /// timed, and the divisor of a time limit that gives the time for training.
-constexpr double kSamplesPerSecond = 100'000, kTrainingPathsPerSecond = 50'000, kTimeShare = 8;
+constexpr double kSamplesPerSecond = 250'000, kTrainingPathsPerSecond = 50'000, kTimeShare = 8;
 /// For Guiding::kAuto: divisors of the time limit after which training gives up, at first and once
 /// guiding is known to reduce noise.
 constexpr double kMaxTimeShare = 20, kMaxGuidedTimeShare = 4;
@@ -63,15 +63,6 @@ uint64_t as_count(double paths) {
 
 uint64_t samples_of(const Settings& settings) {
   return uint64_t{settings.width} * settings.height * settings.spp;
-}
-
-/// Returns the number of samples that the render is expected to take. With a time limit,
-/// Settings::spp may be out of reach.
-uint64_t expected_samples(const Settings& settings, uint32_t threads) {
-  const uint64_t samples = samples_of(settings);
-  if (!(settings.time_limit > 0)) return samples;
-  const double in_time = double{settings.time_limit} * threads * kSamplesPerSecond;
-  return in_time < static_cast<double>(samples) ? static_cast<uint64_t>(in_time) : samples;
 }
 
 /// Returns the number of training paths of a render with Guiding::kOn.
@@ -333,6 +324,13 @@ GuidingView view_of(const GuidingTraining& training) {
 GuidingGrid grid_of(const Scene& scene) {
   const Bounds& b = scene.bounds();
   return {{b.lo.x, b.lo.y, b.lo.z}, {b.hi.x, b.hi.y, b.hi.z}};
+}
+
+uint64_t expected_samples(const Settings& settings, uint32_t threads) {
+  const uint64_t samples = samples_of(settings);
+  if (!(settings.time_limit > 0)) return samples;
+  const double in_time = double{settings.time_limit} * threads * kSamplesPerSecond;
+  return in_time < static_cast<double>(samples) ? static_cast<uint64_t>(in_time) : samples;
 }
 
 bool needs_training(const Settings& settings) {

@@ -52,6 +52,10 @@ GuidingView view_of(const GuidingTraining& training);
 /// Returns the grid of a scene's guiding field.
 GuidingGrid grid_of(const Scene& scene);
 
+/// Returns the number of samples that a render is expected to take on `threads` threads. With a
+/// time limit, Settings::spp may be out of reach.
+uint64_t expected_samples(const Settings& settings, uint32_t threads);
+
 /// Returns whether the settings ask for path guiding or learned roulette.
 bool needs_training(const Settings& settings);
 
