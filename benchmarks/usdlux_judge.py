@@ -62,7 +62,7 @@ class Verdict:
 
     @property
     def mean_is_open(self) -> bool:
-        """Whether the means differ by over 0.5 %, but the excess is within three standard errors."""
+        """Whether the means differ by over 0.5 %, but by less than that plus 3 standard errors."""
         return 0 < abs(self.difference) - MEAN_LIMIT <= 3 * self.noise
 
     @property
