@@ -47,6 +47,8 @@ def test_the_defaults_leave_the_decision_to_pilots() -> None:
 def test_the_defaults_use_light_paths_for_caustics(caustics: Any, default: Any) -> None:
     choice = default.stats["transport"]
     assert choice["chosen"] == "light" and choice["gain"] > 1.3
+    seconds = default.stats["seconds"]
+    assert 0 < choice["seconds"] < seconds["first_samples"] < seconds["render"]
     assert default.stats["guiding"] is None
     assert not np.array_equal(default.beauty, render(caustics, quality="plain").beauty)
 
