@@ -121,8 +121,9 @@ void RenderRun::check_textures() const {
 RenderStatistics RenderRun::statistics() const {
   RenderStatistics s;
   s.build_s = build_s_;
-  s.render_s = seconds_since(start_);
-  s.first_samples_s = runner_.first_samples_s();
+  const double choice_s = transport_ ? transport_->seconds : 0;
+  s.render_s = choice_s + seconds_since(start_);
+  s.first_samples_s = choice_s + runner_.first_samples_s();
   s.threads = plan_.waves.threads;
   s.wave_size = plan_.waves.wave_size;
   s.cancelled = watch_.stopped();
