@@ -36,21 +36,28 @@ struct WavefrontRenderer::Impl {
   double build_s = 0;
   PilotCache pilot_cache;
 
-  /// Renders with settings whose transport is decided. Pilot renders pass data in `shared`.
+  /// Renders with settings whose transport is decided, and keeps the statistics.
   RenderedImage render(const Settings& settings, LightPathShare light_share,
-                       const RenderOptions& options, Watch& watch, const PilotShared& shared = {},
+                       const RenderOptions& options, Watch& watch,
                        const std::optional<TransportChoice>& choice = {});
   /// Chooses the transport for `settings` with Transport::kAuto.
   TransportChoice choose(const Settings& settings, const RenderOptions& options, Watch& watch);
   /// Renders a small image for choose_transport(). Gives up if `stopped` returns true.
   TransportPilot render_pilot(const Settings& settings, LightPathShare share, bool wants_squares,
                               const PilotShared& shared, const std::function<bool()>& stopped);
+  /// Returns the predicted gain of path guiding for `settings` without light paths, or 0 if guiding
+  /// would not be used. Gives up if `stopped` returns true.
+  double guiding_gain(Settings settings, const std::function<bool()>& stopped);
 };
 
 namespace {
 
 /// Largest fraction of a time limit that pilot renders for the transport may take.
 constexpr double kPilotShare = 0.05;
+
+/// Predicted gain of light paths from which guiding is not considered. Smaller gains are compared,
+/// because guiding and light paths exclude each other.
+constexpr double kSureGain = 4;
 
 /// Decides those settings that need no pilot render.
 Settings without_open_choices(Settings used) {
@@ -66,6 +73,15 @@ Settings without_open_choices(Settings used) {
   if (used.max_depth == 0) used.transport = Transport::kPath;
   if (used.joins_light() && used.guiding == Guiding::kAuto) used.guiding = Guiding::kOff;
   return used;
+}
+
+/// Options of a pilot render, which gives up if `stopped` returns true.
+RenderOptions pilot_options(const std::function<bool()>& stopped) {
+  RenderOptions options;
+  options.progress = [&stopped](const RenderStatus&) {
+    return stopped() ? Request::kStop : Request::kContinue;
+  };
+  return options;
 }
 
 /// Marks the renderer as rendering during its lifetime.
@@ -184,20 +200,39 @@ CostProfile WavefrontRenderer::cost_profile() const {
 TransportPilot WavefrontRenderer::Impl::render_pilot(const Settings& settings, LightPathShare share,
                                                      bool wants_squares, const PilotShared& shared,
                                                      const std::function<bool()>& stopped) {
-  RenderOptions options;
+  RenderOptions options = pilot_options(stopped);
   options.wants_camera_squares = wants_squares;
-  options.progress = [&](const RenderStatus&) {
-    return stopped() ? Request::kStop : Request::kContinue;
-  };
   Watch watch(options.interval_s);
+  const RenderPlan plan(*scene, *accel, settings, share, options.policy);
+  RenderRun run(scene, plan, options, watch, build_s, {});
+  run.run(pilot_cache, shared, [](const PilotResults&) {});
+  RenderStatistics counted = run.statistics();
+  RenderedImage image = run.finish(counted);
   TransportPilot pilot;
-  RenderedImage image = render(settings, share, options, watch, shared);
   pilot.beauty = std::move(image.beauty);
   for (AovLayer& layer : image.aovs)
     if (layer.name == aov_name(Aov::kByLightPaths)) pilot.by_light_paths = std::move(layer.values);
-  pilot.rays = statistics.rays + statistics.shadow_rays;
-  pilot.records = statistics.records;
+  pilot.rays = counted.rays + counted.shadow_rays;
+  pilot.records = counted.records;
   return pilot;
+}
+
+double WavefrontRenderer::Impl::guiding_gain(Settings settings,
+                                             const std::function<bool()>& stopped) {
+  // Training depends on the whole image only, so rendering one pixel is sufficient.
+  settings.transport = Transport::kPath;
+  settings.region = Region{0, 0, 1, 1};
+  settings.crop = true;
+  settings.aovs = {};
+  settings.light_groups.clear();
+  settings.expressions.clear();
+  const RenderOptions options = pilot_options(stopped);
+  Watch watch(options.interval_s);
+  const RenderPlan plan(*scene, *accel, settings, {}, options.policy);
+  RenderRun run(scene, plan, options, watch, build_s, {});
+  run.run(pilot_cache, {}, [](const PilotResults&) {});
+  const GuidingStatistics guiding = run.statistics().guiding;
+  return guiding.used ? guiding.gain : 0;
 }
 
 RenderedImage WavefrontRenderer::render(const Settings& settings, const RenderOptions& options) {
@@ -211,7 +246,7 @@ RenderedImage WavefrontRenderer::render(const Settings& settings, const RenderOp
   if (used.time_limit > 0)
     used.time_limit = std::max(1e-6f, used.time_limit - static_cast<float>(choice.seconds));
   used = without_open_choices(used);
-  return impl_->render(used, choice.share, options, watch, {}, choice);
+  return impl_->render(used, choice.share, options, watch, choice);
 }
 
 TransportChoice WavefrontRenderer::Impl::choose(const Settings& settings,
@@ -238,23 +273,31 @@ TransportChoice WavefrontRenderer::Impl::choose(const Settings& settings,
         settings.time_limit > 0 && seconds_since(start) > kPilotShare * settings.time_limit;
     return is_late || watch.stopped();
   };
-  const TransportChoice choice = choose_transport(
+  TransportChoice choice = choose_transport(
       *scene, settings, expected_samples(settings, thread_count(settings)),
       [&](const Settings& s, LightPathShare share, bool squares) {
         return render_pilot(s, share, squares, shared, stopped);
       },
       stopped);
+  const bool may_guide = settings.guiding == Guiding::kAuto && choice.gain < kSureGain;
+  if (choice.transport == Transport::kLight && may_guide) {
+    const double gain = guiding_gain(settings, stopped);
+    if (gain >= choice.gain) {
+      choice.transport = Transport::kPath;
+      choice.why += ", since guiding is expected to gain more";
+    }
+    choice.seconds = seconds_since(start);
+  }
   if (!watch.stopped()) pilot_cache.transports.keep(scene, settings, choice);
   return choice;
 }
 
 RenderedImage WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare light_share,
                                               const RenderOptions& options, Watch& watch,
-                                              const PilotShared& shared,
                                               const std::optional<TransportChoice>& choice) {
   const RenderPlan plan(*scene, *accel, settings, light_share, options.policy);
   RenderRun run(scene, plan, options, watch, build_s, choice);
-  run.run(pilot_cache, shared, [&](const PilotResults& found) {
+  run.run(pilot_cache, {}, [&](const PilotResults& found) {
     const std::lock_guard lock(mutex);
     learned = std::make_shared<const Learned>(
         Learned{scene, plan.view.lights.by_tree, found.lights, found.training, choice});
