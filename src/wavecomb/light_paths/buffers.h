@@ -34,8 +34,10 @@ struct LightPathBuffers {
         merge_points(context.merges() ? capacity : 0),
         aovs(context.is_active() ? LightPathAovs(capacity, layout, tables, context.connects)
                                  : LightPathAovs()),
-        ratio_block_(context.is_active() ? SoaBlock(1, capacity) : SoaBlock()) {
-    if (context.is_active()) ratios = ratio_block_.floats(0);
+        ratio_block_(context.is_active() ? SoaBlock(2, capacity) : SoaBlock()) {
+    if (!context.is_active()) return;
+    ratios = ratio_block_.floats(0);
+    awaits_merge = ratio_block_.uints(1);
   }
   static constexpr size_t kSplats = 4096;  ///< capacity of the buffer of light splats
 
@@ -44,9 +46,10 @@ struct LightPathBuffers {
   MergePointRows merge_points;  ///< merge points of camera paths
   LightPathAovs aovs;
   LightVertexUse use = LightVertexUse::kToCamera;
-  /// Ratio R of the camera path in each slot (PathState::ratio), or -1 if the path still needs a
-  /// vertex for merging.
-  float* ratios = nullptr;
+  float* ratios = nullptr;  ///< ratio R of the camera path in each slot (PathState::ratio)
+  /// 1 if the camera path in the slot has had delta bounces only, so that light paths may be merged
+  /// at its next vertex with a non-delta lobe; else 0.
+  uint32_t* awaits_merge = nullptr;
 
   /// Initialises the ratio R of the camera paths in `slot` at their first hits to N / G (join.h).
   template <typename F>
@@ -57,11 +60,12 @@ struct LightPathBuffers {
     const F ratio =
         inverse_camera_density<F>(camera, hit.time, hit.p, hit.dir, active) * (1.f / context.share);
     scatter<F>(ratios, ratio, slot, active);
+    scatter<UInt<F>>(awaits_merge, UInt<F>(0u), slot, active);
   }
   /// Returns the ratio R of camera paths.
   template <typename F>
   F ratio(const UInt<F>& slot, const Mask<F>& active) const {
-    return max(gather<F>(ratios, slot, active), F(0.f));
+    return gather<F>(ratios, slot, active);
   }
   size_t bytes() const {
     return splats.bytes() + vertices.bytes() + merge_points.bytes() + aovs.bytes() +

@@ -22,9 +22,8 @@ class LightPathCoupling {
                             const Mask<F>& active, PathState<F>& state) {
     if (!context_.is_active()) [[likely]]
       return;
-    const F word = gather<F>(buffers_.ratios, slot, active);
-    state.ratio = max(word, F(0.f));
-    awaits_merge_ = word < 0.f;
+    state.ratio = gather<F>(buffers_.ratios, slot, active);
+    awaits_merge_ = Mask<F>(gather<UInt<F>>(buffers_.awaits_merge, slot, active) != 0u);
     merge_point_.stored = Mask<F>(false);
     if (context_.connects) [[unlikely]]
       offer_ = offer_for<F>(buffers_.vertices, slot, depth, max_depth, active);
@@ -87,7 +86,9 @@ class LightPathCoupling {
                              const PathAovs& aovs, const Mask<F>& active) const {
     if (!context_.is_active()) [[likely]]
       return;
-    scatter<F>(buffers_.ratios, select(awaits_merge_, F(-1.f), next.ratio), slot, alive);
+    scatter<F>(buffers_.ratios, select(awaits_merge_, F(0.f), next.ratio), slot, alive);
+    const Mask<UInt<F>> awaits(awaits_merge_);
+    scatter<UInt<F>>(buffers_.awaits_merge, select(awaits, UInt<F>(1u), UInt<F>(0u)), slot, alive);
     if (any(merge_point_.stored))
       store_row<MergePoint, F>(buffers_.merge_points.rows, slot, merge_point_.row,
                                merge_point_.stored);
