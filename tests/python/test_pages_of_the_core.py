@@ -35,6 +35,14 @@ def sources() -> str:
     return "\n".join(path.read_text("utf-8") for path in files)
 
 
+@cache
+def python_sources() -> str:
+    """The text of the Python package, of tests in Python and of benchmarks."""
+    folders = (ROOT / "python" / "wavecomb", ROOT / "tests", ROOT / "benchmarks")
+    files = (path for folder in folders for path in sorted(folder.rglob("*.py*")))
+    return "\n".join(path.read_text("utf-8") for path in files if path.suffix in (".py", ".pyi"))
+
+
 def code(page: str) -> set[str]:
     """Words in backticks, outside of blocks of code."""
     text = (ROOT / "docs" / f"{page}.md").read_text("utf-8")
@@ -56,13 +64,10 @@ def test_files_exist(page: str) -> None:
 
 @pytest.mark.parametrize("page", PAGES)
 def test_names_exist(page: str) -> None:
-    """Types, constants, macros and functions with an underscore or parentheses."""
+    """Each code span that is an identifier, qualified or called or not, names something."""
+    text = sources() + python_sources()
     for word in code(page):
         name = word.removesuffix("()")
-        is_type = re.fullmatch(r"[A-Z][a-z]+([A-Z]\w*)+|k[A-Z]\w+|WAVECOMB_\w+", name)
-        is_called = word.endswith("()") and re.fullmatch(r"[a-z]\w+", name)
-        if (is_type or is_called) and name not in MADE_UP:
-            python = "\n".join(
-                path.read_text("utf-8") for path in (ROOT / "python" / "wavecomb").glob("*.py*")
-            )
-            assert re.search(rf"\b{name}\b", sources() + python), f"{page}: {word}"
+        if re.fullmatch(r"[A-Za-z_]\w*(::\w+)*", name) and name not in MADE_UP:
+            for part in name.split("::"):
+                assert re.search(rf"\b{part}\b", text), f"{page}: {word}"

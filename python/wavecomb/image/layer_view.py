@@ -81,12 +81,9 @@ _UNITS = {
     "variance": "variance, luminance",
     "depth": "depth, scene units",
     "half_depth": "depth to half opacity, scene units",
-    "guided_share": "share of bounces that are guided",
-    "survival": "survival probability of roulette",
 }
+"""Titles of legends with units; other layers have the title of their AOV."""
 _LOGARITHMIC = ("cost", "error", "variance")
-SCALARS = tuple(_UNITS)
-"""Layers that are displayed in false colours."""
 NOT_FINITE = (0, 255, 255)
 
 
@@ -184,6 +181,20 @@ def show_layer(
     return heat(array, name, low, high)
 
 
+def has_false_colours(name: str) -> bool:
+    """Returns whether a layer has one number per pixel and is displayed in false colours."""
+    row = aovs.core_aovs().get(name)
+    if row is None:
+        return name in ("samples", *aovs.ERRORS)
+    return row.channels == 1 and row.content in ("value", "exact")
+
+
+def _legend_title(name: str) -> str:
+    """Returns the title of a legend, from the name of a layer or another title."""
+    row = aovs.core_aovs().get(name)
+    return _UNITS.get(name) or (row.title if row else "") or name
+
+
 def heat(
     values: NDArray[Any],
     name: str,
@@ -221,7 +232,7 @@ def heat(
     index = (np.clip(position, 0.0, 1.0) * (len(table) - 1) + 0.5).astype(np.intp)
     pixels = table[index]
     pixels[~finite] = NOT_FINITE
-    return DisplayLayer(pixels, Legend(_UNITS.get(name, name), least, most, logarithmic))
+    return DisplayLayer(pixels, Legend(_legend_title(name), least, most, logarithmic))
 
 
 def ramp(width: int) -> NDArray[np.uint8]:

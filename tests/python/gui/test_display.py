@@ -114,3 +114,11 @@ def test_image_has_the_codes(light):
     assert (shown.width(), shown.height()) == (32, 23)
     for x, y in ((0, 0), (31, 22), (5, 9)):
         assert shown.pixelColor(x, y).getRgb()[:3] == tuple(int(c) for c in codes[y, x])
+
+
+def test_layers_with_false_colours_follow_from_the_table():
+    names = ("depth", "alpha", "cost", "samples", "variance", "distance", "beauty", "uv", "albedo")
+    shown = [name for name in names if layer_view.has_false_colours(name)]
+    assert shown == ["depth", "alpha", "cost", "samples", "variance", "distance"]
+    legend = layer_view.heat(np.ones((2, 2)), "survival").legend
+    assert legend is not None and legend.title == "Survival of roulette"

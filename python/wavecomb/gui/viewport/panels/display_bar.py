@@ -27,7 +27,7 @@ from wavecomb.gui.viewport.panels.expression_dialog import ExpressionDialog
 from wavecomb.gui.viewport.session import Session, Setup
 from wavecomb.gui.viewport.viewport import Viewport
 from wavecomb.gui.widgets import caption, choice, named, real, set_quietly
-from wavecomb.image.layer_view import SCALARS, is_light
+from wavecomb.image.layer_view import has_false_colours, is_light
 from wavecomb.run import aovs as aov_names
 from wavecomb.run import expressions
 
@@ -259,7 +259,7 @@ class DisplayBar(QToolBar):
 
     def _update_range(self) -> None:
         light = is_light(self._viewport.look.layer)
-        coloured = self._viewport.look.layer in SCALARS
+        coloured = has_false_colours(self._viewport.look.layer)
         for widget in (self._stops, self.exposure, self.slider, self.view):
             self._places[widget].setVisible(light)
         self._places[self.automatic].setVisible(coloured)
