@@ -147,7 +147,7 @@ def surface() -> QColor:
 
 
 def surround() -> QColor:
-    """Returns the background colour around images, neutral so that they look right."""
+    """Returns the background colour around images, a neutral grey."""
     return QColor("#181818" if is_dark() else "#777777")
 
 

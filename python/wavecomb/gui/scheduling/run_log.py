@@ -106,7 +106,7 @@ class Run:
         return ratio(self.last.records, self.last.packet_lanes)
 
     def shading_ns(self) -> float:
-        """Returns thread ns per record in the phases keys, sort, materialize and shade."""
+        """Returns thread ns per queued hit, over the phases keys, sort, materialize and shade."""
         seconds = sum(self.last.phases.get(name, 0.0) for name in (*SORTING, "shade"))
         return 1e9 * ratio(seconds, self.last.records)
 

@@ -85,7 +85,7 @@ class Listener(Protocol):
         """Accepts a frame."""
 
     def on_statistics(self, statistics: dict[str, Any], version: int) -> None:
-        """Accepts the statistics so far (docs/statistics.md) of the task with that version."""
+        """Accepts the statistics (docs/statistics.md) of the task with the given version."""
 
     def on_failed(self, message: str) -> None:
         """Accepts an error message of one line. Reports that the task has ended."""
@@ -248,7 +248,7 @@ class Engine:
         return frame
 
     def _first_hits(self, renderer: Renderer, task: Task) -> Filler:
-        """Sends an image at full size: first hits with the lighting of the reduced image."""
+        """Sends a full-size image: first hits lit like the previous reduced image."""
         if self._shown is None or task.setup.region is not None:
             return Filler(self._shown)
         result = renderer.render(

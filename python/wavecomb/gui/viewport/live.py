@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 class News:
-    """An ``engine.Listener`` that keeps the newest item of each kind until it is taken.
+    """An ``engine.Listener`` that stores the newest results until the UI thread takes them.
 
     Args:
         told: Port to which None is sent when a result arrives and no other result is stored.
@@ -288,7 +288,7 @@ class Live(QObject):
             self.state_changed.emit(state)
 
     def _receive(self, letter: None) -> None:
-        """Handles the newest frame, statistics, error and renderer from the render thread."""
+        """Handles the frame, statistics, error and renderer that the render thread has stored."""
         takes: dict[str, Callable[[Any], None]] = {
             "frame": self._take,
             "statistics": self._take_statistics,

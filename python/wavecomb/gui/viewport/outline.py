@@ -86,11 +86,11 @@ class Outline(QObject):
 
     @property
     def image(self) -> QImage | None:
-        """The outline as an image, transparent elsewhere; None if nothing visible is selected."""
+        """The outline as an image with alpha; None if no selected prim is visible."""
         return self._image
 
     def follow(self, frame: Frame) -> None:
-        """Updates the outline for a displayed frame."""
+        """Updates the outline after a new frame was displayed."""
         known = self._frame
         self._frame = frame
         if known is None or (known.version, known.scale) != (frame.version, frame.scale):

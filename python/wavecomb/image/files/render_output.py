@@ -24,15 +24,16 @@ if TYPE_CHECKING:
 def scene_metadata(
     scene: Scene, width: int, height: int, origin: Sequence[float] = (0.0, 0.0, 0.0)
 ) -> dict[str, Any]:
-    """Returns scene-dependent file attributes of an image, mainly the camera's matrices.
+    """Returns the EXR attributes of a scene, mainly the camera's matrices.
 
-    Omits default values: "PixelAspectRatio" of square pixels, "wavecomb:exposure" of 1, and
-    "wavecomb:projection" of perspective. A latlong image has no "worldToNDC".
+    Attributes with default values are left out: "PixelAspectRatio" of square pixels,
+    "wavecomb:exposure" of 1, and "wavecomb:projection" of perspective. A latlong image has no
+    attribute "worldToNDC".
 
-    Both matrices are for row vectors, p' = p M. "worldToCamera" transforms to a camera that looks
-    along -z with y up; "worldToNDC" to x, y in [-1, 1] across the image with y up, after division
-    by w, and z in [-1, 1] between the clipping planes. ``origin`` is the world position of the
-    scene's origin.
+    Both matrices are for row vectors, p' = p M. "worldToCamera" transforms to the space of a camera
+    that looks along -z with y up. "worldToNDC" transforms to x and y in [-1, 1] across the image,
+    with y up, and z in [-1, 1] between the clipping planes, after division by w. ``origin`` is the
+    world position of the scene's origin.
     """
     camera = getattr(scene, "camera", None)
     if camera is None:
