@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Types of the keywords of ``load`` and ``render``, written by tools/update_stub.
+"""Types of the keyword arguments of ``load`` and ``render``. tools/update_stub writes this file.
 
-Only type checkers and editors read this stub.
+Only type checkers and editors read this file.
 """
 
 import os
@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypedDict
 
 class StageKeywords(TypedDict, total=False):
-    """Fields of ``LoadOptions`` for any function."""
+    """The fields of ``LoadOptions`` as keyword arguments."""
 
     camera: str | None
     frame: float | None

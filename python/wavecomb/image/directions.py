@@ -63,7 +63,10 @@ def map_directions(
 
 
 def map_point(direction: NDArray[Any], axes: NDArray[np.float64]) -> tuple[float, float]:
-    """Returns map coordinates of a unit vector: x from 0 (left) to 1, y from 0 (top) to 1."""
+    """Returns the latlong map position of a unit vector, from 0 to 1 in x and y.
+
+    The origin is at the top left.
+    """
     ahead, right, up = axes @ np.asarray(direction, np.float64)
     return (
         float(0.5 + np.arctan2(right, ahead) / (2.0 * np.pi)),

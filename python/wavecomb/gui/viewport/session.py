@@ -349,7 +349,9 @@ class Session(Live):
             super().restart()
 
     def save(self, path: str | os.PathLike[str], look: Look | None = None, **options: Any) -> None:
-        """Writes all layers (.exr) or the displayed image (.png); ``saved`` or ``failed`` follows.
+        """Writes all layers (.exr) or the displayed image (.png).
+
+        Emits ``saved`` or ``failed`` afterwards.
 
         Args:
             path: File name that ends in .exr or .png.

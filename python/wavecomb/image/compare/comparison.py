@@ -74,7 +74,10 @@ class Comparison:
     only_b: tuple[str, ...] = ()
 
     def within(self, tolerance: float) -> bool:
-        """Returns whether channels differ by at most ``tolerance`` and excluded pixels match."""
+        """Returns whether all channels differ by at most ``tolerance``.
+
+        Excluded pixels must be bit-identical.
+        """
         return self.max_abs <= tolerance and self.not_finite_differ == 0
 
     def to_dict(self) -> dict[str, Any]:

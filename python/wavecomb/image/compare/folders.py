@@ -24,7 +24,7 @@ ENDINGS = (".exr", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr")
 
 
 def is_many(source: str) -> bool:
-    """Returns whether a name stands for several images: a folder, or a frame pattern.
+    """Returns whether a name stands for several images: a folder, or a frame placeholder.
 
     An existing file whose name contains a placeholder counts as a single file.
     """
@@ -111,7 +111,7 @@ class PairResult:
     problem: str = ""
 
     def passed(self, tolerance: float | None) -> bool:
-        """Returns whether the images are equal, or within a tolerance."""
+        """Returns whether the images are bit-identical, or differ by at most a tolerance."""
         if self.result is None:
             return False
         within = tolerance is not None and self.result.within(tolerance)

@@ -67,7 +67,7 @@ class Scale:
 def heat_map(
     a: Source, b: Source, kind: Kind = "absolute", *, exposure: float = 0.0
 ) -> NDArray[np.float32]:
-    """Shows differences of image A to the reference B as colours, with title and colour bar.
+    """Shows differences between A and the reference B as colours, with a title and a colour bar.
 
     - The kind "absolute" shows luminance differences on a logarithmic scale. This scale covers four
       decades below the largest difference; smaller differences have the darkest colour.

@@ -38,7 +38,7 @@ def measure(metric: Metric, a: Source, b: Source, exposure: float = 0.0) -> floa
 
 
 def psnr(a: Source, b: Source, exposure: float = 0.0) -> float:
-    """Returns the peak signal-to-noise ratio of the displayed images, -10 log10(mean (A - B)^2) dB.
+    """Returns the peak signal-to-noise ratio of displayed images in dB, -10 log10(mean (A - B)^2).
 
     The values are sRGB encoded in [0, 1] without rounding. The result is infinite for equal images.
 
@@ -123,7 +123,7 @@ def flip(
 
 
 def shown(pixels: NDArray[Any], exposure: float = 0.0) -> NDArray[np.float32]:
-    """Returns displayed values of linear colours: sRGB (height, width, 3) in [0, 1], unrounded."""
+    """Returns displayed sRGB values (height, width, 3) in [0, 1], without rounding."""
     scaled = np.clip(_colours(pixels) * np.float32(2.0**exposure), 0.0, 1.0)
     return srgb_from_linear(scaled)
 

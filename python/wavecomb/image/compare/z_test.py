@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Statistical test whether two noisy images have the same expectation, given pixel variances."""
+"""Statistical test whether two noisy images with known variances have equal expectations."""
 
 from __future__ import annotations
 
@@ -61,7 +61,9 @@ class ZTest:
 
 
 def sidak(p: float, tests: int) -> float:
-    """Returns 1 - (1 - p)^n: the probability that the least of n independent p-values is <= p.
+    """Returns 1 - (1 - p)^n, the probability that the smallest of n p-values is at most p.
+
+    The p-values are independent.
 
     >>> round(sidak(0.01, 5), 6)
     0.04901

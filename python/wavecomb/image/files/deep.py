@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Deep images: samples of each pixel by depth, and their OpenEXR files (docs/deep.md)."""
+"""Deep images, with several samples by depth in each pixel, and their EXR files (docs/deep.md)."""
 
 from __future__ import annotations
 

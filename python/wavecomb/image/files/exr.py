@@ -37,7 +37,9 @@ BAND = 64
 
 
 def channel_names(layer: str, channels: int) -> list[str]:
-    """Returns the EXR channel names of a layer: beauty is R, G, B; albedo is albedo.R and so on.
+    """Returns the EXR channel names of a layer.
+
+    Those of beauty are R, G and B; those of albedo are "albedo.R" and so on.
 
     >>> channel_names("normal", 3)
     ['normal.X', 'normal.Y', 'normal.Z']

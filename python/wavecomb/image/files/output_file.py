@@ -121,7 +121,7 @@ class Publisher(Protocol):
     """Interface that renames files for a process that lacks the permission to do so."""
 
     def is_own(self, target: Path) -> bool:
-        """Returns whether a file is in a folder that this process may modify freely."""
+        """Returns whether this process may create and rename files in a file's folder."""
 
     def part_of(self, target: Path) -> Path:
         """Returns a temporary name for an output file."""
