@@ -298,7 +298,9 @@ class LoadOptions:
 
     @classmethod
     def of(cls, options: LoadOptions | None, changes: Mapping[str, Any]) -> LoadOptions:
-        """Returns options with some values replaced, converted from Python callers' types.
+        """Returns a copy with some values replaced.
+
+        Converts values from the types that callers use.
 
         Raises:
             TypeError: There is no option of that name.

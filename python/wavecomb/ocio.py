@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Views of OpenColorIO through OpenImageIO, from $OCIO or from OpenColorIO's ACES configuration."""
+"""Applies views of OpenColorIO by OpenImageIO, from $OCIO or the built-in ACES configuration."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Self-contained HTML pages of images: a playable sequence, and pairs under a wipe line."""
+"""Self-contained HTML pages of images: a playable sequence, or image pairs under a wipe line."""
 
 from __future__ import annotations
 

@@ -113,7 +113,7 @@ class Picture:
 
     @property
     def has_alpha(self) -> bool:
-        """Whether the image has alpha for compositing, from the setting ``alpha``."""
+        """Whether the image has an alpha channel for compositing (setting ``alpha``)."""
         return bool(self.stats.get("settings", {}).get("alpha")) and "alpha" in self.aovs
 
     def with_denoised(self, *, threads: int = 0) -> Picture:
@@ -269,7 +269,10 @@ class Picture:
         return window_of(self.stats.get("settings", {}))
 
     def file_metadata(self) -> dict[str, Any]:
-        """Returns attributes of an EXR file: version, stage, camera, settings, times, matrices."""
+        """Returns the attributes of an EXR file.
+
+        They describe version, stage, camera, settings, times and matrices.
+        """
         from wavecomb.run.stats import image_metadata
 
         return {**image_metadata(self.stats), **self.metadata}

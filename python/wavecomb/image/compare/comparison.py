@@ -86,7 +86,7 @@ class Comparison:
 
 
 def compare(a: Source, b: Source) -> Comparison:
-    """Compares two images: files, ``Picture`` objects or arrays (height, width[, channels]).
+    """Compares two images: files, ``Picture`` objects or arrays.
 
     >>> import numpy as np
     >>> difference = compare(np.ones((4, 4, 3)), np.zeros((4, 4, 3)))
