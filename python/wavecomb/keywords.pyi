@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Types of the keyword arguments of ``load`` and ``render``. tools/update_stub writes this file.
+"""Types of the keywords of ``load`` and ``render``, written by tools/update_stub.
 
-Only type checkers and editors read this file.
+Only type checkers and editors read this stub.
 """
 
 import os
@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypedDict
 
 class StageKeywords(TypedDict, total=False):
-    """The fields of ``LoadOptions`` as keyword arguments."""
+    """Fields of ``LoadOptions`` for any function."""
 
     camera: str | None
     frame: float | None

@@ -112,34 +112,29 @@ class LoadOptions:
     Attributes:
         camera: Path or unique name of a camera prim. None uses the camera of the render settings,
             else the first camera of the stage, else a camera that frames the whole scene.
-        frame: Time code. None means the start time code of the stage; a stage without a start time
-            code is read at default values.
+        frame: Time code. None means the stage's start time code, or default values if it has none.
         purposes: Purposes of the geometry: "default", "render", "proxy", "guide". None uses those
             of the render settings, else "default" and "render".
-        variants: Selected variants, such as {"/World/Car{paint}": "red"}. A key without a path is a
-            variant set of the default prim.
+        variants: Selected variants, such as {"/World/Car{paint}": "red"}. A key without a path
+            means the default prim.
         mask: Paths or patterns (docs/stages.md) of the prims to render, with their descendants and
-            everything they need. None means all prims.
-        payloads: Patterns of the prims whose payloads are loaded, or only "none". None means all
-            payloads.
-        holdouts: Prims that cut holes into the image, together with their descendants. The holes
-            are black with alpha 0.
-        catchers: Prims that show only the shadows on them, together with their descendants
-            (docs/visibility.md).
+            everything they need. The default is all prims.
+        payloads: Patterns of prims whose payloads are loaded, or only "none". The default is all.
+        holdouts: Prims that, with descendants, cut black holes with alpha 0 into the image.
+        catchers: Prims that, with descendants, show only shadows on them (docs/visibility.md).
         catch: Purpose of the load for a stage with shadow catchers. "through" is the main render,
             in which the camera does not see catchers. "lit" and "bare" are the renders of catchers
             with and without other objects.
         session_layer: Layer file whose opinions are stronger than those of the stage.
         subdivision: "off", a level from 0 to 10 for all subdivision surfaces, or "auto" to choose
             levels by the size of edges in the image (docs/subdivision.md).
-        strand_pixels: Width in pixels below which curves are thinned out, and the remaining curves
-            are widened to this width (docs/hair.md). 0 disables thinning.
+        strand_pixels: Width in pixels below which curves are thinned out and the remaining curves are
+            widened to this width (docs/hair.md). 0 disables this.
         shutter: Opening and closing time relative to the frame, in time codes; None uses the
             camera's shutter.
         motion_blur: Whether to render motion blur; None enables it unless the render settings
             disable it.
-        motion_steps: Number of time steps of every motion, from 2 to 64. None chooses up to 8 as
-            needed.
+        motion_steps: Time steps of every motion, from 2 to 64. None chooses up to 8 as needed.
         depth_of_field: Whether to render depth of field; None enables it unless the render settings
             disable it.
         projection: "perspective", "orthographic" or "latlong"; None uses the camera's projection.
@@ -155,8 +150,7 @@ class LoadOptions:
         working_space: Working colour space: "rec709" or "acescg" (docs/textures.md).
         lights: "visible", or "hidden" to make the shapes of lights invisible to all rays while they
             still emit (docs/decisions/light-shapes.md).
-        size: Width and height of the image, in pixels, for which automatic subdivision levels are
-            chosen.
+        size: Width and height of the image for which "auto" chooses subdivision levels.
         threads: Number of threads for images, textures and subdivision; 0 uses all cores.
     """
 
@@ -298,9 +292,7 @@ class LoadOptions:
 
     @classmethod
     def of(cls, options: LoadOptions | None, changes: Mapping[str, Any]) -> LoadOptions:
-        """Returns a copy with some values replaced.
-
-        Converts values from the types that callers use.
+        """Returns a copy with some values replaced, converted from the types of callers.
 
         Raises:
             TypeError: There is no option of that name.
@@ -402,9 +394,6 @@ def _named_values(
 
 
 def selections(variants: Sequence[str]) -> dict[str, str]:
-    """Converts texts of the form "PRIM{SET}=NAME" to a mapping.
-
-    Raises WavecombError for other texts.
-    """
+    """Converts "PRIM{SET}=NAME" texts to a mapping. Raises WavecombError for other texts."""
     parts = (text.rpartition("=") for text in variants)
     return _named_values("--variant", parts, "PRIM{SET}=NAME or SET=NAME")

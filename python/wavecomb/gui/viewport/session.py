@@ -50,8 +50,7 @@ class Session(Live):
 
     Signals:
         opened(LoadedStage): A stage was loaded, or loaded again after a change of its contents.
-        closing(): The stage will be reloaded from disk. Receivers must drop references to its
-            prims.
+        closing(): The stage will be reloaded from disk. Receivers must release its prims.
         busy(str): Description of the work in the background, or "" if there is none.
         camera_changed(Pose): The camera moved, or another camera was chosen.
         selected(str | None): The selection changed. The argument is the path of the selected prim.
@@ -60,8 +59,7 @@ class Session(Live):
 
     Attributes:
         stage: The loaded stage, or None.
-        usd: The open USD stage, or None. An edit changes the session layer of ``usd`` and then
-            calls ``rebuild``.
+        usd: The open USD stage, or None. Edits change its session layer and then call ``rebuild``.
         up_axis: "X", "Y" or "Z".
         pose: Pose of the camera, or None.
         selection: Path of the selected prim, or None.
@@ -168,8 +166,7 @@ class Session(Live):
 
         Args:
             time: The time code.
-            moving: Whether other time codes will follow. Only reduced images are then rendered
-                until ``restart``.
+            moving: Whether further time codes follow. Images are then reduced until ``restart``.
         """
         if self._request is not None and self.usd is not None:
             source = replace(self._request.source, time=time)
@@ -242,8 +239,8 @@ class Session(Live):
 
         Args:
             pose: New pose. Its ``path`` must be None unless a camera prim has exactly this pose.
-            moving: Whether further movements follow immediately. Only reduced images are rendered
-                until ``settle`` is called.
+            moving: Whether further movements follow immediately. Images are then reduced until
+                ``settle``.
         """
         self.pose = pose
         self._edit_all(Edit(camera=pose.options()), moving=moving)
@@ -286,10 +283,7 @@ class Session(Live):
         return camera_pose(self.usd, path, self._request.source.time, origin)
 
     def edit_material(self, material: int, *, moving: bool = False, **values: Any) -> None:
-        """Changes parameters of the material with an index.
-
-        The arguments are those of ``add_material``.
-        """
+        """Changes a material by index, with keyword arguments of ``add_material``."""
         if self.scene is None:
             return
         name = self.scene.materials[material][0]
@@ -297,10 +291,7 @@ class Session(Live):
         self._edit_all(Edit(materials={material: values}), moving=moving)
 
     def edit_light(self, light: int, *, moving: bool = False, **values: Any) -> None:
-        """Changes parameters of the light with an index.
-
-        The arguments are those of ``add_light``.
-        """
+        """Changes a light by index, with keyword arguments of ``add_light``."""
         if self.scene is None:
             return
         self.light_edits.setdefault(light_key(self.scene, light), {}).update(values)
@@ -349,9 +340,7 @@ class Session(Live):
             super().restart()
 
     def save(self, path: str | os.PathLike[str], look: Look | None = None, **options: Any) -> None:
-        """Writes all layers (.exr) or the displayed image (.png).
-
-        Emits ``saved`` or ``failed`` afterwards.
+        """Writes all layers (.exr) or the displayed image (.png); emits ``saved`` or ``failed``.
 
         Args:
             path: File name that ends in .exr or .png.

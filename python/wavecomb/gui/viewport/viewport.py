@@ -32,8 +32,7 @@ from wavecomb.gui.worker import Worker
 from wavecomb.usd.cameras.framing import corners
 
 ORBIT_RADIANS = 0.008
-"""Rotation in radians per device-independent pixel. A drag of 400 pixels rotates by about half a
-turn."""
+"""Rotation in radians per device-independent pixel; 400 pixels are about half a turn."""
 DOLLY_STEP = 0.88
 """Factor by which one notch of the mouse wheel multiplies the distance to the pivot."""
 ZOOM_STEP = 1.25
@@ -56,13 +55,11 @@ class Viewport(PictureView):
         gizmo: Handles that edit the selected prim, or None if there is no scene panel.
 
     Signals:
-        hovered(object): The mouse moved. The argument is the pixel (x, y) under the cursor, or
-            None.
+        hovered(object): The mouse moved. The argument is the pixel (x, y) under it, or None.
         picked(object): The user clicked a pixel. The argument is the pixel's position (x, y).
         shown(Frame, Look): A new frame or new display settings are displayed.
         failed(str): An error occurred. The argument is a message of one line.
-        region_mode_changed(bool): Region mode was switched on or off. In this mode, the next drag
-            chooses the render region.
+        region_mode_changed(bool): Whether the next drag chooses the render region.
     """
 
     hovered = Signal(object)
@@ -139,8 +136,7 @@ class Viewport(PictureView):
     def pivot(self) -> Vector:
         """Returns the point that the camera orbits.
 
-        The centre of the orbit is the scene point last used under the cursor, or else the centre of
-        the scene.
+        The pivot is the scene point last used under the cursor, or the scene's centre.
         """
         if self._pivot is None:
             bounds = self.bounds()
@@ -158,8 +154,7 @@ class Viewport(PictureView):
     def outline(self) -> np.ndarray:
         """Returns points (n, 3) that enclose the scene.
 
-        The points are the scene's outline, or the corners of its bounding box if there is no
-        outline.
+        The points are the scene's outline or, without an outline, the corners of its bounding box.
         """
         stage = self.session.stage
         if stage is not None and stage.outline is not None:
@@ -208,10 +203,7 @@ class Viewport(PictureView):
         self._frame_points(self.outline())
 
     def frame_selected(self) -> None:
-        """Moves the camera so that the selected prim is in the image.
-
-        Without a selection, frames the whole scene.
-        """
+        """Moves the camera so that the selected prim (or the whole scene) is visible."""
         bounds = self.session.selected_bounds()
         self._frame_points(self.outline() if bounds is None else corners(bounds))
 
@@ -325,10 +317,7 @@ class Viewport(PictureView):
             self.picked.emit(pixel)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Moves the camera towards the point under the cursor.
-
-        With Ctrl, zooms the image instead.
-        """
+        """Dollies towards the point under the cursor. With Ctrl, zooms the image instead."""
         notches = event.angleDelta().y() / 120.0
         if notches:
             if event.modifiers() & Control:
