@@ -119,7 +119,7 @@ class LoadOptions:
             means the default prim.
         mask: Paths or patterns (docs/stages.md) of the prims to render, with their descendants and
             everything they need. The default is all prims.
-        payloads: Patterns of prims whose payloads are loaded, or only "none". The default is all.
+        payloads: Patterns of prims whose payloads are loaded, or only "none". All by default.
         holdouts: Prims that, with descendants, cut black holes with alpha 0 into the image.
         catchers: Prims that, with descendants, show only shadows on them (docs/visibility.md).
         catch: Purpose of the load for a stage with shadow catchers. "through" is the main render,
