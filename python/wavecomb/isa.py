@@ -105,8 +105,8 @@ def chosen_library(places: Sequence[str]) -> tuple[str, Path] | None:
 def library_info() -> dict[str, Any]:
     """Returns a dictionary that describes the loaded library.
 
-    ``library`` is its name, ``isa`` its instruction set and ``lanes`` its SIMD width; ``built``
-    lists all libraries of the build.
+    ``library`` is the name of the library, ``isa`` its instruction set and ``lanes`` its SIMD
+    widths. ``built`` lists all libraries of the build.
 
     Raises:
         ImportError: The library is missing or damaged.

@@ -128,8 +128,8 @@ class LoadOptions:
         session_layer: Layer file whose opinions are stronger than those of the stage.
         subdivision: "off", a level from 0 to 10 for all subdivision surfaces, or "auto" to choose
             levels by the size of edges in the image (docs/subdivision.md).
-        strand_pixels: Width in pixels below which curves are thinned out and the remaining curves are
-            widened to this width (docs/hair.md). 0 disables this.
+        strand_pixels: Width in pixels below which curves are thinned out and the remaining curves
+            are widened to this width (docs/hair.md). 0 disables thinning.
         shutter: Opening and closing time relative to the frame, in time codes; None uses the
             camera's shutter.
         motion_blur: Whether to render motion blur; None enables it unless the render settings

@@ -14,8 +14,7 @@ Pair = tuple[str, str]
 machine."""
 
 VARIABLE = "WAVECOMB_PATH_MAPS"
-"""Environment variable that holds path maps as JSON. It is set only for workers of a render farm.
-"""
+"""Environment variable with path maps as JSON, which is set only for workers of a render farm."""
 
 
 def parse_maps(texts: Iterable[str]) -> tuple[Pair, ...]:

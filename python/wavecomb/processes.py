@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Starts Python processes. All modules that need a process use this module.
+"""Starts Python processes. No other module starts a Python process.
 
 If Python is started with ``-c`` or ``-m``, the working folder is on its ``sys.path``. Python would
 then import a file such as ``json.py`` next to a shot. This module therefore starts isolated
-processes (``python -I``). ``wavecomb.boot`` builds their ``sys.path`` from the standard library,
-site-packages, and the result of ``folders``. The processes inherit only the given file descriptors
-and have a separate process group. They end with the process that started them.
+processes (``python -I``). ``wavecomb.boot`` builds the ``sys.path`` of such a process from the
+standard library, site-packages, and the result of ``folders``. The new process inherits only the
+given file descriptors, has a separate process group, and ends with the process that started it.
 """
 
 from __future__ import annotations
@@ -182,7 +182,7 @@ class _Starter:
     def current(cls) -> _Starter:
         """Returns the thread that starts processes.
 
-        A fork inherits no threads, so a new one is then created.
+        A fork inherits no threads, so a new thread is then created.
         """
         with cls._lock:
             if cls._current is None or cls._current._process != os.getpid():

@@ -119,14 +119,15 @@ class Renderer:
         Args:
             camera: Arguments of ``SceneBuilder.set_camera``: ``transform``, ``window``,
                 ``lens_radius`` ...
-            materials: New parameters by name or id of a material. They are arguments of
-                ``SceneBuilder.add_material`` except program, name and textures.
-            lights: New parameters by name or id of a light. They are arguments of
-                ``SceneBuilder.add_light`` except kind, name, texture and group, such as
-                ``transform`` (object to world), ``color`` and ``radius``.
+            materials: By name or id of a material, new values for arguments of
+                ``SceneBuilder.add_material``. Program, name and textures cannot change.
+            lights: By name or id of a light, new values for arguments of
+                ``SceneBuilder.add_light``, such as ``transform`` (object to world), ``color`` and
+                ``radius``. Kind, name, texture and group cannot change.
             moves: World space transforms by prim path. A transform moves all objects and lights at
                 or below the prim, relative to their positions when loaded; the identity restores
-                these. An instance can only be moved as a whole, and volumes cannot be moved.
+                the positions. An instance can only be moved as a whole, and volumes cannot be
+                moved.
 
         Raises:
             wavecomb.Error: A name, a parameter or a value is invalid. The scene is then unchanged.
@@ -164,7 +165,7 @@ class Renderer:
             **settings: Fields of ``wavecomb.Settings``.
 
         Returns:
-            The image. It is bit-identical to the image of a new scene with the edited values.
+            The image, which is bit-identical to the image of a new scene with the edited values.
 
         Raises:
             wavecomb.Error: An argument is invalid.

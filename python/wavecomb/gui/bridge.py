@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Passes messages from background threads to the UI thread without the use of Qt objects.
+"""Passes messages to the UI thread from threads that hold no Qt objects.
 
 A thread puts a message into a plain Python mailbox and writes a byte to a socket. A socket notifier
 on the window's thread sees the byte and passes the messages to their receivers. Only the UI thread

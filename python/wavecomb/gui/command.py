@@ -22,9 +22,9 @@ class Command(QObject):
     Signals:
         event(dict): The process printed a line with a JSON object on stdout.
         said(str): The process printed a line without a JSON object, on stdout or stderr.
-        finished(code, text, error): The process ended. ``code`` is its exit code and ``text`` all
-            of its stdout. ``error`` is the last line of stderr if the process failed, else "". The
-            exit code of a stopped process is 130.
+        finished(code, text, error): The process ended. ``code`` is the exit code and ``text`` all
+            of stdout. ``error`` is the last line of stderr if the process failed, else "". The exit
+            code of a stopped process is 130.
     """
 
     event = Signal(dict)

@@ -25,8 +25,8 @@ class Source:
         path: File of the stage.
         camera: Prim path or unique name of the camera, or None.
         time: Time code; None means the start time code of the stage.
-        variants: Selected variants, in the form that ``wavecomb.load`` expects. They are authored
-            in the session layer.
+        variants: Selected variants in the form that ``wavecomb.load`` expects, authored in the
+            session layer.
         purposes: Purposes of the geometry; None means "default" and "render".
     """
 

@@ -138,7 +138,7 @@ def scaled_size(width: int, height: int, scale: int) -> tuple[int, int]:
 
 
 def scaled_region(region: Region, scale: int, width: int, height: int) -> Region:
-    """Returns the region of an image reduced by ``scale``. It covers the full-size region."""
+    """Returns the region of an image reduced by ``scale``, rounded outwards."""
     x0, y0, x1, y1 = region
     if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
         raise WavecombError(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""List of keyboard shortcuts. It is built from the window's actions, so it is always up to date."""
+"""List of keyboard shortcuts, which is built from the window's actions."""
 
 from __future__ import annotations
 

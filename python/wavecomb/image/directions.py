@@ -33,10 +33,10 @@ def map_directions(
 
     Args:
         up: Unit vector that the top row of the map shows.
-        ahead: Direction that the centre column of the map shows. It need not be a unit vector or
-            orthogonal to ``up``.
-        height: Number of rows of the map. The map has twice as many columns. Its right half shows
-            the directions to the right of ``ahead``.
+        ahead: Direction that the centre column of the map shows, not necessarily orthogonal to
+            ``up``.
+        height: Number of rows of the map. The number of columns is twice as large. The right half
+            of the map shows the directions to the right of ``ahead``.
 
     Returns:
         Unit vectors (height, 2 height, 3), and a matrix (3, 3) with the rows ahead, right and up.

@@ -153,8 +153,8 @@ def show_layer(
         layer: Array with shape (height, width) or (height, width, channels).
         name: Name of the AOV or of the layer in a file.
         develop: Function that converts radiance to 8-bit sRGB values.
-        low: Lower end of the false colours; None means the smallest value of the layer.
-        high: Upper end of the false colours; None means the largest value of the layer.
+        low: Lower end of the false colours; None derives the value from the layer.
+        high: Upper end of the false colours; None derives the value from the layer.
     """
     array = np.asarray(layer)
     if is_light(name):

@@ -152,7 +152,7 @@ def _source(name: str) -> _Source:
 
 
 def _check_fit(first: _Source, other: _Source) -> None:
-    """Raises WavecombError if two images have different settings, so that their means differ."""
+    """Raises WavecombError if two images have settings with different expected pixel values."""
 
     def refuse(what: str, a: Any, b: Any) -> None:
         raise WavecombError(f"{other.name}: {what} is {b}, that of {first.name} is {a}")

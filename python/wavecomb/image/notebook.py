@@ -62,7 +62,7 @@ def mime_bundle(
     include: Collection[str] | None = None,
     exclude: Collection[str] | None = None,
 ) -> dict[str, str]:
-    """Returns the image as MIME types: HTML with all layers, PNG, and text.
+    """Returns the image in several MIME types: HTML with all layers, PNG, and text.
 
     Args:
         picture: The image.
@@ -81,7 +81,7 @@ def mime_bundle(
 def page(picture: Rendered) -> str:
     """Returns HTML of the image, its summary and its layers.
 
-    The HTML has inline styles and no scripts, so that untrusted notebooks show it too.
+    The HTML has inline styles and no scripts, so that untrusted notebooks also show the HTML.
     """
     shown = codes(picture)
     line = html.escape(facts(picture))

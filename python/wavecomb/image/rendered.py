@@ -271,7 +271,7 @@ class Picture:
     def file_metadata(self) -> dict[str, Any]:
         """Returns the attributes of an EXR file.
 
-        They describe version, stage, camera, settings, times and matrices.
+        The attributes describe version, stage, camera, settings, times and matrices.
         """
         from wavecomb.run.stats import image_metadata
 

@@ -56,7 +56,7 @@ class CameraUpdate:
 class FrameReader:
     """An open stage and the data that its frames share.
 
-    While the object exists, files of the stage must not change, except for images.
+    While the reader is used, files of the stage must not change, except for images.
     """
 
     def __init__(self, path: Path, options: LoadOptions) -> None:

@@ -183,7 +183,7 @@ def _row(values: tuple[float, ...]) -> str:
 
 
 def pixel_rows(a: Side | None, b: Side | None, layer: str, x: int, y: int) -> dict[str, str]:
-    """Returns the pixel values of A, B and A - B as text. The text of a missing image is ""."""
+    """Returns the pixel values of A, B and A - B as text. Missing images have no entry."""
     found: dict[str, NDArray[Any]] = {}
     for name, side in (("A", a), ("B", b)):
         values = side.layer(layer) if side is not None else None

@@ -42,7 +42,7 @@ class Autosave(QObject):
         """Starts saving the edits of a stage automatically.
 
         Args:
-            edits: Edits of the stage, which are saved after each change.
+            edits: Edits of the stage, which are saved shortly after each change.
             folder: Folder of the autosave files, created when needed.
             parent: Qt parent of the writer.
         """

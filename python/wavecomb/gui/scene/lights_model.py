@@ -24,7 +24,7 @@ SOFT_DOME = "soft dome"
 
 
 class LightsModel(HeadedModel):
-    """List model of the stage's lights, sorted by path. Includes lights that are switched off."""
+    """List model of the paths of the stage's lights. Includes lights that are switched off."""
 
     def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
         super().__init__(HEADERS, parent)

@@ -229,7 +229,7 @@ def range_of(parameter: Parameter) -> Range:
 def row_of(parameter: Parameter) -> FieldRow:
     """Returns the field of a parameter.
 
-    If a texture or primvar sets the parameter, the field names it.
+    If a texture or primvar sets the parameter, the field names that source.
     """
     name, one = parameter.name, parameter.definition
     title = name.replace("_", " ")

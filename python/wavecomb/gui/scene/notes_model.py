@@ -35,7 +35,7 @@ class Row:
 def rows_of(stage: LoadedStage) -> list[Row]:
     """Returns a row for each listed prim or file of a finding.
 
-    One more row counts the unlisted ones.
+    One more row counts the prims or files that are not listed.
     """
     out: list[Row] = []
     report = stage.report

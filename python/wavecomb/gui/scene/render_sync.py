@@ -153,7 +153,7 @@ class RenderSync:
     def structures(self, prims: Iterable[Sdf.Path]) -> dict[str, str]:
         """Returns a text for each affected material that identifies its textures and graphs.
 
-        An existing scene cannot change these.
+        An existing scene cannot change textures and graphs.
         """
         out = {}
         for path in {one for prim in prims for one in self._materials_of(prim)}:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Edits that the scene panels make. They change the stage and update the live render."""
+"""Edits that the scene panels make to the stage and to the live render."""
 
 from __future__ import annotations
 

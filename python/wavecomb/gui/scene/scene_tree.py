@@ -109,7 +109,7 @@ MAX_FOUND = 2000
 """Largest number of prims that a search shows."""
 
 MAX_EXPANDED = 300
-"""If a search has more matches, only the ancestors of the first ``MAX_EXPANDED`` are expanded."""
+"""If a search has more matches, only the ancestors of the first match are expanded."""
 
 
 class _View(QTreeView):

@@ -14,8 +14,8 @@ from wavecomb.gui.scene.stage_edits import Key, Opinion
 from wavecomb.usd.lights.light import KINDS
 
 OP = "xformOp:transform:edit"
-"""Name of the transform operation that holds all edits. It is applied after the prim's other
-operations."""
+"""Name of the transform operation that holds all edits. The operation is applied after the prim's
+other operations."""
 _RESET = "!resetXformStack!"
 
 

@@ -124,7 +124,7 @@ def scheduling_of(setup: Setup) -> dict[str, Any]:
 def promise(setup: Setup) -> str:
     """Returns a text that says whether the settings for the order of work affect the image.
 
-    These settings do not change the image, except with a time limit or cost-aware roulette.
+    The order of work does not change the image, except with a time limit or cost-aware roulette.
     """
     if setup.time_limit:
         return (

@@ -24,7 +24,7 @@ class Rounds(QObject):
     settings.
 
     Signals:
-        moved(int, int): Number of finished steps and total number of steps, after each step.
+        moved(int, int): Number of finished steps and total number of steps.
         ended(bool): The sequence ended; True if all steps were finished.
     """
 

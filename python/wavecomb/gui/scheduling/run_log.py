@@ -45,8 +45,8 @@ class Look:
     phases: Mapping[str, float] = field(default_factory=dict)
     """Thread seconds in each render phase."""
     coherence: Mapping[str, float] = field(default_factory=dict)
-    """Length of runs of one material in the shading queues, and homogeneity of the queues. Both are
-    means since the start of the render, because the core reports no counters for them."""
+    """Length of runs of one material in the shading queues, and homogeneity of the queues, as means
+    since the start of the render. The core reports no counters for these values."""
 
 
 def take_look(stats: Mapping[str, Any]) -> Look:

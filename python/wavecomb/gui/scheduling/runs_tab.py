@@ -143,7 +143,7 @@ class RunsTab(QWidget):
     def repeat(self) -> None:
         """Renders with the settings of the base and of the selected series in turn.
 
-        A second call stops this.
+        A second call stops the sequence of renders.
         """
         if self.rounds.running:
             self.rounds.stop()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Controls that show and change a setting. They do not store its value."""
+"""Controls that show and change a setting without storing the value."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class _CalmWheel(QObject):
 def calm(widget: QWidget) -> None:
     """Makes a widget react to the mouse wheel only while it has the focus.
 
-    Without this, scrolling a panel would change settings and restart the render.
+    Otherwise, scrolling a panel would change settings and restart the render.
     """
     widget.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
     widget.installEventFilter(_CalmWheel(widget))
@@ -134,7 +134,7 @@ def control_of(row: Choice | Number, changed: Changed) -> Control:
 
 
 def add_row(form: QFormLayout, label: str, control: QWidget, field: QWidget | None = None) -> None:
-    """Adds a control and its label to a form. Both have the same tooltip.
+    """Adds a control and a label with the same tooltip to a form.
 
     Args:
         form: The form to which the control is added.

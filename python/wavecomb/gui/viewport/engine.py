@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Render thread of a live render. It runs the newest task, stops the previous one and sends frames.
+"""Render thread of a live render.
+
+The thread runs the newest task, stops the previous task and sends frames.
 
 Independent of Qt. If the full-size image would take long, a task first renders a reduced image.
 The engine then renders the full-size image in passes.
@@ -26,7 +28,8 @@ if TYPE_CHECKING:
     from wavecomb.usd import LoadedStage
 
 MOVING_S = 0.1
-"""Target time of a reduced image during camera movements, including denoising, in seconds."""
+"""Target time of a reduced image during camera movements and edits, including denoising, in
+seconds."""
 QUICK_S = 0.15
 """If a pass at full size takes longer than this time in seconds, a reduced image is shown first."""
 
@@ -50,7 +53,10 @@ class Edit:
                 mine[index] = {**mine.get(index, {}), **values}
 
     def copied(self) -> Edit:
-        """Returns a copy. Each live render needs one, because it merges later edits into it."""
+        """Returns a copy.
+
+        Each live render needs a copy, since later edits are merged into the object.
+        """
         return Edit(self.camera, dict(self.materials), dict(self.lights))
 
     def __bool__(self) -> bool:
@@ -79,7 +85,7 @@ class Task:
 
 
 class Listener(Protocol):
-    """Receiver of the engine's results. The engine calls it on the render thread."""
+    """Receiver of the engine's results. All methods are called on the render thread."""
 
     def on_frame(self, frame: Frame) -> None:
         """Accepts a frame."""

@@ -79,13 +79,12 @@ class News:
 
 
 SETTLE_MS = 50
-"""Delay in milliseconds between the last camera movement and the start of the full-size image."""
+"""Delay in milliseconds between the last movement or edit and the start of the full-size image."""
 BURST_S = 0.15
 """Edits that follow each other within this time, in seconds, count as a drag and show reduced
 images."""
 WAIT_S = 3.0
-"""Time in seconds that an image may take during a movement before the next edit stops its render.
-"""
+"""Time in seconds that an image may take during a movement before the next edit stops it."""
 DENOISE_AGAIN = 1.5
 """A frame is denoised again when its sample count has grown by this factor."""
 LATE = 4

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from wavecomb.gui.viewport.session import Session
 
 MOST_PIXELS = 160_000
-"""Largest image size at which an outline is computed. At this size, it takes about 50 ms of CPU
-time."""
+"""Largest image size at which an outline is computed. An outline of this size takes about 50 ms of
+CPU time."""
 COLOUR = (255, 154, 60)
 
 
@@ -31,7 +31,7 @@ def object_mask(renderer: Renderer, path: str, width: int, height: int) -> NDArr
     Returns None if the scene has no objects of the prim.
 
     Args:
-        renderer: Renderer of the current scene. It may be rendering during the call.
+        renderer: Renderer of the current scene, which may be rendering during the call.
         path: Path of the prim.
         width: Width of the mask in pixels.
         height: Height of the mask in pixels.

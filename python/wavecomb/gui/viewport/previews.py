@@ -115,14 +115,14 @@ def enlarged(image: Array, width: int, height: int) -> Array:
 
 
 class Filler:
-    """Fills pixels without samples in frames of the first pass with an estimate without noise.
+    """Replaces frames of the first pass, with few samples, by an estimate without noise.
 
-    The estimate is the irradiance of a reduced image times the albedo of first hits at full size.
+    The estimate is the beauty of a reduced image, adapted to the albedo of first hits at full size.
 
     Args:
-        preview: The reduced image; None means that frames are not filled.
-        albedo: Albedo of first hits at full size, (height, width, 3). None means that the albedo of
-            the reduced image is enlarged.
+        preview: The reduced image; None means that frames are not replaced.
+        albedo: Albedo of first hits at full size, (height, width, 3). None means that the
+            reduced image is only enlarged.
     """
 
     def __init__(self, preview: Frame | None, albedo: Array | None = None) -> None:
@@ -130,7 +130,7 @@ class Filler:
         self._whole: Array | None = None
 
     def fill(self, frame: Frame) -> Frame:
-        """Returns the frame, or a copy without empty pixels if some pixels have no samples."""
+        """Returns the frame, or a copy that shows the estimate if some pixels have no samples."""
         preview = self._preview
         if preview is None or (frame.is_complete and frame.samples_done):
             return frame

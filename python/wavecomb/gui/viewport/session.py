@@ -59,13 +59,13 @@ class Session(Live):
 
     Attributes:
         stage: The loaded stage, or None.
-        usd: The open USD stage, or None. Edits change its session layer and then call ``rebuild``.
+        usd: The open USD stage, or None. Edits change the session layer and then call ``rebuild``.
         up_axis: "X", "Y" or "Z".
         pose: Pose of the camera, or None.
         selection: Path of the selected prim, or None.
         material_edits: Values that ``edit_material`` has changed, by material name.
-        light_edits: Values that ``edit_light`` has changed. The key is the light's name and its
-            number among lights with that name.
+        light_edits: Values that ``edit_light`` has changed, by name and number among lights of that
+            name.
         twins: Live renders with separate settings that show the same scene and camera.
     """
 
@@ -166,7 +166,7 @@ class Session(Live):
 
         Args:
             time: The time code.
-            moving: Whether further time codes follow. Images are then reduced until ``restart``.
+            moving: Whether further time codes follow; images are reduced until ``restart``.
         """
         if self._request is not None and self.usd is not None:
             source = replace(self._request.source, time=time)
@@ -239,7 +239,7 @@ class Session(Live):
 
         Args:
             pose: New pose. Its ``path`` must be None unless a camera prim has exactly this pose.
-            moving: Whether further movements follow immediately. Images are then reduced until
+            moving: Whether further movements follow immediately. Images are reduced until
                 ``settle``.
         """
         self.pose = pose

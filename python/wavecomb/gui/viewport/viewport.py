@@ -55,7 +55,7 @@ class Viewport(PictureView):
         gizmo: Handles that edit the selected prim, or None if there is no scene panel.
 
     Signals:
-        hovered(object): The mouse moved. The argument is the pixel (x, y) under it, or None.
+        hovered(object): The mouse moved. The argument is the pixel (x, y) under the mouse, or None.
         picked(object): The user clicked a pixel. The argument is the pixel's position (x, y).
         shown(Frame, Look): A new frame or new display settings are displayed.
         failed(str): An error occurred. The argument is a message of one line.

@@ -25,7 +25,7 @@ class Comparison:
     """Differences between image A and the reference image B.
 
     Differences are A - B in linear values. A pixel in which a channel of A or B is NaN or infinite
-    is counted, but excluded from all means and maxima. It still counts for ``equal``.
+    is counted, but excluded from all means and maxima. Such a pixel still counts for ``equal``.
 
     Attributes:
         equal: Whether all common layers are bit-identical. In this comparison, -0 differs from 0,

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 class BandFiles:
     """Image files that are written in bands: one EXR file or one per AOV, and a PNG file.
 
-    As a context manager, it renames the files on success and removes them after an exception.
+    As a context manager, the object renames the files on success and removes them on an exception.
 
     Attributes:
-        written: Names of the files. They are known after the first band.
+        written: Names of the files, which are known after the first band.
         rows: Number of rows written so far.
     """
 

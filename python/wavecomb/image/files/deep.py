@@ -147,5 +147,5 @@ def _run(function: Any, *columns: NDArray[Any]) -> None:
 
 
 def deep_of(pair: tuple[Any, Any] | None) -> DeepPicture | None:
-    """Converts a deep image of the core. If it is None, returns None."""
+    """Converts a deep image of the core. Returns None if the core has no deep image."""
     return None if pair is None else DeepPicture(*pair)

@@ -39,7 +39,7 @@ BAND = 64
 def channel_names(layer: str, channels: int) -> list[str]:
     """Returns the EXR channel names of a layer.
 
-    Those of beauty are R, G and B; those of albedo are "albedo.R" and so on.
+    The names are R, G and B for beauty, and albedo.R and so on for albedo.
 
     >>> channel_names("normal", 3)
     ['normal.X', 'normal.Y', 'normal.Z']

@@ -26,7 +26,7 @@ _CGROUP = Path("/sys/fs/cgroup")
 
 
 def machine_limit() -> int | None:
-    """Returns the bytes that this process may use. The machine and control groups limit them."""
+    """Returns the bytes that this process may use, as limited by machine and control groups."""
     found = [bytes_ for bytes_ in (memory_bytes(), _of_group()) if bytes_]
     return min(found) if found else None
 

@@ -2,7 +2,7 @@
 """Output files of a sandboxed process, which must not write to the folders of these files.
 
 The sandboxed process writes a file into its private folder and then asks its parent process to move
-it. The parent process derives the permitted output files from the command line. It moves no other
+it. The parent process derives the permitted output files from the command line, and moves no other
 files.
 """
 

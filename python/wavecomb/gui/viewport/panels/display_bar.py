@@ -32,7 +32,7 @@ from wavecomb.run import aovs as aov_names
 from wavecomb.run import expressions
 
 EXPOSURE = 10.0
-"""Largest exposure in stops. The smallest is its negative."""
+"""Largest exposure in stops. The smallest exposure is the negative of this value."""
 EXPRESSION = expressions.PREFIX
 """Entry of the layer box that opens the dialog for light path expressions."""
 _ZOOMS = ("Fit", "50 %", "100 %", "200 %", "400 %", "800 %", "1600 %")
@@ -219,7 +219,7 @@ class DisplayBar(QToolBar):
         self.choose_layer(names[(at + by) % len(names)])
 
     def _setup_changed(self, setup: Setup) -> None:
-        """Shows the denoised layer if denoising was switched on, else the beauty."""
+        """Shows the denoised layer or the beauty when denoising is switched on or off."""
         shown = self._viewport.look.layer
         if setup.denoise and not self._denoising and shown == "beauty":
             self.choose_layer("denoised")

@@ -52,7 +52,7 @@ def field_text(setup: Setup, learned: dict[str, Any] | None) -> str:
 def light_rows(shares: list[tuple[str, float]], most: int = MOST_LIGHTS) -> list[tuple[str, float]]:
     """Returns the lights with the largest probabilities.
 
-    The last row is the sum of all other lights.
+    If there are further lights, the last row is their sum.
 
     >>> light_rows([("a", 0.5), ("b", 0.3), ("c", 0.2)], 2)
     [('a', 0.5), ('2 others', 0.5)]

@@ -17,9 +17,9 @@ _PLAY, _STOP = "\u25b6", "\u25a0"
 class Timeline(QWidget):
     """Timeline bar, which is visible for stages with a frame range.
 
-    While the timeline plays, each frame is shown as a reduced image. It plays at most at the frame
-    rate of the stage, and repeats the frame range. When playing stops, the current frame is
-    rendered at full size.
+    While the timeline plays, each frame is shown as a reduced image. The timeline plays at most at
+    the frame rate of the stage, and repeats the frame range. When playing stops, the current frame
+    is rendered at full size.
     """
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
