@@ -15,11 +15,11 @@ DEFAULT = ("beauty", "albedo", "normal", "depth", "samples")
 """Default layers of an image."""
 
 GUIDES = ("guide_albedo", "guide_normal")
-"""AOVs that guide the denoiser. They describe surfaces seen directly, in mirrors or through clear
+"""AOVs that guide the denoiser: features of surfaces seen directly, in mirrors or through clear
 glass."""
 ERRORS = ("error", "variance")
 DEEP = "deep"
-"""AOV of the deep image. The option ``--deep`` writes it to a separate file, so it is not a layer.
+"""AOV of the deep image, which the option ``--deep`` writes to a separate file, not to a layer.
 """
 LIGHT = "light_"
 TECHNIQUES = ("by_bounces", "by_light_samples", "by_light_paths")
@@ -164,10 +164,7 @@ def expand(asked: Iterable[str]) -> tuple[str, ...]:
 
 
 def with_others(aovs: tuple[str, ...], others: Iterable[str]) -> tuple[str, ...]:
-    """Returns ``aovs`` and further AOVs that the core must render.
-
-    Guides for the denoiser are an example.
-    """
+    """Returns ``aovs`` and further AOVs that the core must render, such as denoiser guides."""
     missing = [name for name in others if name not in aovs]
     return expand([*aovs, *missing]) if missing else aovs
 

@@ -2,10 +2,10 @@
 """Shadow catchers: combines three renders of a stage into one image (docs/visibility.md).
 
 In the main render, the camera does not see the catchers. Two further renders show only the
-catchers. In the first, all other objects cast shadows on the catchers; in the second, there are no
-other objects. Let c be the coverage of a pixel by catchers. Let L and L0 be the luminance that the
-catchers reflect in the first and second of these renders, which use the same random numbers. The
-shadow then adds c (1 - L / L0) to the pixel's alpha.
+catchers: "lit" with shadows of all other objects, and "bare" without other objects. Let c be the
+coverage of a pixel by catchers. Let L and L0 be the luminance that the catchers reflect in "lit"
+and in "bare", which use the same random numbers. The shadow adds c (1 - L / L0) to the pixel's
+alpha.
 """
 
 from __future__ import annotations
