@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Summary of a stage as Wavecomb would render it."""
+"""Summarises the contents of a stage as Wavecomb would render it."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
 
 _MOST_VOLUMES = 16
-"""Maximum number of volumes in the text output."""
+"""Maximum number of volumes that the text output lists."""
 
 
 def stage_info(loaded: LoadedStage, stage: str) -> dict[str, Any]:
-    """Returns the summary of a stage as plain data.
+    """Returns the summary of a stage as a dictionary.
 
     Args:
         loaded: Result of ``wavecomb.load``.
@@ -63,7 +63,7 @@ def stage_info(loaded: LoadedStage, stage: str) -> dict[str, Any]:
 
 
 def machine_info() -> dict[str, Any]:
-    """Returns the resources and features of this machine as plain data."""
+    """Returns the resources and features of this machine as a dictionary."""
     from wavecomb import _core, vdb
     from wavecomb.isa import library_info
     from wavecomb.machine import memory_bytes, usable_cores
@@ -83,7 +83,7 @@ def machine_info() -> dict[str, Any]:
 
 
 def machine_rows(info: dict[str, Any]) -> list[tuple[str, str]]:
-    """Returns the machine's resources as names and texts."""
+    """Returns the machine's resources as pairs of name and text."""
     from wavecomb.isa import library_text
 
     memory, limit = info["memory_bytes"], info["memory_limit_bytes"]
@@ -100,12 +100,12 @@ def machine_rows(info: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def machine_lines(info: dict[str, Any]) -> list[str]:
-    """Returns the machine's resources as lines."""
+    """Returns the machine's resources as lines of text."""
     return [f"{name:13}  {text}" for name, text in machine_rows(info)]
 
 
 def print_info(info: dict[str, Any], loaded: LoadedStage, console: Console) -> None:
-    """Prints the summary of a stage."""
+    """Prints the summary of a stage to the console."""
     from rich.markup import escape
     from rich.table import Table
 
@@ -163,7 +163,7 @@ def print_info(info: dict[str, Any], loaded: LoadedStage, console: Console) -> N
 
 
 def _volume_rows(row: Callable[[str, str], None], volume: dict[str, Any]) -> None:
-    """Adds rows for a volume and its grids."""
+    """Adds table rows for a volume and its grids."""
     low, high = volume["bounds"]
     times = f" x {volume['count']}" if volume["count"] > 1 else ""
     what = "" if volume["grids"] else ", homogeneous"

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Selects the native library: in a portable build, the best one for this CPU.
+"""Selects the native library ``wavecomb._core`` that fits this CPU best.
 
 A portable build (docs/building.md) has ``wavecomb/lib/<isa>/_core`` for each instruction set, and
 ``wavecomb/_cpu``, which detects the CPU's instruction sets. The first import of ``wavecomb._core``
-loads the best library. The environment variable ``WAVECOMB_ISA`` selects another library.
+loads the best library that this CPU supports. The environment variable ``WAVECOMB_ISA`` selects
+another instruction set.
 """
 
 from __future__ import annotations
@@ -24,23 +25,23 @@ from typing import Any
 from wavecomb.errors import WavecombError, join_core
 
 ISAS = ("x86-64-v4", "x86-64-v3", "x86-64-v2", "armv8-a")
-"""Supported instruction sets, best first."""
+"""Supported instruction sets, from best to worst."""
 
 VARIABLE = "WAVECOMB_ISA"
 CORE = "wavecomb._core"
 
 
 def choose(built: Sequence[str], runnable: Sequence[str], forced: str | None = None) -> str:
-    """Returns the instruction set whose library is to be loaded.
+    """Returns the instruction set whose library will be loaded.
 
     Args:
-        built: Instruction sets with a library; not empty.
-        runnable: Instruction sets of this CPU.
-        forced: Instruction set that the user requests, if any.
+        built: Instruction sets for which there is a library; at least one.
+        runnable: Instruction sets that this CPU supports.
+        forced: Instruction set that the user requests, or None.
 
     Raises:
-        WavecombError: ``forced`` is unknown, not built or not supported by this CPU, or this CPU
-            supports no library.
+        WavecombError: ``forced`` is unknown, was not built or is not supported by this CPU, or this
+            CPU supports none of the libraries.
     """
     there_are = ", ".join(isa for isa in ISAS if isa in built)
     if forced:
@@ -63,10 +64,10 @@ def choose(built: Sequence[str], runnable: Sequence[str], forced: str | None = N
 
 
 def libraries(places: Sequence[str]) -> dict[str, Path]:
-    """Returns the library of each instruction set that was built, best first.
+    """Returns the library of each instruction set that was built, from best to worst.
 
     Args:
-        places: Folders of the package, as in ``wavecomb.__path__``.
+        places: Folders of the package ``wavecomb``, as in ``wavecomb.__path__``.
     """
     found: dict[str, Path] = {}
     for isa in ISAS:
@@ -79,10 +80,13 @@ def libraries(places: Sequence[str]) -> dict[str, Path]:
 
 
 def chosen_library(places: Sequence[str]) -> tuple[str, Path] | None:
-    """Returns instruction set and file of ``wavecomb._core``; None in a build with one library.
+    """Returns the instruction set and file of ``wavecomb._core``.
+
+    Returns None if the build has only one library.
 
     Raises:
-        WavecombError: ``choose`` fails, or ``WAVECOMB_ISA`` is set in a build with one library.
+        WavecombError: The library that ``WAVECOMB_ISA`` names is not available, or this CPU
+            supports none of the libraries.
     """
     built, forced = libraries(places), os.environ.get(VARIABLE)
     if not built:
@@ -99,10 +103,13 @@ def chosen_library(places: Sequence[str]) -> tuple[str, Path] | None:
 
 
 def library_info() -> dict[str, Any]:
-    """Returns ``library`` (its name), ``isa``, ``lanes`` and ``built`` (all libraries).
+    """Returns a dictionary that describes the loaded library.
+
+    ``library`` is the name of the library, ``isa`` its instruction set and ``lanes`` its SIMD
+    widths. ``built`` lists all libraries of the build.
 
     Raises:
-        ImportError: There is no library, or it is broken.
+        ImportError: The library is missing or damaged.
         WavecombError: ``chosen_library`` fails.
     """
     import wavecomb
@@ -118,7 +125,7 @@ def library_info() -> dict[str, Any]:
 
 
 def library_text() -> str:
-    """Returns ``library_info`` as one line of text."""
+    """Returns the entries of ``library_info`` as one line of text."""
     info = library_info()
     lanes = ", ".join(str(width) for width in info["lanes"])
     of = f" of {', '.join(info['built'])}" if len(info["built"]) > 1 else ""
@@ -135,13 +142,16 @@ class CoreLoader(ExtensionFileLoader):
 
 
 class Finder:
-    """Import finder for ``wavecomb._core``, and for nothing else."""
+    """Import finder that handles only the module ``wavecomb._core``."""
 
     @staticmethod
     def find_spec(
         name: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Finds a module; part of the interface of ``sys.meta_path``."""
+        """Returns the spec of ``wavecomb._core``, or None.
+
+        Part of the interface of ``sys.meta_path``.
+        """
         if name != CORE or path is None:
             return None
         chosen = chosen_library(path)

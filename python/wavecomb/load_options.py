@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Load options of a stage: one table whose rows are the fields of ``LoadOptions``.
+"""Load options of a stage: a table with a row for each field of ``LoadOptions``.
 
-The rows determine the keywords of ``load``, ``render``, ``render_frames`` and ``load_stage``, the
-options of commands, and values in checkpoints.
+The rows determine the keyword arguments of ``load``, ``render``, ``render_frames`` and
+``load_stage``, the options of commands, and the values in checkpoints.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ CATCH = ("through", "lit", "bare")
 
 @dataclass(frozen=True)
 class Row:
-    """Description of a load option for commands and files.
+    """Description of a load option, for command lines and for checkpoints.
 
     Attributes:
         help: Description of the option in one sentence.
         kind: "text", "file", "number", "integer", "pair", "choice", "switch" (on or off), or "not"
             (a flag that disables something).
-        unset: Description of the default.
+        unset: Description of the default value.
         option: Name of the command-line option; "" if there is none.
-        metavar: Placeholder of the option's value in help.
+        metavar: Placeholder of the option's value in the help text.
         choices: Valid values.
         many: Whether the option may be repeated.
         least: Smallest number.
         most: Largest number.
-        above: Whether ``least`` itself is excluded.
-        unit: Unit of a numeric option.
+        above: Whether valid numbers must be larger than ``least``, not equal to it.
+        unit: Unit of the option's number.
     """
 
     help: str
@@ -55,7 +55,7 @@ class Row:
     unit: str = ""
 
     def check(self, name: str, value: Any) -> None:
-        """Raises WavecombError with ``name`` for an invalid value; None is always valid."""
+        """Raises WavecombError with ``name`` if a value is invalid. None is always valid."""
         if value is None:
             return
         for one in value if self.many and self.choices else (value,):
@@ -95,7 +95,7 @@ class Row:
 
     @property
     def key(self) -> str:
-        """Name of the option among a command's arguments and in checkpoints."""
+        """Key of the option in the arguments of a command and in checkpoints."""
         return self.option.removeprefix("--").replace("-", "_") + "s" * (
             self.many and self.option not in ("--mask", "--payloads")
         )
@@ -107,35 +107,34 @@ def _row(default: Any, text: str, kind: str, option: str = "", **more: Any) -> A
 
 @dataclass(frozen=True)
 class LoadOptions:
-    """Load options of a stage; None means that the stage decides.
+    """Load options of a stage. None means that the stage determines the value.
 
     Attributes:
-        camera: Path or unique name of a camera prim; None uses the camera of the render settings,
-            else the first of the stage, else one that frames everything.
-        frame: Time code; None means the stage's start time, or default values in a stage without.
-        purposes: Purposes of the geometry: "default", "render", "proxy", "guide"; None uses the
-            purposes of the render settings, else "default" and "render".
-        variants: Variant selections: {"/World/Car{paint}": "red"}; a set without a path is one of
-            the default prim.
-        mask: Paths or patterns (docs/stages.md) of prims to render, with their descendants and
-            everything they need; by default all.
-        payloads: Patterns of prims whose payloads are loaded, or "none" alone; by default all.
-        holdouts: Prims that, with their descendants, cut holes into the image: black, with alpha 0.
-        catchers: Prims that, with their descendants, show only the shadows on them
-            (docs/visibility.md).
-        catch: Purpose of the load for a stage with catchers: "through" for the main render, whose
-            camera does not see catchers, or "lit" and "bare" for the renders of catchers with and
-            without other objects.
-        session_layer: File with opinions that are stronger than the stage's.
+        camera: Path or unique name of a camera prim. None uses the camera of the render settings,
+            else the first camera of the stage, else a camera that frames the whole scene.
+        frame: Time code. None means the stage's start time code, or default values if it has none.
+        purposes: Purposes of the geometry: "default", "render", "proxy", "guide". None uses those
+            of the render settings, else "default" and "render".
+        variants: Selected variants, such as {"/World/Car{paint}": "red"}. A key without a path
+            means the default prim.
+        mask: Paths or patterns (docs/stages.md) of the prims to render, with their descendants and
+            everything they need. The default is all prims.
+        payloads: Patterns of prims whose payloads are loaded, or only "none". All by default.
+        holdouts: Prims that, with descendants, cut black holes with alpha 0 into the image.
+        catchers: Prims that, with descendants, show only shadows on them (docs/visibility.md).
+        catch: Purpose of the load for a stage with shadow catchers. "through" is the main render,
+            in which the camera does not see catchers. "lit" and "bare" are the renders of catchers
+            with and without other objects.
+        session_layer: Layer file whose opinions are stronger than those of the stage.
         subdivision: "off", a level from 0 to 10 for all subdivision surfaces, or "auto" to choose
             levels by the size of edges in the image (docs/subdivision.md).
-        strand_pixels: Width in pixels below which curves are thinned out and the remaining ones
-            widened up to this width (docs/hair.md); 0 disables it.
+        strand_pixels: Width in pixels below which curves are thinned out and the remaining curves
+            are widened to this width (docs/hair.md). 0 disables thinning.
         shutter: Opening and closing time relative to the frame, in time codes; None uses the
             camera's shutter.
         motion_blur: Whether to render motion blur; None enables it unless the render settings
             disable it.
-        motion_steps: Steps of every motion, 2 to 64; None chooses up to 8 as needed.
+        motion_steps: Time steps of every motion, from 2 to 64. None chooses up to 8 as needed.
         depth_of_field: Whether to render depth of field; None enables it unless the render settings
             disable it.
         projection: "perspective", "orthographic" or "latlong"; None uses the camera's projection.
@@ -143,16 +142,16 @@ class LoadOptions:
         lens_settings: Lens settings such as {"lens_k1": "-0.1", "rolling_shutter": "top"}, which
             override the camera's attributes (docs/cameras.md).
         st_map: ST map image of the lens distortion, which replaces the distortion coefficients.
-        render_settings: Path or name of a RenderSettings prim; None uses those that the stage
-            names, else the only ones under /Render (docs/cameras.md).
+        render_settings: Path or name of a RenderSettings prim. None uses the prim that the stage
+            names, else the only one below /Render (docs/cameras.md).
         product: Path or name of a product of the render settings; None uses the first product.
         texture_limit: Memory limit of textures and volume grids in MB (10^6 bytes); None means no
             limit. Textures beyond the limit are swapped to a temporary file (docs/textures.md).
         working_space: Working colour space: "rec709" or "acescg" (docs/textures.md).
         lights: "visible", or "hidden" to make the shapes of lights invisible to all rays while they
             still emit (docs/decisions/light-shapes.md).
-        size: Width and height of the image for which automatic levels are chosen.
-        threads: Threads for images, textures and subdivision; 0 means all.
+        size: Width and height of the image for which "auto" chooses subdivision levels.
+        threads: Number of threads for images, textures and subdivision; 0 uses all cores.
     """
 
     camera: str | None = _row(
@@ -293,10 +292,10 @@ class LoadOptions:
 
     @classmethod
     def of(cls, options: LoadOptions | None, changes: Mapping[str, Any]) -> LoadOptions:
-        """Returns options with some values replaced, converted from Python callers' types.
+        """Returns a copy with some values replaced, converted from the types of callers.
 
         Raises:
-            TypeError: An option does not exist.
+            TypeError: There is no option of that name.
         """
         known = {one.name for one in fields(cls)}
         unknown = [name for name in changes if name not in known]
@@ -317,34 +316,34 @@ class LoadOptions:
 
     @property
     def chooses_what_opens(self) -> bool:
-        """Whether options are set that apply only while a file is opened."""
+        """Whether an option is set that affects how the stage's files are opened."""
         return bool(self.mask or self.payloads or self.session_layer is not None)
 
     def as_dict(self) -> dict[str, Any]:
-        """Returns the options by name."""
+        """Returns all options by name."""
         return {one.name: getattr(self, one.name) for one in fields(self)}
 
     def check(self) -> None:
-        """Raises WavecombError for values that are invalid for every stage."""
+        """Raises WavecombError if a value is invalid for every stage."""
         for one in fields(self):
             row = row_of(one)
             row.check(row.option[2:].replace("-", " ") or one.name, getattr(self, one.name))
 
 
 def row_of(option: Field[Any]) -> Row:
-    """Returns the description of a field of ``LoadOptions``."""
+    """Returns the table row of a field of ``LoadOptions``."""
     return cast(Row, option.metadata["row"])
 
 
 def rows() -> dict[str, Row]:
-    """Returns the rows of all options that commands have, by field name."""
+    """Returns the table rows of all options that commands have, by field name."""
     return {one.name: row_of(one) for one in fields(LoadOptions) if row_of(one).option}
 
 
 def split(
     options: Mapping[str, Any], without: Iterable[str] = ()
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Splits keywords into load options and others.
+    """Splits keyword arguments into load options and all others.
 
     >>> split({"camera": "/Cam", "seed": 3})
     ({'camera': '/Cam'}, {'seed': 3})
@@ -355,7 +354,7 @@ def split(
 
 
 def given(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Converts a command's arguments, by ``Row.key``, to fields; omits those that are not given.
+    """Converts a command's arguments, by ``Row.key``, to fields. Leaves out missing arguments.
 
     Raises:
         WavecombError: A value is invalid.
@@ -385,7 +384,7 @@ def given(values: Mapping[str, Any]) -> dict[str, Any]:
 def _named_values(
     option: str, parts: Iterable[tuple[str, str, str]], form: str = "NAME=VALUE"
 ) -> dict[str, str]:
-    """Converts texts that are split at an equals sign to a mapping; raises WavecombError."""
+    """Converts (name, "=", value) parts to a mapping. Raises WavecombError if a part is missing."""
     values: dict[str, str] = {}
     for name, equals, value in parts:
         if not (name and equals and value):
@@ -395,6 +394,6 @@ def _named_values(
 
 
 def selections(variants: Sequence[str]) -> dict[str, str]:
-    """Parses PRIM{SET}=NAME texts to a mapping; raises WavecombError."""
+    """Converts "PRIM{SET}=NAME" texts to a mapping. Raises WavecombError for other texts."""
     parts = (text.rpartition("=") for text in variants)
     return _named_values("--variant", parts, "PRIM{SET}=NAME or SET=NAME")

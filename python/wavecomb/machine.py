@@ -19,7 +19,7 @@ def usable_cores() -> int:
 
 
 def memory_bytes() -> int | None:
-    """Returns the memory of the machine in bytes; None if unknown."""
+    """Returns the memory of the machine in bytes, or None if it is unknown."""
     try:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (ValueError, OSError, AttributeError):
@@ -30,7 +30,7 @@ def memory_bytes() -> int | None:
 def without_collection() -> Iterator[None]:
     """Disables Python's cyclic garbage collector in a block that creates many objects.
 
-    The collector would visit all objects again and again, a tenth to a fifth of the block's time.
+    The collector would visit all objects repeatedly, which takes 10 to 20 % of the block's time.
     """
     was_enabled = gc.isenabled()
     gc.disable()
@@ -42,14 +42,14 @@ def without_collection() -> Iterator[None]:
 
 
 def give_back_memory() -> None:
-    """Returns freed memory to the operating system."""
+    """Returns memory that was freed, but is still reserved, to the operating system."""
     from wavecomb import _core
 
     _core.give_back_memory()
 
 
 def temporary_folder() -> str:
-    """Returns the folder for temporary files: ``TMPDIR``, else /var/tmp (on a disk), else /tmp."""
+    """Returns the folder for temporary files: ``TMPDIR``, else /var/tmp, else /tmp."""
     chosen = os.environ.get("TMPDIR")
     if chosen:
         return chosen

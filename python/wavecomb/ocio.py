@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Views of OpenColorIO through OpenImageIO, from $OCIO or from OpenColorIO's ACES configuration."""
+"""Applies views of OpenColorIO by OpenImageIO, from $OCIO or the built-in ACES configuration."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from wavecomb.errors import WavecombError
 
 PREFIX = "ocio:"
-"""Start of a tone mapping that names a view: "ocio:VIEW" or "ocio:VIEW|DISPLAY"."""
+"""Prefix of a tone mapping that names a view, "ocio:VIEW" or "ocio:VIEW|DISPLAY"."""
 
 _ENCODED = ("srgb - display", "srgb", "rec.1886 rec.709 - display")
 _LINEAR = (
@@ -29,7 +29,7 @@ _LINEAR = (
 
 @functools.cache
 def _config(name: str | None) -> tuple[Any, str, str] | None:
-    """Returns configuration, display and linear Rec.709 colour space, or None if one is missing."""
+    """Returns configuration, display and linear Rec.709 space, or None if any is missing."""
     import OpenImageIO as oiio
 
     config = oiio.ColorConfig(name or "ocio://default")
@@ -52,13 +52,16 @@ def _current() -> tuple[Any, str, str] | None:
 
 
 def displays() -> list[str]:
-    """Returns the displays of the configuration; none if $OCIO cannot be used."""
+    """Returns the displays of the configuration, or an empty list if $OCIO cannot be used."""
     current = _current()
     return [] if current is None else list(current[0].getDisplayNames())
 
 
 def views(display: str | None = None) -> list[str]:
-    """Returns the views of a display, by default of an sRGB screen; none if $OCIO is unusable."""
+    """Returns the views of a display; the default display is an sRGB screen.
+
+    The list is empty if $OCIO cannot be used.
+    """
     current = _current()
     if current is None:
         return []
@@ -67,14 +70,14 @@ def views(display: str | None = None) -> list[str]:
 
 
 def tone_map(view: str, display: str | None = None) -> str:
-    """Returns the tone mapping of ``wavecomb.Picture.save`` that shows an image through a view.
+    """Returns the value of ``tone_map`` in ``wavecomb.Picture.save`` that applies a view.
 
     Args:
-        view: Name of a view, regardless of case.
-        display: Name of a display, regardless of case; None means an sRGB screen.
+        view: Name of a view; upper and lower case are equal.
+        display: Name of a display; upper and lower case are equal. None means an sRGB screen.
 
     Raises:
-        WavecombError: $OCIO cannot be used, or it has no such view or display.
+        WavecombError: $OCIO cannot be used, or its configuration has no such view or display.
     """
     if why := problem():
         raise WavecombError(why)
@@ -92,13 +95,13 @@ def _known(what: str, name: str, there: list[str]) -> str:
 
 
 def mapped(rgb: NDArray[Any], tone_map: str) -> NDArray[np.uint8]:
-    """Converts linear Rec.709 (h, w, 3) to 8-bit values by a result of ``tone_map``."""
+    """Converts linear Rec.709 (h, w, 3) to 8-bit values by a tone mapping from ``tone_map``."""
     view, _, display = tone_map.removeprefix(PREFIX).partition("|")
     return through_view(rgb, view, display or None)
 
 
 def problem() -> str | None:
-    """Returns why $OCIO is not used, or None."""
+    """Returns why $OCIO cannot be used, or None if there is no problem."""
     if os.environ.get("OCIO") and _current() is None:
         return (
             f"$OCIO {os.environ['OCIO']}: cannot be read, or has no linear Rec.709 colour space; "
@@ -108,10 +111,10 @@ def problem() -> str | None:
 
 
 def through_view(rgb: NDArray[Any], view: str, display: str | None = None) -> NDArray[np.uint8]:
-    """Converts linear Rec.709, finite, (h, w, 3) to 8-bit values of the display.
+    """Converts finite linear Rec.709 colours (h, w, 3) to 8-bit values of the display.
 
     Raises:
-        WavecombError: There is no such view.
+        WavecombError: The display has no view of that name.
     """
     import OpenImageIO as oiio
 

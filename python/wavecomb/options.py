@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of a render, from the core's table (core/settings_table.h).
+"""Settings of a render, read from the core's table (core/settings_table.h).
 
-The settings determine the keywords of ``wavecomb.render``, the options of commands, the window's
-fields and the keys of benchmark suites.
+The settings determine the keyword arguments of ``wavecomb.render``, the options of commands, the
+window's fields and the keys of benchmark suites.
 """
 
 from __future__ import annotations
@@ -17,24 +17,25 @@ from wavecomb.core_table import rows_by_name
 
 @dataclass(frozen=True)
 class Setting:
-    """A setting with a single value.
+    """A setting of a render, which has a single value.
 
     Attributes:
-        name: Attribute of ``wavecomb.Settings``, and keyword.
+        name: Attribute of ``wavecomb.Settings``, which is also a keyword argument.
         label: Label of the setting in the window.
         help: Description of the setting in one sentence.
         kind: "integer", "number", "flag", "choice" or "text".
-        default: Default value; None if it depends on other settings.
-        least: Smallest valid number; None means no limit.
-        most: Largest valid number; None means no limit.
-        zero: Meaning of the value 0, if 0 has a special meaning.
-        steps: Valid numbers besides 0; empty means all.
-        choices: Value -> its effect, for a choice.
-        group: "picture" (content of the image), "work" (amount of computation), or "order"
-            (execution).
+        default: Default value; None if the default depends on other settings.
+        least: Smallest valid number; None means that there is no lower limit.
+        most: Largest valid number; None means that there is no upper limit.
+        zero: Meaning of the value 0, if this value has a special meaning.
+        steps: Valid numbers in addition to 0; empty means that all numbers in the range are valid.
+        choices: For a setting of kind "choice", the effect of each value.
+        group: "picture" (what the image shows), "work" (how much is computed) or "order" (in which
+            order).
         changes_picture: Whether the image depends on the setting.
         changes_bits: Whether the setting affects the bits of the beauty image at equal sample
-            counts. With cost-aware roulette, the bits also depend on measured shading costs.
+            counts. With cost-aware roulette, the bits of the image also depend on measured shading
+            costs.
         changes_expectation: Whether the expectation of the image depends on the setting.
     """
 
@@ -64,7 +65,7 @@ class Setting:
 
     @property
     def annotation(self) -> str:
-        """Python type annotation for the stub _core.pyi.
+        """Python type annotation of the setting in the stub _core.pyi.
 
         >>> settings()["light_weights"].annotation
         'Literal["calibrated", "power"]'
@@ -77,7 +78,7 @@ class Setting:
 
 @cache
 def settings() -> Mapping[str, Setting]:
-    """Returns every setting by name, in the table's order.
+    """Returns all settings by name, in the order of the core's table.
 
     >>> settings()["wave_size"].zero
     'automatic'
@@ -88,7 +89,7 @@ def settings() -> Mapping[str, Setting]:
 
 
 def names(group: str, *, without: Iterable[str] = ()) -> tuple[str, ...]:
-    """Returns the settings of a group, in the table's order.
+    """Returns the settings of a group, in the order of the core's table.
 
     >>> names("work")[:2]
     ('roulette', 'roulette_depth')
@@ -110,7 +111,7 @@ def expectation() -> tuple[str, ...]:
 
 
 def default_text(setting: Setting) -> str:
-    """Returns the default as text.
+    """Returns the default value of a setting as text.
 
     >>> default_text(settings()["threads"]), default_text(settings()["spp"])
     ('all', '64')

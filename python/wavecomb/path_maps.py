@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Path maps: replace folder names of a job and its stage by those of this machine."""
+"""Path maps, which replace folder names in a job and its stage by folder names on this machine."""
 
 from __future__ import annotations
 
@@ -10,20 +10,21 @@ from collections.abc import Iterable
 from wavecomb.errors import WavecombError
 
 Pair = tuple[str, str]
-"""A pair of absolute folders: the name in the job and its stage, and the name on this machine."""
+"""A pair of absolute folders: the name that the job and its stage use, and the name on this
+machine."""
 
 VARIABLE = "WAVECOMB_PATH_MAPS"
-"""Environment variable with folder pairs as JSON, which is set only for workers of a farm."""
+"""Environment variable with path maps as JSON, which is set only for workers of a render farm."""
 
 
 def parse_maps(texts: Iterable[str]) -> tuple[Pair, ...]:
-    """Parses texts of the form "FROM=TO".
+    """Parses path maps from texts of the form "FROM=TO".
 
     >>> parse_maps(["/Volumes/share=/share"])
     (('/Volumes/share', '/share'),)
 
     Raises:
-        WavecombError: A text is invalid.
+        WavecombError: A text does not have this form.
     """
     found = []
     for text in texts:
@@ -35,7 +36,7 @@ def parse_maps(texts: Iterable[str]) -> tuple[Pair, ...]:
 
 
 def use_maps(pairs: Iterable[Pair]) -> None:
-    """Makes this process and its child processes use path maps."""
+    """Sets the path maps of this process and its child processes."""
     found = list(pairs)
     if found:
         os.environ[VARIABLE] = json.dumps(found)
@@ -54,7 +55,7 @@ def here(pairs: Iterable[Pair]) -> list[Pair]:
 
 
 def mapped(path: str, pairs: Iterable[Pair]) -> str:
-    """Returns the mapped path of a file; the longest matching folder applies.
+    """Returns the mapped path of a file. If several folders match, the longest one applies.
 
     Relative paths are unchanged.
 

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Starts Python processes; no other module does so.
+"""Starts Python processes. No other module starts a Python process.
 
-A Python that is started with ``-c`` or ``-m`` has the working folder on its ``sys.path``, so that a
-file ``json.py`` next to a shot would be executed. The processes started here are isolated (``python
--I``):
-``wavecomb.boot`` builds their ``sys.path`` from the standard library, site-packages, and the
-folders of ``folders``. Processes started here inherit only the given descriptors, have a separate
-process group, and end with the process that started them.
+If Python is started with ``-c`` or ``-m``, the working folder is on its ``sys.path``. Python would
+then import a file such as ``json.py`` next to a shot. This module therefore starts isolated
+processes (``python -I``). ``wavecomb.boot`` builds the ``sys.path`` of such a process from the
+standard library, site-packages, and the result of ``folders``. The new process inherits only the
+given file descriptors, has a separate process group, and ends with the process that started it.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ _DEPENDENCIES = ("pxr", "numpy", "OpenImageIO", "MaterialX", "click", "rich", "t
 
 
 def interpreter() -> str:
-    """Returns the program of this Python, also if another program embeds Python.
+    """Returns the path of the Python program, even if another program embeds Python.
 
     Raises:
         WavecombError: No Python program was found.
@@ -46,13 +45,13 @@ def interpreter() -> str:
 
 
 def folders() -> tuple[list[str], list[str]]:
-    """Returns folders that a process needs on its ``sys.path`` besides standard and site folders.
+    """Returns folders for the ``sys.path`` of a process, without standard and site folders.
 
     Returns:
-        First the folders of PYTHONPATH, which precede site-packages. Then the user's site folder,
-            the folder of this package, and folders of dependencies that are in none of these, which
-            occurs in programs that modify ``sys.path``. All folders are absolute; the working
-            folder and the folder of the program's script are excluded.
+        First, the folders in PYTHONPATH, which precede site-packages. Second, the user's site
+            folder, the folder of this package, and folders of dependencies that are elsewhere, as
+            in programs that modify ``sys.path``. All folders are absolute. The working folder and
+            the folder of the main script are excluded.
     """
     ignores = sys.flags.ignore_environment
     first = [] if ignores else os.environ.get("PYTHONPATH", "").split(os.pathsep)
@@ -94,20 +93,21 @@ def command(
     python: str | None = None,
     flags: Sequence[str] = (),
 ) -> list[str]:
-    """Returns the command that runs a module in an isolated Python.
+    """Returns the command line that runs a module in an isolated Python process.
 
     Args:
-        target: Module, or "-c", whose first argument is code.
-        arguments: Arguments of the module.
-        parent: Process with which the new one ends, and whose process group it leaves. 0 means the
-            process that starts it; None makes it independent, for example on another machine.
-        keep: Descriptors that the process inherits besides the standard streams.
-        path: Absolute folders of Wavecomb that are added to its ``sys.path``.
-        python: Program to run; None uses this Python.
-        flags: Additional flags of Python.
+        target: Name of the module, or "-c" to run code, which is then the first argument.
+        arguments: Command-line arguments of the module.
+        parent: Id of the process with which the new process ends, and whose process group it
+            leaves. 0 means the process that starts it. None lets the new process run independently,
+            for example on another machine.
+        keep: File descriptors that the process inherits in addition to the standard streams.
+        path: Absolute folders of Wavecomb that are added to the ``sys.path`` of the process.
+        python: Path of the Python program; None means the program of this process.
+        flags: Additional command-line flags of Python.
 
     Raises:
-        WavecombError: No Python was found.
+        WavecombError: No Python program was found.
     """
     first, last = folders() if python is None else ([], [])
     words = [python or interpreter(), "-I"]
@@ -129,17 +129,17 @@ def start(
     flags: Sequence[str] = (),
     **options: Any,
 ) -> subprocess.Popen[Any]:
-    """Starts a module in an isolated Python that ends with this process.
+    """Starts a module in an isolated Python process, which ends with this process.
 
     Args:
-        target: Module, as for ``command``.
-        arguments: Arguments of the module.
-        keep: Descriptors that the process inherits, as for ``command``.
-        flags: Additional flags of Python.
+        target: Name of the module, or "-c", as for ``command``.
+        arguments: Command-line arguments of the module.
+        keep: File descriptors that the process inherits, as for ``command``.
+        flags: Additional command-line flags of Python.
         **options: Arguments of ``subprocess.Popen``.
 
     Raises:
-        WavecombError: No Python was found.
+        WavecombError: No Python program was found.
         OSError: The process could not be started.
     """
     words = command(target, *arguments, parent=os.getpid(), keep=keep, flags=flags)
@@ -147,10 +147,11 @@ def start(
 
 
 def popen(words: Sequence[str], **options: Any) -> subprocess.Popen[Any]:
-    """Starts the result of ``command`` in a new session, from a permanent thread.
+    """Starts a command line from ``command`` in a new session, from a thread that never ends.
 
-    The kernel kills a process when the thread that started it ends, not only when the whole parent
-    does. Therefore threads other than the main thread delegate the start to a permanent thread.
+    The kernel ends a process not only with its parent process, but already with the thread that
+    started it. Threads other than the main thread therefore pass the start to a thread that never
+    ends.
     """
     options = {"start_new_session": True, **options}
     if threading.current_thread() is threading.main_thread():
@@ -161,10 +162,11 @@ def popen(words: Sequence[str], **options: Any) -> subprocess.Popen[Any]:
 
 
 class _Starter:
-    """A thread that starts processes for other threads.
+    """Thread that starts processes on behalf of other threads.
 
     Attributes:
-        jobs: Queue of processes to start: a command, options, and a future.
+        jobs: Queue of processes to start. An item is a command, its options and a future for the
+            result.
     """
 
     _lock = threading.Lock()
@@ -178,7 +180,10 @@ class _Starter:
 
     @classmethod
     def current(cls) -> _Starter:
-        """Returns the starter thread; creates a new one after a fork, which inherits no threads."""
+        """Returns the thread that starts processes.
+
+        A fork inherits no threads, so a new thread is then created.
+        """
         with cls._lock:
             if cls._current is None or cls._current._process != os.getpid():
                 cls._current = cls()
@@ -195,10 +200,11 @@ class _Starter:
 
 
 def isolate_multiprocessing() -> None:
-    """Makes ``multiprocessing`` start isolated processes, with "spawn" and "forkserver".
+    """Makes ``multiprocessing`` start isolated processes for the methods "spawn" and "forkserver".
 
-    Children of ``multiprocessing`` run ``python -c`` and receive this process's ``sys.path``.
-    Commands of Wavecomb call this function before they or their libraries use the module.
+    Child processes of ``multiprocessing`` otherwise run ``python -c`` and receive the ``sys.path``
+    of this process. Commands of Wavecomb call this function before any library uses
+    ``multiprocessing``.
     """
     from multiprocessing import spawn, util
 

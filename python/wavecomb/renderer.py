@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scene that stays ready to render while materials, lights, objects and the camera change."""
+"""Renderer for a scene that is edited between renders."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ Values = Mapping[str, Any]
 
 
 class Renderer:
-    """A scene with its acceleration structures, which can be edited and rendered again.
+    """A scene with its acceleration structures, which can be edited and then rendered again.
 
-    An edit of the camera, a material, a light or a transform takes milliseconds, and the next
-    render starts without loading. Only one thread may use a ``Renderer``.
+    Editing the camera, a material, a light or a transform takes milliseconds. The next render
+    starts without loading the stage. Only one thread may use a ``Renderer``.
 
     >>> renderer = wavecomb.Renderer("shot.usd", size=(640, 360))  # doctest: +SKIP
     >>> renderer.edit(materials={"/World/Looks/Car": {"roughness": 0.1}})  # doctest: +SKIP
@@ -47,13 +47,13 @@ class Renderer:
         threads: int = 0,
         **options: Unpack[StageKeywords],
     ) -> None:
-        """Loads a stage, if it is not loaded yet, and builds acceleration structures.
+        """Builds acceleration structures, after loading the stage if it is not loaded yet.
 
         Args:
             source: A path, a ``Usd.Stage``, a result of ``load``, or a ``Scene``.
-            size: Width and height of images in pixels; by default 600 x 600.
-            threads: Threads for loading, building and edits; 0 means all.
-            **options: Fields of ``LoadOptions``, for a path or a ``Usd.Stage``.
+            size: Width and height of images in pixels; the default is 600 x 600.
+            threads: Number of threads for loading, building and editing; 0 uses all cores.
+            **options: Fields of ``LoadOptions``, if ``source`` is a path or a ``Usd.Stage``.
 
         Raises:
             wavecomb.Error: The stage cannot be rendered, or an argument is invalid.
@@ -78,21 +78,29 @@ class Renderer:
 
     @property
     def scene(self) -> Scene:
-        """The edited scene: a new object after each edit, which shares unchanged data."""
+        """The edited scene.
+
+        Each edit creates a new object, which shares unchanged data with the previous one.
+        """
         return self._core.scene
 
     @property
     def materials(self) -> dict[str, list[int]]:
-        """Ids of materials by name: the paths of their prims, or the names in a ``SceneBuilder``.
+        """Ids of materials by name.
 
-        A material prim has several ids if its meshes provide different primvars.
+        The names are paths of material prims, or names given to a ``SceneBuilder``.
+
+        A material prim has several ids if meshes provide different primvars to it.
         """
         paths = () if self._loaded is None else self._loaded.material_paths
         return _ids(paths or (name for name, _ in self.scene.materials))
 
     @property
     def lights(self) -> dict[str, list[int]]:
-        """Ids of lights by name, as for ``materials``."""
+        """Ids of lights by name.
+
+        The names are paths of light prims, or names given to a ``SceneBuilder``.
+        """
         paths = () if self._loaded is None else self._loaded.light_paths
         return _ids(paths or (name for name, _ in self.scene.lights))
 
@@ -104,23 +112,25 @@ class Renderer:
         lights: Mapping[Key, Values] | None = None,
         moves: Mapping[str, Any] | None = None,
     ) -> None:
-        """Changes the scene; parameters that are not given keep their values.
+        """Edits the scene. Parameters that are not given keep their values.
 
         Transforms are (4, 4) matrices for row vectors, as in USD.
 
         Args:
             camera: Arguments of ``SceneBuilder.set_camera``: ``transform``, ``window``,
                 ``lens_radius`` ...
-            materials: Name or id of a material -> arguments of ``SceneBuilder.add_material``,
-                except program, name and textures.
-            lights: Name or id of a light -> arguments of ``SceneBuilder.add_light``, except kind,
-                name, texture and group: ``transform`` (object to world), ``color``, ``radius`` ...
-            moves: Path of a prim -> transform in world space that moves all objects and lights at
-                or below the prim from where they were loaded; the identity puts them back. An
-                instance moves as a whole, and volumes do not move.
+            materials: By name or id of a material, new values for arguments of
+                ``SceneBuilder.add_material``. Program, name and textures cannot change.
+            lights: By name or id of a light, new values for arguments of
+                ``SceneBuilder.add_light``, such as ``transform`` (object to world), ``color`` and
+                ``radius``. Kind, name, texture and group cannot change.
+            moves: World space transforms by prim path. A transform moves all objects and lights at
+                or below the prim, relative to their positions when loaded; the identity restores
+                the positions. An instance can only be moved as a whole, and volumes cannot be
+                moved.
 
         Raises:
-            wavecomb.Error: A name, a parameter or a value is invalid; nothing is changed.
+            wavecomb.Error: A name, a parameter or a value is invalid. The scene is then unchanged.
         """
         self._core.edit(
             camera=None if camera is None else dict(camera),
@@ -130,7 +140,7 @@ class Renderer:
         )
 
     def _in_scene(self, move: Any) -> Any:
-        """Converts a transform in world space to the scene's space, whose origin may differ."""
+        """Converts a world space transform to the space of the scene, whose origin may differ."""
         origin = (0.0, 0.0, 0.0) if self._loaded is None else self._loaded.origin
         if not any(origin) or np.shape(move) != (4, 4):
             return move
@@ -146,16 +156,16 @@ class Renderer:
         aovs: Iterable[str] | None = None,
         **settings: Unpack[SettingKeywords],
     ) -> Picture:
-        """Renders the scene as it is now.
+        """Renders the scene in its current state.
 
         Args:
-            size: Width and height in pixels; by default that of the constructor.
-            spp: Samples per pixel; with ``adaptive`` or ``noise`` the maximum.
-            aovs: Layers besides beauty, as in ``wavecomb.render``.
+            size: Width and height in pixels; the default is the size given to the constructor.
+            spp: Samples per pixel. With ``adaptive`` or ``noise``, this is the maximum.
+            aovs: Layers in addition to the beauty, as in ``wavecomb.render``.
             **settings: Fields of ``wavecomb.Settings``.
 
         Returns:
-            The image, bit-identical to that of a scene that was built with the edited values.
+            The image, which is bit-identical to the image of a new scene with the edited values.
 
         Raises:
             wavecomb.Error: An argument is invalid.
@@ -183,7 +193,7 @@ def _ids(names: Iterable[str]) -> dict[str, list[int]]:
 def _by_id(
     kind: str, given: Mapping[Key, Values] | None, known: Mapping[str, list[int]]
 ) -> dict[int, dict[str, Any]]:
-    """Replaces names by ids; raises WavecombError for an unknown name."""
+    """Replaces names by ids. Raises WavecombError if a name is unknown."""
     out: dict[int, dict[str, Any]] = {}
     for key, values in (given or {}).items():
         if isinstance(key, str) and key not in known:

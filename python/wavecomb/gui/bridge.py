@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages from other threads to the thread of the window, without Qt objects on other threads.
+"""Passes messages to the UI thread from threads that hold no Qt objects.
 
 A thread puts a message into a plain Python mailbox and writes a byte to a socket. A socket notifier
-on the window's thread sees the byte and passes the messages to their receivers. Only the window's
-thread takes locks of Qt; docs/decisions/window-threads.md explains why that matters.
+on the window's thread sees the byte and passes the messages to their receivers. Only the UI thread
+takes locks of Qt. The reason is in docs/decisions/window-threads.md.
 """
 
 from __future__ import annotations
@@ -48,21 +48,27 @@ class Mailbox:
             self._writer.send(b"\0")
 
     def hush(self) -> None:
-        """Removes all bytes that have woken the reading thread so far.
+        """Removes all bytes that were written so far to wake the reading thread.
 
-        Later messages wake the reading thread again.
+        Messages that are sent later wake the reading thread again.
         """
         with contextlib.suppress(OSError):
             while self._reader.recv(4096):
                 pass
 
     def take(self) -> tuple[int, Any] | None:
-        """Removes the oldest message and returns it with its address, or returns None."""
+        """Removes the oldest message and returns it with its receiver's address.
+
+        Returns None if there is no message.
+        """
         return self._letters.popleft() if self._letters else None
 
 
 class Port:
-    """Sender of messages to one receiver. A plain Python object that any thread may hold."""
+    """Sender of messages to one receiver.
+
+    Senders are plain Python objects, so any thread may hold one.
+    """
 
     __slots__ = ("_address", "_mailbox")
 
@@ -89,7 +95,7 @@ class Bridge(QObject):
         self._notifier.activated.connect(self._deliver)
 
     def port(self, receive: Receive) -> Port:
-        """Creates a port that sends to a bound method, without keeping its object alive."""
+        """Creates a port that sends to a bound method, without keeping the object alive."""
         address = next(self._numbers)
         forget = partial(_forget, self._receivers, address)
         self._receivers[address] = weakref.WeakMethod(receive, forget)
@@ -115,7 +121,7 @@ def _forget(receivers: dict[int, Any], address: int, reference: object) -> None:
 
 
 def _is_there(receiver: object) -> bool:
-    """Returns whether the Qt object of the receiver still exists."""
+    """Returns whether the Qt object that owns the receiving method still exists."""
     return not isinstance(receiver, QObject) or shiboken6.isValid(receiver)
 
 
@@ -128,8 +134,8 @@ def port(receive: Receive) -> Port:
     ``port`` must be called on the window's thread.
 
     Args:
-        receive: A bound method that gets the messages. Messages are dropped after the object of the
-            method is deleted.
+        receive: A bound method that is called with each message. Messages are dropped after the
+            object that owns the method is deleted.
     """
     global _bridge
     application = QCoreApplication.instance()

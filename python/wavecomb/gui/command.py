@@ -13,7 +13,7 @@ from PySide6.QtCore import QObject, QProcess, QTimer, Signal
 from wavecomb import processes
 
 KILL_MS = 8000
-"""Time after a stop request after which the process is killed, in milliseconds."""
+"""Time between a stop request and the killing of a process that has not ended, in milliseconds."""
 
 
 class Command(QObject):
@@ -21,9 +21,10 @@ class Command(QObject):
 
     Signals:
         event(dict): The process printed a line with a JSON object on stdout.
-        said(str): The process printed a line that is not JSON, on stdout or stderr.
-        finished(code, text, error): The process ended: exit code, all of stdout, and the last line
-            of stderr if it failed, else "". A process that was stopped has the exit code 130.
+        said(str): The process printed a line without a JSON object, on stdout or stderr.
+        finished(code, text, error): The process ended. ``code`` is the exit code and ``text`` all
+            of stdout. ``error`` is the last line of stderr if the process failed, else "". The exit
+            code of a stopped process is 130.
     """
 
     event = Signal(dict)
@@ -44,7 +45,7 @@ class Command(QObject):
         return self._process is not None
 
     def start(self, arguments: Sequence[str], *, module: str = "wavecomb", text: str = "") -> None:
-        """Runs a module of Wavecomb as a program.
+        """Runs a module of Wavecomb as a program in a new process.
 
         Args:
             arguments: Command-line arguments.
@@ -69,7 +70,7 @@ class Command(QObject):
         process.closeWriteChannel()
 
     def stop(self) -> None:
-        """Sends SIGTERM to the process, and kills it later if it does not end."""
+        """Sends SIGTERM to the process, and kills the process later if it has not ended."""
         process = self._process
         if process is None:
             return

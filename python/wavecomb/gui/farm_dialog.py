@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Dialog of Render > Send to a farm, which submits a job and shows its progress."""
+"""Dialog of "Render > Send to a farm", which submits a job and shows its progress."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from wavecomb.gui.command import Command
 from wavecomb.gui.widgets import named
 
 Describe = Callable[[str], dict[str, Any]]
-"""Function that describes a farm job for ``farm.from_json``, given the job's output file. Raises
-WavecombError."""
+"""Type of a function that describes a farm job for ``farm.from_json``, given the job's output file.
+Raises WavecombError."""
 
 
 class FarmDialog(QDialog):
@@ -104,7 +104,10 @@ class FarmDialog(QDialog):
     # ---- what it does ----------------------------------------------------------------------------
 
     def begin(self) -> None:
-        """Submits the job in a process, since reading a stage takes time, and then runs it."""
+        """Submits the job in a separate process, and then runs the job.
+
+        The separate process is used since reading a stage takes time.
+        """
         try:
             wanted = self._describe(self.output.text())
         except WavecombError as error:
@@ -166,7 +169,7 @@ class FarmDialog(QDialog):
     def closeEvent(self, event: QCloseEvent) -> None:
         """Stops a running farm job, and hides the dialog until the job has ended.
 
-        Finished tiles are kept.
+        Finished tiles of the job are kept.
         """
         if not self._command.running:
             super().closeEvent(event)

@@ -20,7 +20,10 @@ _NOT_FOR_A_FARM = ("time_limit",)
 
 
 def changed_settings(setup: Setup) -> dict[str, Any]:
-    """Returns the settings that differ from their defaults, except image size and sample counts."""
+    """Returns the settings that differ from their defaults.
+
+    Leaves out image size and sample counts.
+    """
     rows = settings()
     return {
         one.name: getattr(setup, one.name)
@@ -32,9 +35,9 @@ def changed_settings(setup: Setup) -> dict[str, Any]:
 
 
 def describe(session: Session, edits: StageEdits | None, output: str) -> dict[str, Any]:
-    """Describes a farm job that renders the displayed image.
+    """Describes a farm job that renders the stage as the viewport shows it.
 
-    Edits of the stage are saved as a layer over it, beside the output image.
+    Edits of the stage are saved as a layer over the stage, in the folder of the output image.
 
     Args:
         session: Session of the viewport.
@@ -42,8 +45,7 @@ def describe(session: Session, edits: StageEdits | None, output: str) -> dict[st
         output: Path of the output image.
 
     Raises:
-        WavecombError: There is no stage, the view is not through a camera, or edits cannot be
-            saved.
+        WavecombError: No stage is open, the view is not through a camera, or edits cannot be saved.
     """
     source, setup = session.source, session.setup
     if source is None:

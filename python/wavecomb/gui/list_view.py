@@ -29,7 +29,7 @@ def tone(name: str) -> QColor:
 
 
 class RowDelegate(QStyledItemDelegate):
-    """Delegate that paints the data roles ``ColourRole`` and ``ToneRole`` of a cell."""
+    """Delegate that paints the colour (``ColourRole``) and tone (``ToneRole``) of a cell."""
 
     def initStyleOption(self, option: QStyleOptionViewItem, index: Index) -> None:
         """Initialises the style option of a cell with its colour and tone."""
@@ -47,7 +47,7 @@ class RowDelegate(QStyledItemDelegate):
 
 
 def show_rows(view: QTableView, name: str, title: str, tip: str) -> None:
-    """Sets up a list view without grid lines that selects whole rows."""
+    """Sets up a list view without grid lines, in which a click selects a whole row."""
     named(view, name, title, tip)
     view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
     view.setTabKeyNavigation(False)
@@ -66,7 +66,7 @@ def lay_out_rows(
     stretch: int,
     widths: Mapping[int, float],
 ) -> None:
-    """Sets up a list view that selects whole rows, one at a time.
+    """Sets up a list view in which one whole row at a time can be selected.
 
     Args:
         view: List view that already has its model.
@@ -86,7 +86,7 @@ def lay_out_rows(
 
 
 def compact(view: QTableView, name: str, title: str, tip: str) -> None:
-    """Sets up table rows of one line; long texts such as paths are shortened in the middle."""
+    """Sets up table rows of one text line. Long texts such as paths are shortened in the middle."""
     show_rows(view, name, title, tip)
     view.setWordWrap(False)
     view.setTextElideMode(Qt.TextElideMode.ElideMiddle)

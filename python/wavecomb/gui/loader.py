@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Loads a stage for the window. Independent of Qt, because it runs on another thread."""
+"""Loads a stage for the window.
+
+The module is independent of Qt, because it runs on another thread than the window.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,8 @@ class Source:
         path: File of the stage.
         camera: Prim path or unique name of the camera, or None.
         time: Time code; None means the start time code of the stage.
-        variants: Variant selections as for ``wavecomb.load``, authored in the session layer.
+        variants: Selected variants in the form that ``wavecomb.load`` expects, authored in the
+            session layer.
         purposes: Purposes of the geometry; None means "default" and "render".
     """
 
@@ -40,10 +44,10 @@ class Request:
     Attributes:
         source: The stage and its loading options.
         usd: The USD stage, if it is already open; else None.
-        overrides: Private copy of the stage's session layer, or None.
+        overrides: Private copy of the session layer with the user's edits, or None.
         fresh: Whether to reload the layers of ``usd`` from disk first.
-        threads: Number of threads for textures; 0 uses all cores.
-        textures: Textures of the previous scene, to share.
+        threads: Number of threads that read textures; 0 uses all cores.
+        textures: Textures of the previous scene, which the new scene reuses.
         size: Width and height of the rendered image, in pixels.
     """
 
@@ -95,7 +99,7 @@ def read(request: Request) -> Read:
 
 
 def _overrides(request: Request, usd: Usd.Stage) -> Sdf.Layer:
-    """Returns the requested session layer, by default the session layer of the open stage."""
+    """Returns the requested session layer; the default is the session layer of the open stage."""
     return usd.GetSessionLayer() if request.overrides is None else request.overrides
 
 
@@ -109,7 +113,7 @@ def _options(request: Request) -> dict[str, Any]:
 
 
 def _load(request: Request, overrides: Sdf.Layer | None) -> LoadedStage:
-    """Loads the scene from a second copy of the stage, so that the window's stage stays usable."""
+    """Loads the scene from a second copy of the stage. The window can use its stage meanwhile."""
     from wavecomb.usd import LoadReport, load_stage, open_stage
     from wavecomb.usd.stage.report import capture_diagnostics
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The main window, which contains the viewport, bars and panels."""
+"""The main window, which contains the viewport, tool bars and panels."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class MainWindow(TakesFiles, QMainWindow):
 
     Args:
         setup: Initial render settings.
-        settings: Storage of the window's state; None uses the user's settings.
+        settings: Storage for the window's state; None means the user's Qt settings.
     """
 
     def __init__(self, setup: Setup | None = None, settings: QSettings | None = None) -> None:
@@ -116,7 +116,7 @@ class MainWindow(TakesFiles, QMainWindow):
         self._sizing.timeout.connect(self._share_width)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Gives half of the window's width to the image."""
+        """Divides the window's width so that the image gets half of it."""
         super().resizeEvent(event)
         self._sizing.start()
 
@@ -153,7 +153,7 @@ class MainWindow(TakesFiles, QMainWindow):
         return dock
 
     def _size_bottom(self, visible: bool) -> None:
-        """Limits the height of a panel below the image the first time it is shown."""
+        """Limits the height of a panel below the image when the panel first becomes visible."""
         if visible and not self._bottom_sized:
             self._bottom_sized = True
             shown = [dock for dock in self.docks.values() if dock is self.sender()]
@@ -329,10 +329,10 @@ class MainWindow(TakesFiles, QMainWindow):
         self._open_dialog(FarmDialog(self._farm_job, str(path.with_suffix(".exr")), self))
 
     def _farm_job(self, output: str) -> dict[str, Any]:
-        """Describes a farm job for the displayed stage, saving edits beside the image.
+        """Describes a farm job for the displayed stage. Saves the stage's edits beside the image.
 
         Raises:
-            WavecombError: There is no stage, or its edits cannot be saved.
+            WavecombError: No stage is open, or the edits of the stage cannot be saved.
         """
         from wavecomb.gui.farm_job import describe
 
@@ -384,7 +384,7 @@ class MainWindow(TakesFiles, QMainWindow):
             self.actions_by_name[name].setChecked(False)
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Saves the window's state and ends its threads."""
+        """Saves the window's state and ends the window's threads when the window closes."""
         self.autosave.close()
         self.settings.setValue("geometry", self.saveGeometry())
         self.settings.setValue("state", self.saveState(_STATE_VERSION))

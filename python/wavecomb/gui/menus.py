@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Actions of the window and their places in the menus."""
+"""Actions of the window and the menus that contain them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from wavecomb.gui.actions import Entry, keypad, make_action
 from wavecomb.gui.recent_stages import RecentStages
 
 Window = Any
-"""A ``main_window.MainWindow``; its module imports this one, so the type is not imported here."""
+"""Type of a ``main_window.MainWindow``. ``main_window`` imports this module, so this module cannot
+import the class."""
 
 MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
     (
@@ -48,7 +49,7 @@ MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ),
     ("&Help", ("shortcuts", "about")),
 )  # fmt: skip
-"""Titles of menus with the names of their actions; "-" is a separator."""
+"""Title of each menu with the names of the menu's actions; "-" is a separator."""
 CHECKED = ("region",)
 
 
@@ -188,7 +189,7 @@ def make_menus(window: Window) -> tuple[dict[str, QAction], RecentStages]:
     """Fills the menu bar of a window.
 
     Returns:
-        The actions by name, and the menu of recently opened stages.
+        The window's actions by name, and the menu of recently opened stages.
     """
     actions: dict[str, QAction] = {}
     by_name = {entry.name: entry for entry in entries(window)}

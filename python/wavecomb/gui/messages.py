@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Error messages of the window: a line that stays until it is closed, never a traceback."""
+"""Error messages of the window: one line of text that the user closes, never a traceback."""
 
 from __future__ import annotations
 
@@ -22,10 +22,13 @@ WARNING_MS = 12000
 
 
 class MessageBar(QFrame):
-    """Message bar over the image. Errors and findings stay until closed, warnings for some time.
+    """Message bar over the image.
+
+    Errors and findings of the loader stay until the user closes them; warnings disappear after some
+    time.
 
     Signals:
-        details(): Emitted when the user asks for details of the findings.
+        details(): Emitted when the user asks for details of the loader's findings.
     """
 
     details = Signal()
@@ -79,7 +82,10 @@ class MessageBar(QFrame):
         self._timer.start(WARNING_MS)
 
     def show_findings(self, lines: Sequence[str]) -> None:
-        """Shows the first of several lines and the number of the rest, until closed or replaced."""
+        """Shows the first of several lines and the number of further lines.
+
+        The message stays until it is closed or replaced.
+        """
         more = f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""
         text = lines[0] + more if lines else ""
         if text and text != self._label.text():
@@ -102,7 +108,7 @@ class MessageBar(QFrame):
 
 
 class _Reporter(QObject):
-    """Receiver that reports errors of any thread on the window's thread."""
+    """Receiver of errors from any thread, which reports the errors on the window's thread."""
 
     def __init__(self, tell: Callable[[str], None]) -> None:
         super().__init__()
@@ -126,10 +132,10 @@ def log_folder() -> Path:
 
 
 def install_hooks(tell: Callable[[str], None]) -> Callable[[], None]:
-    """Installs hooks that turn internal errors on any thread into one line and a report file.
+    """Installs hooks that report an internal error on any thread in one line and in a report file.
 
     Args:
-        tell: Function called on the window's thread with the line that reports an error.
+        tell: Function that is called on the window's thread with the line that reports an error.
 
     Returns:
         Returns a function that removes the hooks.
@@ -158,7 +164,7 @@ def install_hooks(tell: Callable[[str], None]) -> Callable[[], None]:
 
 
 def fault_line(error: BaseException, report: Path | None) -> str:
-    """Returns the line that reports an internal error."""
+    """Returns a line of text that reports an internal error."""
     from wavecomb.run.error_messages import describe
 
     core = describe(error) if isinstance(error, Exception) else str(error)
@@ -171,7 +177,7 @@ def fault_line(error: BaseException, report: Path | None) -> str:
 def write_report(
     kind: type[BaseException], error: BaseException, trace: TracebackType | None
 ) -> Path | None:
-    """Writes the traceback to a report file; returns None if that is not possible."""
+    """Writes the traceback to a report file; returns None if the file cannot be written."""
     from wavecomb.version import version
 
     now = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")

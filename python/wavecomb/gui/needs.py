@@ -30,7 +30,7 @@ _PACKAGES = {
     "libgthread-2.0.so.0": "libglib2.0-0",
     "libz.so.1": "zlib1g",
 }
-"""Debian and Ubuntu packages whose names do not follow from the name of their library."""
+"""Debian and Ubuntu packages whose names cannot be derived from the names of their libraries."""
 
 
 def package_of(library: str) -> str:
@@ -46,7 +46,9 @@ def package_of(library: str) -> str:
 
 
 def missing_libraries(plugin: str | None = None) -> list[str]:
-    """Returns the system libraries that Qt's X11 plug-in lacks; empty where that is unknown.
+    """Returns the system libraries that Qt's X11 plug-in needs but that are not installed.
+
+    The list is empty if this is unknown.
 
     Args:
         plugin: File of the plug-in; the default is the plug-in of PySide6.
@@ -89,13 +91,14 @@ print("platform:", QApplication(["wavecomb"]).platformName())
 
 
 def start_qt(timeout: float = 60.0) -> tuple[str, str]:
-    """Starts Qt in a separate process, because a missing library would end this one.
+    """Starts Qt in a separate process, because Qt ends a process in which a library is missing.
 
     Args:
         timeout: Time limit of the process in seconds.
 
     Returns:
-        Returns the name of Qt's platform, such as "xcb", and ""; or "" and the problem.
+        Returns the name of Qt's platform, such as "xcb", and "". On failure returns "" and the
+        problem.
     """
     import subprocess
 
@@ -119,7 +122,7 @@ def start_qt(timeout: float = 60.0) -> tuple[str, str]:
 
 
 def check_window() -> None:
-    """Raises WavecombError with a line of explanation if a window cannot be opened."""
+    """Raises WavecombError with a one-line explanation if a window cannot be opened."""
     check_installed("gui", "the window")
     if not has_display():
         raise WavecombError(NO_DISPLAY)

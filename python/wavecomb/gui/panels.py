@@ -57,7 +57,7 @@ def make_panels(session: Session) -> list[Panel]:
 
 
 def keep_half(window: QMainWindow, centre: QWidget, docks: Iterable[QDockWidget]) -> None:
-    """Narrows the panels on both sides until the centre has half of the window's width."""
+    """Narrows the panels on both sides until the image has half of the window's width."""
     sides = [
         dock
         for dock in docks

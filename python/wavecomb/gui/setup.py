@@ -23,17 +23,18 @@ NOT_IN_PREVIEWS = (
     "adaptive", "noise", "time_limit", "guiding", "transport", "merge_radius", "firefly",
     "integrator", "allocate",
 )  # fmt: skip
-"""Settings that keep their defaults in reduced images."""
+"""Settings that keep their default values while reduced images are rendered."""
 PREVIEW_DEPTH = 3
 
 _LIVE = {"guiding": "off", "transport": "path"}
-"""Defaults that differ in live renders, whose first image should not wait for pilot renders."""
+"""Defaults of live renders that differ from other renders. The first image should not wait for
+pilot renders."""
 
 
 if TYPE_CHECKING:
 
     class _Rows:
-        """Type stub with a field for each row of the table of settings."""
+        """Type stub that declares a field for each row of the core's table of settings."""
 
         def __init__(self, **values: Any) -> None: ...
         def __getattr__(self, name: str) -> Any: ...
@@ -55,9 +56,10 @@ class Setup(_Rows):
     """Settings of a live render: the fields of the core's table, and fields that only a window has.
 
     Attributes:
-        aovs: Layers to render beside the beauty, by the names of docs/aovs.md.
+        aovs: Layers to render in addition to the beauty, by their names in docs/aovs.md.
         denoise: Whether frames are also denoised.
-        region: Rectangle x0, y0, x1, y1 of pixels to render, without x1 and y1; None renders all.
+        region: Pixels to render, as a rectangle x0, y0, x1, y1 that excludes x1 and y1. None
+            renders all pixels.
         own_policy: A policy object that replaces ``policy``, or None.
         profile: Initial costs from ``wavecomb.run.cost_profile.load_costs``, or None.
     """
@@ -98,12 +100,12 @@ class Setup(_Rows):
     def settings(
         self, scale: int = 1, *, preview: bool = False, depth: int = PREVIEW_DEPTH
     ) -> Settings:
-        """Returns the checked settings of the core.
+        """Returns the core's render settings for this setup, with all values checked.
 
         Args:
-            scale: Divisor of width and height.
-            preview: Whether to render only one sample per pixel, with few bounces and guides for
-                denoising.
+            scale: Number by which width and height are divided.
+            preview: Whether to render one sample per pixel with few bounces and with guide layers
+                for the denoiser.
             depth: Largest number of bounces of a preview.
 
         Raises:
@@ -129,14 +131,14 @@ class Setup(_Rows):
 
 
 def scaled_size(width: int, height: int, scale: int) -> tuple[int, int]:
-    """Returns the size of an image at 1 / scale, at least one pixel."""
+    """Returns the width and height of an image divided by ``scale``, at least one pixel each."""
     if scale == 1:
         return width, height
     return max(1, width // scale), max(1, height // scale)
 
 
 def scaled_region(region: Region, scale: int, width: int, height: int) -> Region:
-    """Returns a region at 1 / scale that covers the full region, within the scaled image."""
+    """Returns the region of an image reduced by ``scale``, rounded outwards."""
     x0, y0, x1, y1 = region
     if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
         raise WavecombError(

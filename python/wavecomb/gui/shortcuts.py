@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The list of keyboard shortcuts, built from the actions, so that it is always up to date."""
+"""List of keyboard shortcuts, which is built from the window's actions."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ MOUSE = (
     ("Pan by a tenth of the picture", "Shift+arrow keys, in the viewport"),
     ("Dolly in, out", "PgUp, PgDown, in the viewport"),
 )
-"""Mouse and keyboard controls of the viewport that are not actions."""
+"""Mouse and keyboard controls of the viewport that are not actions of the window."""
 
 
 def plain_text(action: QAction) -> str:
-    """Returns an action's original text without mnemonics and dots."""
+    """Returns the text of an action without mnemonic marks and trailing dots."""
     text = str(action.property(TITLE) or action.text())
     return text.replace("&", "").rstrip(".\u2026")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Linear colours on the screen, and conversion of pixels to Qt images."""
+"""Conversion of linear colours to screen colours, and of pixels to Qt images."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def from_display(colour: QColor) -> Colour:
 def swatch(colour: Colour, size: int, wide: int = 1) -> QIcon:
     """Makes an icon filled with a colour, ``wide`` times as wide as high.
 
-    The frame makes the colour visible on any background.
+    A frame around the colour makes the icon visible on any background.
     """
     ratio = 2.0
     pixmap = QPixmap(round(size * wide * ratio), round(size * ratio))
@@ -53,7 +53,7 @@ def swatch(colour: Colour, size: int, wide: int = 1) -> QIcon:
 
 
 def to_qimage(pixels: NDArray[np.uint8]) -> QImage:
-    """Converts (height, width, 3) 8-bit values to an image that owns its data."""
+    """Converts 8-bit values with shape (height, width, 3) to an image that owns its data."""
     height, width = pixels.shape[:2]
     data = np.ascontiguousarray(pixels)
     borrowed = QImage(data.data, width, height, 3 * width, QImage.Format.Format_RGB888)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Table models that are replaced as a whole, with sort keys, efficient for thousands of rows."""
+"""Table models with sort keys.
+
+Rows are replaced as a whole, which is efficient for thousands of rows.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +15,15 @@ from PySide6.QtGui import QColor, QFont
 ColourRole = Qt.ItemDataRole.UserRole + 10
 """Item data role of a linear colour, shown as a square before the text."""
 ToneRole = Qt.ItemDataRole.UserRole + 11
-"""Item data role of the text's tone: "dim", "warning", "error", or None."""
+"""Item data role of the tone of a cell's text: "dim", "warning", "error", or None."""
 
 
 class HeadedModel(QAbstractTableModel):
-    """Table with fixed column titles. Subclasses implement ``data``.
+    """Table model with fixed column titles. Subclasses implement ``data``.
 
     Args:
         headers: Titles of the columns.
-        tips: Tooltips of the titles; empty means none.
+        tips: Tooltips of the column titles; an empty tuple means that there are no tooltips.
     """
 
     def __init__(
@@ -37,7 +40,7 @@ class HeadedModel(QAbstractTableModel):
         self.endResetModel()
 
     def tell(self, first: int, last: int) -> None:
-        """Updates the cells of some columns."""
+        """Notifies views that cells in some columns have changed."""
         if self.rows:
             corners = self.index(0, first), self.index(len(self.rows) - 1, last)
             self.dataChanged.emit(*corners)
@@ -62,14 +65,14 @@ class HeadedModel(QAbstractTableModel):
 
 
 Cell = tuple[str, Any]
-"""A table cell that holds a text and a sort key (``Qt.ItemDataRole.UserRole``). The tooltip has the
-whole text."""
+"""A table cell that holds a text and a sort key (``Qt.ItemDataRole.UserRole``). The tooltip of the
+cell shows the whole text."""
 
 
 class Table(HeadedModel):
     """Table model of rows of cells under a header.
 
-    The columns ``left`` hold text, all others align right.
+    Columns in ``left`` hold text and align left. All other columns align right.
     """
 
     def __init__(

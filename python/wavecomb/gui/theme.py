@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Dark and light themes: palettes, colours of plots, sizes relative to the font."""
+"""Dark and light themes: palettes, plot colours, and sizes relative to the font."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _SERIES = {
 
 
 class _Theme(QObject):
-    """Emitter of the signal that the colours of the theme changed."""
+    """Object with the signal that is emitted when the colours of the theme change."""
 
     changed = Signal()
 
@@ -57,12 +57,12 @@ def _follow() -> None:
 
 
 def on_change(call: Callable[[], None]) -> None:
-    """Calls a method of a QObject whenever colours change, as long as the object exists."""
+    """Calls a method of a QObject whenever the theme's colours change, while the object exists."""
     _the().changed.connect(call)
 
 
 def choice() -> str:
-    """Returns the applied theme: "system", "dark" or "light"."""
+    """Returns the name of the chosen theme: "system", "dark" or "light"."""
     return _the().choice
 
 
@@ -91,7 +91,7 @@ def _name() -> str:
 
 
 def palette(dark: bool) -> QPalette:
-    """Returns a palette with all roles, for enabled and disabled widgets."""
+    """Returns a palette of all colour roles, for enabled and disabled widgets."""
     window, base, alternate, button, text, dim, line, highlight, link = map(
         QColor, _COLOURS[DARK if dark else LIGHT]
     )
@@ -116,7 +116,10 @@ def palette(dark: bool) -> QPalette:
 
 
 def series(n: int) -> QColor:
-    """Returns the colour of the n-th curve; neighbours are distinguishable even in greyscale."""
+    """Returns the colour of the n-th curve.
+
+    Consecutive colours are distinguishable even in greyscale.
+    """
     colours = _SERIES[_name()]
     return QColor(colours[n % len(colours)])
 
@@ -144,7 +147,7 @@ def surface() -> QColor:
 
 
 def surround() -> QColor:
-    """Returns the background colour around images, neutral so that they look right."""
+    """Returns the background colour around images, a neutral grey."""
     return QColor("#181818" if is_dark() else "#777777")
 
 
@@ -164,5 +167,5 @@ def error() -> QColor:
 
 
 def em(count: float = 1.0) -> int:
-    """Converts heights of the application's font to device-independent pixels."""
+    """Converts a length in font heights to device-independent pixels."""
     return round(QFontMetricsF(QApplication.font()).height() * count)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Small shared controls with tooltip, accessible name and object name."""
+"""Small controls that have a tooltip, an accessible name and an object name."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ W = TypeVar("W", bound=QWidget)
 
 
 def named(widget: W, name: str, title: str, tip: str) -> W:
-    """Sets object name, accessible name and tooltip of a widget."""
+    """Sets the object name, accessible name and tooltip of a widget."""
     widget.setObjectName(name)
     widget.setAccessibleName(title)
     widget.setToolTip(tip)
@@ -73,7 +73,7 @@ def choice(
 
 
 def search_field(name: str, title: str, tip: str, hint: str) -> QLineEdit:
-    """Creates a search field; ``hint`` is shown while it is empty."""
+    """Creates a search field, which shows ``hint`` while it is empty."""
     field = named(QLineEdit(), name, title, tip)
     field.setPlaceholderText(hint)
     field.setClearButtonEnabled(True)
@@ -81,7 +81,7 @@ def search_field(name: str, title: str, tip: str, hint: str) -> QLineEdit:
 
 
 def caption(text: str, buddy: QWidget) -> QLabel:
-    """Creates a label whose mnemonic focuses the control ``buddy``."""
+    """Creates a label whose keyboard mnemonic moves the focus to ``buddy``."""
     label = QLabel(text)
     label.setBuddy(buddy)
     label.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
@@ -98,16 +98,16 @@ def ask_file(
     mode: QFileDialog.FileMode = QFileDialog.FileMode.ExistingFile,
     ending: str = "",
 ) -> None:
-    """Opens a file dialog without blocking.
+    """Opens a file dialog that does not block the window.
 
     Args:
         parent: Parent of the dialog.
         title: Title of the dialog.
-        kinds: Filter, such as "USD (*.usda *.usdc)".
-        take: Function that is called with the chosen name.
+        kinds: Filter of file names, such as "USD (*.usda *.usdc)".
+        take: Function that is called with the chosen file name.
         start: Initial folder or file of the dialog.
         mode: Whether to choose an existing file or a folder.
-        ending: Ending of a file to write, without the dot; "" means that the file is read.
+        ending: File extension of a file to write, without the dot; "" means that a file is read.
     """
     dialog = QFileDialog(parent, title, start, kinds)
     if ending:
@@ -128,10 +128,10 @@ class TakesFiles:
         return True
 
     def take_files(self, paths: list[str], at: QPointF) -> None:
-        """Handles files dropped at a point of the widget."""
+        """Handles files that were dropped at a point of the widget."""
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        """Accepts a drag of accepted files."""
+        """Accepts a drag if its files have an accepted kind."""
         if self._taken(event):
             event.acceptProposedAction()
 
@@ -148,14 +148,14 @@ class TakesFiles:
 
 
 def set_quietly(box: QSpinBox | QDoubleSpinBox | QSlider, value: float) -> None:
-    """Sets a value without emitting signals."""
+    """Sets the value of a widget without emitting signals."""
     box.blockSignals(True)
     box.setValue(value)  # type: ignore[arg-type]
     box.blockSignals(False)
 
 
 def set_text_colour(label: QLabel, colour: QColor) -> None:
-    """Sets the colour of a label's text; other colours continue to follow the application."""
+    """Sets the text colour of a label. All other colours still follow the application."""
     palette = label.palette()
     palette.setColor(label.foregroundRole(), colour)
     label.setPalette(palette)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Background workers, which run only the newest job or all jobs in order.
 
-The classes live on the window's thread and block only in ``close``. A job must not hold or create
+Workers belong to the UI thread. Only their method ``close`` blocks. A job must not hold or create
 Qt objects, and its result must be plain data.
 """
 
@@ -28,7 +28,7 @@ Outcome = tuple[Any, str | None]
 def refuse_qt(job: Job) -> None:
     """Raises TypeError if a job holds a Qt object.
 
-    Otherwise the thread of the job might release the last reference to that object.
+    The thread of the job might otherwise delete that object by releasing its last reference.
     """
     for held in _held(job):
         if isinstance(held, (shiboken6.Object, SignalInstance)):
@@ -36,7 +36,7 @@ def refuse_qt(job: Job) -> None:
 
 
 def _held(job: Any) -> Iterator[Any]:
-    """Yields the values that a function holds: self, arguments, defaults, closure variables."""
+    """Yields the objects that a function holds: self, arguments, defaults, closure variables."""
     yield getattr(job, "__self__", None)
     if isinstance(job, functools.partial):
         yield from job.args
@@ -49,7 +49,10 @@ def _held(job: Any) -> Iterator[Any]:
 
 
 def _run(number: int, job: Job, told: Port) -> None:
-    """Runs a job on its worker thread. No variable in this function may be a Qt object."""
+    """Runs a job on its worker thread.
+
+    No variable in this function may be a Qt object, since it could be deleted on this thread.
+    """
     try:
         outcome: Outcome = (job(), None)
     except Exception as error:
@@ -91,9 +94,9 @@ class _OneThread(QObject):
         raise NotImplementedError
 
     def close(self, seconds: float = 5.0) -> bool:
-        """Rejects further jobs and waits for the running one; returns whether it has ended.
+        """Rejects further jobs and waits for the running job. Returns whether this job has ended.
 
-        A job that has not ended continues harmlessly, because it holds no object of the window.
+        A job that has not ended may continue, because it holds no object of the window.
         """
         self._closed = True
         thread, self._thread = self._thread, None
@@ -104,13 +107,13 @@ class _OneThread(QObject):
 
 
 class Worker(_OneThread):
-    """Worker for the newest job: a later job replaces a waiting one.
+    """Worker for the newest job. A later job replaces a job that is still waiting.
 
-    A running job is not stopped. Its result is reported even if a newer job waits, unless
-    ``cancel`` was called.
+    A running job is not stopped. The running job's result is reported even if a newer job waits,
+    unless ``cancel`` was called.
 
     Signals:
-        done(key, result), failed(key, line): Results, emitted on the window's thread.
+        done(key, result), failed(key, line): A job succeeded or failed. Emitted on the UI thread.
     """
 
     done = Signal(object, object)
@@ -123,12 +126,12 @@ class Worker(_OneThread):
         self._told = True
 
     def submit(self, job: Job, key: object = None) -> None:
-        """Submits the next job.
+        """Submits a job, which replaces a waiting job.
 
         Args:
-            job: The job, preferably a partial of a function.
-            key: Value that is returned with the result. Nothing happens if a job with this key is
-                running.
+            job: The job, preferably a ``functools.partial`` of a module-level function.
+            key: Value that is emitted together with the result. If a job with this key is running,
+                the new job is ignored.
 
         Raises:
             TypeError: The job holds a Qt object.
@@ -144,7 +147,7 @@ class Worker(_OneThread):
             self._waiting = (job, key)
 
     def cancel(self) -> None:
-        """Drops the waiting job and the result of the running one."""
+        """Drops the waiting job and the result of the running job."""
         self._waiting, self._told = None, False
 
     def close(self, seconds: float = 5.0) -> bool:
@@ -171,14 +174,14 @@ class Worker(_OneThread):
 
 
 class Errands(_OneThread):
-    """Worker for all jobs, one after the other, with separate callbacks for each job."""
+    """Worker that runs all jobs one after the other, with separate callbacks for each job."""
 
     def __init__(self, name: str, parent: QObject | None = None) -> None:
         super().__init__(name, parent)
         self._jobs: deque[tuple[Job, Callable[[Any], None], Callable[[str], None]]] = deque()
 
     def submit(self, job: Job, done: Callable[[Any], None], failed: Callable[[str], None]) -> None:
-        """Queues a job; afterwards calls ``done(result)`` or ``failed(line)``.
+        """Queues a job. When the job has ended, calls ``done(result)`` or ``failed(line)``.
 
         Raises:
             TypeError: The job holds a Qt object.
@@ -211,11 +214,11 @@ class Errands(_OneThread):
 
 
 class Tasks(QObject):
-    """Background tasks, the newest of which is reported.
+    """Queue of background tasks. A status text describes the newest task.
 
     Signals:
-        busy(str): Description such as "writing a.exr", or "" if there is no task.
-        failed(str): Error in one line.
+        busy(str): Description of the newest task, such as "writing a.exr", or "" if there is none.
+        failed(str): A task failed. The argument is a message of one line.
 
     Attributes:
         jobs: Key and description of each task.
@@ -231,17 +234,17 @@ class Tasks(QObject):
         self._numbers = itertools.count()
 
     def begin(self, key: str, what: str) -> None:
-        """Reports a task, replacing one with the same key."""
+        """Adds a task to the reported tasks, replacing a task with the same key."""
         self.jobs = [job for job in self.jobs if job[0] != key] + [(key, what)]
         self.busy.emit(what)
 
     def end(self, key: str) -> None:
-        """Reports that a task has ended."""
+        """Removes a task that has ended from the reported tasks."""
         self.jobs = [job for job in self.jobs if job[0] != key]
         self.busy.emit(self.jobs[-1][1] if self.jobs else "")
 
     def run(self, what: str, work: Callable[[], object], then: Callable[[], None] | None) -> None:
-        """Runs a function on another thread, after all earlier ones."""
+        """Runs a function on another thread, after all functions that were submitted earlier."""
         key = f"{what} {next(self._numbers)}"
         self.begin(key, what)
 
@@ -257,5 +260,5 @@ class Tasks(QObject):
         self._errands.submit(work, done, failed)
 
     def close(self) -> None:
-        """Waits for the running task and drops all results."""
+        """Waits for the running task and drops the results of all tasks."""
         self._errands.close()

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cryptomatte in files: layer names, manifests and metadata (specification 1.2.0).
+"""Layer names, manifests and metadata of Cryptomatte files (specification 1.2.0).
 
-Ranks of (id, coverage), sorted by descending coverage, are stored as pairs of channels: channels R,
-G of the layer "CryptoObject00" hold the first rank, B, A the second, and so on. Ids are stored as
-the bits of floats.
+A rank is a pair of id and coverage. Ranks are sorted by descending coverage and stored as pairs of
+channels: channels R and G of the layer "CryptoObject00" hold the first rank, B and A the second,
+and so on. Ids are stored as the bits of floats.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ LEVELS = {
     "crypto_material": "CryptoMaterial",
     "crypto_asset": "CryptoAsset",
 }
-"""AOV -> layer name in files."""
+"""Layer name in files for each Cryptomatte AOV."""
 
 
 def is_crypto(layer: str) -> bool:
-    """Returns whether a layer of a file belongs to a Cryptomatte."""
+    """Returns whether a file's layer is part of a Cryptomatte."""
     return re.fullmatch(r"Crypto(Object|Material|Asset)\d\d", layer) is not None
 
 
 def layers(aov: str, pairs: NDArray[Any]) -> dict[str, NDArray[Any]]:
-    """Splits ranks (height, width, 2 * ranks) into layers of four channels."""
+    """Splits Cryptomatte ranks (height, width, 2 * ranks) into layers of four channels."""
     return {
         f"{LEVELS[aov]}{k:02d}": pairs[:, :, 4 * k : 4 * k + 4] for k in range(pairs.shape[2] // 4)
     }
 
 
 def gather(found: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Collects the ranks (height, width, 2 * ranks) of each level from a file's layers, by AOV."""
+    """Joins the Cryptomatte layers of a file. Returns ranks (height, width, 2 * ranks) by AOV."""
     out: dict[str, NDArray[Any]] = {}
     for aov, name in LEVELS.items():
         parts = sorted(layer for layer in found if re.fullmatch(rf"{name}\d\d", layer))
@@ -47,10 +47,10 @@ def gather(found: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
 
 
 def metadata(manifests: Mapping[str, Mapping[str, int]]) -> dict[str, str]:
-    """Returns the file attributes that describe the levels and their names.
+    """Returns the file attributes that describe Cryptomattes and their object names.
 
     Args:
-        manifests: AOV -> name -> id.
+        manifests: For each AOV, the object names and their ids.
     """
     out: dict[str, str] = {}
     if not manifests:
@@ -70,7 +70,7 @@ def metadata(manifests: Mapping[str, Mapping[str, int]]) -> dict[str, str]:
 
 
 def manifests(attributes: Mapping[str, Any]) -> dict[str, dict[str, int]]:
-    """Parses the manifests from a file's attributes."""
+    """Parses the Cryptomatte manifests in a file's attributes."""
     out: dict[str, dict[str, int]] = {}
     by_name = {name: aov for aov, name in LEVELS.items()}
     for key, value in attributes.items():
@@ -82,10 +82,10 @@ def manifests(attributes: Mapping[str, Any]) -> dict[str, dict[str, int]]:
 
 
 def matte(pairs: NDArray[Any], number: int) -> NDArray[np.float32]:
-    """Returns the coverage (height, width) of each pixel by an id.
+    """Returns the fraction of each pixel (height, width) that an id covers.
 
     Args:
-        pairs: (height, width, 2 * ranks).
+        pairs: Cryptomatte ranks with shape (height, width, 2 * ranks).
         number: The id, from ``_core.crypto_id``.
     """
     bits = np.ascontiguousarray(pairs[:, :, 0::2], dtype=np.float32).view(np.uint32)

@@ -15,7 +15,7 @@ Array = NDArray[np.float32]
 
 
 def check_denoiser() -> None:
-    """Raises WavecombError with installation advice unless denoising is available."""
+    """Raises WavecombError with installation advice if denoising is not available."""
     needed("pyoidn", "denoising", extra="denoise")
 
 
@@ -24,18 +24,18 @@ def denoise(
 ) -> Array:
     """Denoises an image.
 
-    Albedo and normals are denoised separately first and then guide the image as noise-free
-    features, which Open Image Denoise recommends for the most detail.
+    Albedo and normals are first denoised themselves. They then guide the image as noise-free
+    features, as Open Image Denoise recommends.
 
     Args:
-        beauty: (height, width, 3), linear; values that are not finite are replaced.
-        albedo: (height, width, 3) albedo.
-        normal: (height, width, 3) means of unit normals.
-        threads: Number of threads; 0 means all.
-        fast: Whether to skip denoising of the guides and to use a smaller network, for previews.
+        beauty: Linear colours (height, width, 3). Values that are not finite are replaced.
+        albedo: Albedo with shape (height, width, 3).
+        normal: Means of unit normals, with shape (height, width, 3).
+        threads: Number of threads; 0 uses all cores.
+        fast: Whether to use a smaller network and guides that are not denoised, for previews.
 
     Raises:
-        WavecombError: The library is missing or fails.
+        WavecombError: The library is missing or reports an error.
     """
     oidn = needed("pyoidn", "denoising", extra="denoise")
     with oidn.Device() as device:
@@ -53,7 +53,7 @@ def denoise(
 
 
 def _clean(image: Array, low: float, high: float | None) -> Array:
-    """Returns finite values in the filter's input range."""
+    """Replaces values that are not finite, and clamps values to the denoiser's input range."""
     finite = np.nan_to_num(image, nan=0.0, posinf=0.0, neginf=0.0)
     return np.ascontiguousarray(np.clip(finite, low, high), dtype=np.float32)
 

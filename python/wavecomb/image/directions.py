@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Directional distributions: the core's square parametrisation, and latlong maps."""
+"""Mapping of directional distributions between the core's unit square and latlong maps."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 def square_points(directions: NDArray[Any]) -> NDArray[np.float64]:
     """Maps unit vectors (..., 3) to points (u, v) in the unit square (..., 2).
 
-    P. Clarberg, "Fast Equal-Area Mapping of the (Hemi)Sphere using SIMD", JGT 13(3) 2008; the same
-    mapping as guiding/directions.h.
+    The mapping is that of guiding/directions.h: P. Clarberg, "Fast Equal-Area Mapping of the
+    (Hemi)Sphere using SIMD", JGT 13(3) 2008.
 
     >>> square_points(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])).tolist()
     [[0.5, 0.5], [1.0, 0.5]]
@@ -29,16 +29,17 @@ def square_points(directions: NDArray[Any]) -> NDArray[np.float64]:
 def map_directions(
     up: NDArray[Any], ahead: NDArray[Any], height: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Returns the unit vectors of a latlong map's pixels, and the axes of the map.
+    """Returns the unit vector of each pixel of a latlong map, and the axes of the map.
 
     Args:
-        up: Unit vector of the map's top row.
-        ahead: Direction of the map's centre column; may be any direction.
-        height: Number of rows. The map has 2 height columns; its right half shows directions to the
-            right of ``ahead``.
+        up: Unit vector that the top row of the map shows.
+        ahead: Direction that the centre column of the map shows, not necessarily orthogonal to
+            ``up``.
+        height: Number of rows of the map. The number of columns is twice as large. The right half
+            of the map shows the directions to the right of ``ahead``.
 
     Returns:
-        (height, 2 height, 3) vectors, and a (3, 3) matrix with the rows ahead, right and up.
+        Unit vectors (height, 2 height, 3), and a matrix (3, 3) with the rows ahead, right and up.
     """
     up = np.asarray(up, np.float64)
     flat = np.asarray(ahead, np.float64) - up * (np.asarray(ahead, np.float64) @ up)
@@ -62,7 +63,10 @@ def map_directions(
 
 
 def map_point(direction: NDArray[Any], axes: NDArray[np.float64]) -> tuple[float, float]:
-    """Returns map coordinates of a unit vector: x from 0 (left) to 1, y from 0 (top) to 1."""
+    """Returns the latlong map position of a unit vector, from 0 to 1 in x and y.
+
+    The origin is at the top left.
+    """
     ahead, right, up = axes @ np.asarray(direction, np.float64)
     return (
         float(0.5 + np.arctan2(right, ahead) / (2.0 * np.pi)),
@@ -73,13 +77,13 @@ def map_point(direction: NDArray[Any], axes: NDArray[np.float64]) -> tuple[float
 def density_map(
     density: NDArray[Any], up: NDArray[Any], ahead: NDArray[Any], height: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Resamples a distribution over bins of the square to a latlong map; also returns its axes.
+    """Resamples a distribution over the unit square to a latlong map. Also returns the map's axes.
 
     Args:
-        density: (n, n) values of bins, with rows along v.
-        up: Unit vector of the map's top row.
-        ahead: Direction of the map's centre column.
-        height: Number of rows.
+        density: Values of the bins with shape (n, n), in rows along v.
+        up: Unit vector that the top row of the map shows.
+        ahead: Direction that the centre column of the map shows.
+        height: Number of rows of the map.
     """
     vectors, axes = map_directions(up, ahead, height)
     side = len(density)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Converts layers of an image for display: radiance as colours, other layers by colour maps."""
+"""Converts layers of an image to screen colours.
+
+Radiance is tone-mapped; other layers get false colours.
+"""
 
 from __future__ import annotations
 
@@ -19,20 +22,20 @@ _HUE_BELOW, _HUE_ABOVE = 255.0, 70.0
 
 
 def colour_map(count: int = 256) -> NDArray[np.float32]:
-    """Returns a map from dark violet over red to light yellow (count, 3), in linear Rec.709.
+    """Returns a colour map (count, 3) from dark violet over red to light yellow, in linear Rec.709.
 
-    OKLab lightness (Ottosson 2020) rises linearly, so that steps look uniform; the hue turns from
-    violet to yellow; chroma is the largest in the gamut, up to 0.2.
+    The OKLab lightness (Ottosson 2020) rises linearly, so that steps look uniform. The hue turns
+    from violet to yellow. The chroma is the largest in the gamut, but at most 0.2.
     """
     t = np.linspace(0.0, 1.0, count)
     return _largest_chroma(0.2 + 0.76 * t, np.radians(300.0 + 170.0 * t), 0.2)
 
 
 def signed_colour_map(count: int = 257) -> NDArray[np.float32]:
-    """Returns a map from light blue over black to light orange (count, 3), in linear Rec.709.
+    """Returns a colour map (count, 3) from light blue over black to light orange.
 
-    Lightness rises linearly from the middle, which is black, to both ends. Blue and orange are
-    distinguishable with all common colour deficiencies.
+    Lightness rises linearly from the middle, which is black, to both ends. People with any common
+    colour vision deficiency can distinguish blue and orange.
     """
     t = np.linspace(-1.0, 1.0, count)
     hue = np.radians(np.where(t < 0.0, _HUE_BELOW, _HUE_ABOVE))
@@ -42,7 +45,7 @@ def signed_colour_map(count: int = 257) -> NDArray[np.float32]:
 def _largest_chroma(
     lightness: NDArray[np.float64], hue: NDArray[np.float64], most: float
 ) -> NDArray[np.float32]:
-    """Returns colours with the largest chroma inside the gamut, found by bisection."""
+    """Returns the colours with the largest chroma, up to ``most``, that are inside the gamut."""
     low, high = np.zeros_like(lightness), np.full_like(lightness, most)
     for _ in range(20):
         chroma = 0.5 * (low + high)
@@ -56,7 +59,7 @@ def _largest_chroma(
 def _linear_from_oklab(
     lightness: NDArray[Any], a: NDArray[Any], b: NDArray[Any]
 ) -> NDArray[np.float64]:
-    """Converts OKLab to linear Rec.709 (n, 3): https://bottosson.github.io/posts/oklab/."""
+    """Converts OKLab to linear Rec.709 (n, 3). Source: https://bottosson.github.io/posts/oklab/."""
     long = (lightness + 0.3963377774 * a + 0.2158037573 * b) ** 3
     medium = (lightness - 0.1055613458 * a - 0.0638541728 * b) ** 3
     short = (lightness - 0.0894841775 * a - 1.2914855480 * b) ** 3
@@ -71,7 +74,7 @@ def _linear_from_oklab(
 
 
 Develop = Callable[[NDArray[Any]], NDArray[np.uint8]]
-"""Converts linear Rec.709 (height, width, 3) to 8-bit codes."""
+"""Converts linear Rec.709 (height, width, 3) to 8-bit sRGB values."""
 
 _CRYPTO = ("crypto_", "Crypto")
 _UNITS = {
@@ -89,13 +92,13 @@ NOT_FINITE = (0, 255, 255)
 
 @dataclass(frozen=True)
 class Legend:
-    """Legend of false colours.
+    """Legend of a layer in false colours.
 
     Attributes:
-        title: Quantity and unit.
+        title: Name and unit of the displayed quantity.
         low: Value of the darkest colour.
         high: Value of the lightest colour.
-        logarithmic: Whether equal colour steps are equal ratios.
+        logarithmic: Whether the colour scale is logarithmic.
     """
 
     title: str
@@ -104,7 +107,7 @@ class Legend:
     logarithmic: bool
 
     def ticks(self, count: int = 5) -> list[tuple[float, str]]:
-        """Returns positions from 0 to 1 along the bar with their labels."""
+        """Returns the labels of the colour bar with their positions, from 0 to 1."""
         out = []
         for t in np.linspace(0.0, 1.0, count):
             if self.logarithmic:
@@ -117,11 +120,11 @@ class Legend:
 
 @dataclass(frozen=True)
 class DisplayLayer:
-    """A layer converted for display.
+    """A layer that was converted to screen colours.
 
     Attributes:
-        pixels: (height, width, 3) 8-bit codes.
-        legend: Legend of false colours; None for true colours.
+        pixels: 8-bit sRGB values with shape (height, width, 3).
+        legend: Legend of the false colours; None if the layer is not in false colours.
     """
 
     pixels: NDArray[np.uint8]
@@ -141,14 +144,14 @@ def show_layer(
     low: float | None = None,
     high: float | None = None,
 ) -> DisplayLayer:
-    """Converts a layer for display.
+    """Converts a layer to screen colours.
 
     Args:
-        layer: (height, width) or (height, width, channels).
+        layer: Array with shape (height, width) or (height, width, channels).
         name: Name of the AOV or of the layer in a file.
-        develop: Conversion of radiance.
-        low: Lower end of false colours; None derives it from the image.
-        high: Upper end of false colours; None derives it from the image.
+        develop: Function that converts radiance to 8-bit sRGB values.
+        low: Lower end of the false colours; None derives the value from the layer.
+        high: Upper end of the false colours; None derives the value from the layer.
     """
     array = np.asarray(layer)
     if is_light(name):
@@ -201,11 +204,11 @@ def heat(
     low: float | None = None,
     high: float | None = None,
 ) -> DisplayLayer:
-    """Converts values to false colours; values that are not finite become cyan.
+    """Converts values to false colours. Values that are not finite become cyan.
 
     Args:
         values: (height, width).
-        name: Name of a layer, which determines title and kind of scale, or another title.
+        name: Name of the layer, which determines the legend's title and scale, or any other title.
         low: Value of the darkest colour; None derives it from the image.
         high: Value of the lightest colour; None derives it from the image.
     """
@@ -236,7 +239,7 @@ def heat(
 
 
 def ramp(width: int) -> NDArray[np.uint8]:
-    """Returns the false colours from low to high (width, 3)."""
+    """Returns the false colours (width, 3) of a colour bar, from low to high."""
     table = _table()
     return table[np.linspace(0, len(table) - 1, width).astype(np.intp)]
 
@@ -247,7 +250,7 @@ def _table() -> NDArray[np.uint8]:
 
 
 def id_colours(ids: NDArray[Any]) -> NDArray[np.uint8]:
-    """Returns a distinct colour for each integer (h, w) -> (h, w, 3); 0 is black."""
+    """Returns a distinct colour (h, w, 3) for each integer (h, w). The integer 0 is black."""
     mixed = ids.astype(np.uint32) * np.uint32(2654435761)
     mixed ^= mixed >> np.uint32(15)
     mixed *= np.uint32(2246822519)

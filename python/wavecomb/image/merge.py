@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Merges images of one stage that were rendered with different seeds."""
+"""Merges images of the same stage that were rendered with different seeds."""
 
 from __future__ import annotations
 
@@ -20,20 +20,21 @@ from wavecomb.options import settings as known_settings
 from wavecomb.run.aovs import of_kind
 
 SQUARED = ("variance",)
-"""Layers with variances of means, which are combined with squared weights."""
+"""Layers that contain variances of means, which are merged with squared weights."""
 SPREAD = ("error",)
-"""Layers with standard errors, the square roots of the variances of means."""
+"""Layers that contain standard errors, which are square roots of the variances of means."""
 _HITS = "_hits "
-"""Prefix of internal layers that count the samples with a hit, for means over hits."""
+"""Prefix of internal layers with the number of samples that hit a surface. They are needed for
+means over hits."""
 
 
 def _sums() -> tuple[str, ...]:
-    """Returns the layers whose pixels are summed over all images."""
+    """Returns the layers whose values are added when images are merged."""
     return ("samples", *of_kind("sum"))
 
 
 def _counted() -> tuple[str, ...]:
-    """Returns the layers whose pixels count only if they are finite."""
+    """Returns the layers in which merging ignores values that are not finite."""
     return (*of_kind("mean_of_hits"), *of_kind("median"))
 
 
@@ -42,11 +43,12 @@ class MergedImage:
     """The merged image.
 
     Attributes:
-        layers: Layers in the form of ``read_layers``.
-        metadata: Attributes of the file header.
-        manifests: Cryptomatte level -> name -> id.
-        seeds: Seeds of all merged images.
-        window: Position of the pixels, as for ``write_exr``; None if they are the displayed image.
+        layers: Layers by name, as ``read_layers`` returns them.
+        metadata: Attributes of the EXR header.
+        manifests: For each Cryptomatte level, the object names and their ids.
+        seeds: Seeds of all images that were merged.
+        window: Position of the pixels, as for ``write_exr``. None means that they fill the
+            displayed image.
     """
 
     layers: dict[str, NDArray[Any]]
@@ -58,7 +60,7 @@ class MergedImage:
 
 @dataclass(frozen=True)
 class _Source:
-    """An image to be merged."""
+    """An image that is to be merged."""
 
     name: str
     attributes: dict[str, Any]
@@ -69,19 +71,19 @@ class _Source:
 def merge(paths: Sequence[str | os.PathLike[str]]) -> MergedImage:
     """Merges images pixel by pixel, weighted by their sample counts.
 
-    Sums sample counts and costs. Combines variances and errors to those of the merged image.
-    Weights Cryptomatte coverage like colours and keeps the largest ranks. Ignores depths that are
-    not finite. Takes position, texture coordinates and ids, which belong to single samples, from
-    the first image with a sample in the pixel. Omits the denoised layer.
+    Sample counts and costs are added. Variances and errors are combined to those of the merged
+    image. Cryptomatte coverage is weighted like colours, and the largest ranks are kept. Depths
+    that are not finite are ignored. Position, texture coordinates and ids belong to single samples,
+    so they come from the first image with a sample in the pixel. The denoised layer is left out.
 
     >>> merge(["a.exr", "b.exr"]).layers["samples"].max()  # doctest: +SKIP
     128.0
 
     Args:
-        paths: Two or more EXR files of ``wavecomb render`` or ``wavecomb merge``.
+        paths: Two or more EXR files from ``wavecomb render`` or ``wavecomb merge``.
 
     Raises:
-        WavecombError: The images cannot be merged; the message names the file and the difference.
+        WavecombError: The images cannot be merged. The message names the file and the difference.
         OSError: A file cannot be read.
     """
     if len(paths) < 2:
@@ -123,7 +125,10 @@ def merge(paths: Sequence[str | os.PathLike[str]]) -> MergedImage:
 
 
 def _overscan(source: _Source) -> int:
-    """Returns the overscan of an image; raises WavecombError if its settings are invalid."""
+    """Returns the overscan of an image.
+
+    Raises WavecombError if the image's settings are invalid.
+    """
     beyond = source.settings.get("overscan", 0)
     edges = [source.settings.get(name) for name in ("width", "height")]
     if isinstance(beyond, int) and all(isinstance(e, int) and 0 <= 2 * beyond < e for e in edges):
@@ -147,7 +152,7 @@ def _source(name: str) -> _Source:
 
 
 def _check_fit(first: _Source, other: _Source) -> None:
-    """Raises WavecombError if two images do not have the same expectation."""
+    """Raises WavecombError if two images have settings with different expected pixel values."""
 
     def refuse(what: str, a: Any, b: Any) -> None:
         raise WavecombError(f"{other.name}: {what} is {b}, that of {first.name} is {a}")
@@ -179,9 +184,9 @@ def _check_fit(first: _Source, other: _Source) -> None:
 def _check_shapes(
     source: _Source, layers: dict[str, NDArray[Any]], shapes: dict[str, tuple[int, ...]]
 ) -> None:
-    """Raises WavecombError if a layer's size or channel count is inconsistent.
+    """Raises WavecombError if the size or channel count of a layer is inconsistent.
 
-    ``shapes`` holds the layer shapes of earlier images and is extended.
+    ``shapes`` holds the layer shapes of earlier images. The function adds new layers to it.
     """
     size = source.settings.get("height"), source.settings.get("width")
     for name, layer in layers.items():
@@ -225,7 +230,7 @@ def _add(
     pairs: dict[str, list[NDArray[Any]]],
     layers: dict[str, NDArray[Any]],
 ) -> None:
-    """Adds the layers of one image to the weighted sums."""
+    """Adds the layers of an image to the weighted sums."""
     samples = layers["samples"].astype(np.float64)
     for level, ranks in cryptomatte.gather(layers).items():
         weighted = ranks.copy()
@@ -279,7 +284,7 @@ def _means(
 
 
 def _merge_ranks(weighted: list[NDArray[Any]], samples: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Adds the coverage of equal ids and keeps the largest ranks; processes one row at a time."""
+    """Adds the coverage of equal ids and keeps the largest ranks, one row at a time."""
     height, width = samples.shape[:2]
     ranks = weighted[0].shape[2] // 2
     out = np.zeros((height, width, 2 * ranks), np.float32)
@@ -300,7 +305,7 @@ def _merge_ranks(weighted: list[NDArray[Any]], samples: NDArray[np.float64]) -> 
 
 
 def _metadata(sources: list[_Source], seeds: tuple[int, ...]) -> dict[str, Any]:
-    """Returns the metadata of the first image, with the seeds and render time of all."""
+    """Returns the metadata of the first image with all seeds and the total render time."""
     first = sources[0]
     kept = ("Software", "worldToCamera", "worldToNDC", "chromaticities")
     metadata = {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shows an image in a notebook: tone-mapped, with a summary line and collapsible layers."""
+"""Shows an image in a notebook, with tone mapping, a summary line and collapsible layers."""
 
 from __future__ import annotations
 
@@ -15,12 +15,15 @@ from wavecomb.image.layer_view import is_light, show_layer
 from wavecomb.image.thumbnails import base64_text, data_uri, encode_image, shrink, subsample
 
 MAX_EDGE = 1600
-"""Longer edge of an image in a notebook in pixels; larger images are reduced by averaging."""
+"""Largest edge of an image in a notebook, in pixels. Larger images are reduced by averaging."""
 LAYER_EDGE = 360
 
 
 class Rendered(Protocol):
-    """Interface of ``wavecomb.Picture``, which imports this module."""
+    """Interface of ``wavecomb.Picture``.
+
+    The class itself cannot be imported, since its module imports this one.
+    """
 
     @property
     def beauty(self) -> NDArray[np.float32]:
@@ -28,11 +31,11 @@ class Rendered(Protocol):
 
     @property
     def denoised(self) -> NDArray[np.float32] | None:
-        """(height, width, 3), linear and denoised; None if it was not denoised."""
+        """Denoised linear colours (height, width, 3); None if the image was not denoised."""
 
     @property
     def samples(self) -> NDArray[np.uint32]:
-        """(height, width) sample counts."""
+        """Sample counts of pixels, with shape (height, width)."""
 
     @property
     def stats(self) -> dict[str, Any]:
@@ -46,11 +49,11 @@ class Rendered(Protocol):
         """Returns the layers by name."""
 
     def shown(self) -> NDArray[Any]:
-        """Returns the displayed colours in linear Rec.709."""
+        """Returns the colours to display, in linear Rec.709."""
 
 
 def codes(picture: Rendered) -> NDArray[np.uint8]:
-    """Returns the image as 8-bit sRGB codes, with the tone mapping "neutral"."""
+    """Returns the image as 8-bit sRGB values, with the tone mapping "neutral"."""
     return display(shrink(picture.shown(), MAX_EDGE), tone_map="neutral")
 
 
@@ -59,11 +62,11 @@ def mime_bundle(
     include: Collection[str] | None = None,
     exclude: Collection[str] | None = None,
 ) -> dict[str, str]:
-    """Returns the result of ``Picture._repr_mimebundle_``: HTML with layers, a PNG, and text.
+    """Returns the image in several MIME types: HTML with all layers, PNG, and text.
 
     Args:
         picture: The image.
-        include: Requested MIME types; None means all.
+        include: MIME types to return; None means all.
         exclude: MIME types to leave out.
     """
     made = {
@@ -76,9 +79,9 @@ def mime_bundle(
 
 
 def page(picture: Rendered) -> str:
-    """Returns HTML of the image, its summary and its layers, which untrusted notebooks keep.
+    """Returns HTML of the image, its summary and its layers.
 
-    The HTML contains no scripts, and only inline styles.
+    The HTML has inline styles and no scripts, so that untrusted notebooks also show the HTML.
     """
     shown = codes(picture)
     line = html.escape(facts(picture))
@@ -123,7 +126,7 @@ def _layer(name: str, array: NDArray[Any]) -> str:
 def facts(picture: Rendered) -> str:
     """Returns a one-line summary of the image.
 
-    The summary lists the size, samples, render time, and whether the render was stopped.
+    The summary has the size, samples per pixel, render time, and whether the render was stopped.
     """
     height, width = picture.beauty.shape[:2]
     parts = [f"{width} x {height}", samples_text(picture.samples)]
@@ -140,7 +143,7 @@ def facts(picture: Rendered) -> str:
 
 
 def samples_text(samples: NDArray[Any]) -> str:
-    """Formats samples per pixel as a number or range.
+    """Formats the samples per pixel as a number or, if they differ, as a range.
 
     >>> samples_text(np.array([[16, 16]])), samples_text(np.array([[4, 64]]))
     ('16 samples a pixel', '4 to 64 samples a pixel')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Self-contained HTML pages of images: a playable sequence, and pairs under a wipe line."""
+"""Self-contained HTML pages of images: a playable sequence, or image pairs under a wipe line."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from wavecomb.image.thumbnails import DisplayOptions, Kind, data_uri, fit_image
 
 MAX_FRAMES = 1000
-"""Maximum number of images of a page."""
+"""Maximum number of images on a page."""
 SPEEDS = (6, 12, 24, 25, 30, 60)
-"""Selectable playback speeds in frames per second, besides the requested one."""
+"""Playback speeds in frames per second that the page offers in addition to the requested one."""
 _HERE = Path(__file__).parent
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
-"""Content security policy, by which the browser prevents the page from fetching anything."""
+"""Content security policy that prevents the page from loading anything from the network."""
 
 
 def escape(text: object) -> str:
@@ -29,11 +29,11 @@ def escape(text: object) -> str:
 
 
 def document(title: str, facts: str, body: str) -> str:
-    """Returns the whole page with embedded styles and scripts.
+    """Returns a complete HTML page with embedded styles and scripts.
 
     Args:
         title: Plain text.
-        facts: Line of plain text below the title.
+        facts: Line of plain text that is shown below the title.
         body: HTML markup.
     """
     style = (_HERE / "pages.css").read_text(encoding="utf-8")
@@ -52,20 +52,20 @@ def sequence_page(
     pictures: Mapping[str, str], look: DisplayOptions, *, title: str, fps: float = 24.0,
     width: int = 960, kind: Kind = "jpeg",
 ) -> str:  # fmt: skip
-    """Returns a page that plays images, with a contact sheet of all images below.
+    """Returns a page that plays a sequence of images, with a contact sheet of all images below.
 
-    Without JavaScript the page shows only the contact sheet.
+    Without JavaScript, the page shows only the contact sheet.
 
     Args:
-        pictures: Name -> file, in order.
+        pictures: File of each image by name, in playing order.
         look: Display options.
         title: Title of the page.
-        fps: Frames per second.
-        width: Largest width of images in the page, pixels.
-        kind: Encoding: "jpeg", or "png" for close inspection.
+        fps: Initial playback speed in frames per second.
+        width: Largest width, in pixels, of images on the page.
+        kind: Image encoding on the page, "jpeg", or "png" for close inspection.
 
     Raises:
-        WavecombError: A file lacks the layer.
+        WavecombError: A file does not contain the layer.
         OSError: A file cannot be read.
     """
     cells, size = [], ""
@@ -91,14 +91,14 @@ def sequence_page(
 
 @dataclass(frozen=True)
 class Pair:
-    """Pair of images on a page, with descriptive lines.
+    """Pair of images on a page, with lines of description.
 
     Attributes:
-        name: Common name; "" if the page title gives it.
-        facts: Lines of plain text.
-        a: 8-bit sRGB codes (height, width, 3).
-        b: Reference of the same size.
-        difference: Difference map of any size, or None.
+        name: Name of both images; "" if the title of the page contains it.
+        facts: Lines of plain text that describe the pair.
+        a: Image A as 8-bit sRGB values (height, width, 3).
+        b: Reference image B, with the same size as A.
+        difference: Difference map of the images, of any size, or None.
     """
 
     name: str
@@ -109,12 +109,12 @@ class Pair:
 
 
 def pair_section(pair: Pair, key: str, names: tuple[str, str]) -> str:
-    """Returns HTML with a pair under a wipe line; side by side without JavaScript.
+    """Returns HTML that shows a pair under a wipe line, or side by side without JavaScript.
 
     Args:
         pair: The images.
-        key: Anchor in the page.
-        names: Names of A and B.
+        key: Anchor of the pair in the page.
+        names: Names of images A and B.
     """
     shown = [(names[0], pair.a), (names[1], pair.b)]
     if pair.difference is not None:
@@ -134,7 +134,7 @@ def pair_section(pair: Pair, key: str, names: tuple[str, str]) -> str:
 
 @dataclass(frozen=True)
 class Cell:
-    """A table cell: text, an anchor in the page that it links to, and a style for good or bad."""
+    """A table cell: its text, the anchor that it links to, and a mark for good or bad values."""
 
     text: str
     link: str = ""
@@ -142,7 +142,7 @@ class Cell:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[Cell | str]]) -> str:
-    """Returns an HTML table whose first column holds row headers."""
+    """Returns an HTML table. The cells of the first column are row headers."""
     heads = "".join(f'<th scope="col">{escape(one)}</th>' for one in head)
     body = []
     for row in rows:
@@ -156,7 +156,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[Cell | str]]) -> str:
 
 
 def figure_text(value: float | None) -> str:
-    """Formats a figure of a table; an en dash if there is none.
+    """Formats a number for a table. A missing number becomes an en dash.
 
     >>> figure_text(0.001234), figure_text(None)
     ('0.001234', '–')

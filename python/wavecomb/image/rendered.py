@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from wavecomb.image.files.image import Transfer
 
 NOWHERE = (0.0, 0.0, 0.0)
-"""Origin of scenes that use world coordinates."""
+"""World position of the scene origin, for scenes that use world coordinates."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -31,27 +31,31 @@ class Picture:
     """A rendered image. Row 0 is the top.
 
     Attributes:
-        beauty: (height, width, 3), linear Rec.709, or in the working space of the stage.
-        albedo: (height, width, 3); like normal and depth, None if it was not requested.
-        normal: (height, width, 3), world space.
-        depth: (height, width), along the camera's axis; infinite for pixels without a hit.
-        samples: (height, width) number of samples of each pixel.
-        error: (height, width) error estimate of adaptive sampling (docs/render.md); infinite for
-            too few samples. None unless the render was adaptive or had error=True.
-        variance: (height, width, 3) variance of each pixel's mean, as if its samples were
-            independent. None unless the render was adaptive or had error=True.
-        denoised: (height, width, 3) denoised beauty; None unless requested.
-        stats: Statistics of the render; docs/statistics.md has the schema.
-        cancelled: Whether the render was stopped early; the image then holds the finished samples.
-        learned: Guiding field, from which another render can start; empty if none was trained.
-        costs: Cost profile of shading by material and texture name, from which another render can
-            start.
-        aovs: Further AOVs by name, (height, width) or (height, width, channels): docs/aovs.md.
-            Cryptomatte levels are pairs of id and coverage, which `wavecomb.cryptomatte` reads.
-        manifests: Cryptomatte level -> name -> id of objects in the image.
-        deep: Samples by depth; None unless the AOV deep was requested (docs/deep.md).
-        metadata: Additional attributes of the file header.
-        chosen: Names of the layers to save; empty means all layers.
+        beauty: Linear colours (height, width, 3) in Rec.709, or in the stage's working space.
+        albedo: Albedo (height, width, 3). None if it was not requested, as for ``normal`` and
+            ``depth``.
+        normal: Normals (height, width, 3) in world space.
+        depth: Depth (height, width) along the camera's axis; infinite for pixels without a hit.
+        samples: Number of samples of each pixel, with shape (height, width).
+        error: Error estimate of adaptive sampling (height, width); infinite for pixels with too few
+            samples (docs/render.md). None unless the render was adaptive or had the option
+            ``error=True``.
+        variance: Variance (height, width, 3) of each pixel's mean, under the assumption that its
+            samples are independent. None unless the render was adaptive or had the option
+            ``error=True``.
+        denoised: Denoised beauty (height, width, 3); None if it was not requested.
+        stats: Statistics of the render, with the schema in docs/statistics.md.
+        cancelled: Whether the render was stopped early. The image then contains the samples that
+            were finished.
+        learned: Guiding field, which can initialise another render; empty if no field was trained.
+        costs: Shading costs by material and texture name, which can initialise another render.
+        aovs: Further AOVs (docs/aovs.md) by name, with shape (height, width) or (height, width,
+            channels). Cryptomatte AOVs are pairs of id and coverage, which `wavecomb.cryptomatte`
+            reads.
+        manifests: For each Cryptomatte level, the names and ids of the objects in the image.
+        deep: Deep image (docs/deep.md); None unless the AOV ``deep`` was requested.
+        metadata: Further attributes for the EXR header.
+        chosen: Names of the layers to save. An empty tuple means all layers.
     """
 
     beauty: NDArray[np.float32]
@@ -73,7 +77,10 @@ class Picture:
     chosen: tuple[str, ...] = ()
 
     def layers(self) -> dict[str, NDArray[Any]]:
-        """Returns the layers of an EXR file by name, in order; a Cryptomatte has several layers."""
+        """Returns the layers of an EXR file by name, in file order.
+
+        A Cryptomatte AOV has several layers.
+        """
         from wavecomb.image import cryptomatte
 
         arrays = {
@@ -106,17 +113,18 @@ class Picture:
 
     @property
     def has_alpha(self) -> bool:
-        """Whether the image has alpha for compositing, from the setting ``alpha``."""
+        """Whether the image has an alpha channel for compositing (setting ``alpha``)."""
         return bool(self.stats.get("settings", {}).get("alpha")) and "alpha" in self.aovs
 
     def with_denoised(self, *, threads: int = 0) -> Picture:
-        """Returns the image with the layer ``denoised`` (Open Image Denoise); beauty is unchanged.
+        """Returns a copy with the layer ``denoised``, computed by Open Image Denoise.
 
-        The AOVs guide_albedo and guide_normal guide the denoiser, or albedo and normal if the image
-        lacks them. The guide AOVs describe the surfaces that mirrors and clear glass show.
+        The AOVs guide_albedo and guide_normal guide the denoiser. If the image lacks them, albedo
+        and normal are used. The guide AOVs describe the surfaces that are visible in mirrors and
+        through clear glass.
 
         Raises:
-            WavecombError: The extra ``denoise`` or an AOV is missing.
+            WavecombError: The extra ``denoise`` is not installed, or a guide AOV is missing.
         """
         from wavecomb.errors import WavecombError
         from wavecomb.image.denoise import denoise
@@ -143,21 +151,24 @@ class Picture:
         exposure: float = 0.0,
         tone_map: Transfer = "clamp",
     ) -> list[Path]:
-        """Writes all layers (.exr) or the image for display (.png), atomically.
+        """Writes all layers (.exr) or the displayed image (.png) atomically.
 
-        A .png shows the denoised image if there is one.
+        A .png file shows the denoised image if there is one.
 
         Args:
             path: File name that ends in .exr or .png.
-            half: EXR: store colours as 16-bit floats.
-            compression: EXR: none, rle, zips, zip, piz, pxr24, b44, b44a, dwaa or dwab.
-            tile: EXR: edge of tiles in pixels, a multiple of 16; 0 means scanlines.
-            split: EXR: write one file per AOV, path.NAME.exr, with the beauty in ``path`` itself.
-            exposure: PNG: exposure in stops.
-            tone_map: PNG: "clamp", "neutral", or "ocio:VIEW" for a view of OpenColorIO.
+            half: For .exr files, whether to store colours as 16-bit floats.
+            compression: For .exr files: "none", "rle", "zips", "zip", "piz", "pxr24", "b44",
+                "b44a", "dwaa" or "dwab".
+            tile: For .exr files, the edge of tiles in pixels, which is a multiple of 16; 0 means
+                scanlines.
+            split: For .exr files, whether to write one file per AOV, named path.NAME.exr. The
+                beauty is written to ``path``.
+            exposure: For .png files, the exposure in stops.
+            tone_map: For .png files: "clamp", "neutral", or "ocio:VIEW" for a view of OpenColorIO.
 
         Returns:
-            The files that were written.
+            The names of the files that were written.
 
         >>> picture = wavecomb.render("mixed.usdc")  # doctest: +SKIP
         >>> picture.save("mixed.exr", half=True)  # doctest: +SKIP
@@ -196,7 +207,7 @@ class Picture:
         >>> picture.save_deep("shot.deep.exr")  # doctest: +SKIP
 
         Raises:
-                WavecombError: There is no deep image, or the name does not end in .exr.
+                WavecombError: The render has no deep image, or the name does not end in .exr.
         """
         from wavecomb.errors import WavecombError
 
@@ -206,7 +217,7 @@ class Picture:
         return self.deep.save(path, half=half, metadata=metadata, window=self.window())
 
     def save_learned(self, path: str | os.PathLike[str]) -> None:
-        """Writes the guiding field for ``learn_from`` of another render atomically.
+        """Writes the guiding field atomically, for the option ``learn_from`` of another render.
 
         Raises:
             WavecombError: No guiding field was trained.
@@ -216,7 +227,7 @@ class Picture:
         save_learned(path, self.learned)
 
     def shown(self) -> NDArray[Any]:
-        """Returns the colours of a PNG in linear Rec.709: denoised if available."""
+        """Returns the colours for a PNG file in linear Rec.709, denoised if possible."""
         from wavecomb.image.working_space import to_rec709
 
         shown = self.beauty if self.denoised is None else self.denoised
@@ -236,7 +247,7 @@ class Picture:
         return f"<wavecomb.Picture {facts(self)}; {', '.join(self.layers())}>"
 
     def _repr_png_(self) -> bytes:
-        """Returns the image for a notebook, with highlights rolled off towards white."""
+        """Returns the image as PNG for a notebook, with the tone mapping "neutral"."""
         from wavecomb.image.notebook import codes
         from wavecomb.image.thumbnails import encode_image
 
@@ -251,14 +262,17 @@ class Picture:
         return mime_bundle(self, include, exclude)
 
     def window(self) -> tuple[int, int, int, int] | None:
-        """Returns the position of the pixels for ``write_exr``.
+        """Returns the position of the pixels in the displayed image, for ``write_exr``.
 
-        The result is None if the pixels are exactly the displayed image.
+        The result is None if the pixels exactly fill the displayed image.
         """
         return window_of(self.stats.get("settings", {}))
 
     def file_metadata(self) -> dict[str, Any]:
-        """Returns attributes of an EXR file: version, stage, camera, settings, times, matrices."""
+        """Returns the attributes of an EXR file.
+
+        The attributes describe version, stage, camera, settings, times and matrices.
+        """
         from wavecomb.run.stats import image_metadata
 
         return {**image_metadata(self.stats), **self.metadata}
@@ -276,7 +290,7 @@ def picture_of(
     Args:
         result: Result of ``_core.render``.
         stats: Result of ``make_stats``.
-        scene: The rendered scene, for the camera's matrices.
+        scene: The rendered scene, which provides the camera's matrices.
         aovs: Names from ``aovs.expand``.
     """
     from wavecomb.image.files.deep import deep_of
@@ -312,9 +326,10 @@ def picture_of(
 def in_world(
     aovs: dict[str, NDArray[np.float32]], origin: Sequence[float]
 ) -> dict[str, NDArray[np.float32]]:
-    """Returns AOVs with positions in world space, as exact as float32 permits.
+    """Converts positions in the AOVs to world space, as exactly as float32 permits.
 
-    Pixels without a hit keep 0, since no surface is at (0, 0, 0) of a scene with another origin.
+    Pixels without a hit keep the value 0. In a scene with another origin than the world, no surface
+    has this position.
     """
     if "position" not in aovs or not any(origin):
         return aovs
@@ -324,9 +339,9 @@ def in_world(
 
 
 def window_of(settings: Mapping[str, Any]) -> tuple[int, int, int, int] | None:
-    """Returns column and row of the first pixel in the displayed image, and the size of that image.
+    """Returns column and row of the first pixel in the displayed image, and that image's size.
 
-    The result is None without crop and overscan, since the pixels then are the displayed image.
+    The result is None without crop and overscan, because the pixels then fill the displayed image.
     """
     is_cropped = settings.get("crop") and settings.get("region") is not None
     beyond = int(settings.get("overscan", 0))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images for pages and notebooks: thumbnails, contact sheets, wipes, PNG and JPEG as bytes."""
+"""Images for pages and notebooks: thumbnails, contact sheets, wipes, and PNG or JPEG data."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ _QUALITY = "jpeg:90"
 
 
 def encode_image(codes: NDArray[np.uint8], kind: Kind = "png") -> bytes:
-    """Encodes 8-bit sRGB codes (height, width, 3) as the bytes of an image file.
+    """Encodes 8-bit sRGB values (height, width, 3) as a PNG or JPEG file in memory.
 
     Args:
-        codes: Pixels with row 0 at the top.
-        kind: "png" is lossless; "jpeg" has quality 90 without chroma subsampling and takes about a
-            tenth of the size.
+        codes: 8-bit sRGB values, with row 0 at the top.
+        kind: "png" is lossless. "jpeg" has quality 90 without chroma subsampling, and about a tenth
+            of the size.
     """
     spec = png_spec(*codes.shape[:2])
     if kind == "jpeg":
@@ -73,8 +73,8 @@ def shrink(pixels: NDArray[Any], most: int) -> NDArray[np.float32]:
     """Reduces an image to at most ``most`` pixels per edge by averaging square blocks.
 
     Args:
-        pixels: Linear (height, width, channels).
-        most: Largest length of the longer edge in pixels.
+        pixels: Linear values with shape (height, width, channels).
+        most: Largest number of pixels of the longer edge.
 
     >>> shrink(np.ones((100, 50, 3)), 40).shape
     (33, 16, 3)
@@ -89,19 +89,19 @@ def shrink(pixels: NDArray[Any], most: int) -> NDArray[np.float32]:
 
 
 def subsample(pixels: NDArray[P], most: int) -> NDArray[P]:
-    """Reduces an image by skipping pixels, for ids and values that are not finite."""
+    """Reduces an image by leaving out pixels, for ids and for values that are not finite."""
     step = max(1, -(-max(pixels.shape[:2]) // most))
     return np.ascontiguousarray(pixels[::step, ::step])
 
 
 @dataclass(frozen=True)
 class DisplayOptions:
-    """Display options of image files.
+    """Options that determine how image files are displayed.
 
     Attributes:
-        layer: Layer of the file; "" means its colours.
-        denoised: Whether to show the layer ``denoised``, if the file has one, instead of beauty.
-        exposure: Exposure of radiance layers in stops.
+        layer: Name of the displayed layer; "" means the layer with the file's colours.
+        denoised: Whether to show the layer ``denoised`` instead of the beauty, if the file has it.
+        exposure: Exposure of radiance layers, in stops.
         tone_map: Tone mapping of radiance layers, "clamp" or "neutral".
     """
 
@@ -111,10 +111,10 @@ class DisplayOptions:
     tone_map: Transfer = "clamp"
 
     def codes(self, file: str) -> NDArray[np.uint8]:
-        """Reads an image file as 8-bit sRGB codes (height, width, 3).
+        """Reads an image file as 8-bit sRGB values (height, width, 3).
 
         Raises:
-            WavecombError: The file lacks the layer.
+            WavecombError: The file does not contain the layer.
             OSError: The file cannot be read.
         """
         layers = read_layers(file)
@@ -134,12 +134,12 @@ class DisplayOptions:
         return show_layer(pixels if pixels.shape[2] > 1 else pixels[:, :, 0], name).pixels
 
     def of_light(self, pixels: NDArray[Any]) -> NDArray[np.uint8]:
-        """Converts linear Rec.709 to 8-bit codes."""
+        """Converts linear Rec.709 to 8-bit sRGB values."""
         return display(pixels, exposure=self.exposure, tone_map=self.tone_map)
 
 
 def fit_image(codes: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
-    """Reduces an image in linear light to fit into a rectangle; never enlarges it.
+    """Reduces an image in linear space to fit into a rectangle. A smaller image keeps its size.
 
     Args:
         codes: 8-bit sRGB (h, w, 3).
@@ -169,31 +169,32 @@ def fit_image(codes: NDArray[np.uint8], width: int, height: int) -> NDArray[np.u
 Codes = NDArray[np.uint8]
 
 MAX_IMAGES = 2000
-"""Maximum number of images of a contact sheet."""
+"""Maximum number of images on a contact sheet."""
 _PAPER = 24
 _GAP = 12
 _TEXT = 13
 _LABEL = 20
 _SHAPE = 1.6
-"""Approximate aspect ratio of a sheet if the number of columns is not given."""
+"""Approximate aspect ratio of a contact sheet if the number of columns is not given."""
 
 
 def contact_sheet(
     pictures: Mapping[str, str], look: DisplayOptions, *, width: int = 240, columns: int = 0
 ) -> Codes:
-    """Arranges small images in a grid, each with its name below.
+    """Arranges small images in a grid, with the name of each image below it.
 
     Args:
         pictures: Name -> file.
         look: Display options.
-        width: Width of each image in pixels; the row height is that of the highest image.
-        columns: Images per row; 0 chooses a sheet that is clearly wider than high.
+        width: Width of each image in pixels. The highest image determines the height of all rows.
+        columns: Number of images per row; 0 chooses a number that makes the sheet clearly wider
+            than high.
 
     Returns:
-        8-bit sRGB codes (height, width, 3).
+        8-bit sRGB values with shape (height, width, 3).
 
     Raises:
-        WavecombError: A file lacks the layer.
+        WavecombError: A file does not contain the layer.
         OSError: A file cannot be read.
     """
     names = list(pictures)
@@ -218,13 +219,13 @@ def _columns(count: int, width: int, height: int) -> int:
 
 
 def wipe(a: Codes, b: Codes, at: float = 0.5, names: tuple[str, str] = ("A", "B")) -> Codes:
-    """Shows A to the left of a line and B to its right, with their names.
+    """Shows image A to the left of a vertical line and image B to its right, with their names.
 
     Args:
-        a: 8-bit sRGB codes (height, width, 3).
-        b: Image of the same size.
-        at: Position of the line, from 0 (left) to 1.
-        names: Names of A and B.
+        a: Image A as 8-bit sRGB values (height, width, 3).
+        b: Image B, with the same size as A.
+        at: Position of the line as a fraction of the width; 0 is the left edge.
+        names: Names of images A and B.
     """
     width = a.shape[1]
     column = min(max(round(at * width), 0), width)
@@ -250,7 +251,7 @@ def _length(text: str) -> int:
 def _written(
     codes: Codes, texts: Sequence[tuple[int, int, str]], room: int, *, shadow: bool = False
 ) -> Codes:
-    """Draws texts at positions (x, baseline); cuts the beginning of texts that do not fit."""
+    """Draws texts at positions (x, baseline). Removes the beginning of a text that does not fit."""
     import OpenImageIO as oiio
 
     canvas = oiio.ImageBuf(np.ascontiguousarray(codes))

@@ -18,7 +18,8 @@ LUMINANCE = (0.2126, 0.7152, 0.0722)
 CHROMATICITIES = {
     "acescg": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767),
 }
-"""Chromaticities x, y of red, green, blue and white for EXR headers; omitted for Rec.709."""
+"""Chromaticities x, y of red, green, blue and white, for EXR headers. Rec.709 has no entry, since
+it is the default."""
 
 # AP1 to Rec.709 with Bradford adaptation of the white point: S-2014-004, TB-2014-004 (ACES).
 _ACESCG_TO_REC709 = np.array(
@@ -45,7 +46,7 @@ def from_rec709(rgb: NDArray[Any], working: str) -> NDArray[Any]:
 
 
 def header_of(working: str) -> dict[str, Any]:
-    """Returns EXR attributes of images in the working space."""
+    """Returns the EXR attributes that identify the working space of an image."""
     if working == "rec709":
         return {}
     return {"chromaticities": CHROMATICITIES[working], "wavecomb:working_space": working}

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs renders: sequences of frames, checkpoints, progress, statistics, isolation."""
+"""Runs renders: frame sequences, checkpoints, progress, statistics and process isolation."""

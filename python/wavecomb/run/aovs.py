@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Names of AOVs: validates requested names and selects those that the core renders."""
+"""Validates the names of AOVs, and selects the AOVs that the core renders."""
 
 from __future__ import annotations
 
@@ -15,29 +15,32 @@ DEFAULT = ("beauty", "albedo", "normal", "depth", "samples")
 """Default layers of an image."""
 
 GUIDES = ("guide_albedo", "guide_normal")
-"""Denoiser guides: features of surfaces seen directly, in mirrors or through clear glass."""
+"""AOVs that guide the denoiser: features of surfaces seen directly, in mirrors or through clear
+glass."""
 ERRORS = ("error", "variance")
 DEEP = "deep"
-"""Name of the deep image, which ``--deep`` writes to a separate file instead of a layer."""
+"""AOV of the deep image, which the option ``--deep`` writes to a separate file, not to a layer.
+"""
 LIGHT = "light_"
 TECHNIQUES = ("by_bounces", "by_light_samples", "by_light_paths")
-"""Contributions of each light transport technique; their sum is the beauty."""
+"""AOVs with the contributions of each light transport technique. Their sum is the beauty."""
 
 
 @dataclass(frozen=True)
 class Aov:
-    """An AOV of the core: a row of its table (core/aov.h).
+    """An AOV of the core, as described by a row of its table (core/aov.h).
 
     Attributes:
-        name: Name for ``--aov`` and of the layer.
-        channels: Number of channels of the AOV's layer; 0 for no numeric layer or several layers.
-        letters: Names of the AOV's channels in files, such as "XYZ"; "" for numbers or a single
-            channel.
-        content: Meaning of the AOV's numbers: "light", "colour", "direction", "id", "exact" (data
+        name: Name of the AOV in the option ``--aov``, and of its layer.
+        channels: Number of channels of the AOV's layer; 0 if it has no numeric layer or several
+            layers.
+        letters: Letters of the channel names in files, such as "XYZ". "" means that channels are
+            numbered or that there is one channel.
+        content: Meaning of the AOV's values: "light", "colour", "direction", "id", "exact" (values
             that lossy compression would make useless) or "value".
-        kind: How samples are combined per pixel: "mean", "mean_of_hits", "nearest", "coverage",
-            "groups", "sum" or "median".
-        title: Title in the window; "" if the window does not offer the layer.
+        kind: How the samples of a pixel are combined: "mean", "mean_of_hits", "nearest",
+            "coverage", "groups", "sum" or "median".
+        title: Title of the layer in the window; "" if the window does not offer it.
     """
 
     name: str
@@ -50,7 +53,7 @@ class Aov:
 
 @cache
 def core_aovs() -> Mapping[str, Aov]:
-    """Returns every AOV of the core by name, in the table's order.
+    """Returns all AOVs of the core by name, in the order of the core's table.
 
     >>> core_aovs()["depth"].kind
     'mean_of_hits'
@@ -66,11 +69,13 @@ _OTHERS = {
     "unbiased": ("RGB", "light"),
     "variance": ("RGB", "value"),
 }
-"""Channel letters and content of layers that are not AOVs."""
+"""Channel letters and content of the layers that are not AOVs."""
 
 
 def letters(layer: str) -> str:
-    """Returns names of a layer's channels in files; "" for numbers or a single channel.
+    """Returns the letters of a layer's channel names in files.
+
+    "" means that channels are numbered or that there is one channel.
 
     >>> letters("normal")
     'XYZ'
@@ -82,7 +87,7 @@ def letters(layer: str) -> str:
 
 
 def content(layer: str) -> str:
-    """Returns the meaning of a layer's numbers (Aov.content); "value" for unknown layers.
+    """Returns the meaning of a layer's values (``Aov.content``); "value" for unknown layers.
 
     >>> content("by_bounces"), content("position")
     ('light', 'exact')
@@ -97,14 +102,14 @@ def content(layer: str) -> str:
 
 @cache
 def layer_order() -> tuple[str, ...]:
-    """Returns layers with named channels, in the order of a file."""
+    """Returns the names of the layers with named channels, in the order of an EXR file."""
     named = tuple(name for name, row in core_aovs().items() if row.letters)
     return ("beauty", *named, "variance")
 
 
 @cache
 def of_kind(kind: str) -> tuple[str, ...]:
-    """Returns names of AOVs whose samples are combined in a given way (``Aov.kind``).
+    """Returns the names of the AOVs with a given ``Aov.kind``.
 
     >>> of_kind("coverage")
     ('crypto_object', 'crypto_material', 'crypto_asset')
@@ -114,7 +119,9 @@ def of_kind(kind: str) -> tuple[str, ...]:
 
 @cache
 def names() -> tuple[str, ...]:
-    """Returns the names of all AOVs; "light_NAME" additionally selects a single light group.
+    """Returns the names of all AOVs.
+
+    The name "light_NAME", which selects one light group, is valid in addition.
 
     >>> names()[:3]
     ('beauty', 'albedo', 'normal')
@@ -123,18 +130,20 @@ def names() -> tuple[str, ...]:
 
 
 def groups() -> dict[str, tuple[str, ...]]:
-    """Returns names that stand for several AOVs."""
+    """Returns the names that stand for several AOVs, with these AOVs."""
     return {"all": names(), "crypto": of_kind("coverage"), "techniques": TECHNIQUES}
 
 
 def expand(asked: Iterable[str]) -> tuple[str, ...]:
-    """Returns AOVs in canonical order without duplicates, followed by named ones; includes beauty.
+    """Returns AOVs in canonical order, including beauty.
+
+    Removes duplicates and replaces names that stand for several AOVs.
 
     >>> expand(["depth", "crypto", "light_key"])
     ('beauty', 'depth', 'crypto_object', 'crypto_material', 'crypto_asset', 'light_key')
 
     Raises:
-        WavecombError: An AOV does not exist.
+        WavecombError: There is no AOV of that name.
     """
     all_names, several = names(), groups()
     wanted: dict[str, None] = {"beauty": None}
@@ -155,7 +164,7 @@ def expand(asked: Iterable[str]) -> tuple[str, ...]:
 
 
 def with_others(aovs: tuple[str, ...], others: Iterable[str]) -> tuple[str, ...]:
-    """Returns ``aovs`` with additional AOVs that the core must render, such as denoiser guides."""
+    """Returns ``aovs`` and further AOVs that the core must render, such as denoiser guides."""
     missing = [name for name in others if name not in aovs]
     return expand([*aovs, *missing]) if missing else aovs
 
@@ -173,11 +182,12 @@ _SUM_BYTES = {
     **{"mean": 8, "mean_of_hits": 8, "nearest": 4, "coverage": 0, "groups": 0, "sum": 8},
     "median": 88,
 }
-"""Bytes of a film channel by kind; kinds without a value are counted separately."""
+"""Bytes per pixel of a film channel, by ``Aov.kind``. Kinds that are not listed are counted
+separately."""
 
 
 def bytes_per_pixel(aovs: Iterable[str], light_groups: int) -> int:
-    """Returns the bytes per pixel of film sums and output layers (docs/aovs.md)."""
+    """Returns the bytes per pixel of the film and of output layers (docs/aovs.md)."""
     chosen = set(aovs)
     kept = [row for row in core_aovs().values() if row.name in chosen]
     total = 32 + 12 + 4
@@ -193,13 +203,13 @@ def bytes_per_pixel(aovs: Iterable[str], light_groups: int) -> int:
 
 
 def splat_layers(aovs: Iterable[str], light_groups: int) -> int:
-    """Returns the number of non-beauty layers that store light path contributions."""
+    """Returns the number of AOVs other than beauty that store light path contributions."""
     chosen = set(aovs)
     return len({"direct", "indirect"} & chosen) + _many_layers(chosen, light_groups)
 
 
 def _many_layers(chosen: set[str], light_groups: int) -> int:
-    """Returns the number of light groups and light path expressions."""
+    """Returns the number of light groups and of light path expressions."""
     groups = light_groups if "light_groups" in chosen else sum(map(_is_light, chosen))
     return groups + sum(map(expressions.is_expression, chosen))
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders an image in bands of rows, from the top, if it is too large for memory.
+"""Renders an image in bands of rows, from top to bottom, if it is too large for the memory.
 
-Pixels do not depend on which other pixels are rendered, so that bands are bit-identical to rows of
-the whole image. Features that need all pixels at once are not available: denoising, adaptive
-sampling and checkpoints.
+A pixel's value does not depend on which other pixels are rendered, so bands are bit-identical to
+rows of the whole image. Denoising, adaptive sampling and checkpoints need all pixels at once, so
+they are not available.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
     from wavecomb.run.callbacks import Reporter, Status
 
 STEP = 64
-"""Band heights are multiples of this number of rows, or of the tile height."""
+"""The height of a band is a multiple of this number of rows, or of the tile height."""
 _ADDED = ("samples_done", "rays", "seconds")
-"""Status entries to which the values of earlier bands are added."""
+"""Progress values that are added over all bands."""
 _SECONDS = ("render", "build", "denoise")
-"""Times in the statistics that are summed over all bands."""
+"""Times in the statistics that are added over all bands."""
 
 
 def band_rows(
@@ -41,19 +41,19 @@ def band_rows(
     tile: int = 0,
     light_groups: int = 1,
 ) -> int | None:
-    """Returns the number of rows of a band; None if the whole image fits.
+    """Returns the number of rows of a band, or None if the whole image fits into memory.
 
     Args:
         settings: Settings of the render.
         aovs: Expanded AOVs.
-        megabytes: Memory limit of film and layers in units of 10^6 bytes; None allows half of the
-            machine's memory, or more if the whole image is required.
-        whole: Name of an option that requires the whole image.
-        tile: Edge length of the file's tiles; 0 means scanlines.
-        light_groups: Number of light groups of the scene.
+        megabytes: Memory limit of film and layers in units of 10^6 bytes. None allows half of the
+            machine's memory, or more if an option needs the whole image.
+        whole: Name of an option that needs the whole image, or "".
+        tile: Edge length of tiles in the file; 0 means scanlines.
+        light_groups: Number of light groups in the scene.
 
     Raises:
-        WavecombError: The whole image is required and does not fit.
+        WavecombError: An option needs the whole image, which does not fit into memory.
     """
     machine = machine_limit()
     most = megabytes * 1e6 if megabytes is not None else machine and 0.5 * machine
@@ -77,7 +77,7 @@ def band_rows(
 
 
 def _needs_all(settings: Settings, aovs: Sequence[str]) -> str:
-    """Returns the name of a setting that needs all pixels at once, or ""."""
+    """Returns the name of a setting that needs all pixels of the image at once, or ""."""
     if settings.time_limit:
         return "--time-limit"
     if settings.allocate != "even":
@@ -99,13 +99,14 @@ def render_bands(
     rows: int,
     reporter: Reporter | None = None,
 ) -> Iterator[Result]:
-    """Renders bands of ``rows`` rows, each when the iterator advances.
+    """Yields the image in bands of ``rows`` rows. A band is rendered when the iterator advances.
 
     Args:
-        render: Renders with the given settings and reports progress to the given reporter.
+        render: Function that renders with the given settings and reports progress to the given
+            reporter.
         settings: Settings of the whole image.
-        rows: Number of rows of a band.
-        reporter: Receives the progress of the whole image.
+        rows: Number of rows in each band.
+        reporter: Object that receives the progress of the whole image.
     """
     from wavecomb import _core
 
@@ -123,9 +124,9 @@ def render_bands(
 def without_samples(
     render: Callable[[Settings], Picture], settings: Settings, rows: int
 ) -> Picture:
-    """Returns ``rows`` rows of an image without samples, with the core's values for all layers.
+    """Returns ``rows`` rows without samples. All layers have the values of pixels without samples.
 
-    ``render`` renders with the given settings.
+    ``render`` is a function that renders with the given settings.
     """
     from wavecomb import _core
 
@@ -149,7 +150,7 @@ def without_samples(
 
 
 class _BandReporter:
-    """Reporter that combines the progress of bands."""
+    """Progress reporter that combines the progress of all bands."""
 
     def __init__(self, reporter: Reporter, samples: int) -> None:
         self._reporter = reporter
@@ -169,10 +170,10 @@ class _BandReporter:
 
 
 def sum_stats(bands: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Combines the statistics of bands.
+    """Combines the statistics of all bands.
 
-    Adds counts and times, weights means over records by the number of records, and takes the
-    maximum of memory.
+    Counts and times are added. Means per queued hit (record) are weighted by the number of records.
+    For memory, the maximum is used.
     """
     from wavecomb.run.stats import sort_overhead
 
@@ -213,9 +214,9 @@ def sum_stats(bands: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -
 
 
 def _mean(parts: Sequence[Any], weights: Sequence[float]) -> Any:
-    """Averages floats with weights, also inside mappings.
+    """Returns weighted means of floats, including those in nested mappings.
 
-    Values other than floats come from the first band.
+    Values that are not floats come from the first band.
     """
     first = parts[0]
     if isinstance(first, Mapping):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Callbacks during a render: progress, checkpoints, previews, stop requests."""
+"""Callbacks during a render, for progress, checkpoints, previews and stop requests."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ if TYPE_CHECKING:
     from wavecomb.image.files.image import Transfer
 
 Status = Mapping[str, Any]
-"""State of a render; the keys are those of ``Snapshot.status`` in _core.pyi."""
+"""State of a render. The keys are those of ``Snapshot.status`` in _core.pyi."""
 
 
 class Sink:
-    """Base of outputs that are written at intervals and at the end of a render.
+    """Base class of files that are written at intervals during a render and at its end.
 
-    An error while writing does not stop the render; it is reported, and writing is tried again.
+    An error while writing a file does not stop the render. The error is reported, and writing is
+    tried again later.
     """
 
     def __init__(self, path: str | os.PathLike[str], every: float) -> None:
@@ -29,11 +30,11 @@ class Sink:
         self._next = time.monotonic() + every
 
     def is_due(self) -> bool:
-        """Returns whether the interval has passed."""
+        """Returns whether the interval since the last writing has passed."""
         return time.monotonic() >= self._next
 
     def take(self, snapshot: Snapshot) -> str | None:
-        """Writes the file; returns a warning if that fails."""
+        """Writes the file. Returns a warning if the file cannot be written."""
         self._next = time.monotonic() + self.every
         try:
             self.write(snapshot)
@@ -43,12 +44,12 @@ class Sink:
         return None
 
     def write(self, snapshot: Snapshot) -> None:
-        """Writes the file; raises OSError."""
+        """Writes the file. Raises OSError if the file cannot be written."""
         raise NotImplementedError
 
 
 class CheckpointSink(Sink):
-    """Sink that saves checkpoints; ``seconds`` is the render time of earlier runs."""
+    """Sink that writes checkpoints. ``seconds`` is the render time before this run."""
 
     def __init__(
         self,
@@ -62,7 +63,7 @@ class CheckpointSink(Sink):
         self._seconds = seconds
 
     def write(self, snapshot: Snapshot) -> None:
-        """Writes the complete state of the render."""
+        """Writes the complete state of the render to the checkpoint."""
         from wavecomb.run.checkpoint import save_checkpoint
 
         seconds = self._seconds + snapshot.status["seconds"]
@@ -70,7 +71,7 @@ class CheckpointSink(Sink):
 
 
 class PreviewSink(Sink):
-    """Sink that saves the current image for display."""
+    """Sink that writes the current image as a preview."""
 
     def __init__(
         self,
@@ -87,7 +88,10 @@ class PreviewSink(Sink):
         self._working = working_space
 
     def write(self, snapshot: Snapshot) -> None:
-        """Writes the beauty: as PNG, or linear and uncompressed as EXR, by the file's name."""
+        """Writes the beauty as PNG, or as linear uncompressed EXR.
+
+        The file's extension decides which.
+        """
         from wavecomb.image.files.exr import write_exr
         from wavecomb.image.files.image import write_png
         from wavecomb.image.working_space import to_rec709
@@ -100,23 +104,23 @@ class PreviewSink(Sink):
 
 
 class Reporter(Protocol):
-    """Interface that shows the progress of a render."""
+    """Interface of an object that shows the progress of a render."""
 
     def show(self, status: Status) -> None:
-        """Shows the progress; called about ten times per second."""
+        """Shows the progress. The render calls this method about ten times per second."""
 
     def wrote(self, path: str) -> None:
-        """Reports that a checkpoint or preview was written."""
+        """Reports that a checkpoint or a preview was written."""
 
 
 class Watcher:
     """Callbacks that ``_core.render`` calls during a render.
 
     Args:
-        sinks: Outputs that receive snapshots when they are due, and the last snapshot.
+        sinks: Files that are written during the render when they are due, and at its end.
         reporter: Shows progress.
-        is_stopped: Returns whether a stop was requested.
-        warn: Receives each warning once.
+        is_stopped: Function that returns whether a stop was requested.
+        warn: Function that receives each warning once.
     """
 
     def __init__(
@@ -134,7 +138,7 @@ class Watcher:
         self._warned: set[str] = set()
 
     def progress(self, status: Status) -> str | None:
-        """Returns "stop", "snapshot" or None for the render to continue."""
+        """Returns "stop" or "snapshot", or None if the render should continue."""
         if self._reporter is not None:
             self._reporter.show(status)
         if self._is_stopped():
@@ -142,7 +146,7 @@ class Watcher:
         return "snapshot" if any(sink.is_due() for sink in self._sinks) else None
 
     def snapshot(self, snapshot: Snapshot) -> None:
-        """Passes a snapshot of the paused render to all sinks that are due."""
+        """Passes a snapshot of the paused render to all sinks whose interval has passed."""
         for sink in self._sinks:
             if not (snapshot.finished or sink.is_due()):
                 continue

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shadow catchers: combines three renders of a stage to one image (docs/visibility.md).
+"""Shadow catchers: combines three renders of a stage into one image (docs/visibility.md).
 
-In the main render the camera does not see the catchers. Two further renders show only the catchers:
-one with all objects casting shadows and one without any. Let c be a pixel's coverage by catchers,
-and L and L0 their reflected luminance in these renders, which use the same random numbers. Then the
-shadow adds the alpha c (1 - L / L0).
+In the main render, the camera does not see the catchers. Two further renders show only the
+catchers: "lit" with shadows of all other objects, and "bare" without other objects. Let c be the
+coverage of a pixel by catchers. Let L and L0 be the luminance that the catchers reflect in "lit"
+and in "bare", which use the same random numbers. The shadow adds c (1 - L / L0) to the pixel's
+alpha.
 """
 
 from __future__ import annotations
@@ -29,16 +30,16 @@ PASSES: tuple[Mapping[str, str], ...] = (
     {"catch": "lit", "lights": "hidden"},
     {"catch": "bare", "lights": "hidden"},
 )
-"""Load options that replace the stage's options in the two renders of catchers."""
+"""Load options of the two renders that show only the catchers."""
 _LAYERS = ("direct", "indirect", LAYER)
 
 
 def check(settings: Settings, given: Mapping[str, Any]) -> None:
-    """Raises WavecombError for settings that cannot be combined with catchers.
+    """Raises WavecombError if settings or options cannot be combined with catchers.
 
     Args:
         settings: Settings of the render.
-        given: Values of further options by name; options that are set are rejected.
+        given: Values of further options by name. An option that is set raises an error.
     """
     asked = {name: getattr(settings, name) for name in ("time_limit", "adaptive", "noise")}
     asked["allocate"] = settings.allocate != "even"
@@ -52,7 +53,7 @@ def check(settings: Settings, given: Mapping[str, Any]) -> None:
 
 
 def with_alpha(settings: Settings) -> Settings:
-    """Returns the settings with the layer that receives shadows."""
+    """Returns the settings with the AOV to which the shadows are added."""
     from wavecomb import _core
 
     if LAYER in settings.aovs:
@@ -61,7 +62,7 @@ def with_alpha(settings: Settings) -> Settings:
 
 
 def catcher_settings(settings: Settings) -> Settings:
-    """Returns the settings for the two renders of catchers."""
+    """Returns the settings for the two renders that show only the catchers."""
     from wavecomb import _core
 
     own = {"aovs": list(_LAYERS), "light_weights": "power", "error": False, "firefly": "keep"}
@@ -71,11 +72,12 @@ def catcher_settings(settings: Settings) -> Settings:
 def with_catcher_shadows(
     picture: Picture, render: Callable[[Mapping[str, str]], Result]
 ) -> Picture:
-    """Returns the image with the shadows on its catchers.
+    """Returns the image after adding the shadows on catchers to its alpha.
 
     Args:
-        picture: Image without catchers; it has the AOV alpha.
-        render: Loads the stage with replaced options and renders it with ``catcher_settings``.
+        picture: Image of the main render, without catchers but with the AOV ``alpha``.
+        render: Function that loads the stage with the given load options and renders it with
+            ``catcher_settings``.
     """
     lit, bare = (_light_of(render(how)) for how in PASSES)
     alpha = with_shadows(picture.aovs[LAYER], lit[1], lit[0], bare[0])
@@ -94,13 +96,14 @@ def with_shadows(
     lit: NDArray[np.float64],
     bare: NDArray[np.float64],
 ) -> NDArray[np.float32]:
-    """Adds shadows on catchers to alpha, in proportion to their darkness.
+    """Adds the shadows on catchers to alpha, in proportion to how dark they are.
 
     Args:
-        alpha: Alpha of all other objects. Objects behind catchers are not counted twice.
-        share: Coverage of each pixel by catchers.
-        lit: Luminance that catchers reflect with shadows.
-        bare: Luminance that catchers reflect without other objects.
+        alpha: Alpha of all objects other than catchers. An object behind a catcher is not counted
+            twice.
+        share: Fraction of each pixel that catchers cover.
+        lit: Luminance that catchers reflect, with shadows of other objects.
+        bare: Luminance that catchers reflect in the absence of other objects.
 
     >>> with_shadows(np.zeros(2), np.ones(2), np.array([0.25, 1]), np.ones(2)).tolist()
     [0.75, 0.0]

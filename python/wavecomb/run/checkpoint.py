@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checkpoints, from which a stopped render continues with an identical result.
+"""Checkpoints, from which a stopped render can continue.
 
-A file is an uncompressed NumPy archive (.npz) with ``header``, JSON as bytes, and the arrays of
-``Snapshot.state()``. A checkpoint is written under a temporary name and renamed when it is on disk,
-so that a complete file always exists; the archive's checksums detect damage.
+The result is identical to that of an uninterrupted render.
+
+A checkpoint is an uncompressed NumPy archive (.npz). It contains ``header``, which is JSON as
+bytes, and the arrays of ``Snapshot.state()``. A checkpoint is first written under a temporary name,
+and renamed when it is on disk. A complete file therefore exists at any time. Checksums in the
+archive detect damage.
 """
 
 from __future__ import annotations
@@ -43,29 +46,29 @@ class Checkpoint:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Settings of the render that affect the image; see ``image_settings``."""
+        """Settings of the render that affect the image, as ``image_settings`` returns them."""
         return dict(self.header["settings"])
 
     @property
     def source(self) -> dict[str, Any]:
-        """Options with which the stage was loaded: camera, frame, purposes, variants."""
+        """Load options of the stage, such as camera, frame, purposes and variants."""
         return dict(self.header["source"])
 
     @property
     def aovs(self) -> tuple[str, ...]:
-        """AOVs of the image, in the form of ``aovs.expand``."""
+        """AOVs of the image, as ``aovs.expand`` returns them."""
         return tuple(self.header["aovs"])
 
     @property
     def seconds(self) -> float:
-        """Render time of all runs so far, in seconds."""
+        """Render time of all runs that contributed to the checkpoint, in seconds."""
         return float(self.header["seconds"])
 
 
 def image_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Returns the settings that affect the image.
 
-    A time limit is excluded, since it affects only the number of samples.
+    The time limit is left out, since it affects only the number of samples.
     """
     rows = known_settings()
     chosen = {
@@ -91,7 +94,7 @@ def make_header(
     source: Mapping[str, Any],
     aovs: Sequence[str],
 ) -> dict[str, Any]:
-    """Returns the header that all checkpoints of a render share."""
+    """Returns the header entries that are equal in all checkpoints of a render."""
     from wavecomb import _core
 
     return {
@@ -108,7 +111,7 @@ def make_header(
 
 
 def _fingerprint(scene: Scene, settings: Settings) -> dict[str, str]:
-    """Returns the fingerprint of image-relevant parts; names matter only for Cryptomattes."""
+    """Returns hashes of the scene's parts that affect the image. Names affect only Cryptomattes."""
     parts = dict(scene.fingerprint())
     if not any(name.startswith("crypto_") for name in settings.aovs):
         parts.pop("names", None)
@@ -118,7 +121,7 @@ def _fingerprint(scene: Scene, settings: Settings) -> dict[str, str]:
 def save_checkpoint(
     path: str | os.PathLike[str], header: Mapping[str, Any], state: Mapping[str, Any]
 ) -> None:
-    """Writes a file, which gets its name only when it is complete and on disk."""
+    """Writes a checkpoint, which gets its file name only when it is complete and on disk."""
     write_archive(path, header, state, durable=True)
 
 
@@ -153,7 +156,7 @@ _PARTS: dict[str, tuple[type, ...]] = {
 
 
 def _check_header(header: dict[str, Any]) -> None:
-    """Raises ArchiveError unless all header entries exist with valid types."""
+    """Raises ArchiveError if an entry of the header is missing or has a wrong type."""
     for key, types in _PARTS.items():
         if not isinstance(header.get(key, ()), types):
             raise ArchiveError(f"its {key} is invalid")
@@ -183,7 +186,10 @@ def _check_header(header: dict[str, Any]) -> None:
 
 
 def _check_state(state: dict[str, Any]) -> int:
-    """Returns the current pass; raises ArchiveError unless arrays have the saved form."""
+    """Returns the sample count at which the current pass ends.
+
+    Raises ArchiveError if an array has a wrong shape or type.
+    """
     if not {"pass.target", "pass.active"} <= state.keys():
         raise ArchiveError("an entry is missing")
     target = state["pass.target"]
@@ -196,7 +202,7 @@ def _check_state(state: dict[str, Any]) -> int:
 
 
 def check_replaceable(path: str | os.PathLike[str]) -> None:
-    """Raises WavecombError if a checkpoint would replace a file that is not a checkpoint."""
+    """Raises WavecombError if writing a checkpoint would replace a file of another kind."""
     target = Path(path)
     if not target.is_file() or target.stat().st_size == 0:
         return
@@ -209,11 +215,13 @@ def check_replaceable(path: str | os.PathLike[str]) -> None:
 
 
 def check_fits(checkpoint: Checkpoint, header: Mapping[str, Any]) -> None:
-    """Raises WavecombError that names the difference if a render cannot continue a checkpoint.
+    """Raises WavecombError if a render cannot continue from a checkpoint.
+
+    The message names the difference.
 
     Args:
         checkpoint: The checkpoint.
-        header: Header of the render that is to continue.
+        header: Header of the render that should continue from the checkpoint.
     """
     name, old = checkpoint.path, checkpoint.header
     parts = [part for part, key in header["scene"].items() if old["scene"].get(part) != key]
@@ -240,7 +248,7 @@ def check_fits(checkpoint: Checkpoint, header: Mapping[str, Any]) -> None:
 
 
 def build_note(checkpoint: Checkpoint, header: Mapping[str, Any]) -> str | None:
-    """Returns a warning if another build made the checkpoint, so that last bits may differ."""
+    """Returns a warning if another build wrote the checkpoint, as the last bits may then differ."""
     for key in ("version", "library"):
         if checkpoint.header[key] != header[key]:
             return (
@@ -251,7 +259,7 @@ def build_note(checkpoint: Checkpoint, header: Mapping[str, Any]) -> str | None:
 
 
 def _take_more_samples(checkpoint: Checkpoint, before: dict[str, Any], now: dict[str, Any]) -> None:
-    """Allows an even, non-adaptive render to continue with another number of samples."""
+    """Allows a render with equal sample counts in all pixels to continue with another count."""
     if any(before.get(name) for name in ("adaptive", "noise", "allocate")):
         return
     if now["spp"] >= checkpoint.state["pass.target"]:

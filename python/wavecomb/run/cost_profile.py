@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cost profiles: time to shade a hit, by material, as initial values for later renders."""
+"""Cost profiles: the time to shade a hit with each material, as initial values of later renders."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ Profile = dict[str, dict[str, float]]
 
 
 def load_costs(path: str | os.PathLike[str]) -> Profile:
-    """Reads a cost profile: {"materials": {name: ns}, "textures": {name: ns}}.
+    """Reads a cost profile of the form {"materials": {name: ns}, "textures": {name: ns}}.
 
     Raises:
-        WavecombError: The file is not a cost profile.
+        WavecombError: The file cannot be read, or is not a cost profile.
         OSError: The file is not a regular file.
     """
     name = os.fspath(path)
@@ -39,10 +39,10 @@ def load_costs(path: str | os.PathLike[str]) -> Profile:
 
 
 def check_costs(profile: Mapping[str, Any], name: str = "costs") -> Profile:
-    """Returns a cost profile whose numbers are plain floats.
+    """Returns a valid cost profile with all numbers converted to floats.
 
     Raises:
-        WavecombError: The structure or a number is invalid.
+        WavecombError: The structure of the cost profile or one of its numbers is invalid.
     """
     checked: Profile = {}
     for kind in ("materials", "textures"):

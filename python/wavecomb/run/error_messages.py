@@ -11,7 +11,7 @@ from wavecomb.run.isolation.memory import describe_limit
 
 
 def describe(error: Exception) -> str:
-    """Returns an exception as one line for the user."""
+    """Returns the message of an exception as one line for the user."""
     core = sys.modules.get("wavecomb._core")
     if isinstance(error, WavecombError) or (core is not None and isinstance(error, core.Error)):
         return str(error)

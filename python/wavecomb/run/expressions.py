@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light path expressions as AOVs, ``lpe:NAME=EXPRESSION``, and names for common ones.
+"""Light path expressions as AOVs, ``lpe:NAME=EXPRESSION``, and names of common expressions.
 
-docs/light-path-expressions.md has the grammar.
+The grammar is in docs/light-path-expressions.md.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import re
 from types import MappingProxyType
 
 PREFIX = "lpe:"
-"""Prefix of light path expressions among AOVs."""
+"""Prefix of an AOV that is a light path expression."""
 LAYER = "lpe_"
-"""Prefix of the layer names of light path expressions."""
+"""Prefix of the layer name of a light path expression."""
 
 _ANY_LIGHT = "[LO]"
 NAMED = MappingProxyType(
@@ -51,7 +51,7 @@ NAMED = MappingProxyType(
         "combinedvolume": f"CV.*{_ANY_LIGHT}",
     }
 )
-"""Names of Arnold's and Karma's AOVs -> light path expressions."""
+"""Light path expression of each AOV name that is common in Arnold and Karma."""
 
 
 def is_expression(aov: str) -> bool:
@@ -60,7 +60,7 @@ def is_expression(aov: str) -> bool:
 
 
 def spelled(aov: str) -> str:
-    """Replaces a name in ``NAMED`` by its full expression.
+    """Replaces a name in ``NAMED`` by the expression that the name stands for.
 
     >>> spelled("lpe:background"), spelled("lpe:a=C.*"), spelled("depth")
     ('lpe:background=CB', 'lpe:a=C.*', 'depth')
@@ -83,7 +83,7 @@ def layer_of(aov: str) -> str:
 
 
 def as_aov(text: str, name: str) -> str:
-    """Converts an expression to an AOV whose name is valid for layers.
+    """Converts a light path expression to an AOV with a valid layer name.
 
     >>> as_aov("C<RD> L", "direct diffuse")
     'lpe:direct_diffuse=C<RD>L'

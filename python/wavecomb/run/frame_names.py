@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parses frame ranges, and fills frame numbers into file names."""
+"""Parses frame ranges, and inserts frame numbers into file names."""
 
 from __future__ import annotations
 
@@ -21,17 +21,18 @@ _PLACE = re.compile(
 
 
 def parse_frames(text: str | Iterable[float]) -> tuple[float, ...]:
-    """Returns frames in the given order without duplicates.
+    """Returns the frames of a range in the given order, without duplicates.
 
     Args:
-        text: Numbers, or a comma-separated list of frames and ranges: ``1-48``, ``1-48x2`` (every
-            second), ``48-1`` (backwards), ``1,5,9``, ``-10--2``, ``1-2x0.25``.
+        text: Comma-separated list of frames and ranges, such as ``1,5,9``, ``1-48``, ``1-48x2``
+            (every second frame), ``48-1`` (backwards), ``-10--2`` (negative frames) or ``1-2x0.25``
+            (fractional frames). A number is also valid.
 
     >>> parse_frames("1-7x3,-2--1,0.5")
     (1.0, 4.0, 7.0, -2.0, -1.0, 0.5)
 
     Raises:
-        WavecombError: The text is invalid.
+        WavecombError: The text is not a valid frame range.
     """
     if not isinstance(text, str):
         text = ",".join(f"{float(frame):f}" for frame in text)
@@ -45,7 +46,7 @@ def parse_frames(text: str | Iterable[float]) -> tuple[float, ...]:
 
 
 def _range(part: str, text: str) -> Iterable[Decimal]:
-    """Yields the frames of one number or range in exact decimal arithmetic."""
+    """Yields the frames of a number or range, in exact decimal arithmetic."""
     match = _RANGE.fullmatch(part)
     if match is None:
         raise WavecombError(
@@ -84,15 +85,15 @@ def frame_text(frame: float) -> str:
 
 
 def has_place(pattern: str) -> bool:
-    """Returns whether a file name contains a placeholder for the frame."""
+    """Returns whether a file name contains a placeholder for the frame number."""
     return _PLACE.search(os.path.basename(pattern)) is not None
 
 
 def matching(pattern: str) -> dict[float, str]:
     """Returns the existing files that match a name with a frame placeholder, sorted by frame.
 
-    If two files have the same frame (``a.7.exr``, ``a.0007.exr``), uses the name that ``fill``
-    gives.
+    If two files have the same frame number (``a.7.exr``, ``a.0007.exr``), the result contains the
+    name that ``fill`` returns.
 
     Raises:
         OSError: The folder cannot be read.
@@ -115,11 +116,12 @@ def matching(pattern: str) -> dict[float, str]:
 
 
 def fill(pattern: str, frame: float) -> str:
-    """Returns the file name of a frame.
+    """Returns the file name for a frame.
 
-    In the last path element, ``####`` becomes the frame padded to four digits, ``%04d`` to four
-    characters with the sign, and ``<frame>`` is not padded. ``$F4``, ``${F4}`` and ``$F`` are
-    Houdini's forms of ``####`` and ``<frame>``. Fractional frames keep their decimals.
+    In the last path element, ``####`` is replaced by the frame number with four digits, ``%04d`` by
+    the frame number with four characters including the sign, and ``<frame>`` by the number without
+    padding. ``$F4`` and ``${F4}`` (Houdini) have the meaning of ``####``, and ``$F`` that of
+    ``<frame>``. Fractional frame numbers keep their decimals.
 
     >>> fill("out/a.####.exr", 7), fill("a%04d.png", -7), fill("a_<frame>.exr", 1.5)
     ('out/a.0007.exr', 'a-007.png', 'a_1.5.exr')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads frames of a stage that stays open between frames."""
+"""Reads the frames of a stage, which stays open between frames."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CameraUpdate:
-    """Camera and metadata of another frame, for a scene that is otherwise unchanged.
+    """Camera and metadata of a frame whose scene is otherwise that of an earlier frame.
 
     Attributes:
-        camera: Camera arguments of ``Renderer.edit``; None if the camera is unchanged.
-        camera_path: ``LoadedStage.camera_path`` at the frame.
-        shutter: ``LoadedStage.shutter`` at the frame.
-        render: ``LoadedStage.render`` at the frame.
-        frame: ``LoadedStage.frame`` at the frame.
+        camera: Camera arguments for ``Renderer.edit``; None if the camera does not change.
+        camera_path: Value of ``LoadedStage.camera_path`` at the frame.
+        shutter: Value of ``LoadedStage.shutter`` at the frame.
+        render: Value of ``LoadedStage.render`` at the frame.
+        frame: Value of ``LoadedStage.frame`` at the frame.
     """
 
     camera: dict[str, Any] | None
@@ -54,13 +54,13 @@ class CameraUpdate:
 
 
 class FrameReader:
-    """An open stage with data that its frames share.
+    """An open stage and the data that its frames share.
 
-    Contract: files of the stage must not change, except images.
+    While the reader is used, files of the stage must not change, except for images.
     """
 
     def __init__(self, path: Path, options: LoadOptions) -> None:
-        """Opens the stage; raises WavecombError for errors."""
+        """Opens the stage. Raises WavecombError if the stage cannot be opened."""
         check_view(options)
         opening = LoadReport()
         layer = None if options.session_layer is None else Path(options.session_layer)
@@ -77,8 +77,8 @@ class FrameReader:
         """Reads the stage at a frame.
 
         Args:
-            options: Load options with the frame.
-            **how: Further arguments of ``load_stage``.
+            options: Load options, including the frame.
+            **how: Further arguments that are passed to ``load_stage``.
 
         Raises:
             WavecombError: The stage cannot be rendered.
@@ -90,7 +90,7 @@ class FrameReader:
         return self._before
 
     def read_camera(self, options: LoadOptions) -> CameraUpdate | None:
-        """Returns the changes at a frame if at most the camera changes; None otherwise."""
+        """Returns the changes at a frame if at most the camera changes; otherwise returns None."""
         before, when = self._before, time_code(self._stage, options.frame)
         if before is None:
             return None

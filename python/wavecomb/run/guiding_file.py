@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Guiding field of a render, saved as the starting point of later renders.
+"""Files with the guiding field of a render, from which later renders can start.
 
-A file holds the guiding field in the form of checkpoints. A saved guiding field fits scenes with
-the same number of materials. After changes of geometry or lighting a guiding field is less
-accurate, but never biases the image.
+A file contains a guiding field in the form in which checkpoints store it. A guiding field can be
+used for scenes with the same number of materials. If geometry or lighting has changed, guiding is
+less effective, but the image is still unbiased.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from wavecomb._core import Settings
 
 BEFORE = "before"
-"""Option value in place of a file name: each frame starts from the previous frame's guiding
-field."""
+"""Option value that is used in place of a file name. Each frame then starts from the guiding field
+of the previous frame."""
 ENDING = ".learned"
 _KIND = "wavecomb-learned"
 _FORMAT = 1
@@ -33,12 +33,12 @@ class _HasLearned(Protocol):
 
 @dataclass
 class Learning:
-    """The initial guiding field of the renders of a command.
+    """Initial guiding field for the renders of a command.
 
     Attributes:
-        given: The initial guiding field; None starts without one.
-        follows: Whether each render starts from the result of the previous render.
-        last: Guiding field of the last render, or its initial field.
+        given: Initial guiding field; None means that renders start without one.
+        follows: Whether each render starts from the guiding field of the previous render.
+        last: Guiding field after the last render, or the initial field before any render.
     """
 
     given: bytes | None = None
@@ -46,7 +46,7 @@ class Learning:
     last: bytes = b""
 
     def take(self, result: _HasLearned) -> None:
-        """Stores the guiding field of a render."""
+        """Stores the guiding field of a finished render."""
         self.last = result.learned or self.last
         if self.follows and result.learned:
             self.given = result.learned
@@ -66,11 +66,12 @@ def check_trains_field(settings: Settings, option: str) -> None:
 
 
 def save_learned(path: str | os.PathLike[str], learned: bytes) -> None:
-    """Writes the guiding field of a render.
+    """Writes the guiding field of a render to a file.
 
     Raises:
         OSError: The file cannot be written.
-        WavecombError: There is no field: the render was not guided, or too short for training.
+        WavecombError: The render has no guiding field, because guiding was off or the render was
+            too short.
     """
     if not learned:
         raise WavecombError(
@@ -90,7 +91,7 @@ def load_learned(path: str | os.PathLike[str]) -> bytes:
 
     Raises:
         OSError: The file cannot be read.
-        WavecombError: The file has another kind or format, or is damaged.
+        WavecombError: The file is damaged, or has another kind or format.
     """
     import numpy as np
 
@@ -109,7 +110,7 @@ def load_learned(path: str | os.PathLike[str]) -> bytes:
 
 
 def learned_of(source: str | os.PathLike[str] | bytes | _HasLearned | None) -> bytes | None:
-    """Returns the guiding field of a file or picture; None for None."""
+    """Returns the guiding field of a file or a picture. Returns None if ``source`` is None."""
     if source is None or isinstance(source, bytes):
         return source
     return load_learned(source) if isinstance(source, (str, os.PathLike)) else source.learned

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The benchmark panel: starts ``wavecomb bench run``, shows its progress and opens the report.
 
-The report is a web page (docs/bench-report.md), which the window opens in the browser.
+The report is an HTML page, which the window opens in the web browser (docs/bench-report.md).
 """
 
 from __future__ import annotations
@@ -39,13 +39,15 @@ _PREPARES = {
 
 
 class BenchPanel(TakesFiles, QWidget):
-    """Panel with the form, buttons, progress and log of a benchmark.
+    """Panel with the options, the start and stop buttons, the progress and the log of a benchmark.
 
-    The viewport pauses while a suite runs, since its renders would disturb the measurement.
+    The viewport pauses while a benchmark suite runs, since its renders would disturb the
+    measurement.
 
     Signals:
         done(Path): Emitted after the report page was opened in a browser.
-        failed(str): Emitted on an error, with one line on how to fix it; the panel shows it too.
+        failed(str): Emitted on an error, with one line on how to fix it. The panel also shows this
+            line.
     """
 
     done = Signal(object)
@@ -115,18 +117,18 @@ class BenchPanel(TakesFiles, QWidget):
         column.addWidget(self.log, 1)
 
     def sizeHint(self) -> QSize:
-        """Returns a size that fits the form and a few lines of the log."""
+        """Returns a preferred size that fits the form and a few lines of the log."""
         return QSize(theme.em(64), theme.em(36))
 
     # ---- actions -------------------------------------------------------------------------------
 
     @property
     def busy(self) -> bool:
-        """Whether a suite runs, or a report or an estimate is being made."""
+        """Whether a suite is running, or a report or a time estimate is being made."""
         return self.suite.running or self.helper.running
 
     def start(self) -> None:
-        """Starts the chosen benchmark suite, or resumes it if the folder holds results."""
+        """Starts the chosen benchmark suite, or resumes the suite if its results already exist."""
         choice = self.choice.choice()
         if choice is None or self.suite.running:
             return
@@ -151,7 +153,7 @@ class BenchPanel(TakesFiles, QWidget):
             self.suite.stop()
 
     def estimate(self) -> None:
-        """Runs ``wavecomb bench run --dry-run`` and shows its estimate."""
+        """Runs ``wavecomb bench run --dry-run`` and shows the estimated run time."""
         choice = self.choice.choice()
         if choice is not None and not self.busy:
             self._reporting = False
@@ -159,10 +161,10 @@ class BenchPanel(TakesFiles, QWidget):
             self.helper.start(choice.arguments(dry=True))
 
     def open_report(self, folder: Path | None = None) -> None:
-        """Opens the report of a results folder in the browser; makes it first if necessary.
+        """Opens the report of a results folder in the web browser, making the report if necessary.
 
         Args:
-            folder: Results folder; None means the folder in the form.
+            folder: Results folder; None means the folder that is entered in the form.
         """
         if self.busy:
             return
@@ -178,14 +180,14 @@ class BenchPanel(TakesFiles, QWidget):
             self.helper.start(["bench", "report", str(self._folder)])
 
     def shutdown(self) -> None:
-        """Stops all processes of the panel. A stopped suite can be resumed."""
+        """Stops all processes that the panel started. A stopped benchmark suite can be resumed."""
         self._measuring = False
         self.choice.shutdown()
         self.suite.shutdown()
         self.helper.shutdown()
 
     def take_files(self, paths: list[str], at: QPointF) -> None:
-        """Opens the report of a results folder that was dropped."""
+        """Opens the report of a results folder that was dropped on the panel."""
         self.open_report(Path(paths[0]))
 
     # ---- messages of the processes -------------------------------------------------------------

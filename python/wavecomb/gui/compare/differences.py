@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Differences of two images, as numbers and as maps. The module is independent of Qt.
 
-The computed numbers equal the output of `wavecomb compare`.
+The numbers equal those that `wavecomb compare` prints.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ MAPS = {
     "flip-hdr": "FLIP, high range",
     "z": "z-test",
 }
-"""Kinds of difference maps with their names."""
+"""Displayed name of each kind of difference map."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +36,12 @@ class Numbers:
         layer: Name of the layer.
         comparison: Differences of the linear pixel values.
         psnr: PSNR of the displayed values, in dB.
-        flip: Mean FLIP of the displayed values; None if not known (yet).
+        flip: Mean FLIP of the displayed values; None if FLIP is not computed yet or not available.
         flip_note: Reason for a missing FLIP value.
         test: Result of the z-test; None if no variance is known.
         test_note: Reason for a missing z-test result.
-        others_differ: Layers of both images whose bits differ; None if only one layer was compared.
+        others_differ: Names of the other common layers that are not bit-identical; None if only
+            ``layer`` was compared.
     """
 
     layer: str
@@ -53,12 +54,12 @@ class Numbers:
     others_differ: tuple[str, ...] | None = None
 
     def with_flip(self, mean: float | None, note: str = "") -> Numbers:
-        """Returns a copy with the FLIP value filled in."""
+        """Returns a copy with the given FLIP value and note."""
         return replace(self, flip=mean, flip_note=note)
 
 
 def numbers(a: Side, b: Side, layer: str, exposure: float) -> Numbers:
-    """Computes all numbers except FLIP, which takes longer.
+    """Computes all difference values except FLIP, which takes longer.
 
     Raises:
         ValueError: The sizes or channels differ (``picture_sides.problem`` has a clearer message).
@@ -173,7 +174,7 @@ def _test_rows(found: Numbers) -> list[tuple[str, str, str]]:
 
 
 def decibels(value: float) -> str:
-    """Formats a value in decibels."""
+    """Formats a PSNR in decibels."""
     return f"{value:.2f} dB" if math.isfinite(value) else "infinite: looks equal"
 
 
@@ -182,7 +183,7 @@ def _row(values: tuple[float, ...]) -> str:
 
 
 def pixel_rows(a: Side | None, b: Side | None, layer: str, x: int, y: int) -> dict[str, str]:
-    """Returns the values of A, B and A - B at a pixel as text; "" without an image."""
+    """Returns the pixel values of A, B and A - B as text. Missing images have no entry."""
     found: dict[str, NDArray[Any]] = {}
     for name, side in (("A", a), ("B", b)):
         values = side.layer(layer) if side is not None else None

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Computes FLIP in a separate process, because the library holds Python's lock for seconds.
 
-Run as a module, this file reads a job in .npz format from stdin and writes the result to stdout.
+When it is run as a program, this module reads a FLIP job in .npz format from stdin and writes the
+result to stdout.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from wavecomb.errors import WavecombError
 
 
 class FlipProcess:
-    """Runner of FLIP processes; ``stop``, called from any thread, ends the running process."""
+    """Runner of FLIP processes. Any thread may call ``stop`` to end the running process."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -30,11 +31,11 @@ class FlipProcess:
     def flip(
         self, a: NDArray[Any], b: NDArray[Any], high_range: bool, exposure: float
     ) -> NDArray[np.float32]:
-        """Computes ``perceptual.flip`` of two images (height, width, channels).
+        """Computes ``perceptual.flip`` of two images with shape (height, width, channels).
 
         Raises:
-            WavecombError: The library is missing, or the process failed. The message of the error
-                is one line.
+            WavecombError: The FLIP library is missing, or the process failed. The message of the
+                error is one line.
         """
         job = io.BytesIO()
         np.savez(job, a=a, b=b, high_range=high_range, exposure=exposure)
@@ -64,7 +65,7 @@ class FlipProcess:
 
 
 def main() -> int:
-    """Runs the FLIP job in the separate process."""
+    """Runs the FLIP job in this process, which ``FlipProcess`` started."""
     from wavecomb.image.compare.perceptual import flip
 
     job = np.load(io.BytesIO(sys.stdin.buffer.read()), allow_pickle=False)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Background computation of a comparison: displayed images, numbers, FLIP and difference map."""
+"""Background computation of a comparison: images, difference values, FLIP and difference map."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Ask:
 
     Attributes:
         a: Image A, or None.
-        b: Image B, the reference, or None.
+        b: Image B, the reference image, or None.
         look: Layer, exposure and tone mapping of both images.
         kind: Kind of the difference map, a key of ``differences.MAPS``.
     """
@@ -44,11 +44,11 @@ class Ask:
         return problem(self.a, self.b, self.look.layer)
 
     def pictures(self) -> tuple[Any, ...]:
-        """Returns a key that is equal for requests with equal displayed images."""
+        """Returns a key that is equal for requests whose displayed images are equal."""
         return (*self._sides(), self.look)
 
     def figures(self) -> tuple[Any, ...]:
-        """Returns a key that is equal for requests with equal numbers."""
+        """Returns a key that is equal for requests whose difference values are equal."""
         return (*self._sides(), self.look.layer, self.look.exposure)
 
     def _sides(self) -> tuple[int, int]:
@@ -56,14 +56,15 @@ class Ask:
 
 
 class Jobs(QObject):
-    """Four background workers, for displayed images, numbers, FLIP and the difference map.
+    """Four background workers: for displayed images, difference values, FLIP and difference map.
 
-    Each worker computes only the newest request.
+    Each worker computes only its newest request.
 
     Signals:
-        images(A, B): Displayed images, QImage or None.
-        numbers(Numbers): Numbers, first without and then with FLIP; None if there is no comparison.
-        map(QImage, Scale): Difference map; None, None if there is no map.
+        images(A, B): Displayed images as QImage; None for a missing image.
+        numbers(Numbers): Difference values, emitted first without and then with FLIP; None if there
+            is no comparison.
+        map(QImage, Scale): Difference map and its colour scale; both are None if there is no map.
         failed(str): Emitted on an error, with a message of one line.
     """
 
@@ -96,7 +97,7 @@ class Jobs(QObject):
         return any(w.busy for w in (self._pictures, self._figures, self._looks, self._map))
 
     def want(self, ask: Ask) -> None:
-        """Computes the parts of a request that are not displayed already."""
+        """Computes all results of a request that are not displayed already."""
         self._ask = ask
         if self._shown.get("pictures") != ask.pictures():
             self._shown["pictures"] = ask.pictures()
@@ -235,7 +236,7 @@ def _map(
 
 
 def _images(ask: Ask) -> tuple[DisplayLayer | None, DisplayLayer | None]:
-    """Returns both displayed images; if they use false colours, the scale is common."""
+    """Returns both displayed images. False colours use one scale for both images."""
     layers = [
         _drawable(side.layer(ask.look.layer)) if side is not None else None
         for side in (ask.a, ask.b)
@@ -255,7 +256,7 @@ def _images(ask: Ask) -> tuple[DisplayLayer | None, DisplayLayer | None]:
 
 
 def _drawable(layer: NDArray[Any] | None) -> NDArray[Any] | None:
-    """Adapts a layer's channels for ``show``: drops alpha, repeats a grey channel."""
+    """Converts a layer for ``show``: drops alpha and repeats a grey channel."""
     if layer is None:
         return None
     channels = layer.shape[2]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Layout of the compare view: panes, and the zoom and pan that all panes share."""
+"""Layout of the compare view: its panes, and the zoom and pan that apply to all panes."""
 
 from __future__ import annotations
 
@@ -24,10 +24,11 @@ class Layout:
         mode: View mode, one of ``MODES``.
         shown: Image that the flip view shows, "A" or "B".
         area: Area of the widget that the panes fill.
-        size: Size of image A in pixels, or of B without A; None without images.
+        size: Size of image A in pixels, or the size of image B if there is no A; None without
+            images.
         gap: Gap between panes.
-        bar: Height of the area below the difference that is kept free for the colour bar.
-        zoom: Points per pixel; None fits the whole image.
+        bar: Height of the free area below the difference map, where the colour bar is drawn.
+        zoom: Zoom in points per pixel; None fits the whole image into the pane.
         centre: Point of the image in the middle of a pane, as a fraction of the image size.
     """
 
@@ -42,7 +43,7 @@ class Layout:
         self.centre = QPointF(0.5, 0.5)
 
     def panes(self) -> list[tuple[str, QRectF]]:
-        """Returns the content (A, B or D) and the rectangle of each pane."""
+        """Returns the content of each pane ("A", "B" or "D") and the pane's rectangle."""
         which = {SIDE: (A, B), WIPE: (A,), FLIP: (self.shown,), DIFFERENCE: (D,), THREE: (A, B, D)}
         kinds = which[self.mode]
         gap = self.gap if len(kinds) > 1 else 0.0
@@ -51,7 +52,7 @@ class Layout:
         return [(k, QRectF(i * (width + gap), 0, width, height)) for i, k in enumerate(kinds)]
 
     def pane_at(self, at: QPointF) -> QRectF:
-        """Returns the pane under a point, or the first pane if the point is in none."""
+        """Returns the pane at a point of the widget; outside all panes, returns the first pane."""
         panes = [rect for _, rect in self.panes()]
         return next((rect for rect in panes if rect.contains(at)), panes[0])
 
@@ -63,9 +64,9 @@ class Layout:
         return min(pane.width() / self.size.width(), pane.height() / self.size.height())
 
     def target(self, pane: QRectF, size: QSizeF | None = None) -> QRectF:
-        """Returns the rectangle that a whole image covers.
+        """Returns the rectangle that the whole image covers in a pane.
 
-        Images of other sizes than image A are aligned with A's top left corner.
+        An image whose size differs from image A is aligned with A's top left corner.
         """
         reference = self.size or size or QSizeF(1, 1)
         scale = self.points_per_pixel()
@@ -81,7 +82,7 @@ class Layout:
         return QPointF(offset.x() / target.width(), offset.y() / target.height())
 
     def pixel_at(self, at: QPointF) -> tuple[int, int] | None:
-        """Returns the column and row of the pixel under a point, or None."""
+        """Returns the column and row of the pixel at a point of the widget, or None."""
         if self.size is None:
             return None
         share = self.share(at, self.pane_at(at))
@@ -94,7 +95,7 @@ class Layout:
         self.zoom, self.centre = None, QPointF(0.5, 0.5)
 
     def set_zoom(self, zoom: float, at: QPointF | None = None) -> None:
-        """Sets the zoom in points per pixel, keeping the image point under ``at`` fixed."""
+        """Sets the zoom in points per pixel, keeping the image point at ``at`` fixed."""
         pane = self.pane_at(at) if at is not None else None
         before = self.share(at, pane) if at is not None and pane is not None else None
         self.zoom = min(max(zoom, 1.0 / MOST_ZOOM), MOST_ZOOM)

@@ -51,7 +51,7 @@ def _row(name: str) -> Choice | Number:
 
 
 class LiveSettings(QWidget):
-    """Grid with the settings of both live renders of a comparison.
+    """Form rows with the settings of two live renders that are compared.
 
     A change of a setting restarts only the render that the setting belongs to.
     """
@@ -91,7 +91,7 @@ class LiveSettings(QWidget):
         self.show_setup()
 
     def show_setup(self) -> None:
-        """Shows the current settings of the render."""
+        """Shows the current settings of a live render in the form."""
         live = self._source.live
         if live is None:
             return

@@ -60,7 +60,7 @@ class _Table(QTableWidget):
         return "\n".join(lines)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Copies the table on Ctrl+C."""
+        """Copies the table when the user presses Ctrl+C."""
         if event.matches(QKeySequence.StandardKey.Copy):
             QGuiApplication.clipboard().setText(self.text())
         else:
@@ -68,7 +68,7 @@ class _Table(QTableWidget):
 
 
 class NumbersPanel(QWidget):
-    """Panel with the tables of differences and of pixel values, one above the other."""
+    """Panel with a table of difference values above a table of pixel values."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -90,7 +90,7 @@ class NumbersPanel(QWidget):
         self.set_pixel(None, None, "beauty", -1, -1)
 
     def set_numbers(self, found: Numbers | None, message: str) -> None:
-        """Shows the numbers of a comparison, or ``message`` as the reason why there are none."""
+        """Shows the difference values of a comparison, or ``message`` if there are none."""
         listed = rows(found) if found is not None else []
         self._verdict.setText(f"{found.layer}: {listed[0][1]}" if found is not None else message)
         font = self._verdict.font()
@@ -100,7 +100,7 @@ class NumbersPanel(QWidget):
         self._table.set_rows(listed[1:])
 
     def set_pixel(self, a: Side | None, b: Side | None, layer: str, x: int, y: int) -> None:
-        """Shows the values of both images at a pixel; x < 0 means no pixel."""
+        """Shows the values of both images at a pixel. A negative ``x`` clears the values."""
         if x < 0:
             self._pixel.set_rows([("Pixel", "move the mouse over a picture", "")])
             return

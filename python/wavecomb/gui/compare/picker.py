@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bar of one side of a comparison that shows and selects the source of its image."""
+"""Bar that shows and selects the image source of one side of a comparison."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ class SidePicker(TakesFiles, QWidget):
         )  # fmt: skip
 
     def render_other(self) -> None:
-        """Starts a separate render, initially with the viewport's settings."""
+        """Starts a separate render, whose initial settings are those of the viewport."""
         self.source.render(self._session.setup)
 
     def _show(self) -> None:

@@ -37,7 +37,7 @@ class Side:
         path: Path of the image file, or None.
         variance: Variance of each pixel's mean, shaped like the beauty layer; None if unknown.
         live: Whether the image is a frame of a render that is still running.
-        number: Unique number of the image.
+        number: Unique identifier of the image.
     """
 
     name: str
@@ -67,7 +67,8 @@ class Side:
 def read_side(path: Path) -> Side:
     """Reads an image file: EXR with all layers, PNG and others, .npy of a results folder.
 
-    A file NAME_var.exr beside NAME.exr, as golden images have it, is read as the variance.
+    A file NAME_var.exr beside NAME.exr is read as the variance of NAME.exr; golden images have such
+    a file.
 
     Raises:
         WavecombError: The file cannot be read. The message of the error is one line that names the
@@ -97,7 +98,7 @@ def _read_npy(path: Path) -> dict[str, Array]:
 
 
 def side_of_frame(frame: Frame, name: str, *, live: bool) -> Side:
-    """Makes an image to compare from a frame of a live render; shares the frame's arrays."""
+    """Makes an image to compare from a frame of a live render, sharing the frame's arrays."""
     layers = {layer: _three(frame.layer(layer)) for layer in frame.names()}
     done = frame.status.get("samples_done")
     note = f"{frame.width} x {frame.height}"
@@ -116,7 +117,7 @@ def _three(layer: Array | None) -> Array:
 
 
 def common_layers(a: Side | None, b: Side | None) -> list[str]:
-    """Returns the layers of both images, or of the only image, the beauty first."""
+    """Returns the layer names of both images, or of the only image. The beauty comes first."""
     sides = [side for side in (a, b) if side is not None]
     names: list[str] = []
     for name in ("beauty", *(name for side in sides for name in side.layers)):
@@ -147,7 +148,7 @@ def problem(a: Side | None, b: Side | None, layer: str) -> str:
 
 
 def pair(a: Side, b: Side, layer: str) -> tuple[Array, Array]:
-    """Returns a layer of both images; drops an alpha channel that only one of them has."""
+    """Returns the same layer of both images, dropping alpha if only one of the images has it."""
     one, two = a.layer(layer), b.layer(layer)
     assert one is not None and two is not None
     channels = min(one.shape[2], two.shape[2])

@@ -27,8 +27,8 @@ MAX_PICTURES = 32
 class Verdict:
     """Result of a bitwise comparison of two images.
 
-    ``kind`` is "same", "different", "first" (nothing to compare with yet) or "none" (no comparison
-    is possible).
+    ``kind`` is "same", "different", "first" (there is no earlier image to compare with) or "none"
+    (the image cannot be compared).
     """
 
     kind: str
@@ -49,10 +49,10 @@ def even_samples(samples: NDArray[Any] | None) -> int:
 
 
 def picture_key(setup: Mapping[str, Any], revision: Hashable) -> tuple[Hashable, ...] | None:
-    """Returns a key of everything that determines an image's bits at equal sample counts.
+    """Returns a key of all inputs that determine an image's bits at equal sample counts.
 
-    ``revision`` identifies scene and camera. Returns None if the image depends on the speed of the
-    machine, as with a time limit or with roulette by measured costs.
+    ``revision`` identifies the scene and camera. Returns None if the image depends on the speed of
+    the machine, as it does with a time limit or with roulette by measured costs.
     """
     if setup.get("time_limit"):
         return None
@@ -71,18 +71,18 @@ class PictureBook:
     def __init__(self) -> None:
         self._pictures: dict[Hashable, tuple[str, dict[str, Any]]] = {}
         self.checked = 0
-        """Number of comparisons with images of other settings since the last different image."""
+        """Number of comparisons with images from other settings since bits last differed."""
 
     def add(
         self, key: Hashable | None, samples: Hashable, mark: str, settings: Mapping[str, Any]
     ) -> Verdict:
-        """Compares an image with the first image of the same key.
+        """Compares the bits of an image with those of the first image that had the same key.
 
         Args:
             key: Key from ``picture_key``.
             samples: Sample count of every pixel, or an identifier of the sample count map.
             mark: Hash from ``fingerprint``.
-            settings: Scheduling settings, to report the differences.
+            settings: Scheduling settings of the image, which the verdict names if bits differ.
         """
         if key is None:
             return Verdict("none", "This picture depends on time, so no two are equal")
@@ -102,7 +102,7 @@ class PictureBook:
         return Verdict("different", f"DIFFERENT picture with {changes}: please report this")
 
     def clear(self) -> None:
-        """Forgets all images and their fingerprints."""
+        """Removes all stored images and their fingerprints."""
         self._pictures.clear()
         self.checked = 0
 

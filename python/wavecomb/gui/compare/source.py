@@ -25,7 +25,7 @@ SHORT = {
     **{"lanes": "lanes", "wave_size": "waves", "ray_order": "rays", "shadow_order": "shadow rays"},
     **{"adaptive": "adaptive", "denoise": "denoise", "clamp_indirect": "clamp"},
 }
-"""Short names of the settings that distinguish two live renders."""
+"""Short labels of the settings that distinguish two live renders."""
 
 
 class SideSource(QObject):
@@ -35,7 +35,7 @@ class SideSource(QObject):
 
     Signals:
         changed(): Emitted when ``side`` or ``kind`` changes.
-        failed(str): Emitted on an error, with one line that says how to fix it.
+        failed(str): Emitted on an error, with one line on how to fix it.
     """
 
     changed = Signal()
@@ -63,13 +63,13 @@ class SideSource(QObject):
         self._reader.submit(partial(read_side, path), path)
 
     def set_side(self, side: Side, kind: str = FILE) -> None:
-        """Shows the given image."""
+        """Shows the given image on this side of the comparison."""
         self._release()
         self.kind, self.side = kind, side
         self.changed.emit()
 
     def keep(self) -> None:
-        """Shows the viewport's current image, without following later changes."""
+        """Shows the viewport's current image. Later changes of the viewport have no effect."""
         frame = self._session.last_frame
         if frame is None:
             self.failed.emit(f"{self.name}: there is no picture to keep yet: open a stage first")
@@ -120,7 +120,7 @@ class SideSource(QObject):
         other.changed.emit()
 
     def close(self) -> None:
-        """Stops reading files and rendering."""
+        """Stops the reading of files and the separate render."""
         self._reader.close()
         self._release()
         self.side = None
@@ -146,7 +146,7 @@ class SideSource(QObject):
 
 
 def setup_text(setup: Setup, beside: Setup | None = None) -> str:
-    """Describes a setup in short, by its differences from another setup.
+    """Describes a setup briefly, by its differences from another setup.
 
     If the two setups are equal, the text names the policy and the sample count.
     """

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""View of two images and their difference: side by side, wipe or flip, with common zoom and pan."""
+"""View of two images and their difference.
+
+The modes are side by side, wipe and flip; all panes share zoom and pan.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,7 @@ from wavecomb.image.files import image
 def paint_label(
     painter: QPainter, pane: QRectF, text: str, *, middle: bool = False, right: bool = False
 ) -> None:
-    """Paints wrapped text on a dark background in a corner or the middle of a pane."""
+    """Paints a wrapped text on a dark background in a corner or in the middle of a pane."""
     if not text or pane.width() < theme.em(2):
         return
     pad = theme.em(0.35)
@@ -53,7 +56,10 @@ def paint_label(
 
 
 def paint_bar(painter: QPainter, area: QRectF, scale: Scale) -> None:
-    """Paints the title, colour ramp and tick labels, leaving out labels that would overlap."""
+    """Paints the title, colour ramp and tick labels of a colour scale.
+
+    Leaves out labels that would overlap.
+    """
     metrics = painter.fontMetrics()
     pad = theme.em(0.4)
     left, width = area.left() + pad, max(area.width() - 2 * pad, 1.0)
@@ -83,13 +89,13 @@ _PAN_STEP = 0.1
 
 
 class CompareView(TakesFiles, QWidget):
-    """Widget that draws the compared images, independent of their sources.
+    """Widget that draws the images of a comparison, independent of the images' sources.
 
     Signals:
-        hovered(x, y): The pixel under the mouse, or -1, -1.
+        hovered(x, y): Column and row of the pixel under the mouse; -1, -1 if there is none.
         flipped(which): The flip view changed to image "A" or "B".
-        wiped(fraction): The wipe line moved to this fraction of the width; 0 is the left edge.
-        dropped(which, paths): Files were dropped on the half of image "A" or "B".
+        wiped(fraction): The wipe line moved to ``fraction`` of the width; 0 is the left edge.
+        dropped(which, paths): Files were dropped on image "A" or "B", given by ``which``.
     """
 
     hovered = Signal(int, int)
@@ -123,12 +129,12 @@ class CompareView(TakesFiles, QWidget):
     # ---- what is shown -------------------------------------------------------------------------
 
     def set_image(self, which: str, image: QImage | None) -> None:
-        """Sets image "A", image "B" or the difference "D"."""
+        """Sets the displayed image "A", "B", or the difference map "D"."""
         self._images[which] = image
         self.update()
 
     def image(self, which: str) -> QImage | None:
-        """Returns an image that was set by ``set_image``."""
+        """Returns the image that ``set_image`` has set for "A", "B" or "D"."""
         return self._images[which]
 
     def set_scale(self, scale: Scale | None) -> None:
@@ -142,7 +148,7 @@ class CompareView(TakesFiles, QWidget):
         self.update()
 
     def set_message(self, message: str) -> None:
-        """Shows a message in place of the difference map; "" removes the message."""
+        """Shows a message in place of the difference map; the text "" removes the message."""
         self.message = message
         self.update()
 
@@ -164,7 +170,7 @@ class CompareView(TakesFiles, QWidget):
         self.update()
 
     def set_zoom(self, zoom: float, at: QPointF | None = None) -> None:
-        """Sets the zoom in points per pixel, keeping the image point under ``at`` fixed."""
+        """Sets the zoom in points per pixel, keeping the image point at ``at`` fixed."""
         self._arranged().set_zoom(zoom, at)
         self.update()
 
@@ -188,7 +194,7 @@ class CompareView(TakesFiles, QWidget):
         return self._arranged().points_per_pixel()
 
     def pixel_at(self, at: QPointF) -> tuple[int, int] | None:
-        """Returns the column and row of the pixel under a point of the widget."""
+        """Returns the column and row of the image pixel at a point of the widget."""
         return self._arranged().pixel_at(at)
 
     def target(self, number: int) -> QRectF:
@@ -294,7 +300,10 @@ class CompareView(TakesFiles, QWidget):
         self._drag = at
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Moves the wipe line or image in a drag, else reports the pixel under the mouse."""
+        """Moves the wipe line or the image in a drag.
+
+        Without a drag, reports the pixel under the mouse.
+        """
         at = event.position()
         if self._wiping:
             self.set_wipe(at.x() / max(self._panes()[0][1].width(), 1.0))
@@ -314,7 +323,7 @@ class CompareView(TakesFiles, QWidget):
         self._drag, self._wiping = None, False
 
     def leaveEvent(self, event: object) -> None:
-        """Reports that the mouse is over no pixel of an image."""
+        """Reports that no image pixel is under the mouse."""
         self._hover(None)
 
     def _hover(self, pixel: tuple[int, int] | None) -> None:
@@ -330,7 +339,7 @@ class CompareView(TakesFiles, QWidget):
             self.set_zoom(self.points_per_pixel() * ZOOM_STEP**steps, event.position())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Handles keys for zoom, pan, wipe line and flip."""
+        """Handles keys that zoom, pan, move the wipe line or flip the images."""
         key, keys = Qt.Key(event.key()), Qt.Key
         steps = {
             keys.Key_Left: (-1, 0),
@@ -368,5 +377,9 @@ class CompareView(TakesFiles, QWidget):
     focusOutEvent = focusInEvent
 
     def take_files(self, paths: list[str], at: QPointF) -> None:
-        """Emits ``dropped``: files on the left half replace image A, on the right half B."""
+        """Emits ``dropped``.
+
+        Files on the left half of the widget replace image A, files on the right half replace image
+        B.
+        """
         self.dropped.emit(A if at.x() < self.width() / 2 else B, paths)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare window: shows two images or two live renders and the numbers of their differences."""
+"""Compare window, which shows two images or two live renders and their difference values."""
 
 from __future__ import annotations
 
@@ -43,10 +43,11 @@ _KEYS = {"side": "1", "wipe": "2", "flip": "3", "difference": "4", "three": "5"}
 
 
 class CompareWindow(QWidget):
-    """Window that compares images A and B, in one view and with numbers.
+    """Window that compares images A and B visually and by difference values.
 
     Signals:
-        failed(str): Emitted on an error, with one line on how to fix it; the window shows it too.
+        failed(str): Emitted on an error, with one line on how to fix it. The window also shows this
+            line.
     """
 
     failed = Signal(str)
@@ -127,7 +128,7 @@ class CompareWindow(QWidget):
         return bar
 
     def _mark_mode(self) -> None:
-        """Gives the button of the chosen view mode the colours of a selection."""
+        """Highlights the button of the chosen view mode."""
         colours = QApplication.palette()
         for button in self._modes.values():
             own = QPalette()
@@ -165,18 +166,18 @@ class CompareWindow(QWidget):
         return combo
 
     def sizeHint(self) -> QSize:
-        """Returns a window size that fits two images and the numbers."""
+        """Returns a preferred size that fits two images and the table of difference values."""
         return QSize(theme.em(70), theme.em(42))
 
     # ---- public methods
     # ----------------------------------------------------------------------------
 
     def keep(self, which: str) -> None:
-        """Keeps the viewport's current image as image "A" or "B"."""
+        """Copies the viewport's current image to image "A" or "B"."""
         self.sources[which].keep()
 
     def open(self, which: str, paths: list[str | Path]) -> None:
-        """Opens a file as image "A" or "B"; two files at once become A and B."""
+        """Opens a file as image "A" or "B". Two files at once become A and B."""
         if len(paths) > 2:
             self._fail(f"{len(paths)} files were dropped: drop one, or two for A and B")
         elif len(paths) == 2:
@@ -186,7 +187,10 @@ class CompareWindow(QWidget):
             self.sources[which].open(Path(paths[0]))
 
     def compare(self, a: Side | Path | None, b: Side | Path | None) -> None:
-        """Shows two images, and raises the window. The value None keeps the current image."""
+        """Shows two images, and raises the window.
+
+        An argument of None keeps the current image of that side.
+        """
         for source, side in ((self.a, a), (self.b, b)):
             if isinstance(side, Side):
                 source.set_side(side)
@@ -211,7 +215,7 @@ class CompareWindow(QWidget):
         return self._jobs.busy or self.a.loading or self.b.loading
 
     def shutdown(self) -> None:
-        """Stops live renders and computations."""
+        """Stops the live renders and all computations of the window."""
         self._jobs.close()
         self.a.close()
         self.b.close()
@@ -222,7 +226,7 @@ class CompareWindow(QWidget):
         self.view.set_zoom(1.0 / self.view.devicePixelRatioF())
 
     def look(self) -> Look:
-        """Returns the layer, exposure and tone mapping for both images."""
+        """Returns the layer, exposure and tone mapping that apply to both images."""
         layer = self._layer.currentText() or "beauty"
         return Look(layer, self._exposure.value(), self._tone.currentText())
 
@@ -281,13 +285,13 @@ class CompareWindow(QWidget):
             self.session.failed.emit(message)
 
     def hideEvent(self, event: QHideEvent) -> None:
-        """Pauses the separate renders while the window is hidden."""
+        """Pauses the window's separate renders while the window is hidden."""
         for source in self.sources.values():
             if source.live is not None:
                 source.live.pause()
 
     def showEvent(self, event: object) -> None:
-        """Resumes the separate renders."""
+        """Resumes the window's separate renders."""
         for source in self.sources.values():
             if source.live is not None and self.session.state != "paused":
                 source.live.resume()

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scene panels: the stage's prim tree, materials and lights, and the edits of them."""
+"""Scene panels: prim tree, materials and lights of the stage, and their edits."""

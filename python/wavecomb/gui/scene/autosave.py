@@ -25,7 +25,9 @@ DELAY_MS = 2000
 
 
 class Autosave(QObject):
-    """Automatic writer of unsaved edits to a file, which exists until they are saved or undone.
+    """Automatic writer of unsaved edits to a file.
+
+    The file is removed when the edits are saved or undone.
 
     Each stage has one autosave file. A window holds a lock beside the autosave file while its stage
     is open. A second window with the same stage writes no autosave file.
@@ -37,10 +39,10 @@ class Autosave(QObject):
     found = Signal()
 
     def __init__(self, edits: SceneEdits, folder: Path, parent: QObject | None = None) -> None:
-        """Follows the edits of a stage.
+        """Starts saving the edits of a stage automatically.
 
         Args:
-            edits: The edits to save.
+            edits: Edits of the stage, which are saved shortly after each change.
             folder: Folder of the autosave files, created when needed.
             parent: Qt parent of the writer.
         """
@@ -59,7 +61,10 @@ class Autosave(QObject):
 
     @property
     def file(self) -> Path | None:
-        """Autosave file of the open stage; None without a stage or without the lock."""
+        """Autosave file of the open stage.
+
+        None if no stage is open or another window holds the lock.
+        """
         return self._file
 
     def close(self) -> None:
@@ -78,7 +83,7 @@ class Autosave(QObject):
         self._file = self._lock = None
 
     def write(self) -> None:
-        """Writes the edits to the autosave file now, or removes the file if there are none."""
+        """Writes the edits to the autosave file now, or removes the file if there are no edits."""
         if self._file is None or self._edits.edits is None:
             return
         if self._edits.history.stack.isClean():

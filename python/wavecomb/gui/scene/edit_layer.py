@@ -14,11 +14,11 @@ from wavecomb.image.files.output_file import replacing
 _NOT_REPEATED = frozenset(
     {"subLayers", "subLayerOffsets", "comment", "documentation", "customLayerData", "owner"}
 )
-"""Metadata of the root layer that is not copied to a layer of edits over the stage."""
+"""Metadata fields of the stage's root layer that are not copied to a new layer of edits."""
 
 
 def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:
-    """Returns a layer with the content of the session layer, and the stage as its sublayer.
+    """Returns a layer that contains the session layer's edits and has the stage as a sublayer.
 
     Args:
         stage: Stage with edits in its session layer.
@@ -42,10 +42,12 @@ def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:
 
 
 def save_edits(stage: Usd.Stage, path: str | os.PathLike[str]) -> Path:
-    """Writes the edits of a stage as a .usda file, never partially, and returns its path.
+    """Writes the edits of a stage to a .usda file and returns its path.
+
+    A failure leaves no partial file.
 
     Raises:
-        WavecombError: The file cannot be written, or would replace a file of the stage.
+        WavecombError: The file cannot be written, or the path is that of a file of the stage.
     """
     target = Path(path)
     if target.suffix.lower() not in (".usda", ".usd"):

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Form as data: rows of fields with editable values. The form is independent of widgets."""
+"""Form data without a user interface: rows of fields with editable values.
+
+The form is independent of widgets.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,7 @@ class Range:
         soft_high: Value at the right end of the slider.
         decimals: Number of displayed decimals.
         logarithmic: Whether the slider is logarithmic. If ``low`` is 0, the left end of a
-            logarithmic slider means 0.
+            logarithmic slider stands for the value 0.
     """
 
     low: float
@@ -61,7 +64,7 @@ UNIT = Range(0.0, 1.0, 0.0, 1.0)
 def differs(shown: Any, value: Any) -> bool:
     """Returns whether a field must be updated to show a new value.
 
-    Ignores rounding differences of values, because an update would move the text cursor.
+    Ignores rounding differences of values, because updating a field moves its text cursor.
     """
     if isinstance(shown, tuple) != isinstance(value, tuple):
         return True
@@ -81,14 +84,14 @@ class FieldRow:
         name: Name of the edited parameter.
         label: Label in front of the field.
         kind: "number", "colour", "switch", or "driven" for a value from a texture or primvar.
-        value: Value when the form was made: a number, a colour of three numbers, or a bool; None
+        value: Value when the form was made: a number, a colour of three numbers, or a bool. None
             for a driven field.
         title: Full name for people, such as "coat weight".
         bounds: Range of the number, or of each component of the colour.
         default: Value of the parameter if nothing is authored; None if unknown.
         driver: Source of the value of a driven field, such as "texture wood.png".
         group: Heading above the field, or "" for none.
-        tip: Tooltip with the effect and the edited attribute.
+        tip: Tooltip that describes the field's effect and names the edited attribute.
     """
 
     name: str
@@ -104,17 +107,20 @@ class FieldRow:
 
 
 class FormModel(QObject):
-    """Form that edits one object at a time. Subclasses provide the values and receive the edits.
+    """Form that edits one object at a time.
+
+    Subclasses provide the values of the fields and receive the edits.
 
     Signals:
-        remade(): The rows changed, because the form shows another object or none.
+        remade(): The rows changed, because the form now shows another object or no object.
         changed(): Values of the form changed, but its rows are the same.
 
     Attributes:
         rows: Fields of the form, in order.
         title: Name of the edited object, or "".
-        note: Text in place of the fields or below them.
-        set_typing: Called at the start and end of typing a value, which becomes one undo step.
+        note: Text that is shown below the fields, or alone if there are no fields.
+        set_typing: Function that is called when the user begins and ends typing a value. All
+            changes in between become one undo step.
     """
 
     remade = Signal()
@@ -128,19 +134,22 @@ class FormModel(QObject):
         self._folds: dict[str, bool] = {}
 
     def value(self, name: str) -> Any:
-        """Returns the value that a field shows; None leaves the field as it is."""
+        """Returns the value that a field shows; None means that the field must not change."""
         raise NotImplementedError
 
     def is_edited(self, name: str) -> bool:
-        """Returns whether a field has an edit that can be reset."""
+        """Returns whether a field has an edit that the user can reset."""
         raise NotImplementedError
 
     def set_value(self, name: str, value: Any) -> None:
-        """Edits a field; None resets it to the value of the stage."""
+        """Edits a field; the value None resets the field to the value in the stage's files."""
         raise NotImplementedError
 
     def groups(self) -> list[str]:
-        """Returns the headings in order; "" comes first if some fields have no heading."""
+        """Returns the headings of the form in order.
+
+        The heading "" comes first if some fields have no heading.
+        """
         return list(dict.fromkeys(row.group for row in self.rows))
 
     def is_open(self, group: str) -> bool:

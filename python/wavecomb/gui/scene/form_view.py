@@ -29,11 +29,14 @@ from wavecomb.gui.scene.value_fields import (
 from wavecomb.gui.widgets import named
 
 LABEL_EM = 6.2
-"""Width of the field labels, equal in all groups."""
+"""Width of the field labels, the same in all groups of fields."""
 
 
 def field_of(row: FieldRow) -> Field | DrivenField:
-    """Creates the field of a form row; a driven row gets a field that only shows its source."""
+    """Creates the field of a form row.
+
+    A driven row gets a field that only names the value's source.
+    """
     if row.kind == DRIVEN:
         return DrivenField(row.title, row.driver)
     if row.kind == SWITCH:
@@ -130,7 +133,7 @@ class Rows(QWidget):
         self._form.setVerticalSpacing(theme.em(0.25))
 
     def add(self, row: FieldRow, field: QWidget) -> None:
-        """Adds a row to the form."""
+        """Adds a row with a label and a field to the form."""
         label = QLabel(row.label)
         label.setWordWrap(True)
         label.setFixedWidth(theme.em(LABEL_EM))
@@ -142,10 +145,10 @@ class Rows(QWidget):
 
 
 class Group(QWidget):
-    """Form rows under a heading that collapses them.
+    """Group of form rows under a heading that collapses the rows.
 
     Signals:
-        toggled(str, bool): The user opened (True) or closed the group of that title.
+        toggled(str, bool): The user opened (True) or closed (False) the group with the given title.
     """
 
     toggled = Signal(str, bool)

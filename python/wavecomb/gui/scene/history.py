@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Undo steps: Qt's undo stack, with commands that merge within one drag or one typed value."""
+"""Undo history of edits on Qt's undo stack. Changes within one drag or one typed value merge."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from PySide6.QtGui import QUndoCommand, QUndoStack
 from wavecomb.gui.scene.stage_edits import Step
 
 MERGE_S = 0.7
-"""Changes of one value at shorter intervals, in seconds, merge into one undo step."""
+"""Largest interval, in seconds, between changes of one value that merge into one undo step."""
 _EDIT = 1
-"""Id of commands that may merge."""
+"""Command id that Qt compares to find commands that may merge."""
 
 
 class EditCommand(QUndoCommand):
@@ -24,7 +24,7 @@ class EditCommand(QUndoCommand):
     Args:
         step: The undo step that the command applies.
         history: The history that the command belongs to.
-        stretch: Number that is equal for undo steps that may merge.
+        stretch: Number that is equal in two commands that may merge.
         typing: Whether the undo step is part of typing a value.
         moment: Time of the undo step in seconds.
     """
@@ -67,11 +67,12 @@ class History(QObject):
     """Undo history of one stage.
 
     Signals:
-        step(Step): Requests to apply a step: a new one, a redone one, or the inverse of one.
+        step(Step): Asks the receiver to apply a step. On undo, the step is the inverse of the
+            original step.
 
     Attributes:
-        stack: Qt's undo stack; it is clean while the edits equal the saved ones.
-        now: Clock in seconds, used to distinguish drags from single changes.
+        stack: Qt's undo stack. The stack is in its clean state while all edits are saved.
+        now: Function that returns the time in seconds, used to detect changes of the same drag.
     """
 
     step = Signal(object)
@@ -86,15 +87,18 @@ class History(QObject):
         self._typing = False
 
     def push(self, step: Step) -> None:
-        """Applies a step and adds it to the history.
+        """Applies an undo step and adds it to the history.
 
-        Merges the step with the previous step of the same drag.
+        Merges the step with the previous step if both belong to one drag.
         """
         command = EditCommand(step, self, self._stretch, self._typing, self.now())
         self.stack.push(command)
 
     def set_typing(self, typing: bool) -> None:
-        """Marks the start (True) and end of typing a value, which becomes one step at any speed."""
+        """Marks the start (True) and end (False) of typing a value.
+
+        All changes in between become one undo step.
+        """
         self._typing = typing
         self._stretch += 1
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Editable inputs of lights: the inputs in the core's table of lights, and brightness."""
+"""Editable inputs of lights: those of the core's table of lights, and the brightness inputs."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class LightInput:
         name: Name of the input in the window.
         input: UsdLux name of the input, without "inputs:".
         label: Label in the form.
-        kind: Kind of field, see ``form_model``.
+        kind: Kind of the form field, one of those in ``form_model``.
         default: Value if nothing is authored.
         bounds: Range of the number, or of each component of the colour.
         tip: Tooltip that describes the effect of the input.
@@ -90,7 +90,8 @@ def light_inputs() -> dict[str, LightInput]:
 def inputs_of(prim: Usd.Prim) -> list[LightInput]:
     """Returns the inputs of a prim in the order of a form.
 
-    Brightness comes first, then the inputs of the light type, then the inputs under headings.
+    Brightness comes first, then inputs of the light type without heading, then inputs with
+    headings.
     """
     kind = KINDS.get(str(prim.GetTypeName()), "")
     brightness = {one.name for one in BRIGHTNESS}

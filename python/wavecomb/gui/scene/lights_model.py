@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lights of the stage as data: the list with switches, and the form of one light. No widgets."""
+"""Models of the stage's lights: a list with on/off switches, and a form that edits one light.
+
+No widgets.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ SOFT_DOME = "soft dome"
 
 
 class LightsModel(HeadedModel):
-    """List of the stage's lights by path, including lights that are switched off."""
+    """List model of the paths of the stage's lights. Includes lights that are switched off."""
 
     def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
         super().__init__(HEADERS, parent)
@@ -43,7 +46,7 @@ class LightsModel(HeadedModel):
         self.tell(0, len(HEADERS) - 1)
 
     def flags(self, index: Any) -> Qt.ItemFlag:
-        """Returns the item flags; switchable cells have a check box."""
+        """Returns the item flags of a cell; cells that switch a light have a check box."""
         flags = super().flags(index)
         if index.column() in (ON, SOLO) and self._switch(self.rows[index.row()]):
             flags |= Qt.ItemFlag.ItemIsUserCheckable
@@ -53,7 +56,7 @@ class LightsModel(HeadedModel):
         return bool(path) and not uneditable(self._edits.prim(path))
 
     def data(self, index: Any, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """Returns the data of a cell, also for ``ColourRole`` and ``ToneRole``."""
+        """Returns the data of a cell for a role, which may be ``ColourRole`` or ``ToneRole``."""
         path, column = self.rows[index.row()], index.column()
         if role == Qt.ItemDataRole.DisplayRole:
             if column == NAME:
@@ -144,6 +147,6 @@ class LightForm(FormModel):
         return self.path is not None and self._edits.light_is_edited(self.path, name)
 
     def set_value(self, name: str, value: Any) -> None:
-        """Edits a field; None resets it to the value of the stage."""
+        """Edits a field; the value None resets the field to the value in the stage's files."""
         if self.path is not None:
             self._edits.set_light(self.path, name, value)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Panels of lights and materials: a list, and below it the form of the selected row."""
+"""Panels of lights and of materials: each has a list, and a form for the selected row."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ if TYPE_CHECKING:
 
 
 class ListAndForm(QWidget):
-    """A list of prims, and the form of its selected row.
+    """Panel with a list of prims above a form that edits the selected prim.
 
-    The selection is kept when the list is read again.
+    The same prim stays selected when the list is read again.
 
     Args:
-        model: Model with the rows of the list.
-        form: Model with the fields of one row.
-        show: Function that shows the fields of a row, or no fields for None.
+        model: Table model of the list.
+        form: Form model that edits the selected row.
+        show: Function that makes the form show a row of the list; None clears the form.
         name: Object name in the singular, such as "light".
         title: Accessible name in the singular, such as "Light".
         tip: Tooltip of the list.
@@ -82,7 +82,10 @@ class ListAndForm(QWidget):
         return self.form.fields
 
     def choose_first(self, is_wanted: Callable[[Any], bool]) -> bool:
-        """Selects the first row that satisfies a predicate; returns whether there is such a row."""
+        """Selects the first row for which a function returns True.
+
+        Returns whether there is such a row.
+        """
         for number, row in enumerate(self.model.rows):
             if is_wanted(row):
                 self.view.selectRow(number)
@@ -106,7 +109,10 @@ class ListAndForm(QWidget):
 
 
 class LightsPanel(ListAndForm):
-    """Panel of the lights of the stage by path; "" stands for the default dome light."""
+    """Panel of the stage's lights.
+
+    A light is identified by its path; "" is the default dome light.
+    """
 
     def __init__(self, edits: SceneEdits) -> None:
         form = LightForm(edits)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plots and a table of the materials in a render: cost per shading record, number of records."""
+"""Plots and a table of shading costs: time per queued hit (record) and hits of each material."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class MaterialCost:
     predicted_ns: float
     """Predicted ns per shading record, used to schedule the next pass."""
     calibrated_ns: float
-    """Calibrated ns per shading record, measured before the first pass."""
+    """Calibrated ns per shading record, measured before the first pass of the render."""
     share: float
     """Fraction of the shading time of all materials, 0 to 1."""
 
@@ -63,7 +63,7 @@ class MaterialCost:
 def material_costs(stats: Mapping[str, Any], order: str = "time") -> list[MaterialCost]:
     """Returns the materials that were shaded, sorted in descending order.
 
-    ``order`` is the sort key, one of ``ORDERS``.
+    ``order`` is the name of the sort order, one of ``ORDERS``.
     """
     used = [one for one in stats.get("materials", ()) if one.get("records")]
     times = [one["records"] * (one["ns_per_record"] or one["predicted_ns"]) for one in used]
@@ -92,7 +92,7 @@ def material_costs(stats: Mapping[str, Any], order: str = "time") -> list[Materi
 
 
 def short_names(paths: Sequence[str]) -> list[str]:
-    """Returns the last part of each prim path, with as many parts as needed to be unique.
+    """Returns short unique names of prims: as many trailing parts of each path as necessary.
 
     >>> short_names(["/A/Looks/Gold", "/A/Looks/Wood", "/B/Looks/Gold", ""])
     ['A/Looks/Gold', 'Wood', 'B/Looks/Gold', '(no name)']
@@ -133,7 +133,7 @@ def predicted_colour() -> QColor:
 
 
 class MaterialsTab(QWidget):
-    """Tab with bars of the most costly materials, and a sortable table of all materials."""
+    """Tab with a bar chart of the most expensive materials and a table of all materials."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -231,7 +231,7 @@ class MaterialsTab(QWidget):
     def show_series(
         self, series: Sequence[Series], labels: Sequence[str], current: Series | None
     ) -> None:
-        """Draws the chosen series, or the current series if none was chosen."""
+        """Draws the costs of the chosen run series, or of the current series if none was chosen."""
         chosen = self.of.currentData()
         follow = self.of.currentIndex() <= 0 or chosen not in series
         blocked = self.of.blockSignals(True)

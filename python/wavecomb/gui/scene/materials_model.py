@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Materials of the scene as data: the list with costs, and the form of one material. No widgets."""
+"""Models of the scene's materials: a list with shading costs, and a form that edits one material.
+
+No widgets.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +53,7 @@ LABELS = {"conductor_eta": "eta", "conductor_k": "k"}
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the list: a material prim, or a material that the loader made.
+    """A row of the list, for a material prim or for a material that the loader created.
 
     Attributes:
         path: Path of the material prim, or "" if there is none.
@@ -66,7 +69,7 @@ class Row:
 
 
 def rows_of(scene: Scene, paths: tuple[str, ...]) -> list[Row]:
-    """Returns one row for each material prim, and for each material without a prim."""
+    """Returns a row for each material prim, and a row for each material that has no prim."""
     by_path: dict[str, list[int]] = {}
     for number, path in enumerate(paths):
         by_path.setdefault(path or f"#{number}", []).append(number)
@@ -108,7 +111,7 @@ class MaterialsModel(HeadedModel):
             self.tell(NAME, NAME)
 
     def count(self, statistics: dict[str, Any]) -> None:
-        """Updates record counts and costs from ``materials`` in the render statistics."""
+        """Updates hit counts and costs from the entry ``materials`` of the render statistics."""
         self._figures = statistics["materials"]
         self.tell(RECORDS, COST)
 
@@ -124,7 +127,7 @@ class MaterialsModel(HeadedModel):
         return out
 
     def data(self, index: Any, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """Returns a cell's data, also for ``ColourRole``."""
+        """Returns the data of a cell for a role, which may be ``ColourRole``."""
         row, column = self.rows[index.row()], index.column()
         if role == Qt.ItemDataRole.DisplayRole:
             if column == NAME:
@@ -150,10 +153,10 @@ class MaterialsModel(HeadedModel):
 
 
 class MaterialForm(FormModel):
-    """Form that edits one material, with the headings of its MaterialX definition.
+    """Form that edits one material under the group headings of its MaterialX definition.
 
     Attributes:
-        row: The material's row of the list; None if no material is shown.
+        row: The list's row of the edited material; None if no material is shown.
     """
 
     def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
@@ -188,21 +191,21 @@ class MaterialForm(FormModel):
         self.changed.emit()
 
     def value(self, name: str) -> Any:
-        """Returns the value that a field shows; None leaves the field as it is."""
+        """Returns the value that a field shows; None means that the field must not change."""
         parameter = self._now.get(name)
         if parameter is None or parameter.driven_by or self.row is None:
             return None
         return self._edits.parameter_value(self.row.path, parameter)
 
     def is_edited(self, name: str) -> bool:
-        """Returns whether a field has an edit that can be reset."""
+        """Returns whether a field has an edit that the user can reset."""
         parameter = self._now.get(name)
         if parameter is None or self.row is None:
             return False
         return self._edits.is_edited(self.row.path, parameter)
 
     def set_value(self, name: str, value: Any) -> None:
-        """Edits a field; None resets it to the value of the stage."""
+        """Edits a field; the value None resets the field to the value in the stage's files."""
         if self.row is not None:
             self._edits.set_parameter(self.row.path, name, value)
 
@@ -224,7 +227,10 @@ def range_of(parameter: Parameter) -> Range:
 
 
 def row_of(parameter: Parameter) -> FieldRow:
-    """Returns the field of a parameter; a driven parameter gets a field that names its source."""
+    """Returns the field of a parameter.
+
+    If a texture or primvar sets the parameter, the field names that source.
+    """
     name, one = parameter.name, parameter.definition
     title = name.replace("_", " ")
     driver, kind = "", NUMBER

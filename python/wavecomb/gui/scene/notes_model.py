@@ -21,7 +21,7 @@ KINDS = (UNSUPPORTED, WARNING, NOTE)
 
 @dataclass(frozen=True)
 class Row:
-    """One finding of the loader at a place: a prim path, a file, or "" for the whole stage."""
+    """A finding of the loader. ``place`` is a prim path, a file, or "" for the whole stage."""
 
     kind: str
     what: str
@@ -33,7 +33,10 @@ class Row:
 
 
 def rows_of(stage: LoadedStage) -> list[Row]:
-    """Returns a row for each prim or file of a finding, and one row that counts the others."""
+    """Returns a row for each listed prim or file of a finding.
+
+    One more row counts the prims or files that are not listed.
+    """
     out: list[Row] = []
     report = stage.report
 
@@ -60,7 +63,7 @@ class NotesModel(HeadedModel):
         super().__init__(HEADERS, parent)
 
     def data(self, index: Any, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """Returns the data of a cell, also for ``ToneRole``."""
+        """Returns the data of a cell for a role, which may be ``ToneRole``."""
         row = self.rows[index.row()]
         if role == Qt.ItemDataRole.DisplayRole:
             return (row.kind, row.what, row.place)[index.column()]
@@ -72,7 +75,7 @@ class NotesModel(HeadedModel):
 
 
 class NotesFilter(QSortFilterProxyModel):
-    """Filter for findings of one kind that contain a text in any column."""
+    """Filter for the loader's findings, by kind and by a text that a column must contain."""
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Panel of the loader's findings: unsupported features, errors in the stage, choices it made."""
+"""Panel of the loader's findings: unsupported features, stage errors, choices of the loader."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 class NotesPanel(QWidget):
     """List of the loader's findings with a filter.
 
-    A double click selects the prim of a finding; Ctrl+C copies lines.
+    A double click selects the prim of a finding. Ctrl+C copies the selected lines.
     """
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:

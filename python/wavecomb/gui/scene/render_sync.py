@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Updates the rendered scene after edits of a stage, without loading the stage again if possible.
+"""Applies edits of a stage to the rendered scene, without loading the stage again if possible.
 
-Edits of visibility and variants change the contents of the scene, so the stage is loaded again.
+Edits of visibility and variants add or remove objects of the scene, so the stage is loaded again.
 Edits of constants inside a material graph or a texture reader also load the stage again.
 """
 
@@ -32,10 +32,10 @@ if TYPE_CHECKING:
 
 
 class RenderSync:
-    """Base of ``SceneEdits``, which reads materials and lights of the stage and updates the render.
+    """Base class of ``SceneEdits``. Reads the stage's materials and lights and updates the render.
 
     Attributes:
-        session: The session whose scene follows the edits.
+        session: The session whose rendered scene is updated.
         stage_edits: Edits of the session's open stage.
     """
 
@@ -44,11 +44,11 @@ class RenderSync:
 
     @property
     def time(self) -> Usd.TimeCode:
-        """Time code at which attributes are read."""
+        """Time code at which the attributes of the stage are read."""
         return self.stage_edits.time
 
     def prim(self, path: str) -> Usd.Prim:
-        """Returns a prim by path, or an invalid prim if there is none."""
+        """Returns the prim at a path, or an invalid prim if there is none."""
         if not path or not Sdf.Path.IsValidPathString(path):
             return Usd.Prim()
         return self.stage_edits.stage.GetPrimAtPath(path)
@@ -56,16 +56,16 @@ class RenderSync:
     # ---- materials -----------------------------------------------------------------------------
 
     def parameters(self, path: str) -> dict[str, Parameter]:
-        """Returns the parameters of a material by name, empty if there is no such prim."""
+        """Returns the parameters of a material by name, or no parameters if it does not exist."""
         prim = self.prim(path)
         return material_parameters(prim, self.time) if prim else {}
 
     def parameter_value(self, path: str, parameter: Parameter) -> Any:
-        """Returns the current value of a parameter."""
+        """Returns the current value of a material parameter."""
         return self.stage_edits.values.get((Sdf.Path(path), f"!{parameter.name}"), parameter.value)
 
     def is_edited(self, path: str, parameter: Parameter) -> bool:
-        """Returns whether a parameter was edited in this window."""
+        """Returns whether a material parameter was edited in this window."""
         attribute = parameter.attribute
         if attribute is None:
             return (Sdf.Path(path), f"!{parameter.name}") in self.stage_edits.values
@@ -90,9 +90,10 @@ class RenderSync:
         return IN_INSTANCE if prim.IsInstanceProxy() else ""
 
     def light_value(self, path: str, name: str) -> Any:
-        """Returns the current value of one of ``light_inputs()``.
+        """Returns the current value of a light input, one of ``light_inputs()``.
 
-        For a light whose edits cannot be saved, the value is a factor on its authored colour.
+        If the edits of a light cannot be saved, the value is a factor on the light's authored
+        colour.
         """
         known = light_inputs()[name]
         if self.light_reason(path):
@@ -100,7 +101,10 @@ class RenderSync:
         return known.read(self.prim(path), self.time)
 
     def light_fields(self, path: str) -> list[LightInput]:
-        """Returns the editable inputs of a light: only brightness if edits cannot be saved."""
+        """Returns the editable inputs of a light.
+
+        Only brightness is editable if edits cannot be saved.
+        """
         return list(BRIGHTNESS) if self.light_reason(path) else inputs_of(self.prim(path))
 
     def light_key(self, path: str, name: str) -> Key:
@@ -116,7 +120,7 @@ class RenderSync:
     # ---- into the render -----------------------------------------------------------------------
 
     def make_step(self, step: Step) -> None:
-        """Applies a step to the stage and updates the render."""
+        """Applies an undo step to the stage and updates the render."""
         before = {} if step.structural else self.structures(step.prims)
         self.stage_edits.apply(step)
         moves = any(".xformOp" in what for _, what in step.after)
@@ -128,26 +132,29 @@ class RenderSync:
             self.show_step(step)
 
     def _materials_of(self, prim: Sdf.Path) -> set[str]:
-        """Returns the materials in use at a prim's path or at the paths of its ancestors."""
+        """Returns the used materials at the path of a prim or of one of its ancestors."""
         path, stage = str(prim), self.session.stage
         known = {one for one in stage.material_paths if one} if stage is not None else set()
         return {one for one in known if path == one or path.startswith(one + "/")}
 
     def live_values(self, path: str) -> dict[str, Any]:
-        """Returns the edited values of a material that no attribute can hold."""
+        """Returns the edited material values that have no attribute on the stage."""
         own = Sdf.Path(path)
         known = self.stage_edits.values.items()
         return {what[1:]: value for (prim, what), value in known if prim == own}
 
     def can_show(self, path: str, name: str, value: Any) -> bool:
-        """Returns whether the render can show a value that no attribute can hold."""
+        """Returns whether the render can show an edited value without loading the stage again."""
         known = self.live_values(path)
         before = surface_values(self.prim(path), self.time, known)
         after = surface_values(self.prim(path), self.time, {**known, name: value})
         return before is None or after is None or before.structure == after.structure
 
     def structures(self, prims: Iterable[Sdf.Path]) -> dict[str, str]:
-        """Returns, by path, the material properties that an existing scene cannot change."""
+        """Returns a text for each affected material that identifies its textures and graphs.
+
+        An existing scene cannot change textures and graphs.
+        """
         out = {}
         for path in {one for prim in prims for one in self._materials_of(prim)}:
             found = surface_values(self.prim(path), self.time)
@@ -171,7 +178,7 @@ class RenderSync:
                 self._sync_material(material)
 
     def _sync_material(self, path: str) -> None:
-        """Updates the scene materials of a prim with the current values of the stage."""
+        """Updates the scene's materials that come from a prim with the stage's current values."""
         scene = self.session.scene
         if scene is None:
             return
@@ -234,5 +241,5 @@ class RenderSync:
 
 
 def light_prim(path: str) -> Sdf.Path:
-    """Returns the key of a light; the default dome has a path that no prim has."""
+    """Returns the edit key of a light. The default dome light gets a path that no prim has."""
     return Sdf.Path(path) if path else Sdf.Path("/soft_dome_of_wavecomb")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Edits by the scene panels, which change the stage and update the live render."""
+"""Edits that the scene panels make to the stage and to the live render."""
 
 from __future__ import annotations
 
@@ -27,22 +27,23 @@ if TYPE_CHECKING:
 
 
 class SceneEdits(QObject, RenderSync):
-    """Edits of the session's open stage. Each edit is an undo step of ``history``.
+    """Editor of the session's open stage. Each edit is an undo step in ``history``.
 
     Edits of visibility and variants load the stage again. Edits of materials and lights change the
-    existing scene immediately.
+    existing scene without loading the stage again.
 
     Signals:
-        reset(): Another stage or none is open; prims of the earlier stage are invalid.
+        reset(): Another stage was opened, or the stage was closed. Prims of the earlier stage are
+            invalid.
         structure_changed(): Prims may have been added or removed.
-        scene_changed(): The stage was loaded (again), which changes indices of materials and
-            lights.
+        scene_changed(): The stage was loaded or loaded again, which changes indices of materials
+            and lights.
         changed(): A value was edited, or an edit was undone or redone.
 
     Attributes:
         history: Undo history of the edits.
         edits: Edits of the open stage; None without a stage.
-        solo: The light that is shown alone, or None.
+        solo: Path of the light that is shown alone, or None.
     """
 
     reset = Signal()
@@ -68,7 +69,7 @@ class SceneEdits(QObject, RenderSync):
 
     @property
     def edits(self) -> StageEdits | None:
-        """Edits of the open stage, or None."""
+        """Edits of the open stage; None without a stage."""
         return self.stage_edits if self._is_open else None
 
     @property
@@ -78,7 +79,7 @@ class SceneEdits(QObject, RenderSync):
 
     @property
     def stage(self) -> LoadedStage | None:
-        """The loaded stage, or None."""
+        """The loaded stage with its scene; None without a stage."""
         return self.session.stage
 
     @property
@@ -87,11 +88,11 @@ class SceneEdits(QObject, RenderSync):
         return self._solo.path
 
     def is_hidden(self, path: str) -> bool:
-        """Returns whether a prim is hidden, by itself or by an ancestor."""
+        """Returns whether a prim or one of its ancestors is hidden."""
         return state(self.prim(path), self.time)[0] in (HIDDEN, HIDDEN_ABOVE)
 
     def can_undo(self) -> str:
-        """Returns the text of the step that undo would revert, or ""."""
+        """Returns the description of the step that undo would revert, or "" if there is none."""
         return self.history.stack.undoText()
 
     def lines(self) -> list[str]:
@@ -112,7 +113,7 @@ class SceneEdits(QObject, RenderSync):
             self.set_visible(can, all(self.is_hidden(path) for path in can))
 
     def select_variant(self, path: str, name: str, choice: str | None) -> None:
-        """Selects a variant; None restores the selection of the stage."""
+        """Selects a variant; None restores the selection that the stage's files contain."""
         self._do(lambda edits: edits.variant(Sdf.Path(path), name, choice))
 
     def solo_light(self, path: str | None, lights: Iterable[str]) -> None:
@@ -144,13 +145,16 @@ class SceneEdits(QObject, RenderSync):
             self.changed.emit()
 
     def set_typing(self, typing: bool) -> None:
-        """Marks the start and end of typing a value, which becomes one undo step at any speed."""
+        """Marks the start and end of typing a value.
+
+        All changes in between become one undo step.
+        """
         self.history.set_typing(typing)
 
     # ---- materials -----------------------------------------------------------------------------
 
     def set_parameter(self, path: str, name: str, value: Any) -> None:
-        """Edits a parameter of a material; None restores the value of the stage."""
+        """Edits a parameter of a material; None restores the value in the stage's files."""
         parameter = self.parameters(path).get(name)
         label = f"{name} of {path}"
         if parameter is None or parameter.driven_by:
@@ -173,7 +177,7 @@ class SceneEdits(QObject, RenderSync):
     # ---- lights --------------------------------------------------------------------------------
 
     def set_light(self, path: str, name: str, value: Any) -> None:
-        """Edits an input of a light; None restores the value of the stage."""
+        """Edits an input of a light; None restores the value in the stage's files."""
         opinion: Opinion | None = None
         if value is not None and self.light_reason(path):
             opinion = Opinion(as_stored(value))
@@ -190,7 +194,7 @@ class SceneEdits(QObject, RenderSync):
         return placement(self.prim(path), self.time) if self._is_open else None
 
     def move(self, before: Placement, change: Gf.Matrix4d) -> None:
-        """Changes a transform by a matrix in world space, for row vectors."""
+        """Changes a prim's transform by a matrix in world space, in the row vector convention."""
         self._do(lambda edits: edits.plan(f"transform of {before.path}", before.moved(change)))
 
     # ---- history -------------------------------------------------------------------------------
@@ -204,7 +208,7 @@ class SceneEdits(QObject, RenderSync):
         self.history.redo()
 
     def save(self, path: str) -> bool:
-        """Writes the edits as a layer over the stage; returns whether it succeeded."""
+        """Saves the edits as a layer over the stage; returns whether the file was written."""
         if self.edits is None:
             self.session.failed.emit("there is no stage: open one first")
             return False
@@ -226,7 +230,7 @@ class SceneEdits(QObject, RenderSync):
         self._do(lambda edits: edits.plan(label, {key: opinion}))
 
     def _do(self, plan: Callable[[StageEdits], Step | None]) -> None:
-        """Applies a planned step and adds it to the history."""
+        """Applies a new undo step and adds it to the history."""
         if self.edits is None:
             return
         try:
@@ -238,7 +242,7 @@ class SceneEdits(QObject, RenderSync):
             self.history.push(step)
 
     def _perform(self, step: Step) -> None:
-        """Applies a step of the history and updates the render."""
+        """Applies an undo step of the history and updates the render."""
         if not self._is_open:
             return
         self._touched |= set(step.prims)
@@ -269,7 +273,7 @@ class SceneEdits(QObject, RenderSync):
         self.changed.emit()
 
     def _forget(self, edits: StageEdits | None = None) -> None:
-        """Drops all undo steps, because another stage or none is open."""
+        """Removes all undo steps, because another stage was opened or the stage was closed."""
         self.stage_edits, self._is_open = edits or _no_edits(), edits is not None
         self._solo, self._touched = Solo(), set()
         self.history.clear()
@@ -278,10 +282,10 @@ class SceneEdits(QObject, RenderSync):
 
 
 def _no_edits() -> StageEdits:
-    """Returns edits of an empty stage, for use while no stage is open."""
+    """Returns an editor of an empty stage, for use while no stage is open."""
     return StageEdits(Usd.Stage.CreateInMemory(), Usd.TimeCode.Default())
 
 
 def _word(word: str) -> Opinion:
-    """Returns a value for the attribute ``visibility``."""
+    """Returns an opinion for the attribute ``visibility``."""
     return Opinion(word, Sdf.ValueTypeNames.Token)

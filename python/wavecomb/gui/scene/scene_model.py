@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The prims of a stage as a tree model that is read on demand."""
+"""Tree model of the prims of a stage, which reads prims only when a view requests them."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ NAME, TYPE, VISIBILITY, VARIANTS = range(4)
 HEADERS = ("Name", "Type", "Visible", "Variants")
 PathRole = Qt.ItemDataRole.UserRole
 StateRole = Qt.ItemDataRole.UserRole + 1
-"""Item data role of a prim's visibility state, for the eye icon."""
+"""Item data role of a prim's visibility state, which the eye icon shows."""
 
 PREDICATE = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
 ROOT = QModelIndex()
 
 CHUNK = 500
-"""Number of children that the model passes to a view at once. The view requests more when it
-scrolls to the end."""
+"""Number of children of a prim that the model passes to a view at once. The view requests more
+children when it scrolls to the end."""
 
 
 class _Node:
-    """A row of the tree, which stands for one prim.
+    """A node of the tree, for one prim.
 
-    The list of child names is None until requested; child nodes are created on demand.
+    The list of child names is None until a view requests it. Child nodes are created on demand.
     """
 
     __slots__ = ("made", "names", "parent", "path", "row", "shown")
@@ -48,9 +48,9 @@ class _Node:
 
 
 class SceneModel(QAbstractItemModel):
-    """Tree model of prims with the columns name, type, visibility and variants.
+    """Tree model of a stage's prims, with columns for name, type, visibility and variants.
 
-    Shows the prims inside instances.
+    The tree includes the prims inside instances.
     """
 
     def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
@@ -61,7 +61,10 @@ class SceneModel(QAbstractItemModel):
         self._root = _Node(Sdf.Path.absoluteRootPath, None, 0)
 
     def reset(self, matches: Collection[Sdf.Path] | None = None) -> None:
-        """Reads all prims again; given search matches, shows only those and their ancestors."""
+        """Reads all prims again.
+
+        If ``matches`` is given, shows only those prims and their ancestors.
+        """
         self.beginResetModel()
         self._matches = matches or ()
         self._filter = None
@@ -89,7 +92,7 @@ class SceneModel(QAbstractItemModel):
         return QModelIndex() if node is self._root else self.createIndex(node.row, NAME, node)
 
     def refresh(self) -> None:
-        """Updates the cells of all rows."""
+        """Updates the cells of all rows, after edits of visibility or variants."""
         top = self.rowCount()
         if top:
             self.dataChanged.emit(self.index(0, 0), self.index(top - 1, len(HEADERS) - 1))
@@ -125,7 +128,7 @@ class SceneModel(QAbstractItemModel):
         return node.shown < len(self._names(node))
 
     def fetchMore(self, parent: QModelIndex = ROOT) -> None:
-        """Passes more children of a row to the view."""
+        """Passes the next children of a row to the view."""
         node = self._node(parent)
         count = min(len(self._names(node)), node.shown + CHUNK)
         if count > node.shown:
@@ -157,7 +160,7 @@ class SceneModel(QAbstractItemModel):
         return parent.column() <= 0 and bool(self._names(self._node(parent)))
 
     def rowCount(self, parent: QModelIndex = ROOT) -> int:
-        """Returns the number of rows that the view has."""
+        """Returns the number of child rows that were passed to the view."""
         if parent.column() > 0:
             return 0
         node = self._node(parent)
@@ -180,7 +183,10 @@ class SceneModel(QAbstractItemModel):
         return None
 
     def data(self, index: QModelIndex, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """Returns a cell's data, also for ``PathRole``, ``StateRole`` and ``ToneRole``."""
+        """Returns the data of a cell for a role.
+
+        The role may be ``PathRole``, ``StateRole`` or ``ToneRole``.
+        """
         prim = self.prim(index)
         if not prim:
             return None
@@ -245,13 +251,15 @@ class SceneModel(QAbstractItemModel):
 
 
 def search(usd: Usd.Stage, text: str, step: int = 500) -> Iterator[list[Sdf.Path]]:
-    """Finds prims whose name or type contains a text, or whose path does if the text has a "/".
+    """Finds the prims whose name or type contains a text.
+
+    If the text has a "/", searches the paths.
 
     Args:
         usd: The stage.
         text: The text to find; case is ignored.
-        step: Number of prims searched per yielded list, so that the caller can do other work
-            between.
+        step: Number of prims to search before a list is yielded. The caller can do other work
+            between lists.
     """
     wanted = text.casefold()
     by_path = "/" in wanted

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scene panel: tree with visibility and variants, materials, lights, and findings of the loader."""
+"""Scene panel: tree of prims, materials, lights, and findings of the loader."""
 
 from __future__ import annotations
 
@@ -33,11 +33,12 @@ if TYPE_CHECKING:
 
 
 class ScenePanel(QWidget):
-    """Panel with tabs, whose selection is synchronised with the session.
+    """Panel with tabs for the stage's contents. The selection is synchronised with the session.
 
     Signals:
         selected(str): A prim was selected, in any panel or in the image.
-        frame_wanted(): F was pressed in the tree, to frame the selected prims.
+        frame_wanted(): The user pressed F in the tree, so that the camera should frame the selected
+            prims.
     """
 
     selected = Signal(str)
@@ -93,7 +94,7 @@ class ScenePanel(QWidget):
         self._count_notes()
 
     def shutdown(self) -> None:
-        """Clears the undo history, because Qt destroys its stack before Python's objects."""
+        """Clears the undo history, because Qt destroys the undo stack before Python's objects."""
         self.edits.history.clear()
 
     def _make_actions(self) -> None:
@@ -113,7 +114,10 @@ class ScenePanel(QWidget):
     # ---- edits ---------------------------------------------------------------------------------
 
     def save(self) -> None:
-        """Writes the edits to the layer of the previous save, or asks for a file."""
+        """Saves the edits to the layer of the previous save.
+
+        Asks for a file before the first save.
+        """
         if self._layer and self._layer[0] == self.session.path:
             self.edits.save(self._layer[1])
         else:
@@ -124,7 +128,7 @@ class ScenePanel(QWidget):
             self._layer = self.session.path, path
 
     def ask_save(self) -> None:
-        """Asks for a file and writes the edits to this file."""
+        """Asks for a file name and saves the edits to this file."""
         stage = self.session.stage
         start = ""
         if stage is not None:
@@ -140,7 +144,7 @@ class ScenePanel(QWidget):
         self.state.setToolTip("\n".join(shown))
 
     def select_parent(self) -> None:
-        """Selects the parent of the selected prim, unless it is the root."""
+        """Selects the parent of the selected prim, unless the parent is the root of the stage."""
         if parent := (self.session.selection or "").rpartition("/")[0]:
             self.session.select(parent)
 
@@ -172,7 +176,7 @@ class ScenePanel(QWidget):
         self.variants.show_prim(self.variants_path())
 
     def variants_path(self) -> str | None:
-        """Returns the prim whose variants are shown, or None."""
+        """Returns the prim whose variant sets are shown, or None."""
         path = (self.session.selection or "").partition("[")[0]
         return path if path and Sdf.Path.IsValidPathString(path) else None
 

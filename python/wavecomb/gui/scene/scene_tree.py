@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tree of the stage with visibility and variants."""
+"""Tree view of a stage's prims with their visibility and variants."""
 
 from __future__ import annotations
 
@@ -60,12 +60,15 @@ if TYPE_CHECKING:
 
 
 class EyeDelegate(QStyledItemDelegate):
-    """Delegate that paints an eye: open, crossed out, or faint if an ancestor is hidden."""
+    """Delegate that paints an eye icon.
+
+    The icon is crossed out if the prim is hidden, and faint if an ancestor is hidden.
+    """
 
     def sizeHint(
         self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
     ) -> QSize:
-        """Returns a size that is large enough to click."""
+        """Returns a cell size that is large enough for clicking."""
         return QSize(theme.em(2), theme.em(1.5))
 
     def paint(
@@ -106,7 +109,7 @@ MAX_FOUND = 2000
 """Largest number of prims that a search shows."""
 
 MAX_EXPANDED = 300
-"""With more matches, only the ancestors of the first are expanded."""
+"""If a search has more matches, only the ancestors of the first match are expanded."""
 
 
 class _View(QTreeView):
@@ -115,7 +118,7 @@ class _View(QTreeView):
     The space bar and a click on the eye icon toggle visibility.
 
     Signals:
-        frame_wanted(): The user pressed F to frame the selected prims.
+        frame_wanted(): The user pressed F, so that the camera should frame the selected prims.
     """
 
     frame_wanted = Signal()
@@ -131,7 +134,10 @@ class _View(QTreeView):
         return [index.data(PathRole) for index in self.selectionModel().selectedRows(NAME)]
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Handles Space (visibility) and F (frame), and all other keys as Qt does."""
+        """Handles Space, which toggles visibility, and F, which frames prims.
+
+        Passes other keys to Qt.
+        """
         if event.modifiers() or event.key() not in (Qt.Key.Key_Space, Qt.Key.Key_F):
             super().keyPressEvent(event)
             return
@@ -142,7 +148,10 @@ class _View(QTreeView):
         event.accept()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Toggles visibility by a click on an eye, for all selected prims if it is one of them."""
+        """Toggles visibility by a click on an eye icon.
+
+        A click on a selected prim toggles all selected prims.
+        """
         index = self.indexAt(event.position().toPoint())
         if event.button() == Qt.MouseButton.LeftButton and index.isValid():
             path = index.data(PathRole)
@@ -178,7 +187,7 @@ class _View(QTreeView):
 
 
 class SceneTree(QWidget):
-    """Search field, tree, and a line with the number of matches."""
+    """Scene tree with a search field above and a line with the number of matches below."""
 
     def __init__(self, edits: SceneEdits, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -242,7 +251,7 @@ class SceneTree(QWidget):
     # ---- what is selected ----------------------------------------------------------------------
 
     def choose(self, path: str | None) -> None:
-        """Selects and shows a prim, given its path or the name from ``Renderer.pick``."""
+        """Selects a prim and scrolls to it, given its path or the name from ``Renderer.pick``."""
         plain = (path or "").partition("[")[0].rstrip("/")
         index = QModelIndex()
         if plain and Sdf.Path.IsValidPathString(plain):
@@ -297,7 +306,7 @@ class SceneTree(QWidget):
             self.view.expand(self.model.index(row, 0))
 
     def _on_structure(self) -> None:
-        """Reads the rows again and restores the expanded ones."""
+        """Reads the rows again and expands those that were expanded before."""
         opened: list[Sdf.Path] = []
         stack = [self.model.index(row, 0) for row in range(self.model.rowCount())]
         while stack:

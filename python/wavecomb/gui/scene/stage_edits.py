@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Edits of a stage in its session layer: planning, applying and listing them. Independent of Qt.
+"""Plans, applies and lists edits of a stage, which are stored in its session layer.
+
+Independent of Qt.
 
 Edits must be used on the thread that owns the stage. Edits never write to the files of the stage.
 """
@@ -16,13 +18,13 @@ from wavecomb.errors import WavecombError
 from wavecomb.gui.scene.visibility import hide, show, uneditable
 
 Key = tuple[Sdf.Path, str]
-"""Key of an edit: a prim, and ``.NAME`` of an attribute, ``{NAME}`` of a variant set, or ``!NAME``
-of a value that no attribute of the stage can hold."""
+"""Key of an edit: the path of a prim, and a text. The text is ``.NAME`` for an attribute,
+``{NAME}`` for a variant set, or ``!NAME`` for a value that has no attribute on the stage."""
 
 
 @dataclass(frozen=True)
 class Opinion:
-    """Value that the session layer has for one key.
+    """Value that the session layer contains for an edit key.
 
     Attributes:
         value: Value of the attribute, or name of the variant.
@@ -44,7 +46,7 @@ class VariantSet:
 
 @dataclass(frozen=True)
 class Solo:
-    """The light that is shown alone, or None, and the earlier visibility of all lights."""
+    """Path of the light that is shown alone, or None, and the earlier visibility of all lights."""
 
     path: str | None = None
     before: Mapping[Key, Opinion | None] = field(default_factory=dict)
@@ -56,9 +58,9 @@ class Step:
 
     Attributes:
         label: Displayed description, such as "intensity of /Key".
-        before: Opinions before the step by edit key, None for no opinion.
+        before: Opinions before the step, by edit key; None means that there was no opinion.
         after: Opinions after the step, with the same edit keys.
-        solo: Solo state before and after the step; None if unchanged.
+        solo: Light shown alone before and after the step; None if the step does not change it.
     """
 
     label: str
@@ -67,39 +69,48 @@ class Step:
     solo: tuple[Solo, Solo] | None = None
 
     def inverse(self) -> Step:
-        """Returns the step that reverts this one."""
+        """Returns a step that reverts this step."""
         solo = self.solo[::-1] if self.solo is not None else None
         return Step(f"undo {self.label}", self.after, self.before, solo)
 
     def then(self, later: Step) -> Step:
-        """Merges this step with a later step that has no additional keys."""
+        """Returns this step merged with a later step.
+
+        This step must contain all edit keys of the later step.
+        """
         return Step(later.label, self.before, {**self.after, **later.after}, self.solo)
 
     @property
     def drags(self) -> bool:
-        """Whether the step may be part of a drag. Resetting a value is always a separate step."""
+        """Whether the step can be merged with other steps of a drag.
+
+        Resetting a value is always a separate step.
+        """
         return not self.structural and self.solo is None and None not in self.after.values()
 
     @property
     def structural(self) -> bool:
-        """Whether the stage must be loaded again, because visibility or variants changed."""
+        """Whether the stage must be loaded again.
+
+        This is necessary if visibility or variants change.
+        """
         return any(what == ".visibility" or what.startswith("{") for _, what in self.after)
 
     @property
     def prims(self) -> tuple[Sdf.Path, ...]:
-        """Prims that the edit keys of the step belong to."""
+        """Paths of the prims that the step edits."""
         return tuple(dict.fromkeys(path for path, _ in self.after))
 
 
 @dataclass
 class StageEdits:
-    """The edits of one USD stage.
+    """Edits of one USD stage, stored in its session layer.
 
     Attributes:
-        stage: The stage, whose session layer holds the edits.
-        time: Time code at which attributes are read.
-        values: Edited values that no attribute can hold, by prim and parameter name. Values that no
-            attribute can hold affect the image but cannot be saved.
+        stage: The edited stage.
+        time: Time code at which the attributes of the stage are read.
+        values: Edited values that have no attribute on the stage, by prim and parameter name.
+            Values without an attribute affect the image but cannot be saved.
     """
 
     stage: Usd.Stage
@@ -121,7 +132,7 @@ class StageEdits:
         return out
 
     def opinion(self, key: Key) -> Opinion | None:
-        """Returns the edited value of a key, or None."""
+        """Returns the edited value of an edit key, or None if there is no edit."""
         path, what = key
         if what.startswith("!"):
             return Opinion(self.values[key]) if key in self.values else None
@@ -138,7 +149,7 @@ class StageEdits:
         return Opinion(attribute.default, attribute.typeName)
 
     def edited(self) -> list[Key]:
-        """Returns the keys of all edits, in the order of the stage.
+        """Returns the keys of all edits, sorted in the order of the stage's prims.
 
         Edits that cannot be saved come last.
         """
@@ -156,7 +167,7 @@ class StageEdits:
         return [*sorted(found), *sorted(self.values)]
 
     def lines(self) -> list[str]:
-        """Returns the edits, one line each."""
+        """Returns descriptions of the edits, one line each."""
         out = []
         for key in self.edited():
             path, what = key
@@ -172,9 +183,10 @@ class StageEdits:
     # ------------------
 
     def visible(self, paths: Iterable[Sdf.Path], visible: bool) -> Step | None:
-        """Plans to show or hide prims.
+        """Returns an undo step that shows or hides prims.
 
-        The opinions equal the result of ``UsdGeom.Imageable.MakeVisible`` and ``MakeInvisible``.
+        The step authors the same opinions as ``UsdGeom.Imageable.MakeVisible`` or
+        ``MakeInvisible``.
 
         Raises:
             WavecombError: A prim is inside an instance.
@@ -193,10 +205,11 @@ class StageEdits:
         return self.plan(f"{'show' if visible else 'hide'} {name}", opinions)
 
     def variant(self, path: Sdf.Path, name: str, choice: str | None) -> Step | None:
-        """Plans to select a variant; None restores the selection of the stage.
+        """Returns an undo step that selects a variant; None restores the stage's selection.
 
         Raises:
-            WavecombError: There is no such set or variant, or the prim is inside an instance.
+            WavecombError: There is no such variant set or variant, or the prim is inside an
+                instance.
         """
         prim = self.stage.GetPrimAtPath(path)
         if prim and (prim.IsInstanceProxy() or prim.IsInPrototype()):
@@ -209,7 +222,7 @@ class StageEdits:
         return self.plan(f"{name} of {path}", {(path, f"{{{name}}}"): opinion})
 
     def plan(self, label: str, opinions: Mapping[Key, Opinion | None]) -> Step | None:
-        """Plans a step that sets opinions or, for None, removes them."""
+        """Returns an undo step that sets opinions, and removes those whose value is None."""
         before = {key: self.opinion(key) for key in opinions}
         step = Step(
             label,
@@ -264,7 +277,7 @@ def _remove(layer: Sdf.Layer, path: Sdf.Path, what: str) -> None:
 
 
 def _text(value: Any) -> str:
-    """Formats a value for people, with numbers of four digits."""
+    """Formats a value for people. Numbers have four digits."""
     if isinstance(value, str):
         return value
     if hasattr(value, "__len__"):

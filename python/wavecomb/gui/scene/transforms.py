@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Edits of a prim's transform, as an additional transform operation over the authored ones.
+"""Edits of a prim's transform, stored in an additional transform operation of the prim.
 
 Independent of Qt.
 """
@@ -14,19 +14,19 @@ from wavecomb.gui.scene.stage_edits import Key, Opinion
 from wavecomb.usd.lights.light import KINDS
 
 OP = "xformOp:transform:edit"
-"""Name of the transform operation that holds all edits and is applied after the prim's other
-operations."""
+"""Name of the transform operation that holds all edits. The operation is applied after the prim's
+other operations."""
 _RESET = "!resetXformStack!"
 
 
 @dataclass(frozen=True)
 class Placement:
-    """The transform of a prim before an edit.
+    """The transform of a prim at the start of an edit.
 
     Attributes:
         path: Path of the prim.
-        edit: Value of the operation ``OP``.
-        parent: Transform from the parent to the world, applied after ``OP``.
+        edit: Value of the transform operation ``OP``.
+        parent: Transform from the parent's space to world space, applied after ``OP``.
         order: Names of the prim's transform operations.
     """
 
@@ -36,7 +36,10 @@ class Placement:
     order: tuple[str, ...]
 
     def moved(self, change: Gf.Matrix4d) -> dict[Key, Opinion | None]:
-        """Returns the opinions after a change in world space, for row vectors."""
+        """Returns the opinions after a change by a matrix in world space.
+
+        The matrix applies to row vectors.
+        """
         value = self.edit * (self.parent * change * self.parent.GetInverse())
         order = list(self.order)
         if OP not in order:
@@ -61,7 +64,7 @@ def placement(prim: Usd.Prim, time: Usd.TimeCode) -> Placement | None:
 
 
 def moves_alone(prim: Usd.Prim, time: Usd.TimeCode) -> bool:
-    """Returns whether a single light, and nothing else, follows the transform of a prim."""
+    """Returns whether a prim's transform is constant and moves one light and nothing else."""
     if not prim or str(prim.GetTypeName()) not in KINDS or prim.GetAllChildren():
         return False
     others = (prim.GetRelationship(name) for name in ("light:filters", "portals"))

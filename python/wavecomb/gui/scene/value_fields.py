@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fields for numbers and colours that are edited live: slider, number, colour button, reset."""
+"""Form fields for numbers and colours, with slider, number box, colour and reset buttons."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ def _is_history(event: Any) -> bool:
 
 
 class _Spin(QDoubleSpinBox):
-    """Number field that emits changes while typing and uses a point as decimal mark.
+    """Number box that emits changes while the user types and uses a point as decimal mark.
 
-    The field leaves undo and redo to the window and has no undo history.
+    The number box has no undo history. Undo and redo shortcuts reach the window.
 
     Signals:
         typing(bool): The user began (True) or finished typing a value into the field.
@@ -65,7 +65,10 @@ class _Spin(QDoubleSpinBox):
         self.setMinimumWidth(theme.em(3.4))
 
     def show_value(self, value: float) -> None:
-        """Shows a value, extending the range if needed, without emitting a signal."""
+        """Shows a value without emitting a signal.
+
+        Extends the range of the number box if needed.
+        """
         with QSignalBlocker(self):
             self.setRange(min(self.minimum(), value), max(self.maximum(), value))
             self.setValue(value)
@@ -78,7 +81,7 @@ class _Spin(QDoubleSpinBox):
         return super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Ignores undo and redo of the text, which would change the value without an edit."""
+        """Ignores undo and redo of the typed text, which would bypass the window's undo history."""
         if _is_history(event):
             event.ignore()
             return
@@ -93,7 +96,10 @@ class _Spin(QDoubleSpinBox):
             self.typing.emit(False)
 
     def wheelEvent(self, event: Any) -> None:
-        """Changes the value only with the focus, so that scrolling a list does not edit fields."""
+        """Changes the value only while the box has the focus.
+
+        Otherwise scrolling a list would edit fields.
+        """
         if self.hasFocus():
             super().wheelEvent(event)
         else:
@@ -101,11 +107,11 @@ class _Spin(QDoubleSpinBox):
 
 
 class Field(QWidget):
-    """Base class of fields: a row with a reset button.
+    """Base class of form fields: a row with a reset button.
 
     Signals:
         changed(value): The user changed the value: a number, a colour or a bool.
-        reset(): The user asks for the authored value of the stage.
+        reset(): The user wants to restore the value in the stage's files.
         typing(bool): The user began (True) or finished typing a value.
     """
 
@@ -140,12 +146,12 @@ class Field(QWidget):
         raise NotImplementedError
 
     def set_edited(self, edited: bool) -> None:
-        """Enables the reset button if there is an edit."""
+        """Enables the reset button if the field has an edit."""
         self.back.setEnabled(edited)
 
 
 class NumberField(Field):
-    """Field of a slider and a number box."""
+    """Form field of a slider and a number box."""
 
     def __init__(self, name: str, bounds: Range = UNIT) -> None:
         super().__init__(name)
@@ -169,7 +175,7 @@ class NumberField(Field):
         self.spin.valueChanged.connect(self._on_spin)
 
     def value(self) -> float:
-        """Returns the value of the number."""
+        """Returns the value in the number box."""
         return self.spin.value()
 
     def set_value(self, value: float) -> None:
@@ -193,7 +199,7 @@ class NumberField(Field):
 
 
 class SwitchField(Field):
-    """Field of a check box."""
+    """Form field of a check box."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
@@ -204,7 +210,7 @@ class SwitchField(Field):
         self.box.toggled.connect(lambda on: self.changed.emit(on))
 
     def value(self) -> bool:
-        """Returns whether the box is checked."""
+        """Returns whether the check box is checked."""
         return self.box.isChecked()
 
     def set_value(self, value: Any) -> None:
@@ -214,7 +220,7 @@ class SwitchField(Field):
 
 
 class ColourField(Field):
-    """Field of a button that opens a colour dialog, and of three linear numbers below."""
+    """Form field for a colour: a button that opens a colour dialog, and three linear numbers."""
 
     def __init__(self, name: str, bounds: Range = UNIT) -> None:
         super().__init__(name)
@@ -266,7 +272,10 @@ class ColourField(Field):
         self.changed.emit(self.value())
 
     def _choose(self) -> None:
-        """Opens a modeless colour dialog. A colour brighter than white keeps its peak value."""
+        """Opens a colour dialog that does not block the window.
+
+        A colour brighter than white keeps its largest component.
+        """
         before = self.value()
         peak = max(1.0, *before)
         r, g, b = (part / peak for part in before)
@@ -295,7 +304,7 @@ class ColourField(Field):
 
 
 class PlainText(QLineEdit):
-    """A read-only line that can be copied, even if it is too narrow for its text."""
+    """Read-only text line that can be copied, even if the line is too narrow for its text."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text)

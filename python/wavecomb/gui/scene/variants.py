@@ -30,7 +30,7 @@ class VariantBar(QWidget):
         self.hide()
 
     def show_prim(self, path: str | None) -> None:
-        """Shows the variants of another prim."""
+        """Shows the variant sets of another prim."""
         self.model.show_prim(path)
 
     def _fill(self) -> None:
@@ -53,8 +53,8 @@ class VariantBar(QWidget):
     def _clear(self) -> None:
         """Removes all rows.
 
-        The widgets are deleted later, because a combo box may still be handling the event that
-        caused the call.
+        The old widgets are deleted later, because one of them may still be handling the event that
+        led to this call.
         """
         self.combos = {}
         while self._form.rowCount():

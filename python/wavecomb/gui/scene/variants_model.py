@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class VariantsModel(QObject):
-    """Variant sets of one prim.
+    """Model of the variant sets of one prim.
 
     Signals:
         changed(): ``sets`` changed.
@@ -22,7 +22,7 @@ class VariantsModel(QObject):
     Attributes:
         path: Path of the prim, or None.
         sets: Variant sets of the prim.
-        editable: Whether variants can be selected, which is not possible inside an instance.
+        editable: Whether variants can be selected. This is not possible inside an instance.
     """
 
     changed = Signal()
@@ -42,7 +42,7 @@ class VariantsModel(QObject):
         self._read()
 
     def choose(self, name: str, choice: str | None) -> None:
-        """Selects a variant; None restores the selection of the stage."""
+        """Selects a variant; None restores the selection in the stage's files."""
         if self.path is not None:
             self._edits.select_variant(self.path, name, choice)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Visibility on a stage, and the opinions that would change it, which the caller authors."""
+"""Visibility of prims on a stage, and the visibility opinions that show or hide a prim."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from collections.abc import Mapping
 from pxr import Sdf, Usd, UsdGeom
 
 Words = dict[Sdf.Path, str]
-"""Visibility opinions: "invisible" or "inherited" by prim."""
+"""Visibility opinion of each prim, "invisible" or "inherited"."""
 
 VISIBLE, HIDDEN, HIDDEN_ABOVE, NOT_DRAWN = "visible", "hidden", "hidden above", ""
-"""Values of ``state``: drawn, hidden by an opinion of the prim or of an ancestor, not drawable."""
+"""Results of ``state``: drawn, hidden by an opinion of the prim, hidden by an ancestor, or not
+drawable."""
 
 
 def uneditable(prim: Usd.Prim) -> str:
@@ -31,7 +32,7 @@ def says_hidden(prim: Usd.Prim, time: Usd.TimeCode) -> bool:
 
 
 def state(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[str, Sdf.Path | None]:
-    """Returns the state of a prim, and the prim that hides it or None."""
+    """Returns the visibility state of a prim, and the prim that hides it (or None)."""
     if not prim or not prim.IsA(UsdGeom.Imageable):
         return NOT_DRAWN, None
     if says_hidden(prim, time):

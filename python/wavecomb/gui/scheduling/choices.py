@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Choices, descriptions and presets of the scheduling panel. Independent of Qt."""
+"""Setting values, descriptions and presets that the scheduling panel offers. Independent of Qt."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from wavecomb.options import names, settings
 
 @dataclass(frozen=True)
 class Choice:
-    """A setting with named values."""
+    """A setting with a fixed set of values, shown as a drop-down field."""
 
     field: str
     label: str
@@ -25,7 +25,7 @@ class Choice:
 
 @dataclass(frozen=True)
 class Number:
-    """A numeric setting. If the number is 0, the field shows the text ``zero``."""
+    """A numeric setting. If the setting is 0, the field shows the text in ``zero`` instead."""
 
     field: str
     label: str
@@ -39,7 +39,7 @@ class Number:
 
 
 def lane_choices() -> dict[Any, str]:
-    """Returns the SIMD widths of this build, with descriptions."""
+    """Returns the SIMD widths that this build supports, with descriptions."""
     from wavecomb import _core
 
     widths = _core.lane_widths()
@@ -59,7 +59,7 @@ WAVE_SIZES: dict[Any, str] = {
 
 
 def choice(name: str) -> Choice:
-    """Returns the description of a drop-down field for a setting of the core's table."""
+    """Returns the drop-down field of a setting in the core's table of settings."""
     row = settings()[name]
     values: dict[Any, str] = dict(row.choices)
     if name == "wave_size":
@@ -80,11 +80,11 @@ _SHOWN: dict[str, dict[str, Any]] = {
     "roulette_depth": {"most": 64},
     "min_spp": {"most": 65536},
 }
-"""Display options of fields that differ from the core's table."""
+"""Display options of fields that replace those in the core's table of settings."""
 
 
 def number(name: str) -> Number:
-    """Returns the description of a number field for a setting of the core's table."""
+    """Returns the number field of a setting in the core's table of settings."""
     row = settings()[name]
     values: dict[str, Any] = {"least": row.least or 0, "most": row.most, "zero": row.zero}
     if row.kind == "number":
@@ -95,7 +95,7 @@ def number(name: str) -> Number:
 
 
 def fields_of(group: str, without: tuple[str, ...] = ()) -> tuple[Choice | Number, ...]:
-    """Returns the settings of a group as fields, in the order of the table."""
+    """Returns the fields of a group of settings, in the order of the core's table."""
     rows = (settings()[name] for name in names(group, without=without))
     is_choice = lambda row: row.kind == "choice" or row.name in ("lanes", "wave_size")  # noqa: E731
     return tuple(choice(row.name) if is_choice(row) else number(row.name) for row in rows)
@@ -112,7 +112,7 @@ WORK_FIELDS = names("work")
 
 
 def scheduling_of(setup: Setup) -> dict[str, Any]:
-    """Returns the settings that distinguish series, including the names of loaded policies."""
+    """Returns the settings that distinguish run series, including the names of loaded policies."""
     values = {name: getattr(setup, name) for name in FIELDS}
     if setup.own_policy is not None:
         values["policy"] = setup.own_policy.name
@@ -122,9 +122,9 @@ def scheduling_of(setup: Setup) -> dict[str, Any]:
 
 
 def promise(setup: Setup) -> str:
-    """Returns a text that says how the settings for the order of work affect the image.
+    """Returns a text that says whether the settings for the order of work affect the image.
 
-    Settings of order do not change the image, except with a time limit or cost-aware roulette.
+    The order of work does not change the image, except with a time limit or cost-aware roulette.
     """
     if setup.time_limit:
         return (
@@ -140,7 +140,7 @@ def promise(setup: Setup) -> str:
 
 
 def recipe_of(setup: Setup) -> dict[str, Any]:
-    """Returns the fields of a setup that restore the given settings."""
+    """Returns the fields of a setup that must be restored to repeat a run."""
     return {name: getattr(setup, name) for name in (*FIELDS, "own_policy", "profile")}
 
 
@@ -151,7 +151,7 @@ def defaults(names: tuple[str, ...]) -> dict[str, Any]:
 
 
 def presets() -> dict[str, tuple[str, dict[str, Any]]]:
-    """Returns presets as (description, settings) by name.
+    """Returns the presets by name. Each preset is a pair of a description and settings.
 
     All presets except the first set only the order of work.
     """

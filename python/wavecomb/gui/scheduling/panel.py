@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scheduling panel: settings of order and amount of work, which can change during a render."""
+"""Scheduling panel: settings for the order and amount of work, which can change during a render."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _PROFILE_FILTER = "Cost profile (*.json);;All files (*)"
 class SchedulingPanel(QScrollArea):
     """Panel of the session's scheduling settings.
 
-    The only state of the panel is the list of loaded policies.
+    The panel itself stores only the list of loaded policies.
     """
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
@@ -76,7 +76,7 @@ class SchedulingPanel(QScrollArea):
         self._show(session.setup)
 
     def shutdown(self) -> None:
-        """Ends the thread of the bit-comparison indicator."""
+        """Ends the thread of the indicator that compares image bits."""
         self.light.shutdown()
 
     # ---- construction
@@ -203,9 +203,9 @@ class SchedulingPanel(QScrollArea):
         ask_file(self, "Load a policy", _POLICY_FILTER, self.load_policy, start=start)
 
     def load_policy(self, path: str) -> None:
-        """Offers the policies of a Python file and selects the first.
+        """Adds the policies in a Python file to the menu and selects the first of them.
 
-        Errors are shown as messages.
+        Errors are shown in the message bar.
         """
         try:
             policies = load_policies(path)
@@ -231,7 +231,10 @@ class SchedulingPanel(QScrollArea):
         ask_file(self, "Load costs", _PROFILE_FILTER, self.load_profile)
 
     def load_profile(self, path: str) -> None:
-        """Starts renders with the costs in a file. Errors are shown as messages."""
+        """Loads a file of shading costs, with which later renders start.
+
+        Errors are shown in the message bar.
+        """
         from wavecomb.run.cost_profile import load_costs
 
         try:

@@ -43,7 +43,7 @@ class Bar:
 
 
 class AmountAxis(pg.AxisItem):
-    """Plot axis with tick labels such as 20 k and 1.5 M."""
+    """Plot axis with short tick labels such as "20 k" and "1.5 M"."""
 
     def tickStrings(self, values: list[float], scale: float, spacing: float) -> list[str]:
         """Returns the labels of the axis ticks."""
@@ -51,7 +51,7 @@ class AmountAxis(pg.AxisItem):
 
 
 class Plot(pg.PlotWidget):
-    """Plot that follows the theme, always shows all data and ignores the mouse."""
+    """Plot that follows the theme, always shows all of its data and ignores the mouse."""
 
     def __init__(self, name: str, title: str, parent: QWidget | None = None) -> None:
         axes = {side: AmountAxis(side) for side in ("left", "bottom")}
@@ -92,7 +92,7 @@ class Plot(pg.PlotWidget):
 
 
 class Curves(Plot):
-    """Curves over seconds of rendering, one for each series, with a y axis that starts at 0."""
+    """Plot of curves over the seconds of rendering, one for each series. The y axis starts at 0."""
 
     def __init__(self, name: str, title: str) -> None:
         super().__init__(name, title)
@@ -103,7 +103,10 @@ class Curves(Plot):
     def show_curves(
         self, curves: Sequence[tuple[Sequence[float], Sequence[float], QColor, bool]]
     ) -> None:
-        """Draws (times, values, colour, strong) curves; strong marks the current run."""
+        """Draws curves, given as (times, values, colour, strong).
+
+        ``strong`` marks the current run.
+        """
         self.clear()
         for times, values, colour, strong in curves:
             width = max(1.0, 0.2 * theme.em() if strong else 0.12 * theme.em())
@@ -122,7 +125,7 @@ class Curves(Plot):
 
 
 class Bars(Plot):
-    """Horizontal bars in named rows, the first row at the top."""
+    """Horizontal bar chart with named rows, of which the first is at the top."""
 
     def __init__(self, name: str, title: str, *, names: bool = True) -> None:
         super().__init__(name, title)
@@ -141,7 +144,7 @@ class Bars(Plot):
     def show_bars(self, rows: Sequence[str], bars: Sequence[Bar], most: float = 0.0) -> None:
         """Draws bars into the plot.
 
-        The axis ends at ``most`` or, if that is 0, at the longest bar.
+        The axis ends at ``most``, or at the end of the longest bar if ``most`` is 0.
         """
         self._bars = list(bars)
         self.clear()
@@ -192,7 +195,7 @@ class Bars(Plot):
 
 
 class Legend(QLabel):
-    """Legend with names and colours, in wrapped text below a plot, where it covers no bars."""
+    """Legend of a plot: names and colours in a wrapped text below the plot."""
 
     def __init__(self, name: str) -> None:
         super().__init__()
@@ -206,7 +209,7 @@ class Legend(QLabel):
     def show_entries(self, entries: Callable[[], Sequence[tuple[str, QColor]]]) -> None:
         """Shows (name, colour) pairs in the legend.
 
-        The function is called again when the theme changes.
+        Calls ``entries`` again when the theme changes.
         """
         self._entries = entries
         self.retheme()
@@ -264,12 +267,12 @@ def phase_colour(name: str) -> QColor:
 
 
 def phases_between(a: Look, b: Look) -> dict[str, float]:
-    """Returns the thread seconds of each phase between two readings of the counters."""
+    """Returns the thread seconds in each render phase between two readings of the counters."""
     return {name: b.phases.get(name, 0.0) - a.phases.get(name, 0.0) for name in PHASES}
 
 
 def stacked(row: int, label: str, seconds: dict[str, float], scale: float, mode: str) -> list[Bar]:
-    """Returns the bars of one row of a phase plot, placed end to end.
+    """Returns the bars of one row of a phase plot. Each bar begins where the previous one ends.
 
     ``scale`` converts seconds to the shown unit.
     """
@@ -288,7 +291,7 @@ def stacked(row: int, label: str, seconds: dict[str, float], scale: float, mode:
 
 
 def rows_over_time(run: Run) -> list[tuple[Look, Look]]:
-    """Splits a run into at most a dozen intervals of similar length."""
+    """Splits the counter readings of a run into at most a dozen intervals of similar length."""
     least = run.last.seconds / _MOST_STRETCHES
     return stretches(run, least_s=0.999 * least) or stretches(run)
 
@@ -323,7 +326,7 @@ class PhasePlot(QWidget):
     def show_series(
         self, series: Sequence[Series], labels: Sequence[str], current: Series | None
     ) -> None:
-        """Draws the phases of the series."""
+        """Draws the time in each render phase for the given series."""
         mode = self.mode.currentText()
         self.plot.name_it(_TITLES[mode])
         bars: list[Bar] = []

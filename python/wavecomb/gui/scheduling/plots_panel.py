@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Live plots: time by phase, coherence of queues, costs of materials, comparison of runs."""
+"""Live plots: time by render phase, coherence of queues, costs of materials, and run comparison."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Curve = Callable[[Run], tuple[list[float], list[float]]]
 
 
 class PlotsPanel(QWidget):
-    """Panel that sorts the session's statistics into runs, and draws them in the visible tab."""
+    """Panel that groups the session's statistics into runs and plots them in the visible tab."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -149,7 +149,7 @@ class PlotsPanel(QWidget):
     # -------------------------------------------------------------------------------------
 
     def shown(self) -> list[Series]:
-        """Returns the newest series of the current image and the reference series."""
+        """Returns the newest series of the current image and the series it is compared with."""
         current = self.log.current
         if current is None:
             return []
@@ -184,7 +184,7 @@ class PlotsPanel(QWidget):
         self._line.setText(summary(current))
 
     def showEvent(self, event: object) -> None:
-        """Draws data that arrived while the panel was hidden."""
+        """Draws the data that arrived while the panel was hidden."""
         super().showEvent(event)  # type: ignore[arg-type]
         self.refresh()
 

@@ -17,13 +17,13 @@ from wavecomb.scheduling import SchedulingPolicy, check_policy
 
 
 def load_policies(path: str | os.PathLike[str]) -> list[SchedulingPolicy]:
-    """Creates one object of each SchedulingPolicy that a file defines, in the order of the file.
+    """Creates an object of each ``SchedulingPolicy`` class that a file defines, in file order.
 
-    Executes the file on each call, so an edited file can be loaded again.
+    Executes the file on each call, so that changes of the file take effect.
 
     Raises:
         WavecombError: The file cannot be read or executed, or has no valid policy. The message is
-            one line that names the file and, if known, the line in it.
+            one line that names the file and, if known, the line number.
     """
     path = Path(path)
     module = _run(path)
@@ -43,7 +43,7 @@ def load_policies(path: str | os.PathLike[str]) -> list[SchedulingPolicy]:
 
 
 class OwnPolicy(SchedulingPolicy):
-    """A loaded policy for a live render, whose exceptions become one-line errors.
+    """A loaded policy for a live render, which converts exceptions to one-line errors.
 
     Attributes:
         path: File of the policy.
@@ -57,7 +57,7 @@ class OwnPolicy(SchedulingPolicy):
         self.columns = policy.columns  # type: ignore[misc]
 
     def order(self, queue: Any, costs: Any, keys: Any) -> bool | None:
-        """Calls ``order`` of the loaded policy; adds advice to its exceptions."""
+        """Calls ``order`` of the loaded policy and adds advice to its exceptions."""
         try:
             return self.policy.order(queue, costs, keys)
         except Exception as error:
@@ -68,7 +68,7 @@ class OwnPolicy(SchedulingPolicy):
 def describe_failure(error: BaseException, path: str | os.PathLike[str]) -> str:
     """Describes an error of a policy in one line.
 
-    Includes the line number if the error is in the policy's file.
+    Includes the line number if the error occurred in the policy's file.
     """
     name = os.fspath(path)
     if isinstance(error, SyntaxError):

@@ -11,17 +11,21 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from wavecomb.gui.viewport.session import Frame, Session
 
 LIMIT_MS = 20_000
-"""Largest duration of a step in milliseconds. A slower render counts with its progress so far."""
+"""Time limit of a step in milliseconds. A render that is not finished after this time counts with
+the samples that it has."""
 
 
 class Rounds(QObject):
-    """Sequence of steps, each of which renders with some settings to the end or for ``LIMIT_MS``.
+    """Sequence of renders with different settings.
 
-    A change of settings from outside ends the sequence without restoring the original settings.
+    Each step lasts until the render ends, or ``LIMIT_MS`` milliseconds.
+
+    If anything else changes the settings, the sequence ends without restoring the original
+    settings.
 
     Signals:
-        moved(int, int): Number of finished steps, and total number of steps.
-        ended(bool): Whether all steps were done when the sequence ended.
+        moved(int, int): Number of finished steps and total number of steps.
+        ended(bool): The sequence ended; True if all steps were finished.
     """
 
     moved = Signal(int, int)
@@ -44,11 +48,14 @@ class Rounds(QObject):
 
     @property
     def running(self) -> bool:
-        """Whether there are unfinished steps."""
+        """Whether a sequence is running."""
         return bool(self._steps)
 
     def start(self, steps: Sequence[Mapping[str, Any]]) -> None:
-        """Starts the sequence. Steps are fields of the setup, with the same names in all steps."""
+        """Starts the sequence.
+
+        Each step gives values for fields of the setup. All steps must give the same fields.
+        """
         if not steps or self.running or self._session.stage is None:
             return
         self._steps = list(steps)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Statistics of live renders, sorted into runs and series. Independent of Qt.
+"""Groups statistics of live renders into runs and series. Independent of Qt.
 
-A *look* is a reading of a render's counters at one moment. A *run* is one render from its start to
-the next restart, with constant settings. Runs with the same settings and the same picture are
-repeats and form a *series*.
+A *look* is a reading of all counters of a render at one time. A *run* is one render with constant
+settings, from its start to the next restart. Runs with the same settings and the same image are
+repeats, which form a *series*.
 """
 
 from __future__ import annotations
@@ -16,40 +16,41 @@ from wavecomb.options import names
 from wavecomb.run.stats import COHERENCE, PHASES, SORTING
 
 WORK = names("work", without=("spp",))
-"""Settings that change the amount of work, and thus the noise."""
+"""Settings that change the amount of work and therefore the noise."""
 
 FIELDS = (*names("order", without=("progressive",)), *WORK)
-"""Settings that distinguish series. All fields but those of ``WORK`` leave the image unchanged."""
+"""Settings whose values distinguish run series. The fields that are not in ``WORK`` leave the image
+unchanged."""
 
 MAX_LOOKS = 240
-"""Largest number of counter readings in a run. Beyond it, every second reading is dropped to limit
-memory use."""
+"""Largest number of counter readings in a run. When a run has more readings, every second reading
+is dropped to limit memory use."""
 MAX_SERIES = 100
 SHORTEST_S = 0.25
-"""Shortest abandoned run that is kept, in seconds. Shorter runs, for example while the camera
-orbits, are too short to compare."""
+"""Duration, in seconds, from which an abandoned run is kept. Shorter runs, such as those during a
+camera orbit, are too short to compare."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """Values of the counters since the start of a run."""
+    """Counter values since the start of a run."""
 
     seconds: float
-    """Wall time of rendering in seconds, without pauses."""
+    """Wall time of rendering in seconds, not counting pauses."""
     samples: int = 0
     rays: int = 0
-    """Camera, bounce and shadow rays."""
+    """Number of camera, bounce and shadow rays."""
     records: int = 0
     packet_lanes: int = 0
     phases: Mapping[str, float] = field(default_factory=dict)
-    """Thread seconds by phase."""
+    """Thread seconds in each render phase."""
     coherence: Mapping[str, float] = field(default_factory=dict)
-    """Run length and homogeneity of material queues, as means over the run so far, since the core
-    reports no counters for these."""
+    """Length of runs of one material in the shading queues, and homogeneity of the queues, as means
+    since the start of the render. The core reports no counters for these values."""
 
 
 def take_look(stats: Mapping[str, Any]) -> Look:
-    """Reads the counters of a statistics dictionary (docs/statistics.md)."""
+    """Returns the counter values in a statistics dictionary (docs/statistics.md)."""
     counts = stats.get("counts", {})
     phases = stats.get("phases_s", {})
     coherence = stats.get("coherence", {})
@@ -67,7 +68,7 @@ def take_look(stats: Mapping[str, Any]) -> Look:
 
 @dataclass
 class Run:
-    """One render, as counter readings (looks) in order of time; the first reading is all zeros."""
+    """One render, as counter readings (looks) in time order. The first reading is all zeros."""
 
     looks: list[Look] = field(default_factory=lambda: [Look(0.0)])
     stats: Mapping[str, Any] = field(default_factory=dict)
@@ -90,38 +91,44 @@ class Run:
             self.looks = [*self.looks[:-1:2], look]
 
     def continues(self, look: Look) -> bool:
-        """Returns whether a counter reading can belong to this run: counters never decrease."""
+        """Returns whether a counter reading can belong to this run.
+
+        Counters of a run never decrease.
+        """
         last = self.last
         return not self.finished and look.seconds >= last.seconds and look.samples >= last.samples
 
     def lane_utilisation(self) -> float:
-        """Returns records / (packets x lanes), 0 to 1; 0 before anything was shaded."""
+        """Returns the packet occupancy, records / (packets x lanes).
+
+        The value is 0 before any shading.
+        """
         return ratio(self.last.records, self.last.packet_lanes)
 
     def shading_ns(self) -> float:
-        """Returns thread ns per record in the phases keys, sort, materialize and shade."""
+        """Returns thread ns per queued hit, over the phases keys, sort, materialize and shade."""
         seconds = sum(self.last.phases.get(name, 0.0) for name in (*SORTING, "shade"))
         return 1e9 * ratio(seconds, self.last.records)
 
     def run_length(self) -> float:
-        """Returns the mean length of runs of one material, in records."""
+        """Returns the mean number of consecutive queued hits with one material."""
         return self.last.coherence.get("run_length", 0.0)
 
 
 @dataclass
 class Series:
-    """All runs with the same settings and the same picture."""
+    """All runs with the same settings and the same image."""
 
     number: int
     settings: Mapping[str, Any]
     picture: Hashable
-    """Key of the inputs besides settings that determine the amount of work, such as scene, edits,
-    camera, size and seed."""
+    """Key of everything except settings that determines the amount of work: scene, edits, camera,
+    size, seed."""
     changed: str
-    """Description of the differences from the previous series."""
+    """Description of the settings that differ from the previous series."""
     runs: list[Run] = field(default_factory=list)
     recipe: Mapping[str, Any] = field(default_factory=dict)
-    """Fields of a setup that restore these settings."""
+    """Fields of a setup that must be restored to repeat the runs."""
 
     @property
     def run(self) -> Run:
@@ -130,7 +137,7 @@ class Series:
 
     @property
     def best(self) -> Run:
-        """The longest run, which has the smallest statistical error."""
+        """The longest run of the series, which has the smallest statistical error."""
         return max(self.runs, key=lambda run: run.last.seconds)
 
     def does_the_work_of(self, other: Series) -> bool:
@@ -141,7 +148,7 @@ class Series:
 
 
 class RunLog:
-    """Log that sorts statistics into runs, and runs into series."""
+    """Log that groups statistics into runs and runs into series."""
 
     def __init__(self) -> None:
         self.series: list[Series] = []
@@ -157,14 +164,17 @@ class RunLog:
         finished: bool = False,
         recipe: Mapping[str, Any] | None = None,
     ) -> Series:
-        """Adds statistics and returns the series that they belong to.
+        """Adds a reading of the statistics.
+
+        Returns the series of the run that the reading belongs to.
 
         Args:
             stats: Statistics of the render.
-            settings: Values of the fields in ``FIELDS``, as far as known.
-            picture: Key of the other inputs that determine the amount of work, such as the scene.
+            settings: Values of the fields in ``FIELDS``; unknown fields may be missing.
+            picture: Key of everything except settings that determines the amount of work, such as
+                the scene.
             finished: Whether the render has ended.
-            recipe: Fields of a setup that restore the settings of the run.
+            recipe: Fields of a setup that must be restored to repeat the run.
         """
         known = {name: settings[name] for name in FIELDS if name in settings}
         look = take_look(stats)
@@ -187,7 +197,10 @@ class RunLog:
         return series
 
     def finish(self) -> bool:
-        """Marks the current run as finished; returns False if it was finished already."""
+        """Marks the current run as finished.
+
+        Returns False if there is none or it was finished already.
+        """
         if self._current is None or self._current.run.finished:
             return False
         self._current.run.finished = True
@@ -195,12 +208,12 @@ class RunLog:
 
     @property
     def current(self) -> Series | None:
-        """The current series, which renders now or rendered last."""
+        """Series of the current run, or of the last run if nothing renders."""
         return self._current
 
     @property
     def base(self) -> Series | None:
-        """Reference series of comparisons: the pinned series, else the picture's first series."""
+        """Series that other series are compared with: the pinned one, else the image's first."""
         if self.pinned is not None:
             return self.pinned
         if self._current is None:
@@ -210,7 +223,10 @@ class RunLog:
         )
 
     def pin(self, series: Series | None) -> None:
-        """Pins the series that others are compared with; None means the first of the picture."""
+        """Pins the series that others are compared with.
+
+        None means the first series of the image.
+        """
         self.pinned = series
 
     def clear(self) -> None:
@@ -241,7 +257,7 @@ class RunLog:
         return series
 
     def _end_run(self) -> None:
-        """Removes the current run if it was too short to compare."""
+        """Removes the current run if it is unfinished and shorter than ``SHORTEST_S``."""
         series = self._current
         if series is None or series.run.finished or series.run.last.seconds >= SHORTEST_S:
             return
@@ -253,7 +269,7 @@ class RunLog:
 
 
 def differences(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns the values of ``after`` that differ from ``before``, in the order of ``FIELDS``."""
+    """Returns the settings in ``after`` that differ from ``before``, in the order of ``FIELDS``."""
     return {
         name: after[name] for name in FIELDS if name in after and before.get(name) != after[name]
     }
@@ -283,7 +299,7 @@ _OFF = ("adaptive", "noise", "time_limit")
 
 
 def describe(settings: Mapping[str, Any]) -> str:
-    """Describes settings in few words, for labels.
+    """Describes settings in a few words, for labels.
 
     >>> describe({"policy": "material", "lanes": 1, "wave_size": 0, "ray_order": "slot"})
     'material, 1 lane, wave auto, rays slot'
@@ -304,9 +320,10 @@ def describe(settings: Mapping[str, Any]) -> str:
 
 
 def labels(series: Sequence[Series]) -> list[str]:
-    """Returns a label for each series: the values of the settings that differ between series.
+    """Returns a label for each series. A label lists the settings that differ between series.
 
-    The policy comes first, because policies are compared most often. Equal labels get numbers.
+    The label begins with the policy, because policies are compared most often. Equal labels are
+    distinguished by numbers.
     """
     varying = [
         name
@@ -329,7 +346,7 @@ def ratio(above: float, below: float) -> float:
 
 
 def last_of(series: Iterable[Series], count: int, keep: Series | None = None) -> list[Series]:
-    """Returns the newest ``count`` series, including ``keep`` if the log has it."""
+    """Returns the newest ``count`` series. If the log has ``keep``, the result includes it."""
     every = list(series)
     newest = every[-count:]
     if keep is not None and keep in every and keep not in newest:

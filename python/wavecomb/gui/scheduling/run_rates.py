@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Speed of runs, its uncertainty, and comparison of runs. Independent of Qt.
+"""Computes the speed of runs and its uncertainty, and compares runs. Independent of Qt.
 
-A rate is measured over a whole run with constant settings, never over a moment. The spread of a
-rate is computed over the intervals between consecutive readings. Two runs of one picture are
-compared interval by interval at equal samples. Two such runs have done the same work, since paths
-do not depend on the order of shading, and expensive parts of the image have equal weights. A single
-pair of runs cannot reveal effects on whole runs, such as a machine whose speed drifts. A difference
-therefore *holds* only if repeated pairs agree.
+A rate is measured over a whole run with constant settings, not at one moment. The spread of a rate
+is computed over the intervals between consecutive counter readings. Two runs of the same image are
+compared interval by interval, at equal numbers of samples. At equal numbers of samples, two runs
+have traced the same paths, because paths do not depend on the order of shading. Expensive parts of
+the image therefore have equal weights. A single pair of runs cannot reveal errors that affect a
+whole run, such as a change in the speed of the machine. A speed difference therefore *holds* only
+if several pairs of runs agree.
 """
 
 from __future__ import annotations
@@ -35,13 +36,13 @@ _T975 = (
 
 @dataclass(frozen=True)
 class Rate:
-    """A rate: the number of events per second."""
+    """A rate, in events per second."""
 
     value: float
     spread: float
-    """Standard deviation over intervals divided by the mean; 0 with fewer than two intervals."""
+    """Standard deviation over intervals divided by the mean; 0 for fewer than two intervals."""
     stretches: int
-    """Number of intervals or runs that the spread is computed from."""
+    """Number of intervals or runs over which the spread is computed."""
     seconds: float
 
     least: int = MIN_STRETCHES
@@ -54,29 +55,30 @@ class Rate:
 
 @dataclass(frozen=True)
 class Ratio:
-    """The speed of one series as a multiple of another's, at equal work."""
+    """Speed of one series divided by the speed of another series that does the same work."""
 
     value: float
     low: float
     high: float
-    """End of a 95 % interval that begins at ``low``; 0 and infinity if it is unknown."""
+    """Upper end of the 95 % interval whose lower end is ``low``. The interval is 0 to infinity if
+    it is unknown."""
     repeats: int
-    """Number of pairs of runs. With one pair of runs, the interval does not cover drift of the
-    machine."""
+    """Number of pairs of runs. With one pair of runs, the interval ignores changes in the speed of
+    the machine."""
     short: bool = False
 
     @property
     def differs(self) -> bool:
-        """Whether the interval excludes 1."""
+        """Whether the 95 % interval excludes the ratio 1."""
         return not self.short and (self.low > 1.0 or self.high < 1.0)
 
     @property
     def holds(self) -> bool:
-        """Whether the ratio differs from 1 with enough repeats."""
+        """Whether the ratio differs from 1 and enough pairs of runs confirm it."""
         return self.differs and self.repeats >= MIN_REPEATS
 
     def verdict(self) -> str:
-        """Returns the verdict of the comparison in words, for a table."""
+        """Returns the result of the comparison in words, for a table."""
         if self.short:
             return "too short"
         if self.repeats < MIN_REPEATS:
@@ -87,7 +89,7 @@ class Ratio:
 
 
 def stretches(run: Run, least_s: float = 0.0) -> list[tuple[Look, Look]]:
-    """Returns pairs of consecutive counter readings; joins intervals shorter than ``least_s``."""
+    """Returns pairs of consecutive counter readings. Joins intervals shorter than ``least_s``."""
     pairs = []
     start = run.looks[0]
     for look in run.looks[1:]:
@@ -117,9 +119,9 @@ def rate(run: Run, counter: str) -> Rate:
 
 
 def rate_of(series: Series, counter: str) -> Rate:
-    """Returns the rate over all finished runs of a series.
+    """Returns the mean rate over all finished runs of a series.
 
-    With several runs, the interval covers the spread between runs.
+    If there are several runs, the spread is computed between runs.
     """
     runs = _whole(series.runs)
     if len(runs) == 1:
@@ -133,7 +135,7 @@ def rate_of(series: Series, counter: str) -> Rate:
 
 
 def moments(run: Run, counter: str) -> tuple[list[float], list[float]]:
-    """Returns the middle of each interval, in seconds, and the rate in it, for a curve."""
+    """Returns two arrays for a curve: the middle of each interval, in seconds, and its rate."""
     pairs = stretches(run)
     times = [(a.seconds + b.seconds) / 2 for a, b in pairs]
     values = [
@@ -143,7 +145,7 @@ def moments(run: Run, counter: str) -> tuple[list[float], list[float]]:
 
 
 def compare_runs(run: Run, base: Run) -> Ratio:
-    """Returns the speed of ``run`` over that of ``base``, up to the samples that both have."""
+    """Returns the speed of ``run`` divided by that of ``base``, at equal sample counts."""
     samples = min(run.last.samples, base.last.samples)
     seconds = min(time_of(run, samples), time_of(base, samples))
     if samples <= 0 or seconds <= 0.0:
@@ -168,9 +170,9 @@ def compare_runs(run: Run, base: Run) -> Ratio:
 
 
 def compare(series: Series, base: Series) -> Ratio | None:
-    """Returns the speed of ``series`` divided by the base's, or None if their work differs.
+    """Returns the speed of ``series`` divided by that of ``base``, or None if their work differs.
 
-    The i-th runs of both series form a pair, so that alternating runs are compared close in time.
+    The i-th runs of both series form a pair. If the series alternate, these runs are close in time.
     """
     if not series.does_the_work_of(base):
         return None
@@ -190,7 +192,10 @@ def compare(series: Series, base: Series) -> Ratio | None:
 
 
 def time_of(run: Run, samples: float) -> float:
-    """Returns the seconds that a run took for a number of samples, interpolated between looks."""
+    """Returns the seconds that a run took for a number of samples.
+
+    Interpolates between counter readings.
+    """
     looks = run.looks
     i = bisect_left([look.samples for look in looks], samples)
     if i == 0:

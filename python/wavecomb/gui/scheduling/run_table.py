@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Table of runs, as rows, text and CSV. Independent of Qt."""
+"""Table of runs as rows, as text and as CSV. Independent of Qt."""
 
 from __future__ import annotations
 
@@ -45,23 +45,23 @@ _TIPS = {
 }
 TIPS = {name: _TIPS[name] for name in COLUMNS}
 LEFT = tuple(COLUMNS.index(name) for name in ("settings", "verdict", "changed"))
-"""Columns of the run table that hold text."""
+"""Columns of the run table that contain text. All other columns contain numbers."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the table, for one series."""
+    """A row of the table, which describes one series."""
 
     series: Series
     label: str
     texts: tuple[str, ...]
-    """Texts of the row, one for each of ``COLUMNS``."""
+    """Texts of the row, one for each column in ``COLUMNS``."""
     ratio: Ratio | None
     is_base: bool
 
 
 def rows(log: RunLog, count: int = 20) -> list[Row]:
-    """Returns rows of the newest series, from old to new, compared with the base series."""
+    """Returns a row for each of the newest series, from old to new, compared with a base series."""
     base = log.base
     shown = [one for one in last_of(log.series, count, log.pinned) if one.runs]
     names = labels(shown)
@@ -104,7 +104,7 @@ def _ratio_texts(ratio: Ratio | None) -> tuple[str, str, str]:
 
 
 def as_text(table: Sequence[Row]) -> str:
-    """Formats the table as aligned text, for a mail or a notebook."""
+    """Formats the table as aligned text that can be pasted into a mail or a notebook."""
     cells = [COLUMNS, *(row.texts for row in table)]
     widths = [max(len(line[i]) for line in cells) for i in range(len(COLUMNS))]
     return "\n".join(
@@ -119,7 +119,7 @@ def as_text(table: Sequence[Row]) -> str:
 def as_csv(table: Sequence[Row]) -> str:
     """Formats the table as CSV.
 
-    Each run has one line, with all settings as plain values and times in seconds.
+    Each run is one line, with all settings as plain values and with times in seconds.
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tab with the table of recent runs, which can be pinned, repeated, copied and saved."""
+"""Tab with the table of recent runs, in which runs can be pinned, repeated, copied and saved."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ NOTE = (
 
 
 class RunsTab(QWidget):
-    """Tab that shows a log of runs.
+    """Tab that shows the log of runs as a table.
 
     Signals:
-        changed(): Another run was pinned, or runs were removed, so plots must be redrawn.
+        changed(): Another series was pinned, or runs were removed. Plots must be redrawn.
     """
 
     changed = Signal()
@@ -141,7 +141,10 @@ class RunsTab(QWidget):
         self.changed.emit()
 
     def repeat(self) -> None:
-        """Renders the base and the selected series in turn, or stops a running sequence."""
+        """Renders with the settings of the base and of the selected series in turn.
+
+        A second call stops the sequence of renders.
+        """
         if self.rounds.running:
             self.rounds.stop()
             return
@@ -164,7 +167,10 @@ class RunsTab(QWidget):
         ask_file(self, "Save runs", "CSV (*.csv)", self.save, start="runs.csv", ending="csv")
 
     def save(self, path: str) -> None:
-        """Writes the runs as CSV, never partially. Errors are shown as messages."""
+        """Saves the runs as a CSV file.
+
+        A failure leaves no partial file. Errors are shown in the message bar.
+        """
         text = as_csv(self._rows)
 
         def work() -> None:

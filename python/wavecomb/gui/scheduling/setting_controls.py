@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stateless controls that show and change a setting."""
+"""Controls that show and change a setting without storing the value."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from PySide6.QtWidgets import (
 from wavecomb.gui.scheduling.choices import Choice, Number
 
 Changed = Callable[[str, Any], None]
-"""Callback with field and value, called when the user chose a value."""
+"""Type of a function that is called with a field name and the value that the user chose."""
 
 
 class _CalmWheel(QObject):
-    """Event filter that leaves the wheel to the panel unless the control has the focus."""
+    """Event filter that ignores wheel events until the control has the focus."""
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Ignores wheel events without focus."""
+        """Ignores wheel events while the control does not have the focus."""
         is_wheel = event.type() == QEvent.Type.Wheel
         passes = is_wheel and isinstance(watched, QWidget) and not watched.hasFocus()
         if passes:
@@ -38,14 +38,14 @@ class _CalmWheel(QObject):
 def calm(widget: QWidget) -> None:
     """Makes a widget react to the mouse wheel only while it has the focus.
 
-    Otherwise scrolling a panel would change settings and restart renders.
+    Otherwise, scrolling a panel would change settings and restart the render.
     """
     widget.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
     widget.installEventFilter(_CalmWheel(widget))
 
 
 class ChoiceBox(QComboBox):
-    """Combo box of a setting with named values; 0 is shown as "auto"."""
+    """Combo box of a setting with named values. The value 0 is shown as "auto"."""
 
     def __init__(self, choice: Choice, changed: Changed, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -75,7 +75,10 @@ class ChoiceBox(QComboBox):
         self.setItemData(self.count() - 1, tip, Qt.ItemDataRole.ToolTipRole)
 
     def show_value(self, value: Any) -> None:
-        """Shows a value without emitting a change. Adds the value if it is not offered."""
+        """Shows a value without emitting a change.
+
+        Adds the value to the combo box if it is missing there.
+        """
         index = self.find(value)
         with QSignalBlocker(self):
             if index < 0:
@@ -126,18 +129,18 @@ def number_box(number: Number, changed: Changed) -> QSpinBox | QDoubleSpinBox:
 
 
 def control_of(row: Choice | Number, changed: Changed) -> Control:
-    """Creates the control of a setting, for all bars and panels."""
+    """Creates the control of a setting; all bars and panels use this function."""
     return ChoiceBox(row, changed) if isinstance(row, Choice) else number_box(row, changed)
 
 
 def add_row(form: QFormLayout, label: str, control: QWidget, field: QWidget | None = None) -> None:
-    """Adds a control with its label, which shares the control's tooltip.
+    """Adds a control and a label with the same tooltip to a form.
 
     Args:
-        form: The form that gets the control.
+        form: The form to which the control is added.
         label: Text of the label.
         control: The control.
-        field: Widget that contains the control and its buttons, if it has buttons.
+        field: Widget that contains the control and further buttons; None means the control itself.
     """
     text = QLabel(label)
     text.setBuddy(control)

@@ -25,11 +25,11 @@ from wavecomb.gui.viewport.session import Session, Setup
 
 _MODE = Choice("adaptive_mode", "Adaptive", "Distribution of samples.", choices.ADAPTIVE_MODES)
 _FIRST = {"adaptive": 0.02, "noise": 0.02}
-"""Initial targets when adaptive sampling is switched on."""
+"""Error target that each mode of adaptive sampling starts with."""
 
 
 class WorkGroup(QGroupBox):
-    """Group of settings that change the amount of work, and thus the noise."""
+    """Group of controls for the settings that change the amount of work and therefore the noise."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__("Amount of work", parent)
@@ -80,5 +80,5 @@ class WorkGroup(QGroupBox):
 
 
 def mode_of(setup: Setup) -> str:
-    """Returns the adaptive mode of a setup, which has at most one of the two error targets."""
+    """Returns the adaptive sampling mode of a setup, which has at most one error target."""
     return "pixel" if setup.adaptive else "noise" if setup.noise else "off"

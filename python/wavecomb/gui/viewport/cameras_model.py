@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cameras of the view: a free camera, then the cameras of the stage. No widgets."""
+"""List of the cameras that can be selected: a free camera, then the cameras of the stage.
+
+No widgets.
+"""
 
 from __future__ import annotations
 
@@ -18,10 +21,12 @@ _ROOT = QModelIndex()
 
 
 class CamerasModel(QAbstractListModel):
-    """List of camera names, with paths as ``Qt.ItemDataRole.UserRole`` (None for the free camera).
+    """List of camera names.
+
+    ``Qt.ItemDataRole.UserRole`` holds the path, or None for the free camera.
 
     Signals:
-        moved(): The current camera and its ``row`` in the list changed.
+        moved(): Another camera became the current camera, which changes ``row``.
     """
 
     moved = Signal()
@@ -43,7 +48,7 @@ class CamerasModel(QAbstractListModel):
         return self.paths.index(path) if path in self.paths else 0
 
     def choose(self, row: int) -> None:
-        """Changes to another camera."""
+        """Makes the camera in a row of the list the current camera."""
         self._session.use_camera(self.paths[row])
 
     def _fill(self, stage: LoadedStage | None) -> None:
@@ -60,7 +65,7 @@ class CamerasModel(QAbstractListModel):
         return 0 if parent.isValid() else len(self.paths)
 
     def data(self, index: Any, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """Returns the name or path of a camera."""
+        """Returns the name or the path of a camera for an item data role."""
         path = self.paths[index.row()]
         if role == Qt.ItemDataRole.UserRole:
             return path

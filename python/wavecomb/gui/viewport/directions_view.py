@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""View of a map of all directions in false colours, with a mark."""
+"""View of a latlong map in false colours, with a ring around one direction."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from wavecomb.image.layer_view import heat
 
 
 class DirectionsView(QWidget):
-    """View of an array with twice as many columns as rows; empty until ``show_map``."""
+    """View of an array with twice as many columns as rows. The view is empty until ``show_map``."""
 
     def __init__(self, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -32,17 +32,17 @@ class DirectionsView(QWidget):
         return self._image
 
     def sizeHint(self) -> QSize:
-        """Returns a size twice as wide as high."""
+        """Returns a preferred size that is twice as wide as high."""
         return QSize(theme.em(20), theme.em(10))
 
     def show_map(
         self, values: NDArray[Any] | None, mark: tuple[float, float] | None = None
     ) -> None:
-        """Draws values from 0 to their maximum in false colours, with a ring.
+        """Shows an array in false colours from 0 to the array's maximum, with a ring.
 
         Args:
-            values: Array (height, 2 height); None clears the view.
-            mark: Position of the ring, from 0 to 1 in each direction, or None.
+            values: Array with shape (height, 2 height); None clears the view.
+            mark: Position of the ring as a fraction of width and height, or None.
         """
         self._image, self._mark = None, mark
         if values is not None:
@@ -50,7 +50,7 @@ class DirectionsView(QWidget):
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Draws the map as large as possible, and the ring."""
+        """Draws the map as large as the widget allows, and the ring on it."""
         if self._image is None:
             return
         wide = min(self.width(), 2 * self.height())

@@ -28,8 +28,8 @@ class Look:
 
     Attributes:
         layer: Name of the layer.
-        exposure: Exposure of colours, in stops.
-        view: "Linear", "Neutral" or an OCIO view.
+        exposure: Exposure of colour layers, in stops.
+        view: Tone mapping: "Linear", "Neutral", or the name of an OCIO view.
         low: Lower end of the false colours; None means the minimum of the image.
         high: Upper end of the false colours; None means the maximum of the image.
     """
@@ -42,17 +42,17 @@ class Look:
 
 
 def views() -> list[str]:
-    """Returns the names for ``Look.view``."""
+    """Returns the names that ``Look.view`` can have."""
     return [LINEAR, NEUTRAL, *ocio.views()]
 
 
 def develop(rgb: NDArray[Any], exposure: float, view: str) -> NDArray[np.uint8]:
-    """Converts linear Rec.709 to 8-bit values.
+    """Converts linear Rec.709 colours to 8-bit display values.
 
-    "Linear" and "Neutral" are ``wavecomb.image.files.image.display`` with "clamp" and "neutral".
+    "Linear" and "Neutral" use ``image.display`` with the transfers "clamp" and "neutral".
 
     Raises:
-        WavecombError: There is no such view.
+        WavecombError: ``view`` is not the name of a view.
     """
     if view in (LINEAR, NEUTRAL):
         transfer: image.Transfer = "clamp" if view == LINEAR else "neutral"
@@ -69,7 +69,7 @@ def show(layer: NDArray[Any], look: Look) -> DisplayLayer:
     """Converts a layer to screen pixels.
 
     Args:
-        layer: (height, width) or (height, width, channels).
+        layer: Array with shape (height, width) or (height, width, channels).
         look: Display settings; ``look.layer`` is the name of the layer.
     """
     light = functools.partial(develop, exposure=look.exposure, view=look.view)
@@ -82,7 +82,7 @@ def show(layer: NDArray[Any], look: Look) -> DisplayLayer:
 
 @dataclass(frozen=True)
 class Developed:
-    """A frame, its display settings, and the resulting pixels."""
+    """A frame, its display settings, and the resulting screen pixels."""
 
     frame: Frame
     look: Look
@@ -90,7 +90,10 @@ class Developed:
 
 
 def develop_frame(frame: Frame, look: Look) -> Developed:
-    """Converts a layer of a frame to screen pixels, or the beauty if the frame lacks the layer."""
+    """Converts a layer of a frame to screen pixels.
+
+    Uses the beauty if the frame lacks the layer.
+    """
     layer = frame.layer(look.layer)
     if layer is None:
         return Developed(frame, look, show(frame.beauty, replace(look, layer="beauty")))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mouse buttons and modifiers of the viewport."""
+"""Actions of the mouse buttons and modifier keys in the viewport."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 
 
 class Drag(Enum):
-    """Action that a mouse button starts."""
+    """Action that a press of a mouse button in the viewport starts."""
 
     NONE = auto()
     ORBIT = auto()
@@ -34,7 +34,10 @@ Alt, Control, Shift = (
 
 
 def drag_of(button: Qt.MouseButton, modifiers: Qt.KeyboardModifier) -> Drag:
-    """Returns the action of a button, as in Blender (middle button) and usdview (Alt)."""
+    """Returns the action of a mouse button.
+
+    Middle button drags work as in Blender, drags with Alt as in usdview.
+    """
     if button == Middle:
         if modifiers & Shift:
             return Drag.PAN

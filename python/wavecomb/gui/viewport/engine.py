@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Render thread of a live render: takes the newest task, stops the previous one, returns frames.
+"""Render thread of a live render.
 
-Independent of Qt. If the full image would take long, a task first renders a reduced image. Then the
-engine renders the full image pass by pass.
+The thread runs the newest task, stops the previous task and sends frames.
+
+Independent of Qt. If the full-size image would take long, a task first renders a reduced image.
+The engine then renders the full-size image in passes.
 """
 
 from __future__ import annotations
@@ -26,14 +28,18 @@ if TYPE_CHECKING:
     from wavecomb.usd import LoadedStage
 
 MOVING_S = 0.1
-"""Target time of an image during movements, with denoising, in seconds."""
+"""Target time of a reduced image during camera movements and edits, including denoising, in
+seconds."""
 QUICK_S = 0.15
-"""Time of a full pass above which a reduced image comes first, in seconds."""
+"""If a pass at full size takes longer than this time in seconds, a reduced image is shown first."""
 
 
 @dataclass
 class Edit:
-    """Changes of a scene that are applied together. Later values replace earlier ones."""
+    """Changes of a scene that are applied to the renderer together.
+
+    A later value of a parameter replaces an earlier one.
+    """
 
     camera: dict[str, Any] | None = None
     materials: dict[int, dict[str, Any]] = field(default_factory=dict)
@@ -47,7 +53,10 @@ class Edit:
                 mine[index] = {**mine.get(index, {}), **values}
 
     def copied(self) -> Edit:
-        """Returns a copy, because each live render merges later edits separately."""
+        """Returns a copy.
+
+        Each live render needs a copy, since later edits are merged into the object.
+        """
         return Edit(self.camera, dict(self.materials), dict(self.lights))
 
     def __bool__(self) -> bool:
@@ -56,13 +65,13 @@ class Edit:
 
 @dataclass
 class Task:
-    """Description of the next render.
+    """Description of the next render that the engine should do.
 
     Attributes:
         setup: Checked settings.
-        version: Version number of the frames of this task.
+        version: Version number that the task's frames get.
         edit: Changes of the scene to apply first.
-        moving: Whether the task asks only for a reduced image.
+        moving: Whether the task renders only a reduced image.
         loaded: The loaded stage, for statistics.
         renderer: Renderer to use from now on; None keeps the current one.
     """
@@ -76,13 +85,13 @@ class Task:
 
 
 class Listener(Protocol):
-    """Receiver of results, called on the render thread."""
+    """Receiver of the engine's results. All methods are called on the render thread."""
 
     def on_frame(self, frame: Frame) -> None:
         """Accepts a frame."""
 
     def on_statistics(self, statistics: dict[str, Any], version: int) -> None:
-        """Accepts the statistics so far (docs/statistics.md) of the task with that version."""
+        """Accepts the statistics (docs/statistics.md) of the task with the given version."""
 
     def on_failed(self, message: str) -> None:
         """Accepts an error message of one line. Reports that the task has ended."""
@@ -92,11 +101,11 @@ class Listener(Protocol):
 
 
 class Engine:
-    """Owner of the render thread and the renderer.
+    """Render engine, which owns the render thread and the renderer.
 
     Attributes:
         listener: Receiver of the engine's results.
-        superseded: Whether a newer task replaces the running render.
+        superseded: Whether a newer task is waiting, so that the running render must stop.
     """
 
     def __init__(self, listener: Listener) -> None:
@@ -118,9 +127,9 @@ class Engine:
     # ---- from any thread -----------------------------------------------------------------------
 
     def submit(self, task: Task) -> None:
-        """Stops the current task and starts this one.
+        """Stops the current task and starts the given task.
 
-        Keeps the edits of a task that had not started when a newer task replaced it.
+        If the current task has not started yet, its edits are added to the new task.
         """
         with self._condition:
             before = self._task
@@ -153,7 +162,7 @@ class Engine:
         self._going.set()
 
     def wait(self, seconds: float) -> None:
-        """Waits until the render is resumed, at most for some seconds."""
+        """Waits until the render is resumed, for at most a few seconds."""
         self._going.wait(seconds)
 
     def is_busy(self) -> bool:
@@ -217,7 +226,7 @@ class Engine:
                 self._whole(renderer, task, filler)
 
     def _is_shown(self, task: Task) -> bool:
-        """Returns whether the last reduced image shows this scene with these settings."""
+        """Returns whether the last reduced image was rendered with the settings of the task."""
         return self._shown is not None and self._shown.setup == task.setup
 
     def _scale_for(self, task: Task, limit: float) -> int:
@@ -245,7 +254,7 @@ class Engine:
         return frame
 
     def _first_hits(self, renderer: Renderer, task: Task) -> Filler:
-        """Sends an image at full size: first hits with the lighting of the reduced image."""
+        """Sends a full-size image: first hits lit like the previous reduced image."""
         if self._shown is None or task.setup.region is not None:
             return Filler(self._shown)
         result = renderer.render(
@@ -276,7 +285,7 @@ class Engine:
         self.listener.on_frame(self._last_frame(renderer, task, filler, result, statistics))
 
     def statistics_of(self, source: Any, held_s: float) -> dict[str, Any]:
-        """Returns the statistics of a result or a snapshot, on the render thread."""
+        """Returns the statistics of a result or a snapshot. Called on the render thread."""
         from wavecomb.run.stats import make_stats
 
         stage = str(self._loaded.stage_path) if self._loaded is not None else None

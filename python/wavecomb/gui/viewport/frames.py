@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images of a live render at one moment."""
+"""Frames: the images of a live render at one time."""
 
 from __future__ import annotations
 
@@ -26,18 +26,21 @@ class Frame:
     """An image of a live render. The arrays of a frame must not be modified.
 
     Attributes:
-        beauty: (height, width, 3), linear Rec.709. A reduced image has no noise, nor has a frame in
-            which some pixels have no samples yet.
-        layers: The ``setup.aovs`` by name, (height, width) or (height, width, channels).
-        denoised: (height, width, 3), possibly from an earlier frame of this version; None if
-            missing.
-        status: samples_done, samples_total, passes, seconds, error and so on, as in
-            ``Snapshot.status``.
-        version: Version of scene and setup. A session never shows an older version again.
-        scale: Divisor of width and height; 1 is full size.
+        beauty: Linear Rec.709 colours with shape (height, width, 3). Reduced images, and frames in
+            which some pixels have no samples yet, show an estimate without noise.
+        layers: The layers in ``setup.aovs`` by name, with shape (height, width) or (height, width,
+            channels).
+        denoised: Denoised beauty with shape (height, width, 3), possibly from an earlier frame of
+            this version. None if there is none.
+        status: Progress values such as ``samples_done``, ``samples_total``, ``passes``, ``seconds``
+            and ``error``, as in ``Snapshot.status``.
+        version: Version of the scene and the setup that the frame shows. After a frame, a session
+            never shows a frame of an older version.
+        scale: Number by which width and height are divided; 1 means full size.
         final: Whether the render has ended.
         setup: Settings of the render.
-        picture: Result as of `wavecomb.render`, for final frames at full size, else None.
+        picture: Result of the render, as ``wavecomb.render`` returns it, for final frames at full
+            size; otherwise None.
     """
 
     beauty: NDArray[np.float32]
@@ -62,12 +65,12 @@ class Frame:
 
     @property
     def samples_done(self) -> int:
-        """Number of samples of all pixels."""
+        """Sum of the sample counts of all pixels."""
         return int(self.status.get("samples_done", 0))
 
     @property
     def is_complete(self) -> bool:
-        """Whether every pixel that is rendered has a sample."""
+        """Whether every pixel in the render region has at least one sample."""
         samples = self.layers["samples"]
         if self.setup.region is not None:
             x0, y0, x1, y1 = scaled_region(
@@ -77,12 +80,12 @@ class Frame:
         return bool(samples.all())
 
     def names(self) -> list[str]:
-        """Returns the names of layers that can be shown, the beauty first."""
+        """Returns the names of the layers that can be shown. The beauty comes first."""
         shown = ["beauty", *(["denoised"] if self.denoised is not None else [])]
         return [*shown, *(name for name in self.layers if name not in shown)]
 
     def layer(self, name: str) -> Array | None:
-        """Returns a layer by name, including beauty and denoised, or None."""
+        """Returns the layer with a name, which may be "beauty" or "denoised", or None."""
         if name == "beauty":
             return self.beauty
         if name == "denoised":
@@ -90,19 +93,19 @@ class Frame:
         return self.layers.get(name)
 
     def pixel(self, x: int, y: int) -> tuple[int, int]:
-        """Returns column and row in the arrays for a pixel of the full-size image."""
+        """Returns the column and row in the frame's arrays for a pixel of the full-size image."""
         column = min(max(x * self.width // self.setup.width, 0), self.width - 1)
         return column, min(max(y * self.height // self.setup.height, 0), self.height - 1)
 
 
 def layers_of_result(result: Result) -> dict[str, Array]:
-    """Returns all layers of a result except the beauty."""
+    """Returns all layers of a render result by name, except the beauty."""
     named = {name: getattr(result, name) for name in _FIELDS}
     return {name: array for name, array in {**named, **result.aovs}.items() if array is not None}
 
 
 def layers_of_snapshot(snapshot: Snapshot, names: tuple[str, ...]) -> dict[str, Array]:
-    """Returns copies of the requested layers that a snapshot has."""
+    """Returns copies of those requested layers that a snapshot contains."""
     out: dict[str, Array] = {"samples": snapshot.samples()}
     for name in map(layer_of, names):
         if name not in ("beauty", "samples") and (array := snapshot.layer(name)) is not None:
@@ -115,9 +118,9 @@ def layers_of_snapshot(snapshot: Snapshot, names: tuple[str, ...]) -> dict[str, 
 
 
 def denoised_frame(frame: Frame) -> tuple[Frame, Any]:
-    """Denoises a frame with Open Image Denoise, in a faster mode until the render has ended.
+    """Denoises a frame with Open Image Denoise. Uses a faster mode while the render is running.
 
-    Returns None as image if guide layers are missing.
+    The returned image is None if guide layers are missing.
     """
     from wavecomb.image.denoise import denoise
 

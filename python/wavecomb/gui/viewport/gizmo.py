@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Handles over the image that move, rotate and scale the selected light or object."""
+"""Handles over the viewport's image that move, rotate and scale the selected light or object."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ MOVE, ROTATE, SCALE = "move", "rotate", "scale"
 LENGTH = 80.0
 """Length of a handle in device-independent pixels."""
 REACH = 8.0
-"""Distance at which a handle is hit, in device-independent pixels."""
+"""Largest distance between mouse and handle at which a click hits the handle, in device-independent
+pixels."""
 _COLOURS = {"x": "#e8594f", "y": "#7ac74f", "z": "#5b9bf0", "all": "#e0e0e0"}
 _ACTIVE = "#ffd24a"
 _EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if (a ^ b).bit_count() == 1]
@@ -35,14 +36,14 @@ _EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if (a ^ b).bit_count
 
 @dataclass(frozen=True)
 class Anchor:
-    """The selected prim before a drag, in scene space.
+    """The selected prim at the start of a drag, in scene space.
 
     Attributes:
-        pivot: (3,) point that stays during rotation and scaling.
-        axes: (3, 3) directions of the handles, as rows.
-        bounds: (2, 3), or None for a light without a size.
-        placement: Transform of the prim on the stage.
-        live: Whether the render follows during a drag.
+        pivot: Point (3,) that stays fixed during rotation and scaling.
+        axes: Directions (3, 3) of the handles, one per row.
+        bounds: Corners (2, 3) of the prim's bounding box, or None for a light without a size.
+        placement: Transform of the prim on the stage at the start of the drag.
+        live: Whether the render is updated during the drag, not only at its end.
     """
 
     pivot: Array
@@ -53,10 +54,10 @@ class Anchor:
 
 
 class Gizmo(QObject):
-    """Gizmo of the viewport.
+    """Gizmo of the viewport, whose handles edit the transform of the selected prim.
 
     Signals:
-        mode_changed(str): "move", "rotate", "scale", or "" if there are no handles.
+        mode_changed(str): New mode, "move", "rotate" or "scale", or "" if the handles are hidden.
     """
 
     mode_changed = Signal(str)
@@ -78,7 +79,7 @@ class Gizmo(QObject):
         return cast("PictureView", self.parent())
 
     def set_mode(self, mode: str) -> None:
-        """Shows the handles of a mode, or hides the handles if that mode is already active."""
+        """Shows the handles of a mode. If that mode is already active, hides the handles."""
         self.mode = "" if mode == self.mode else mode
         self.mode_changed.emit(self.mode)
         self._refresh()
@@ -108,7 +109,7 @@ class Gizmo(QObject):
     # ---- places of the handles -----------------------------------------------------------------
 
     def _pixels(self, points: Array) -> Array | None:
-        """Returns points (n, 2) of the widget for points of the scene."""
+        """Returns widget positions (n, 2) of scene points (n, 3)."""
         pose, setup = self._session.pose, self._session.setup
         if pose is None:
             return None
@@ -119,7 +120,7 @@ class Gizmo(QObject):
         return np.array([(place.x(), place.y()) for place in places])
 
     def _reach(self, anchor: Anchor) -> float:
-        """Returns the length of a handle in the scene, 0 if it is behind the camera."""
+        """Returns the length of a handle in scene units; 0 if the pivot is behind the camera."""
         pose = self._session.pose
         if pose is None:
             return 0.0
@@ -127,7 +128,7 @@ class Gizmo(QObject):
         return 0.0 if ends is None else LENGTH / max(float(np.linalg.norm(ends[1] - ends[0])), 1e-9)
 
     def handles(self) -> dict[str, Array]:
-        """Returns the handles by name, each as a polyline (n, 2) in the widget."""
+        """Returns the handles by name. Each handle is a polyline (n, 2) in widget coordinates."""
         anchor = self._anchor
         if anchor is None or not self.mode or (length := self._reach(anchor)) == 0.0:
             return {}
@@ -153,7 +154,10 @@ class Gizmo(QObject):
     # ---- drags ---------------------------------------------------------------------------------
 
     def press(self, place: QPointF) -> bool:
-        """Starts a drag if a handle is at a point of the widget; returns whether it did."""
+        """Starts a drag if a handle is at a point of the widget.
+
+        Returns whether a drag was started.
+        """
         self._handle = self._hit(place)
         self._start, self._change = place, np.eye(4)
         if self._handle and self._anchor is not None and self._anchor.live:
@@ -161,7 +165,10 @@ class Gizmo(QObject):
         return bool(self._handle)
 
     def drag(self, place: QPointF) -> None:
-        """Continues a drag. Lights follow a drag at once, other objects only when it ends."""
+        """Continues a drag.
+
+        Lights are updated during a drag, other objects only when the drag ends.
+        """
         anchor = self._anchor
         if anchor is None:
             return
@@ -191,7 +198,7 @@ class Gizmo(QObject):
         self._edits.move(anchor.placement, Gf.Matrix4d(change.tolist()))
 
     def _changed(self, anchor: Anchor, place: QPointF) -> Array:
-        """Returns the change (4, 4) in scene space, for row vectors, of a drag to a point."""
+        """Returns the transform (4, 4) of a drag to a point, in scene space for row vectors."""
         out, length, pose = np.eye(4), self._reach(anchor), self._session.pose
         centre = self._pixels(anchor.pivot[None, :])
         if pose is None or centre is None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A live render on the UI thread.
+"""A live render, controlled from the UI thread.
 
-A live render can be edited while it runs, and shows only frames of the newest version.
+A live render can be edited while it runs. It shows only frames of the newest scene version.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 
 
 class News:
-    """An ``engine.Listener`` that keeps the newest item of each kind until it is taken.
+    """An ``engine.Listener`` that stores the newest results until the UI thread takes them.
 
     Args:
-        told: Port that receives None when the first new item arrives.
+        told: Port to which None is sent when a result arrives and no other result is stored.
     """
 
     def __init__(self, told: Port) -> None:
@@ -43,7 +43,7 @@ class News:
         self._news: dict[tuple[str, str], Any] = {}
 
     def take(self) -> list[tuple[str, Any]]:
-        """Removes and returns all items as (kind, content), in order of arrival."""
+        """Removes and returns all stored results as (kind, content), in order of arrival."""
         with self._lock:
             news, self._news = self._news, {}
         return [(kind, content) for (kind, _), content in news.items()]
@@ -59,58 +59,61 @@ class News:
     # ---- on the render thread ------------------------------------------------------------------
 
     def on_frame(self, frame: Frame) -> None:
-        """Keeps the frame until it is taken, replacing an older one."""
+        """Stores the frame in place of an older stored frame."""
         self._put("frame", frame)
 
     def on_statistics(self, statistics: dict[str, Any], version: int) -> None:
-        """Keeps the statistics and their version until they are taken."""
+        """Stores the statistics and their version."""
         self._put("statistics", (statistics, version))
 
     def on_failed(self, message: str) -> None:
-        """Keeps an error message until it is taken.
+        """Stores an error message.
 
-        An error message does not replace a different one.
+        Different error messages are all stored.
         """
         self._put("failed", message, message)
 
     def on_ready(self, renderer: Renderer) -> None:
-        """Keeps the renderer of a new scene until it is taken."""
+        """Stores the renderer of a new scene."""
         self._put("ready", renderer)
 
 
 SETTLE_MS = 50
-"""Delay between the last movement and the full image, in milliseconds."""
+"""Delay in milliseconds between the last movement or edit and the start of the full-size image."""
 BURST_S = 0.15
-"""Edits at shorter intervals, in seconds, count as a drag with reduced images."""
+"""Edits that follow each other within this time, in seconds, count as a drag and show reduced
+images."""
 WAIT_S = 3.0
-"""Largest time that an image may take during a movement before the next edit stops it, in
-seconds."""
+"""Time in seconds that an image may take during a movement before the next edit stops it."""
 DENOISE_AGAIN = 1.5
-"""Factor of the number of samples after which a frame is denoised again."""
+"""A frame is denoised again when its sample count has grown by this factor."""
 LATE = 4
-"""A denoised image counts as late if the newest frame has more than this many times its samples."""
+"""A denoised image is outdated if the newest frame has more than this many times its samples."""
 
 IDLE, RENDERING, PAUSED, STOPPED, FINISHED = "idle", "rendering", "paused", "stopped", "finished"
 
 
 class Live(QObject):
-    """A live render with separate settings. All methods are for the UI thread; none blocks.
+    """A live render that has its own settings.
+
+    All methods must be called on the UI thread, and none blocks.
 
     Attributes:
         setup: Settings.
-        last_frame: The last emitted frame, or None.
-        version: Version of scene and settings.
+        last_frame: The frame that was emitted last, or None.
+        version: Current version of the scene and the settings.
         oldest: Oldest version whose frames may still be shown.
-        state: The last emitted state.
+        state: The state that was emitted last.
         renderer: The core's renderer, or None.
 
     Signals:
         frame(Frame): A new frame of the newest version.
-        statistics(dict): Statistics (docs/statistics.md), about twice per second during a render.
+        statistics(dict): Statistics (docs/statistics.md), emitted about twice per second during a
+            render.
         setup_changed(Setup): Settings changed.
-        edited(int): Scene or settings changed; carries the new version.
+        edited(int): The scene or the settings changed. The argument is the new version.
         state_changed(str): "idle", "rendering", "paused", "stopped" or "finished".
-        failed(str), warned(str): Message in one line.
+        failed(str), warned(str): Error or warning message in one line.
     """
 
     frame = Signal(object)
@@ -161,7 +164,7 @@ class Live(QObject):
     ) -> None:
         """Starts rendering a new scene; ``make`` creates the renderer on the render thread.
 
-        ``moving`` says whether a reduced image is enough.
+        ``moving`` says whether a reduced image is sufficient.
         """
         self._pending = Edit()
         self._moving = moving
@@ -169,7 +172,9 @@ class Live(QObject):
         self._submit(Task(self.setup, 0, edit, moving, loaded, make))
 
     def change(self, **values: Any) -> bool:
-        """Changes fields of the setup and restarts the render; emits ``failed`` for invalid values.
+        """Changes fields of the setup and restarts the render.
+
+        Emits ``failed`` if a value is invalid.
 
         Returns:
             Returns whether the setup was changed.
@@ -198,8 +203,8 @@ class Live(QObject):
 
         Args:
             edit: The changes of the scene.
-            moving: Whether similar edits follow. Images are reduced until ``settle`` is called, or
-                until no edit came for some time.
+            moving: Whether the edit belongs to a series of edits, such as a drag. Only reduced
+                images are rendered until ``settle`` is called or no edit has arrived for some time.
         """
         self._pending.add(edit)
         now = time.perf_counter()
@@ -212,7 +217,7 @@ class Live(QObject):
         self._flush()
 
     def settle(self) -> None:
-        """Ends a movement and starts the full image."""
+        """Ends a series of edits and starts the full-size image."""
         self._settle.stop()
         if self._moving:
             self._moving = False
@@ -282,7 +287,7 @@ class Live(QObject):
             self.state_changed.emit(state)
 
     def _receive(self, letter: None) -> None:
-        """Handles the newest frame, statistics, error and renderer from the render thread."""
+        """Handles the frame, statistics, error and renderer that the render thread has stored."""
         takes: dict[str, Callable[[Any], None]] = {
             "frame": self._take,
             "statistics": self._take_statistics,
@@ -332,7 +337,7 @@ class Live(QObject):
         self.frame.emit(frame)
 
     def _denoise(self, frame: Frame) -> None:
-        """Denoises a complete frame in the background; reduced images are denoised already."""
+        """Denoises a complete frame on another thread. Reduced images are already denoised."""
         if not self.setup.denoise or frame.status.get("preview") or not frame.is_complete:
             return
         if frame.final or frame.samples_done >= DENOISE_AGAIN * self._denoising:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Camera movements (orbit, pan, dolly, frame) as functions from one camera pose to another."""
+"""Camera movements (orbit, pan, dolly, frame), as functions that return a new camera pose."""
 
 from __future__ import annotations
 
@@ -23,14 +23,15 @@ UPS = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """A camera, with the parameters of ``Renderer.edit(camera=...)``.
+    """A camera pose, with the parameters that ``Renderer.edit(camera=...)`` accepts.
 
     Attributes:
-        to_world: (4, 4) for row vectors; the camera looks along -z.
-        window: x0, x1, y0, y1 on the plane z = -1, for an orthographic camera across its axis, for
-            a latlong camera in radians.
-        others: Values of further ``camera_parameters()`` that differ from their defaults.
-        path: Path of the camera prim that the pose comes from; None for a free camera.
+        to_world: Camera-to-world matrix (4, 4) for row vectors. The camera looks along -z.
+        window: Image window x0, x1, y0, y1. For a perspective camera, it lies on the plane z = -1;
+            for an orthographic camera, across the axis; for a latlong camera, the values are angles
+            in radians.
+        others: Values of the other ``camera_parameters()`` that differ from their defaults.
+        path: Path of the camera prim that has this pose; None for a free camera.
     """
 
     to_world: Matrix
@@ -44,7 +45,7 @@ class Pose:
         return {**here, **camera_defaults(), **self.others}
 
     def value(self, name: str) -> Any:
-        """Returns the value of a camera parameter in ``others``, or the parameter's default."""
+        """Returns the value of a camera parameter: that in ``others``, or else the default."""
         return self.others[name] if name in self.others else camera_parameters()[name].default
 
     def changed(self, **others: Any) -> Pose:
@@ -53,15 +54,18 @@ class Pose:
 
     @property
     def projection(self) -> str:
-        """Projection: perspective, orthographic or latlong."""
+        """Projection of the camera: "perspective", "orthographic" or "latlong"."""
         return str(self.value("projection"))
 
     def fitted(self, width: int, height: int) -> tuple[float, float, float, float]:
-        """Returns the window that an image of this size shows."""
+        """Returns the image window for an image of the given size."""
         return camera_window(self.options(), width, height)
 
     def around(self, before: Sequence[float], now: Sequence[float]) -> Pose:
-        """Converts the pose to a scene with another origin, at the same position in the world."""
+        """Converts the pose to a scene space with another origin.
+
+        The world position does not change.
+        """
         if tuple(before) == tuple(now):
             return self
         to_world = self.to_world.copy()
@@ -75,37 +79,38 @@ class Pose:
 
     @property
     def right(self) -> Vector:
-        """Unit vector to the right of the camera."""
+        """Unit vector of the camera's x axis, to the right in the image."""
         return self.to_world[0, :3]
 
     @property
     def up(self) -> Vector:
-        """Unit vector upwards in the camera's image."""
+        """Unit vector of the camera's y axis, upwards in the image."""
         return self.to_world[1, :3]
 
     @property
     def back(self) -> Vector:
-        """Unit vector opposite to the view direction."""
+        """Unit vector of the camera's z axis, opposite to the view direction."""
         return self.to_world[2, :3]
 
     def depth_of(self, point: Vector) -> float:
-        """Returns the distance of a point along the camera axis, negative behind the camera."""
+        """Returns the distance of a point along the view direction; negative behind the camera."""
         return float((self.position - point) @ self.back)
 
 
 def pose_of(to_world: Matrix, values: Mapping[str, Any], path: str | None) -> Pose:
-    """Returns the pose of a camera from a mapping with values of ``camera_parameters()``."""
+    """Returns the pose for a mapping with values of ``camera_parameters()``."""
     others = {name: values[name] for name in camera_defaults() if name in values}
     return Pose(to_world, tuple(values["window"]), others, path)
 
 
 def pose_of_scene(camera: dict[str, Any], path: str | None) -> Pose:
-    """Returns the pose of ``Scene.camera``, the camera of a scene."""
+    """Returns the pose of a scene's camera, ``Scene.camera``."""
     return pose_of(np.array(camera["to_world"], np.float64), camera, path)
 
 
 STEEPEST = math.radians(89.9)
-"""Largest elevation of an orbit. At the poles, the up direction would be undefined."""
+"""Largest elevation angle of an orbit, in radians. At the poles, the camera's up direction would be
+undefined."""
 VIEWS = ("front", "back", "right", "left", "top", "bottom")
 
 
@@ -114,7 +119,7 @@ def orbit(pose: Pose, pivot: Vector, yaw: float, pitch: float, up_axis: str) -> 
 
     Args:
         pose: Initial pose.
-        pivot: Point that keeps its position in the image.
+        pivot: Centre of the orbit, which keeps its position in the image.
         yaw: Radians about the stage's up axis; positive moves the camera to its right.
         pitch: Radians about the camera's right; positive raises the camera.
         up_axis: "X", "Y" or "Z".
@@ -129,14 +134,14 @@ def orbit(pose: Pose, pivot: Vector, yaw: float, pitch: float, up_axis: str) -> 
 
 
 def pan(pose: Pose, depth: float, across: float, upwards: float, size: tuple[float, float]) -> Pose:
-    """Moves the camera so that points at ``depth`` follow the cursor.
+    """Moves the camera so that scene points at ``depth`` follow the cursor.
 
     Args:
         pose: Initial pose.
-        depth: Distance along the axis, positive.
-        across: Movement of the cursor to the right, in pixels.
-        upwards: Movement of the cursor upwards, in pixels.
-        size: Size of the image, in the same pixels.
+        depth: Distance along the view direction, positive.
+        across: Cursor movement to the right, in pixels.
+        upwards: Cursor movement upwards, in pixels.
+        size: Width and height of the image, in the same pixels.
     """
     x0, x1, y0, y1 = pose.fitted(*map(round, size))
     if pose.projection == "orthographic":
@@ -147,9 +152,9 @@ def pan(pose: Pose, depth: float, across: float, upwards: float, size: tuple[flo
 
 
 def dolly(pose: Pose, pivot: Vector, factor: float) -> Pose:
-    """Moves towards a point by multiplying the distance by ``factor``, which is positive.
+    """Moves the camera so that its distance to a point is multiplied by ``factor`` > 0.
 
-    An orthographic camera does not move; instead its window is scaled.
+    For an orthographic camera, scales the image window instead of moving the camera.
     """
     if pose.projection == "orthographic":
         return replace(_scaled(pose, factor), path=None)
@@ -157,18 +162,18 @@ def dolly(pose: Pose, pivot: Vector, factor: float) -> Pose:
 
 
 def frame(pose: Pose, points: Matrix, aspect: float) -> Pose:
-    """Moves the camera so that points fill the image except for a margin, keeping its direction.
+    """Moves the camera so that points fill the image up to a margin. Keeps the view direction.
 
     Args:
         pose: Initial pose.
-        points: (n, 3), such as the corners of a box.
+        points: Points with shape (n, 3), such as the corners of a box.
         aspect: Width / height of the image.
     """
     return _framed(pose, pose.to_world[:3, :3], points, aspect)
 
 
 def view(pose: Pose, name: str, points: Matrix, up_axis: str, aspect: float) -> Pose:
-    """Views all points (n, 3) from a side, which is a name of ``VIEWS``."""
+    """Views all points (n, 3) from a side, which is one of ``VIEWS``."""
     up = np.array(UPS[up_axis])
     # As in `usd.camera.frame_points`, the front is +Z, or -Y if Z is up.
     front = np.array({"Z": (0.0, -1.0, 0.0)}.get(up_axis, (0.0, 0.0, 1.0)))
@@ -185,7 +190,7 @@ def view(pose: Pose, name: str, points: Matrix, up_axis: str, aspect: float) -> 
 
 
 def opposite(pose: Pose, pivot: Vector, up_axis: str) -> Pose:
-    """Views a point from the other side."""
+    """Rotates the camera by half a turn about the vertical axis through a point."""
     turn = rotation(np.array(UPS[up_axis]), math.pi)
     return _placed(pose, pose.to_world[:3, :3] @ turn, pivot + (pose.position - pivot) @ turn)
 
@@ -222,7 +227,7 @@ def _scaled(pose: Pose, factor: float) -> Pose:
 
 
 def rotation(axis: Vector, angle: float) -> Matrix:
-    """Returns a right-handed rotation about a unit vector for row vectors, (3, 3), by Rodrigues."""
+    """Returns the rotation (3, 3) about a unit vector, for row vectors, by Rodrigues' formula."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     turn = np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross)
@@ -230,7 +235,7 @@ def rotation(axis: Vector, angle: float) -> Matrix:
 
 
 def _placed(pose: Pose, axes: Matrix, position: Vector) -> Pose:
-    """Returns a free camera with these axes (rows), made exactly orthonormal."""
+    """Returns a free camera with these axes as matrix rows, after making them orthonormal."""
     back = axes[2] / np.linalg.norm(axes[2])
     right = np.cross(axes[1], back)
     right /= np.linalg.norm(right)
@@ -241,11 +246,11 @@ def _placed(pose: Pose, axes: Matrix, position: Vector) -> Pose:
 
 
 def project(pose: Pose, points: Matrix, size: tuple[int, int]) -> Matrix | None:
-    """Returns the pixels (n, 2) of points (n, 3), or None if any of them is behind the camera.
+    """Returns pixel positions (n, 2) of points (n, 3), or None if any point is behind the camera.
 
     Args:
-        pose: The camera; a latlong camera is not supported.
-        points: (n, 3) in scene space.
+        pose: Pose of the camera, which must not be a latlong camera.
+        points: Points in scene space, with shape (n, 3).
         size: Width and height of the image.
     """
     local = (np.asarray(points, float) - pose.position) @ pose.to_world[:3, :3].T

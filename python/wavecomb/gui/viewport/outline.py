@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Outline of the selected prims, from the objects that the camera sees."""
+"""Outline of the selected prims in the image, computed from the objects that the camera sees."""
 
 from __future__ import annotations
 
@@ -20,15 +20,18 @@ if TYPE_CHECKING:
     from wavecomb.gui.viewport.session import Session
 
 MOST_PIXELS = 160_000
-"""Largest size at which outlines are computed, which takes about 50 ms of CPU time."""
+"""Largest image size at which an outline is computed. An outline of this size takes about 50 ms of
+CPU time."""
 COLOUR = (255, 154, 60)
 
 
 def object_mask(renderer: Renderer, path: str, width: int, height: int) -> NDArray[np.bool_] | None:
-    """Returns the pixels whose first hit is on a prim or below it, or None if there are no objects.
+    """Returns a mask of the pixels whose first hit is on a prim or below the prim.
+
+    Returns None if the scene has no objects of the prim.
 
     Args:
-        renderer: Renderer of the current scene, which may be rendering.
+        renderer: Renderer of the current scene, which may be rendering during the call.
         path: Path of the prim.
         width: Width of the mask in pixels.
         height: Height of the mask in pixels.
@@ -50,7 +53,7 @@ def object_mask(renderer: Renderer, path: str, width: int, height: int) -> NDArr
 
 
 def edges(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Returns the pixels outside of a mask that touch it."""
+    """Returns a mask of the pixels that touch another mask from outside."""
     grown = mask.copy()
     for axis in (0, 1):
         for step in (1, -1):
@@ -61,7 +64,7 @@ def edges(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 class Outline(QObject):
-    """Outline of the session's selection over a view, computed on another thread."""
+    """Outline of the session's selection that is drawn over a view. Another thread computes it."""
 
     def __init__(self, session: Session, view: PictureView) -> None:
         super().__init__(view)
@@ -83,11 +86,11 @@ class Outline(QObject):
 
     @property
     def image(self) -> QImage | None:
-        """The outline as an image, transparent elsewhere; None if nothing visible is selected."""
+        """The outline as an image with alpha; None if no selected prim is visible."""
         return self._image
 
     def follow(self, frame: Frame) -> None:
-        """Updates the outline for a displayed frame."""
+        """Updates the outline after a new frame was displayed."""
         known = self._frame
         self._frame = frame
         if known is None or (known.version, known.scale) != (frame.version, frame.scale):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Indicator light that shows whether the image has stayed bit-identical."""
+"""Coloured indicator that shows whether the image has stayed bit-identical."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ WAITING = "Waits until each pixel has all samples"
 
 
 class PictureLight(QWidget):
-    """Indicator that compares the bits of each finished image with those of earlier settings.
+    """Indicator that compares the bits of each finished image with images from earlier settings.
 
-    Images are compared if every pixel has the same number of samples, or at the end of an adaptive
-    render. Bits are hashed on another thread.
+    An image is compared when every pixel has the same number of samples, or when an adaptive render
+    ends. The bits are hashed on another thread, so that the window does not wait.
     """
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Widget that shows an image: zoom, pan, device pixels, a pixel grid at large zoom."""
+"""Widget that shows an image with zoom, pan and, at large zoom, a pixel grid."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ _TEXT = QColor(240, 240, 240)
 
 
 def legend_text(legend: Legend) -> str:
-    """Returns the title of a legend, and whether its scale is logarithmic."""
+    """Returns the title of a false-colour legend, and whether the legend's scale is logarithmic."""
     return f"{legend.title}, logarithmic" if legend.logarithmic else legend.title
 
 
 def paint_legend(painter: QPainter, area: QRect, legend: Legend, font: QFont) -> None:
-    """Draws title, colours and numbers into the lower left of an area."""
+    """Draws the title, colours and numbers of a legend into the lower left corner of an area."""
     metrics = QFontMetricsF(font)
     line = metrics.height()
     ticks = legend.ticks()
@@ -67,14 +67,14 @@ def paint_legend(painter: QPainter, area: QRect, legend: Legend, font: QFont) ->
 
 LEAST_ZOOM, MOST_ZOOM = 1 / 16, 64.0
 GRID_ZOOM = 10.0
-"""Zoom, in device pixels per image pixel, from which a pixel grid is drawn."""
+"""Smallest zoom at which a pixel grid is drawn, in device pixels per image pixel."""
 
 
 class PictureView(QWidget):
     """View of an image with a given size in pixels. A smaller image is stretched to that size.
 
     Signals:
-        zoom_changed(float): Zoom in device pixels per image pixel.
+        zoom_changed(float): The zoom changed. The argument is in device pixels per image pixel.
     """
 
     zoom_changed = Signal(float)
@@ -93,9 +93,9 @@ class PictureView(QWidget):
         """Sets the image.
 
         Args:
-            image: The image; None shows nothing.
-            size: Size in pixels; the image may be smaller.
-            legend: Legend of false colours, or None.
+            image: The image; None clears the view.
+            size: Size in pixels at which the image is shown. The image may be smaller.
+            legend: Legend of the image's false colours, or None.
         """
         self._image, self._legend = image, legend
         if size != self._size:
@@ -127,8 +127,9 @@ class PictureView(QWidget):
         """Sets the zoom in device pixels per image pixel; None fits the image to the widget.
 
         Args:
-            zoom: The zoom, which is clamped to limits.
-            about: Point of the widget that stays fixed; None means its centre.
+            zoom: The zoom, which is clamped to the allowed range.
+            about: Point of the widget whose image point stays fixed; None means the centre of the
+                widget.
         """
         place = about if about is not None else QPointF(self.rect().center())
         before = self.to_picture(place)
@@ -142,7 +143,7 @@ class PictureView(QWidget):
         self.update()
 
     def shift(self, by: QPointF) -> None:
-        """Pans the image by device-independent pixels."""
+        """Pans the image by a distance in device-independent pixels."""
         if self._zoom is None:
             self._zoom = self._fitting()
         self._shift += by
@@ -161,7 +162,7 @@ class PictureView(QWidget):
         return QRectF(x, y, wide, high)
 
     def to_picture(self, place: QPointF) -> QPointF:
-        """Converts a point of the widget to pixels of the image."""
+        """Converts a point of the widget to image coordinates in pixels."""
         rect = self.picture_rect()
         return QPointF(
             (place.x() - rect.x()) / rect.width() * self._size.width(),
@@ -169,7 +170,7 @@ class PictureView(QWidget):
         )
 
     def from_picture(self, place: QPointF) -> QPointF:
-        """Converts a point of the image to a point of the widget."""
+        """Converts image coordinates in pixels to a point of the widget."""
         rect = self.picture_rect()
         return QPointF(
             rect.x() + place.x() / self._size.width() * rect.width(),
@@ -195,7 +196,7 @@ class PictureView(QWidget):
             put(min(max(get(), -most), most))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Keeps the image inside the widget."""
+        """Adapts the panning after the widget was resized, so that the image stays visible."""
         super().resizeEvent(event)
         self._keep_inside()
         self.zoom_changed.emit(self.zoom())
@@ -203,7 +204,7 @@ class PictureView(QWidget):
     # ---- painting ------------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Paints background, image, grid, overlay of subclasses and legend."""
+        """Paints background, image, pixel grid, the overlay of subclasses, and the legend."""
         painter = QPainter(self)
         painter.fillRect(self.rect(), theme.surround())
         if self._image is not None:

@@ -12,17 +12,17 @@ from wavecomb.errors import WavecombError
 from wavecomb.gui.viewport.frames import Array, Frame
 
 _DARK = np.float32(0.05)
-"""Small value added to albedos before a division."""
+"""Small value that is added to albedos so that a division by zero cannot occur."""
 SCALES = (1, 2, 3, 4, 6, 8, 12)
 
 
 def reduced_scale(pixels: int, rate: float, overhead: float, limit: float) -> int:
-    """Returns the smallest reduction that renders one sample per pixel within a time limit.
+    """Returns the smallest reduction factor with which one sample per pixel fits into a time limit.
 
     Args:
-        pixels: Pixels of the full image.
-        rate: Samples per second; 0 if unknown.
-        overhead: Constant time of a render, in seconds.
+        pixels: Number of pixels of the full-size image.
+        rate: Samples per second; 0 if the rate is unknown.
+        overhead: Time of a render that is independent of the sample count, in seconds.
         limit: Time limit in seconds.
 
     >>> reduced_scale(1_000_000, 2_000_000.0, 0.01, 0.06)
@@ -37,26 +37,30 @@ def reduced_scale(pixels: int, rate: float, overhead: float, limit: float) -> in
 
 
 class Pace:
-    """Time model of reduced images: constant time + pixels / rate, fitted to recent images."""
+    """Model of the time of reduced images, constant + pixels / rate, fitted to recent images."""
 
     def __init__(self) -> None:
         self._sums = np.zeros(5)
 
     def learn(self, pixels: int, seconds: float) -> None:
-        """Adds the measured time of an image, weighted 1.25 times as much as the previous image."""
+        """Adds the measured time of an image.
+
+        Each image has 1.25 times the weight of the previous one.
+        """
         self._sums *= 0.8
         self._sums += (1.0, pixels, seconds, pixels * pixels, pixels * seconds)
 
     def scale(self, pixels: int, limit: float) -> int:
-        """Returns the smallest reduction of an image with this expected time in seconds."""
+        """Returns the smallest reduction factor of an image for a given time in seconds."""
         rate, constant = self._fit()
         return reduced_scale(pixels, rate, constant, limit)
 
     def _fit(self) -> tuple[float, float]:
-        """Returns pixels per second (0 if unknown) and constant seconds, by least squares.
+        """Returns the fitted pixels per second (0 if unknown) and constant time in seconds.
 
-        An assumed empty image with half the mean time and a small weight makes the solution unique.
-        The assumed image makes the model optimistic, so that finer images are tried.
+        The least squares fit includes an imaginary image of 0 pixels, with a small weight and half
+        the mean time, so that the solution is unique. The imaginary image makes the model
+        optimistic, so that larger images are tried.
         """
         n, x, t, xx, xt = self._sums
         if n == 0.0:
@@ -69,9 +73,9 @@ class Pace:
 
 
 def smooth(frame: Frame, back: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Returns the beauty of a reduced image without noise.
+    """Returns an estimate of the beauty without noise from a reduced frame.
 
-    The image is denoised or, without Open Image Denoise, shaded by its first hits.
+    If Open Image Denoise is available, the beauty is denoised. Otherwise the first hits are shaded.
 
     Args:
         frame: A reduced frame with guide layers.
@@ -87,7 +91,7 @@ def smooth(frame: Frame, back: NDArray[np.float64]) -> NDArray[np.float32]:
 
 
 def by_first_hit(beauty: Array, albedo: Array, normal: Array, back: Array) -> NDArray[np.float32]:
-    """Returns an image of the first hits, lit by a headlight of the beauty's mean brightness."""
+    """Returns first hits lit from the camera, with the mean brightness of the beauty."""
     lit = np.clip(albedo, 0.0, 1.0) * (0.3 + 0.7 * np.abs(normal @ back))[:, :, None]
     hit = np.linalg.norm(normal, axis=2) > 0.5
     if not hit.any():
@@ -98,7 +102,7 @@ def by_first_hit(beauty: Array, albedo: Array, normal: Array, back: Array) -> ND
 
 
 def enlarged(image: Array, width: int, height: int) -> Array:
-    """Enlarges an image to (height, width, ...), with bilinear interpolation."""
+    """Enlarges an image to (height, width, ...) by bilinear interpolation."""
     out = np.asarray(image, np.float32)
     for axis, size in ((0, height), (1, width)):
         count = out.shape[axis]
@@ -111,13 +115,14 @@ def enlarged(image: Array, width: int, height: int) -> Array:
 
 
 class Filler:
-    """Fills frames of the first pass, in which few pixels have samples, without noise.
+    """Replaces frames of the first pass, with few samples, by an estimate without noise.
 
-    The filled pixels have the light of a reduced image and the albedo of first hits at full size.
+    The estimate is the beauty of a reduced image, adapted to the albedo of first hits at full size.
 
     Args:
-        preview: The reduced image; None leaves frames as they are.
-        albedo: (height, width, 3) albedo at full size; None means: enlarge the reduced image.
+        preview: The reduced image; None means that frames are not replaced.
+        albedo: Albedo of first hits at full size, (height, width, 3). None means that the
+            reduced image is only enlarged.
     """
 
     def __init__(self, preview: Frame | None, albedo: Array | None = None) -> None:
@@ -125,7 +130,7 @@ class Filler:
         self._whole: Array | None = None
 
     def fill(self, frame: Frame) -> Frame:
-        """Returns the frame, or a frame that looks complete if some pixels have no samples."""
+        """Returns the frame, or a copy that shows the estimate if some pixels have no samples."""
         preview = self._preview
         if preview is None or (frame.is_complete and frame.samples_done):
             return frame

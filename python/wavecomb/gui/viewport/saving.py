@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes frames as files like `wavecomb render`."""
+"""Writes frames to files in the same form as `wavecomb render`."""
 
 from __future__ import annotations
 
@@ -54,14 +54,16 @@ def save_frame(
     look: Look,
     options: dict[str, Any],
 ) -> None:
-    """Writes a frame, all layers (.exr) or the displayed image (.png), never partially.
+    """Writes all layers of a frame (.exr) or the displayed image (.png).
+
+    A failure leaves no partial file.
 
     Args:
         frame: Frame at full size.
         path: File name that ends in .exr or .png.
-        scene: Scene, for the camera's matrices.
-        loaded: Loaded stage, for the header.
-        look: Display settings of the .png.
+        scene: Scene of the frame, from which the camera matrices are written.
+        loaded: Loaded stage, whose path and options are written to the header.
+        look: Display settings that are applied to a .png file.
         options: Arguments of ``Picture.save``.
 
     Raises:

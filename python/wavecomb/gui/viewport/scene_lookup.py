@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lookups of a session on its stage and in its scene. Independent of Qt."""
+"""Functions with which a session looks up objects on the stage and in the scene.
+
+Independent of Qt.
+"""
 
 from __future__ import annotations
 
@@ -53,7 +56,7 @@ def edits_again(
     materials: Mapping[str, Mapping[str, Any]],
     lights: Mapping[tuple[str, int], Mapping[str, Any]],
 ) -> Edit:
-    """Converts edits to the indices of a scene that was loaded again.
+    """Converts edits by name to edits by index, for a scene that was loaded again.
 
     Args:
         scene: The new scene.
@@ -73,13 +76,13 @@ def edits_again(
 
 
 def prim_bounds(usd: Usd.Stage, loaded: LoadedStage, path: str) -> NDArray[np.float64] | None:
-    """Returns the world bounds of a prim's geometry and lights, (2, 3), or None if it has none.
+    """Returns the bounds (2, 3) of a prim's geometry and lights in scene space, or None.
 
     Args:
         usd: The stage.
         loaded: The loaded stage.
-        path: Path in the form of ``Renderer.pick``: "/World/Forest[12]/Leaves" is in the prim
-            "/World/Forest".
+        path: Path in the notation of ``Renderer.pick``, in which "/World/Forest[12]/Leaves" is an
+            instance below the prim "/World/Forest".
     """
     from pxr import Gf, Sdf, UsdGeom
 
@@ -106,13 +109,13 @@ def prim_bounds(usd: Usd.Stage, loaded: LoadedStage, path: str) -> NDArray[np.fl
 
 
 def light_key(scene: Scene, index: int) -> tuple[str, int]:
-    """Returns the name of a light, and its number among lights with that name."""
+    """Returns the key of a light: its name, and its number among lights with the same name."""
     names = [name for name, _ in scene.lights[: index + 1]]
     return names[-1], names.count(names[-1]) - 1
 
 
 def make_renderer(scene: Scene, threads: int) -> Renderer:
-    """Creates the core's renderer."""
+    """Creates a renderer of the core."""
     from wavecomb import _core
 
     return _core.Renderer(scene, threads)

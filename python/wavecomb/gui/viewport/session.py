@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The open stage and its live render, shared by all panels of the window.
 
-A session lives on the window's thread, and no method blocks. Loading, rendering, denoising and
-saving run on other threads, whose results arrive as signals.
+A session is used on the UI thread, and none of its methods blocks. Loading, rendering, denoising
+and saving run on other threads, whose results arrive as signals.
 """
 
 from __future__ import annotations
@@ -46,27 +46,27 @@ __all__ = ["Frame", "Live", "Pose", "Session", "Setup"]
 
 
 class Session(Live):
-    """A stage, its live render, and further live renders of it with other settings (twins).
+    """A stage, its live render, and optional further live renders with other settings (twins).
 
     Signals:
         opened(LoadedStage): A stage was loaded, or loaded again after a change of its contents.
-        closing(): The stage will be reloaded from disk; receivers must release its prims.
-        busy(str): Description of background work, or "".
-        camera_changed(Pose): The camera moved, or another was chosen.
-        selected(str | None): Path of the prim that was selected, in the image or elsewhere.
+        closing(): The stage will be reloaded from disk. Receivers must release its prims.
+        busy(str): Description of the work in the background, or "" if there is none.
+        camera_changed(Pose): The camera moved, or another camera was chosen.
+        selected(str | None): The selection changed. The argument is the path of the selected prim.
         saved(str): A file was written.
-        noted(LoadedStage): The report of the stage has new findings.
+        noted(LoadedStage): The loader's report of the stage has new findings.
 
     Attributes:
         stage: The loaded stage, or None.
-        usd: The USD stage, or None. Edits change its session layer and then call ``rebuild``.
+        usd: The open USD stage, or None. Edits change the session layer and then call ``rebuild``.
         up_axis: "X", "Y" or "Z".
-        pose: The camera, or None.
+        pose: Pose of the camera, or None.
         selection: Path of the selected prim, or None.
-        material_edits: Values changed by ``edit_material``, by the material's name.
-        light_edits: Values changed by ``edit_light``, by the light's name and its number among
-            lights with that name.
-        twins: Live renders of the same scene and camera with separate settings.
+        material_edits: Values that ``edit_material`` has changed, by material name.
+        light_edits: Values that ``edit_light`` has changed, by name and number among lights of that
+            name.
+        twins: Live renders with separate settings that show the same scene and camera.
     """
 
     opened = Signal(object)
@@ -106,7 +106,7 @@ class Session(Live):
     def scene(self) -> Scene | None:
         """The core's scene with all edits, or None.
 
-        ``Scene.material(i)`` and ``Scene.light(i)`` return current parameter values.
+        Use ``Scene.material(i)`` and ``Scene.light(i)`` to read current parameter values.
         """
         if self.renderer is not None:
             return self.renderer.scene
@@ -127,7 +127,7 @@ class Session(Live):
         variants: Mapping[str, str] | None = None,
         purposes: tuple[str, ...] | None = None,
     ) -> None:
-        """Loads a stage; ``opened`` or ``failed`` follows.
+        """Loads a stage on another thread, and then emits ``opened`` or ``failed``.
 
         The current stage stays open until the new stage is loaded.
         """
@@ -135,7 +135,7 @@ class Session(Live):
         self._read(Request(source, threads=self.setup.threads), f"reading {source.path.name}")
 
     def reload(self) -> None:
-        """Reloads the stage from disk, dropping edits but keeping the camera."""
+        """Reloads the stage from disk. Edits are dropped, and the camera is kept."""
         if self._request is None or self.stage is None:
             self.failed.emit("there is no stage to reload: open one first")
             return
@@ -150,7 +150,7 @@ class Session(Live):
         self._read(request, f"reading {source.path.name} again")
 
     def rebuild(self, reason: str) -> None:
-        """Loads the stage again after edits of the session layer of ``usd``, keeping the camera.
+        """Loads the stage again after edits of the session layer, keeping the camera.
 
         Args:
             reason: Description of the change for people, such as "variant of /World/Car".
@@ -162,12 +162,11 @@ class Session(Live):
         self._read(request, reason)
 
     def show_time(self, time: float, *, moving: bool = False) -> None:
-        """Loads the stage again at another time code, keeping edits and a free camera.
+        """Loads the stage again at another time code. Edits and a free camera are kept.
 
         Args:
             time: The time code.
-            moving: Whether other time codes follow, so that a reduced image is enough until
-                ``restart``.
+            moving: Whether further time codes follow; images are reduced until ``restart``.
         """
         if self._request is not None and self.usd is not None:
             source = replace(self._request.source, time=time)
@@ -228,7 +227,7 @@ class Session(Live):
         self.failed.emit(message)
 
     def note_words(self, report: LoadReport | None) -> None:
-        """Adds later messages of USD to the report of the open stage."""
+        """Adds messages that USD emits after loading to the report of the open stage."""
         if report is not None and self.stage is not None:
             self.stage.report.absorb(report)
             self.noted.emit(self.stage)
@@ -239,8 +238,9 @@ class Session(Live):
         """Moves the camera.
 
         Args:
-            pose: New pose, whose ``path`` is None unless a camera prim has exactly this pose.
-            moving: Whether more movements follow immediately. Images are reduced until ``settle``.
+            pose: New pose. Its ``path`` must be None unless a camera prim has exactly this pose.
+            moving: Whether further movements follow immediately. Images are reduced until
+                ``settle``.
         """
         self.pose = pose
         self._edit_all(Edit(camera=pose.options()), moving=moving)
@@ -254,7 +254,7 @@ class Session(Live):
             live.edit(edit.copied(), moving=moving)
 
     def settle(self) -> None:
-        """Ends a movement of the camera or scene, in this render and in its twins."""
+        """Ends a movement of the camera or scene, in the session's render and in its twins."""
         super().settle()
         for live in self.twins:
             live.settle()
@@ -265,7 +265,7 @@ class Session(Live):
         return None if self._request is None else self._request.source
 
     def use_camera(self, path: str | None) -> None:
-        """Changes to a camera prim; None changes to a free camera at the current pose."""
+        """Views through a camera prim; None changes to a free camera with the current pose."""
         if self.pose is None:
             return
         if path is None:
@@ -283,7 +283,7 @@ class Session(Live):
         return camera_pose(self.usd, path, self._request.source.time, origin)
 
     def edit_material(self, material: int, *, moving: bool = False, **values: Any) -> None:
-        """Changes parameters of a material by index, with keyword arguments of ``add_material``."""
+        """Changes a material by index, with keyword arguments of ``add_material``."""
         if self.scene is None:
             return
         name = self.scene.materials[material][0]
@@ -291,7 +291,7 @@ class Session(Live):
         self._edit_all(Edit(materials={material: values}), moving=moving)
 
     def edit_light(self, light: int, *, moving: bool = False, **values: Any) -> None:
-        """Changes parameters of a light by index, with keyword arguments of ``add_light``."""
+        """Changes a light by index, with keyword arguments of ``add_light``."""
         if self.scene is None:
             return
         self.light_edits.setdefault(light_key(self.scene, light), {}).update(values)
@@ -305,7 +305,7 @@ class Session(Live):
         return None if self.renderer is None else self.renderer.pick(*at)
 
     def learned(self, x: float, y: float) -> dict[str, Any] | None:
-        """Returns ``Renderer.learned`` for the surface at pixel (x, y), or None."""
+        """Returns the result of ``Renderer.learned`` for the surface at pixel (x, y), or None."""
         at = float(x), float(y), self.setup.width, self.setup.height
         return None if self.renderer is None else self.renderer.learned(*at)
 
@@ -316,31 +316,31 @@ class Session(Live):
             self.selected.emit(path)
 
     def selected_bounds(self) -> NDArray[np.float64] | None:
-        """Returns the bounds of the selected prim in the scene, (2, 3), or None."""
+        """Returns the bounds (2, 3) of the selected prim in scene space, or None."""
         if self.selection is None or self.stage is None or self.usd is None:
             return None
         return prim_bounds(self.usd, self.stage, self.selection)
 
     def pause(self) -> None:
-        """Pauses the render and its twins."""
+        """Pauses the session's render and its twins."""
         super().pause()
         for live in self.twins:
             live.pause()
 
     def resume(self) -> None:
-        """Continues the render and its twins, or restarts those that were stopped."""
+        """Resumes paused renders of the session, and restarts stopped ones."""
         super().resume()
         for live in self.twins:
             live.resume()
 
     def restart(self) -> None:
-        """Restarts the render from the first sample, at full size."""
+        """Restarts the session's render from the first sample, at full size."""
         self._playing = False
         if self.stage is not None:
             super().restart()
 
     def save(self, path: str | os.PathLike[str], look: Look | None = None, **options: Any) -> None:
-        """Writes all layers (.exr) or the displayed image (.png); ``saved`` or ``failed`` follows.
+        """Writes all layers (.exr) or the displayed image (.png); emits ``saved`` or ``failed``.
 
         Args:
             path: File name that ends in .exr or .png.
@@ -356,7 +356,7 @@ class Session(Live):
         self.run(f"writing {Path(name).name}", work, lambda: self.saved.emit(name))
 
     def twin(self, setup: Setup) -> Live:
-        """Starts another live render of the same scene and camera, with separate settings.
+        """Starts a twin: a live render of the same scene and camera with separate settings.
 
         The twin follows all edits of the scene and the camera. ``drop_twin`` ends the twin.
         """
@@ -377,7 +377,7 @@ class Session(Live):
     def run(
         self, what: str, work: Callable[[], object], then: Callable[[], None] | None = None
     ) -> None:
-        """Runs ``work`` on another thread, then ``then`` on the window's thread.
+        """Runs ``work`` on another thread, and then ``then`` on the UI thread.
 
         See ``Tasks.run``.
         """

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Undo history of camera movements, separate from the history of edits.
 
-Camera movements do not change the stage, so they are not in the undo history of edits.
-Otherwise undoing an edit would first revert all later camera movements, and a stage that was only
-viewed would count as unsaved.
+Camera movements do not change the stage, so they have a separate undo history. In a common history,
+undoing an edit would first revert all later camera movements. A stage that was only viewed would
+also count as unsaved.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from wavecomb.gui.viewport.navigate import Pose
 from wavecomb.gui.viewport.session import Session
 
 MERGE_S = 0.7
-"""Camera movements at shorter intervals, in seconds, merge into one undo step."""
+"""Largest interval, in seconds, between camera movements that merge into one undo step."""
 _MOVE = 2
 
 
@@ -35,26 +35,26 @@ class MoveCommand(QUndoCommand):
         self._there = True
 
     def redo(self) -> None:
-        """Moves the camera to the later pose."""
+        """Moves the camera to the pose after the movement."""
         history = self._history()
         if history is not None and not self._there:
             history.go(self.after)
         self._there = False
 
     def undo(self) -> None:
-        """Moves the camera back to the earlier pose."""
+        """Moves the camera back to the pose before the movement."""
         if (history := self._history()) is not None:
             history.go(self.before)
 
     def id(self) -> int:
-        """Returns the id by which Qt finds commands that may merge.
+        """Returns the command id that Qt compares to find commands that may merge.
 
-        Choosing a camera is always a separate step.
+        The choice of another camera is always a separate undo step.
         """
         return _MOVE if self.after.path is None else -1
 
     def mergeWith(self, other: QUndoCommand) -> bool:
-        """Merges a later movement of the same drag."""
+        """Merges a later camera movement if both belong to the same drag."""
         if not isinstance(other, MoveCommand) or other.moment - self.moment >= MERGE_S:
             return False
         self.after, self.moment = other.after, other.moment
@@ -65,8 +65,8 @@ class ViewHistory(QObject):
     """Undo history of the poses of a session's camera.
 
     Attributes:
-        stack: Undo stack of movements.
-        now: Clock in seconds, which distinguishes drags from single movements.
+        stack: Undo stack of the camera movements.
+        now: Function that returns the time in seconds, used to detect movements of the same drag.
     """
 
     def __init__(self, session: Session, parent: QObject | None = None) -> None:
@@ -80,7 +80,7 @@ class ViewHistory(QObject):
         session.camera_changed.connect(self._on_moved)
 
     def go(self, pose: Pose) -> None:
-        """Moves the camera without adding an undo step."""
+        """Moves the camera to a pose without adding an undo step."""
         self._pose = pose
         self._session.set_camera(pose)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The live image, with mouse and keyboard control of its camera."""
+"""Viewport: shows the live image, and controls the camera by mouse and keyboard."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ from wavecomb.gui.worker import Worker
 from wavecomb.usd.cameras.framing import corners
 
 ORBIT_RADIANS = 0.008
-"""Rotation per device-independent pixel; 400 pixels are about half a turn."""
+"""Rotation in radians per device-independent pixel; 400 pixels are about half a turn."""
 DOLLY_STEP = 0.88
-"""Factor on the distance to the pivot for one notch of the mouse wheel."""
+"""Factor by which one notch of the mouse wheel multiplies the distance to the pivot."""
 ZOOM_STEP = 1.25
 KEY_RADIANS = np.radians(15.0)
 CLICK_PIXELS = 4
@@ -46,20 +46,20 @@ EMPTY = (
 
 
 class Viewport(PictureView):
-    """View of a session's frames that moves its camera.
+    """View that shows a session's frames and moves its camera.
 
     Attributes:
         look: Display settings.
-        frame_shown: The frame on the screen, or None.
-        marked: Outline of the selected prims.
-        gizmo: Handles that edit the selection, or None without a scene panel.
+        frame_shown: The displayed frame, or None.
+        marked: Outline that is drawn around the selected prims.
+        gizmo: Handles that edit the selected prim, or None if there is no scene panel.
 
     Signals:
-        hovered(object): (x, y) of the pixel under the cursor, or None.
-        picked(object): (x, y) of a pixel that was clicked.
-        shown(Frame, Look): The frame and settings that are now on the screen.
-        failed(str): Error in one line.
-        region_mode_changed(bool): Whether the next drag chooses a region.
+        hovered(object): The mouse moved. The argument is the pixel (x, y) under the mouse, or None.
+        picked(object): The user clicked a pixel. The argument is the pixel's position (x, y).
+        shown(Frame, Look): A new frame or new display settings are displayed.
+        failed(str): An error occurred. The argument is a message of one line.
+        region_mode_changed(bool): Whether the next drag chooses the render region.
     """
 
     hovered = Signal(object)
@@ -96,12 +96,12 @@ class Viewport(PictureView):
         theme.on_change(self.update)
 
     def close_threads(self) -> None:
-        """Ends the threads before the window is destroyed."""
+        """Ends the viewport's threads before the window is destroyed."""
         self._developer.close()
         self.marked.close()
 
     def set_look(self, look: Look) -> None:
-        """Sets layer, exposure and view."""
+        """Sets the display settings: layer, exposure and tone mapping."""
         self.look = look
         if self._frame is not None:
             self._take(self._frame)
@@ -136,7 +136,7 @@ class Viewport(PictureView):
     def pivot(self) -> Vector:
         """Returns the point that the camera orbits.
 
-        The orbit centre is the last point under the cursor, or the centre of the scene.
+        The pivot is the scene point last used under the cursor, or the scene's centre.
         """
         if self._pivot is None:
             bounds = self.bounds()
@@ -144,7 +144,7 @@ class Viewport(PictureView):
         return self._pivot
 
     def bounds(self) -> np.ndarray:
-        """Returns the bounds of the scene, (2, 3)."""
+        """Returns the bounding box of the scene, with shape (2, 3)."""
         scene = self.session.scene
         bounds = np.array(scene.bounds if scene is not None else [[-1.0] * 3, [1.0] * 3], float)
         if not np.isfinite(bounds).all() or (bounds[1] < bounds[0]).any():
@@ -154,7 +154,7 @@ class Viewport(PictureView):
     def outline(self) -> np.ndarray:
         """Returns points (n, 3) that enclose the scene.
 
-        The points are the scene's outline or, without an outline, the corners of its bounds.
+        The points are the scene's outline or, without an outline, the corners of its bounding box.
         """
         stage = self.session.stage
         if stage is not None and stage.outline is not None:
@@ -166,7 +166,7 @@ class Viewport(PictureView):
         return self.session.setup.width / self.session.setup.height
 
     def _aim(self, place: QPointF) -> None:
-        """Makes the scene point under the cursor the pivot of the camera."""
+        """Makes the scene point under the cursor the pivot of later camera movements."""
         at = self.to_picture(place)
         hit = self.session.pick(at.x(), at.y())
         if hit is not None and hit.get("position") is not None:
@@ -176,14 +176,14 @@ class Viewport(PictureView):
         return self.session.pose
 
     def orbit(self, yaw: float, pitch: float, *, moving: bool = False) -> None:
-        """Orbits about the pivot by angles in radians."""
+        """Orbits the camera about the pivot by angles in radians."""
         if (pose := self._pose()) is not None:
             up = self.session.up_axis
             moved = navigate.orbit(pose, self.pivot(), yaw, pitch, up)
             self.session.set_camera(moved, moving=moving)
 
     def pan(self, across: float, upwards: float, *, moving: bool = False) -> None:
-        """Pans the camera by device-independent pixels."""
+        """Pans the camera by a distance in device-independent pixels."""
         if (pose := self._pose()) is not None:
             depth = pose.depth_of(self.pivot())
             if depth <= 0.0:
@@ -194,16 +194,16 @@ class Viewport(PictureView):
             self.session.set_camera(moved, moving=moving)
 
     def dolly(self, factor: float, *, moving: bool = False) -> None:
-        """Multiplies the distance to the pivot by a factor."""
+        """Moves the camera so that its distance to the pivot is multiplied by a factor."""
         if (pose := self._pose()) is not None:
             self.session.set_camera(navigate.dolly(pose, self.pivot(), factor), moving=moving)
 
     def frame_all(self) -> None:
-        """Frames the whole scene."""
+        """Moves the camera so that the whole scene is in the image."""
         self._frame_points(self.outline())
 
     def frame_selected(self) -> None:
-        """Frames the selected prim, or the whole scene."""
+        """Moves the camera so that the selected prim (or the whole scene) is visible."""
         bounds = self.session.selected_bounds()
         self._frame_points(self.outline() if bounds is None else corners(bounds))
 
@@ -213,7 +213,7 @@ class Viewport(PictureView):
             self.session.set_camera(navigate.frame(pose, points, self.aspect()))
 
     def view_from(self, name: str) -> None:
-        """Views the scene from a side: front, back, right, left, top, bottom."""
+        """Views the scene from a side: "front", "back", "right", "left", "top" or "bottom"."""
         if (pose := self._pose()) is not None:
             points = self.outline()
             self._pivot = 0.5 * (points.min(axis=0) + points.max(axis=0))
@@ -221,7 +221,7 @@ class Viewport(PictureView):
             self.session.set_camera(navigate.view(pose, name, points, up, self.aspect()))
 
     def view_opposite(self) -> None:
-        """Views the pivot from the other side."""
+        """Moves the camera to the opposite side of the pivot."""
         if (pose := self._pose()) is not None:
             up = self.session.up_axis
             self.session.set_camera(navigate.opposite(pose, self.pivot(), up))
@@ -251,7 +251,7 @@ class Viewport(PictureView):
         return left, top, right, bottom
 
     def clear_region(self) -> None:
-        """Removes the render region."""
+        """Removes the render region, so that the whole image is rendered."""
         self.set_region_mode(False)
         if self.session.setup.region is not None:
             self.session.change(region=None)
@@ -317,7 +317,7 @@ class Viewport(PictureView):
             self.picked.emit(pixel)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Dollies towards the point under the cursor; with Ctrl, zooms the image."""
+        """Dollies towards the point under the cursor. With Ctrl, zooms the image instead."""
         notches = event.angleDelta().y() / 120.0
         if notches:
             if event.modifiers() & Control:
@@ -328,11 +328,11 @@ class Viewport(PictureView):
         event.accept()
 
     def leaveEvent(self, event: object) -> None:
-        """Reports that no pixel is under the cursor."""
+        """Reports that the cursor is over no pixel."""
         self.hovered.emit(None)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Orbits or pans by arrow keys, dollies by page keys, leaves region mode by Escape."""
+        """Orbits or pans by arrow keys, dollies by page keys, and leaves region mode by Escape."""
         key, shift = event.key(), bool(event.modifiers() & Shift)
         step = float(KEY_RADIANS)
         ways = {
@@ -366,7 +366,7 @@ class Viewport(PictureView):
     # ---- painting ------------------------------------------------------------------------------
 
     def paint_over(self, painter: QPainter) -> None:
-        """Paints outline, gizmo and region, or the message while there is no image."""
+        """Paints outline, gizmo and region over the image, or a message if there is no image."""
         if self.image() is None:
             painter.setPen(QColor("#d8d8d8"))
             painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._message)
@@ -395,5 +395,5 @@ class Viewport(PictureView):
             painter.drawRect(box)
 
     def sizeHint(self) -> QSize:
-        """Returns the preferred size."""
+        """Returns the preferred size of the viewport."""
         return QSize(theme.em(50), theme.em(34))

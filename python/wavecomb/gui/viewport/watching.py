@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Watcher of the render thread, which takes frames of a render, pauses and stops it."""
+"""Watcher of a full-size render, which sends its frames and can pause and stop it."""
 
 from __future__ import annotations
 
@@ -19,24 +19,25 @@ STATISTICS_S = 0.5
 
 
 Host = Any
-"""An ``engine.Engine``; its module imports this one, so the type is not imported here."""
+"""Type of an ``engine.Engine``. ``engine`` imports this module, so this module cannot import the
+class."""
 
 
 class Watch:
-    """Watcher of a full render, which takes frames, pauses and stops."""
+    """Watcher of a full-size render, which sends its frames and can pause and stop it."""
 
     def __init__(self, engine: Host, setup: Setup, version: int, filler: Filler) -> None:
         self._engine = engine
         self._setup, self._version = setup, version
         self._filler = filler
         self.held_s = 0.0
-        """Total time in pauses, in seconds."""
+        """Total time for which the render was paused, in seconds."""
         self._next = 0.0
         self._next_statistics = time.perf_counter() + 0.25
         self._begun = time.perf_counter()
 
     def progress(self, status: Mapping[str, Any]) -> str | None:
-        """Requests a stop, a snapshot, or nothing."""
+        """Render callback: requests that the render stops, that it takes a snapshot, or neither."""
         engine = self._engine
         if engine.superseded:
             return "stop"
@@ -45,7 +46,7 @@ class Watch:
         return None
 
     def snapshot(self, snapshot: Snapshot) -> None:
-        """Sends a frame, and waits while the engine is paused."""
+        """Snapshot callback: sends a frame, and waits while the engine is paused."""
         if snapshot.finished or self._engine.superseded:
             return
         start = time.perf_counter()
@@ -66,7 +67,7 @@ class Watch:
         self.held_s += time.perf_counter() - start
 
     def _send(self, snapshot: Snapshot) -> bool:
-        """Sends a frame. Returns whether the frame states that the render is paused."""
+        """Sends a frame. Returns whether the sent frame says that the render is paused."""
         paused = self._engine.paused
         layers = layers_of_snapshot(snapshot, self._setup.layers())
         status = {**snapshot.status, "paused": paused}
@@ -81,7 +82,7 @@ class Watch:
 
 
 class _SoFar:
-    """Adapts a snapshot to the interface of results that ``make_stats`` expects."""
+    """Adapter that gives a snapshot the attributes of a result that ``make_stats`` reads."""
 
     cancelled = False
 

@@ -24,33 +24,33 @@ TRIMMED_SHARE = 0.001
 class Comparison:
     """Differences between image A and the reference image B.
 
-    Differences are A - B in linear values. Pixels in which a channel of A or B is NaN or infinite
-    are counted and excluded from all means and maxima; equality compares their bits.
+    Differences are A - B in linear values. A pixel in which a channel of A or B is NaN or infinite
+    is counted, but excluded from all means and maxima. Such a pixel still counts for ``equal``.
 
     Attributes:
-        equal: Whether all common layers are bit-identical: -0 differs from 0, and a NaN equals
-            itself. Layers that only one image has are listed but ignored.
+        equal: Whether all common layers are bit-identical. In this comparison, -0 differs from 0,
+            and a NaN equals itself. Layers that only one of the images has do not affect ``equal``.
         width: Width in pixels.
         height: Height in pixels.
         channels: Number of channels of the colour layer.
         pixels_different: Number of pixels of the colour layer with different bits.
-        pixels_not_finite: Number of excluded pixels.
-        not_finite_differ: Number of excluded pixels with different bits.
+        pixels_not_finite: Number of excluded pixels, which have a NaN or infinite channel.
+        not_finite_differ: Number of excluded pixels whose bits differ.
         luminance_mean_abs: Mean absolute difference of Rec.709 luminance.
         luminance_max_abs: Largest absolute difference of Rec.709 luminance.
-        luminance_max_at: Column and row of the pixel with the largest luminance difference, from 0
-            at the top left; None without differences.
+        luminance_max_at: Column and row, counted from 0 at the top left, of the pixel with the
+            largest luminance difference. None if there are no differences.
         max_abs: Largest absolute difference of any channel.
         mean_signed: Mean difference of each channel.
         mean_abs: Mean absolute difference of each channel.
         rmse: Square root of the mean squared difference over pixels and channels.
         rel_mse: Mean of (A - B)^2 / (B^2 + 0.01) over pixels and channels.
-        rel_mse_trimmed: ``rel_mse`` without the 0.1 % of pixels with the largest terms, which would
-            otherwise dominate it.
-        layers: Other common layers -> {"equal": bool, "max_abs": float}; max_abs covers values that
-            are finite in both, and is None if the shapes differ.
-        only_a: Layers that only A has.
-        only_b: Layers that only B has.
+        rel_mse_trimmed: ``rel_mse`` without the 0.1 % of pixels with the largest terms, because few
+            outliers can dominate ``rel_mse``.
+        layers: Result for each further common layer, {"equal": bool, "max_abs": float}. ``max_abs``
+            ignores values that are not finite in A or B; it is None if the shapes differ.
+        only_a: Names of layers that only A has.
+        only_b: Names of layers that only B has.
     """
 
     equal: bool
@@ -74,16 +74,19 @@ class Comparison:
     only_b: tuple[str, ...] = ()
 
     def within(self, tolerance: float) -> bool:
-        """Returns whether channels differ by at most ``tolerance`` and excluded pixels match."""
+        """Returns whether all channels differ by at most ``tolerance``.
+
+        Excluded pixels must be bit-identical.
+        """
         return self.max_abs <= tolerance and self.not_finite_differ == 0
 
     def to_dict(self) -> dict[str, Any]:
-        """Returns the fields for JSON."""
+        """Returns all fields as a dictionary that can be written as JSON."""
         return dataclasses.asdict(self)
 
 
 def compare(a: Source, b: Source) -> Comparison:
-    """Compares two images: files, ``Picture`` objects or arrays (height, width[, channels]).
+    """Compares two images: files, ``Picture`` objects or arrays.
 
     >>> import numpy as np
     >>> difference = compare(np.ones((4, 4, 3)), np.zeros((4, 4, 3)))
@@ -106,7 +109,7 @@ def compare(a: Source, b: Source) -> Comparison:
 
 
 def layers_of(source: Source) -> dict[str, NDArray[Any]]:
-    """Returns the layers of a file, picture or array as float32 (height, width, channels)."""
+    """Returns the layers of an image by name, as float32 arrays (height, width, channels)."""
     import numpy as np
 
     if isinstance(source, (str, os.PathLike)):
@@ -126,7 +129,7 @@ def layers_of(source: Source) -> dict[str, NDArray[Any]]:
 
 
 def colour_layer(layers: Mapping[str, NDArray[Any]], name: str) -> NDArray[Any]:
-    """Returns the beauty layer, or the only layer."""
+    """Returns the beauty layer, or the only layer of the image."""
     if "beauty" in layers:
         return layers["beauty"]
     if len(layers) == 1:
@@ -157,7 +160,7 @@ def _colour_pair(
 
 
 def trimmed_mean(values: NDArray[Any], share: float = TRIMMED_SHARE) -> float:
-    """Returns the mean without the largest floor(share * size) values; 0 for an empty array.
+    """Returns the mean without the floor(share * size) largest values; 0 for an empty array.
 
     >>> import numpy as np
     >>> trimmed_mean(np.array([1.0, 2.0, 3.0, 100.0]), 0.25)
@@ -170,7 +173,10 @@ def trimmed_mean(values: NDArray[Any], share: float = TRIMMED_SHARE) -> float:
 
 
 def luminance(pixels: NDArray[Any]) -> NDArray[Any]:
-    """Returns Rec.709 luminance in float64 (height, width); the first channel if fewer than 3."""
+    """Returns the Rec.709 luminance in float64.
+
+    With fewer than 3 channels, returns the first channel.
+    """
     import numpy as np
 
     from wavecomb.image.working_space import LUMINANCE

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Collects and compares images of folders and sequences, and writes a page with the results."""
+"""Compares the images of two folders or sequences, and writes an HTML page with the results."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ from wavecomb.image.thumbnails import DisplayOptions, fit_image
 from wavecomb.run.frame_names import frame_text, has_place, matching
 
 ENDINGS = (".exr", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr")
-"""Extensions of image files in folders."""
+"""File extensions of the images that a folder comparison includes."""
 
 
 def is_many(source: str) -> bool:
-    """Returns whether a name stands for several images: a folder, or a frame pattern.
+    """Returns whether a name stands for several images: a folder, or a frame placeholder.
 
-    An existing file with such a name counts as a single file.
+    An existing file whose name contains a placeholder counts as a single file.
     """
     return os.path.isdir(source) or (has_place(source) and not os.path.exists(source))
 
 
 def images_of(source: str) -> dict[str, str]:
-    """Returns files by name: frames of a sequence in order, or all images in a folder tree.
+    """Returns files by name: the frames of a sequence in order, or all images in a folder tree.
 
     Args:
         source: A folder, or a name with a frame placeholder, such as ``out/shot.####.exr``.
 
     Raises:
-        WavecombError: There are no images.
+        WavecombError: The source contains no images.
     """
     try:
         if os.path.isdir(source):
@@ -64,7 +64,7 @@ def _below(folder: str) -> list[str]:
 
 
 def collect(sources: Iterable[str]) -> dict[str, str]:
-    """Returns files by name of all images in folders, sequences and files, in the given order.
+    """Returns all images in folders, sequences and files by name, in the given order.
 
     Raises:
         WavecombError: A source does not exist.
@@ -83,7 +83,7 @@ def collect(sources: Iterable[str]) -> dict[str, str]:
 
 
 def natural(name: str) -> list[tuple[int, int, str]]:
-    """Returns a sort key that orders numbers by value.
+    """Returns a key that sorts names with numbers by the values of the numbers.
 
     >>> sorted(["a10.exr", "a9.exr"], key=natural)
     ['a9.exr', 'a10.exr']
@@ -97,10 +97,10 @@ class PairResult:
     """Comparison of two images with the same name.
 
     Attributes:
-        name: Path inside the folders, or frame.
+        name: Path of both images inside their folders, or the frame number.
         a: File of image A.
         b: File of the reference image B.
-        result: Differences; None if the images cannot be compared.
+        result: Differences of the images; None if the images cannot be compared.
         problem: Reason why the images cannot be compared, or "".
     """
 
@@ -111,7 +111,7 @@ class PairResult:
     problem: str = ""
 
     def passed(self, tolerance: float | None) -> bool:
-        """Returns whether the images are equal, or within a tolerance."""
+        """Returns whether the images are bit-identical, or differ by at most a tolerance."""
         if self.result is None:
             return False
         within = tolerance is not None and self.result.within(tolerance)
@@ -120,12 +120,12 @@ class PairResult:
 
 @dataclass(frozen=True)
 class FolderPair:
-    """Images of two folders or sequences.
+    """Images of two folders or sequences, paired by name.
 
     Attributes:
-        pairs: Name -> files of A and B.
-        only_a: Names that only A has.
-        only_b: Names that only B has.
+        pairs: Files of A and B for each name that both sides have.
+        only_a: Names of images that only A has.
+        only_b: Names of images that only B has.
     """
 
     pairs: dict[str, tuple[str, str]]
@@ -133,7 +133,10 @@ class FolderPair:
     only_b: tuple[str, ...]
 
     def compared(self) -> Iterator[PairResult]:
-        """Compares each pair in turn; yields a result with a problem for unreadable images."""
+        """Compares one pair after the other.
+
+        For an unreadable image, the result contains the problem.
+        """
         for name, (a, b) in self.pairs.items():
             try:
                 yield PairResult(name, a, b, compare(a, b))
@@ -142,14 +145,14 @@ class FolderPair:
 
 
 def pair_up(a: str, b: str) -> FolderPair:
-    """Pairs images of two folders by their paths, or of two sequences by their frames.
+    """Pairs the images of two folders by path, or of two sequences by frame.
 
     Args:
-        a: A folder, or a name with a frame placeholder.
-        b: Folder, or name with a frame placeholder, of the reference images.
+        a: A folder, or a file name with a frame placeholder.
+        b: Folder, or file name with a frame placeholder, of the reference images.
 
     Raises:
-        WavecombError: A source does not exist, or the two have no name in common.
+        WavecombError: A source does not exist, or the two sources have no name in common.
     """
     for one, other in ((a, b), (b, a)):
         if not is_many(one):
@@ -164,7 +167,7 @@ def pair_up(a: str, b: str) -> FolderPair:
 
 
 def as_plain(pair: PairResult, tolerance: float | None) -> dict[str, Any]:
-    """Returns the result of a pair for JSON."""
+    """Returns the result of a pair as a dictionary that can be written as JSON."""
     found = {} if pair.result is None else pair.result.to_dict()
     passed = pair.passed(tolerance)
     return {"name": pair.name, "a": pair.a, "b": pair.b, "passed": passed,
@@ -175,8 +178,8 @@ def as_plain(pair: PairResult, tolerance: float | None) -> dict[str, Any]:
 
 
 MAX_PAIRS = 60
-"""Maximum number of pairs with images in a page, those that differ most; the table lists all
-pairs."""
+"""Maximum number of pairs whose images are in a page. The pairs that differ most are chosen; the
+table lists all pairs."""
 _HEAD = ("picture", "", "differ", "RMSE", "relMSE", "largest", "at")
 
 
@@ -193,13 +196,13 @@ def compare_page(
     """Returns a self-contained HTML page with comparisons.
 
     Args:
-        results: Results of the pairs.
-        look: Display options of images.
-        sources: Names of A and of the reference B.
-        folders: The compared folders; None for a comparison of two files.
-        tolerance: Tolerance within which images pass.
-        kind: Kind of difference maps.
-        width: Largest width of images in the page, pixels.
+        results: Results of comparing the pairs.
+        look: Display options for the images in the page.
+        sources: Names of the folders or files A and B, of which B is the reference.
+        folders: The compared folders; None if two files were compared.
+        tolerance: Largest channel difference at which a pair passes.
+        kind: Kind of the difference maps, as for ``heat_map``.
+        width: Largest width, in pixels, of images in the page.
     """
     ranked = [one for one in results if one.result is not None and not one.passed(tolerance)]
     ranked.sort(key=lambda one: -_rmse(one))
@@ -224,7 +227,7 @@ def compare_page(
 
 
 def _short(sources: tuple[str, str]) -> tuple[str, str]:
-    """Returns short names of A and B that differ from each other."""
+    """Returns different short names for A and B, with the parent folder if necessary."""
     names = [os.path.basename(os.path.normpath(one)) for one in sources]
     if names[0] != names[1]:
         return names[0], names[1]

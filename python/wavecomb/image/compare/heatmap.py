@@ -23,7 +23,8 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 DECADES = 4
 Z_RANGE = 5.0
 MIN_WIDTH = 340
-"""Smallest width in pixels, for title and labels; narrower images are padded with black."""
+"""Smallest width of a map in pixels, so that title and labels fit. Narrower images are padded with
+black."""
 
 _NOT_FINITE = (0.0, 1.0, 1.0)
 _BAR_HEIGHT = 58
@@ -36,12 +37,13 @@ class Scale:
     """Differences mapped to a colour scale.
 
     Attributes:
-        title: Quantity and unit.
-        colours: (count, 3) colours of the scale.
-        ticks: Position along the bar, from 0 to 1, and label.
-        position: (height, width) position of every pixel along the bar; NaN means black.
-        finite: (height, width) mask; False (a value of A or B is not finite) means cyan. The
-            mask is None if all values are finite.
+        title: Name and unit of the displayed quantity.
+        colours: Colours of the scale, with shape (count, 3).
+        ticks: Position along the colour bar, from 0 to 1, and label of each tick.
+        position: Position of every pixel's value along the colour bar, with shape (height, width).
+            NaN is shown in black.
+        finite: Mask of the pixels whose values in A and B are finite, with shape (height, width).
+            Other pixels are cyan. None means that the values of all pixels are finite.
     """
 
     title: str
@@ -51,7 +53,7 @@ class Scale:
     finite: NDArray[np.bool_] | None = None
 
     def pixels(self) -> NDArray[np.float32]:
-        """Returns the colours (height, width, 3) of all pixels in linear Rec.709."""
+        """Returns the colours of all pixels in linear Rec.709, with shape (height, width, 3)."""
         last = len(self.colours) - 1
         known = ~np.isnan(self.position)
         along = np.clip(np.where(known, self.position, 0.0), 0.0, 1.0)
@@ -65,18 +67,21 @@ class Scale:
 def heat_map(
     a: Source, b: Source, kind: Kind = "absolute", *, exposure: float = 0.0
 ) -> NDArray[np.float32]:
-    """Shows differences of image A to the reference B as colours, with title and colour bar.
+    """Shows differences between A and the reference B as colours, with a title and a colour bar.
 
-    - "absolute" shows differences of luminance on a logarithmic scale. This scale covers four
+    - The kind "absolute" shows luminance differences on a logarithmic scale. This scale covers four
       decades below the largest difference; smaller differences have the darkest colour.
-    - "signed" uses a logarithmic scale for each sign: A is brighter in orange pixels and darker in
-      blue pixels. Differences more than four decades below the largest are black.
-    - "flip-ldr" and "flip-hdr" show FLIP from 0 to 1; see ``perceptual.flip``.
+    - The kind "signed" uses a logarithmic scale for each sign. A is brighter than B in orange
+      pixels and darker in blue pixels. Differences that are more than four decades below the
+      largest are black.
+    - The kinds "flip-ldr" and "flip-hdr" show FLIP values from 0 to 1, computed by
+    ``perceptual.flip``.
 
-    Equal pixels are black; pixels with a NaN or an infinity are cyan.
+    Equal pixels are black. Pixels with a NaN or an infinity are cyan.
 
     Returns:
-        Linear Rec.709, (height + bar, width, 3), at least ``MIN_WIDTH`` wide.
+        Linear Rec.709 pixels with shape (height + bar, width, 3). The width is at least
+        ``MIN_WIDTH``.
     """
     return _draw(scale_of(a, b, kind, exposure=exposure))
 
@@ -89,14 +94,14 @@ def scale_of(
     exposure: float = 0.0,
     flip_values: NDArray[np.float32] | None = None,
 ) -> Scale:
-    """Returns the scale that ``heat_map`` draws.
+    """Returns the colour scale with which ``heat_map`` shows the differences of two images.
 
     Args:
         a: Image A.
         b: Reference image.
         kind: Kind of difference, as for ``heat_map``.
-        exposure: Exposure in stops for FLIP of displayed images.
-        flip_values: Result of ``perceptual.flip`` if it is known already.
+        exposure: Exposure in stops of the displayed images for the kind "flip-ldr".
+        flip_values: Result of ``perceptual.flip``; None means that it is computed.
     """
     pixels_a, pixels_b = colour_pair(a, b)
     finite = np.isfinite(pixels_a).all(axis=2) & np.isfinite(pixels_b).all(axis=2)
@@ -115,12 +120,15 @@ def scale_of(
 
 
 def z_map(test: ZTest) -> NDArray[np.float32]:
-    """Shows z-test deviates from -5 to 5 standard errors, the largest of each pixel's channels."""
+    """Shows the deviates of a z-test in colours from -5 to 5 standard errors.
+
+    The channel with the largest deviate determines a pixel's colour.
+    """
     return _draw(z_scale(test))
 
 
 def z_scale(test: ZTest) -> Scale:
-    """Returns the scale that ``z_map`` draws."""
+    """Returns the colour scale with which ``z_map`` shows the deviates of a z-test."""
     channel = np.abs(test.z_pixels).argmax(axis=2)[:, :, None]
     z = np.take_along_axis(test.z_pixels, channel, axis=2)[:, :, 0]
     ticks = [(0.5 + 0.5 * value / Z_RANGE, _number(value)) for value in (-5, -2.5, 0, 2.5, 5)]
@@ -136,7 +144,7 @@ def write_heat_map(
     *,
     exposure: float = 0.0,
 ) -> None:
-    """Writes ``heat_map`` as a PNG file."""
+    """Writes the result of ``heat_map`` as a PNG file."""
     from wavecomb.image.files.image import write_png
 
     write_png(path, heat_map(a, b, kind, exposure=exposure))
@@ -175,7 +183,7 @@ def _linear(values: NDArray[Any], kind: str) -> Scale:
 
 
 def _decades(size: NDArray[np.float64], peak: float) -> NDArray[np.float64]:
-    """Maps the peak to 1, and four decades below it to 0."""
+    """Maps values to a logarithmic scale: the peak to 1, and a value four decades below to 0."""
     with np.errstate(divide="ignore"):
         return np.clip(1.0 + np.log10(size / peak) / DECADES, 0.0, 1.0)
 
@@ -190,7 +198,7 @@ def _draw(scale: Scale) -> NDArray[np.float32]:
 
 
 def _bar(width: int, scale: Scale) -> NDArray[np.float32]:
-    """Draws the title, the colour ramp, and as many labelled ticks as fit."""
+    """Draws the title, the colour ramp and its ticks. Leaves out labels that would overlap."""
     import OpenImageIO as oiio
 
     length = width - 2 * _MARGIN

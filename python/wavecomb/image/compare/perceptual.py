@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Perceptual differences of two images: PSNR, SSIM and FLIP.
+"""Perceptual metrics that compare two images: PSNR, SSIM and FLIP.
 
-SSIM and FLIP need the extra "bench". Values that are not finite count as 0 in these metrics;
-``compare`` reports how many there are.
+SSIM and FLIP need the optional packages of the extra "bench". The metrics treat values that are not
+finite as 0. ``compare`` reports the number of such values.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _SSIM_RADIUS = 5
 
 
 def measure(metric: Metric, a: Source, b: Source, exposure: float = 0.0) -> float:
-    """Returns the image mean of one metric for image A against the reference B."""
+    """Returns one metric for image A against the reference B, averaged over the image."""
     if metric == "psnr":
         return psnr(a, b, exposure)
     if metric == "ssim":
@@ -38,9 +38,9 @@ def measure(metric: Metric, a: Source, b: Source, exposure: float = 0.0) -> floa
 
 
 def psnr(a: Source, b: Source, exposure: float = 0.0) -> float:
-    """Returns the peak signal-to-noise ratio of the displayed images, -10 log10(mean (A - B)^2) dB.
+    """Returns the peak signal-to-noise ratio of displayed images in dB, -10 log10(mean (A - B)^2).
 
-    Values are sRGB encoded in [0, 1] and not rounded; the result is infinite for equal images.
+    The values are sRGB encoded in [0, 1] without rounding. The result is infinite for equal images.
 
     Raises:
         ValueError: The sizes differ.
@@ -56,8 +56,9 @@ def ssim(a: Source, b: Source, exposure: float = 0.0) -> float:
     SSIM = (2 m_a m_b + C1) (2 s_ab + C2) / ((m_a^2 + m_b^2 + C1) (s_a^2 + s_b^2 + C2)), C1 =
     0.01^2, C2 = 0.03^2, with means m and (co)variances s under a Gaussian window of 11 x 11 pixels,
     sigma 1.5 (Wang et al., "Image quality assessment: from error visibility to structural
-    similarity", 2004, equation 13 and section III.C). SSIM is computed on Rec.709 luma of the image
-    times 2^exposure, clamped to [0, 1] and sRGB encoded; only windows inside the image count.
+    similarity", 2004, equation 13 and section III.C). SSIM is computed on the Rec.709 luma of the
+    image times 2^exposure, clamped to [0, 1] and sRGB encoded. The mean is over windows that are
+    completely inside the image.
 
     Raises:
         ValueError: A side is shorter than 11 pixels, or the sizes differ.
@@ -87,16 +88,16 @@ def ssim(a: Source, b: Source, exposure: float = 0.0) -> float:
 def flip(
     a: Source, b: Source, *, high_range: bool = False, exposure: float = 0.0
 ) -> NDArray[np.float32]:
-    """Returns FLIP of each pixel (height, width): 0 means equal appearance, 1 is the maximum.
+    """Returns the FLIP value of each pixel (height, width), from 0 (equal appearance) to 1.
 
-    Low range is LDR-FLIP of the displayed images (Andersson et al., "FLIP: a difference evaluator
-    for alternating images", 2020). High range is HDR-FLIP, the maximum over exposures that are
-    derived from the reference B (Andersson et al. 2021), with the ACES tone curve; it ignores
-    ``exposure``. The viewing distance is 0.7 m from a 4K display that is 0.7 m wide: 67 pixels per
-    degree.
+    By default, computes LDR-FLIP of the displayed images (Andersson et al., "FLIP: a difference
+    evaluator for alternating images", 2020). With ``high_range``, computes HDR-FLIP (Andersson et
+    al. 2021), the maximum over several exposures with the ACES tone curve. The exposures are
+    derived from the reference B, and ``exposure`` is ignored. The assumed display is 4K, 0.7 m wide
+    and viewed from 0.7 m, which means 67 pixels per degree.
 
     Raises:
-        ValueError: The sizes differ, or the reference of HDR-FLIP is black.
+        ValueError: The sizes differ, or the reference image for HDR-FLIP is black.
     """
     evaluator = needed("flip_evaluator", "FLIP")
     pair = colour_pair(a, b)
@@ -122,15 +123,15 @@ def flip(
 
 
 def shown(pixels: NDArray[Any], exposure: float = 0.0) -> NDArray[np.float32]:
-    """Returns displayed values of linear colours: sRGB (height, width, 3) in [0, 1], unrounded."""
+    """Returns displayed sRGB values (height, width, 3) in [0, 1], without rounding."""
     scaled = np.clip(_colours(pixels) * np.float32(2.0**exposure), 0.0, 1.0)
     return srgb_from_linear(scaled)
 
 
 def _colours(pixels: NDArray[Any]) -> NDArray[np.float32]:
-    """Returns three channels, repeating the first if there are fewer.
+    """Returns three channels. If there are fewer, repeats the first channel.
 
-    Non-finite values are replaced by 0.
+    Replaces values that are not finite by 0.
     """
     colours = pixels[:, :, :3] if pixels.shape[2] >= 3 else pixels[:, :, :1].repeat(3, axis=2)
     return np.where(np.isfinite(colours), colours, np.float32(0)).astype(np.float32)

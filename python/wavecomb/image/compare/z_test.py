@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Statistical test whether two noisy images have the same expectation, given pixel variances."""
+"""Statistical test whether two noisy images with known variances have equal expectations."""
 
 from __future__ import annotations
 
@@ -27,19 +27,20 @@ class ZTest:
     """Result of ``z_test``.
 
     Attributes:
-        agrees: Whether ``p_value`` is at least ``significance``.
-        p_value: Smallest p-value over tiles, the image mean and all channels, with Sidak's
+        agrees: Whether ``p_value`` is at least the level ``significance``.
+        p_value: Smallest p-value of all tiles, of the image mean and of all channels, after Sidak's
             correction.
-        tests: Number of tests: (tiles + 1) x channels.
+        tests: Number of combined tests, (tiles + 1) x channels.
         significance: Significance level.
-        tile: Side of a tile in pixels.
+        worst_tile: Column and row, in pixels, of the tile with the smallest p-value. None if the
+            p-value of the image mean is smaller.
         worst_tile: Column and row in pixels of the tile with the smallest p-value; None if the
             image mean has a smaller one.
-        mean_z: Deviate of the image mean per channel.
-        pixels_accepted: Fraction of pixel values with p above the Sidak level for the number of
-            pixel values.
-        p_pixels: (height, width, channels) p-values of pixels.
-        z_pixels: Deviates of pixels, A - B in standard errors; 0 for pixels without variance.
+        mean_z: Deviate of the image mean for each channel, in standard errors.
+        pixels_accepted: Fraction of pixel values whose p-value is above the Sidak level for a test
+            of all pixel values.
+        p_pixels: p-values of pixels, with shape (height, width, channels).
+        z_pixels: Deviates (A - B) of pixels in standard errors; 0 for pixels without variance.
     """
 
     agrees: bool
@@ -54,13 +55,15 @@ class ZTest:
     z_pixels: Array = field(repr=False, compare=False)
 
     def to_dict(self) -> dict[str, Any]:
-        """Returns all results except the per-pixel arrays, for JSON."""
+        """Returns all results that can be written as JSON, without the per-pixel arrays."""
         names = [f.name for f in dataclasses.fields(self) if f.repr]
         return {name: getattr(self, name) for name in names}
 
 
 def sidak(p: float, tests: int) -> float:
-    """Returns 1 - (1 - p)^n: the probability that the least of n independent p-values is <= p.
+    """Returns 1 - (1 - p)^n, the probability that the smallest of n p-values is at most p.
+
+    The p-values are independent.
 
     >>> round(sidak(0.01, 5), 6)
     0.04901
@@ -79,19 +82,20 @@ def z_test(
 ) -> ZTest:
     """Tests the hypothesis that A and B have the same expectation.
 
-    z = (A - B) / sqrt(var A + var B), p = 2 (1 - Phi(|z|)), for means over tiles, whose noise is
-    lower by a factor of the tile's side, and over the image; Sidak's correction combines them into
-    one p-value. Variances are those of each pixel's *mean* (of the image itself, not of one sample)
-    and treated as exact, so they should come from about 30 independent renders or more. Pixels are
-    treated as independent; a filter wider than a pixel makes the test too strict.
+    The deviate is z = (A - B) / sqrt(var A + var B), and the p-value is 2 (1 - Phi(|z|)). Both are
+    computed for the image mean and for means over tiles, which have less noise than pixels. Sidak's
+    correction combines all p-values. A variance is that of the pixel's mean, not of one sample. The
+    test treats variances as exact, so they should come from at least about 30 independent renders.
+    The test treats pixels as independent, so that it is too strict if the pixel filter is wider
+    than a pixel.
 
-    Where both variances are 0, a relative difference of up to 1e-5 counts as rounding.
+    If both variances are 0, a relative difference of up to 1e-5 counts as a rounding error.
 
     Args:
         a: Image under test.
         b: Reference image.
-        variance_a: Variance of A's pixels, in the same size; None means exact pixels.
-        variance_b: Variance of B's pixels, in the same size; None means exact pixels.
+        variance_a: Variance of A's pixels, with the shape of A; None means that A has no noise.
+        variance_b: Variance of B's pixels, with the shape of B; None means that B has no noise.
         tile: Side of a tile in pixels.
         significance: Significance level.
 
@@ -153,7 +157,7 @@ def _variance(source: Source | None, like: Array, name: str) -> Array:
 
 
 def _tile_sums(values: Array, tile: int) -> Array:
-    """Returns sums over tiles; tiles at the right and bottom edges may be smaller."""
+    """Returns sums over tiles. Tiles at the right and bottom edges may be smaller."""
     rows = np.arange(0, values.shape[0], tile)
     columns = np.arange(0, values.shape[1], tile)
     return np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1)

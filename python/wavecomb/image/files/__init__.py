@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Image files: formats, output of renders, and atomic writing."""
+"""Image files: reading, formats, writing of renders, and atomic replacement."""

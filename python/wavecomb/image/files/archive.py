@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads and writes NumPy archives.
+"""Reads and writes NumPy archives (.npz) with a JSON header.
 
-Reading an untrusted archive needs no more memory than its size.
+Reading an untrusted archive needs at most as much memory as the archive's file size.
 """
 
 from __future__ import annotations
@@ -33,10 +33,11 @@ class ArchiveError(Exception):
 
 
 def read_archive(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:
-    """Reads an uncompressed archive; returns its header (parsed JSON) and the other arrays.
+    """Reads an uncompressed archive. Returns its header as parsed JSON, and all other arrays.
 
     Raises:
-        ArchiveError: The file is not an archive, declares more data than it has, or is damaged.
+        ArchiveError: The file is not an archive, is damaged, or declares more data than it
+            contains.
         OSError: The file cannot be opened.
     """
     with Path(path).open("rb") as file:
@@ -68,14 +69,14 @@ def write_archive(
     *,
     durable: bool = False,
 ) -> None:
-    """Writes an archive for ``read_archive`` atomically.
+    """Writes an archive atomically, in the form that ``read_archive`` reads.
 
     Args:
         path: The file.
-        header: Values that are stored as JSON.
+        header: Values that are stored as the JSON header.
         arrays: Numeric arrays by name.
-        durable: Whether the file must be on disk, not only in the system's cache, before it is
-            renamed.
+        durable: Whether the file must be on disk, not only in the system's cache, before it gets
+            its name.
     """
     parts = {name: np.asarray(value) for name, value in arrays.items()}
     parts["header"] = np.frombuffer(json.dumps(header).encode("utf-8"), np.uint8)
@@ -86,17 +87,17 @@ def write_archive(
 def read_kind(
     path: str | os.PathLike[str], kind: str, of_format: int, option: str, advice: str
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Reads an archive of Wavecomb, whose header states its kind, format and version.
+    """Reads a Wavecomb archive, whose header states its kind, format and version.
 
     Args:
         path: The file.
         kind: Expected kind.
-        of_format: Expected format.
+        of_format: Format number that the header must have.
         option: Option of `wavecomb render` that writes such a file.
-        advice: Advice for a file of another format.
+        advice: Advice in the error message for a file with another format.
 
     Raises:
-        ArchiveError: The file is damaged or of another kind.
+        ArchiveError: The file is damaged, or it is an archive of another kind.
         OSError: The file cannot be opened.
         WavecombError: The file has another format.
     """
@@ -117,7 +118,7 @@ def read_kind(
 
 
 def _check_sizes(file: Any) -> None:
-    """Raises ArchiveError for an archive whose members are larger than its file."""
+    """Raises ArchiveError if the members of an archive declare more bytes than the file has."""
     size = os.fstat(file.fileno()).st_size
     with zipfile.ZipFile(file) as archive:
         parts = archive.infolist()
@@ -134,7 +135,7 @@ def _check_sizes(file: Any) -> None:
 
 
 def _check_shape(member: Any, size: int) -> None:
-    """Raises ArchiveError for an array that declares more values than it has bytes."""
+    """Raises ArchiveError if an array declares more values than the archive contains."""
     version = np.lib.format.read_magic(member)
     if version == (1, 0):
         shape, _, dtype = np.lib.format.read_array_header_1_0(member)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes image files from bands of rows, so that the whole image is never in memory."""
+"""Writes image files in bands of rows, so that the whole image is never in memory."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
 
 class BandFiles:
-    """The EXR file of an image, or one file per AOV, and its PNG.
+    """Image files that are written in bands: one EXR file or one per AOV, and a PNG file.
 
-    A context manager: the files are renamed on success and removed on an exception.
+    As a context manager, the object renames the files on success and removes them on an exception.
 
     Attributes:
-        written: Names of the files, from the first band on.
+        written: Names of the files, which are known after the first band.
         rows: Number of rows written so far.
     """
 
@@ -43,14 +43,15 @@ class BandFiles:
         exposure: float = 0.0,
         tone_map: Transfer = "clamp",
     ) -> None:
-        """Takes the arguments of ``Picture.save`` and the height of the whole image.
+        """Stores the arguments of ``Picture.save`` and the height of the whole image.
 
         Args:
             output: File name that ends in .exr, or None.
             png: File name that ends in .png, or None.
-            height: Total number of rows.
-            window: Position in a larger image, as in ``write_exr``.
-            file_options: Arguments half, compression, tile and split of ``Picture.save``.
+            height: Number of rows of the whole image.
+            window: Position of the image in a larger image, as in ``write_exr``.
+            file_options: The arguments ``half``, ``compression``, ``tile`` and ``split`` of
+                ``Picture.save``.
             exposure: Exposure of the PNG in stops.
             tone_map: Tone mapping of the PNG.
         """
@@ -66,11 +67,11 @@ class BandFiles:
         self._display: RowFile | None = None
 
     def __enter__(self) -> BandFiles:
-        """Returns this writer; files are opened with the first band."""
+        """Returns this writer. The files are opened when the first band is written."""
         return self
 
     def add(self, band: Picture) -> None:
-        """Writes the next rows; all bands must have the same layers."""
+        """Writes the next rows. All bands must have the same layers."""
         self.rows += len(band.beauty)
         layers = self._by_file(band.layers())
         if not self.written:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Deep images: samples of each pixel by depth, and their OpenEXR files (docs/deep.md)."""
+"""Deep images, with several samples by depth in each pixel, and their EXR files (docs/deep.md)."""
 
 from __future__ import annotations
 
@@ -18,26 +18,27 @@ from wavecomb.image.files.exr import BAND, Window, bands_of, set_attributes
 from wavecomb.image.files.output_file import one_line, replacing, why_not_written
 
 CHANNELS = ("R", "G", "B", "A", "Z", "ZBack")
-"""Channels of a sample, in the order of ``DeepPicture.samples``."""
+"""Channels of a deep sample, in the column order of ``DeepPicture.samples``."""
 _HALF_MAX = 65504.0
 
 
 @dataclass(frozen=True, repr=False)
 class DeepPicture:
-    """A deep image: samples of each pixel by depth, with row 0 at the top.
+    """A deep image, with several samples by depth in each pixel. Row 0 is at the top.
 
     Attributes:
-        counts: (height, width) number of samples of each pixel.
-        samples: (n, 6) R, G, B, A, Z, ZBack of all samples, pixel by pixel in row order, the
-            closest sample of a pixel first. Colours are premultiplied. Z is the depth along the
-            camera's axis in scene units; ZBack is larger than Z for samples of volumes.
+        counts: Number of samples of each pixel, with shape (height, width).
+        samples: R, G, B, A, Z and ZBack of all samples, with shape (n, 6). The pixels are in row
+            order, and the samples of a pixel are sorted from near to far. Colours are
+            premultiplied. Z is the depth along the camera's axis in scene units. ZBack is larger
+            than Z in samples of volumes.
     """
 
     counts: NDArray[np.uint32]
     samples: NDArray[np.float32]
 
     def flat(self) -> NDArray[np.float64]:
-        """Composites all samples of each pixel to (height, width, 4), premultiplied.
+        """Composites the samples of each pixel. Returns premultiplied RGBA (height, width, 4).
 
         >>> one = DeepPicture(np.full((1, 1), 2), np.array([[.5, 0, 0, .5, 1, 1.], [1] * 6]))
         >>> one.flat()[0, 0].tolist()
@@ -64,9 +65,10 @@ class DeepPicture:
 
         Args:
             path: File name that ends in .exr.
-            half: Whether to store colours and alpha as 16-bit floats; depths are always 32-bit.
+            half: Whether to store colours and alpha as 16-bit floats. Depths are always 32-bit
+                floats.
             metadata: File attributes, as for ``write_exr``.
-            window: Position in a larger image, as for ``write_exr``.
+            window: Position of the pixels in a larger image, as for ``write_exr``.
 
         Raises:
             WavecombError: The name does not end in .exr.
@@ -116,14 +118,14 @@ class DeepPicture:
 
 
 def _clamped(samples: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Clamps colours to the range of half floats."""
+    """Clamps colours to the range of 16-bit floats."""
     out = samples.copy()
     out[:, :4] = np.clip(out[:, :4], -_HALF_MAX, _HALF_MAX)
     return out
 
 
 def _deep_data(spec: Any, counts: NDArray[np.uint32], samples: NDArray[np.float32]) -> Any:
-    """Converts rows to OpenImageIO's deep data."""
+    """Converts some rows of the deep image to OpenImageIO's ``DeepData``."""
     import OpenImageIO as oiio
 
     data = oiio.DeepData()
@@ -140,10 +142,10 @@ def _deep_data(spec: Any, counts: NDArray[np.uint32], samples: NDArray[np.float3
 
 
 def _run(function: Any, *columns: NDArray[Any]) -> None:
-    """Calls ``function`` for each row of the columns."""
+    """Calls ``function`` once for each row, with the values of all columns as arguments."""
     deque(map(function, *(column.tolist() for column in columns)), maxlen=0)
 
 
 def deep_of(pair: tuple[Any, Any] | None) -> DeepPicture | None:
-    """Converts a deep image of the core; returns None for None."""
+    """Converts a deep image of the core. Returns None if the core has no deep image."""
     return None if pair is None else DeepPicture(*pair)

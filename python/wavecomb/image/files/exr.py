@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes OpenEXR files with many layers by OpenImageIO.
+"""Writes multi-layer OpenEXR files by OpenImageIO.
 
-Arrays are (height, width) or (height, width, channels), with row 0 at the top. Errors are OSError
-(for the file), WavecombError (for options) or ValueError (for arrays) with a one-line message that
-names the file.
+Arrays have the shape (height, width) or (height, width, channels), with row 0 at the top. Errors
+have a one-line message that names the file: OSError for files, WavecombError for options,
+ValueError for arrays.
 """
 
 from __future__ import annotations
@@ -26,17 +26,20 @@ COMPRESSIONS: tuple[str, ...] = get_args(Compression)
 _LOSSY = ("pxr24", "b44", "b44a", "dwaa", "dwab")
 MAX_TILE = 4096
 Window = tuple[int, int, int, int]
-"""Column and row of the first pixel in the whole image, and the width and height of that image."""
+"""Column and row of a file's first pixel in the displayed image, and width and height of the
+displayed image."""
 
 _HALF_MAX = 65504.0
 ALPHA = "A"
 """Name of the alpha channel that belongs to R, G and B."""
 BAND = 64
-"""Rows that are converted and written together: four blocks of an EXR file."""
+"""Number of rows that are converted and written together, which is four blocks of an EXR file."""
 
 
 def channel_names(layer: str, channels: int) -> list[str]:
-    """Returns the EXR channel names of a layer: beauty is R, G, B; albedo is albedo.R and so on.
+    """Returns the EXR channel names of a layer.
+
+    The names are R, G and B for beauty, and albedo.R and so on for albedo.
 
     >>> channel_names("normal", 3)
     ['normal.X', 'normal.Y', 'normal.Z']
@@ -55,10 +58,10 @@ def channel_names(layer: str, channels: int) -> list[str]:
 
 
 def is_exact(layer: str) -> bool:
-    """Returns whether lossy compression would invalidate a layer.
+    """Returns whether lossy compression would make a layer useless.
 
-    Lossy compression would change ids. Positions far from 0 exceed the range of lossy compression,
-    since dwaa treats every channel named Y as luminance.
+    Lossy compression would change ids, whose bits must be exact. Dwaa treats every channel named Y
+    as luminance, whose range is too small for positions far from 0.
     """
     return is_crypto(layer) or aovs.content(layer) in ("exact", "id")
 
@@ -74,19 +77,21 @@ def write_exr(
     window: Window | None = None,
     called: str | os.PathLike[str] | None = None,
 ) -> None:
-    """Writes an OpenEXR file with one part atomically.
+    """Writes an OpenEXR file of one part atomically.
 
     Args:
         path: File name that ends in .exr.
-        layers: Name -> (height, width) or (height, width, channels); "beauty" becomes R, G, B.
-        half: Whether to store colours as 16-bit floats; other layers are always 32-bit. Finite
-            values outside of the range of half floats are clamped.
-        compression: OpenEXR compression. Lossy compressions (pxr24, b44, dwaa ...) are rejected for
-            layers with ids or positions.
+        layers: Arrays (height, width) or (height, width, channels) by layer name. "beauty" is
+            written as R, G, B.
+        half: Whether to store colours as 16-bit floats. All other layers are stored as 32-bit
+            floats. Finite values outside of the range of half floats are clamped.
+        compression: OpenEXR compression. Lossy compressions (pxr24, b44, dwaa and others) are
+            rejected for layers with ids or positions.
         tile: Edge of square tiles in pixels, a multiple of 16; 0 means scanlines.
-        metadata: File attributes: str, int, float, or (4, 4) arrays. "Software" has a default.
+        metadata: File attributes of type str, int, float or (4, 4) array. "Software" has a default
+            value.
         window: Position of the pixels in a larger image; None means that they are the whole image.
-        called: Name of the file in messages if ``path`` is temporary.
+        called: File name for error messages, if ``path`` is a temporary file.
     """
     name = os.fspath(path if called is None else called)
     sheet = ExrLayout(
@@ -98,7 +103,7 @@ def write_exr(
 
 
 class ExrLayout:
-    """Layout of layers in an EXR file: its header, and pixel values by rows.
+    """Converter of layers to an EXR file: the file's header, and pixel values in rows.
 
     Attributes:
         spec: OpenImageIO's specification of the file.
@@ -116,9 +121,9 @@ class ExrLayout:
         window: Window | None = None,
         height: int | None = None,
     ) -> None:
-        """Arguments are those of ``write_exr``.
+        """Prepares the header. The arguments are those of ``write_exr``.
 
-        ``height`` is the file's height if layers have fewer rows.
+        ``height`` is the number of rows of the file, if ``layers`` hold only some of the rows.
         """
         if Path(name).suffix.lower() != ".exr":
             raise ValueError(f"{name}: the name of an OpenEXR file must end in .exr")
@@ -144,7 +149,7 @@ class ExrLayout:
     def values(
         self, layers: Mapping[str, NDArray[Any]], rows: slice = slice(None)
     ) -> NDArray[np.float32]:
-        """Returns rows of the layers as (rows, width, channels of the file)."""
+        """Returns some rows of all layers, with shape (rows, width, channels of the file)."""
         both = zip(self._planes(layers), self._halves, strict=True)
         return np.concatenate([_values(plane[rows], as_half) for plane, as_half in both], axis=2)
 
@@ -164,7 +169,7 @@ def _may_be_half(layer: str) -> bool:
 
 
 def check_options(name: str, layers: Any, compression: str, tile: int) -> None:
-    """Raises WavecombError for options that are invalid for a file with these layers."""
+    """Raises WavecombError if an option is invalid for a file with these layers."""
     if compression not in COMPRESSIONS:
         raise WavecombError(
             f"{name}: compression {compression!r} is none of {', '.join(COMPRESSIONS)}"
@@ -198,13 +203,16 @@ def _spec(planes: list[NDArray[Any]], halves: list[bool], names: list[str], tile
 
 
 def set_attributes(spec: Any, metadata: Mapping[str, Any]) -> None:
-    """Sets file attributes in the form of ``write_exr``."""
+    """Sets file attributes from the argument ``metadata`` of ``write_exr``."""
     for key, value in {"Software": "Wavecomb", **metadata}.items():
         _attribute(spec, key, value)
 
 
 def _attribute(spec: Any, key: str, value: Any) -> None:
-    """Sets an attribute; (4, 4) becomes a float matrix and (n,) a float array."""
+    """Sets a file attribute.
+
+    An array (4, 4) becomes a float matrix and an array (n,) a float array.
+    """
     import OpenImageIO as oiio
 
     if np.ndim(value) == 2:
@@ -216,7 +224,7 @@ def _attribute(spec: Any, key: str, value: Any) -> None:
 
 
 def bands_of(height: int, rows: int = BAND) -> Iterator[slice]:
-    """Yields slices of rows, so that no copy of the whole image is needed."""
+    """Yields slices of consecutive rows, so that the whole image is never copied at once."""
     return (slice(row, min(row + rows, height)) for row in range(0, height, rows))
 
 
@@ -227,9 +235,9 @@ def write_bands(
     *,
     called: str | None = None,
 ) -> None:
-    """Writes an image from bands of rows, from the top.
+    """Writes an image from bands of rows, in order from the top.
 
-    For tiled files a band is a row of tiles.
+    For a tiled file, a band is one row of tiles.
     """
     with replacing(path) as part:
         file = RowFile(part, spec, called or os.fspath(path))
@@ -239,10 +247,10 @@ def write_bands(
 
 
 class RowFile:
-    """An image file that is written in bands of rows, from the top.
+    """Writer of an image file in bands of rows, in order from the top.
 
-    For tiled files a band is a row of tiles. Errors are OSError with a one-line message that names
-    the file.
+    For a tiled file, a band is one row of tiles. Errors are raised as OSError with a one-line
+    message that names the file.
     """
 
     def __init__(self, part: Path, spec: Any, called: str) -> None:
@@ -251,7 +259,7 @@ class RowFile:
         Args:
             part: The file.
             spec: OpenImageIO's specification of the file.
-            called: Name of the file in messages.
+            called: File name for error messages.
         """
         import OpenImageIO as oiio
 
@@ -265,7 +273,7 @@ class RowFile:
         self._check(self._output.open(self._part, spec))
 
     def add(self, pixels: NDArray[Any]) -> None:
-        """Writes the next rows (rows, width, channels)."""
+        """Writes the next rows, with shape (rows, width, channels)."""
         first = self._spec.y + self._row
         self._row += len(pixels)
         last, left = self._spec.y + self._row, self._spec.x

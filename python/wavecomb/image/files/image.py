@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads image files of any format and writes PNG files, by OpenImageIO.
 
-Arrays are (height, width, channels), with row 0 at the top.
+Arrays have the shape (height, width, channels), with row 0 at the top.
 
-Errors are OSError (for the file) or ValueError (for arrays) with a one-line message that names the
-file.
+Errors have a one-line message that names the file: OSError for files, ValueError for arrays.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ __all__ = [
 
 Array = NDArray[np.float32]
 Transfer = Literal["clamp", "neutral"] | str
-"""Tone mapping: "clamp", "neutral", or a result of ``wavecomb.ocio.tone_map``."""
+"""Tone mapping: "clamp", "neutral", or a name from ``wavecomb.ocio.tone_map``."""
 
 _HALF_MAX = 65504.0
 _NAN_COLOUR = (255, 0, 255)
@@ -54,11 +53,12 @@ def write_png(
 
     Args:
         path: File name that ends in .png.
-        rgb: Linear Rec.709 (height, width, 3).
+        rgb: Linear Rec.709 colours with shape (height, width, 3).
         exposure: Exposure in stops; the image is multiplied by 2^exposure.
-        tone_map: "clamp" clips at 1; "neutral" rolls highlights off towards white; "ocio:VIEW" is a
-            view of OpenColorIO. See ``display``.
-        alpha: (height, width) alpha of premultiplied colours; None means an opaque image.
+        tone_map: "clamp" clips values at 1. "neutral" compresses highlights towards white.
+            "ocio:VIEW" applies a view of OpenColorIO. See ``display``.
+        alpha: Alpha (height, width), with which the colours are premultiplied; None means that the
+            image is opaque.
     """
     name = os.fspath(path)
     if Path(name).suffix.lower() != ".png":
@@ -75,7 +75,7 @@ def write_png(
 
 
 def write_png_codes(path: str | os.PathLike[str], codes: NDArray[np.uint8]) -> None:
-    """Writes 8-bit sRGB codes (height, width, 3) unchanged and atomically."""
+    """Writes 8-bit sRGB values (height, width, 3) to a file unchanged and atomically."""
     name = os.fspath(path)
     pixels = _colours(codes)
     spec = png_spec(*pixels.shape[:2])
@@ -109,9 +109,11 @@ def display(
     tone_map: Transfer = "clamp",
     alpha: NDArray[Any] | None = None,
 ) -> NDArray[np.uint8]:
-    """Converts linear Rec.709 to 8-bit sRGB, or to unpremultiplied RGBA if ``alpha`` is given.
+    """Converts linear Rec.709 to 8-bit sRGB.
 
-    Pixels with a NaN become magenta to be visible; infinities are clamped.
+    If ``alpha`` is given, returns RGBA without premultiplication.
+
+    Pixels with a NaN become magenta, so that they are visible. Infinities are clamped.
     """
     linear = _colours(rgb).astype(np.float32, copy=False)
     broken = np.isnan(linear).any(axis=2)
@@ -140,7 +142,8 @@ def display(
 def _neutral(rgb: Array) -> Array:
     """Applies Khronos PBR Neutral: keeps colours below 0.76 and desaturates highlights.
 
-    Equations from the reference of https://github.com/KhronosGroup/ToneMapping, "PBR Neutral".
+    The equations are those of the reference code of "PBR Neutral" in
+    https://github.com/KhronosGroup/ToneMapping.
     """
     start, desaturation, f90 = 0.8 - 0.04, 0.15, 0.04
     low = rgb.min(axis=2, keepdims=True)
@@ -170,16 +173,16 @@ def linear_from_srgb(encoded: Array) -> Array:
 def read_image(path: str | os.PathLike[str]) -> Array:
     """Reads an image of any format as linear float32 (height, width, channels).
 
-    Treats integer files (PNG, JPEG ...) as sRGB and linearises them, except alpha.
+    Integer files (PNG, JPEG and others) are converted from sRGB to linear values, except for alpha.
     """
     return _read(path)[0]
 
 
 def read_codes(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
-    """Reads an 8-bit image as displayed on white: (height, width, 3).
+    """Reads an image as 8-bit sRGB values (height, width, 3), composited over white.
 
     Raises:
-        OSError: The file cannot be read; the one-line message names it.
+        OSError: The file cannot be read. The message is one line that names the file.
     """
     codes, spec = _pixels(path, "uint8")
     alpha = spec.alpha_channel
@@ -192,10 +195,12 @@ def read_codes(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
 
 
 def read_layers(path: str | os.PathLike[str]) -> dict[str, Array]:
-    """Reads an image by layers, named as in ``write_exr``: {"beauty": (h, w, 3), ...}.
+    """Reads all layers of an image by name, such as {"beauty": (h, w, 3)}.
 
-    The layer is the part of a channel's name before the last dot. R, G, B and Y without a dot are
-    "beauty"; any other channel without a dot is a separate layer.
+    ``write_exr`` uses the same names.
+
+    The layer name is the part of a channel name before the last dot. The channels R, G, B and Y
+    without a dot form the layer "beauty". Any other channel without a dot is a separate layer.
     """
     pixels, names = _read(path)
     groups: dict[str, list[int]] = {}
@@ -238,7 +243,7 @@ def _open(name: str) -> Any:
 
 
 def _check_size(name: str, spec: Any) -> None:
-    """Raises OSError for an image without pixels, or too large for this machine's memory."""
+    """Raises OSError if an image has no pixels or needs more memory than the machine has."""
     if min(spec.width, spec.height, spec.nchannels) < 1 or spec.depth > 1 or spec.deep:
         raise OSError(f"{name}: has no pixels, or several in depth")
     # Memory for the float image, its copy by layers, and the buffers of OpenImageIO.
@@ -253,7 +258,10 @@ def _check_size(name: str, spec: Any) -> None:
 
 
 def _pixels(path: str | os.PathLike[str], kind: str) -> tuple[NDArray[Any], Any]:
-    """Reads values of a NumPy type (height, width, channels) and OpenImageIO's specification."""
+    """Reads pixel values (height, width, channels) in a NumPy type.
+
+    Also returns OpenImageIO's specification.
+    """
     name = os.fspath(path)
     source = _open(name)
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes output files atomically, from hidden folders for unfinished files."""
+"""Writes output files atomically. Unfinished files are in hidden folders."""
 
 from __future__ import annotations
 
@@ -20,21 +20,23 @@ from typing import Any, Protocol
 _START, _END, _LOCK = ".wavecomb-", ".part", ".lock"
 
 _YOUNG_S = 60.0
-"""Seconds for which a folder without a lock file is kept, since it may just be created."""
+"""Seconds for which a private folder without a lock file is kept, since its owner may just be
+creating it."""
 
 
 class PrivateFolder:
-    """A hidden folder next to an output file, which is locked while its owner runs.
+    """A hidden folder next to an output file. It is locked while its owner process runs.
 
-    The kernel releases the lock (flock) when the owner ends for any reason. A process id would not
-    work, since containers that share a disk may have processes with the same id.
+    The kernel releases the lock (flock) when the owner process ends, even after a crash. The id of
+    the owner process would not suffice, since containers that share a disk can have processes with
+    equal ids.
 
     Attributes:
         path: The folder.
     """
 
     def __init__(self, parent: Path) -> None:
-        """Creates and locks the folder.
+        """Creates and locks a private folder.
 
         Args:
             parent: Folder of the output file.
@@ -59,7 +61,7 @@ class PrivateFolder:
             os.close(self._lock)
 
     def close(self) -> None:
-        """Removes the folder and its content."""
+        """Removes the private folder and its content."""
         shutil.rmtree(self.path, ignore_errors=True)
         os.close(self._lock)
 
@@ -76,7 +78,10 @@ class PrivateFolder:
 
 
 def _try_lock(descriptor: int) -> bool | None:
-    """Locks a file: returns True on success, False if it is locked, None without lock support."""
+    """Locks a file.
+
+    Returns True on success, False if the file is locked, None without lock support.
+    """
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -91,9 +96,9 @@ def _is_linked(descriptor: int) -> bool:
 
 
 def remove_abandoned(parent: Path) -> None:
-    """Removes private folders whose owners have ended without cleaning up.
+    """Removes private folders whose owner processes have ended without removing them.
 
-    Keeps locked folders, and all folders on file systems without locks.
+    Keeps locked folders. On file systems without lock support, keeps all folders.
     """
     for folder in parent.glob(f"{_START}*{_END}"):
         with contextlib.suppress(OSError):
@@ -113,19 +118,19 @@ def remove_abandoned(parent: Path) -> None:
 
 
 class Publisher(Protocol):
-    """Interface that renames files on behalf of a process without permission."""
+    """Interface that renames files for a process that lacks the permission to do so."""
 
     def is_own(self, target: Path) -> bool:
-        """Returns whether a file is in a folder that this process may modify freely."""
+        """Returns whether this process may create and rename files in a file's folder."""
 
     def part_of(self, target: Path) -> Path:
-        """Returns a temporary name for a file."""
+        """Returns a temporary name for an output file."""
 
     def check(self, target: Path) -> None:
         """Raises OSError unless the output file can be written now."""
 
     def publish(self, part: Path, target: Path, *, durable: bool) -> None:
-        """Renames the temporary file."""
+        """Renames the temporary file to the name of the output file."""
 
 
 publisher: Publisher | None = None
@@ -136,7 +141,7 @@ def _publisher_of(target: Path) -> Publisher | None:
 
 
 def _target(path: str | os.PathLike[str]) -> Path:
-    """Returns the file behind symbolic links; raises OSError if it cannot be written."""
+    """Resolves symbolic links of a file name. Raises OSError if the file cannot be written."""
     check_name(path)
     target = Path(os.path.realpath(path))
     if target.is_dir():
@@ -153,7 +158,7 @@ def _target(path: str | os.PathLike[str]) -> Path:
 
 
 def reason(error: OSError) -> str:
-    """Returns the reason for an error, such as "Permission denied", else the whole message."""
+    """Returns the reason for an OSError, such as "Permission denied", or else the whole message."""
     return error.strerror or str(error)
 
 
@@ -161,7 +166,7 @@ _ENDINGS = (".exr", ".png", ".jpg", ".jpeg", ".html", ".learned")
 
 
 def check_name(path: str | os.PathLike[str]) -> None:
-    """Raises OSError with a one-line message if libraries cannot open a file with this name.
+    """Raises OSError with a one-line message if libraries cannot open a file of this name.
 
     USD and OpenImageIO require UTF-8 names and determine the format by the extension.
     """
@@ -178,13 +183,13 @@ def check_name(path: str | os.PathLike[str]) -> None:
 
 
 def why_not_written(part: str | os.PathLike[str], said: str) -> str:
-    """Returns the reason why a library could not write a file: a full disk, or its own message.
+    """Returns why a library could not write a file: the disk is full, or the library's message.
 
-    Libraries do not report the system's error, so this function appends to the file to obtain it.
+    Libraries do not report the error of the system, so this function tries to append to the file.
 
     Args:
         part: The incomplete file.
-        said: Message of the library.
+        said: Error message of the library.
     """
     try:
         with open(part, "ab", 0) as file:
@@ -220,7 +225,7 @@ _KINDS = (
 
 
 def kind_of(path: str | os.PathLike[str]) -> str | None:
-    """Returns the kind of a special file, such as "a FIFO"; None for regular files and folders.
+    """Returns the kind of a special file, such as "a FIFO", or None for regular files and folders.
 
     Opening a FIFO blocks until another process opens it for writing.
     """
@@ -239,7 +244,7 @@ def check_regular(path: str | os.PathLike[str]) -> None:
 
 
 def one_line(message: str, name: str) -> str:
-    """Returns a library's message as one line without the file name, which the caller adds."""
+    """Converts a library's message to one line, without the file name, which the caller adds."""
     line = " ".join(message.replace(f'"{name}"', "it").split())
     return line.rstrip(".") or "unknown reason"
 
@@ -247,7 +252,7 @@ def one_line(message: str, name: str) -> str:
 def problem_of(library: Any) -> str:
     """Returns the error message of OpenImageIO or of one of its readers.
 
-    The message quotes file content, which may not be valid text.
+    The message may quote content of a damaged file, which may not be valid text.
     """
     try:
         return str(library.geterror())
@@ -258,8 +263,8 @@ def problem_of(library: Any) -> str:
 def check_writable(path: str | os.PathLike[str]) -> None:
     """Raises OSError with a one-line message unless the file can be written now.
 
-    Call this before long work. The function creates missing folders, and creates and removes a
-    private folder next to the file.
+    Call this function before a long computation. The function creates missing folders. It also
+    creates and removes a private folder next to the file.
     """
     check_name(path)
     target = Path(os.path.realpath(path))
@@ -282,7 +287,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 
 def _sync(path: Path) -> None:
-    """Flushes a file or a folder's entries to disk."""
+    """Flushes a file, or the entries of a folder, to disk."""
     number = os.open(path, os.O_RDONLY)
     try:
         os.fsync(number)
@@ -291,7 +296,10 @@ def _sync(path: Path) -> None:
 
 
 def publish(part: Path, target: Path, *, durable: bool = False) -> None:
-    """Renames a finished file; copies it first if the target is on another file system."""
+    """Renames a finished file.
+
+    If the target is on another file system, copies the file there first.
+    """
     if durable:
         _sync(part)
     try:
@@ -311,15 +319,16 @@ def publish(part: Path, target: Path, *, durable: bool = False) -> None:
 
 @contextlib.contextmanager
 def replacing(path: str | os.PathLike[str], *, durable: bool = False) -> Iterator[Path]:
-    """Yields a temporary file name; renames that file to ``path`` on success.
+    """Yields a temporary file name, and renames the temporary file to ``path`` on success.
 
     The temporary file is in a private folder next to ``path``. On an exception the temporary file
-    is removed and ``path`` remains unchanged. After a crash ``path`` is unchanged as well, and the
-    next call for a file in that folder removes the private folder.
+    is removed and ``path`` remains unchanged. After a crash, ``path`` is also unchanged. The next
+    call for a file in the same folder removes the private folder.
 
     Args:
         path: The file.
-        durable: Whether to flush the file to disk before the renaming, for power failures.
+        durable: Whether to flush the file to disk before it is renamed, as a protection against
+            power failures.
 
     >>> with replacing("/tmp/answer.txt") as part:
     ...     _ = part.write_text("42")
@@ -349,6 +358,6 @@ def replacing(path: str | os.PathLike[str], *, durable: bool = False) -> Iterato
 
 @contextlib.contextmanager
 def replacing_all(paths: Iterable[str | os.PathLike[str]]) -> Iterator[list[Path]]:
-    """Replaces several files: renames none before all are written."""
+    """Replaces several files. Renames the first file only after all files are written."""
     with contextlib.ExitStack() as stack:
         yield [stack.enter_context(replacing(path)) for path in paths]

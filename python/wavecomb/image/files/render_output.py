@@ -24,15 +24,16 @@ if TYPE_CHECKING:
 def scene_metadata(
     scene: Scene, width: int, height: int, origin: Sequence[float] = (0.0, 0.0, 0.0)
 ) -> dict[str, Any]:
-    """Returns scene-dependent file attributes of an image, mainly the camera's matrices.
+    """Returns the EXR attributes of a scene, mainly the camera's matrices.
 
-    Omits default values: "PixelAspectRatio" of square pixels, "wavecomb:exposure" of 1, and
-    "wavecomb:projection" of perspective. A latlong image has no "worldToNDC".
+    Attributes with default values are left out: "PixelAspectRatio" of square pixels,
+    "wavecomb:exposure" of 1, and "wavecomb:projection" of perspective. A latlong image has no
+    attribute "worldToNDC".
 
-    Both matrices are for row vectors, p' = p M. "worldToCamera" transforms to a camera that looks
-    along -z with y up; "worldToNDC" to x, y in [-1, 1] across the image with y up, after division
-    by w, and z in [-1, 1] between the clipping planes. ``origin`` is the world position of the
-    scene's origin.
+    Both matrices are for row vectors, p' = p M. "worldToCamera" transforms to the space of a camera
+    that looks along -z with y up. "worldToNDC" transforms to x and y in [-1, 1] across the image,
+    with y up, and z in [-1, 1] between the clipping planes, after division by w. ``origin`` is the
+    world position of the scene's origin.
     """
     camera = getattr(scene, "camera", None)
     if camera is None:
@@ -76,7 +77,7 @@ def _parallel(
 
 
 def scene_digest(scene: Scene) -> str:
-    """Returns a hash of counts, bounds, camera, lights, materials and names of a scene.
+    """Returns a hash of a scene's counts, bounds, camera, lights, materials and names.
 
     The hash excludes points and texels, since hashing them would take as long as reading them.
     """
@@ -106,7 +107,7 @@ def fitted_window(
     conform: str = "expandAperture",
     pixel_aspect: float = 1.0,
 ) -> tuple[float, float, float, float]:
-    """Fits a camera's window to the aspect ratio of the image, like the renderer.
+    """Fits the window of a camera to the aspect ratio of the image, as the renderer does.
 
     Args:
         window: x0, x1, y0, y1.
@@ -132,7 +133,10 @@ def fitted_window(
 def camera_window(
     camera: Mapping[str, Any], width: int, height: int
 ) -> tuple[float, float, float, float]:
-    """Returns ``fitted_window`` of ``Scene.camera`` or of arguments of ``set_camera``."""
+    """Returns the ``fitted_window`` of a camera.
+
+    The camera is ``Scene.camera``, or a mapping with the arguments of ``set_camera``.
+    """
     if camera.get("projection") == "latlong":
         x0, x1, y0, y1 = (float(edge) for edge in camera["window"])
         return x0, x1, y0, y1
@@ -166,7 +170,9 @@ def aov_of(layer: str) -> str:
 
 
 def split_names(path: str | os.PathLike[str], aovs: Collection[str]) -> dict[str, Path]:
-    """Returns file names by AOV: ``path`` for beauty, otherwise with ".NAME" before the extension.
+    """Returns the file name of each AOV.
+
+    Beauty gets ``path``; other AOVs get ".NAME" before the extension.
 
     >>> split_names("out/a.exr", ["beauty", "depth"])["depth"].name
     'a.depth.exr'
@@ -182,7 +188,7 @@ def split_names(path: str | os.PathLike[str], aovs: Collection[str]) -> dict[str
 
 
 def by_aov(layers: Mapping[str, NDArray[Any]]) -> dict[str, dict[str, NDArray[Any]]]:
-    """Groups layers by AOV; only Cryptomattes have several."""
+    """Groups layers by AOV. Only Cryptomatte AOVs have several layers."""
     grouped: dict[str, dict[str, NDArray[Any]]] = {}
     for name, pixels in layers.items():
         grouped.setdefault(aov_of(name), {})[name] = pixels
@@ -192,7 +198,7 @@ def by_aov(layers: Mapping[str, NDArray[Any]]) -> dict[str, dict[str, NDArray[An
 def compression_for(layers: Iterable[str], compression: Compression) -> Compression:
     """Returns the compression for a file with these layers.
 
-    The result is zip if the given compression would invalidate a layer.
+    The result is "zip" if the given compression would make a layer useless.
     """
     return "zip" if any(map(is_exact, layers)) else compression
 
@@ -211,10 +217,10 @@ def save_layers(
 ) -> list[Path]:
     """Writes layers to one file, or to one file per AOV, atomically as a set.
 
-    Split files with ids or positions use zip instead of a lossy compression.
+    Files with ids or positions are compressed by zip if the chosen compression is lossy.
 
     Returns:
-        The files that were written.
+        The names of the files that were written.
     """
     if not split:
         attributes = {**metadata, **cryptomatte.metadata(manifests)}

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Memory limit of an expendable process.
+"""Memory limit of a child process that may be killed.
 
 The limit applies to writable private memory (RLIMIT_DATA): arrays, heaps and stacks. Reserved
-address space, mapped read-only files and tiles of a texture store do not count, so that a limit of
-the machine's size never affects a valid scene. docs/decisions/sandbox.md has figures.
+address space, mapped read-only files and tiles of a texture store do not count. A limit equal to
+the machine's memory therefore never affects a valid scene (docs/decisions/sandbox.md).
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ _CGROUP = Path("/sys/fs/cgroup")
 
 
 def machine_limit() -> int | None:
-    """Returns the bytes that this process may use, from the machine and its control groups."""
+    """Returns the bytes that this process may use, as limited by machine and control groups."""
     found = [bytes_ for bytes_ in (memory_bytes(), _of_group()) if bytes_]
     return min(found) if found else None
 
 
 def _of_group() -> int | None:
-    """Returns the lowest limit of the control groups of this process; None without a limit."""
+    """Returns the lowest memory limit of this process's control groups, or None without a limit."""
     limits: list[int] = []
     for place, name in _groups():
         # Inside a container, the control group's path is its path on the host, but the container's
@@ -50,7 +50,7 @@ def _of_group() -> int | None:
 
 
 def _groups() -> list[tuple[Path, str]]:
-    """Returns the control group folders of this process with the names of their limit files."""
+    """Returns this process's control group folders, with the names of their memory limit files."""
     found = []
     try:
         lines = Path("/proc/self/cgroup").read_text().splitlines()
@@ -70,10 +70,10 @@ requested_mb: float | None = None
 
 
 def request_limit(megabytes: float | None) -> None:
-    """Stores the limit that ``apply_limit`` applies later.
+    """Stores the memory limit that ``apply_limit`` applies later.
 
     Raises:
-        WavecombError: The limit is too small.
+        WavecombError: The memory limit is too small.
     """
     global requested_mb
     if megabytes is not None and megabytes < MIN_MB:
@@ -82,15 +82,16 @@ def request_limit(megabytes: float | None) -> None:
 
 
 def requested_limit() -> int | None:
-    """Returns the limit in bytes; None without a limit."""
+    """Returns the memory limit in bytes, or None without a limit."""
     return machine_limit() if requested_mb is None else int(requested_mb * MEGABYTE)
 
 
 def apply_limit() -> None:
-    """Limits the memory of this supervised child process and records the limit for its parent.
+    """Applies the memory limit to this child process, and records the limit for the parent process.
 
     Raises:
-        WavecombError: A limit is set but there is no child process.
+        WavecombError: A memory limit was requested, but this process is not an isolated child
+            process.
     """
     if not progress_notes.is_expendable():
         if requested_mb is None:
@@ -110,7 +111,7 @@ def apply_limit() -> None:
 
 
 class Group:
-    """A control group that limits all memory of a process, including shared mappings."""
+    """A control group (cgroup) that limits all memory of a process, including shared mappings."""
 
     def __init__(self, path: Path) -> None:
         """Stores the folder of the control group."""
@@ -118,10 +119,12 @@ class Group:
 
     @classmethod
     def make(cls, bytes_: int | None) -> Group | None:
-        """Creates a group inside that of this process; returns None if that is not permitted.
+        """Creates a control group inside that of this process.
+
+        Returns None if this is not permitted.
 
         Args:
-            bytes_: Limit in bytes; None creates no group.
+            bytes_: Memory limit in bytes; None means that no group is created.
         """
         if bytes_ is None:
             return None
@@ -151,27 +154,28 @@ class Group:
 
 
 def limit_text(page: mmap.mmap) -> str:
-    """Returns the limit of a process for its crash message; "" without a limit."""
+    """Returns the memory limit of a child process as text for its crash message, or ""."""
     megabytes = progress_notes.slot(page, "limit")
     return f"{megabytes} MB (--memory-limit)" if megabytes else ""
 
 
 UNPACKED = 8160
-"""Largest ratio of a value's size in memory to its size in a .usdc file.
+"""Upper bound of a value's size in memory, as a multiple of its size in a .usdc file.
 
-Integer coding stores 8 bytes in 2 bits, and LZ4 compresses up to 255 bytes to one.
+The integer coding of .usdc files stores 8 bytes in 2 bits, and LZ4 compresses up to 255 bytes to
+one byte.
 """
 
 
 def is_exhausted(error: BaseException, layer_bytes: Callable[[], int]) -> bool:
-    """Returns whether an error means that this expendable process reached its memory limit.
+    """Returns whether an error means that this child process has reached its memory limit.
 
-    USD reports the same error for lack of memory and for damaged values. The value counts as
-    damaged only if the files are too small to contain a value that exceeds the limit.
+    USD reports the same error if memory is exhausted and if a value in a file is damaged. The value
+    counts as damaged if even the largest value in files of this size would fit into the limit.
 
     Args:
-        error: A MemoryError or a USD error.
-        layer_bytes: Returns the size of the files that USD reads.
+        error: The MemoryError or USD error.
+        layer_bytes: Function that returns the total size of the files that USD reads.
     """
     bytes_ = resource.getrlimit(resource.RLIMIT_DATA)[0]
     if not progress_notes.is_expendable() or bytes_ == resource.RLIM_INFINITY:
@@ -184,7 +188,7 @@ def is_exhausted(error: BaseException, layer_bytes: Callable[[], int]) -> bool:
 
 
 def data_bytes() -> int:
-    """Returns the memory of this process that counts towards the limit, in bytes."""
+    """Returns the bytes of this process that count towards its memory limit."""
     for line in Path("/proc/self/status").read_text().splitlines():
         if line.startswith("VmData:"):
             return int(line.split()[1]) * 1024
@@ -192,7 +196,7 @@ def data_bytes() -> int:
 
 
 def available_bytes() -> int:
-    """Returns the bytes that this process may still allocate."""
+    """Returns the bytes that this process may still allocate before it reaches its memory limit."""
     bytes_ = resource.getrlimit(resource.RLIMIT_DATA)[0]
     if bytes_ == resource.RLIM_INFINITY:
         bytes_ = machine_limit() or 1 << 62
@@ -200,7 +204,7 @@ def available_bytes() -> int:
 
 
 def describe_limit() -> str:
-    """Returns text such as "; the limit is 24000 MB (--memory-limit)" for messages, or ""."""
+    """Returns a text for messages, such as "; the limit is 24000 MB (--memory-limit)", or ""."""
     bytes_ = resource.getrlimit(resource.RLIMIT_DATA)[0]
     if not progress_notes.is_expendable() or bytes_ == resource.RLIM_INFINITY:
         return ""

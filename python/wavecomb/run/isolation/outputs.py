@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Output files of a sandboxed process, which cannot write to their destination folders.
+"""Output files of a sandboxed process, which must not write to the folders of these files.
 
-The process writes into its private folder and then asks its parent to move the file. The parent
-derives the permitted outputs from its own parsing of the command line and moves no other files.
+The sandboxed process writes a file into its private folder and then asks its parent process to move
+it. The parent process derives the permitted output files from the command line, and moves no other
+files.
 """
 
 from __future__ import annotations
@@ -27,12 +28,12 @@ _MAX_BYTES = 1 << 20
 
 @dataclass(frozen=True)
 class Outputs:
-    """Files that a command may write.
+    """Output files that a command may write.
 
     Attributes:
         names: File names.
-        parts: (folder, prefix, suffix) of numbered files.
-        trees: (folder, suffix) of files anywhere below a folder.
+        parts: Folder, prefix and suffix of files with a number between prefix and suffix.
+        trees: Folder and suffix of files that may be anywhere below the folder.
     """
 
     names: tuple[str, ...] = ()
@@ -40,7 +41,7 @@ class Outputs:
     trees: tuple[tuple[str, str], ...] = ()
 
     def resolved(self) -> Outputs:
-        """Returns the outputs with symbolic links resolved."""
+        """Returns a copy in which the symbolic links of all paths are resolved."""
         real = os.path.realpath
         return Outputs(
             tuple(dict.fromkeys(map(real, self.names))),
@@ -49,13 +50,13 @@ class Outputs:
         )
 
     def folders(self) -> list[str]:
-        """Returns the folders of the files."""
+        """Returns the folders that contain the output files."""
         named = [os.path.dirname(name) for name in self.names]
         named += [part[0] for part in self.parts] + [tree[0] for tree in self.trees]
         return list(dict.fromkeys(named))
 
     def allow(self, target: str) -> bool:
-        """Returns whether a path with resolved links is one of the permitted output files."""
+        """Returns whether a path, with symbolic links resolved, is a permitted output file."""
         folder, name = os.path.split(target)
         return (
             target in self.names
@@ -76,7 +77,10 @@ def _send(channel: socket.socket, message: Any) -> None:
 
 
 def _receive(channel: socket.socket) -> Any:
-    """Returns the next message; None if the peer has ended or the message is too large."""
+    """Returns the next message.
+
+    Returns None if the other process has ended or the message is too large.
+    """
     size = _exactly(channel, _HEAD.size)
     if size is None:
         return None
@@ -96,15 +100,18 @@ def _exactly(channel: socket.socket, count: int) -> bytes | None:
 
 
 class Mover:
-    """Parent side: moves finished files from the private folder to their names."""
+    """Parent process side: moves finished files from the private folder to their final names."""
 
     def __init__(self, outputs: Outputs, private: Path) -> None:
-        """Stores the outputs and the private folder of the child."""
+        """Stores the permitted output files and the private folder of the child process."""
         self._outputs = outputs.resolved()
         self._private = private
 
     def serve(self, channel: socket.socket) -> None:
-        """Answers the child's requests until it ends; runs on a separate thread."""
+        """Answers requests of the child process until it ends.
+
+        Call this method on a separate thread.
+        """
         with contextlib.suppress(OSError, ValueError):
             while (message := _receive(channel)) is not None:
                 _send(channel, self._answer(message))
@@ -152,10 +159,13 @@ class Mover:
 
 
 class Client:
-    """Child side, which ``wavecomb.image.files.output_file`` uses; thread-safe."""
+    """Child process side, which ``wavecomb.image.files.output_file`` uses.
+
+    The class is thread-safe.
+    """
 
     def __init__(self, channel: socket.socket, private: Path) -> None:
-        """Stores the socket to the parent and the private folder."""
+        """Stores the socket to the parent process and the private folder."""
         self._channel = channel
         self._private = private
         self._lock = threading.Lock()
@@ -181,9 +191,9 @@ class Client:
             return self._private / f"{self._count}{target.suffix}"
 
     def check(self, target: Path) -> None:
-        """Raises OSError unless the file can be written now."""
+        """Raises OSError if the output file cannot be written now."""
         self._ask("check", str(target))
 
     def publish(self, part: Path, target: Path, *, durable: bool) -> None:
-        """Moves a finished file to its destination."""
+        """Moves a finished file from the private folder to its final name."""
         self._ask("move", part.name, str(target), durable)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Base class of panels about one pixel, which is under the cursor or was clicked."""
+"""Base class of panels that show data of one pixel, which is under the cursor or was clicked."""
 
 from __future__ import annotations
 
@@ -10,16 +10,19 @@ from wavecomb.gui.viewport.session import Session
 
 
 class CursorPanel(QWidget):
-    """Panel that is refilled with a short delay when the pixel or the image changes.
+    """Panel whose data is updated shortly after the pixel or the image changes.
 
     Attributes:
-        follow: Check box that makes the panel follow the cursor.
+        follow: Check box; while it is checked, the panel shows the pixel under the cursor.
     """
 
     def __init__(
         self, session: Session, name: str, later_ms: int, parent: QWidget | None = None
     ) -> None:
-        """Creates the panel. ``name`` is the object name of the panel and prefix of its parts."""
+        """Creates the panel.
+
+        ``name`` is the object name of the panel and the prefix of its widgets' object names.
+        """
         super().__init__(parent)
         self.setObjectName(name)
         self._session = session
@@ -34,7 +37,7 @@ class CursorPanel(QWidget):
         session.frame.connect(lambda frame: self._soon())
 
     def hover(self, pixel: tuple[int, int] | None) -> None:
-        """Handles the pixel under the cursor."""
+        """Handles a change of the pixel under the cursor."""
         if self.follow.isChecked() and pixel is not None:
             self.pick(pixel)
 
@@ -48,5 +51,5 @@ class CursorPanel(QWidget):
             self._timer.start()
 
     def _fill(self) -> None:
-        """Shows the data of the pixel."""
+        """Shows the data of the chosen pixel in the panel."""
         raise NotImplementedError

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tool bar for displaying the image: layer, exposure, view, range of false colours, zoom."""
+"""Tool bar with display settings: layer, exposure, tone mapping, false colours and zoom."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from wavecomb.run import aovs as aov_names
 from wavecomb.run import expressions
 
 EXPOSURE = 10.0
-"""Range of the exposure in stops, in both directions."""
+"""Largest exposure in stops. The smallest exposure is the negative of this value."""
 EXPRESSION = expressions.PREFIX
 """Entry of the layer box that opens the dialog for light path expressions."""
 _ZOOMS = ("Fit", "50 %", "100 %", "200 %", "400 %", "800 %", "1600 %")
@@ -40,14 +40,14 @@ _ZOOMS = ("Fit", "50 %", "100 %", "200 %", "400 %", "800 %", "1600 %")
 
 @cache
 def _titles() -> dict[str, str]:
-    """Returns the titles of the offered layers, in their order."""
+    """Returns the titles of the layers that the layer box offers, in order."""
     own = {name: row.title for name, row in aov_names.core_aovs().items() if row.title}
     last = {"samples": "Samples", "error": "Error", "variance": "Variance"}
     return {"beauty": "Beauty", "denoised": "Denoised", **own, **last}
 
 
 def _title(layer: str) -> str:
-    """Returns the title of a layer."""
+    """Returns the displayed title of a layer."""
     if layer == EXPRESSION:
         return "Light path\u2026"
     if layer.startswith(expressions.LAYER):
@@ -56,12 +56,14 @@ def _title(layer: str) -> str:
 
 
 class DisplayBar(QToolBar):
-    """Tool bar of display settings. Choosing a layer that is not rendered restarts the render.
+    """Tool bar of display settings.
+
+    Choosing a layer that the current render lacks restarts the render.
 
     Attributes:
-        layer: Control of the layer.
-        exposure: Control of the exposure in stops.
-        view: Control of the tone mapping.
+        layer: Combo box that selects the displayed layer.
+        exposure: Number box of the exposure in stops.
+        view: Combo box that selects the tone mapping.
     """
 
     def __init__(self, session: Session, viewport: Viewport, parent: QWidget | None = None) -> None:
@@ -157,7 +159,8 @@ class DisplayBar(QToolBar):
     def _fill_layers(self) -> None:
         """Fills the combo box of layers.
 
-        The box offers AOVs, light groups if there are several, and rendered expressions.
+        The combo box offers AOVs, rendered light path expressions and, if there are several, light
+        groups.
         """
         scene, names = self._session.scene, list(_titles())
         groups = () if scene is None else scene.light_groups
@@ -175,7 +178,7 @@ class DisplayBar(QToolBar):
         self.layer.setCurrentIndex(max(self.layer.findData(self._viewport.look.layer), 0))
 
     def ask_expression(self) -> ExpressionDialog:
-        """Opens the dialog for a light path expression, whose layer is then shown."""
+        """Opens the dialog that adds a light path expression and shows its layer."""
         if self._dialog is None:
             self._dialog = ExpressionDialog(self._session, self.choose_layer, self)
         self._dialog.show()
@@ -216,7 +219,7 @@ class DisplayBar(QToolBar):
         self.choose_layer(names[(at + by) % len(names)])
 
     def _setup_changed(self, setup: Setup) -> None:
-        """Switches between beauty and denoised layer when denoising changes."""
+        """Shows the denoised layer or the beauty when denoising is switched on or off."""
         shown = self._viewport.look.layer
         if setup.denoise and not self._denoising and shown == "beauty":
             self.choose_layer("denoised")
@@ -289,11 +292,11 @@ class DisplayBar(QToolBar):
     # ------------------------------------------------------------------------------
 
     def restore(self, settings: QSettings) -> None:
-        """Restores the saved view."""
+        """Restores the tone mapping that was saved in an earlier session."""
         self.set_view(str(settings.value("display/view", display.LINEAR)))
         if (problem := ocio.problem()) is not None:
             self._session.warned.emit(problem)
 
     def keep(self, settings: QSettings) -> None:
-        """Saves the view for the next session."""
+        """Saves the tone mapping for the next session."""
         settings.setValue("display/view", self._viewport.look.view)

@@ -25,22 +25,25 @@ from wavecomb.run import expressions
 from wavecomb.run.error_messages import describe
 
 OWN = "custom"
-"""Entry that stands for an unnamed expression."""
+"""Entry of the box of named expressions for an expression without a name."""
 
 
 def aovs_with(setup: Setup, name: str, text: str) -> tuple[str, ...]:
-    """Returns the AOVs of a setup with an expression, which replaces one of the same name."""
+    """Returns the AOVs of a setup and an added expression.
+
+    An expression of the same name is replaced.
+    """
     layer = expressions.LAYER + name
     others = [aov for aov in setup.aovs if expressions.layer_of(aov) != layer]
     return (*others, f"{expressions.PREFIX}{name}={text}")
 
 
 def problem_of(setup: Setup, name: str, text: str, groups: Sequence[str]) -> str:
-    """Returns why an expression cannot be a layer, or "" if it can.
+    """Returns why an expression cannot be rendered as a layer, or "" if it can.
 
     Args:
         setup: Setup of the render.
-        name: Name of the layer, without ``lpe_``.
+        name: Name of the layer, without the prefix ``lpe_``.
         text: The expression.
         groups: Light groups of the stage.
     """
@@ -58,24 +61,24 @@ def problem_of(setup: Setup, name: str, text: str, groups: Sequence[str]) -> str
 
 
 class ExpressionDialog(QDialog):
-    """Dialog that asks for a name and an expression.
+    """Dialog that asks for a light path expression and the name of its layer.
 
     Attributes:
-        known: Box of named expressions.
+        known: Combo box of the named expressions.
         name: Field for the name of the layer.
         text: Field for the expression.
-        note: Label with the problem of the expression.
-        show_layer: Button that adds and shows the layer.
+        note: Label that says what is wrong with the expression.
+        show_layer: Button that adds the layer to the render and shows it.
     """
 
     def __init__(
         self, session: Session, shown: Callable[[str], object], parent: QWidget | None = None
     ) -> None:
-        """Creates the dialog without changing the render.
+        """Creates the dialog. The render does not change until the user accepts.
 
         Args:
-            session: Session whose render gets the layer.
-            shown: Called with the name of the layer after the render was restarted with it.
+            session: Session whose render gets the new layer.
+            shown: Function that is called with the layer's name after the render was restarted.
             parent: Parent of the dialog.
         """
         super().__init__(parent)
@@ -125,7 +128,7 @@ class ExpressionDialog(QDialog):
         column.addLayout(buttons)
 
     def take(self, name: str) -> None:
-        """Fills in a named expression."""
+        """Fills the text field with a named expression."""
         if name in expressions.NAMED:
             self.name.setText(name)
             self.text.setText(expressions.NAMED[name])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Panel with the data of one pixel: layer values, visible object, cost."""
+"""Panel with data of one pixel: layer values, visible object and cost."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def value_text(value: Any) -> str:
 def pixel_rows(
     frame: Frame, x: int, y: int, origin: Sequence[float] = NOWHERE
 ) -> list[tuple[str, str]]:
-    """Returns names and values of all layers of a frame at a pixel of the full-size image.
+    """Returns the name and value of each layer of a frame at a pixel of the full-size image.
 
     ``origin`` is the world position of the scene's origin.
     """
@@ -72,7 +72,7 @@ def pixel_rows(
 
 
 def seen_rows(hit: dict[str, Any] | None, origin: Sequence[float]) -> list[tuple[str, str]]:
-    """Returns names and values of a result of ``Session.pick``, with positions in world space."""
+    """Returns the names and values that ``Session.pick`` has found, in world space."""
     if hit is None:
         return [("prim", "nothing")]
     if hit.get("position") is not None:
@@ -81,7 +81,7 @@ def seen_rows(hit: dict[str, Any] | None, origin: Sequence[float]) -> list[tuple
 
 
 class Inspector(CursorPanel):
-    """Panel that follows the cursor over the viewport, or keeps the clicked pixel."""
+    """Panel that shows the pixel under the cursor, or the pixel that was clicked."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(session, "inspector", _LATER_MS, parent)

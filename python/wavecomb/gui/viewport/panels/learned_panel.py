@@ -20,12 +20,12 @@ from wavecomb.image.directions import density_map, map_point
 _LATER_MS = 40
 _HEIGHT = 128
 MOST_LIGHTS = 12
-"""Largest number of lights that the panel shows as separate bars. All further lights share one
-bar."""
+"""Largest number of lights that the panel shows as separate bars. All other lights are added up in
+one bar."""
 
 
 def field_text(setup: Setup, learned: dict[str, Any] | None) -> str:
-    """Describes the guiding field at a surface point, or says why there is none.
+    """Describes the guiding field at a surface point, or says why there is no guiding.
 
     Args:
         setup: Setup of the render.
@@ -50,7 +50,9 @@ def field_text(setup: Setup, learned: dict[str, Any] | None) -> str:
 
 
 def light_rows(shares: list[tuple[str, float]], most: int = MOST_LIGHTS) -> list[tuple[str, float]]:
-    """Returns the largest shares of lights, and the sum of the remaining ones as the last row.
+    """Returns the lights with the largest probabilities.
+
+    If there are further lights, the last row is their sum.
 
     >>> light_rows([("a", 0.5), ("b", 0.3), ("c", 0.2)], 2)
     [('a', 0.5), ('2 others', 0.5)]
@@ -62,10 +64,10 @@ def light_rows(shares: list[tuple[str, float]], most: int = MOST_LIGHTS) -> list
 
 
 class LearnedPanel(CursorPanel):
-    """Panel that follows the cursor over the viewport, or keeps the clicked pixel.
+    """Panel that shows the surface under the cursor, or the surface that was clicked.
 
     Attributes:
-        learned: The shown result of ``Renderer.learned``, or None.
+        learned: The displayed result of ``Renderer.learned``, or None.
     """
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
@@ -94,7 +96,7 @@ class LearnedPanel(CursorPanel):
         layout.addWidget(self.follow)
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Updates the panel when it is shown, because hidden panels are not updated."""
+        """Updates the panel when it becomes visible, because hidden panels are not updated."""
         super().showEvent(event)
         self._soon()
 

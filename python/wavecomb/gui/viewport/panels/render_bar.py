@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tool bar of the render: camera, size, region; pause, stop, restart."""
+"""Tool bar of the render: camera, image size and region; buttons to pause, stop and restart."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from wavecomb.run.settings import MAX_EDGE
 
 
 class RenderBar(QToolBar):
-    """Tool bar with the most used controls of a render."""
+    """Tool bar with the most frequently used controls of a render."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__("Render", parent)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Panel of the settings that lighters change: render time, light transport, noise removal."""
+"""Panel of the settings that lighting artists change: time, light transport and denoising."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ _ROWS: dict[str, tuple[str, dict[str, Any]]] = {
     "firefly": ("&Fireflies", {}),
     "clamp_indirect": ("C&lamp", {}),
 }
-"""Label of each setting, with display options where they differ from the Scheduling panel."""
+"""Label of each setting, and display options that differ from those in the Scheduling panel."""
 _CHOICES = ("guiding", "transport", "firefly")
 _TEXTS = {"path": "camera paths", "light": "light paths", "bdpt": "both, connected"}
 _NAMES = {"max_depth": "depth"}
-"""Names of controls, where they differ from the names of their settings."""
+"""Object names of controls that differ from the names of their settings."""
 
 
 class RenderPanel(QWidget):
-    """Panel of the most used render settings."""
+    """Panel of the most frequently used render settings."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Timeline of an animated stage: a slider for the frame, and playing."""
+"""Timeline of an animated stage: a slider for the frame, and a button that plays the animation."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ _PLAY, _STOP = "\u25b6", "\u25a0"
 
 
 class Timeline(QWidget):
-    """Timeline bar, shown for stages with a range of frames.
+    """Timeline bar, which is visible for stages with a frame range.
 
-    Playing shows each frame as a reduced image, at most at the frame rate of the stage, and repeats
-    the range. When playing stops, the current frame is rendered in full.
+    While the timeline plays, each frame is shown as a reduced image. The timeline plays at most at
+    the frame rate of the stage, and repeats the frame range. When playing stops, the current frame
+    is rendered at full size.
     """
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
@@ -76,7 +77,7 @@ class Timeline(QWidget):
         set_quietly(self.frame, frame)
 
     def _choose(self, frame: int) -> None:
-        """Shows a frame, as a reduced image while playing or while the slider is dragged."""
+        """Shows a frame of the animation. While playing or dragging, the image is reduced."""
         self._waiting = True
         self._session.show_time(frame, moving=self.is_playing or self.slider.isSliderDown())
         self._show(frame)
