@@ -70,6 +70,7 @@ def test_bands_are_the_whole_picture(stage: Path, tmp_path: Path, words: tuple[s
     assert same(*files)
 
 
+@pytest.mark.slow
 def test_files_beside_it(stage: Path, whole: Path, tmp_path: Path) -> None:
     """PNG, AOV files and statistics equal those of a render in one piece."""
     file, png, stats = (tmp_path / name for name in ("a.exr", "a.png", "a.json"))

@@ -61,6 +61,7 @@ def document(folder, depth, feed, value):
     (folder / "deep.mtlx").write_text(text)
 
 
+@pytest.mark.slow
 def test_a_chain_that_doubles(tmp_path):
     """Each level uses the one below twice: 2^32 nodes by path, but only 33 different ones."""
     depth = 32

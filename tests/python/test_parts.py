@@ -97,6 +97,7 @@ def test_ci_sees_failures(
     result.stdout.fnmatch_lines(["*needs engine_that_nobody_has: *cannot be imported*"])
 
 
+@pytest.mark.slow
 def test_ci_sees_files_that_are_not_collected(
     inner: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:

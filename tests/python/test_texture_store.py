@@ -290,6 +290,7 @@ def smoky(stage):
     return path
 
 
+@pytest.mark.slow
 @needs_store
 @only_where(vdb.is_there(), "this build is without OpenVDB")
 def test_grids_leave_less_for_textures(smoky, stage):

@@ -353,6 +353,7 @@ def lit_ball(builder: Any) -> None:
     builder.set_camera(camera, projection="orthographic", window=(-1.1, 1.1, -1.1, 1.1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("anisotropy", [0.0, 0.5])
 def test_walks_are_a_medium_in_the_same_mesh(anisotropy: float) -> None:
     """Equals the same medium rendered as a mesh interior in a diffusely transmitting skin."""
