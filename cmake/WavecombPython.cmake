@@ -38,6 +38,13 @@ file(GLOB binding_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/bindings/*.cp
 if(NOT binding_sources)
   message(FATAL_ERROR "bindings/ holds no *.cpp: there is no Python module to build.")
 endif()
+# Unity batches (WAVECOMB_BATCH). render.cpp reuses local names of other sources.
+foreach(_group IN ITEMS "camera;geometry;lights;materials;meshes" "graphs;scene;scene_values;settings;volumes"
+    "module;recording;renderer;statistics;watching")
+  list(GET _group 0 _name)
+  list(TRANSFORM _group REPLACE "(.+)" "${PROJECT_SOURCE_DIR}/bindings/\\1.cpp")
+  set_source_files_properties(${_group} PROPERTIES UNITY_GROUP ${_name})
+endforeach()
 
 # An Embree that is neither staged nor in a system folder (embree_ROOT) needs an rpath.
 set(_embree_rpath "")
@@ -86,7 +93,7 @@ function(wavecomb_add_module name core flags folder)
     list(APPEND rpath "$ORIGIN/${up}../../..")
   endif()
   list(APPEND rpath ${_embree_rpath})
-  set_target_properties(${name} PROPERTIES
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ${WAVECOMB_BATCH} UNITY_BUILD_MODE GROUP
     OUTPUT_NAME _core
     LIBRARY_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/${folder}"
     INSTALL_RPATH "${rpath}"

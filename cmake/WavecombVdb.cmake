@@ -10,7 +10,15 @@ set(_vdb_rpath "$ORIGIN" "$ORIGIN/lib")
 if(WAVECOMB_TBB_IS_WHEEL)
   list(APPEND _vdb_rpath "$ORIGIN/../../..")
 endif()
-set_target_properties(wavecomb_vdb PROPERTIES
+# Two unity batches: sources that include OpenVDB's headers, and all others.
+foreach(_source IN LISTS _vdb_sources)
+  set(_group plain)
+  if(_source MATCHES "/(archive|chunks|open_tree|writing)\\.cpp$")
+    set(_group openvdb)
+  endif()
+  set_source_files_properties("${_source}" PROPERTIES UNITY_GROUP ${_group})
+endforeach()
+set_target_properties(wavecomb_vdb PROPERTIES UNITY_BUILD ${WAVECOMB_BATCH} UNITY_BUILD_MODE GROUP
   OUTPUT_NAME _vdb
   LIBRARY_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}"
   INSTALL_RPATH "${_vdb_rpath}"

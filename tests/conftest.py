@@ -52,6 +52,16 @@ def caustics(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.fixture(scope="session")
+def plain_room(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Generate the plain form of the scene room with fewer triangles and texels."""
+    from wavecomb.scenes import write_scene
+
+    path = tmp_path_factory.mktemp("plain_room") / "room.usdc"
+    write_scene("room", path, plain=True, triangles=12_000, teapot_level=4, texture_size=64)
+    return path
+
+
 @pytest.fixture
 def forked(monkeypatch: pytest.MonkeyPatch) -> None:
     """Also fork the processes that the package starts, such as readers of stages."""

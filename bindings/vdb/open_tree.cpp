@@ -10,9 +10,6 @@ namespace {
 using Origin = BrickWriter::Origin;
 
 template <typename Value>
-using GridOf = openvdb::Grid<typename openvdb::tree::Tree4<Value, 5, 4, 3>::Type>;
-
-template <typename Value>
 struct ChannelsOf : std::integral_constant<uint32_t, 1> {};
 template <typename T>
 struct ChannelsOf<openvdb::math::Vec3<T>> : std::integral_constant<uint32_t, 3> {};

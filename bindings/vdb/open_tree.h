@@ -10,6 +10,10 @@
 
 namespace vdb {
 
+/// OpenVDB's grid of a value type.
+template <typename Value>
+using GridOf = openvdb::Grid<typename openvdb::tree::Tree4<Value, 5, 4, 3>::Type>;
+
 /// Describes a grid; requires its topology only.
 GridFacts facts_of(const openvdb::GridBase& grid);
 

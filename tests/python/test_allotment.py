@@ -37,6 +37,7 @@ def render(scene: Any, **settings: Any) -> wavecomb.Picture:
     return wavecomb.render(scene, **{"size": (SIZE, SIZE), "spp": 64, **settings})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 def test_one_picture_whatever_the_schedule(cornell: Any, way: str) -> None:
     plain = render(cornell, allocate=way)
@@ -73,6 +74,7 @@ def test_too_few_samples_are_even(cornell: Any) -> None:
     assert few.stats["allotment"] is None
 
 
+@pytest.mark.slow
 def test_is_unbiased(cornell: Any) -> None:
     """The mean of many low-sample images equals that of images with even sampling."""
 
@@ -117,6 +119,7 @@ def test_counts_that_cannot_be_are_refused(cornell: Any) -> None:
         _core.render(cornell, settings, state=state)
 
 
+@pytest.mark.slow
 def test_time_limit(cornell: Any) -> None:
     picture = render(cornell, spp=1 << 20, time_limit=1.0, allocate="error")
     assert picture.samples.min() > 0

@@ -70,6 +70,7 @@ def test_bands_are_the_whole_picture(stage: Path, tmp_path: Path, words: tuple[s
     assert same(*files)
 
 
+@pytest.mark.slow
 def test_files_beside_it(stage: Path, whole: Path, tmp_path: Path) -> None:
     """PNG, AOV files and statistics equal those of a render in one piece."""
     file, png, stats = (tmp_path / name for name in ("a.exr", "a.png", "a.json"))
@@ -110,6 +111,7 @@ def test_a_cropped_picture_says_where_it_lies(stage: Path, whole: Path, tmp_path
             assert np.array_equal(read_layers(file)[name], layer[20:180, 30:110])
 
 
+@pytest.mark.slow
 def test_a_cropped_picture_in_memory(stage: Path) -> None:
     """Cropped renders in memory, also adaptive ones, equal the same part of a full-size image."""
     region = (30, 20, 110, 180)

@@ -56,6 +56,7 @@ def bash(command: Path, folder: Path, *words: str) -> list[str]:
     return done.stdout.split()
 
 
+@pytest.mark.slow
 @needs("bin:bash")
 def test_bash_completes_commands_options_and_values(command: Path, tmp_path: Path) -> None:
     assert bash(command, tmp_path, "re") == ["render"]
@@ -64,6 +65,7 @@ def test_bash_completes_commands_options_and_values(command: Path, tmp_path: Pat
     assert bash(command, tmp_path, "render", "--tone-map", "n") == ["neutral"]
 
 
+@pytest.mark.slow
 @needs("bin:bash", "wavecomb._core")
 def test_bash_knows_the_tables(command: Path, tmp_path: Path) -> None:
     """Bash completes settings of the core, AOVs, scenes and commands of a group."""

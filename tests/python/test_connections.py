@@ -39,6 +39,7 @@ WAYS: list[dict[str, Any]] = [
 ]
 
 
+@pytest.mark.slow
 def test_one_picture_whatever_the_schedule(caustics: Path, mixed: Any) -> None:
     for stage in (wavecomb.load(caustics), mixed):
         plain = render(stage).beauty
@@ -48,6 +49,7 @@ def test_one_picture_whatever_the_schedule(caustics: Path, mixed: Any) -> None:
                 assert np.array_equal(plain, render(stage, **way).beauty), way
 
 
+@pytest.mark.slow
 def test_settings_of_paths_change_the_picture_alike(mixed: Any) -> None:
     for way in (
         {"roulette": "cost-aware", "costs": "model"},

@@ -273,6 +273,7 @@ def test_what_cannot_be_is_refused(options: list[str], says: str, tmp_path: Path
     assert len(run.stderr.strip().splitlines()) == 1 or "Usage" in run.stderr
 
 
+@pytest.mark.slow
 def test_it_goes_on_from_a_checkpoint(tmp_path: Path) -> None:
     """Resuming with other threads and wave sizes gives the same bits as one run."""
     scene = wavecomb.load(write(tmp_path, CAMERA + LIT + _hair())).scene

@@ -298,6 +298,7 @@ def test_random_stages(seed: int, tmp_path: Path) -> None:
     assert error < 5e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "options"),
     [

@@ -421,6 +421,7 @@ def test_a_worker_that_ends_with_a_result(
     same(tmp_path / "a.exr", one_process(stage, tmp_path))
 
 
+@pytest.mark.slow
 def test_slurm_that_refuses(stage: Path, tmp_path: Path, slurm: Path) -> None:
     folder = made(stage, tmp_path)
     words = ("farm", "resume", folder.path, "--on", "slurm")

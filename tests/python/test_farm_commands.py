@@ -179,6 +179,7 @@ def test_tasks_of_a_job_by_another_queue(stage: Path, tmp_path: Path) -> None:
     assert run("farm", "resume", job).returncode == 0 and (tmp_path / "a.2.exr").exists()
 
 
+@pytest.mark.slow
 def test_missing_files(stage: Path, tmp_path: Path) -> None:
     here = tmp_path / "s.usda"
     here.write_text(
@@ -195,6 +196,7 @@ def test_missing_files(stage: Path, tmp_path: Path) -> None:
     assert (tmp_path / "a.exr").exists()
 
 
+@pytest.mark.slow
 def test_what_the_command_refuses(stage: Path, tmp_path: Path) -> None:
     for words, said in (
         (("--checkpoint", str(tmp_path / "x")), "--checkpoint: is not for a farm"),
@@ -310,6 +312,7 @@ def test_path_maps(stage: Path, tmp_path: Path) -> None:
     assert not first.exists()
 
 
+@pytest.mark.slow
 def test_parts_of_another_class_do_not_count(stage: Path, tmp_path: Path) -> None:
     words = (*SMALL, "--tiles", "2x1", "--on", "none")
     assert run("farm", "submit", stage, "-o", tmp_path / "a.exr", *words).returncode == 0

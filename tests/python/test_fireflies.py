@@ -24,6 +24,7 @@ def render(stage: Any, **settings: Any) -> wavecomb.Picture:
     return wavecomb.render(stage, **(plain | settings))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transport", ["path", "light"])
 def test_reweighting_takes_fireflies_and_keeps_the_unbiased_sum(
     caustics: Path, transport: str
@@ -59,6 +60,7 @@ def test_a_reweighted_picture_is_resumed(caustics: Path, tmp_path: Path) -> None
     assert {"unbiased", "by_bounces", "by_light_samples", "by_light_paths"} <= {*read_layers(again)}
 
 
+@pytest.mark.slow
 def test_what_reweighting_does_not_go_with_is_one_line(caustics: Path, tmp_path: Path) -> None:
     asked = ["--firefly", "reweight", "--size", "64", "64", "--spp", "1"]
     out = str(tmp_path / "a.exr")

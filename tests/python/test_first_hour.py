@@ -413,6 +413,7 @@ def test_type_checkers_find_misspelt_keywords(tmp_path: Path) -> None:
     assert lines == {3, 4, 5}, done.stdout
 
 
+@pytest.mark.slow
 @REAL
 @pytest.mark.parametrize("name", ["edit_and_render.py", "no_usd.py", "stage_in_memory.py"])
 def test_the_examples_run(name: str, tmp_path: Path) -> None:

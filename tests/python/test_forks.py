@@ -56,6 +56,7 @@ def test_code(end: str, tmp_path: Path) -> None:
     assert forked[2].splitlines()[-1:] == fresh[2].splitlines()[-1:]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [["--version"], ["nonsense"], ["info", "none.usda"]])
 def test_commands(words: list[str], tmp_path: Path) -> None:
     fresh, forked = both(["-m", "wavecomb", *words], cwd=tmp_path)

@@ -54,6 +54,7 @@ def mended() -> dict[str, Verdict]:
     return {verdict.name: verdict for verdict in verdicts}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", MENDED)
 def test_what_was_found_and_mended(case: str, mended: dict[str, Verdict]) -> None:
     assert mended[case].outcome in GOOD, mended[case].said

@@ -36,6 +36,7 @@ def test_reference_is_whole_and_small(name: str) -> None:
         assert file.stat().st_size < MAX_BYTES, file
 
 
+@pytest.mark.slow
 def test_a_small_bias_is_found() -> None:
     """One per cent more light, or a shift by one pixel, fails the comparison."""
     scene = read_golden("Lights")

@@ -55,6 +55,7 @@ def render(scene: Any, **settings: Any) -> wavecomb.Picture:
     return wavecomb.render(scene, **{"size": (SIZE, SIZE), "spp": SPP, **settings})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS, ids=str)
 @pytest.mark.parametrize("name", ["cornell", "mixed"])
 def test_one_picture_whatever_the_schedule(
@@ -98,6 +99,7 @@ def test_parts_are_those_of_the_whole(cornell: Any, way: dict[str, Any]) -> None
     assert other["guided_share"] == whole.stats["guiding"]["guided_share"]
 
 
+@pytest.mark.slow
 def test_a_resumed_picture_is_that_which_nothing_stopped(stage: Path, tmp_path: Path) -> None:
     def run(name: str, *arguments: str) -> Any:
         out = tmp_path / name
@@ -128,6 +130,7 @@ def stopped(cornell: Any) -> dict[str, Any]:
     return stop.state
 
 
+@pytest.mark.slow
 def test_what_was_learned_goes_on_with_a_render(cornell: Any, stopped: dict[str, Any]) -> None:
     """A resumed render with other threads and lanes uses the stored field and does not train."""
     way = {"guiding": "on", "spp": 128}
@@ -157,6 +160,7 @@ def test_more_samples_are_guided_as_those_before(cornell: Any, stopped: dict[str
     assert (more.samples == 160).all()
 
 
+@pytest.mark.slow
 def test_a_render_that_finds_it_does_not_pay_keeps_that(cornell: Any) -> None:
     part = as_settings(guiding="auto", spp=1000, region=(0, 0, 2, 1))
     stop = StopAt(1)
@@ -165,6 +169,7 @@ def test_a_render_that_finds_it_does_not_pay_keeps_that(cornell: Any) -> None:
     assert again["kept"] and not again["used"] and again["gain"] > 0
 
 
+@pytest.mark.slow
 def test_what_is_learned_is_kept_for_the_next_render_of_a_scene(cornell: Any) -> None:
     renderer = _core.Renderer(cornell)
     way: dict[str, Any] = {"guiding": "on", "roulette": "efficient"}
@@ -201,6 +206,7 @@ def test_a_damaged_field_is_refused(cornell: Any, stopped: dict[str, Any]) -> No
     assert refused > 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["cornell", "mixed"])
 def test_is_unbiased(request: pytest.FixtureRequest, name: str) -> None:
     """Means over many seeds agree with those of unguided renders, for each tile of the image."""
@@ -260,10 +266,9 @@ def test_the_summary_says_what_was_learned(stage: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_auto_decides_alike_whatever_the_schedule(tmp_path: Path) -> None:
+def test_auto_decides_alike_whatever_the_schedule(plain_room: Path) -> None:
     """All schedules, and the reference integrator, choose guiding in a room lit through a door."""
-    write_scene("room", tmp_path / "room.usdc", plain=True)
-    scene = wavecomb.load(tmp_path / "room.usdc").scene
+    scene = wavecomb.load(plain_room).scene
     part: dict[str, Any] = {
         **{"size": (480, 320), "spp": 132, "region": (100, 100, 104, 102), "guiding": "auto"}
     }
@@ -298,6 +303,7 @@ def test_auto_leaves_a_stage_alone_where_it_does_not_pay() -> None:
     assert np.array_equal(automatic.beauty, render(scene, **part).beauty)
 
 
+@pytest.mark.slow
 def test_auto_learns_only_where_that_is_a_small_share(cornell: Any) -> None:
     """Guiding is trained only if a small fraction of the samples or of the time limit suffices."""
     part: dict[str, Any] = {"guiding": "auto", "region": (0, 0, 1, 1)}
@@ -326,6 +332,7 @@ def test_a_limit_of_time_is_taught_for_as_long_as_it_may_be(cornell: Any) -> Non
 LEARNED_AOVS = ("guided_share", "survival")
 
 
+@pytest.mark.slow
 def test_layers_say_what_became_of_bounces(cornell: Any) -> None:
     plain = render(cornell, aovs=LEARNED_AOVS, roulette="off")
     assert not plain.aovs["guided_share"].any()
@@ -396,6 +403,7 @@ def test_what_was_learned_can_be_looked_up(cornell: Any) -> None:
     assert renderer.learned(*place)["density"] is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weights", ["power", "calibrated"])
 def test_shares_of_lights_are_those_of_the_render(mixed: Any, weights: str) -> None:
     """Selection by power has the same light probabilities at all points and in the statistics."""

@@ -224,6 +224,7 @@ def test_white_hair_under_a_white_sky_is_white(kind: str) -> None:
     assert picture.beauty.mean(axis=(0, 1)) == pytest.approx(1.0, abs=0.005)
 
 
+@pytest.mark.slow
 def test_lamps_are_what_each_brings_alone() -> None:
     """With several lights, a vertex samples one of three; a single light needs no selection."""
     lamps = [

@@ -341,6 +341,7 @@ def scattered_once(x: float) -> float:
     return float(light.mean() * most * 4 * np.pi / 4.0)
 
 
+@pytest.mark.slow
 def test_lamps_draw_distances_in_meshes() -> None:
     """Single scattering from a visible light in thin fog, against a closed form."""
     pictures = [thin_fog(True, seed, 0.3, depth=1, equiangular="on") for seed in range(100)]
@@ -637,6 +638,7 @@ def test_placed_glass_holds_what_is_inside_of_it() -> None:
         assert refuses_light_paths(builder) == refused
 
 
+@pytest.mark.slow
 def test_a_search_in_many_meshes_takes_no_time() -> None:
     """The search is fast with thousands of glasses and objects on a large floor."""
     import time

@@ -147,6 +147,7 @@ def test_stop_and_go_on() -> None:
     assert process.returncode == 0 and out == "end\n"
 
 
+@pytest.mark.slow
 def test_the_command_says_where_usd_crashed(tmp_path: Path) -> None:
     stage = tmp_path / "bad.usda"
     stage.write_text(GOOD)

@@ -80,6 +80,7 @@ def test_most_materials_are_glossy_and_all_are_worn(kitchen: Usd.Stage) -> None:
     assert len(glossy) >= 25
 
 
+@pytest.mark.slow
 def test_it_is_the_same_each_time(tmp_path: Path) -> None:
     for name in "ab":
         write_scene("kitchen", tmp_path / f"{name}.usda", teapot_level=3, texture_size=32)

@@ -85,6 +85,7 @@ def test_another_size_and_camera_have_the_same_mean(cornell: Any, taught: waveco
     assert given.mean() == pytest.approx(alone.mean(), rel=0.01)
 
 
+@pytest.mark.slow
 def test_what_is_no_good_ends_in_a_line(
     stage: Path, cornell: Any, taught: wavecomb.Picture, tmp_path: Path
 ) -> None:
@@ -114,6 +115,7 @@ def test_what_is_no_good_ends_in_a_line(
     assert done.exit_code == 2 and "this render trains no guiding field" in done.output
 
 
+@pytest.mark.slow
 def test_a_command_keeps_it_and_another_starts_from_it(stage: Path, tmp_path: Path) -> None:
     size = ("--size", SIZE, SIZE, "--guiding", "on")
     kept = tmp_path / "a.learned"

@@ -83,6 +83,7 @@ def plain(scene: Any) -> Any:
     return np.array([quarters(scene, seed, **off) for seed in range(SEEDS)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS, ids=str)
 def test_learning_changes_no_mean(scene: Any, plain: Any, way: dict[str, Any]) -> None:
     seeds = range(SEEDS, 2 * SEEDS)
@@ -93,6 +94,7 @@ def test_learning_changes_no_mean(scene: Any, plain: Any, way: dict[str, Any]) -
     assert np.all(np.abs(learned.mean(axis=0) - mean) < 6.0 * error + 0.002 * mean)
 
 
+@pytest.mark.slow
 def test_one_picture_whatever_the_schedule(scene: Any) -> None:
     way = WAYS[1]
     whole = render(scene, **way)

@@ -51,6 +51,7 @@ def test_the_field_is_that_of_an_even_render(cornell: Any, both: wavecomb.Pictur
     assert not np.array_equal(both.samples, plain.samples)
 
 
+@pytest.mark.slow
 def test_one_picture_whatever_the_schedule(cornell: Any, both: wavecomb.Picture) -> None:
     others: list[dict[str, Any]] = [
         {"lanes": 1, "threads": 1},

@@ -39,6 +39,7 @@ def render(stage: Any, **settings: Any) -> wavecomb.Picture:
     return wavecomb.render(stage, **(plain | settings))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "projection"), [("caustics", None), ("mixed", None), ("pool", "latlong")]
 )

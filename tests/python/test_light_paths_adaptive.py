@@ -47,6 +47,7 @@ def test_one_picture_whatever_the_schedule(
             assert got.tobytes() == want.tobytes(), (layer, way)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transport", ["light", "bdpt"])
 def test_the_error_is_that_of_both_kinds_of_paths(stage: Any, transport: str) -> None:
     """The reported error agrees with the deviation from the mean over seeds."""
@@ -64,6 +65,7 @@ def test_the_error_is_that_of_both_kinds_of_paths(stage: Any, transport: str) ->
     assert 0.5 < variance / pictures.var(axis=0, ddof=1).sum() < 2.5
 
 
+@pytest.mark.slow
 def test_noise_ends_where_it_is_asked_to(stage: Any) -> None:
     found = render(stage, noise=0.05, spp=1024)
     assert found.stats["error"] <= 0.05

@@ -93,6 +93,7 @@ def went_on(scene: Any, settings: dict[str, Any], runs: int = 200) -> tuple[Any,
     raise AssertionError("it never ended")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("transport", "ending"),
     [("light", ENDINGS[0]), ("bdpt", ENDINGS[0]), ("light", ENDINGS[1]), ("bdpt", ENDINGS[2]),

@@ -38,6 +38,7 @@ def render(stage: Any, **settings: Any) -> wavecomb.Picture:
     return wavecomb.render(stage, **(plain | settings))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["pool", "mixed"])
 def test_one_picture_whatever_the_schedule(stages: Any, name: str) -> None:
     stage = wavecomb.load(stages(name))
@@ -69,6 +70,7 @@ def test_parts_are_those_of_the_whole(stages: Any) -> None:
     assert not part[:y0].any()
 
 
+@pytest.mark.slow
 def test_stopped_renders_go_on(stages: Any) -> None:
     scene = wavecomb.load(stages("pool")).scene
     settings: dict[str, Any] = {

@@ -70,6 +70,7 @@ def stage(folder: Path, kind: str) -> Path:
     return write(folder, HEADER + LIGHTS[kind] % GOES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["rect", "inherited", "shaped", "sphere", "cylinder", "distant"])
 def test_a_moving_light_is_the_mean_of_still_ones(tmp_path: Path, kind: str) -> None:
     path = stage(tmp_path, kind)

@@ -215,6 +215,7 @@ def test_grids_of_integers_are_listed_and_left_out(tmp_path: Path) -> None:
     assert "grids of int32 (left out)" in report and "/Smoke/density" in report
 
 
+@pytest.mark.slow
 def test_a_command_says_one_line(tmp_path: Path) -> None:
     stage = tmp_path / "s.usda"
     stage.write_text(VOLUME.replace("a.vdb", "a.nvdb"))

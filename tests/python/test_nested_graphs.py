@@ -61,6 +61,7 @@ def document(folder, depth, feed, value):
     (folder / "deep.mtlx").write_text(text)
 
 
+@pytest.mark.slow
 def test_a_chain_that_doubles(tmp_path):
     """Each level of nested graphs uses the level below twice: 2^32 nodes, with only 33
     different values.

@@ -132,6 +132,7 @@ def scene() -> Any:
     return builder.build()
 
 
+@pytest.mark.slow
 @needs("wavecomb._core")
 def test_a_notebook_shows_a_bar_and_the_picture_so_far(notebook: Handle) -> None:
     made = wavecomb.render(scene(), size=(192, 192), spp=200, seed=3)

@@ -72,6 +72,7 @@ def run(inner: pytest.Pytester, *options: str) -> pytest.RunResult:
     return inner.runpytest_subprocess("-ra", "-p", "no:cacheprovider", *options)
 
 
+@pytest.mark.slow
 def test_a_user_sees_skips(inner: pytest.Pytester) -> None:
     inner.makepyfile(test_some=TESTS, test_module=MODULE)
     result = run(inner)
@@ -98,6 +99,7 @@ def test_ci_sees_failures(
     result.stdout.fnmatch_lines(["*needs engine_that_nobody_has: *cannot be imported*"])
 
 
+@pytest.mark.slow
 def test_ci_sees_files_that_are_not_collected(
     inner: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -115,6 +115,7 @@ subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
 """
 
 
+@pytest.mark.slow
 def test_started_processes_import_nothing_from_the_working_folder(place: Place) -> None:
     out = place.program(SEVERAL, place.shot)
     assert set(out.split()) == {str(PACKAGE / "__init__.py")} and len(out.split()) == 7
@@ -167,6 +168,7 @@ assert answer["status"] == "ok", answer
 """
 
 
+@pytest.mark.slow
 @needs("wavecomb._core")
 def test_bench_workers_import_nothing_from_the_working_folder(place: Place) -> None:
     place.program(BENCH, place.stage, place.safe)

@@ -199,6 +199,7 @@ def test_a_preview_may_be_linear(tmp_path: Path) -> None:
     assert (read_layers(preview)["beauty"] == read_layers(out)["beauty"]).all()
 
 
+@pytest.mark.slow
 def test_ctrl_c_while_usd_is_loaded_is_not_lost(tmp_path: Path) -> None:
     stage = tmp_path / "ball.usda"
     stage.write_text('#usda 1.0\ndef Sphere "Ball" {\n}\n')

@@ -70,6 +70,7 @@ def test_each_part_can_be_forced(caustics: Any, quality: str) -> None:
     assert quality == "plain" or "guiding" in guided.stats["transport"]["why"]
 
 
+@pytest.mark.slow
 def test_all_parts_and_schedules_decide_alike(caustics: Any, default: Any) -> None:
     for way in ({"threads": 1, "wave_size": 100, "policy": "material"}, {"lanes": 1, "threads": 2}):
         other = render(caustics, **way)
@@ -79,6 +80,7 @@ def test_all_parts_and_schedules_decide_alike(caustics: Any, default: Any) -> No
     assert np.array_equal(wider.beauty[:16, 10:26], default.beauty)
 
 
+@pytest.mark.slow
 def test_a_decision_is_handed_on(caustics: Any, default: Any) -> None:
     """Pilot renders are not repeated if an earlier render's decision is given, or known to the
     renderer."""
@@ -113,6 +115,7 @@ def test_more_samples_do_not_change_the_transport_of_a_render(caustics: Any) -> 
         assert (more.samples == PART["spp"]).all()
 
 
+@pytest.mark.slow
 def test_short_time_limits_leave_no_time_for_pilots(caustics: Any) -> None:
     stats = render(caustics, time_limit=0.1, threads=2).stats
     assert stats["transport"]["chosen"] == "path"
@@ -120,6 +123,7 @@ def test_short_time_limits_leave_no_time_for_pilots(caustics: Any) -> None:
     assert stats["guiding"] is None
 
 
+@pytest.mark.slow
 def test_late_pilots_give_up(caustics: Any) -> None:
     """For 64 threads, more samples are expected than this machine renders in half a second."""
     stats = render(caustics, time_limit=0.5, threads=64).stats
@@ -127,8 +131,8 @@ def test_late_pilots_give_up(caustics: Any) -> None:
     assert "too much of the time limit" in stats["transport"]["why"]
 
 
-def test_a_room_is_guided_if_paths_start_at_the_camera(tmp_path: Path) -> None:
-    write_scene("room", tmp_path / "room.usdc", plain=True)
-    scene = wavecomb.load(tmp_path / "room.usdc").scene
+@pytest.mark.slow
+def test_a_room_is_guided_if_paths_start_at_the_camera(plain_room: Path) -> None:
+    scene = wavecomb.load(plain_room).scene
     stats = render(scene, spp=256, region=(0, 0, 4, 4), transport="path").stats
     assert stats["guiding"]["used"] and stats["guiding"]["gain"] >= 1.25

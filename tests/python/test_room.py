@@ -42,6 +42,7 @@ def look_of(mesh: UsdGeom.Mesh) -> str:
     return str(material.GetPrim().GetName())
 
 
+@pytest.mark.slow
 def test_the_room_is_furnished(stage: Usd.Stage) -> None:
     names = [prim.GetName() for prim in stage.GetPrimAtPath("/World/Objects").GetChildren()]
     assert len(names) >= 40
@@ -71,6 +72,7 @@ def test_every_material_is_bound_and_plain(stage: Usd.Stage) -> None:
     assert any("normal" in info.textures for info in MATERIALS.values())
 
 
+@pytest.mark.slow
 def test_plain_changes_nothing(room: Path, tmp_path: Path) -> None:
     write_scene("room", tmp_path / "room.usdc", plain=True, **SMALL)
     plain, ordinary = (Sdf.Layer.FindOrOpen(str(path)) for path in (tmp_path / "room.usdc", room))

@@ -387,6 +387,7 @@ def test_required_and_not_there(place: Path, monkeypatch: pytest.MonkeyPatch) ->
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_without_user_namespaces_auto_works_without(place: Path, tmp_path: Path) -> None:
     """bubblewrap fails, as it does where user namespaces are not permitted."""
     fake = tmp_path / "bwrap"

@@ -233,6 +233,7 @@ def test_compare_refuses(frames: Path, others: Path, tmp_path: Path) -> None:
     assert "is one image, but" in failed("compare", frames, one)
 
 
+@pytest.mark.slow
 def test_both_work_in_their_sandbox(frames: Path, others: Path, tmp_path: Path) -> None:
     """``sheet`` and ``compare`` run in a sandbox in which only their outputs can be written."""
     page, sheet = tmp_path / "a.html", tmp_path / "b.html"

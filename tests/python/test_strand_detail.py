@@ -52,6 +52,7 @@ def lawn(path: Path, away: float, projection: str = "perspective", widths: str =
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("widths", ["constant", "uniform", "varying", "vertex"])
 def test_opacity_and_colours_are_kept(tmp_path: Path, widths: str) -> None:
     """The remaining strands have the same coverage and mean colour."""

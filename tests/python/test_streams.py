@@ -38,6 +38,7 @@ def shell(command: str, folder: Path, **options: object) -> subprocess.Completed
     )  # type: ignore[call-overload]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "to", [">&-", "2>&-", ">&- 2>&-", "<&- >&- 2>&-", "> /dev/full", "2> /dev/full",
            "> /dev/full 2>&1", "| head -0", "2>&1 | head -1", "--progress json > /dev/full",
@@ -55,6 +56,7 @@ def test_an_image_is_written_whatever_becomes_of_messages(
     assert ("messages were lost" in done.stderr) == is_told, done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["info a.usda", "doctor", "completion bash", "--help"])
 def test_a_result_that_is_lost_is_an_error_and_a_reader_that_ends_is_none(
     stage: Path, tmp_path: Path, command: str
@@ -69,6 +71,7 @@ def test_a_result_that_is_lost_is_an_error_and_a_reader_that_ends_is_none(
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.slow
 def test_a_closed_stream_is_not_given_to_a_file(stage: Path, tmp_path: Path) -> None:
     """With closed streams, messages of libraries do not end up in the first file that is opened."""
     words = "render a.usda -o a.exr --stats a.json --isolate off"
@@ -92,6 +95,7 @@ def test_clean() -> None:
     assert terminal.clean(os.fsdecode(b"a\xffb")) == "a\\xffb"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("forced", [False, True])
 def test_names_in_a_stage_reach_no_terminal_as_they_are(tmp_path: Path, forced: bool) -> None:
     """Control characters of file names are escaped in all output, with or without Rich."""
@@ -175,6 +179,7 @@ IN_ALL = ("click", "wavecomb.cli.group", "wavecomb.run.error_messages", "wavecom
 LATER = ("numpy", "wavecomb._core", "pxr.Usd", "OpenImageIO", "wavecomb.cli.summary")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("isolate", "module"),
     [*(("on", module) for module in IN_ALL), *(("off", module) for module in IN_ALL + LATER)],

@@ -21,6 +21,7 @@ def render(stage: Any, **settings: Any) -> wavecomb.Picture:
     return wavecomb.render(stage, **(plain | settings))
 
 
+@pytest.mark.slow
 def test_techniques_add_up_to_the_beauty(caustics: Path) -> None:
     stage = wavecomb.load(caustics)
     plain = render(stage)

@@ -60,6 +60,7 @@ def test_every_row_names_tests(request: pytest.FixtureRequest) -> None:
     assert not lost, "tests/long_tests.txt names what is no test: " + ", ".join(lost)
 
 
+@pytest.mark.slow
 def test_a_row_is_skipped_unless_all_tests_run(monkeypatch: pytest.MonkeyPatch) -> None:
     row = next(row for row in ROWS if "*" not in row.long and "statistics" in row.long)
     words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", row.long]

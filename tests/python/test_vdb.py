@@ -105,6 +105,7 @@ def test_bricks_of_zeros_may_be_left_out(tmp_path: Path) -> None:
     assert len(vdb.read(path, head, whole=False).origins) == 3
 
 
+@pytest.mark.slow
 def test_tiles_come_as_bricks(tmp_path: Path) -> None:
     """16^3 equal bricks are one tile, and a single brick is a tile of 8^3 voxels."""
     path = tmp_path / "a.vdb"

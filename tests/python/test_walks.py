@@ -175,6 +175,7 @@ def add_ball(builder: Any, radius: float, material: int) -> None:
     builder.add_to_group(0, number)
 
 
+@pytest.mark.slow
 def test_a_black_sphere_lets_through_what_misses_all_collisions() -> None:
     """Chords of a sphere in uniform light have the density l / (2 R^2)."""
     radius, free_paths = 1.0, (2.0, 1.0, 0.5)
@@ -354,6 +355,7 @@ def lit_ball(builder: Any) -> None:
     builder.set_camera(camera, projection="orthographic", window=(-1.1, 1.1, -1.1, 1.1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("anisotropy", [0.0, 0.5])
 def test_walks_are_a_medium_in_the_same_mesh(anisotropy: float) -> None:
     """Subsurface scattering equals the same medium in a mesh with a diffuse transmission."""

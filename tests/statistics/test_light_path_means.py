@@ -72,6 +72,7 @@ def test_layers_agree_with_those_of_camera_paths(wide: Any, transport: str) -> N
         assert_agree(f"{transport} {name}", a, b)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transport", ["light", "bdpt"])
 @pytest.mark.parametrize("ending", ENDINGS, ids=lambda e: next(iter(e)))
 def test_samples_that_go_where_the_noise_is(

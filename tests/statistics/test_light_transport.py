@@ -137,12 +137,14 @@ def compare(
     assert_agree(name, joined, alone)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_lights_are_unbiased(kind: str, tmp_path: Path, beauty: Any) -> None:
     path = write_stage(tmp_path / "stage.usda", *corner(*lights(tmp_path)[kind]))
     compare(f"light paths {kind}", wavecomb.load(path), beauty)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["sky", "several"])
 def test_connections_are_unbiased(kind: str, tmp_path: Path, beauty: Any) -> None:
     path = write_stage(tmp_path / "stage.usda", *corner(*lights(tmp_path)[kind]))
@@ -150,6 +152,7 @@ def test_connections_are_unbiased(kind: str, tmp_path: Path, beauty: Any) -> Non
     compare(f"connections {kind}", stage, beauty, transport="bdpt", max_depth=5)
 
 
+@pytest.mark.slow
 def test_connections_find_light_that_a_shade_hides(tmp_path: Path, beauty: Any) -> None:
     """A light in a box that is open at the top: all light arrives via the ceiling."""
     shade = [
@@ -165,6 +168,7 @@ def test_connections_find_light_that_a_shade_hides(tmp_path: Path, beauty: Any) 
     compare("connections shade", stage, beauty, transport="bdpt", max_depth=6)
 
 
+@pytest.mark.slow
 def test_a_tree_of_lights(tmp_path: Path, beauty: Any) -> None:
     path = write_stage(tmp_path / "stage.usda", *corner(*lights(tmp_path)["several"]))
     compare("light paths tree", wavecomb.load(path), beauty, light_selection="tree")
@@ -184,6 +188,7 @@ LENSES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lens", list(LENSES))
 def test_cameras_are_unbiased(lens: str, tmp_path: Path, beauty: Any) -> None:
     prims = [p if "Camera" not in p else LENSES[lens] for p in corner(*lights(tmp_path)["rect"])]
@@ -201,6 +206,7 @@ def test_cameras_are_unbiased(lens: str, tmp_path: Path, beauty: Any) -> None:
         compare(f"connections {lens}", stage, beauty, transport="bdpt", **wide)
 
 
+@pytest.mark.slow
 def test_connections_are_unbiased_in_motion(tmp_path: Path, beauty: Any) -> None:
     """A ball that moves while the shutter is open: camera and light path share a time."""
     shutter = "double shutter:open = 0\ndouble shutter:close = 1\nfloat focalLength"
@@ -214,6 +220,7 @@ def test_connections_are_unbiased_in_motion(tmp_path: Path, beauty: Any) -> None
     compare("connections in motion", stage, beauty, 24, 8, transport="bdpt")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ball", ["Frosted", "Clear", "Coated"])
 def test_what_transmits_is_unbiased(ball: str, tmp_path: Path, beauty: Any) -> None:
     """A ball under a large light, which camera paths also find through the ball."""
@@ -243,6 +250,7 @@ def test_what_transmits_is_unbiased(ball: str, tmp_path: Path, beauty: Any) -> N
         compare(f"connections through {ball}", stage, beauty, transport="bdpt", max_depth=6)
 
 
+@pytest.mark.slow
 def test_shading_normals_are_unbiased(tmp_path: Path, beauty: Any) -> None:
     """Smooth normals on coarse facets, adjusted towards the viewer at silhouettes."""
     shape = sphere("Coarse", "Gloss", (-0.2, 0.6, 0.9), 0.5, rings=5, smooth=True)
@@ -254,6 +262,7 @@ def test_shading_normals_are_unbiased(tmp_path: Path, beauty: Any) -> None:
     assert_agree("light paths coarse", a, b, tolerance=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["sun", "rect"])
 def test_aiming_in_a_wide_stage_is_unbiased(kind: str, tmp_path: Path, beauty: Any) -> None:
     """A glass ball on a wide ground, under lights that camera paths also find through it."""
@@ -276,6 +285,7 @@ def test_aiming_in_a_wide_stage_is_unbiased(kind: str, tmp_path: Path, beauty: A
     compare(f"light paths wide {kind}", stage, beauty, max_depth=6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transport", ["light", "bdpt"])
 def test_light_through_a_plate_of_glass(transport: str, tmp_path: Path, beauty: Any) -> None:
     """A point light above a clear plate above a floor, which camera paths cannot find.

@@ -45,6 +45,7 @@ def test_a_floor_under_glass(tmp_path: Path, beauty: Any) -> None:
     assert beauty(stage, 16, 16, **settings).max() == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lamp", ["ball", "sun"])
 def test_what_a_mirror_shows_is_unbiased(lamp: str, tmp_path: Path, beauty: Any) -> None:
     """A glass ball in front of a mirror, with lights that camera paths find."""

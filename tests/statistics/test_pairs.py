@@ -87,6 +87,7 @@ def test_stages_come_from_their_seeds_alone(tmp_path: Path) -> None:
     assert (one.features, one.depth) == (two.features, two.depth)
 
 
+@pytest.mark.slow
 def test_every_enclosure_is_among_the_stages(tmp_path: Path) -> None:
     counts: Counter[str] = Counter()
     for seed in range(240):

@@ -34,6 +34,7 @@ def z_of(a: np.ndarray, b: np.ndarray) -> float:
     return float((a.mean() - b.mean()) / np.sqrt(variance))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transport", ["path", "light"])
 @pytest.mark.parametrize(("lights", "right"), [("visible", 2.597), ("hidden", 8 / 3)])
 def test_lampshade(transport: str, lights: str, right: float) -> None:
@@ -49,6 +50,7 @@ def test_lampshade(transport: str, lights: str, right: float) -> None:
     assert found.mean() == pytest.approx(right, rel=0.015)
 
 
+@pytest.mark.slow
 def test_techniques_agree_at_lifted_origins(tmp_path: Path) -> None:
     """A light without effect takes 99 of 100 light samples, so that bounces find the other light.
 
@@ -94,6 +96,7 @@ def test_a_light_below_a_surface_is_the_walks_to_find(weights: str) -> None:
     assert found == pytest.approx(0.0, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_guided_bounces_by_cosine() -> None:
     """Guiding is mixed with the density that samples bounces; a fault once lost 15 % of light."""
     stage = wavecomb.load(CASES / "glossy_box.usda")

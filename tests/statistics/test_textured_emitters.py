@@ -87,6 +87,7 @@ def exact(height: float) -> float:
     return float(ALBEDO / np.pi * (row[:, None] * form).mean())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("texture_filter", ["auto", "whole"])
 @pytest.mark.parametrize("height", [0.3, 3.0])
 @pytest.mark.parametrize("technique", ["both", "bounces", "bdpt"])

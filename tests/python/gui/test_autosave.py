@@ -82,6 +82,7 @@ def test_edits_are_copied_until_they_are_saved_or_undone(new_window, qtbot, path
     qtbot.waitUntil(lambda: saved(window) is None)
 
 
+@pytest.mark.slow
 def test_unsaved_edits_are_restored_by_the_next_window(new_window, qtbot, path):
     first = new_window(path)
     first.scene.edits.set_light("/Key", "intensity", 9.0)
@@ -94,6 +95,7 @@ def test_unsaved_edits_are_restored_by_the_next_window(new_window, qtbot, path):
     assert second.scene.edits.lines()
 
 
+@pytest.mark.slow
 def test_discarded_edits_are_gone(new_window, path):
     first = new_window(path)
     first.scene.edits.set_light("/Key", "intensity", 9.0)
@@ -105,6 +107,7 @@ def test_discarded_edits_are_gone(new_window, path):
     assert offer(new_window(path)) is None
 
 
+@pytest.mark.slow
 def test_a_second_window_of_a_stage_leaves_the_copy_alone(new_window, qtbot, path):
     first, second = new_window(path), new_window(path)
     assert first.autosave.file is not None and second.autosave.file is None

@@ -136,6 +136,7 @@ def test_values_of_a_pixel() -> None:
     assert pixel_rows(a, b, "beauty", 16, 5) == {} and pixel_rows(a, b, "none", 3, 5) == {}
 
 
+@pytest.mark.slow
 def test_flip_in_its_process_is_flip() -> None:
     pytest.importorskip("flip_evaluator")
     process = FlipProcess()

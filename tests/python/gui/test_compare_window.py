@@ -73,6 +73,7 @@ def pair(qtbot, window, files):
     return window
 
 
+@pytest.mark.slow
 def test_numbers_of_dropped_files(qtbot, pair, files):
     found = compare(files["a"], files["b"])
     assert verdict(pair) == "beauty: different"
@@ -201,6 +202,7 @@ def test_maps(qtbot, pair):
     assert "needs a variance" in pair.view.message
 
 
+@pytest.mark.slow
 def test_exposure_is_that_of_both_and_of_flip(qtbot, pair):
     before = numbers(pair)
     colour = pair.view.image("A").pixelColor(0, 0)
