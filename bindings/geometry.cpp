@@ -224,39 +224,55 @@ nb::object box_of(const PointBounds& bounds) {
 /// Returns the corners per face, baked points, bounds, and for quads the result of `split_quads`;
 /// or None if the mesh is not plain.
 nb::object plain_mesh(const Array<float>& points, const Array<int32_t>& counts,
-                      const Array<int32_t>& indices, const std::optional<Array<double>>& matrix,
-                      double limit) {
+                      const Array<int32_t>& indices, const Array<double>& matrix, double limit) {
   if (points.ndim() != 2 || points.shape(1) != 3) throw Error("points must have the shape (n, 3)");
-  if (matrix && matrix->size() != 16) throw Error("a matrix must have the shape (4, 4)");
-  const std::span<const int32_t> corners{indices.data(), indices.size()};
-  std::span<const float> input{points.data(), points.size()};
-  std::vector<float> baked;
-  std::optional<PointBounds> bounds;
-  uint32_t size = 0;
-  std::vector<int64_t> split;
-  std::vector<uint32_t> triangles;
+  if (matrix.size() != 16) throw Error("a matrix must have the shape (4, 4)");
+  std::optional<PlainMesh> mesh;
   {
     std::optional<nb::gil_scoped_release> release;
     if (points.size() >= kMinParallelSize) release.emplace();
-    size = corners_of_faces({counts.data(), counts.size()}, corners, points.shape(0));
-    if (size == 4) {
-      split = split_quads(input, corners, {});
-      triangles.reserve(split.size());
-      for (const int64_t corner : split)
-        triangles.push_back(static_cast<uint32_t>(corners[static_cast<size_t>(corner)]));
-    }
-    if (size != 0 && matrix) {
-      baked.resize(points.size());
-      bake_points(input, std::span<const double, 16>(matrix->data(), 16), baked);
-      input = baked;
-    }
-    if (size != 0) bounds = bounds_of(input, limit);
+    mesh = make_plain_mesh({points.data(), points.size()}, {counts.data(), counts.size()},
+                           {indices.data(), indices.size()},
+                           std::span<const double, 16>(matrix.data(), 16), limit);
   }
-  if (!bounds) return nb::none();
-  nb::object positions = matrix ? array_of(std::move(baked), 3) : nb::none();
-  nb::object quads = nb::none(), faces = nb::none();
-  if (size == 4) quads = array_of(std::move(split), 3), faces = array_of(std::move(triangles), 3);
-  return nb::make_tuple(size, positions, box_of(*bounds), quads, faces);
+  if (!mesh) return nb::none();
+  nb::object positions = nb::none(), quads = nb::none(), faces = nb::none();
+  if (!mesh->positions.empty()) positions = array_of(std::move(mesh->positions), 3);
+  if (mesh->corners_per_face == 4)
+    quads = array_of(std::move(mesh->split), 3), faces = array_of(std::move(mesh->triangles), 3);
+  return nb::make_tuple(mesh->corners_per_face, positions, box_of(mesh->bounds), quads, faces);
+}
+
+/// Returns positions, triangles, triangle counts, bounds, and whether all points are used, of the
+/// meshes up to the first one that is not plain.
+nb::tuple plain_meshes(const Array<float>& points, const Array<int32_t>& counts,
+                       const Array<int32_t>& indices, const Array<uint32_t>& sizes,
+                       const Array<double>& matrices, double limit) {
+  if (sizes.ndim() != 2 || sizes.shape(1) != 3 || matrices.size() != 16 * sizes.shape(0))
+    throw Error("sizes must have the shape (k, 3), and matrices the shape (k, 4, 4)");
+  std::vector<MeshSizes> each;
+  size_t ends[3] = {};
+  for (size_t i = 0; i < sizes.shape(0); ++i) {
+    const uint32_t* size = sizes.data() + 3 * i;
+    each.push_back({size[0], size[1], size[2]});
+    for (size_t k = 0; k < 3; ++k) ends[k] += size[k];
+  }
+  if (points.size() != 3 * ends[0] || counts.size() != ends[1] || indices.size() != ends[2])
+    throw Error("the sizes of the meshes do not match their arrays");
+  PlainMeshes meshes;
+  {
+    const nb::gil_scoped_release release;
+    meshes = make_plain_meshes({points.data(), points.size()}, {counts.data(), counts.size()},
+                               {indices.data(), indices.size()}, each,
+                               {matrices.data(), matrices.size()}, limit);
+  }
+  std::vector<float> boxes;
+  for (const PointBounds& bounds : meshes.bounds)
+    for (const auto& row : bounds) boxes.insert(boxes.end(), row.begin(), row.end());
+  return nb::make_tuple(
+      array_of(std::move(meshes.positions), 3), array_of(std::move(meshes.triangles), 3),
+      array_of(std::move(meshes.triangle_counts), 0), array_of(std::move(boxes), 3),
+      array_of(std::move(meshes.uses_all_points), 0));
 }
 
 /// Returns transformed points, normals and bounds of a shape, or None if a point is not finite or
@@ -286,12 +302,7 @@ nb::object used_points(const Array<uint32_t>& triangles, size_t point_count) {
   {
     std::optional<nb::gil_scoped_release> release;
     if (triangles.size() >= kMinParallelSize) release.emplace();
-    for (size_t i = 0; i < triangles.size(); ++i) {
-      const uint32_t point = triangles.data()[i];
-      if (point >= point_count) throw Error("a triangle has a point that is not there");
-      found += 1 - used[point];
-      used[point] = 1;
-    }
+    found = mark_used_points({triangles.data(), triangles.size()}, used);
   }
   if (found == point_count) return nb::none();
   auto* held = new std::vector<uint8_t>(std::move(used));
@@ -332,7 +343,9 @@ void bind_geometry(nb::module_& m) {
   m.def("edge_pixels", &pixels, "points"_a, "counts"_a, "indices"_a, "transforms"_a, "to_camera"_a,
         "centre"_a, "half"_a, "pixels_per_unit"_a, "projection"_a = "perspective");
   m.def("split_quads", &quads, "points"_a, "indices"_a, "starts"_a = nb::none());
-  m.def("plain_mesh", &plain_mesh, "points"_a, "counts"_a, "indices"_a, "matrix"_a = nb::none(),
+  m.def("plain_mesh", &plain_mesh, "points"_a, "counts"_a, "indices"_a, "matrix"_a, nb::kw_only(),
+        "limit"_a);
+  m.def("plain_meshes", &plain_meshes, "points"_a, "counts"_a, "indices"_a, "sizes"_a, "matrices"_a,
         nb::kw_only(), "limit"_a);
   m.def("place_shape", &transform_shape, "points"_a, "normals"_a, "matrix"_a, "inverse"_a,
         nb::kw_only(), "limit"_a);

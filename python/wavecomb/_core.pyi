@@ -1105,7 +1105,7 @@ def plain_mesh(
     points: NDArray[np.float32],
     counts: NDArray[np.int32],
     indices: NDArray[np.int32],
-    matrix: Any = None,
+    matrix: Any,
     *,
     limit: float,
 ) -> (
@@ -1121,8 +1121,33 @@ def plain_mesh(
     """Converts a mesh of only triangles or only quads; returns None for other and invalid meshes.
 
     Returns the number of corners per face, 3 or 4; points (n, 3) transformed by a matrix (4, 4) for
-    row vectors, None without a matrix; their bounds (2, 3), all within the limit; and for quads the
-    corners of ``split_quads`` and their point indices (2 k, 3).
+    row vectors, None if it is the identity; their bounds (2, 3), all within the limit; and for
+    quads the corners of ``split_quads`` and their point indices (2 k, 3).
+    """
+
+def plain_meshes(
+    points: NDArray[np.float32],
+    counts: NDArray[np.int32],
+    indices: NDArray[np.int32],
+    sizes: NDArray[np.uint32],
+    matrices: NDArray[np.float64],
+    *,
+    limit: float,
+) -> tuple[
+    NDArray[np.float32],
+    NDArray[np.uint32],
+    NDArray[np.uint32],
+    NDArray[np.float32],
+    NDArray[np.uint8],
+]:
+    """Converts g of k meshes as ``plain_mesh`` does, up to the first one that it refuses.
+
+    points, counts and indices hold one mesh after another; sizes (k, 3) are the numbers of points,
+    faces and corners of each; matrices have the shape (k, 4, 4).
+
+    Returns points (n, 3); point indices (m, 3) of triangles, relative to the mesh's first point;
+    the number of triangles of each mesh (g,); bounds (2 g, 3); and for each mesh (g,) whether its
+    triangles use all its points.
     """
 
 def place_shape(

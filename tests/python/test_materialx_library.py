@@ -16,7 +16,7 @@ import pytest
 from materialx_nodes import Node, patterns, points, run
 
 from wavecomb.usd.materialx.library import WIDTHS, definition_of, flat_graph, library
-from wavecomb.usd.materialx.nodes.network import PER_COMPONENT, primitive, support_of
+from wavecomb.usd.materialx.nodes.network import PER_COMPONENT, primitive
 from wavecomb.usd.materialx.nodes.node_graphs import CATEGORIES, ExpandedGraph
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "material-graphs.md"
@@ -45,6 +45,20 @@ def reason(identifier):
     if "_matrix" in identifier:
         return MATRIX
     return REASONS[definition_of(identifier).category]
+
+
+def support_of(identifier):
+    """Returns how a library node is compiled: "primitive", "graph", or "" if it cannot be."""
+    definition = definition_of(identifier)
+    if definition is None:
+        return ""
+    if primitive(definition.category, identifier) is not None:
+        return "primitive"
+    graph = flat_graph(identifier, CATEGORIES)
+    if graph is None:
+        return ""
+    known = (primitive(node.category, node.identifier) for node in graph.nodes.values())
+    return "graph" if all(one is not None for one in known) else ""
 
 
 @functools.cache

@@ -205,39 +205,6 @@ def test_windows_import_nothing_from_the_working_folder(place: Place) -> None:
     place.check()
 
 
-MULTIPROCESSING = """
-import multiprocessing, sys
-from wavecomb import processes
-
-def work(queue):
-    import json, numpy, wavecomb
-    queue.put([place for place in sys.path if place])
-
-if __name__ == "__main__":
-    if sys.argv[1] == "safe":
-        processes.isolate_multiprocessing()
-        processes.isolate_multiprocessing()
-    sys.path.insert(0, "")
-    for method in ("spawn", "forkserver"):
-        context = multiprocessing.get_context(method)
-        queue = context.Queue()
-        process = context.Process(target=work, args=(queue,))
-        process.start()
-        if sys.argv[1] == "safe":
-            print(*queue.get(timeout=60), sep="\\n")
-        process.join(60)
-"""
-
-
-def test_multiprocessing_imports_nothing_from_the_working_folder(place: Place) -> None:
-    found = place.program(MULTIPROCESSING, "safe").splitlines()
-    assert found and str(place.work) not in found and str(place.safe) not in found
-    place.check()
-    with contextlib.suppress(AssertionError, subprocess.TimeoutExpired):
-        place.program(MULTIPROCESSING, "unsafe")
-    assert place.marker.exists(), "without it, the files are executed"
-
-
 def test_a_process_finds_the_package_that_lies_in_the_working_folder() -> None:
     """As in a checkout: the package is found although the folder is not on the module path."""
     words = processes.command("-c", "import wavecomb, sys; print(wavecomb.__file__, sys.path)")
@@ -387,7 +354,7 @@ STARTERS = {
     "sys": {"executable"},
 }  # fmt: skip
 CLUSTERS = {"multiprocessing", "ProcessPoolExecutor", "LocalCluster", "Nanny", "SubprocessCluster"}
-"""Names that use multiprocessing. Files with such names must call isolate_multiprocessing()."""
+"""Users of multiprocessing, whose children import from the working folder. No file may use them."""
 
 WORTH_PARSING = re.compile(
     rf"\b({'|'.join(CLUSTERS)}|subprocess|pty|asyncio|QProcess)\b|sys\.executable"
@@ -432,8 +399,8 @@ def test_nobody_else_starts_python() -> None:
             continue
         tree = ast.parse(type_only(text))
         found, clusters = starts(tree), names_of(tree) & CLUSTERS
-        if clusters and "isolate_multiprocessing(" not in text:
-            problems.append(f"{name}: {min(clusters)} without isolate_multiprocessing")
+        if clusters:
+            problems.append(f"{name}: {min(clusters)}")
         if "QProcess(" in text and "processes.command(" not in text:
             problems.append(f"{name}: QProcess without processes.command")
         if found and name in PROGRAMS and not any("sys.executable" in one for one in found):

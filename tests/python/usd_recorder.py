@@ -101,6 +101,21 @@ class Recorder:
         )
         return len(self.meshes) - 1
 
+    def add_meshes(
+        self, positions, indices, points, triangles, materials, asset_lengths, groups, names
+    ):
+        first = len(self.meshes)
+        ends = np.cumsum(points)[:-1], np.cumsum(triangles)[:-1]
+        arrays = zip(np.split(positions, ends[0]), np.split(indices, ends[1]), strict=True)
+        for (own, faces), material, length, group, name in zip(
+            arrays, materials, asset_lengths, groups, names, strict=True
+        ):
+            number = self.add_mesh(
+                own, faces, material=int(material), name=name, asset_length=int(length)
+            )
+            self.add_to_group(int(group), number)
+        return first
+
     def replace_mesh(self, mesh, positions, indices, *, material=INHERIT, **arrays):
         names = ("name", "light_group", "asset", "mesh_light")
         kept = {key: self.meshes[mesh][key] for key in names}

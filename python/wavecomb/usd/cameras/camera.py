@@ -99,8 +99,10 @@ class Lens:
         return out
 
 
-def find_camera(stage: Usd.Stage, wanted: str | None) -> Usd.Prim | None:
+def find_camera(stage: Usd.Stage, wanted: str | None, has_cameras: bool = True) -> Usd.Prim | None:
     """Returns the camera ``wanted``, that of the render settings, or the stage's first camera.
+
+    ``has_cameras`` may be False if the stage is known to have no cameras, which saves a search.
 
     Raises:
         WavecombError: ``wanted`` names no camera.
@@ -117,6 +119,8 @@ def find_camera(stage: Usd.Stage, wanted: str | None) -> Usd.Prim | None:
             camera = stage.GetPrimAtPath(target)
             if camera and camera.IsA(UsdGeom.Camera):
                 return camera
+    if not has_cameras:
+        return None
     for prim in Usd.PrimRange.Stage(stage):
         if prim.GetTypeName() == "Camera":
             return prim

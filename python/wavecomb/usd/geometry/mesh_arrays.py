@@ -97,8 +97,7 @@ def bake_and_triangulate(
     thousand meshes. Returns None for any other or invalid mesh; ``triangulate`` and ``extent`` then
     report errors.
     """
-    is_identity = matrix == IDENTITY
-    found = _core.plain_mesh(points, counts, indices, None if is_identity else matrix, limit=LIMIT)
+    found = _core.plain_mesh(points, counts, indices, matrix, limit=LIMIT)
     if found is None:
         return None
     size, baked, bounds, corners, triangles = found

@@ -118,6 +118,15 @@ class Group:
         self.boxes.append(bounds)
         if len(self.shown) < _MAX_SHOWN:
             self.shown.append(bounds)
+        self._merge_boxes()
+
+    def grow_by(self, boxes: NDArray[Any]) -> None:
+        """Extends the bounds of the group by boxes (k, 2, 3)."""
+        self.boxes.append(np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)]))
+        self.shown.extend(boxes[: max(0, _MAX_SHOWN - len(self.shown))])
+        self._merge_boxes()
+
+    def _merge_boxes(self) -> None:
         whole = self.bounds if len(self.boxes) > _MANY_BOXES else None
         if whole is not None:
             self.boxes = [whole]

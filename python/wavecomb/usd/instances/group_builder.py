@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -22,26 +23,18 @@ from wavecomb.usd.instances.instance_materials import (
     InstanceBindings,
     InstanceMaterials,
 )
+from wavecomb.usd.instances.mesh_batch import DrawCount, LoadProgress, MeshBatches
 from wavecomb.usd.instances.placement import GroupInstancer, VolumeInstancer, outline_of
 from wavecomb.usd.instances.point_instancer import moved_instances, read_instances
 from wavecomb.usd.lights.mesh_light import MeshLights
 from wavecomb.usd.materials.assignment import Assigner, BoundMaterials
+from wavecomb.usd.materials.bindings import BindingScan, bound_materials
 from wavecomb.usd.materials.draw_item import DrawItem
-from wavecomb.usd.materials.material import (
-    INHERIT_MATERIAL,
-    BindingScan,
-    MaterialTable,
-    bound_materials,
-)
+from wavecomb.usd.materials.material import INHERIT_MATERIAL, MaterialTable
 from wavecomb.usd.stage.collections import LightGroups
 from wavecomb.usd.stage.context import LoadContext, world_to_scene
 from wavecomb.usd.stage.frame_cache import MeshCache
 from wavecomb.usd.stage.traversal import STRANDS, CollectedPrims, InstancePrim, Traversal
-
-LoadProgress = Callable[[int, int], None]
-"""Progress callback: progress(prims drawn, prims found so far)."""
-STEP = 512
-"""Number of prims between two calls of the progress callback."""
 
 _ANY = Usd.PrimIsActive & Usd.PrimIsLoaded
 """Predicate for prototypes of point instancers, which may be overs or classes."""
@@ -81,8 +74,7 @@ class GroupBuilder:
         self.light_groups, self.surfaces = light_groups, surfaces
         self.gprims = GprimReader(context, surfaces, traversal.skeletons, cache)
         self.memory_check = MemoryCheck(context.stage, context.time)
-        self.progress, self.detail = progress, detail
-        self.found, self.drawn = 0, 0
+        self.count, self.detail = DrawCount(progress), detail
         self.assigner = Assigner(context, materials)
         self.mesh_lights = MeshLights(context, traversal.lights, materials)
         self.bindings = BindingScan()
@@ -122,17 +114,16 @@ class GroupBuilder:
         for draw in found.volumes:
             self.volumes.add(group, draw, scope)
         group.has_lights_or_volumes |= bool(group.lights or group.volumes)
-        self.found += len(found.draws)
+        self.count.found += len(found.draws)
         for draw in found.stand_ins:
             for material in draw.subset_materials:
                 if material is not None:
                     self.materials.expect(material)
             self._draw(group, draw, scope)
-        for draw in found.draws:
-            self._draw(group, draw, scope)
-            self.drawn += 1
-            if self.progress is not None and self.drawn % STEP == 0:
-                self.progress(self.drawn, self.found)
+        MeshBatches(
+            self.context, group, scope, self.gprims, self.assigner, self.instancer,
+            draw=self._draw, count=self.count.add,
+        ).draw(found.draws)  # fmt: skip
         self._place_instances(group, found.instances, scope)
         for instance in found.instancers:
             self._place_instancer(group, instance, scope)
@@ -142,6 +133,9 @@ class GroupBuilder:
         if scope.override:
             return
         prims = found.binding_prims()
+        if scope == Scope() and not found.has_bindings:  # no prim above the roots binds either
+            found.bind(repeat(None))
+            return
         if scope.alias is not None:
             prims = [self._proxy(prim, scope.alias) for prim in prims]
         # Use one Python object per material, since dict lookups are faster by identity than by

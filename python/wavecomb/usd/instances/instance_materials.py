@@ -19,12 +19,8 @@ from pxr import Sdf, Usd, UsdGeom, UsdShade, Vt
 from wavecomb.usd.geometry.primvar import PrimvarError, from_attribute, in_linear
 from wavecomb.usd.instances.group import Scope
 from wavecomb.usd.materials.assignment import is_uniform
-from wavecomb.usd.materials.material import (
-    DEFAULT_COLOUR,
-    INHERIT_MATERIAL,
-    MaterialTable,
-    bound_materials,
-)
+from wavecomb.usd.materials.bindings import bound_materials
+from wavecomb.usd.materials.material import DEFAULT_COLOUR, INHERIT_MATERIAL, MaterialTable
 from wavecomb.usd.materials.network import colour
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.traversal import InstancePrim, inherit

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -247,6 +248,13 @@ def outline_of(
     smooth = None if shape.cage is None else surfaces.limit_points(shape.cage)
     if smooth is not None:
         return framing.outline(smooth, more)
-    used = _core.used_points(shape.triangles, shape.positions.shape[-2])
-    points = shape.positions if used is None else shape.positions[..., used, :]
+    return outline_of_points(shape.positions, shape.triangles, more)
+
+
+def outline_of_points(
+    points: NDArray[Any], triangles: NDArray[np.uint32] | None, more: NDArray[np.float64] | None
+) -> NDArray[np.float64]:
+    """Returns the extreme points of those points (..., n, 3) that triangles use; None uses all."""
+    used = None if triangles is None else _core.used_points(triangles, points.shape[-2])
+    points = points if used is None else points[..., used, :]
     return framing.outline(points.reshape(-1, 3), more)

@@ -119,6 +119,11 @@ class StageContents:
     cameras: tuple[str, ...] = ()
     lights: tuple[str, ...] = ()
 
+    @property
+    def may_have_cameras(self) -> bool:
+        """Whether the stage has cameras, or so many lights that cameras may be missing here."""
+        return bool(self.cameras) or len(self.lights) == MAX_SURVEYED
+
 
 def list_contents(stage: Usd.Stage) -> StageContents:
     """Lists cameras and lights in one pass over the stage."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from pxr import Sdf, UsdLux
+from pxr import Sdf, Usd, UsdLux
 
 from wavecomb.usd.lights.light import LightReader
 from wavecomb.usd.materials.draw_item import DrawItem
@@ -18,6 +18,11 @@ from wavecomb.usd.stage.context import LoadContext
 NO_RESPONSE = "noMaterialResponse"
 SYNC_MODES = ("materialGlowTintsLight", "independent", NO_RESPONSE)
 """Values of ``light:materialSyncMode``."""
+
+
+def is_mesh_light(prim: Usd.Prim) -> bool:
+    """Returns whether a gprim is a light."""
+    return bool(prim.HasAPI(UsdLux.LightAPI))
 
 
 @dataclass(frozen=True)
@@ -54,7 +59,7 @@ class MeshLights:
 
         ``draw`` holds the gprim and its transform to its group; ``kind`` is ``DrawItem.kind``.
         """
-        if not draw.prim.HasAPI(UsdLux.LightAPI):
+        if not is_mesh_light(draw.prim):
             return None
         path = draw.prim.GetPath()
         if kind not in ("mesh", "patch", "shape"):

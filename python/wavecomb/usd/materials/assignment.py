@@ -96,6 +96,24 @@ class Assigner:
         assigned.reads = primvars.read
         return assigned
 
+    def shared_material(self, draw: DrawItem) -> int | None:
+        """Returns the id of a gprim's material if it is simple: in use, and equal on all gprims.
+
+        Simple materials emit no light, and neither they nor their displacement read any values of
+        the gprim. Returns None for other materials and for gprims with GeomSubsets or with display
+        colours. Assumes that a gprim without a binding takes no material from its instance.
+        """
+        if draw.subsets:
+            return None
+        if draw.material is None:
+            return self.table.plain_in_use() if draw.is_plain else None
+        surface, number = self.table.in_use(draw.material) or (None, 0)
+        if surface is None or surface.uv_names or surface.displacement is not None:
+            return None
+        if surface.program == "hair" or not is_uniform(surface):
+            return None
+        return None if self.table.any_emits(number, None) else number
+
     def _surface(self, draw: DrawItem, material: UsdShade.Material) -> Surface:
         """Returns the surface of a material on a gprim."""
         surface = self.table.surface(material)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Resolves material bindings and adds materials to the scene."""
+"""Adds materials to the scene."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from wavecomb.usd.materials.surface import (
     is_cloudy,
 )
 from wavecomb.usd.materials.texture import TextureTable
-from wavecomb.usd.stage.context import BINDING_PURPOSES, LoadContext
+from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.volumes.material import filling
 
@@ -53,26 +53,6 @@ SPLATS = Surface("splats", "emissive", {"emission": (1.0, 1.0, 1.0)})
 """Material of Gaussian splats, which multiplies their own radiance."""
 
 
-def bound_materials(
-    prims: Sequence[Usd.Prim], purposes: Sequence[str] = BINDING_PURPOSES
-) -> list[UsdShade.Material | None]:
-    """Returns the material bound to each prim, computed in bulk.
-
-    Tries each of ``purposes`` in turn; a binding of that purpose precedes an all-purpose binding.
-    """
-    if not prims:
-        return []
-    compute = UsdShade.MaterialBindingAPI.ComputeBoundMaterials
-    found = list(compute(prims, purposes[0])[0])
-    for purpose in purposes[1:]:
-        bare = [i for i, material in enumerate(found) if not material]
-        if bare:
-            others = compute([prims[i] for i in bare], purpose)[0]
-            for i, material in zip(bare, others, strict=True):
-                found[i] = material
-    return [material if material else None for material in found]
-
-
 def surface_source(material: UsdShade.Material) -> tuple[str, UsdShade.Shader]:
     """Returns the kind of a material's surface and its shader.
 
@@ -90,34 +70,6 @@ def surface_source(material: UsdShade.Material) -> tuple[str, UsdShade.Shader]:
         if (hair := mtlx.hair_bsdf(candidate)) is not None:
             return mtlx.HAIR, hair
     return "", shader
-
-
-class BindingScan:
-    """Search for bindings on a prim or its ancestors that affect prims inside an instance."""
-
-    def __init__(self) -> None:
-        self._cache: dict[Sdf.Path, tuple[bool, bool]] = {}
-
-    def above(self, prim: Usd.Prim) -> tuple[bool, bool]:
-        """Returns (has a stronger-than-descendants binding, has a collection binding).
-
-        Both results cover the prim and its ancestors.
-        """
-        above: list[Usd.Prim] = []
-        while prim and not prim.IsPseudoRoot() and prim.GetPath() not in self._cache:
-            above.append(prim)
-            prim = prim.GetParent()
-        nothing = (False, False)
-        strong, collection = self._cache.get(prim.GetPath(), nothing) if prim else nothing
-        for prim in reversed(above):
-            for name in prim.GetAuthoredPropertyNames():
-                if name.startswith("material:binding"):
-                    if name.startswith("material:binding:collection"):
-                        collection = True
-                    strength = prim.GetRelationship(name).GetMetadata("bindMaterialAs")
-                    strong = strong or strength == UsdShade.Tokens.strongerThanDescendants
-            self._cache[prim.GetPath()] = (strong, collection)
-        return strong, collection
 
 
 class MaterialTable:
@@ -286,6 +238,15 @@ class MaterialTable:
         if "openpbr" in parameters:
             parameters["openpbr"] = converted(parameters["openpbr"], OPENPBR_COLOURS)
         return parameters
+
+    def in_use(self, material: UsdShade.Material) -> tuple[Surface, int] | None:
+        """Returns the surface of a material object and its id if meshes use them already."""
+        known = self._by_object.get(id(material))
+        return None if known is None else self._surface_ids.get(id(known[1]))
+
+    def plain_in_use(self) -> int | None:
+        """Returns the id of the default display colour if meshes use it already."""
+        return self._plain.get((*DEFAULT_COLOUR, 1.0))
 
     def paths(self) -> tuple[str, ...]:
         """Returns the prim path of each material by id; "" for materials from display colours."""

@@ -21,7 +21,8 @@ from pxr import Tf, Usd, UsdGeom
 
 from wavecomb.usd.geometry.mesh_arrays import UV_NAMES
 from wavecomb.usd.lights.light import KINDS, LightReader
-from wavecomb.usd.materials.material import MaterialTable, bound_materials
+from wavecomb.usd.materials.bindings import bound_materials
+from wavecomb.usd.materials.material import MaterialTable
 from wavecomb.usd.materials.pixels import Image, TextureError, read_header
 from wavecomb.usd.materials.texture import MEGABYTE, Key, TextureTable, stored_type
 from wavecomb.usd.stage.collections import LightGroups

@@ -47,8 +47,12 @@ def check_view(options: LoadOptions) -> None:
     _blur(options, True)
 
 
-def view_settings(stage: Usd.Stage, options: LoadOptions, report: LoadReport) -> ViewSettings:
+def view_settings(
+    stage: Usd.Stage, options: LoadOptions, report: LoadReport, has_cameras: bool = True
+) -> ViewSettings:
     """Combines options with the stage's render settings; options take precedence.
+
+    ``has_cameras`` may be False if the stage is known to have no cameras, which saves a search.
 
     Raises:
         WavecombError: The stage lacks something that the options name.
@@ -64,7 +68,7 @@ def view_settings(stage: Usd.Stage, options: LoadOptions, report: LoadReport) ->
     )  # fmt: skip
     return ViewSettings(
         choice,
-        find_camera(stage, options.camera or choice.camera),
+        find_camera(stage, options.camera or choice.camera, has_cameras),
         lens,
         _blur(options, choice.motion_blur),
         tuple(options.purposes or choice.purposes or PURPOSES[:2]),

@@ -154,6 +154,23 @@ def problem_of(bounds: NDArray[Any], matrix: Gf.Matrix4d, *, in_world: bool) -> 
     return None if max(abs(p), abs(q), abs(r)) <= NEAR * _scale(matrix) else STORED
 
 
+def may_be_coarse(
+    bounds: NDArray[Any], matrices: NDArray[np.float64], *, in_world: bool
+) -> NDArray[np.intp]:
+    """Returns the indices of all shapes for which ``problem_of`` may return a message.
+
+    ``bounds`` (k, 2, 3) and ``matrices`` (k, 4, 4) are the arguments of ``problem_of``.
+    """
+    low, high = bounds[:, 0].astype(np.float64), bounds[:, 1].astype(np.float64)
+    size = (high - low).max(axis=1)
+    reach = np.maximum(high, -low).max(axis=1)
+    away = np.abs(0.5 * (low + high) - matrices[:, 3, :3]).max(axis=1)
+    found = ~(away <= size * (_COARSE / _STEP))
+    if not in_world:
+        found |= (reach > NEAR) & (reach * _STEP > _COARSE * size)
+    return np.flatnonzero(found)
+
+
 def _scale(matrix: Gf.Matrix4d) -> float:
     return float(abs(matrix.GetDeterminant3()) ** (1.0 / 3.0))
 

@@ -34,7 +34,8 @@ from wavecomb.usd.geometry.shutter import find_motion
 from wavecomb.usd.geometry.strands import StrandDetail
 from wavecomb.usd.geometry.subdivision import SubdivisionSurfaces, parse_level
 from wavecomb.usd.instances.group import Group, changes_size, is_lit_by_emitters, placed_lights
-from wavecomb.usd.instances.group_builder import GroupBuilder, LoadProgress
+from wavecomb.usd.instances.group_builder import GroupBuilder
+from wavecomb.usd.instances.mesh_batch import LoadProgress
 from wavecomb.usd.instances.placement import add_volumes, report_grid_memory, report_ignored_volumes
 from wavecomb.usd.layers.opening import list_contents, open_stage, select_variants
 from wavecomb.usd.layers.population import report_unloaded_payloads
@@ -203,7 +204,7 @@ class _Load:
             mtlx.report_problems(c.stage, c.report)
         report_unloaded_payloads(c.stage, c.report)
         found = list_contents(c.stage)
-        settings = view_settings(c.stage, c.options, c.report)
+        settings = view_settings(c.stage, c.options, c.report, found.may_have_cameras)
         c.motion = find_motion(settings.camera, c.time, settings.blur, c.report)
         c.purposes, c.binding_purposes = settings.purposes, settings.binding_purposes
         c.origin = textures.origin = find_origin(

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,26 @@ DRAWN = frozenset(("mesh", "patch", "shape", "splats", *STRANDS.values()))
 """Kinds of prims that become geometry in the scene."""
 
 
+class AuthoredNames(NamedTuple):
+    """Names of properties with authored opinions.
+
+    Attributes:
+        names: All names.
+        has_primvars: Whether one of them is a primvar.
+        has_bindings: Whether one of them binds a material.
+    """
+
+    names: frozenset[str]
+    has_primvars: bool
+    has_bindings: bool
+
+    @classmethod
+    def of(cls, names: Sequence[str]) -> AuthoredNames:
+        """Classifies names."""
+        prefixes = "primvars:", "material:binding"
+        return cls(frozenset(names), *(any(n.startswith(p) for n in names) for p in prefixes))
+
+
 @dataclass
 class InstancePrim:
     """A native instance or a point instancer, which is expanded after bindings are resolved."""
@@ -59,6 +79,8 @@ class CollectedPrims:
     instancers: list[InstancePrim] = field(default_factory=list)
     lights: list[tuple[Light, AnimatedTransform]] = field(default_factory=list)
     stand_ins: list[DrawItem] = field(default_factory=list)
+    has_bindings: bool = False
+    """Whether a prim at or below the roots binds a material."""
 
     def binding_prims(self) -> list[Usd.Prim]:
         """Returns all prims with material bindings, in the order that ``bind`` expects."""
@@ -95,7 +117,7 @@ class Traversal:
         self.modes = DrawModes(self.time, self.report)
         self._kinds: dict[str, str] = {}
         self._counts: dict[Sdf.Path, int] = {}
-        self._names: dict[tuple[str, ...], tuple[frozenset[str], bool]] = {}
+        self._names: dict[tuple[str, ...], AuthoredNames] = {}
 
     def kind(self, prim: Usd.Prim) -> str:
         """Returns the kind of a prim, computed once per type name."""
@@ -163,7 +185,8 @@ class Traversal:
             (prim, base, None, purpose, inherited, predicate, None, "default")
             for prim in reversed(roots)
         ]
-        kinds, has_instances = self._kinds, bool(roots and roots[0].GetStage().GetPrototypes())
+        kinds, known_names = self._kinds, self._names
+        has_instances = bool(roots and roots[0].GetStage().GetPrototypes())
         while stack:
             prim, matrix, track, purpose, inherited, pick, parent, mode = stack.pop()
             type_name = prim.GetTypeName()
@@ -171,16 +194,14 @@ class Traversal:
             if kind == "shading":
                 continue
             names: frozenset[str] = frozenset()
-            has_primvars = False
+            listed = tuple(prim.GetAuthoredPropertyNames())
+            authored = known_names.get(listed)
+            if authored is None:  # Most prims share a set of property names.
+                authored = known_names[listed] = AuthoredNames.of(listed)
+            if authored.has_bindings:
+                found.has_bindings = True
             if kind != "other":
-                listed = tuple(prim.GetAuthoredPropertyNames())
-                known = self._names.get(listed)
-                # Cache by the list of property names, since most prims have the same list as
-                # another prim.
-                if known is None:
-                    has_primvars = any(name.startswith("primvars:") for name in listed)
-                    known = self._names[listed] = frozenset(listed), has_primvars
-                names, has_primvars = known
+                names = authored.names
                 if (
                     "visibility" in names
                     and word(prim.GetAttribute("visibility").Get(time)) == "invisible"
@@ -189,9 +210,9 @@ class Traversal:
                 if not RAY_NAMES.isdisjoint(names):
                     self.rays.read(prim)
                 if "purpose" in names:
-                    authored = prim.GetAttribute("purpose")
-                    if authored.HasAuthoredValue():
-                        purpose = word(authored.Get(), purpose)
+                    attribute = prim.GetAttribute("purpose")
+                    if attribute.HasAuthoredValue():
+                        purpose = word(attribute.Get(), purpose)
                 if kind != "scope" and "xformOpOrder" in names:
                     own, resets = local(prim)
                     if self.motion is not None:
@@ -255,7 +276,7 @@ class Traversal:
             elif kind.startswith("unsupported"):
                 if shown:
                     self.report.missing(str(prim.GetTypeName()), prim.GetPath())
-            elif children and has_primvars and kind in ("xform", "scope"):
+            elif children and authored.has_primvars and kind in ("xform", "scope"):
                 inherited = inherit(prim, inherited)
             if children:
                 above = Parent(prim, parent)

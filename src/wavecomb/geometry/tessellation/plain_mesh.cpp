@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "wavecomb/core/error.h"
+#include "wavecomb/geometry/tessellation/quads.h"
+
 namespace wavecomb {
 
 void bake_points(std::span<const float> points, std::span<const double, 16> matrix,
@@ -58,6 +61,80 @@ uint32_t corners_of_faces(std::span<const int32_t> counts, std::span<const int32
   uint32_t highest = 0;  // negative indices become large unsigned numbers
   for (const int32_t index : indices) highest = std::max(highest, static_cast<uint32_t>(index));
   return is_plain && highest < point_count ? static_cast<uint32_t>(size) : 0;
+}
+
+namespace {
+
+bool is_identity(std::span<const double, 16> matrix) {
+  for (size_t i = 0; i < 16; ++i)
+    if (matrix[i] != (i % 5 == 0 ? 1.0 : 0.0)) return false;
+  return true;
+}
+
+}  // namespace
+
+size_t mark_used_points(std::span<const uint32_t> triangles, std::span<uint8_t> used) {
+  size_t found = 0;
+  for (const uint32_t point : triangles) {
+    if (point >= used.size()) throw Error("a triangle has a point that is not there");
+    found += 1 - used[point];
+    used[point] = 1;
+  }
+  return found;
+}
+
+std::optional<PlainMesh> make_plain_mesh(std::span<const float> points,
+                                         std::span<const int32_t> counts,
+                                         std::span<const int32_t> indices,
+                                         std::span<const double, 16> matrix, double limit) {
+  PlainMesh mesh;
+  mesh.corners_per_face = corners_of_faces(counts, indices, points.size() / 3);
+  if (mesh.corners_per_face == 0) return std::nullopt;
+  if (!is_identity(matrix)) {
+    mesh.positions.resize(points.size());
+    bake_points(points, matrix, mesh.positions);
+  }
+  const std::optional<PointBounds> bounds =
+      bounds_of(mesh.positions.empty() ? points : mesh.positions, limit);
+  if (!bounds) return std::nullopt;
+  mesh.bounds = *bounds;
+  if (mesh.corners_per_face == 4) {
+    mesh.split = split_quads(points, indices, {});
+    mesh.triangles.reserve(mesh.split.size());
+    for (const int64_t corner : mesh.split)
+      mesh.triangles.push_back(static_cast<uint32_t>(indices[static_cast<size_t>(corner)]));
+  }
+  return mesh;
+}
+
+PlainMeshes make_plain_meshes(std::span<const float> points, std::span<const int32_t> counts,
+                              std::span<const int32_t> indices, std::span<const MeshSizes> sizes,
+                              std::span<const double> matrices, double limit) {
+  PlainMeshes out;
+  for (const MeshSizes& size : sizes) {
+    const std::span<const float> own = points.first(3 * size_t{size.points});
+    const std::span<const int32_t> corners = indices.first(size.corners);
+    const std::optional<PlainMesh> mesh =
+        make_plain_mesh(own, counts.first(size.faces), corners, matrices.first<16>(), limit);
+    if (!mesh) break;
+    const std::span<const float> there = mesh->positions.empty() ? own : mesh->positions;
+    out.positions.insert(out.positions.end(), there.begin(), there.end());
+    const size_t first = out.triangles.size();
+    if (mesh->corners_per_face == 4)
+      out.triangles.insert(out.triangles.end(), mesh->triangles.begin(), mesh->triangles.end());
+    else
+      out.triangles.insert(out.triangles.end(), corners.begin(), corners.end());
+    const std::span<const uint32_t> triangles = std::span(out.triangles).subspan(first);
+    out.triangle_counts.push_back(static_cast<uint32_t>(triangles.size() / 3));
+    out.bounds.push_back(mesh->bounds);
+    std::vector<uint8_t> used(size.points, 0);
+    out.uses_all_points.push_back(mark_used_points(triangles, used) == size.points);
+    points = points.subspan(own.size());
+    counts = counts.subspan(size.faces);
+    indices = indices.subspan(corners.size());
+    matrices = matrices.subspan(16);
+  }
+  return out;
 }
 
 }  // namespace wavecomb

@@ -38,4 +38,48 @@ std::optional<PointBounds> bounds_of(std::span<const float> points, double limit
 uint32_t corners_of_faces(std::span<const int32_t> counts, std::span<const int32_t> indices,
                           size_t point_count);
 
+/// Sets the flag in `used` of each point that triangles use; returns the number of points whose
+/// flag was 0. Throws Error if an index is out of range.
+size_t mark_used_points(std::span<const uint32_t> triangles, std::span<uint8_t> used);
+
+/// A plain mesh in the space of its group.
+struct PlainMesh {
+  uint32_t corners_per_face = 0;    ///< 3 or 4
+  std::vector<float> positions;     ///< 3 per point; empty if the transform is the identity
+  std::vector<int64_t> split;       ///< for quads the result of `split_quads`
+  std::vector<uint32_t> triangles;  ///< for quads the points of `split`
+  PointBounds bounds;
+};
+
+/// Converts a mesh, or returns nothing if it is not plain.
+///
+/// `points`: 3 per point. `counts`: corners of each face. `indices`: point of each corner.
+/// `matrix`: 4 x 4, for row vectors. Bounds are limited as in `bounds_of`.
+std::optional<PlainMesh> make_plain_mesh(std::span<const float> points,
+                                         std::span<const int32_t> counts,
+                                         std::span<const int32_t> indices,
+                                         std::span<const double, 16> matrix, double limit);
+
+/// Several plain meshes, one after another in common arrays.
+struct PlainMeshes {
+  std::vector<float> positions;           ///< 3 per point
+  std::vector<uint32_t> triangles;        ///< 3 per triangle, relative to the mesh's first point
+  std::vector<uint32_t> triangle_counts;  ///< 1 per mesh
+  std::vector<PointBounds> bounds;        ///< 1 per mesh
+  std::vector<uint8_t> uses_all_points;   ///< 1 per mesh: whether triangles use all its points
+};
+
+/// Sizes of a mesh in common arrays.
+struct MeshSizes {
+  uint32_t points, faces, corners;
+};
+
+/// Converts meshes up to the first one that is not plain.
+///
+/// `points`, `counts` and `indices` hold one mesh after another and have the sizes that `sizes`
+/// adds up to. `matrices`: 16 numbers per mesh. Arguments are otherwise as in `make_plain_mesh`.
+PlainMeshes make_plain_meshes(std::span<const float> points, std::span<const int32_t> counts,
+                              std::span<const int32_t> indices, std::span<const MeshSizes> sizes,
+                              std::span<const double> matrices, double limit);
+
 }  // namespace wavecomb

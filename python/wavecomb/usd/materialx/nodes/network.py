@@ -81,20 +81,6 @@ def primitive(category: str, identifier: str) -> Handler | None:
     return PRIMITIVES.get(category)
 
 
-def support_of(identifier: str) -> str:
-    """Returns how a library node is compiled: "primitive", "graph", or "" if it cannot be."""
-    definition = definition_of(identifier)
-    if definition is None:
-        return ""
-    if primitive(definition.category, identifier) is not None:
-        return "primitive"
-    graph = flat_graph(identifier, CATEGORIES)
-    if graph is None:
-        return ""
-    known = (primitive(node.category, node.identifier) for node in graph.nodes.values())
-    return "graph" if all(one is not None for one in known) else ""
-
-
 class _TooManyNodes(Exception):
     """Raised if a material has more than the supported number of nodes."""
 
