@@ -17,7 +17,7 @@ import numpy as np
 
 from wavecomb.gui.setup import Setup
 from wavecomb.gui.viewport.frames import Frame, layers_of_result
-from wavecomb.gui.viewport.previews import Filler, Pace, smooth
+from wavecomb.gui.viewport.previews import ALBEDO, Filler, Pace, smooth
 from wavecomb.gui.viewport.watching import LOOK_S, Watch
 from wavecomb.run.error_messages import describe
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from wavecomb._core import Renderer, Result
     from wavecomb.usd import LoadedStage
 
-MOVING_S = 0.1
+MOVING_S = 0.11
 """Target time of an image during movements, with denoising, in seconds."""
 QUICK_S = 0.15
 """Time of a full pass above which a reduced image comes first, in seconds."""
@@ -65,6 +65,7 @@ class Task:
         moving: Whether the task asks only for a reduced image.
         loaded: The loaded stage, for statistics.
         renderer: Renderer to use from now on; None keeps the current one.
+        beauty_only: Whether frames of first hits may lack all layers except the beauty.
     """
 
     setup: Setup
@@ -73,6 +74,7 @@ class Task:
     moving: bool = False
     loaded: LoadedStage | None = None
     renderer: Callable[[], Renderer] | None = None
+    beauty_only: bool = False
 
 
 class Listener(Protocol):
@@ -248,15 +250,14 @@ class Engine:
         """Sends an image at full size: first hits with the lighting of the reduced image."""
         if self._shown is None or task.setup.region is not None:
             return Filler(self._shown)
-        result = renderer.render(
-            task.setup.settings(preview=True, depth=0), progress=lambda *_: not self.superseded,
-            interval=LOOK_S,
-        )  # fmt: skip
+        layers = (ALBEDO,) if task.beauty_only else None
+        settings = task.setup.settings(preview=True, depth=0, layers=layers)
+        result = renderer.render(settings, progress=lambda *_: not self.superseded, interval=LOOK_S)
         if result.cancelled:
             return Filler(None)
-        layers, status = layers_of_result(result), {"samples_done": 0, "passes": 0, "preview": True}
-        frame = Frame(result.beauty, layers, None, status, task.version, 1, False, task.setup)
-        filler = Filler(self._shown, layers["guide_albedo"])
+        found, status = layers_of_result(result), {"samples_done": 0, "passes": 0, "preview": True}
+        frame = Frame(result.beauty, found, None, status, task.version, 1, False, task.setup)
+        filler = Filler(self._shown, found[ALBEDO])
         self.listener.on_frame(filler.fill(frame))
         return filler
 

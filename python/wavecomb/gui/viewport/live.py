@@ -103,6 +103,8 @@ class Live(QObject):
         oldest: Oldest version whose frames may still be shown.
         state: The last emitted state.
         renderer: The core's renderer, or None.
+        beauty_only: Whether no layer except the beauty is displayed, so that the first frame at
+            full size may lack the layers.
 
     Signals:
         frame(Frame): A new frame of the newest version.
@@ -129,6 +131,7 @@ class Live(QObject):
         self.oldest = 0
         self.state = IDLE
         self.renderer: Renderer | None = None
+        self.beauty_only = False
         self._numbers = itertools.count(1)
         self._pending = Edit()
         self._moving = False
@@ -266,6 +269,7 @@ class Live(QObject):
         last = self.last_frame.version if self.last_frame is not None else self.version
         self.oldest = last if task.moving else self.version
         self._is_reduced = task.moving
+        task.beauty_only = self.beauty_only
         self._awaiting, self._submitted = True, time.perf_counter()
         if self.state == PAUSED:
             self._engine.resume()
