@@ -11,10 +11,12 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from wavecomb.errors import Error
 from wavecomb.gui.setup import Setup
 from wavecomb.gui.viewport.frames import Frame, layers_of_result
 from wavecomb.gui.viewport.previews import ALBEDO, Filler, Pace, smooth
@@ -38,6 +40,7 @@ class Edit:
     camera: dict[str, Any] | None = None
     materials: dict[int, dict[str, Any]] = field(default_factory=dict)
     lights: dict[int, dict[str, Any]] = field(default_factory=dict)
+    moves: dict[str, Any] = field(default_factory=dict)
 
     def add(self, other: Edit) -> None:
         """Merges a later edit."""
@@ -45,13 +48,14 @@ class Edit:
         for mine, others in ((self.materials, other.materials), (self.lights, other.lights)):
             for index, values in others.items():
                 mine[index] = {**mine.get(index, {}), **values}
+        self.moves.update(other.moves)
 
     def copied(self) -> Edit:
         """Returns a copy, because each live render merges later edits separately."""
-        return Edit(self.camera, dict(self.materials), dict(self.lights))
+        return Edit(self.camera, dict(self.materials), dict(self.lights), dict(self.moves))
 
     def __bool__(self) -> bool:
-        return bool(self.camera or self.materials or self.lights)
+        return bool(self.camera or self.materials or self.lights or self.moves)
 
 
 @dataclass
@@ -91,6 +95,9 @@ class Listener(Protocol):
 
     def on_ready(self, renderer: Renderer) -> None:
         """Accepts a new renderer."""
+
+    def on_refused(self, message: str) -> None:
+        """Accepts the reason, in one line, why the scene cannot make the moves of an edit."""
 
 
 class Engine:
@@ -208,7 +215,7 @@ class Engine:
         if renderer is None:
             return
         if task.edit:
-            _apply(renderer, task.edit)
+            self._apply(renderer, task.edit)
             self._shown = None
         scale = self._scale_for(task, QUICK_S)
         if task.moving or (scale > 1 and not self._is_shown(task)):
@@ -217,6 +224,19 @@ class Engine:
             filler = self._first_hits(renderer, task) if scale > 1 else Filler(None)
             if not self.superseded:
                 self._whole(renderer, task, filler)
+
+    def _apply(self, renderer: Renderer, edit: Edit) -> None:
+        """Edits the scene. Makes an edit without its moves if the scene refuses these."""
+        change = partial(
+            renderer.edit, camera=edit.camera, materials=edit.materials, lights=edit.lights
+        )
+        try:
+            change(moves=edit.moves)
+        except Error as error:
+            if not edit.moves:
+                raise
+            change()
+            self.listener.on_refused(describe(error))
 
     def _is_shown(self, task: Task) -> bool:
         """Returns whether the last reduced image shows this scene with these settings."""
@@ -313,7 +333,3 @@ class Engine:
             task.setup, picture,
         )  # fmt: skip
         return filler.fill(frame)
-
-
-def _apply(renderer: Renderer, edit: Edit) -> None:
-    renderer.edit(camera=edit.camera, materials=edit.materials, lights=edit.lights)

@@ -77,6 +77,10 @@ class News:
         """Keeps the renderer of a new scene until it is taken."""
         self._put("ready", renderer)
 
+    def on_refused(self, message: str) -> None:
+        """Keeps the reason of refused moves until it is taken."""
+        self._put("refused", message)
+
 
 SETTLE_MS = 50
 """Delay between the last movement and the full image, in milliseconds."""
@@ -113,6 +117,7 @@ class Live(QObject):
         edited(int): Scene or settings changed; carries the new version.
         state_changed(str): "idle", "rendering", "paused", "stopped" or "finished".
         failed(str), warned(str): Message in one line.
+        refused(str): The scene could not make the moves of an edit, for the given reason.
     """
 
     frame = Signal(object)
@@ -122,6 +127,7 @@ class Live(QObject):
     state_changed = Signal(str)
     failed = Signal(str)
     warned = Signal(str)
+    refused = Signal(str)
 
     def __init__(self, setup: Setup | None = None, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -289,6 +295,7 @@ class Live(QObject):
             "statistics": self._take_statistics,
             "failed": self._fail,
             "ready": self._take_renderer,
+            "refused": self.refused.emit,
         }
         for kind, news in self._news.take():
             takes[kind](news)
