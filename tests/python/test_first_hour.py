@@ -289,6 +289,8 @@ def test_a_stage_in_memory_with_unsaved_edits(tmp_path: Path) -> None:
     file = tmp_path / "a.usda"
     stage.Export(str(file))
     assert wavecomb.compare(after, wavecomb.render(file, size=(32, 24), spp=4)).equal
+    opened = wavecomb.usd.open_stage(str(file))
+    assert wavecomb.compare(after, wavecomb.render(opened, size=(32, 24), spp=4)).equal
 
 
 @REAL

@@ -131,6 +131,17 @@ def test_display_shows_nan() -> None:
     assert image.display(np.full((1, 1, 3), np.nan, np.float32)).tolist() == [[[255, 0, 255]]]
 
 
+def test_codes_equal_the_rounded_transfer_function():
+    bits = np.arange(0x30000000, 0x3F800001, 37, dtype=np.uint32)
+    values = np.concatenate([[0.0, 1.0], bits.view(np.float32)]).astype(np.float32)
+    expected = np.floor(image.srgb_from_linear(values) * 255.0 + 0.5).astype(np.uint8)
+    assert np.array_equal(image.srgb_codes(values), expected)
+    others = np.array([-0.0, -2.0, 2.0, np.inf, np.nan], np.float32)
+    assert image.srgb_codes(others).tolist() == [0, 0, 255, 255, 0]
+    bright = np.full((1, 2, 3), 3e38, np.float32)  # The sum of the values overflows.
+    assert image.display(bright).min() == 255
+
+
 def test_neutral_tone_map() -> None:
     grey = np.linspace(0, 50, 4001, dtype=np.float32).reshape(1, -1, 1).repeat(3, axis=2)
     mapped = image.display(grey, tone_map="neutral")[0, :, 0].astype(int)

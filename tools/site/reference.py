@@ -243,13 +243,19 @@ def public_headers() -> list[Path]:
             if line and not line.startswith("#")]  # fmt: skip
 
 
+def first_sentence(source: str) -> str:
+    """Return the first sentence of the first comment of a C++ file, without the license."""
+    comment = re.search(r"(?:^///? (?!SPDX).+\n)+", source, re.MULTILINE)
+    text = " ".join(re.findall(r"^///? (.+)", comment[0], re.MULTILINE)) if comment else ""
+    return re.split(r"(?<=\.) ", text)[0]
+
+
 def cpp_page() -> str:
     """Make the page on using the core from C++: example, headers, and link to Doxygen's pages."""
     body = []
     for path in public_headers():
-        comment = re.search(r"^///? (?!SPDX)(.+)", path.read_text(encoding="utf-8"), re.MULTILINE)
-        body.append((code(path.relative_to(ROOT / "src").as_posix()),
-                     cell(comment[1] if comment else "")))  # fmt: skip
+        name = path.relative_to(ROOT / "src").as_posix()
+        body.append((code(name), cell(first_sentence(path.read_text(encoding="utf-8")))))
     example = (ROOT / "examples" / "cpp" / "render_sphere.cpp").read_text(encoding="utf-8")
     pages = (
         'Classes and functions are on <a href="../cpp/annotated.html">the pages of Doxygen</a>.\n'

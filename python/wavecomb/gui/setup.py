@@ -98,7 +98,12 @@ class Setup(_Rows):
         return aov_names.with_others(aov_names.expand(self.aovs), guides)
 
     def settings(
-        self, scale: int = 1, *, preview: bool = False, depth: int = PREVIEW_DEPTH
+        self,
+        scale: int = 1,
+        *,
+        preview: bool = False,
+        depth: int = PREVIEW_DEPTH,
+        layers: tuple[str, ...] | None = None,
     ) -> Settings:
         """Returns the core's render settings for this setup, with all values checked.
 
@@ -107,6 +112,7 @@ class Setup(_Rows):
             preview: Whether to render one sample per pixel with few bounces and with guide layers
                 for the denoiser.
             depth: Largest number of bounces of a preview.
+            layers: AOVs to render; None means those of ``layers()``, and guides in a preview.
 
         Raises:
             WavecombError, wavecomb._core.Error: A value is invalid. The message is one line.
@@ -117,9 +123,9 @@ class Setup(_Rows):
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in own}
         if self.region is not None:
             values["region"] = scaled_region(self.region, scale, self.width, self.height)
-        layers = self.layers()
+        if layers is None:
+            layers = aov_names.with_others(self.layers(), aov_names.GUIDES if preview else ())
         if preview:
-            layers = aov_names.with_others(layers, aov_names.GUIDES)
             values |= {name: settings()[name].default for name in NOT_IN_PREVIEWS}
             # Measuring material costs or light weights would take longer than the preview.
             values |= {"costs": "model", "light_weights": "power"}

@@ -6,10 +6,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import wait_final
-from pxr import Usd, UsdGeom
+from pxr import Gf, Sdf, Usd, UsdGeom
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
+from wavecomb.errors import WavecombError
+from wavecomb.gui.scene.transforms import Placements, changed_transforms
 from wavecomb.gui.viewport.navigate import project
 from wavecomb.gui.viewport.outline import edges
 
@@ -75,6 +77,17 @@ def moved(window, qtbot, tmp_path):
     return window
 
 
+def press(window, path, key, handle):
+    """Selects a prim and presses the mouse on one of its handles; returns the place."""
+    view = window.viewport
+    window.session.select(path)
+    view.setFocus()
+    QTest.keyClick(view, key)
+    at = QPoint(*np.round(view.gizmo.handles()[handle][-1]).astype(int))
+    QTest.mousePress(view, Qt.MouseButton.LeftButton, pos=at)
+    return at
+
+
 def world(window, path):
     cache = UsdGeom.XformCache(window.scene.edits.time)
     return np.array(cache.GetLocalToWorldTransform(window.session.usd.GetPrimAtPath(path)))
@@ -106,6 +119,127 @@ def test_an_object_moves_when_the_drag_ends(moved, qtbot):
     qtbot.waitUntil(lambda: not moved.session._jobs, timeout=20000)
     assert np.allclose(moved.session.scene.bounds_of(BALL), before)
     assert moved.scene.edits.lines() == []
+
+
+def test_an_object_follows_the_drag_without_loading(moved, qtbot):
+    session, opened = moved.session, []
+    session.opened.connect(opened.append)
+    before = session.scene.bounds_of(BALL)
+    view, at = moved.viewport, press(moved, BALL, Qt.Key.Key_W, "all")
+    QTest.mouseMove(view, at + QPoint(20, 0))
+    QTest.mouseMove(view, at + QPoint(40, 0))
+    qtbot.waitUntil(lambda: session.scene.bounds_of(BALL)[0][0] > before[0][0] + 0.2, timeout=20000)
+    assert moved.scene.edits.history.stack.count() == 1, "the drag has not ended"
+    handle = view.gizmo.handles()["all"][0]
+    assert np.allclose(handle, (at.x() + 40, at.y()), atol=2.0), "handles follow the cursor"
+    QTest.mouseRelease(view, Qt.MouseButton.LeftButton, pos=at + QPoint(40, 0))
+    frame = wait_final(qtbot, session)
+    after = session.scene.bounds_of(BALL)
+    assert np.allclose(view.gizmo.handles()["all"][0], handle, atol=2.0)
+    assert not opened and moved.scene.edits.history.stack.count() == 1
+    for change, expected in ((moved.scene.edits.undo, before), (moved.scene.edits.redo, after)):
+        change()
+        again = wait_final(qtbot, session)
+        assert np.allclose(session.scene.bounds_of(BALL), expected, atol=1e-4) and not opened
+    assert np.array_equal(again.beauty, frame.beauty)
+    session.rebuild("the edit on the stage")
+    qtbot.waitUntil(lambda: bool(opened), timeout=20000)
+    loaded = wait_final(qtbot, session)
+    assert np.allclose(session.scene.bounds_of(BALL), after, atol=1e-4)
+    assert np.abs(loaded.beauty - frame.beauty).mean() < 1e-3 * loaded.beauty.mean()
+
+
+def test_moves_of_a_group_and_of_its_parts_add_up(moved, qtbot):
+    session, edits, opened = moved.session, moved.scene.edits, []
+    session.opened.connect(opened.append)
+
+    def shift(path, x, y):
+        matrix = Gf.Matrix4d().SetTranslate(Gf.Vec3d(x, y, 0))
+        turn = Gf.Matrix4d().SetRotate(Gf.Rotation(Gf.Vec3d(0, 0, 1), 20.0 * y))
+        edits.move(edits.placement(path), turn * matrix)
+
+    for path, x, y in ((BALL, 1, 0.5), ("/World", -0.5, 1), (KEY, 0, 1), (BALL, 0.25, 0)):
+        shift(path, x, y)
+    wait_final(qtbot, session)
+    live = session.scene.bounds_of(BALL), session.scene.light(0)["transform"]
+    assert np.allclose(live[1], world(moved, KEY), atol=1e-5) and not opened
+    session.rebuild("the edits on the stage")
+    qtbot.waitUntil(lambda: bool(opened), timeout=20000)
+    wait_final(qtbot, session)
+    # The bounds of a turned instance are those of its turned box.
+    assert np.allclose(np.mean(session.scene.bounds_of(BALL), 0), np.mean(live[0], 0), atol=1e-3)
+    assert np.allclose(session.scene.light(0)["transform"], live[1], atol=1e-5)
+
+
+def test_the_stage_is_loaded_again_where_a_move_is_refused(moved, qtbot, monkeypatch):
+    session, edits, opened = moved.session, moved.scene.edits, []
+    session.opened.connect(opened.append)
+    before = session.scene.bounds_of(BALL)
+
+    class Refusing:
+        """The renderer of the session, which refuses moves."""
+
+        def __init__(self, core):
+            self._core = core
+
+        def edit(self, *, moves=None, **others):
+            if moves:
+                raise WavecombError("object '/World/Ball' is a part of an instance")
+            self._core.edit(**others)
+
+        def __getattr__(self, name):
+            return getattr(self._core, name)
+
+    session._engine._renderer = Refusing(session._engine._renderer)
+    edits.move(edits.placement(BALL), Gf.Matrix4d().SetTranslate(Gf.Vec3d(1, 0, 0)))
+    assert edits.can_follow(Sdf.Path(BALL))
+    qtbot.waitUntil(lambda: bool(opened), timeout=20000)
+    wait_final(qtbot, session)
+    assert session.scene.bounds_of(BALL)[0][0] == pytest.approx(before[0][0] + 1.0, abs=1e-3)
+    assert not edits.can_follow(Sdf.Path(BALL)), "remembered after loading"
+
+
+OTHERS = """#usda 1.0
+def Xform "World"
+{
+    def Xform "Free" { def Sphere "A" { } }
+    def Xform "Filmed" { def Sphere "A" { } def Camera "C" { } }
+    def Xform "Fixed" {
+        def Sphere "A" { uniform token[] xformOpOrder = ["!resetXformStack!"] }
+    }
+    def Xform "Turning" {
+        double xformOp:rotateY.timeSamples = { 1: 0, 4: 90 }
+        uniform token[] xformOpOrder = ["xformOp:rotateY"]
+        def Sphere "A" { }
+    }
+    def Xform "Copy" ( prepend references = </World/Free> ) { }
+    def Xform "Empty" { }
+    def PointInstancer "Many" {
+        rel prototypes = </World/Kinds/K>
+        int[] protoIndices = [0]
+        point3f[] positions = [(0, 3, 0)]
+    }
+    def Scope "Kinds" { def Xform "K" { def Sphere "A" { } } }
+}
+"""
+
+
+def test_prims_that_the_render_can_follow(tmp_path):
+    path = tmp_path / "others.usda"
+    path.write_text(OTHERS.replace("{ ", "{\n").replace(" }", "\n}").replace("} ", "}\n"))
+    stage = Usd.Stage.Open(str(path))
+    placements = Placements(stage, Usd.TimeCode(1.0))
+
+    def follows(name):
+        at = f"/World/{name}"
+        return placements.can_follow(Sdf.Path(at), lambda one: one != "/World/Empty")
+
+    assert follows("Free") and follows("Turning") and follows("Many")
+    for name in ("Filmed", "Fixed", "Turning/A", "Empty", "Kinds/K", "Kinds", "Missing"):
+        assert not follows(name), name
+    sphere = UsdGeom.Xformable(stage.GetPrimAtPath("/World/Free/A"))
+    changed = changed_transforms(stage, lambda: sphere.AddTranslateOp().Set((1, 0, 0)))
+    assert changed == {Sdf.Path("/World/Free/A"), Sdf.Path("/World/Copy/A")}
 
 
 def test_rotation_follows_the_cursor_and_scale_the_axes_of_the_prim(moved):

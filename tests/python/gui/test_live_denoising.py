@@ -81,7 +81,9 @@ def test_movements_show_no_noise(new_session, qtbot, cornell, final):
     qtbot.waitUntil(has_moved, timeout=20000)
     previews = [frame for frame in shown if frame.status.get("preview")]
     assert len(previews) >= 4, "the whole image starts only if the window does not respond"
-    assert max(roughness(frame.beauty) for frame in previews) < 0.3 * raw
+    # At the size on the screen; edges of a much reduced image, as on a busy machine, are steep.
+    sizes = [enlarged(frame.beauty, 240, 240) for frame in previews]
+    assert max(map(roughness, sizes)) < 0.3 * raw
     final(session)
     assert session.last_frame.scale == 1 and roughness(session.last_frame.beauty) > 0.8 * raw
 
@@ -139,3 +141,68 @@ def test_the_pace_of_previews_separates_constant_time_from_pixels():
     for _ in range(30):
         pace.learn(pixels // 16, 1.0)
     assert pace.scale(pixels, 0.083) == 12, "the machine became slow"
+
+
+class RecordingRenderer:
+    """The core's renderer, with a list of the settings of its renders."""
+
+    def __init__(self, scene, threads):
+        from wavecomb import _core
+
+        self._core = _core.Renderer(scene, threads)
+        self.renders = []
+
+    def render(self, settings, **options):
+        self.renders.append(settings)
+        return self._core.render(settings, **options)
+
+    def __getattr__(self, name):
+        return getattr(self._core, name)
+
+
+@pytest.mark.parametrize("beauty_only", [False, True])
+def test_one_render_of_first_hits_brings_the_image_back_to_full_size(
+    new_session, qtbot, cornell, monkeypatch, final, beauty_only
+):
+    monkeypatch.setattr("wavecomb.gui.viewport.session.make_renderer", RecordingRenderer)
+    monkeypatch.setattr(Pace, "scale", lambda *_: 4)
+    session = new_session(width=160, height=120, spp=2)
+    session.beauty_only = beauty_only
+    session._settle.setInterval(1_000_000)  # Only the test ends the movement.
+    session.open(cornell)
+    final(session)
+    shown = []
+    session.frame.connect(shown.append)
+    session.set_camera(orbit(session.pose, np.zeros(3), 0.01, 0.0, "Y"), moving=True)
+    qtbot.waitUntil(lambda: any(frame.scale == 4 for frame in shown), timeout=20000)
+    renders = session.renderer.renders
+    before = len(renders)
+    session.settle()
+    final(session)
+    first_hits, whole = renders[before:]
+    assert (first_hits.width, first_hits.height, first_hits.spp) == (160, 120, 1)
+    assert first_hits.max_depth == 0, "the reduced image is not rendered again"
+    assert (first_hits.aovs == ["guide_albedo"]) == beauty_only
+    assert whole.spp == 2 and whole.max_depth > 0
+    back = next(frame for frame in shown if frame.scale == 1)
+    assert back.status["preview"] and (back.layer("depth") is None) == beauty_only
+    assert (back.beauty > 0.0).any(axis=2).mean() > 0.9, "has the light of the reduced image"
+
+
+def test_a_movement_that_ends_before_its_image_stops_the_older_image(
+    new_session, qtbot, cornell, monkeypatch, final
+):
+    monkeypatch.setattr("wavecomb.gui.viewport.session.make_renderer", RecordingRenderer)
+    monkeypatch.setattr(Pace, "scale", lambda *_: 4)
+    session = new_session(width=160, height=120, spp=2)
+    session._settle.setInterval(1_000_000)
+    session.open(cornell)
+    final(session)
+    renders = session.renderer.renders
+    before = len(renders)
+    for angle in (0.01, 0.02, 0.03):
+        session.set_camera(orbit(session.pose, np.zeros(3), angle, 0.0, "Y"), moving=True)
+    session.settle()
+    final(session)
+    sizes = [settings.width for settings in renders[before:]]
+    assert sizes[-3:] == [40, 160, 160] and len(sizes) <= 4, sizes

@@ -2,12 +2,14 @@
 """Applies edits of a stage to the rendered scene, without loading the stage again if possible.
 
 Edits of visibility and variants add or remove objects of the scene, so the stage is loaded again.
+Edits of transforms move the objects of the scene where it can follow (``transforms``).
 Edits of constants inside a material graph or a texture reader also load the stage again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +17,8 @@ from pxr import Sdf, Usd
 
 from wavecomb.gui.scene.light_inputs import BRIGHTNESS, LightInput, inputs_of, light_inputs
 from wavecomb.gui.scene.stage_edits import Key, StageEdits, Step
-from wavecomb.gui.scene.transforms import moves_alone
+from wavecomb.gui.scene.transforms import Placements, changed_transforms, moves_alone
+from wavecomb.gui.viewport.engine import Edit
 from wavecomb.usd.materials.parameters import (
     IN_INSTANCE,
     Parameter,
@@ -37,10 +40,12 @@ class RenderSync:
     Attributes:
         session: The session whose rendered scene is updated.
         stage_edits: Edits of the session's open stage.
+        placements: Prims that were moved since the stage was loaded.
     """
 
     session: Session
     stage_edits: StageEdits
+    placements: Placements
 
     @property
     def time(self) -> Usd.TimeCode:
@@ -122,14 +127,51 @@ class RenderSync:
     def make_step(self, step: Step) -> None:
         """Applies an undo step to the stage and updates the render."""
         before = {} if step.structural else self.structures(step.prims)
-        self.stage_edits.apply(step)
-        moves = any(".xformOp" in what for _, what in step.after)
-        simple = all(moves_alone(self.prim(str(path)), self.time) for path in step.prims)
-        structural = step.structural or (moves and not simple)
+        moved = {path for path, what in step.after if ".xformOp" in what}
+        follows = all(self.can_follow(path) for path in moved)
+        objects = {path for path in moved if not moves_alone(self.prim(str(path)), self.time)}
+        for path in objects if follows else ():
+            self.placements.begin(path)
+        changed = changed_transforms(self.stage_edits.stage, partial(self.stage_edits.apply, step))
+        structural = step.structural or not follows or not changed <= moved
         if structural or self.structures(step.prims) != before:
             self.session.rebuild(step.label)
-        else:
-            self.show_step(step)
+            return
+        self.show_step(step)
+        if objects:
+            self._move(objects)
+
+    def can_follow(self, path: Sdf.Path) -> bool:
+        """Returns whether the render can follow a prim's transform without loading the stage."""
+        if moves_alone(self.prim(str(path)), self.time):
+            return True
+        return not self.session.is_reading and self.placements.can_follow(path, self._is_rendered)
+
+    def _is_rendered(self, path: str) -> bool:
+        scene, stage = self.session.scene, self.session.stage
+        if scene is None or stage is None:
+            return False
+        lights = (one for one in stage.light_paths if one == path or one.startswith(path + "/"))
+        return scene.bounds_of(path) is not None or any(lights)
+
+    def _move(self, prims: Iterable[Sdf.Path]) -> None:
+        """Moves the rendered objects and lights at or below prims to their places on the stage."""
+        stage = self.session.stage
+        if stage is None:
+            return
+        edit = Edit(moves=self.placements.moves(stage.origin))
+        for number, light in enumerate(stage.light_paths):
+            # Lights may also have moved on their own, which the moves of the scene do not include.
+            below = light and any(Sdf.Path(light).HasPrefix(path) for path in prims)
+            if below and not self.light_reason(light):
+                now = light_transform(self.prim(light), self.time)
+                edit.lights[number] = {"transform": to_scene_space(now, stage.origin)}
+        self.session.edit_all(edit)
+
+    def load_refused(self, reason: str) -> None:
+        """Loads the stage again, because the scene could not follow a transform."""
+        self.placements.refuse()
+        self.session.rebuild("moved objects")
 
     def _materials_of(self, prim: Sdf.Path) -> set[str]:
         """Returns the used materials at the path of a prim or of one of its ancestors."""

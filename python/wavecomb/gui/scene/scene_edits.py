@@ -16,7 +16,7 @@ from wavecomb.gui.scene.history import History
 from wavecomb.gui.scene.light_inputs import light_inputs
 from wavecomb.gui.scene.render_sync import RenderSync
 from wavecomb.gui.scene.stage_edits import Key, Opinion, Solo, StageEdits, Step
-from wavecomb.gui.scene.transforms import Placement, placement
+from wavecomb.gui.scene.transforms import Placement, Placements, placement
 from wavecomb.gui.scene.visibility import HIDDEN, HIDDEN_ABOVE, show, state, uneditable
 from wavecomb.usd.materials.parameters import as_stored
 from wavecomb.usd.stage.time_codes import code_of
@@ -56,12 +56,14 @@ class SceneEdits(QObject, RenderSync):
         self.session = session
         self.history = History(self)
         self.stage_edits = _no_edits()
+        self.placements = Placements(self.stage_edits.stage, self.stage_edits.time)
         self._is_open = False
         self._solo = Solo()
         self._touched: set[Sdf.Path] = set()
         self.history.step.connect(self._perform)
         session.opened.connect(self._on_opened)
         session.closing.connect(self._forget)
+        session.refused.connect(self.load_refused)
         if session.stage is not None and session.usd is not None:
             self._on_opened(session.stage)
 
@@ -265,6 +267,7 @@ class SceneEdits(QObject, RenderSync):
             self.changed.emit()
             return
         self.stage_edits.time = code_of(loaded.frame)
+        self.placements = Placements(usd, self.stage_edits.time, self.placements.refused)
         self.scene_changed.emit()
         # Edits that were made or undone during loading are not in the scene yet.
         for prim in {path for path, _ in self.stage_edits.edited()} | self._touched:
@@ -275,6 +278,7 @@ class SceneEdits(QObject, RenderSync):
     def _forget(self, edits: StageEdits | None = None) -> None:
         """Removes all undo steps, because another stage was opened or the stage was closed."""
         self.stage_edits, self._is_open = edits or _no_edits(), edits is not None
+        self.placements = Placements(self.stage_edits.stage, self.stage_edits.time)
         self._solo, self._touched = Solo(), set()
         self.history.clear()
         self.reset.emit()

@@ -13,13 +13,15 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from wavecomb.errors import Error
 from wavecomb.gui.setup import Setup
 from wavecomb.gui.viewport.frames import Frame, layers_of_result
-from wavecomb.gui.viewport.previews import Filler, Pace, smooth
+from wavecomb.gui.viewport.previews import ALBEDO, Filler, Pace, smooth
 from wavecomb.gui.viewport.watching import LOOK_S, Watch
 from wavecomb.run.error_messages import describe
 
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
     from wavecomb._core import Renderer, Result
     from wavecomb.usd import LoadedStage
 
-MOVING_S = 0.1
+MOVING_S = 0.11
 """Target time of a reduced image during camera movements and edits, including denoising, in
 seconds."""
 QUICK_S = 0.15
@@ -44,6 +46,7 @@ class Edit:
     camera: dict[str, Any] | None = None
     materials: dict[int, dict[str, Any]] = field(default_factory=dict)
     lights: dict[int, dict[str, Any]] = field(default_factory=dict)
+    moves: dict[str, Any] = field(default_factory=dict)
 
     def add(self, other: Edit) -> None:
         """Merges a later edit."""
@@ -51,16 +54,17 @@ class Edit:
         for mine, others in ((self.materials, other.materials), (self.lights, other.lights)):
             for index, values in others.items():
                 mine[index] = {**mine.get(index, {}), **values}
+        self.moves.update(other.moves)
 
     def copied(self) -> Edit:
         """Returns a copy.
 
         Each live render needs a copy, since later edits are merged into the object.
         """
-        return Edit(self.camera, dict(self.materials), dict(self.lights))
+        return Edit(self.camera, dict(self.materials), dict(self.lights), dict(self.moves))
 
     def __bool__(self) -> bool:
-        return bool(self.camera or self.materials or self.lights)
+        return bool(self.camera or self.materials or self.lights or self.moves)
 
 
 @dataclass
@@ -74,6 +78,7 @@ class Task:
         moving: Whether the task renders only a reduced image.
         loaded: The loaded stage, for statistics.
         renderer: Renderer to use from now on; None keeps the current one.
+        beauty_only: Whether frames of first hits may lack all layers except the beauty.
     """
 
     setup: Setup
@@ -82,6 +87,7 @@ class Task:
     moving: bool = False
     loaded: LoadedStage | None = None
     renderer: Callable[[], Renderer] | None = None
+    beauty_only: bool = False
 
 
 class Listener(Protocol):
@@ -98,6 +104,9 @@ class Listener(Protocol):
 
     def on_ready(self, renderer: Renderer) -> None:
         """Accepts a new renderer."""
+
+    def on_refused(self, message: str) -> None:
+        """Accepts the reason, in one line, why the scene cannot make the moves of an edit."""
 
 
 class Engine:
@@ -215,7 +224,7 @@ class Engine:
         if renderer is None:
             return
         if task.edit:
-            _apply(renderer, task.edit)
+            self._apply(renderer, task.edit)
             self._shown = None
         scale = self._scale_for(task, QUICK_S)
         if task.moving or (scale > 1 and not self._is_shown(task)):
@@ -224,6 +233,19 @@ class Engine:
             filler = self._first_hits(renderer, task) if scale > 1 else Filler(None)
             if not self.superseded:
                 self._whole(renderer, task, filler)
+
+    def _apply(self, renderer: Renderer, edit: Edit) -> None:
+        """Edits the scene. Makes an edit without its moves if the scene refuses these."""
+        change = partial(
+            renderer.edit, camera=edit.camera, materials=edit.materials, lights=edit.lights
+        )
+        try:
+            change(moves=edit.moves)
+        except Error as error:
+            if not edit.moves:
+                raise
+            change()
+            self.listener.on_refused(describe(error))
 
     def _is_shown(self, task: Task) -> bool:
         """Returns whether the last reduced image was rendered with the settings of the task."""
@@ -257,15 +279,14 @@ class Engine:
         """Sends a full-size image: first hits lit like the previous reduced image."""
         if self._shown is None or task.setup.region is not None:
             return Filler(self._shown)
-        result = renderer.render(
-            task.setup.settings(preview=True, depth=0), progress=lambda *_: not self.superseded,
-            interval=LOOK_S,
-        )  # fmt: skip
+        layers = (ALBEDO,) if task.beauty_only else None
+        settings = task.setup.settings(preview=True, depth=0, layers=layers)
+        result = renderer.render(settings, progress=lambda *_: not self.superseded, interval=LOOK_S)
         if result.cancelled:
             return Filler(None)
-        layers, status = layers_of_result(result), {"samples_done": 0, "passes": 0, "preview": True}
-        frame = Frame(result.beauty, layers, None, status, task.version, 1, False, task.setup)
-        filler = Filler(self._shown, layers["guide_albedo"])
+        found, status = layers_of_result(result), {"samples_done": 0, "passes": 0, "preview": True}
+        frame = Frame(result.beauty, found, None, status, task.version, 1, False, task.setup)
+        filler = Filler(self._shown, found[ALBEDO])
         self.listener.on_frame(filler.fill(frame))
         return filler
 
@@ -321,7 +342,3 @@ class Engine:
             task.setup, picture,
         )  # fmt: skip
         return filler.fill(frame)
-
-
-def _apply(renderer: Renderer, edit: Edit) -> None:
-    renderer.edit(camera=edit.camera, materials=edit.materials, lights=edit.lights)

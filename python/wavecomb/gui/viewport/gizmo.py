@@ -19,6 +19,7 @@ from wavecomb.usd.cameras.framing import corners
 
 if TYPE_CHECKING:
     from wavecomb.gui.scene.scene_edits import SceneEdits
+    from wavecomb.gui.viewport.frames import Frame
     from wavecomb.gui.viewport.picture_view import PictureView
     from wavecomb.gui.viewport.session import Session
 
@@ -70,8 +71,11 @@ class Gizmo(QObject):
         self._handle = ""
         self._start = QPointF()
         self._change = np.eye(4)
-        for told in (self._session.selected, self._session.opened, edits.changed):
+        self._is_late = False  # Whether the rendered scene may lack an edit.
+        for told in (self._session.selected, self._session.opened):
             told.connect(lambda *_: self._refresh())
+        edits.changed.connect(self._on_changed)
+        self._session.frame.connect(self._on_frame)
 
     @property
     def _view(self) -> PictureView:
@@ -87,7 +91,19 @@ class Gizmo(QObject):
     def _refresh(self) -> None:
         if not self._handle:
             self._anchor = self._find() if self.mode else None
+            self._change = np.eye(4)
             self._view.update()
+
+    def _on_changed(self) -> None:
+        """Moves the handles of a light at once; those of an object when the render has moved it."""
+        self._is_late = True
+        if self._anchor is None or self._anchor.bounds is None:
+            self._refresh()
+
+    def _on_frame(self, frame: Frame) -> None:
+        if self._is_late and frame.version == self._session.version:
+            self._is_late = False
+            self._refresh()
 
     def _find(self) -> Anchor | None:
         path = (self._session.selection or "").partition("[")[0].rstrip("/")
@@ -96,15 +112,15 @@ class Gizmo(QObject):
             return None
         prim = self._edits.prim(path)
         world = np.array(UsdGeom.XformCache(self._edits.time).GetLocalToWorldTransform(prim))
-        live, bounds = moves_alone(prim, self._edits.time), self._session.selected_bounds()
-        pivot = world[3, :3] - stage.origin
+        pivot, bounds = world[3, :3] - stage.origin, None
         axes = np.eye(3)
-        if not live and bounds is not None:
-            pivot = bounds.mean(axis=0)
+        if not moves_alone(prim, self._edits.time):
+            bounds = self._session.selected_bounds()
+            pivot = pivot if bounds is None else bounds.mean(axis=0)
         if self.mode == SCALE:
             sizes = np.linalg.norm(world[:3, :3], axis=1, keepdims=True)
             axes = world[:3, :3] / np.maximum(sizes, 1e-12)
-        return Anchor(pivot, axes, None if live else bounds, placement, live)
+        return Anchor(pivot, axes, bounds, placement, self._edits.can_follow(prim.GetPath()))
 
     # ---- places of the handles -----------------------------------------------------------------
 
@@ -132,15 +148,16 @@ class Gizmo(QObject):
         anchor = self._anchor
         if anchor is None or not self.mode or (length := self._reach(anchor)) == 0.0:
             return {}
+        pivot = anchor.pivot @ self._change[:3, :3] + self._change[3, :3]
         lines = {}
         angles = np.linspace(0.0, 2.0 * np.pi, 49)
         for k, name in enumerate("xyz"):
             u, v = anchor.axes[k - 2], anchor.axes[k - 1]
             ring = np.cos(angles)[:, None] * u + np.sin(angles)[:, None] * v
             rod = np.linspace(0.15, 1.0, 2)[:, None] * anchor.axes[k]
-            lines[name] = anchor.pivot + length * (ring if self.mode == ROTATE else rod)
+            lines[name] = pivot + length * (ring if self.mode == ROTATE else rod)
         if self.mode != ROTATE:
-            lines["all"] = anchor.pivot[None, :]
+            lines["all"] = pivot[None, :]
         pixels = {name: self._pixels(points) for name, points in lines.items()}
         return {name: one for name, one in pixels.items() if one is not None}
 
@@ -165,15 +182,12 @@ class Gizmo(QObject):
         return bool(self._handle)
 
     def drag(self, place: QPointF) -> None:
-        """Continues a drag.
-
-        Lights are updated during a drag, other objects only when the drag ends.
-        """
+        """Continues a drag, which the render follows if it can, or else when the drag ends."""
         anchor = self._anchor
         if anchor is None:
             return
         self._change = self._changed(anchor, place)
-        if anchor.live:
+        if anchor.live and self._edits.can_follow(anchor.placement.path):
             self._author(anchor)
         self._view.update()
 
@@ -181,12 +195,13 @@ class Gizmo(QObject):
         """Ends a drag."""
         handle, self._handle = self._handle, ""
         if self._anchor is not None and handle:
+            if not np.array_equal(self._change, np.eye(4)):
+                self._author(self._anchor)
             if self._anchor.live:
                 self._edits.history.set_typing(False)
-            elif not np.array_equal(self._change, np.eye(4)):
-                self._author(self._anchor)
         self._session.settle()
-        self._refresh()
+        if not self._is_late:
+            self._refresh()
 
     def _author(self, anchor: Anchor) -> None:
         stage = self._session.stage

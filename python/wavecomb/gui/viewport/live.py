@@ -77,6 +77,10 @@ class News:
         """Stores the renderer of a new scene."""
         self._put("ready", renderer)
 
+    def on_refused(self, message: str) -> None:
+        """Keeps the reason of refused moves until it is taken."""
+        self._put("refused", message)
+
 
 SETTLE_MS = 50
 """Delay in milliseconds between the last movement or edit and the start of the full-size image."""
@@ -105,6 +109,8 @@ class Live(QObject):
         oldest: Oldest version whose frames may still be shown.
         state: The state that was emitted last.
         renderer: The core's renderer, or None.
+        beauty_only: Whether no layer except the beauty is displayed, so that the first frame at
+            full size may lack the layers.
 
     Signals:
         frame(Frame): A new frame of the newest version.
@@ -114,6 +120,7 @@ class Live(QObject):
         edited(int): The scene or the settings changed. The argument is the new version.
         state_changed(str): "idle", "rendering", "paused", "stopped" or "finished".
         failed(str), warned(str): Error or warning message in one line.
+        refused(str): The scene could not make the moves of an edit, for the given reason.
     """
 
     frame = Signal(object)
@@ -123,6 +130,7 @@ class Live(QObject):
     state_changed = Signal(str)
     failed = Signal(str)
     warned = Signal(str)
+    refused = Signal(str)
 
     def __init__(self, setup: Setup | None = None, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -132,6 +140,7 @@ class Live(QObject):
         self.oldest = 0
         self.state = IDLE
         self.renderer: Renderer | None = None
+        self.beauty_only = False
         self._numbers = itertools.count(1)
         self._pending = Edit()
         self._moving = False
@@ -274,6 +283,7 @@ class Live(QObject):
         last = self.last_frame.version if self.last_frame is not None else self.version
         self.oldest = last if task.moving else self.version
         self._is_reduced = task.moving
+        task.beauty_only = self.beauty_only
         self._awaiting, self._submitted = True, time.perf_counter()
         if self.state == PAUSED:
             self._engine.resume()
@@ -293,6 +303,7 @@ class Live(QObject):
             "statistics": self._take_statistics,
             "failed": self._fail,
             "ready": self._take_renderer,
+            "refused": self.refused.emit,
         }
         for kind, news in self._news.take():
             takes[kind](news)

@@ -13,6 +13,8 @@ from wavecomb.gui.viewport.frames import Array, Frame
 
 _DARK = np.float32(0.05)
 """Small value that is added to albedos so that a division by zero cannot occur."""
+ALBEDO = "guide_albedo"
+"""Layer with the albedo of first hits."""
 SCALES = (1, 2, 3, 4, 6, 8, 12)
 
 
@@ -83,7 +85,7 @@ def smooth(frame: Frame, back: NDArray[np.float64]) -> NDArray[np.float32]:
     """
     from wavecomb.image.denoise import denoise
 
-    albedo, normal = frame.layers["guide_albedo"], frame.layers["guide_normal"]
+    albedo, normal = frame.layers[ALBEDO], frame.layers["guide_normal"]
     try:
         return denoise(frame.beauty, albedo, normal, threads=frame.setup.threads, fast=True)
     except WavecombError:
@@ -102,15 +104,25 @@ def by_first_hit(beauty: Array, albedo: Array, normal: Array, back: Array) -> ND
 
 
 def enlarged(image: Array, width: int, height: int) -> Array:
-    """Enlarges an image to (height, width, ...) by bilinear interpolation."""
-    out = np.asarray(image, np.float32)
-    for axis, size in ((0, height), (1, width)):
-        count = out.shape[axis]
-        at = np.clip((np.arange(size) + 0.5) * count / size - 0.5, 0.0, count - 1)
-        low = at.astype(int)
-        weight = (at - low).astype(np.float32).reshape(-1, *(1,) * (out.ndim - axis - 1))
-        high = np.minimum(low + 1, count - 1)
-        out = out.take(low, axis) * (1.0 - weight) + out.take(high, axis) * weight
+    """Enlarges an image to (height, width, ...), with bilinear interpolation."""
+    small = np.asarray(image, np.float32)
+    wide = _stretched(small, 1, width)
+    # Rows of the wide image are contiguous, so that the larger step copies whole rows.
+    tall = _stretched(wide.reshape(len(small), -1), 0, height)
+    return tall.reshape(height, width, *small.shape[2:])
+
+
+def _stretched(image: Array, axis: int, size: int) -> Array:
+    """Interpolates an image linearly along an axis."""
+    count = image.shape[axis]
+    at = np.clip((np.arange(size) + 0.5) * count / size - 0.5, 0.0, count - 1)
+    low = at.astype(int)
+    weight = (at - low).astype(np.float32).reshape(-1, *(1,) * (image.ndim - axis - 1))
+    out = image.take(low, axis, mode="clip")
+    change = image.take(low + 1, axis, mode="clip")
+    change -= out
+    change *= weight
+    out += change
     return out
 
 
@@ -138,10 +150,14 @@ class Filler:
         if self._whole is None:
             self._whole = enlarged(preview.beauty, *size)
             if self._albedo is not None:
-                low = enlarged(preview.layers["guide_albedo"], *size) + _DARK
-                # Limiting the albedo ratio avoids dots at edges between dark and bright surfaces.
-                self._whole *= np.clip((self._albedo + _DARK) / low, 0.4, 2.0)
-        holes = frame.layers["samples"][:, :, None] == 0
-        keeps = self._albedo is None
-        beauty = np.where(holes, self._whole, frame.beauty) if keeps else self._whole
+                low = enlarged(preview.layers[ALBEDO], *size)
+                low += _DARK
+                change = self._albedo + _DARK
+                change /= low
+                # The limits avoid dots at edges between dark and bright surfaces.
+                self._whole *= np.clip(change, 0.4, 2.0, out=change)
+        beauty = self._whole
+        if self._albedo is None:
+            holes = frame.layers["samples"][:, :, None] == 0
+            beauty = np.where(holes, self._whole, frame.beauty)
         return replace(frame, beauty=beauty, denoised=beauty if frame.setup.denoise else None)

@@ -75,7 +75,9 @@ def edits_again(
     return edit
 
 
-def prim_bounds(usd: Usd.Stage, loaded: LoadedStage, path: str) -> NDArray[np.float64] | None:
+def prim_bounds(
+    usd: Usd.Stage, loaded: LoadedStage, path: str, scene: Scene | None = None
+) -> NDArray[np.float64] | None:
     """Returns the bounds (2, 3) of a prim's geometry and lights in scene space, or None.
 
     Args:
@@ -83,6 +85,7 @@ def prim_bounds(usd: Usd.Stage, loaded: LoadedStage, path: str) -> NDArray[np.fl
         loaded: The loaded stage.
         path: Path in the notation of ``Renderer.pick``, in which "/World/Forest[12]/Leaves" is an
             instance below the prim "/World/Forest".
+        scene: The scene with all edits; None means the loaded scene.
     """
     from pxr import Gf, Sdf, UsdGeom
 
@@ -92,7 +95,7 @@ def prim_bounds(usd: Usd.Stage, loaded: LoadedStage, path: str) -> NDArray[np.fl
     if not Sdf.Path.IsValidPathString(plain):
         return None
     found = Gf.Range3d()
-    for corner in loaded.scene.bounds_of(plain) or ():
+    for corner in (scene or loaded.scene).bounds_of(plain) or ():
         found.UnionWith(Gf.Vec3d(*corner))
     drawn = [UsdGeom.Tokens.default_, UsdGeom.Tokens.render]
     boxes = UsdGeom.BBoxCache(code_of(loaded.frame), drawn)

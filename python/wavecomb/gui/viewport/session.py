@@ -243,13 +243,14 @@ class Session(Live):
                 ``settle``.
         """
         self.pose = pose
-        self._edit_all(Edit(camera=pose.options()), moving=moving)
+        self.edit_all(Edit(camera=pose.options()), moving=moving)
         self.camera_changed.emit(pose)
 
     def _lives(self) -> tuple[Live, ...]:
         return (self, *self.twins)
 
-    def _edit_all(self, edit: Edit, *, moving: bool) -> None:
+    def edit_all(self, edit: Edit, *, moving: bool = False) -> None:
+        """Edits the scene, also of the twins."""
         for live in self._lives():
             live.edit(edit.copied(), moving=moving)
 
@@ -286,16 +287,15 @@ class Session(Live):
         """Changes a material by index, with keyword arguments of ``add_material``."""
         if self.scene is None:
             return
-        name = self.scene.materials[material][0]
-        self.material_edits.setdefault(name, {}).update(values)
-        self._edit_all(Edit(materials={material: values}), moving=moving)
+        self.material_edits.setdefault(self.scene.materials[material][0], {}).update(values)
+        self.edit_all(Edit(materials={material: values}), moving=moving)
 
     def edit_light(self, light: int, *, moving: bool = False, **values: Any) -> None:
         """Changes a light by index, with keyword arguments of ``add_light``."""
         if self.scene is None:
             return
         self.light_edits.setdefault(light_key(self.scene, light), {}).update(values)
-        self._edit_all(Edit(lights={light: values}), moving=moving)
+        self.edit_all(Edit(lights={light: values}), moving=moving)
 
     # ---- the render ------------------------------------------------------------------------------
 
@@ -319,7 +319,7 @@ class Session(Live):
         """Returns the bounds (2, 3) of the selected prim in scene space, or None."""
         if self.selection is None or self.stage is None or self.usd is None:
             return None
-        return prim_bounds(self.usd, self.stage, self.selection)
+        return prim_bounds(self.usd, self.stage, self.selection, self.scene)
 
     def pause(self) -> None:
         """Pauses the session's render and its twins."""

@@ -76,9 +76,9 @@ class Viewport(PictureView):
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.session = session
-        self.look = Look()
         self.frame_shown: Frame | None = None
         self._frame: Frame | None = None
+        self.set_look(Look())
         self._drag = Drag.NONE
         self._last = QPointF()
         self._pressed = QPointF()
@@ -103,6 +103,7 @@ class Viewport(PictureView):
     def set_look(self, look: Look) -> None:
         """Sets the display settings: layer, exposure and tone mapping."""
         self.look = look
+        self.session.beauty_only = look.layer in ("beauty", "denoised")
         if self._frame is not None:
             self._take(self._frame)
 
@@ -120,8 +121,8 @@ class Viewport(PictureView):
         if frame.version < self.session.oldest:
             return
         self.frame_shown = frame
-        size = QSize(frame.setup.width, frame.setup.height)
-        self.set_picture(to_qimage(shown.pixels), size, shown.legend)
+        size = frame.setup.width, frame.setup.height
+        self.set_picture(to_qimage(shown.pixels), QSize(*size), shown.legend)
         self.marked.follow(frame)
         self.shown.emit(frame, found.look)
 
@@ -313,7 +314,7 @@ class Viewport(PictureView):
         at = self.to_picture(place)
         hit = self.session.pick(at.x(), at.y())
         self.session.select(hit.get("object") if hit is not None else None)
-        if (pixel := self._pixel(place)) is not None:
+        if pixel := self._pixel(place):
             self.picked.emit(pixel)
 
     def wheelEvent(self, event: QWheelEvent) -> None:

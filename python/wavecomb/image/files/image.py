@@ -8,6 +8,7 @@ Errors have a one-line message that names the file: OSError for files, ValueErro
 
 from __future__ import annotations
 
+import functools
 import os
 from pathlib import Path
 from typing import Any, Literal
@@ -116,8 +117,12 @@ def display(
     Pixels with a NaN become magenta, so that they are visible. Infinities are clamped.
     """
     linear = _colours(rgb).astype(np.float32, copy=False)
-    broken = np.isnan(linear).any(axis=2)
-    linear = np.nan_to_num(linear, nan=0.0, posinf=_HALF_MAX, neginf=0.0)
+    broken: NDArray[np.bool_] | None = None
+    with np.errstate(over="ignore", invalid="ignore"):
+        may_be_broken = not np.isfinite(linear.sum())
+    if may_be_broken:
+        broken = np.asarray(np.isnan(linear).any(axis=2))
+        linear = np.nan_to_num(linear, nan=0.0, posinf=_HALF_MAX, neginf=0.0)
     linear = np.clip(linear * np.float32(2.0**exposure), 0.0, np.float32(1e30))
     if alpha is not None:
         covered = np.clip(np.nan_to_num(alpha), 0.0, 1.0).astype(np.float32)[:, :, None]
@@ -130,12 +135,12 @@ def display(
             linear = _neutral(linear)
         elif tone_map != "clamp":
             raise ValueError(f"tone map {tone_map!r} is none of clamp, neutral, ocio:VIEW")
-        encoded = srgb_from_linear(np.clip(linear, 0.0, 1.0))
-        pixels = np.floor(encoded * 255.0 + 0.5).astype(np.uint8)
-    pixels[broken] = _NAN_COLOUR
+        pixels = srgb_codes(linear)
+    if broken is not None:
+        pixels[broken] = _NAN_COLOUR
     if alpha is None:
         return pixels
-    shares = np.where(np.asarray(broken)[:, :, None], np.float32(1.0), covered)
+    shares = covered if broken is None else np.where(broken[:, :, None], np.float32(1.0), covered)
     return np.concatenate([pixels, np.floor(shares * 255.0 + 0.5).astype(np.uint8)], axis=2)
 
 
@@ -146,22 +151,59 @@ def _neutral(rgb: Array) -> Array:
     https://github.com/KhronosGroup/ToneMapping.
     """
     start, desaturation, f90 = 0.8 - 0.04, 0.15, 0.04
-    low = rgb.min(axis=2, keepdims=True)
+    low = np.minimum(np.minimum(rgb[:, :, 0], rgb[:, :, 1]), rgb[:, :, 2])[:, :, None]
     offset = np.where(low < 2 * f90, low - low * low / (4 * f90), f90)
-    rgb = rgb - offset
-    peak = rgb.max(axis=2, keepdims=True)
+    rgb = (rgb - offset).astype(np.float32, copy=False)
+    peaks = np.maximum(np.maximum(rgb[:, :, 0], rgb[:, :, 1]), rgb[:, :, 2])
+    bright = peaks >= start
+    peak = peaks[bright][:, None]
     d = 1.0 - start
-    new_peak = 1.0 - d * d / (np.maximum(peak, start) + d - start)
-    g = 1.0 - 1.0 / (desaturation * (np.maximum(peak, start) - new_peak) + 1.0)
-    scaled = rgb * (new_peak / np.maximum(peak, 1e-6))
-    rolled = scaled * (1.0 - g) + new_peak * g
-    return np.where(peak < start, rgb, rolled).astype(np.float32)
+    new_peak = 1.0 - d * d / (peak + d - start)
+    g = 1.0 - 1.0 / (desaturation * (peak - new_peak) + 1.0)
+    scaled = rgb[bright] * (new_peak / peak)
+    rgb[bright] = scaled * (1.0 - g) + new_peak * g
+    return rgb
 
 
 def srgb_from_linear(linear: Array) -> Array:
     """Encodes values in [0, 1] with the sRGB transfer function (IEC 61966-2-1)."""
     high = 1.055 * np.power(np.maximum(linear, 0.0031308), np.float32(1 / 2.4)) - 0.055
     return np.where(linear <= 0.0031308, 12.92 * linear, high).astype(np.float32)
+
+
+def srgb_codes(linear: Array) -> NDArray[np.uint8]:
+    """Encodes values, limited to [0, 1], as 8-bit sRGB. A NaN becomes 0.
+
+    A table of the leading bits of float32 values replaces the power function.
+    """
+    first_code, next_code_from = _code_tables()
+    values = np.fmin(np.fmax(linear, np.float32(0.0)), np.float32(1.0))
+    values = values + np.float32(0.0)  # makes -0 to 0
+    bucket = values.view(np.uint32) >> _BUCKET_BITS
+    codes = first_code[bucket]
+    codes += values >= next_code_from[bucket]
+    return codes
+
+
+_BUCKET_BITS = 14
+"""Number of low bits of a float32 that do not select a bucket. Buckets of 2^14 floats are narrow
+enough that each contains at most two codes."""
+
+
+@functools.cache
+def _code_tables() -> tuple[NDArray[np.uint8], Array]:
+    """Returns the smallest code of each bucket, and the value from which the next code applies."""
+    one = int(np.float32(1.0).view(np.uint32))
+    least, most = np.zeros(255, np.uint32), np.full(255, one, np.uint32)
+    while (least < most).any():  # bisection for the smallest value of each code from 1
+        middle = least + (most - least) // 2
+        code = np.floor(srgb_from_linear(middle.view(np.float32)) * 255.0 + 0.5)
+        reached = code >= np.arange(1, 256)
+        least, most = np.where(reached, least, middle + 1), np.where(reached, middle, most)
+    starts = np.arange((one >> _BUCKET_BITS) + 1, dtype=np.uint32) << _BUCKET_BITS
+    first_code = np.searchsorted(least, starts, side="right")
+    limits = np.append(least.view(np.float32), np.float32(np.inf))
+    return first_code.astype(np.uint8), limits[first_code]
 
 
 def linear_from_srgb(encoded: Array) -> Array:

@@ -236,7 +236,7 @@ def _prim_path(text: str) -> Sdf.Path | None:
 
 
 def open_stage(
-    file: Path,
+    file: str | os.PathLike[str],
     variants: Mapping[str, str] | None = None,
     overrides: Sdf.Layer | None = None,
     mask: Sequence[str] = (),
@@ -258,6 +258,7 @@ def open_stage(
     Raises:
         WavecombError: A file cannot be read, or a variant, prim or payload does not exist.
     """
+    file = Path(file)
     rule = Usd.Stage.LoadNone if payloads else Usd.Stage.LoadAll
     with abort_on_fifo():
         with _layers(file, session_layer, overrides) as (root, session):
