@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 from build import (
     add,
@@ -67,9 +69,7 @@ def texture_alpha() -> None:
     wall(material)
 
 
-@scene("Textures", 0.97, 1.03, 0.35, "not explained yet")
-def texture_normal_map() -> None:
-    """A normal map."""
+def _normal_mapped() -> Any:
     studio()
     material = principled(base_color=(0.6, 0.6, 0.6), roughness=0.4)
     node = add(material, "ShaderNodeTexImage", image=picture("normals", data=True))
@@ -77,6 +77,19 @@ def texture_normal_map() -> None:
     wire(material, node.outputs["Color"], convert.inputs["Color"])
     wire(material, convert.outputs["Normal"], shader_of(material).inputs["Normal"])
     wall(material)
+    return material
+
+
+@scene("Textures", 0.99, 1.03, 0.35, "Bump Map Correction of Cycles darkens tilted normals")
+def texture_normal_map() -> None:
+    """A normal map."""
+    _normal_mapped()
+
+
+@scene("Textures")
+def texture_normal_map_plain() -> None:
+    """A normal map without Bump Map Correction."""
+    _normal_mapped().cycles.use_bump_map_correction = False
 
 
 @scene("Textures", outside=0.2, why="sharp highlights converge slowly")
