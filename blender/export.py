@@ -18,6 +18,7 @@ from .lights import write_lights
 from .materials import write_materials
 from .motion import Sampled, write_motion
 from .report import Report
+from .textures import write_textures
 from .usda import Asset, Layer, text_of
 from .visibility import write_visibility
 from .world import write_world
@@ -176,6 +177,7 @@ def export_stage(
     write_lights(into)
     write_world(into)
     write_materials(into)
+    write_textures(into)
     write_curves(into)
     write_visibility(into)
     try:

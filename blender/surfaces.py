@@ -10,6 +10,7 @@ from .graph import Value, colour, number
 from .mixtures import mixed
 from .neutral import BLACK, NEUTRAL, Surface, is_zero
 from .nodes import Nodes
+from .normals import normal_of
 from .subsurface import scattering, subsurface
 
 
@@ -37,12 +38,8 @@ def surface_of(n: Nodes, socket: Any) -> Surface | None:
 def _normal(n: Nodes, node: Any, found: Surface) -> None:
     socket = node.inputs.get("Normal")
     if socket is not None and socket.links:
-        source = socket.links[0].from_node
-        if source.type == "BUMP":
-            n.miss("bump (a normal map is needed)")
-            return
-        value = n.socket(socket, "vector3")
-        if value.constant is None:
+        value = normal_of(n, socket)
+        if value is not None:
             found["geometry_normal"] = value
 
 
