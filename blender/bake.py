@@ -27,32 +27,43 @@ def world(into: Translation, made: Any) -> str | None:
     original = made.original if made.is_evaluated else made
     blend = into.file("world.blend")
     bpy.data.libraries.write(blend, {original}, path_remap="ABSOLUTE", fake_user=True)
-    key = f"{original.name}\n{_content(original)}\n{into.time if _is_animated(original) else ''}"
+    key = f"{original.name}\n{content(original)}\n{into.time if is_animated(original) else ''}"
     name = f"world-{hashlib.sha256(key.encode()).hexdigest()[:16]}.exr"
     file = into.file(name)
     if os.path.exists(file):
         return file
-    script = os.path.join(os.path.dirname(os.path.abspath(__file__)), "bake_world.py")
-    words = ["--", blend, original.name, file, str(WIDTH), repr(into.time)]
+    words = [blend, original.name, file, str(WIDTH), repr(into.time)]
+    is_done = run_blender("bake_world.py", words)
+    return file if is_done and os.path.exists(file) else None
+
+
+def run_blender(script: str, words: list[str]) -> bool:
+    """Runs a script of this folder in another Blender; returns whether it succeeded."""
+    import bpy
+
+    path = os.path.join(os.path.dirname(os.path.abspath(__file__)), script)
     if bpy.app.binary_path:
         program = [bpy.app.binary_path, "-b", "--factory-startup", "--disable-autoexec"]
-        command = [*program, "--python-exit-code", "1", "--python", script, *words]
+        command = [*program, "--python-exit-code", "1", "--python", path, "--", *words]
     else:
-        command = [sys.executable, "-I", script, *words]
+        command = [sys.executable, "-I", path, "--", *words]
     try:
         done = subprocess.run(command, capture_output=True, timeout=LIMIT_S, check=False)
     except (OSError, subprocess.TimeoutExpired):
-        return None
-    return file if done.returncode == 0 and os.path.exists(file) else None
+        return False
+    if done.returncode != 0:
+        print("wavecomb: bake:", done.stderr.decode(errors="replace")[-2000:], flush=True)
+    return done.returncode == 0
 
 
-def _is_animated(made: Any) -> bool:
+def is_animated(made: Any) -> bool:
+    """Returns whether a world or material, or its nodes, have keyframes or drivers."""
     tree = made.node_tree
-    return made.animation_data is not None or (tree and tree.animation_data is not None)
+    return made.animation_data is not None or bool(tree and tree.animation_data)
 
 
-def _content(made: Any) -> str:
-    """Returns a text that describes all nodes and values of the node tree of a world."""
+def content(made: Any) -> str:
+    """Returns a text that describes all nodes and values of a node tree."""
     lines: list[str] = []
     _describe(made.node_tree, lines)
     return "\n".join(lines)

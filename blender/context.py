@@ -29,6 +29,8 @@ class Translation:
         options: Additional options of ``wavecomb render``.
         samples: World matrices of moving objects over the shutter interval, by object name.
         instancing: Whether the exporter wrote instances as prototypes.
+        instanced: Names of materials of instances.
+        bakes: Sockets of materials to bake (``textures``).
     """
 
     depsgraph: Any
@@ -39,6 +41,8 @@ class Translation:
     options: list[str] = field(default_factory=list)
     samples: dict[str, dict[float, Any]] = field(default_factory=dict)
     instancing: bool = False
+    instanced: set[str] = field(default_factory=set)
+    bakes: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def scene(self) -> Any:

@@ -61,12 +61,18 @@ class WavecombRenderEngine(bpy.types.RenderEngine):
         try:
             self._render(depsgraph)
         except FAILURES as error:
-            line = " ".join(str(error).split())
-            self.error_set(f"Wavecomb: {line}")
-            self.report({"ERROR"}, f"Wavecomb: {line}")
+            self.report({"ERROR"}, f"Wavecomb: {' '.join(str(error).split())}")
 
     def _render(self, depsgraph: Any) -> None:
         scene, layer = depsgraph.scene, depsgraph.view_layer_eval
+        render = Render(settings.program())
+        try:
+            self._render_by(render, depsgraph, scene, layer)
+        finally:
+            render.kill()
+
+    def _render_by(self, render: Render, depsgraph: Any, scene: Any, layer: Any) -> None:
+        """Exports the scene and renders it by a process that waits for it."""
         session = self._session(scene, layer)
         self.update_stats("", "Exporting")
         whole, region = image_size(scene)
@@ -79,17 +85,13 @@ class WavecombRenderEngine(bpy.types.RenderEngine):
         preview = os.path.join(session.folder, "preview.exr")
         self.update_stats("", "Starting Wavecomb")
         stage = [exported.stage, "-o", output, "--preview", preview, "--preview-every", "2"]
-        if self.is_preview or bpy.app.background:
+        if not shows_progress(self):
             stage = stage[:3]
-        render = Render(settings.program(), [*stage, *arguments])
+        render.begin([*stage, *arguments])
         denoise = scene.wavecomb.denoise
         size = whole if region is None else (region[2] - region[0], region[3] - region[1])
-        try:
-            self._watch(render, lambda: self._show(preview, layer, size))
-            warnings = render.finish()
-        finally:
-            render.kill()
-        for line in warnings:
+        self._watch(render, lambda: self._show(preview, layer, size))
+        for line in render.finish():
             self.report({"INFO"}, f"Wavecomb: {line}")
             print(f"wavecomb: {line}", flush=True)
         if os.path.exists(output):
@@ -173,6 +175,11 @@ class WavecombRenderEngine(bpy.types.RenderEngine):
 
 def _set(target: Any, values: np.ndarray) -> None:
     target.rect.foreach_set(values.ravel())
+
+
+def shows_progress(engine: Any) -> bool:
+    """Returns whether somebody sees the image of a render in progress."""
+    return not (engine.is_preview or bpy.app.background)
 
 
 def image_size(scene: Any) -> tuple[tuple[int, int], tuple[int, int, int, int] | None]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import struct
 import time
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,6 +18,7 @@ from .lights import write_lights
 from .materials import write_materials
 from .motion import Sampled, write_motion
 from .report import Report
+from .textures import write_textures
 from .usda import Asset, Layer, text_of
 from .visibility import write_visibility
 from .world import write_world
@@ -117,6 +119,27 @@ def export_geometry(file: str, scene: Any, view_layer: Any) -> None:
         raise ExportError(f"Blender's USD exporter failed: {str(error).strip()}") from error
     if "FINISHED" not in done or not os.path.exists(file):
         raise ExportError("Blender's USD exporter wrote no file")
+    if not _is_complete(file):
+        raise ExportError(f"Blender's USD exporter wrote an incomplete {file}: is the disk full?")
+
+
+def _is_complete(file: str) -> bool:
+    """Returns whether a binary USD file has its table of contents, which is written last.
+
+    The exporter reports success even if the disk is full.
+    """
+    size = os.path.getsize(file)
+    with open(file, "rb") as stream:
+        head = stream.read(24)
+        if len(head) < 24 or not head.startswith(b"PXR-USDC"):
+            return False
+        (at,) = struct.unpack("<q", head[16:24])
+        if not 24 <= at <= size - 8:
+            return False
+        stream.seek(at)
+        (count,) = struct.unpack("<Q", stream.read(8))
+    # A section has a name of 16 bytes, a start and a size.
+    return bool(size >= at + 8 + 32 * count)
 
 
 def _has_prototypes() -> bool:
@@ -154,10 +177,14 @@ def export_stage(
     write_lights(into)
     write_world(into)
     write_materials(into)
+    write_textures(into)
     write_curves(into)
     write_visibility(into)
-    into.layer.save(into.file(CORRECTION))
-    _write_root(into, scene)
+    try:
+        into.layer.save(into.file(CORRECTION))
+        _write_root(into, scene)
+    except OSError as error:
+        raise ExportError(f"{session.folder} cannot be written: {error.strerror}") from error
     total = time.perf_counter() - start
     return Exported(into.file(STAGE), into.options, into.report, exporter, total - exporter)
 

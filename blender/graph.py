@@ -90,6 +90,17 @@ class Graph:
         else:
             prim.connect(f"{USD_TYPES[value.kind]} inputs:{key}", value.path)
 
+    def image(self, kind: str, file: str, space: str, where: Value, wrap: str) -> Value:
+        """Adds an image of a colour space, looked up at texture coordinates."""
+        made = self.node(
+            f"image_{kind}", kind, file=Asset(file), texcoord=where, uaddressmode=wrap,
+            vaddressmode=wrap,
+        )  # fmt: skip
+        prim = self.layer.over(made.path.rpartition(".")[0])
+        line = next(i for i, text in enumerate(prim.lines) if text.startswith("asset inputs:file"))
+        prim.lines[line] += f' (colorSpace = "{space}")'
+        return made
+
     def op(self, name: str, a: Value, b: Value | None = None) -> Value:
         """Applies an operation of one or two operands of the same type, such as "multiply"."""
         if b is None:

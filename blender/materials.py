@@ -10,6 +10,7 @@ from .graph import Graph, Value, colour, number
 from .hair import write_hair
 from .neutral import BLACK, NEUTRAL, Surface, is_zero
 from .nodes import Nodes
+from .normals import write_displacement
 from .surfaces import surface_of
 from .volumes import write_volume
 
@@ -37,6 +38,8 @@ def _used(into: Translation) -> list[Any]:
         for slot in instance.object.material_slots:
             if slot.material is not None:
                 found[slot.material.name] = slot.material
+                if instance.is_instance:
+                    into.instanced.add(slot.material.name)
         data = instance.object.data
         for material in getattr(data, "materials", None) or ():
             if material is not None:
@@ -68,9 +71,8 @@ def write_material(into: Translation, material: Any, path: str) -> None:
     if surface is None and not has_volume:
         surface = dict(NEUTRAL, base_weight=number(0.0))
     if surface is not None:
+        write_displacement(nodes, material, output.inputs["Displacement"], surface)
         _write(into, path, surface, graph)
-    if output.inputs["Displacement"].links:
-        into.report.miss("displacement", material.name)
 
 
 def _write(into: Translation, path: str, surface: Surface, graph: Graph | None) -> None:

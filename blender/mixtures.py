@@ -73,8 +73,12 @@ def _separate_colours(a: Surface, b: Surface) -> None:
                 number(1.0),
                 one["subsurface_color"],
             )
-            for key in ("specular_roughness", "specular_ior", "specular_color"):
-                if is_zero(one["specular_weight"]):
+            if is_zero(one["specular_weight"]):
+                # An interface of index 1 reflects nothing, and the weight of the metal's
+                # reflection, which OpenPBR shares with it, remains 1.
+                one["specular_weight"] = other["specular_weight"]
+                one["specular_ior"] = other["specular_ior"] = number(1.0)
+                for key in ("specular_roughness", "specular_color"):
                     one[key] = other[key]
             return
 

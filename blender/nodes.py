@@ -32,6 +32,8 @@ class Nodes:
         self.into, self.graph, self.owner = into, graph, owner
         self._known: dict[tuple[Any, ...], Value] = {}
         self._groups: list[Any] = []
+        self._shader_depth = 0
+        self._missed: list[str] = []
 
     def read(self, node: Any, name: str | int, kind: str | None = None) -> Value:
         """Returns the value of an input of a node."""
@@ -65,18 +67,54 @@ class Nodes:
         if node.type == "REROUTE":
             return self.socket(node.inputs[0], KINDS.get(node.inputs[0].type, "color3"))
         if node.type == "GROUP":
-            return self._group(node, socket)
+            return self._group_or_baked(node, socket)
         if node.type == "GROUP_INPUT":
             return self._group_input(socket)
         key = (*(id(group) for group in self._groups), node.name, socket.identifier)
         if key not in self._known:
             made: Callable[[Nodes, Any, Any], Value | None] | None = TYPES.get(node.type)
             value = made(self, node, socket) if made is not None else None
+            value = self._baked(node, socket) if value is None else value
             if value is None:
-                self.miss(f"node {node.bl_label} (the input's own value instead)")
                 return None
             self._known[key] = value
         return self._known[key]
+
+    def _baked(self, node: Any, socket: Any) -> Value | None:
+        """Returns a texture instead of a node that has no translation; None after a message."""
+        text = f"node {node.bl_label} (the input's own value instead)"
+        if len(self._groups) > self._shader_depth:
+            self._missed.append(text)  # The group around it may be baked.
+            return None
+        found = None if self._groups else self.texture(node, socket, "value")
+        if found is None:
+            self.miss(text)
+            return None
+        kind = KINDS.get(socket.type, "color3")
+        return self.graph.component(found, 0) if kind == "float" else self.graph.to(kind, found)
+
+    def _group_or_baked(self, node: Any, socket: Any) -> Value | None:
+        value = self._group(node, socket)
+        if len(self._groups) > self._shader_depth or not self._missed:
+            return value
+        lines, self._missed = self._missed, []
+        found = None if self._groups else self.texture(node, socket, "value")
+        if found is not None:
+            kind = KINDS.get(socket.type, "color3")
+            return self.graph.component(found, 0) if kind == "float" else found
+        for line in lines:
+            self.miss(line)
+        return value
+
+    def texture(self, node: Any, socket: Any, kind: str) -> Value | None:
+        """Returns the texture of an output that will be baked; None if it cannot be."""
+        from .textures import LAYER, request
+
+        file = request(self.into, self.owner, node, socket, kind)
+        if file is None:
+            return None
+        where = self.graph.node("geompropvalue_vector2", "vector2", geomprop=LAYER)
+        return self.graph.image("color3", file, "lin_rec709", where, "clamp")
 
     def _bypassed(self, node: Any, socket: Any) -> Value | None:
         for link in node.internal_links:
@@ -132,9 +170,15 @@ class Nodes:
             return self.shader(inner)
         return node, list(self._groups)
 
+    @property
+    def is_in_group(self) -> bool:
+        """Whether the nodes that are read are in a group."""
+        return bool(self._groups)
+
     def within(self, groups: list[Any]) -> None:
         """Sets the enclosing groups of the nodes that are translated next."""
         self._groups = list(groups)
+        self._shader_depth = len(groups)
 
     def miss(self, feature: str) -> None:
         """Reports a feature of the material that has no effect."""

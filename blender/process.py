@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import queue
@@ -14,6 +15,28 @@ import threading
 from collections.abc import Sequence
 from typing import Any
 
+_WAIT = """
+import importlib, json, os, sys
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+for name in sys.argv[1:]:
+    try:
+        importlib.import_module(name)
+    except ImportError:
+        pass
+line = sys.stdin.readline()
+if not line:
+    sys.exit(0)
+os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+from wavecomb.cli import main
+sys.argv[:] = ["wavecomb", *json.loads(line)]
+main(prog_name="wavecomb")
+"""
+"""Program that loads modules, then waits for a line with the arguments."""
+_MODULES = (
+    "wavecomb.cli.render", "wavecomb.cli.job", "wavecomb.usd.stage", "wavecomb.run.callbacks",
+    "wavecomb.image.files.exr", "pxr.Usd", "pxr.UsdGeom", "pxr.UsdShade", "pxr.UsdLux",
+    "pxr.UsdRender", "pxr.UsdSkel", "pxr.UsdVol",
+)  # fmt: skip
 _FOUND: dict[str, tuple[str, str]] = {}
 
 
@@ -73,21 +96,21 @@ def environment() -> dict[str, str]:
 
 
 class Render:
-    """A running ``wavecomb render``."""
+    """A process that loads Wavecomb while the scene is exported, and then renders."""
 
-    def __init__(self, program: str, arguments: Sequence[str]) -> None:
-        """Starts the render, which ends when this process ends.
+    def __init__(self, program: str) -> None:
+        """Starts the process, which ends when this process ends.
 
         Raises:
             WavecombError: The render could not be started.
         """
         python, boot = locate(program)
-        words = [python, "-I", boot, f"--parent={os.getpid()}", "wavecomb", "render", *arguments]
+        words = [python, "-I", boot, f"--parent={os.getpid()}", "-c", _WAIT, *_MODULES]
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115
         try:
             self._process = subprocess.Popen(
-                [*words, "--progress", "json"],
-                stdin=subprocess.DEVNULL,
+                words,
+                stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._errors,
                 env=environment(),
@@ -98,6 +121,16 @@ class Render:
         self._events: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
+
+    def begin(self, arguments: Sequence[str]) -> None:
+        """Starts ``wavecomb render`` with these arguments.
+
+        The process is already separate from Blender, so that it needs no child of its own.
+        """
+        words = ["render", *arguments, "--progress", "json", "--isolate", "off"]
+        assert self._process.stdin is not None
+        with contextlib.suppress(BrokenPipeError), self._process.stdin as stream:
+            stream.write(json.dumps(words).encode() + b"\n")
 
     def _read(self) -> None:
         assert self._process.stdout is not None
@@ -153,4 +186,5 @@ class Render:
             name = signal.Signals(-code).name
             raise WavecombError(f"Wavecomb was ended by {name}; Blender and the scene are intact")
         errors = [line for line in lines if line.startswith(("error:", "Error:"))]
-        raise WavecombError((errors or lines or [f"Wavecomb ended with code {code}"])[-1])
+        last = (errors or lines or [f"Wavecomb ended with code {code}"])[-1]
+        raise WavecombError(last.removeprefix("error: "))

@@ -6,10 +6,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from .graph import Value, colour, number, vector
+from .graph import Value, colour, number
 from .mixtures import mixed
 from .neutral import BLACK, NEUTRAL, Surface, is_zero
 from .nodes import Nodes
+from .normals import normal_of
+from .subsurface import scattering, subsurface
 
 
 def surface_of(n: Nodes, socket: Any) -> Surface | None:
@@ -36,12 +38,8 @@ def surface_of(n: Nodes, socket: Any) -> Surface | None:
 def _normal(n: Nodes, node: Any, found: Surface) -> None:
     socket = node.inputs.get("Normal")
     if socket is not None and socket.links:
-        source = socket.links[0].from_node
-        if source.type == "BUMP":
-            n.miss("bump (a normal map is needed)")
-            return
-        value = n.socket(socket, "vector3")
-        if value.constant is None:
+        value = normal_of(n, socket)
+        if value is not None:
             found["geometry_normal"] = value
 
 
@@ -60,7 +58,7 @@ def _principled(n: Nodes, node: Any) -> Surface:
     _specular(n, node, found)
     _anisotropy(n, node, found)
     _transmission(n, node, found, base)
-    _subsurface(n, node, found, base)
+    subsurface(n, node, found, base)
     _coat(n, node, found)
     _sheen(n, node, found)
     _film(n, node, found)
@@ -128,24 +126,6 @@ def _root(n: Nodes, value: Value) -> Value:
     return n.graph.node("power_color3FA", "color3", in1=value, in2=number(0.5))
 
 
-def _subsurface(n: Nodes, node: Any, found: Surface, base: Value) -> None:
-    weight = n.graph.clamped(n.read(node, "Subsurface Weight", "float"))
-    found["subsurface_weight"] = weight
-    if is_zero(weight):
-        return
-    found["subsurface_color"] = base
-    radius = n.read(node, "Subsurface Radius", "vector3")
-    scale = n.read(node, "Subsurface Scale", "float")
-    if radius.constant is None or scale.constant is None:
-        n.miss("subsurface radius by a node")
-        radius, scale = vector((1.0, 0.2, 0.1)), number(0.05)
-    found["subsurface_radius"] = scale
-    found["subsurface_radius_scale"] = colour(radius.constant)
-    found["subsurface_scatter_anisotropy"] = n.read(node, "Subsurface Anisotropy", "float")
-    if node.subsurface_method == "BURLEY":
-        n.approximate("subsurface method Christensen-Burley (a random walk instead)")
-
-
 def _coat(n: Nodes, node: Any, found: Surface) -> None:
     found["coat_weight"] = n.read(node, "Coat Weight", "float")
     if is_zero(found["coat_weight"]):
@@ -153,8 +133,33 @@ def _coat(n: Nodes, node: Any, found: Surface) -> None:
     found["coat_roughness"] = n.read(node, "Coat Roughness", "float")
     found["coat_ior"] = n.read(node, "Coat IOR", "float")
     found["coat_color"] = n.read(node, "Coat Tint", "color3")
+    _keep_base(n, node, found)
     if node.inputs["Coat Normal"].links:
         n.miss("normal of the coat")
+
+
+def _keep_base(n: Nodes, node: Any, found: Surface) -> None:
+    """Compensates for the coat's effect on the base in OpenPBR, which Cycles does not have.
+
+    OpenPBR refracts from the coat into the base, by the ratio of their indices, and a rough coat
+    broadens the highlight of the base.
+    """
+    keys = ("coat_weight", "coat_ior", "coat_roughness", "specular_ior", "specular_roughness")
+    values = [found[key].constant for key in keys]
+    weight, ior, rough = (n.graph.clamped(found["coat_weight"]), found["coat_ior"], values[2])
+    if not is_zero(found["transmission_weight"]):
+        n.approximate("coat over a transmissive base (its index is relative to the coat)")
+    elif values[0] is not None and values[1] is not None and values[3] is not None:
+        relative = 1.0 + min(values[0], 1.0) * (values[1] - 1.0)
+        found["specular_ior"] = number(values[3] * relative)
+    else:
+        one = number(1.0)
+        excess = n.graph.op("subtract", ior, one)
+        relative = n.graph.op("add", one, n.graph.op("multiply", weight, excess))
+        found["specular_ior"] = n.graph.op("multiply", found["specular_ior"], relative)
+    if values[0] == 1.0 and rough is not None and values[4] is not None:
+        sharp = max(values[4] ** 4 - 2.0 * rough**4, 0.0) ** 0.25
+        found["specular_roughness"] = number(sharp)
 
 
 def _sheen(n: Nodes, node: Any, found: Surface) -> None:
@@ -252,8 +257,12 @@ def _transparent(n: Nodes, node: Any) -> Surface:
         found["base_color"], found["base_weight"] = BLACK, number(1.0)
         found["geometry_opacity"] = number(1.0 - tint.constant[0])
         return found
-    n.approximate("coloured Transparent BSDF (its shadow is opaque)")
-    # The result is a thin wall without reflection that transmits the tint.
+    n.approximate("coloured Transparent BSDF (its shadow has the tint's smallest component)")
+    # A thin wall without an interface transmits what exceeds the smallest component.
+    least = min(max(min(tint.constant), 0.0), 1.0) if tint.constant is not None else 0.0
+    if tint.constant is not None and least < 1.0:
+        tint = colour([(c - least) / (1.0 - least) for c in tint.constant])
+        found["geometry_opacity"] = number(1.0 - least)
     found |= {"transmission_weight": number(1.0), "transmission_color": tint}
     found |= {"specular_weight": number(0.0), "specular_roughness": number(0.0)}
     found["geometry_thin_walled"] = number(1.0)
@@ -274,14 +283,8 @@ def _emission(n: Nodes, node: Any) -> Surface:
 
 
 def _scattering(n: Nodes, node: Any) -> Surface:
-    tint = n.read(node, "Color", "color3")
-    found = dict(NEUTRAL, base_color=tint, subsurface_weight=number(1.0), subsurface_color=tint)
-    radius, scale = n.read(node, "Radius", "vector3"), n.read(node, "Scale", "float")
-    if radius.constant is not None and scale.constant is not None:
-        found["subsurface_radius"] = scale
-        found["subsurface_radius_scale"] = colour(radius.constant)
-    if "Anisotropy" in node.inputs:
-        found["subsurface_scatter_anisotropy"] = n.read(node, "Anisotropy", "float")
+    found = dict(NEUTRAL, base_color=n.read(node, "Color", "color3"))
+    scattering(n, node, found)
     _normal(n, node, found)
     return found
 

@@ -47,11 +47,11 @@ def same(folder: Path) -> None:
     start = engine.Render
 
     class Recorded(start):  # type: ignore[misc,valid-type]
-        def __init__(self, program: str, arguments: list[str]) -> None:
+        def begin(self, arguments: list[str]) -> None:
             stage = Path(arguments[0]).parent
             shutil.copytree(stage, folder / "stage")
             kept["arguments"] = arguments
-            super().__init__(program, arguments)
+            super().begin(arguments)
 
     engine.Render = Recorded
     image, _ = harness.render(scene, "WAVECOMB", 1)
@@ -106,6 +106,26 @@ def errors(folder: Path) -> None:
     emit(alive=_message(scene) == "")
 
 
+def full(folder: Path) -> None:
+    """A full disk: files of the stage, then the image, exceed the largest size of a file."""
+    import resource
+
+    scene, thing = _ball(1)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    thing.modifiers.new("subdivision", "SUBSURF").render_levels = 2
+    for name, size in (("stage", 100_000), ("correction", 4_000), ("image", 10_000_000)):
+        if name == "image":
+            scene.render.resolution_x = scene.render.resolution_y = 1200
+        if name == "correction":
+            thing.hide_render = True
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+        emit(**{name: _message(scene)})
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    scene.render.resolution_x, scene.render.resolution_y = harness.SIZE
+    thing.hide_render = False
+    emit(alive=_message(scene) == "")
+
+
 def _direct(engine: Any, scene: Any) -> str:
     """Returns the message for a scene without camera, which Blender refuses before the engine."""
     found = _message(scene)
@@ -115,15 +135,21 @@ def _direct(engine: Any, scene: Any) -> str:
 
 
 def animation(folder: Path) -> None:
-    """Three frames of a moving object with motion blur."""
+    """24 frames with motion blur of a moving object, a deforming mesh, a light and the camera."""
     import bpy
 
-    scene, thing = _ball(8)
-    for frame, x in ((1, -1.0), (5, 1.0)):
+    scene, thing = _ball(4)
+    scene.render.resolution_x, scene.render.resolution_y = 48, 36
+    _deforming()
+    for one in (scene.camera, next(o for o in scene.objects if o.type == "LIGHT")):
+        for frame in (1, 27):
+            one.location.x += 0.2
+            one.keyframe_insert("location", frame=frame)
+    for frame, x in ((1, -1.0), (27, 1.0)):
         thing.location.x = x
         thing.keyframe_insert("location", frame=frame)
     scene.render.use_motion_blur = True
-    scene.frame_start, scene.frame_end = 2, 4
+    scene.frame_start, scene.frame_end = 2, 25
     settings = scene.render.image_settings
     settings.file_format, settings.color_depth = "OPEN_EXR", "32"
     scene.render.filepath = str(folder / "frame-")
@@ -138,15 +164,27 @@ def animation(folder: Path) -> None:
     export.export_geometry = counted
     scene.render.engine = "WAVECOMB"
     bpy.ops.render.render(animation=True)
-    emit(exports=count[0])
-    scene.frame_set(4)
+    emit(exports=count[0], frames=len(list(folder.glob("frame-*.exr"))))
+    scene.frame_set(25)
     alone, _ = harness.render(scene, "WAVECOMB", 0)
-    read = bpy.data.images.load(str(folder / "frame-0004.exr"))
+    read = bpy.data.images.load(str(folder / "frame-0025.exr"))
     read.colorspace_settings.name = "Non-Color"
     pixels = np.empty(4 * read.size[0] * read.size[1], np.float32)
     read.pixels.foreach_get(pixels)
     last = pixels.reshape(alone.shape)[::-1]
     emit(difference=float(np.abs(last[..., :3] - alone[..., :3]).max()))
+
+
+def _deforming() -> None:
+    """Adds a cube whose shape keys move over the frames."""
+    thing = build.cube(build.principled("b", base_color=(0.2, 0.5, 0.2)), at=(0, 1.5, 0.5), size=1)
+    thing.shape_key_add(name="rest")
+    key = thing.shape_key_add(name="wide")
+    for point in key.data:
+        point.co.x *= 2.0
+    for frame, value in ((1, 0.0), (27, 1.0)):
+        key.value = value
+        key.keyframe_insert("value", frame=frame)
 
 
 def blend(folder: Path) -> None:
@@ -162,5 +200,5 @@ def blend(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    CASES = {"same": same, "errors": errors, "animation": animation, "blend": blend}
+    CASES = {"same": same, "errors": errors, "full": full, "animation": animation, "blend": blend}
     CASES[sys.argv[1]](Path(sys.argv[2]))

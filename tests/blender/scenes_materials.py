@@ -123,13 +123,11 @@ def principled_transmission_half() -> None:
     _ball(transmission_weight=0.5, roughness=0.3, base_color=(0.8, 0.3, 0.2))
 
 
-SHARP = "sharp highlights and caustics of a light without shape converge slowly"
-
-
-@scene("Principled", 0.97, 1.01, 0.1, SHARP)
+@scene("Principled")
 def principled_coat() -> None:
     """A clear coat."""
     _ball(base_color=(0.6, 0.1, 0.1), roughness=0.6, coat_weight=1.0, coat_roughness=0.05)
+    show_lights()
 
 
 @scene("Principled")
@@ -168,10 +166,10 @@ def principled_alpha() -> None:
     _ball(base_color=(0.7, 0.3, 0.2), alpha=0.4)
 
 
-BOUNDARY = "another model of light at the boundary of the medium"
+BOUNDARY = "half of the light enters by refraction in Cycles; the means agree"
 
 
-@scene("Principled", 0.97, 1.03, 0.35, BOUNDARY, spp=256)
+@scene("Principled", outside=0.1, why=BOUNDARY, spp=256)
 def principled_subsurface() -> None:
     """Subsurface scattering with a short free path."""
     _ball(
@@ -180,7 +178,7 @@ def principled_subsurface() -> None:
     )  # fmt: skip
 
 
-@scene("Principled", 0.97, 1.04, 0.35, BOUNDARY, spp=256)
+@scene("Principled", outside=0.1, why=BOUNDARY, spp=256)
 def principled_subsurface_deep() -> None:
     """Subsurface scattering with a long free path."""
     _ball(
@@ -240,10 +238,17 @@ def shader_translucent() -> None:
     _node("ShaderNodeBsdfTranslucent", Color=(0.7, 0.7, 0.3))
 
 
-@scene("Shaders", 0.94, 1.01, 0.3, "the shadow of a coloured transparent shader is opaque")
+@scene("Shaders", 0.96, 1.0, 0.2, "shadows of a hidden light get the tint's smallest component")
 def shader_transparent() -> None:
-    """Tinted Transparent BSDF."""
+    """Tinted Transparent BSDF, lit by a light that the camera does not see."""
     _node("ShaderNodeBsdfTransparent", Color=(0.4, 0.7, 0.9))
+
+
+@scene("Shaders", spp=256)
+def shader_transparent_visible_light() -> None:
+    """Tinted Transparent BSDF, lit by a light with a shape."""
+    _node("ShaderNodeBsdfTransparent", Color=(0.4, 0.7, 0.9))
+    show_lights()
 
 
 def _mixture(first: str, second: str, factor: float, a: Any = None, b: Any = None) -> None:
@@ -257,7 +262,7 @@ def _mixture(first: str, second: str, factor: float, a: Any = None, b: Any = Non
     sphere(material)
 
 
-@scene("Shaders", 0.92, 1.02, 0.35, SHARP)
+@scene("Shaders")
 def mix_diffuse_glossy() -> None:
     """Mix of a diffuse and a glossy shader with their own colours."""
     _mixture(

@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 from build import (
     add,
+    cube,
     light,
     picture,
     principled,
@@ -67,9 +70,7 @@ def texture_alpha() -> None:
     wall(material)
 
 
-@scene("Textures", 0.97, 1.03, 0.35, "not explained yet")
-def texture_normal_map() -> None:
-    """A normal map."""
+def _normal_mapped() -> Any:
     studio()
     material = principled(base_color=(0.6, 0.6, 0.6), roughness=0.4)
     node = add(material, "ShaderNodeTexImage", image=picture("normals", data=True))
@@ -77,6 +78,19 @@ def texture_normal_map() -> None:
     wire(material, node.outputs["Color"], convert.inputs["Color"])
     wire(material, convert.outputs["Normal"], shader_of(material).inputs["Normal"])
     wall(material)
+    return material
+
+
+@scene("Textures", 0.99, 1.03, 0.35, "Bump Map Correction of Cycles darkens tilted normals")
+def texture_normal_map() -> None:
+    """A normal map."""
+    _normal_mapped()
+
+
+@scene("Textures")
+def texture_normal_map_plain() -> None:
+    """A normal map without Bump Map Correction."""
+    _normal_mapped().cycles.use_bump_map_correction = False
 
 
 @scene("Textures", outside=0.2, why="sharp highlights converge slowly")
@@ -181,3 +195,90 @@ def texture_vertex_colour() -> None:
         x, y, z = vertex.co
         value.color = (0.5 + 0.5 * x, 0.5 + 0.5 * y, 0.5 + 0.5 * z, 1.0)
     light("POINT", 100.0, at=(-3, -3, 2))
+
+
+# ---- nodes that are baked ------------------------------------------------------------------------
+
+
+def _procedural(kind: str, output: str = "Color", **inputs: Any) -> Any:
+    studio()
+    material = principled(roughness=1.0, specular_ior_level=0.0)
+    node = put(add(material, kind), **inputs)
+    wire(material, node.outputs[output], shader_of(material).inputs["Base Color"])
+    sphere(material)
+    return material
+
+
+@scene("Baked")
+def baked_noise() -> None:
+    """A noise texture in generated coordinates."""
+    _procedural("ShaderNodeTexNoise", Scale=4.0)
+
+
+@scene("Baked")
+def baked_voronoi() -> None:
+    """A Voronoi texture's distance."""
+    _procedural("ShaderNodeTexVoronoi", output="Distance", Scale=4.0)
+
+
+@scene("Baked")
+def baked_brick() -> None:
+    """Bricks on a wall, by its texture coordinates."""
+    studio()
+    material = principled(roughness=1.0, specular_ior_level=0.0)
+    node = put(add(material, "ShaderNodeTexBrick"), Scale=4.0, Color1=(0.6, 0.2, 0.1))
+    where = add(material, "ShaderNodeTexCoord")
+    wire(material, where.outputs["UV"], node.inputs["Vector"])
+    wire(material, node.outputs["Color"], shader_of(material).inputs["Base Color"])
+    wall(material)
+
+
+@scene("Baked")
+def baked_magic() -> None:
+    """A magic texture, and a distorted wave that drives roughness."""
+    material = _procedural("ShaderNodeTexMagic", Scale=3.0)
+    wave = put(add(material, "ShaderNodeTexWave"), Scale=2.0, Distortion=4.0)
+    wire(material, wave.outputs["Fac"], shader_of(material).inputs["Roughness"])
+    shader_of(material).inputs["Specular IOR Level"].default_value = 0.5
+
+
+@scene("Baked")
+def baked_two_objects() -> None:
+    """A noise through a colour ramp on two objects that share a material."""
+    studio()
+    material = principled(roughness=1.0, specular_ior_level=0.0)
+    node = put(add(material, "ShaderNodeTexNoise"), Scale=3.0)
+    ramp = add(material, "ShaderNodeValToRGB")
+    ramp.color_ramp.elements[0].color = (0.7, 0.05, 0.02, 1)
+    ramp.color_ramp.elements[1].color = (0.1, 0.6, 0.8, 1)
+    wire(material, node.outputs[0], ramp.inputs["Fac"])
+    wire(material, ramp.outputs["Color"], shader_of(material).inputs["Base Color"])
+    sphere(material, at=(-1.0, 0, 0.8), radius=0.8)
+    cube(material, at=(1.2, 0.5, 0.7), size=1.4)
+
+
+@scene("Baked")
+def baked_bump() -> None:
+    """A bump by a noise texture."""
+    studio()
+    material = principled(base_color=(0.6, 0.6, 0.6), roughness=0.5)
+    material.cycles.use_bump_map_correction = False
+    noise = put(add(material, "ShaderNodeTexNoise"), Scale=5.0, Detail=0.0)
+    bump = put(add(material, "ShaderNodeBump"), Strength=0.6, Distance=0.3)
+    wire(material, noise.outputs[0], bump.inputs["Height"])
+    wire(material, bump.outputs["Normal"], shader_of(material).inputs["Normal"])
+    sphere(material)
+
+
+@scene("Baked")
+def baked_displacement() -> None:
+    """A displacement that Blender renders as a bump."""
+    studio()
+    material = principled(base_color=(0.5, 0.6, 0.5), roughness=0.6)
+    material.cycles.use_bump_map_correction = False
+    noise = put(add(material, "ShaderNodeTexNoise"), Scale=5.0, Detail=0.0)
+    node = put(add(material, "ShaderNodeDisplacement"), Scale=0.15)
+    wire(material, noise.outputs[0], node.inputs["Height"])
+    output = material.node_tree.get_output_node("CYCLES")
+    wire(material, node.outputs[0], output.inputs["Displacement"])
+    wall(material)

@@ -40,9 +40,21 @@ def test_errors_are_one_line(blender: Run, tmp_path: Path) -> None:
     assert row["alive"] is True
 
 
+def test_full_disk_is_one_line(blender: Run, tmp_path: Path) -> None:
+    """A disk without room for geometry, correction or image: one line each; Blender lives on."""
+    row = _rows(blender(str(HERE / "engine_cases.py"), "full", str(tmp_path)))
+    for name in ("stage", "correction", "image"):
+        lines = [line for line in str(row[name]).splitlines() if line.startswith("Error: ")]
+        assert len(lines) == 1, row[name]
+        assert "Wavecomb: " in lines[0], row[name]
+        assert "too large" in lines[0] or "disk" in lines[0], row[name]
+    assert row["alive"] is True
+
+
 def test_animation_exports_geometry_once(blender: Run, tmp_path: Path) -> None:
     """Frames with motion blur reuse the exported geometry; each equals a frame rendered alone."""
     row = _rows(blender(str(HERE / "engine_cases.py"), "animation", str(tmp_path)))
+    assert row["frames"] == 24
     assert row["exports"] == 1
     assert float(str(row["difference"])) < 1e-6
 

@@ -83,6 +83,7 @@ class PreviewSink(Sink):
         working_space: str = "rec709",
     ) -> None:
         super().__init__(path, every)
+        self._next = 0.0  # The first preview is due with the first samples.
         self._exposure = exposure
         self._tone_map = tone_map
         self._working = working_space
