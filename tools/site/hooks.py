@@ -32,6 +32,7 @@ DOXYGEN = {
 STYLE = """
 .md-typeset table:not([class]) { font-size: .68rem; }
 .md-typeset img { border-radius: 2px; }
+.md-typeset img[src$=".svg"] { background: #f7f7f4; }
 .md-typeset td:first-child code { white-space: nowrap; }
 .md-typeset td:not(:first-child) code { white-space: normal; overflow-wrap: break-word; }
 .md-grid { max-width: 68rem; }
