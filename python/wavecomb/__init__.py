@@ -8,11 +8,31 @@
 Names are imported on first use, so that ``import wavecomb`` itself is fast.
 """
 
-from __future__ import annotations
+import _signal  # type: ignore[import-not-found]  # built in, so that its import takes no time
+import sys
 
-from typing import TYPE_CHECKING, Any
 
-from wavecomb import isa
+def _is_command() -> bool:
+    """Returns whether this program is the command ``wavecomb``, and not a user of the library.
+
+    ``sys.argv`` is ``["-m", ...]`` while ``python -m`` imports a package, and a process of
+    ``multiprocessing`` copies it from its parent.
+    """
+    words, given = sys.orig_argv, sys.argv
+    return 0 < len(given) <= len(words) and words[-len(given)].rpartition("/")[2] == "wavecomb"
+
+
+# Ctrl-C ends the command without a traceback until the command installs its handlers
+# (wavecomb.run.progress.keep_interrupts). The import of `typing` alone takes milliseconds.
+if _is_command() and _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
+    try:  # noqa: SIM105 (contextlib takes time to import)
+        _signal.signal(_signal.SIGINT, _signal.SIG_DFL)
+    except ValueError:  # not the main thread
+        pass
+
+from typing import TYPE_CHECKING, Any  # noqa: E402
+
+from wavecomb import isa  # noqa: E402
 
 isa.install()
 

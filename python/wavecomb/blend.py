@@ -7,10 +7,12 @@ and is not part of this package.
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -31,7 +33,7 @@ def extension() -> Path:
         WavecombError: The extension was not found.
     """
     named = os.environ.get("WAVECOMB_BLENDER_EXTENSION")
-    places = [Path(named)] if named else []
+    places = [Path(named).absolute()] if named else []
     places.append(Path(__file__).resolve().parents[2] / "blender")
     for place in places:
         if (place / "export_file.py").is_file():
@@ -42,11 +44,21 @@ def extension() -> Path:
     )
 
 
-def program() -> list[str]:
+_SCRIPT = """import runpy, sys
+runpy.run_path(sys.argv[1], run_name="__main__")
+"""
+
+
+def command(script: str, *words: str) -> list[str]:
     """Returns the command that runs a script in Blender with scripts of files disabled.
 
-    The program is ``$WAVECOMB_BLENDER``, a Blender or a Python with bpy; else ``blender`` on PATH;
-    else this Python if it has bpy.
+    The process is isolated as all processes of ``wavecomb.processes``. The program is
+    ``$WAVECOMB_BLENDER``, a Blender or a Python with bpy; else ``blender`` on PATH; else this
+    Python if it has bpy.
+
+    Args:
+        script: Absolute path of the script.
+        *words: Arguments of the script.
 
     Raises:
         WavecombError: No Blender and no Python with bpy was found.
@@ -56,16 +68,41 @@ def program() -> list[str]:
     if found is None and named:
         raise WavecombError(f"WAVECOMB_BLENDER: {named} is not a program")
     if found is None and importlib.util.find_spec("bpy") is not None:
-        found = processes.interpreter()
+        return processes.command("-c", _SCRIPT, script, "--", *words, parent=os.getpid())
     if found is None:
         raise WavecombError(
             "rendering a .blend file needs Blender 4.2 or later: put `blender` on PATH, or set "
             "WAVECOMB_BLENDER to it or to a Python with bpy"
         )
+    found = os.path.abspath(found)
     if Path(found).name.startswith("python"):
-        return [found, "-I"]
+        run = (_SCRIPT, script, "--", *words)
+        return processes.command("-c", *run, parent=os.getpid(), python=found)
     options = ["--background", "--factory-startup", "--disable-autoexec"]
-    return [found, *options, "--python-exit-code", "1", "--python"]
+    options += ["--python-exit-code", "1", "--python", script, "--"]
+    return processes.program(found, *options, *words)
+
+
+def _run(words: Sequence[str], folder: str) -> subprocess.CompletedProcess[str]:
+    """Runs Blender in a folder that contains no files of the user, and returns its output.
+
+    Raises:
+        subprocess.TimeoutExpired: It took longer than ``LIMIT_S``.
+        OSError: It does not start.
+    """
+    variables = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
+    child = processes.popen(
+        words, cwd=folder, env=variables, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True, errors="replace",
+    )  # fmt: skip
+    try:
+        out, err = child.communicate(timeout=LIMIT_S)
+    except BaseException:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(child.pid, signal.SIGKILL)
+        child.communicate()
+        raise
+    return subprocess.CompletedProcess(child.args, child.returncode, out, err)
 
 
 def export(blend: str, folder: str, frame: float | None) -> tuple[str, list[str], list[str]]:
@@ -85,12 +122,10 @@ def export(blend: str, folder: str, frame: float | None) -> tuple[str, list[str]
     if not os.path.isfile(blend):
         raise WavecombError(f"{blend}: there is no such file")
     script = str(extension() / "export_file.py")
+    folder = os.path.abspath(folder)
     words = [os.path.abspath(blend), folder, *([] if frame is None else [repr(frame)])]
     try:
-        done = subprocess.run(
-            [*program(), script, "--", *words], stdin=subprocess.DEVNULL, capture_output=True,
-            text=True, errors="replace", timeout=LIMIT_S, check=False,
-        )  # fmt: skip
+        done = _run(command(script, *words), folder)
     except subprocess.TimeoutExpired as error:
         raise WavecombError(f"{blend}: Blender took more than {LIMIT_S:.0f} s") from error
     except OSError as error:

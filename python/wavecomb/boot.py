@@ -11,9 +11,19 @@ Contract: imports only the standard library, so that any Python can run it.
 
 from __future__ import annotations
 
+import _signal  # type: ignore[import-not-found]
+import sys
+
+# Ctrl-C ends the command without a traceback during imports, as in wavecomb/__init__.py.
+if (
+    __name__ == "__main__"
+    and next((word for word in sys.argv[1:] if word[:2] != "--"), "") == "wavecomb"
+    and _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler
+):
+    _signal.signal(_signal.SIGINT, _signal.SIG_DFL)
+
 import contextlib
 import os
-import sys
 from collections.abc import Iterable, Sequence
 from types import ModuleType
 from typing import Any

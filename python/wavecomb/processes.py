@@ -146,6 +146,29 @@ def start(
     return popen(words, pass_fds=tuple(keep), **options)
 
 
+_EXEC = """import os, sys
+try:
+    os.execv(sys.argv[1], sys.argv[1:])
+except OSError as error:
+    sys.exit(f"error: {sys.argv[1]} does not start: {error.strerror}")
+"""
+
+
+def program(*words: str) -> list[str]:
+    """Returns the command that runs another program as ``command`` runs a module.
+
+    The program replaces an isolated Python, which has closed inherited descriptors, created a
+    process group, and made the process end with this one.
+
+    Args:
+        *words: Absolute path of the program, and its arguments.
+
+    Raises:
+        WavecombError: No Python was found.
+    """
+    return command("-c", _EXEC, *words, parent=os.getpid())
+
+
 def popen(words: Sequence[str], **options: Any) -> subprocess.Popen[Any]:
     """Starts a command line from ``command`` in a new session, from a thread that never ends.
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of folder `surface`: rays, lights and shading read the same values at a hit.
+// Tests of surface values: rays, lights and shading read the same values at a hit.
 #include "curve_testing.h"
 #include "lane_testing.h"
 #include "wavecomb/geometry/hit/hit_material.h"

@@ -266,6 +266,15 @@ def test_warnings(tmp_path: Path) -> None:
     assert of(rows)[0].startswith("Pictures that must be equal differ, in 1 groups")
     count, different = equality(load(tmp_path / "r").runs)
     assert count > 1 and len(different) == 1
+    different_work = {"policy": "material", "threads": 3, "lanes": 1, "wave_size": 64}
+    work = different_work | {"ray_order": "direction", "shadow_order": "direction"}
+    first = rows[2] | {"picture_sha256": "2" * 64}
+    pair = [first, first | work | {"run_id": "other", "picture_sha256": "3" * 64}]
+    count, different = equality(load(write_folder(tmp_path / "r", pair)).runs)
+    assert (count, len(different)) == (1, 1)
+    for name, value in (("max_depth", 1), ("roulette", "off"), ("spp", 2), ("seed", 9)):
+        pair = [first, first | {name: value, "run_id": "other", "picture_sha256": "3" * 64}]
+        assert equality(load(write_folder(tmp_path / "r", pair)).runs) == (0, []), name
     rows = [row | {"time_limit": 5.0} for row in rows]
     assert equality(load(write_folder(tmp_path / "r", rows)).runs) == (0, [])
 

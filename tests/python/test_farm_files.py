@@ -103,6 +103,19 @@ def test_all_files_are_listed(folder: Path) -> None:
         assert name in missing
 
 
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [("./none.<UDIM>.png", "no tile none.<UDIM>.png is in the folder {0}"),
+     ("tex/t.<UDIM>.png", "the folder of its tiles, {0}/tex, does not exist")],
+)  # fmt: skip
+def test_missing_tiles_name_their_folder(tmp_path: Path, name: str, why: str) -> None:
+    stage = tmp_path / "a.usda"
+    stage.write_text(f'#usda 1.0\ndef Shader "T" {{\n    asset inputs:file = @{name}@\n}}\n')
+    (line,) = list_files(str(stage), None, None)[1]
+    assert line.endswith(f"({why.format(tmp_path)}): /T.inputs:file")
+    assert line.startswith(f"texture {tmp_path}/")
+
+
 def test_files_of_other_stages_are_not_listed(folder: Path) -> None:
     """A process caches translated MaterialX files, but lists them per stage."""
     (folder / "other.mtlx").write_text(LOOK.replace("b.png", "a.png"))

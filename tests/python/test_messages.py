@@ -197,7 +197,9 @@ def Mesh "Plain" {
 @pytest.mark.parametrize(
     ("folder", "said"),
     [("./", "no tile wood.<UDIM>.png is in the folder {0}"),
-     ("./tex/", "the folder of its tiles, {0}/tex, does not exist")],
+     ("", "no tile wood.<UDIM>.png is in the folder {0}"),
+     ("./tex/", "the folder of its tiles, {0}/tex, does not exist"),
+     ("tex/", "the folder of its tiles, {0}/tex, does not exist")],
 )  # fmt: skip
 def test_messages_about_stages_name_folders_and_counts(
     tmp_path: Path, folder: str, said: str

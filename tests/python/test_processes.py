@@ -7,6 +7,7 @@ import ast
 import contextlib
 import os
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -175,6 +176,95 @@ def test_bench_workers_import_nothing_from_the_working_folder(place: Place) -> N
     place.check()
 
 
+EXPORT = """
+import json, os, re, sys
+words = sys.argv[sys.argv.index("--") + 1:]
+assert os.getpgrp() == os.getpid()
+numbers = [int(name) for name in os.listdir("/dev/fd")]
+assert 9 not in numbers, numbers
+if "wait" in words[0]:
+    import time
+    open(words[0], "w").write(str(os.getpid()))
+    time.sleep(60)
+open(words[1] + "/stage.usda", "w").write('#usda 1.0\\ndef Sphere "ball" {}\\n')
+row = {"stage": words[1] + "/stage.usda", "options": [], "messages": ["exported"]}
+json.dump(row, open(words[1] + "/stage.json", "w"))
+"""
+BLENDERS = {
+    "python-with-bpy": 'exec {python} "$@"',
+    # A Blender whose Python has the working folder on its module path.
+    "blender": """
+while [ "$1" != --python ]; do shift; done
+script=$2; shift; shift
+exec {python} -c "import json, sys; exec(open('$script').read())" "$@"
+""",
+}
+"""Programs that stand in for Blender."""
+
+
+def blender(folder: Path, name: str) -> dict[str, str]:
+    """Creates a stand-in for Blender and an extension; returns the variables that select them."""
+    (folder / "export_file.py").write_text(EXPORT)
+    program = folder / name
+    program.write_text("#!/bin/sh\n" + BLENDERS[name].format(python=sys.executable))
+    program.chmod(0o755)
+    return {"WAVECOMB_BLENDER": str(program), "WAVECOMB_BLENDER_EXTENSION": str(folder)}
+
+
+@needs("wavecomb._core")
+@pytest.mark.parametrize("name", list(BLENDERS))
+def test_blender_imports_nothing_from_folders_of_the_user(place: Place, name: str) -> None:
+    """Blender imports nothing from the working folder or the folder of the .blend file.
+
+    Its process inherits no descriptors and has a separate process group.
+    """
+    variables = blender(place.safe, name)
+    file, out = place.shot / "a.blend", place.safe / "a.exr"
+    file.write_bytes(b"")
+    words = [*wavecomb_script(), "render", str(file), "-o", str(out), "--size", "8", "8"]
+    place.run(["sh", "-c", 'exec "$0" "$@" 9< /dev/null', *words, "--spp", "1"], **variables)
+    assert out.is_file()
+    place.check()
+
+
+@only_where(sys.platform == "linux", "the kernel ends a child with its parent on Linux only")
+@pytest.mark.parametrize("name", list(BLENDERS))
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+def test_blender_ends_with_the_command(place: Place, name: str, number: int) -> None:
+    file = place.shot / "wait.blend"
+    file.write_bytes(b"")
+    with subprocess.Popen(
+        [*wavecomb_script(), "render", str(file), "-o", str(place.safe / "a.exr")],
+        cwd=place.work, env={**os.environ, **blender(place.safe, name)},
+        stderr=subprocess.PIPE, text=True,
+    ) as command:  # fmt: skip
+        until = time.monotonic() + 60
+        while not (text := file.read_text()):
+            assert time.monotonic() < until and command.poll() is None
+            time.sleep(0.02)
+        command.send_signal(number)
+        _, said = command.communicate(timeout=60)
+    assert "Traceback" not in said
+    while is_running(int(text)):
+        assert time.monotonic() < until, "it outlived the command"
+        time.sleep(0.02)
+
+
+def test_a_blender_that_does_not_start_is_one_line(tmp_path: Path) -> None:
+    program = tmp_path / "blender"
+    program.write_text("#!/nowhere/sh\n")
+    program.chmod(0o755)
+    (tmp_path / "a.blend").write_bytes(b"")
+    done = subprocess.run(
+        [*wavecomb_script(), "render", str(tmp_path / "a.blend"), "-o", "a.exr"],
+        cwd=tmp_path, env={**os.environ, **blender(tmp_path, "python-with-bpy"),
+                           "WAVECOMB_BLENDER": str(program)},
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr == f"error: {program} does not start: No such file or directory\n"
+
+
 WINDOW = """
 import subprocess, sys, time
 import numpy as np
@@ -333,7 +423,6 @@ def test_what_does_not_start_is_an_error_from_any_thread(monkeypatch: pytest.Mon
 # ---- nobody else does ----------------------------------------------------------------------------
 
 PROGRAMS = {
-    "blend.py": "Blender",
     "bench/process.py": "perf",
     "bench/machine.py": "git",
     "farm/clusters.py": "Slurm's commands",

@@ -7,15 +7,13 @@ hand anywhere else would make the number of files grow, or the edited tree not c
 
 from __future__ import annotations
 
-import json
 import re
-import shlex
 import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
-from parts import not_here
+import syntax
 
 ROOT = Path(__file__).resolve().parents[2]
 CORE = "src/wavecomb"
@@ -235,19 +233,7 @@ template VertexResult<float> shade_vertex<DiffuseBsdf<float>, float, kEverything
 @pytest.fixture(scope="module")
 def compiler() -> list[str]:
     """The library's compiler command for a syntax check, without the folder of headers."""
-    commands = ROOT / "build" / "editable" / "compile_commands.json"
-    if not commands.exists():
-        not_here("the library was not built by make build")
-    entries = json.loads(commands.read_text("utf-8"))
-    entry = next(one for one in entries if "wavecomb_core.dir" in one["command"])
-    words = shlex.split(entry["command"])
-    kept = [words[0]]
-    for at, word in enumerate(words):
-        if word in ("-isystem", "-D"):
-            kept += [word, words[at + 1]]
-        elif re.match(r"-(std|march|D|W(all|extra|error|shadow))", word):
-            kept.append(word)
-    return [*kept, "-Wno-psabi", "-fsyntax-only"]
+    return syntax.command()
 
 
 def applied(tree: Path, change: Change) -> None:

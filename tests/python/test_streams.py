@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -12,7 +13,7 @@ import forks
 import pytest
 from parts import only_where
 
-from wavecomb import terminal
+from wavecomb import processes, terminal
 
 pytest.importorskip("wavecomb._core")
 pytestmark = only_where(sys.platform == "linux", "/dev/full is Linux's")
@@ -173,6 +174,70 @@ sys.meta_path.insert(0, At())
 from wavecomb.cli import main
 main(sys.argv[2:])
 """
+
+
+PLANTED = """
+import os, signal, sys
+class At:
+    def find_spec(self, name, path=None, target=None):
+        if name == os.environ["INTERRUPTED_AT"]:
+            sys.meta_path.remove(self)
+            os.kill(os.getpid(), signal.SIGINT)
+if sys.orig_argv[-1] == "--version":
+    sys.meta_path.insert(0, At())
+"""
+SCRIPT = f"#!{sys.executable}\nimport sys\nfrom wavecomb.cli import main\nsys.exit(main())\n"
+
+
+def interrupted_at(
+    module: str, folder: Path, words: list[object], **options: object
+) -> subprocess.CompletedProcess[str]:
+    """Runs a command that gets Ctrl-C when it imports a module."""
+    (folder / "sitecustomize.py").write_text(PLANTED)
+    env = {**os.environ, "PYTHONPATH": str(folder), "INTERRUPTED_AT": module}
+    return subprocess.run(
+        [str(word) for word in words], capture_output=True, text=True, timeout=100, env=env,
+        **options,
+    )  # type: ignore[call-overload]  # fmt: skip
+
+
+@pytest.mark.parametrize("start", ["module", "script", "process"])
+@pytest.mark.parametrize("module", ["wavecomb.isa", "wavecomb.errors", "wavecomb.cli", "click"])
+def test_ctrl_c_while_the_package_is_imported(tmp_path: Path, start: str, module: str) -> None:
+    script = tmp_path / "bin" / "wavecomb"
+    script.parent.mkdir()
+    script.write_text(SCRIPT)
+    words = {
+        "module": [sys.executable, "-m", "wavecomb", "--version"],
+        "script": [sys.executable, script, "--version"],
+        # Isolated processes ignore PYTHONPATH; the flag is left out here to plant the file.
+        "process": [word for word in processes.command("wavecomb", "--version") if word != "-I"],
+    }[start]
+    done = interrupted_at(module, tmp_path, words)
+    assert done.returncode in (-signal.SIGINT, 130), done
+    assert done.stderr in ("", "stopped\n") and not done.stdout
+
+
+def test_an_ignored_ctrl_c_stays_ignored(tmp_path: Path) -> None:
+    done = interrupted_at(
+        "wavecomb.isa", tmp_path, [sys.executable, "-m", "wavecomb", "--version"],
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
+    )  # fmt: skip
+    assert done.returncode == 0 and done.stdout.startswith("wavecomb ")
+
+
+@pytest.mark.parametrize("name", ["tool.py", "wavecomb.py", "wavecombs"])
+def test_the_library_leaves_handlers_alone(tmp_path: Path, name: str) -> None:
+    script = tmp_path / name
+    script.write_text(
+        "import signal, sys\n"
+        "sys.path.pop(0)\n"
+        "import wavecomb.api\n"
+        "assert signal.getsignal(signal.SIGINT) is signal.default_int_handler\n"
+    )
+    for words in ([script], [script, "wavecomb"], ["-c", script.read_text(), "wavecomb"]):
+        done = subprocess.run([sys.executable, *words], capture_output=True, text=True, timeout=100)
+        assert done.returncode == 0, done.stderr
 
 
 IN_ALL = ("click", "wavecomb.cli.group", "wavecomb.run.error_messages", "wavecomb.cli.render")

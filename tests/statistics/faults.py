@@ -31,7 +31,7 @@ class Fault:
     """A fault that was fixed.
 
     Attributes:
-        seed: Seed of the pairs.py stage that reveals the fault.
+        name: Description of the fault, for messages.
         seed: Seed of the stage of pairs.py that reveals it.
         changes: (file, text of the fix, text without the fix).
     """
@@ -48,14 +48,14 @@ FAULTS = (
         342,
         (
             (
-                CORE + "light_paths/connection.h",
+                CORE + "path/steps/light_connection.h",
                 "near.distance = select(crossing, max(F(distance - closer), F(0.f)), distance);",
                 "near.distance = select(crossing & (closer > 1e30f), F(0.f), distance);",
             ),
             (
-                CORE + "light_paths/connection.h",
-                "if (any(lifted)) {",
-                "if (any(lifted) && v.depth > 1000) {",
+                CORE + "path/steps/light_connection.h",
+                "if (any(has_terminator)) {",
+                "if (any(has_terminator) && v.depth > 1000) {",
             ),
         ),
     ),
@@ -65,8 +65,8 @@ FAULTS = (
         (
             (
                 CORE + "path/steps/sample_light.h",
-                "valid = valid & not_(at.bsdf.enters(wo, wi));",
-                "valid = valid & not_(at.bsdf.enters(wo, wi) & Mask<F>(false));",
+                "valid = valid & not_(at.bsdf.enters(c.wo, wi));",
+                "valid = valid & not_(at.bsdf.enters(c.wo, wi) & Mask<F>(false));",
             ),
         ),
     ),
@@ -76,7 +76,7 @@ FAULTS = (
         (
             (
                 CORE + "guiding/bounce/guided_bounce.h",
-                "const F unguided = bounce_pdf(v, at.bsdf, wo, seen, wi, e);",
+                "const F unguided = bounce_pdf(v, c.at.bsdf, c.wo, c.view, wi, e);",
                 "const F unguided = e.pdf;",
             ),
         ),
@@ -111,6 +111,26 @@ FAULTS = (
 )
 
 
+def without_fixes(text: str, name: str) -> str:
+    """Returns the text of a source file without the fixes of all faults.
+
+    Args:
+        text: Text of the file.
+        name: Path of the file in the repository.
+
+    Raises:
+        ValueError: The file does not contain the text of a fix exactly once.
+    """
+    for fault in FAULTS:
+        for file, fixed, faulty in fault.changes:
+            if file != name:
+                continue
+            if text.count(fixed) != 1:
+                raise ValueError(f"{name} does not contain {fixed!r} once; adapt {fault.name!r}")
+            text = text.replace(fixed, faulty)
+    return text
+
+
 def copy_tree() -> None:
     """Copy the tracked files of the working tree, and reintroduce the faults."""
     shutil.rmtree(TREE, ignore_errors=True)
@@ -121,12 +141,11 @@ def copy_tree() -> None:
         if (ROOT / name).is_file():
             (TREE / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / name, TREE / name)
-    for fault in FAULTS:
-        for name, fixed, faulty in fault.changes:
-            text = (TREE / name).read_text()
-            if text.count(fixed) != 1:
-                sys.exit(f"faults: {name} has no line '{fixed}' any more; adapt {fault.name!r}")
-            (TREE / name).write_text(text.replace(fixed, faulty))
+    for name in {change[0] for fault in FAULTS for change in fault.changes}:
+        try:
+            (TREE / name).write_text(without_fixes((TREE / name).read_text(), name))
+        except ValueError as error:
+            sys.exit(f"faults: {error}")
 
 
 def build() -> None:

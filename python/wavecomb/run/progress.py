@@ -88,7 +88,7 @@ def keep_interrupts() -> None:
 
     ``KeyboardInterrupt`` is lost if it is raised in a callback of a library that prints exceptions
     and continues. Use this function in commands, which a ``KeyboardInterrupt`` ends, but not in a
-    window.
+    window. It also replaces the default action, which applies while the command is imported.
     """
 
     def note(number: int, frame: FrameType | None) -> None:
@@ -96,7 +96,8 @@ def keep_interrupts() -> None:
         signal.default_int_handler(number, frame)
 
     is_main = threading.current_thread() is threading.main_thread()
-    if is_main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    replaced = (signal.default_int_handler, signal.SIG_DFL)
+    if is_main and signal.getsignal(signal.SIGINT) in replaced:
         signal.signal(signal.SIGINT, note)
 
 

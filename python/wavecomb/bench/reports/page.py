@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wavecomb import options
 from wavecomb.bench.analysis.data import SETTINGS, load
 from wavecomb.bench.figures.style import style
 from wavecomb.bench.reports import images
@@ -264,11 +265,16 @@ WORDS = {
 
 
 FEW_ROUNDS = 5
-_CHANGES_NOTHING = ("policy", "threads", "lanes", "wave_size", "ray_order", "shadow_order")
-_EQUAL_IN = [
-    *(n for n in SETTINGS if n not in (*_CHANGES_NOTHING, "experiment") and n[:6] != "factor"),
-    "seed",
-]
+
+
+def _equal_in() -> list[str]:
+    """Returns the columns in which runs agree if their images must be bit-identical."""
+    rows = options.settings().values()
+    same_bits = {row.name for row in rows if not row.changes_bits} - {"spp"}
+    return [
+        *(n for n in SETTINGS if n not in same_bits | {"experiment"} and n[:6] != "factor"),
+        "seed",
+    ]
 
 
 def warnings_of(results: Results) -> list[str]:
@@ -304,12 +310,12 @@ def warnings_of(results: Results) -> list[str]:
 def equality(runs: pd.DataFrame) -> tuple[int, list[str]]:
     """Counts groups of runs that must have equal images, and names those that differ.
 
-    A group agrees in the seed and all settings except those that only order or distribute the work.
+    A group agrees in the sample count, the seed and all settings that change the bits of the image.
     Runs with a time limit are left out, since their sample counts differ.
     """
     ours = runs[(runs["renderer"] == "wavecomb") & (runs["picture_sha256"] != "")]
     ours = ours[ours["time_limit"].fillna(0) == 0]
-    groups = ours.groupby(_EQUAL_IN, dropna=False, sort=False)["picture_sha256"]
+    groups = ours.groupby(_equal_in(), dropna=False, sort=False)["picture_sha256"]
     found = groups.agg(["size", "nunique"]).reset_index()
     repeated = found[found["size"] > 1]
     different = [

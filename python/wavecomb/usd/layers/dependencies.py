@@ -12,7 +12,7 @@ from pxr import Ar, Sdf, Tf, Usd, UsdUtils
 
 from wavecomb.usd import mtlx
 from wavecomb.usd.layers.opening import open_stage
-from wavecomb.usd.materials.network import UDIM, asset_file, tile_files
+from wavecomb.usd.materials.network import UDIM, asset_file, missing_tiles, tile_files
 from wavecomb.usd.stage.report import LoadReport, capture_diagnostics
 
 
@@ -87,10 +87,12 @@ def _add(
 ) -> None:
     """Adds a file of an attribute to the existing or to the missing files."""
     if UDIM in value.path:
-        tiles = [path for _, path in tile_files(asset_file(value, attribute))]
+        pattern = asset_file(value, attribute)
+        tiles = [path for _, path in tile_files(pattern)]
         found.update(dict.fromkeys(tiles))
         if not tiles:
-            missing[f"no tile of {value.path} is there: {attribute.GetPath()}"] = None
+            why = missing_tiles(pattern)
+            missing[f"texture {pattern} does not exist ({why}): {attribute.GetPath()}"] = None
         return
     path = _outer(value.resolvedPath or asset_file(value, attribute))
     if path and os.path.isfile(path):

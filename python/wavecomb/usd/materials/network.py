@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -306,9 +307,11 @@ def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
         return value.resolvedPath
     layer = layer_of_value(attribute)
     found = UsdShade.UdimUtils.ResolveUdimPath(value.path, layer)
-    if not found and layer is not None and value.path.startswith("."):
-        # No tile of the UDIM pattern exists; the absolute pattern is used in messages.
-        return str(layer.ComputeAbsolutePath(value.path))
+    if not found and layer is not None and ":" not in value.path:
+        # No tile of the UDIM pattern exists; the absolute pattern is used in messages. Of the
+        # folders that a resolver searches for "tex/a.png", the one next to the layer is the first.
+        is_search_path = not value.path.startswith((".", "/"))
+        return str(layer.ComputeAbsolutePath("./" * is_search_path + value.path))
     return found or value.path
 
 
@@ -326,6 +329,14 @@ def tile_files(pattern: str) -> list[tuple[int, str]]:
     """Returns numbers (1001 to 1100) and files of the existing tiles of a UDIM pattern."""
     found = UsdShade.UdimUtils.ResolveUdimTilePaths(pattern, None)
     return [(int(number), path) for path, number in found]
+
+
+def missing_tiles(pattern: str) -> str:
+    """Returns the reason why a UDIM pattern has no tiles; the reason names their folder."""
+    folder, name = os.path.split(pattern)
+    if folder and not os.path.isdir(folder):
+        return f"the folder of its tiles, {folder}, does not exist"
+    return f"no tile {name} is in the folder {folder or os.curdir}"
 
 
 def image_files(material: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:

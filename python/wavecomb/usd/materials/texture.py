@@ -26,7 +26,7 @@ from wavecomb.usd.materials.colour_space import (
     halve,
     to_linear,
 )
-from wavecomb.usd.materials.network import UDIM, image_files, tile_files
+from wavecomb.usd.materials.network import UDIM, image_files, missing_tiles, tile_files
 from wavecomb.usd.materials.pixels import Image, ReadAhead, TextureError, read_image, stamp_of
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.report import LoadReport
@@ -205,10 +205,7 @@ class TextureTable:
                 if first is not None:
                     return TiledImage(first, tuple(tiles))
             if not tiles:
-                folder, name = os.path.split(path)
-                why = f"no tile {name} is in the folder {folder or os.curdir}"
-                if folder and not os.path.isdir(folder):
-                    why = f"the folder of its tiles, {folder}, does not exist"
+                why = missing_tiles(path)
                 self._report.warn(f"texture {path} cannot be read ({why})", prim)
             return None
         return self._image(self._twin(path), prim)
