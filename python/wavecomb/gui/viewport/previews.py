@@ -134,7 +134,8 @@ class Filler:
             self._whole = enlarged(preview.beauty, *size)
             if self._albedo is not None:
                 low = enlarged(preview.layers["guide_albedo"], *size) + _DARK
-                # Limiting the albedo ratio avoids dots at edges between dark and bright surfaces.
+                # Limit the ratio of the full-size albedo to the preview's albedo, to avoid dots at
+                # edges between dark and bright surfaces.
                 self._whole *= np.clip((self._albedo + _DARK) / low, 0.4, 2.0)
         holes = frame.layers["samples"][:, :, None] == 0
         keeps = self._albedo is None

@@ -307,7 +307,7 @@ def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
     layer = layer_of_value(attribute)
     found = UsdShade.UdimUtils.ResolveUdimPath(value.path, layer)
     if not found and layer is not None and value.path.startswith("."):
-        # No tile of the UDIM pattern exists; the absolute pattern is used in messages.
+        # No tile of the UDIM pattern exists. Return the absolute pattern, which messages show.
         return str(layer.ComputeAbsolutePath(value.path))
     return found or value.path
 
