@@ -196,9 +196,10 @@ def run_in_sandbox(outputs: Outputs, *, gpu: bool = False, program: str = COMMAN
         folder.close()
         if group is not None:
             group.close()
-    code = os.waitstatus_to_exitcode(status) # If a signal ends the sandboxed process, bubblewrap
-    exits with 128 plus the signal's number. The codes 130 and 143 are Wavecomb's own exit codes. if
-    code > 128 and code not in (128 + signal.SIGINT, 128 + signal.SIGTERM):
+    code = os.waitstatus_to_exitcode(status)
+    # If a signal ends the sandboxed process, bubblewrap exits with 128 plus the signal's number.
+    # The codes 130 and 143 are Wavecomb's own exit codes.
+    if code > 128 and code not in (128 + signal.SIGINT, 128 + signal.SIGTERM):
         code = 128 - code
     _end(code, sent, page, words)
 
