@@ -22,8 +22,8 @@ struct NamedExpression {
 };
 
 /// Scattering event of a path: reflection or transmission by a diffuse, glossy or singular (mirror)
-/// lobe, scattering in a volume, or the start of a subsurface random walk that leaves the surface
-/// on the side where it entered.
+/// lobe, scattering in a volume, or the entry into a subsurface random walk, whose exit follows as
+/// a diffuse reflection.
 enum class PathEvent : uint32_t {
   kReflection = 0,
   kTransmission = 3,
