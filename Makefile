@@ -7,13 +7,14 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 
 BUILD := build/editable
-# Compile sources in unity batches. A clean build is faster, but rebuilding after an
-# edit is slower; OFF suits developers of the core.
+# Compile sources in unity batches. Unity batches make a clean build faster, but rebuilding after an
+# edit slower, so that developers who edit C++ files often should set `BATCH=OFF`.
 BATCH ?= ON
 # Lane widths to compile: "default" means scalar code and the widest vectors of the target CPU, and
 # "all" means every supported width. Later builds keep the lane widths of the last build.
 LANES ?= $(shell cat build/.lanes 2> /dev/null || echo default)
-# Amount of checks in make test-asan: ON (the default checks) or all.
+# C++ tests that make test-asan builds: ON for the tests that need no optimised code, or all for
+# every test.
 CHECKS ?= ON
 ASAN := build/asan$(if $(filter all,$(CHECKS)),-all)
 TSAN := build/tsan
@@ -21,24 +22,24 @@ WHEEL := build/wheel
 CLANG := build/clang
 ARM64 := build/arm64
 VENV := .venv/bin
-# Native libraries in the wheels of make wheels: portable, or a list of instruction sets as in
-# WAVECOMB_ISAS.
+# Instruction sets for which make wheels compiles the native library: portable, or a list in the
+# format of the CMake option WAVECOMB_ISAS.
 ISAS ?= portable
-# Options of make fuzz.
+# Duration in minutes, first seed and number of processes of make fuzz.
 MINUTES ?= 10
 SEED ?= 1
 JOBS ?= $(shell nproc 2> /dev/null || echo 2)
-# Allows one build at a time per directory, also from different make processes.
+# Prefix that lets only one make process at a time build in a build directory.
 LOCK := $(if $(shell command -v flock),flock build/.lock)
 SETUP_LOCK := $(if $(LOCK),$(LOCK)-setup)
 ASAN_LOCK := $(if $(LOCK),$(LOCK)-asan)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_NO_INPUT := 1
-# Tools that search PATH find the programs of the environment first.
+# The programs of .venv precede programs of the same name in PATH.
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
 CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLists.txt tests/naive/CMakeLists.txt benchmarks/micro/CMakeLists.txt)
-# The list includes directories, whose time changes when a file is added or removed.
+# `NATIVE_INPUTS` includes directories, so that adding or removing a source file causes a rebuild.
 NATIVE_INPUTS := $(shell find src bindings 2> /dev/null)
 CPP_FILES := $(shell find src bindings tests/cpp tests/naive benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' -o -name '*.inl' \) 2> /dev/null)
 
@@ -53,7 +54,7 @@ build/.setup: tools/setup tools/wheels tools/setup_embree tools/setup_openvdb to
   constraints.txt pyproject.toml
 	@mkdir -p build && $(SETUP_LOCK) tools/setup && touch $@
 
-# Packages that tests need; parts of make test install them while the core is built.
+# Install the packages that tests need. make test does so while it builds the core.
 build/.setup-test: build/.setup
 	@$(SETUP_LOCK) tools/setup test && touch $@
 
@@ -62,7 +63,8 @@ lanes:
 build/.lanes: lanes
 	@mkdir -p build; [ "$$(cat $@ 2> /dev/null)" = "$(LANES)" ] || echo "$(LANES)" > $@
 
-# pip configures, builds and installs once. After an edit of a source, CMake alone is faster.
+# pip configures CMake, and builds and installs the package. After an edit of a source file, make
+# build runs only CMake, which is faster.
 build/.configured: build/.setup build/.lanes $(CMAKE_INPUTS) pyproject.toml $(wildcard .deps/openvdb/.complete)
 	@echo "build: configuring"
 	@$(LOCK) $(VENV)/python -m pip install -q --no-build-isolation --no-deps -e . --config-settings=build-dir=$(BUILD) \
@@ -82,8 +84,9 @@ setup: build/.setup ## Install build dependencies (system packages, .venv, Embre
 setup-test: build/.setup-test
 build: build/.built ## Build the core and the Python module into .venv (editable); LANES=all builds every lane width
 
-# Dependencies come from separate wheels, except a staged Embree, which is part of Wavecomb's wheel.
-# auditwheel must not copy system libraries, since the wheel already includes all that it needs.
+# Wavecomb's wheel contains the Embree library of .deps/embree, if there is one; pip installs all
+# other dependencies from separate wheels. auditwheel must not copy system libraries, since the
+# wheel already includes all that it needs.
 wheels: build/.setup ## Build the distributable wheel in dist/, with every instruction set, checked by auditwheel
 	@$(VENV)/python -c 'import auditwheel' 2> /dev/null || $(VENV)/python -m pip install -q -c constraints.txt 'auditwheel>=6.8'
 	@echo "wheels: a library for each instruction set"
@@ -100,7 +103,7 @@ sdist: build/.setup ## Build the source distribution in dist/
 	@$(VENV)/python -c 'from scikit_build_core.build import build_sdist; build_sdist("dist")' > /dev/null
 	@ls dist/wavecomb-*.tar.gz
 
-# The target uploads nothing and only prints the files to upload.
+# make release prints the files to upload, but uploads nothing.
 release: test-wheel test-sdist ## Build and test wheels and source distribution, and print what to upload
 	@$(VENV)/python -c 'import twine' 2> /dev/null || $(VENV)/python -m pip install -q -c constraints.txt 'twine>=6'
 	@$(VENV)/python tools/release
@@ -116,7 +119,7 @@ render: build ## Render the Mixed scene to out/mixed.exr and out/mixed.png
 	  test -e out/mixed.usdc || $(VENV)/wavecomb scene mixed -o out/mixed.usdc; wait
 	$(VENV)/wavecomb render out/mixed.usdc -o out/mixed.exr --png out/mixed.png --size 800 500 $$($(denoiser) && echo --denoise)
 
-# make test does not build the site, since MkDocs is in a separate extra.
+# make test does not build the documentation site, since MkDocs is an optional dependency.
 docs: build ## Build the documentation site in out/site
 	@$(VENV)/python -c 'import material' 2> /dev/null || $(VENV)/python -m pip install -q -c constraints.txt 'mkdocs-material>=9.5'
 	NO_MKDOCS_2_WARNING=1 $(VENV)/python -m mkdocs build --strict --quiet
@@ -125,8 +128,9 @@ docs: build ## Build the documentation site in out/site
 
 # ---- tests -------------------------------------------------------------------------------------
 
-# tests/parts.txt lists the parts with their requirements, lanes and time budgets. All parts run
-# even after a failure, so that a layout error does not hide failing tests.
+# tests/parts.txt lists the parts with their requirements, lanes and time budgets. make test runs
+# all parts even after a failure, so that a formatting error in the source code does not hide
+# failing tests.
 test: ## Lint, C++ tests, sanitizers, pytest with a representative of each kind of long test
 	@python3 tools/run_parts $@
 
@@ -136,14 +140,14 @@ test-fast: ## Lint, C++ tests, pytest without slow tests
 test-long: ## All tests with 10^6 samples, 500 random scenes, 100 kills, all sanitizers (over an hour)
 	@python3 tools/run_parts $@
 
-# Run the tests that depend on optimised code. test-asan runs all other C++ tests
+# Run the C++ tests that need a build with compiler optimisation. test-asan runs all other C++ tests
 # (tests/cpp/CMakeLists.txt).
 test-cpp: build build/.setup-test ## C++ tests of values, lanes and whole renders
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet
 	$(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 
-# CHECKS=all builds all tests, kernels and checks, with line numbers in AddressSanitizer's reports,
-# which takes five times as long to compile.
+# `make test-asan CHECKS=all` builds all C++ tests and kernels, with line numbers in
+# AddressSanitizer's reports. Compiling them takes five times as long as with `CHECKS=ON`.
 ASAN_DEBUG = $(if $(filter all,$(CHECKS)),-g1,-g0)
 test-asan: build/.setup-test ## C++ tests of memory and whole renders under AddressSanitizer and UndefinedBehaviorSanitizer
 	@test -e $(ASAN)/build.ninja || $(ASAN_LOCK) $(VENV)/cmake -S . -B $(ASAN) -G Ninja --log-level=NOTICE \
@@ -170,8 +174,8 @@ build-test-tools: build
 test-py: build-test-tools build/.setup-test ## Python and statistical tests
 	@$(MAKE) --no-print-directory run-py
 
-# The run-* targets have no prerequisites: they run as parts of make test, which builds the
-# programs.
+# The run-* targets have no prerequisites, since make test builds all programs before it runs these
+# targets.
 run-py:
 	$(VENV)/python -m pytest -q -n $(JOBS)
 
@@ -181,7 +185,8 @@ run-py-fast:
 run-py-long:
 	WAVECOMB_LONG=1 $(VENV)/python -m pytest -q -n $(JOBS) -o faulthandler_timeout=7200
 
-# make test-long builds all lane widths, and restores the previous widths at its end.
+# make test-long builds all lane widths. At its end, it builds the previously configured lane widths
+# again.
 build-all-lanes:
 	@mkdir -p build; test -e build/.lanes-before || echo "$(LANES)" > build/.lanes-before
 	@$(MAKE) --no-print-directory build LANES=all
@@ -189,14 +194,14 @@ build-all-lanes:
 build-lanes-before:
 	@$(MAKE) --no-print-directory build LANES=$$(cat build/.lanes-before 2> /dev/null || echo "$(LANES)"); rm -f build/.lanes-before
 
-# Run all files of tests/cpp with 10^6 samples.
+# Build and run all C++ tests, with 10^6 samples in each statistical test.
 test-cpp-long: build build/.setup-test
 	@trap '$(LOCK) $(VENV)/cmake -S . -B $(BUILD) --log-level=NOTICE -DWAVECOMB_TESTS=ON' EXIT; \
 	  $(LOCK) $(VENV)/cmake -S . -B $(BUILD) --log-level=NOTICE -DWAVECOMB_TESTS=all; \
 	  $(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet; \
 	  WAVECOMB_LONG=1 $(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 
-# tests/packaging/test_empty_root.py covers a machine without a compiler.
+# tests/packaging/test_empty_root.py runs the wheel in a file system without a compiler.
 test-wheel: wheels ## Install the wheel into a fresh environment and an empty root; render with each library
 	@rm -rf $(WHEEL)/venv && $(VENV)/python -m venv $(WHEEL)/venv
 	@$(WHEEL)/venv/bin/python -m pip install -q -c constraints.txt pip pytest dist/wavecomb-*.whl
@@ -206,11 +211,11 @@ test-wheel: wheels ## Install the wheel into a fresh environment and an empty ro
 test-sdist: sdist build/.setup-test ## Build the source distribution in a separate folder, and render
 	$(VENV)/python -m pytest -q -o faulthandler_timeout=3600 tests/packaging/test_sdist.py
 
-# The clang and ARM64 builds compile OpenSubdiv and GoogleTest from source, since the distribution's
-# libraries are for another standard library or CPU.
+# The clang and ARM64 builds compile OpenSubdiv and GoogleTest from source, since the packages of
+# the Linux distribution use GCC's standard library and the CPU of this machine.
 from_source := -DOpenSubdiv_SOURCE=$(CURDIR)/.deps/source/opensubdiv -DGoogleTest_SOURCE=/usr/src/googletest
-# The clang build has two lane widths and little optimisation, since it tests correctness, not
-# speed.
+# The clang build compiles two lane widths with little optimisation, since it only tests
+# correctness.
 clang_widths = 1;$(if $(shell grep -m 1 -o avx2 /proc/cpuinfo 2> /dev/null),8,4)
 # Path of the newest clang. make expands CLANGXX when it is used, after tools/setup has installed
 # clang.
@@ -218,8 +223,8 @@ CLANGXX ?= $$(ls /usr/bin/clang++-[0-9]* | sort -V | tail -n 1)
 # The oneTBB wheel uses libstdc++, and an exception from a libc++ task ends the process, so the test
 # of exceptions in tasks is left out.
 clang_without := RayRecording.StopsAtItsLimit
-# The reference integrator of the GCC build rendered the reference images. The tests also compare
-# the wavefront with the scalar integrator, and call functions from Python.
+# Python tests of the clang build: they compare images with reference images from the GCC build and
+# with images of the scalar integrator, and call functions of the Python API.
 clang_python := test_golden test_exactness test_api test_python_policy
 
 build/.setup-clang: build/.setup-test
@@ -242,12 +247,12 @@ test-clang: build/.setup-clang ## C++ tests and the Python module with clang and
 	  $(VENV)/python -c "$$folder" > "$$site/others.pth"
 	LD_LIBRARY_PATH=$(CURDIR)/.venv/lib $(CLANG)/venv/bin/python -m pytest -q -n $(JOBS) -k "not come_out and not odd_objects" $(clang_python:%=tests/python/%.py)
 
-# Run tests of code in lanes and of whole renders. Statistical tests take hours under emulation and
-# test formulas that do not depend on the CPU, so they are left out, as are tests of containers.
-# ARM64_TESTS=all includes all tests.
+# Tests of SIMD code and of whole renders, which run under ARM64 emulation. Statistical tests are
+# left out, since they take hours under emulation and test formulas that do not depend on the CPU.
+# Tests of containers are left out, too. ARM64_TESTS=all includes all tests.
 arm64_tests := lanes rows math vec_frame warp sampler morton_hash camera_ray params programs variants surface texture curves \
   curve_clumps volumes subdivision accelerator motion wave renderer policies
-# Statistical tests of materials. Each test takes minutes under emulation.
+# Statistical tests of materials that are left out, since each takes minutes under emulation.
 arm64_without := Programs.*Furnace*:Programs.DeltaLobes*:Programs.WeightIs*:Programs.Reciprocity*:Programs.MultipleScattering*
 ARM64_TESTS ?= $(subst $() ,;,$(strip $(arm64_tests)))
 test-arm64: build/.setup-arm64 ## C++ tests of NEON lanes, cross-compiled for ARM64, under qemu

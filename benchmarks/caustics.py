@@ -135,7 +135,8 @@ def measure(name: str, options: argparse.Namespace) -> dict[str, Any]:
             base, own = costs[options.ways[0]][figure], costs[way][figure]
             if min(own) > 0.0:
                 efficiency[figure] = ratio(base, own)
-                # Ratio of the means over rounds, which a single lucky round affects little.
+                # Ratio of the mean errors over all rounds, to which a single round with a low error
+                # contributes little.
                 efficiency[figure]["of_means"] = float(np.mean(base) / np.mean(own))
         ways[way] = {
             "spp": spp[way], "seconds": summary(seconds[way]), "efficiency": efficiency,

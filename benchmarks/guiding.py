@@ -106,7 +106,8 @@ def measure(
     for name in options.ways:
         stack = np.array(pictures[name])
         pixels = np.sort((stack.var(axis=0, ddof=1) / (mean**2 + 0.01)).mean(axis=-1).ravel())
-        # Error times seconds of each round, from which the spread of the ratios is computed.
+        # Relative squared error of each round's image, times the seconds that the round took. The
+        # spread of the efficiency ratios is computed from these products.
         rounds = [
             float(((one - mean) ** 2 / (mean**2 + 0.01)).mean()) * took
             for one, took in zip(stack, seconds[name], strict=True)

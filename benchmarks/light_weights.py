@@ -164,11 +164,11 @@ def _mitsuba(path: Path, depth: int, args: argparse.Namespace) -> dict[str, Any]
         settings = PeerSettings(args.size, args.size, max_depth=depth, sampler=sampler)
         return MitsubaScene(mi, recorded, settings)
 
-    # Fewer samples, since Mitsuba's scalar variant is slow.
+    # Render the reference image with fewer samples in Mitsuba, since its scalar variant is slow.
     samples = max(args.spp, args.reference // 4)
     truth = opened("independent").render(samples, 1_000_003).astype(np.float64)
     found = {}
-    own = (0.0, 0.0)  # error of the reference image
+    own = (0.0, 0.0)  # sum and square of the errors of Mitsuba's reference image
     for sampler in ("independent", "multijitter"):
         scene = opened(sampler)
         pictures = [scene.render(args.spp, seed + 1) for seed in range(args.rounds)]

@@ -30,8 +30,8 @@ STAGES = ("cornell", "mixed", "dragon")
 TIMES = ("python", "imports", "load", "build", "first_sample", "render", "first_picture", "process")
 MEMORY = ("imports_mb", "peak_mb", "parts_mb", "ratio")
 
-# Program that a child process runs in each round. It measures times with CLOCK_MONOTONIC, which all
-# processes share.
+# Python program that measures the loading of a scene in a child process, once per round. Its time
+# stamps come from CLOCK_MONOTONIC, so they are comparable with the parent process's time stamps.
 CHILD = """
 import time
 start = time.monotonic()
@@ -73,7 +73,10 @@ def turn(stage: Path, size: int, threads: int) -> dict[str, Any]:
             check=True,
             capture_output=True,
             text=True,
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # as the wavecomb command sets it
+            env={
+                **os.environ,
+                "OPENBLAS_NUM_THREADS": "1",
+            },  # the wavecomb command sets the same value
         )
         end = time.monotonic()
     got = json.loads(run.stdout)
@@ -84,8 +87,9 @@ def turn(stage: Path, size: int, threads: int) -> dict[str, Any]:
     record["imports_mb"] = got["imports_bytes"] / 1e6
     record["peak_mb"] = got["peak_bytes"] / 1e6
     record["parts_mb"] = parts / 1e6
-    # Ratio of the peak memory of loading and rendering to the sum of the reported parts. The image
-    # file library is loaded later if no image is read.
+    # Ratio of the peak memory of loading and rendering to the sum of the memory that the statistics
+    # report. If the scene has no images, the peak includes the library that reads image files,
+    # since the library is loaded after `imports_bytes` is measured.
     record["ratio"] = (got["render_peak_bytes"] - got["imports_bytes"]) / parts
     record["memory_bytes"] = got["memory_bytes"]
     return record

@@ -111,7 +111,7 @@ def measure(stage: Any, wave: int, spp: int, args: argparse.Namespace) -> dict[s
                 picture = done.beauty
             elif not np.array_equal(picture, done.beauty):
                 raise SystemExit(f"{policy} gives a different image")
-            if turn > 0:  # the first round only fills the caches
+            if turn > 0:  # the first round fills the caches and is not measured
                 times[policy].append(phase_times(done.stats))
 
     def shading(policy: str) -> list[float]:

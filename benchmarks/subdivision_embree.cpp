@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Builds a mesh in Embree alone for benchmarks/subdivision.py, as Embree's subdivision surface or
+/// Builds and traces a mesh with Embree for benchmarks/subdivision.py, as a subdivision surface or
 /// as triangles.
 ///
 ///      subdivision_embree FILE RATE     RATE: subdivision level, or 0 for a triangle mesh
 ///
-/// FILE: counts of points, faces and corners (int32), points (3 float), face sizes, corners
-/// (int32).
+/// FILE contains the numbers of points, faces and corners (int32), the points (3 float each), the
+/// number of corners of each face (int32), and the point index of each corner (int32).
 #include <embree4/rtcore.h>
 
 #include <chrono>
@@ -29,7 +29,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// 16 rays from a sphere around the scene to points near its centre.
+/// Makes 16 rays that start on a sphere around the scene and point to its centre region.
 RTCRayHit16 make_rays(const RTCBounds& b, std::mt19937& random) {
   std::normal_distribution<float> normal;
   const float c[] = {0.5f * (b.lower_x + b.upper_x), 0.5f * (b.lower_y + b.upper_y),

@@ -81,9 +81,9 @@ def blocks_of(image: Array, size: int = BLOCK) -> Array:
 def judge(batches: Array, reference: Array, size: int = BLOCK) -> Verdict:
     """Compare n >= 2 independent renders, (n, height, width, 3), with a reference."""
     ours = batches.mean(0)
-    own = batches.var(0, ddof=1) / len(batches)  # variance of the mean, per pixel
+    own = batches.var(0, ddof=1) / len(batches)  # variance of each pixel's mean over the batches
     residual = reference - ours
-    # Variance of the images' difference, if they differ only by noise.
+    # Expected variance of the difference between the two images if they differ only by noise.
     steps = np.diff(residual, axis=1) ** 2 / 2
     both = blocks_of(np.concatenate([steps, steps[:, -1:]], axis=1), size)
     variance = np.maximum(both, blocks_of(own, size)) / size**2

@@ -86,8 +86,8 @@ class Run:
         moving.clear()
         start, cpu = time.perf_counter(), time.process_time()
         while time.perf_counter() < start + self.seconds:
-            # Orbit back and forth, so that the camera stays in a room, every 0.01 s, as often as
-            # mouse events arrive.
+            # Move the camera every 0.01 s, which is the typical interval of mouse events. The
+            # camera orbits back and forth, so that it stays inside a room.
             step = 0.005 * math.cos(4.0 * (time.perf_counter() - start))
             self.viewport.orbit(step, 0.0, moving=True)
             due = time.perf_counter() + 0.01

@@ -20,8 +20,8 @@ void bind_settings(nanobind::module_& m);
 void bind_render(nanobind::module_& m);
 void bind_renderer(nanobind::module_& m);
 
-/// Define parts of class SceneBuilder: textures and materials; meshes, curves, points and
-/// instances; volumes.
+/// Add methods to the Python class SceneBuilder: `def_materials` adds the methods for textures and
+/// materials, `def_meshes` for meshes, curves, points and instances, and `def_volumes` for volumes.
 void def_materials(nanobind::class_<wavecomb::SceneBuilder>& builder);
 void def_meshes(nanobind::class_<wavecomb::SceneBuilder>& builder);
 void def_volumes(nanobind::class_<wavecomb::SceneBuilder>& builder);
@@ -36,7 +36,7 @@ uint32_t add_graph(wavecomb::SceneBuilder& builder, const nanobind::bytes& ops,
                    const std::vector<std::pair<uint32_t, uint32_t>>& outputs,
                    const std::vector<std::string>& attributes);
 
-/// Builds a mesh from each description dict. Returns a list of dicts, or of error messages (str)
-/// for descriptions that fail.
+/// Builds a mesh from each dict of `descriptions`. Returns a list with a dict for each mesh, or
+/// with an error message (str) in place of a mesh that could not be built.
 nanobind::list make_surfaces(const wavecomb::SceneBuilder& builder,
                              const nanobind::list& descriptions, uint32_t threads);

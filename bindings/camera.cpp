@@ -63,7 +63,8 @@ nb::object to_python(const CameraParameter& p, const CameraValue& value) {
   return nb::cast(std::get<std::vector<FourNumbers>>(value));
 }
 
-/// Converts an array (k, 4, 4) of transforms over the shutter; None gives no motion.
+/// Converts an array (k, 4, 4) of camera transforms at `k` times of the shutter interval. Returns
+/// no transforms if `value` is None.
 std::vector<Affine> motion_of(nb::handle value) {
   std::vector<Affine> steps;
   if (value.is_none()) return steps;
@@ -81,7 +82,8 @@ std::vector<Affine> motion_of(nb::handle value) {
   return steps;
 }
 
-/// Sets camera values by name; `transform` and `to_world` set the transform and remove motion.
+/// Sets camera parameters from a dict. The keys `transform` and `to_world` set the camera's
+/// transform and remove its motion.
 void take(Camera& camera, const nb::dict& values) {
   for (const char* name : {"transform", "to_world"})
     if (values.contains(name)) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Cameras in Python: values of camera_table() as keyword arguments and dicts.
+/// Conversion of camera parameters between Python and the core. camera_table() lists the
+/// parameters.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -17,6 +18,6 @@ void set_camera(
 /// Returns all camera parameters by name, and to_world.
 nanobind::dict camera_dict(const wavecomb::Scene& scene);
 
-/// Returns a copy of the scene's camera with changed values. Throws Error that names the invalid
-/// value.
+/// Returns a copy of the scene's camera with changed values. Throws an `Error` that names the
+/// parameter if a value is invalid.
 wavecomb::Camera edited_camera(const wavecomb::Scene& scene, const nanobind::dict& values);

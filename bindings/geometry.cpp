@@ -110,8 +110,8 @@ SurfaceDesc describe(const SceneBuilder& builder, const nb::dict& d) {
   return desc;
 }
 
-/// Converts a vector to a NumPy array of shape (-1, columns), or to a one-dimensional array if
-/// `columns` is 0. Moves the data without copying.
+/// Moves a vector into a NumPy array of shape (size / columns, columns), or into a one-dimensional
+/// array if `columns` is 0, without copying the data.
 template <typename T>
 nb::object array_of(std::vector<T>&& values, size_t columns) {
   auto* held = new std::vector<T>(std::move(values));
@@ -211,7 +211,8 @@ nb::object quads(const Array<float>& points, const Array<int32_t>& indices,
       split_quads({points.data(), points.size()}, {indices.data(), indices.size()}, first), 3);
 }
 
-/// Number of values from which it is worthwhile to release the GIL.
+/// Arrays with at least this many values are processed without the GIL. For smaller arrays,
+/// releasing the GIL takes longer than the work.
 constexpr size_t kMinParallelSize = 1 << 15;
 
 /// Returns bounds as an array of shape (2, 3).
@@ -221,8 +222,8 @@ nb::object box_of(const PointBounds& bounds) {
   return array_of(std::move(box), 3);
 }
 
-/// Returns the corners per face, baked points, bounds, and for quads the result of `split_quads`;
-/// or None if the mesh is not plain.
+/// Returns the number of corners per face, the transformed points and their bounds, and the result
+/// of `split_quads` if the faces are quads. Returns None if the mesh needs the general mesh loader.
 nb::object plain_mesh(const Array<float>& points, const Array<int32_t>& counts,
                       const Array<int32_t>& indices, const Array<double>& matrix, double limit) {
   if (points.ndim() != 2 || points.shape(1) != 3) throw Error("points must have the shape (n, 3)");
@@ -295,7 +296,8 @@ nb::object transform_shape(const Array<float>& points, const Array<float>& norma
                         box_of(*bounds));
 }
 
-/// Returns which points are used by triangles, or None if all points are used.
+/// Returns an array that states for each point whether a triangle uses it, or None if triangles use
+/// all points.
 nb::object used_points(const Array<uint32_t>& triangles, size_t point_count) {
   std::vector<uint8_t> used(point_count, 0);
   size_t found = 0;

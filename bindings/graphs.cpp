@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Bindings of value graphs: names of operations, inputs and parameters, and running a program.
+/// Bindings of value graphs: lists of the operations, inputs and material parameters by name, and
+/// evaluation of a graph at given points.
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
@@ -51,8 +52,8 @@ Graph make_graph(const nb::bytes& ops, const std::vector<float>& constants, cons
 
 using Points = nb::ndarray<const float, nb::shape<-1, 30>, nb::c_contig, nb::device::cpu>;
 
-/// Runs a value graph's program at points in packets of type `F`. The last point is repeated to
-/// fill lanes.
+/// Evaluates a compiled value graph at points, in packets of type `F`. Repeats the last point to
+/// fill the last packet.
 template <typename F>
 void run(const GraphSet& set, const TextureView* textures, const Points& points, float* out) {
   const GraphView view = set.view();

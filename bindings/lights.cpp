@@ -21,7 +21,7 @@ using namespace wavecomb;
 
 namespace {
 
-// Names indexed by LightValueKind and LightGroup.
+// Python names of the values of `LightValueKind` and `LightGroup`.
 constexpr const char* kValueKinds[] = {"number", "colour", "flag", "choice", "id", "transforms"};
 constexpr const char* kGroups[] = {"emission", "shape", "shaping", "response"};
 
@@ -59,7 +59,8 @@ LightValue id_of(const Light& light, const LightParameter& p, nb::handle value,
   return id;
 }
 
-/// Converts a value from Python. `builder`: maps names of light groups to ids; may be null.
+/// Converts the value of a light parameter from Python. `builder` converts names of light groups to
+/// ids and may be null.
 LightValue from_python(const Light& light, const LightParameter& p, nb::handle value,
                        SceneBuilder* builder) {
   float number = 0;
@@ -114,8 +115,9 @@ std::string names(const Known& is_known) {
 /// Sets the parameters of a light, whose kind must be set, from keyword arguments.
 void take(Light& light, SceneBuilder& builder, const nb::kwargs& values) {
   const bool of_mesh = light.kind == kMeshLight;
-  // Lights with a transform accept the shared parameters of all kinds, for callers that pass the
-  // same set to each, but not the parameters specific to another kind.
+  // A light with a transform also accepts parameters that it does not use, for callers that pass
+  // the same parameters to lights of several kinds. It rejects parameters that are marked as
+  // specific to another kind of light.
   const auto is_known = [&](const LightParameter& p) {
     return p.kind != LightValueKind::kChoice &&
            ((!of_mesh && !p.is_specific) || p.is_of(light.kind));

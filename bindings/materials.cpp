@@ -53,7 +53,8 @@ TextureUse texture_use(const nb::dict& d) {
 
 namespace {
 
-/// Returns the enum value with the index of `name` in `names`; `what` begins the error message.
+/// Converts a name to the enum value whose index is the name's position in `names`. Throws an
+/// `Error` whose message begins with `what` if the name is unknown.
 template <typename Enum, size_t N>
 Enum named(const char* what, const char* const (&names)[N], const std::string& name) {
   for (uint32_t i = 0; i < N; ++i)
@@ -89,7 +90,8 @@ uint32_t add_texture(SceneBuilder& builder,
   desc.srgb = srgb;
   desc.wrap_s = wrap(wrap_s);
   desc.wrap_t = wrap(wrap_t);
-  const nb::gil_scoped_release release;  // lets other Python threads read images meanwhile
+  // Other Python threads can run while the texture is converted.
+  const nb::gil_scoped_release release;
   return builder.add_texture(desc);
 }
 

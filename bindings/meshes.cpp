@@ -23,11 +23,11 @@ using namespace wavecomb;
 
 namespace {
 
-/// Group index that means "no group".
+/// Value in the array of group indices for meshes that belong to no group.
 constexpr uint32_t kNoGroup = 0xffffffffu;
 
-/// Returns an owner that keeps arrays alive from C++. The destructor acquires the GIL to release
-/// the arrays.
+/// Returns an object with which C++ code keeps NumPy arrays alive. Its deleter acquires the GIL
+/// before it releases the arrays.
 std::shared_ptr<const void> own_arrays(nb::list arrays) {
   return {new nb::list(std::move(arrays)), [](const void* p) {
             const nb::gil_scoped_acquire gil;
@@ -35,8 +35,8 @@ std::shared_ptr<const void> own_arrays(nb::list arrays) {
           }};
 }
 
-/// Returns kVertex for values of shape (n, k) and kCorner for (m, 3, k), with a leading axis of
-/// motion steps if the mesh `deforms`.
+/// Returns `kVertex` for values of shape (n, k) and `kCorner` for values of shape (m, 3, k). If the
+/// mesh `deforms`, the shape begins with the number of motion steps.
 Attribute attribute_of(const std::optional<Array<float>>& values, size_t k, const std::string& name,
                        bool deforms = false) {
   if (!values) return Attribute::kNone;
@@ -47,8 +47,8 @@ Attribute attribute_of(const std::optional<Array<float>>& values, size_t k, cons
   throw Error("mesh '" + name + "' has attributes that are neither per vertex nor per corner");
 }
 
-/// Converts a dict of attributes; each value is a pair of rate and array (values, components). Adds
-/// the arrays to `owners`.
+/// Converts a dict of mesh attributes. Each item of the dict is a pair of the attribute's rate and
+/// an array of shape (values, components). Appends the arrays to `owners`, which keeps them alive.
 std::vector<MeshAttribute> attributes_of(SceneBuilder& builder, const nb::dict& attributes,
                                          nb::list& owners) {
   std::vector<MeshAttribute> out;
@@ -71,7 +71,7 @@ std::vector<MeshAttribute> attributes_of(SceneBuilder& builder, const nb::dict& 
   return out;
 }
 
-/// Creates a mesh that references the arrays without copying and keeps them alive.
+/// Creates a mesh that refers to the NumPy arrays without copying them, and keeps the arrays alive.
 Mesh make_mesh(SceneBuilder& builder, const Array<float>& positions,
                const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& indices,
                const std::optional<Array<float>>& normals, const std::optional<Array<float>>& uvs,
@@ -128,8 +128,8 @@ uint32_t add_mesh(SceneBuilder& builder, const Array<float>& positions,
   return builder.add_mesh(std::move(mesh));
 }
 
-/// Adds triangle meshes without normals or uvs, whose arrays are concatenated; returns the first
-/// id.
+/// Adds several triangle meshes without normals and texture coordinates. The arguments contain the
+/// concatenated arrays of all meshes. Returns the id of the first mesh.
 uint32_t add_meshes(SceneBuilder& builder, const Array<float>& positions,
                     const Array<uint32_t>& indices, const Array<uint32_t>& points,
                     const Array<uint32_t>& triangles, const Array<uint32_t>& materials,
@@ -181,8 +181,9 @@ void replace_mesh(SceneBuilder& builder, uint32_t id, const Array<float>& positi
                                      material, attributes, ""));
 }
 
-/// Creates a mesh with the data that curves and points have in common; the caller sets primitive,
-/// segments and normals. Adds the arrays to `owners`.
+/// Creates the `Mesh` of a curve or point primitive with the members that both have in common. The
+/// caller sets the primitive type, segments and normals. Appends the arrays to `owners`, which
+/// keeps them alive.
 Mesh curved_mesh(SceneBuilder& builder, const Array<float>& positions, const Array<float>& radii,
                  const std::optional<Array<float>>& uvs,
                  const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
@@ -252,7 +253,7 @@ uint32_t add_points(SceneBuilder& builder, const Array<float>& positions, const 
   return builder.add_mesh(std::move(mesh));
 }
 
-/// Rows and bounding radii of Gaussian splats.
+/// Gaussian splats as packed rows, and the radius of each splat's bounding sphere.
 struct GaussianSplatArrays {
   std::vector<GaussianSplatRow> rows;
   std::vector<float> radii;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Python module wavecomb._core: thin bindings without logic. Documented in
-/// python/wavecomb/_core.pyi.
+/// Python module wavecomb._core, which makes the C++ core available in Python. The stub file
+/// python/wavecomb/_core.pyi documents the module.
 #include <nanobind/nanobind.h>
 
 #include "bind.h"

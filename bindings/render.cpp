@@ -40,8 +40,9 @@ using namespace wavecomb;
 
 namespace {
 
-/// Scheduling policy implemented in Python. order() gets copies of the arrays, so that it may keep
-/// or modify them, and fills `keys`. Exceptions end the render and propagate to its caller.
+/// Scheduling policy implemented in Python. The Python method order() gets copies of the queue's
+/// arrays, which it may keep or modify, and fills `keys`. Exceptions of order() end the render and
+/// propagate to the caller of render().
 class PythonPolicy final : public SchedulingPolicy {
  public:
   PythonPolicy(nb::object object, const Scene& scene) : object_(std::move(object)) {
@@ -110,8 +111,8 @@ class PythonPolicy final : public SchedulingPolicy {
     std::copy(values.begin(), values.end(), own);
     return owned<const T>(own, values.size());
   }
-  /// Converts the result of order(), which must be a Python or NumPy bool. Throws Error for values
-  /// of another type.
+  /// Converts the result of the Python method order(). Throws `Error` unless the result is a Python
+  /// or NumPy bool.
   bool truth(const nb::object& result) const {
     const auto type = nb::cast<std::string>(result.type().attr("__name__"));
     if (type != "bool" && type != "bool_")

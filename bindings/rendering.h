@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Renders that are started from Python.
+/// Functions that run a render which was started from Python.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -25,7 +25,7 @@ struct Result {
   std::vector<std::byte> learned;
 };
 
-/// Arguments of render(); an argument that was not given is None.
+/// Arguments of the Python function render(). A missing argument is None.
 struct RenderArguments {
   nanobind::handle settings;
   nanobind::object progress, policy, costs;

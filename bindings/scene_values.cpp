@@ -25,12 +25,12 @@ using namespace wavecomb;
 
 namespace {
 
-// Members of OpenPbr by their Python names.
+// Pairs of a Python name and a member of class `Class`, such as `OpenPbr`.
 template <typename Class, typename Value>
 using Members = std::vector<std::pair<const char*, Value Class::*>>;
 
-// Macros that list the OpenPBR inputs of one type, number or colour, and expand to nothing for
-// inputs of another type.
+// The macros WAVECOMB_NUMBER_* expand to the OpenPBR inputs that are numbers, and WAVECOMB_COLOUR_*
+// to the inputs that are colours. Both expand to nothing for inputs of other types.
 #define WAVECOMB_NUMBER_Number(name) {#name, &OpenPbr::name},
 #define WAVECOMB_NUMBER_Colour(name)
 #define WAVECOMB_NUMBER_Derived(name)
@@ -63,7 +63,7 @@ void put(nb::dict& d, const Class& object, const Members<Class, Value>& members)
   for (const auto& [name, member] : members) d[name] = to_python(object.*member);
 }
 
-/// Reads values from a dict; error messages begin with `what`.
+/// Reader of parameters from a Python dict. Its error messages begin with `what`.
 class Reader {
  public:
   Reader(std::string what, nb::dict values) : what_(std::move(what)), values_(std::move(values)) {}
@@ -76,8 +76,8 @@ class Reader {
   void take(const char* name, Value& to) {
     if (const nb::object value = next(name); value.is_valid()) read(name, value, to);
   }
-  /// Throws Error if the dict has unknown keys; the message appends `which`, such as " that can be
-  /// changed".
+  /// Throws `Error` if the dict has a key that was not read. The message contains `which`, such as
+  /// " that can be changed".
   void end(const char* which = "") const {
     if (nb::len(values_) == used_count_) return;
     for (const auto& [key, value] : values_) {
@@ -115,7 +115,8 @@ class Reader {
   size_t used_count_ = 0;
 };
 
-/// Calls visit<Value>() for colours, numbers and flags, in display order.
+/// Calls `visit<Value>()` for the value types of material parameters: colours, numbers and flags.
+/// The order is the order in which parameters are displayed.
 template <typename Visit>
 void for_each_kind(const Visit& visit) {
   visit.template operator()<Vec3<float>>();
@@ -163,7 +164,8 @@ nb::dict texture_use_dict(const Scene& scene, const TextureUse& use) {
   return d;
 }
 
-/// Calls change(id, values) for each entry of `changes`.
+/// Calls `change(id, values)` for each item of `changes`, a dict from object index to a dict of
+/// values.
 template <typename Change>
 void for_each_change(const char* kind, const nb::dict& changes, const Change& change) {
   for (const auto& [key, value] : changes) {

@@ -29,16 +29,19 @@ wavecomb::Affine affine(
 /// Reads the parameters of program "openpbr" by name. Throws Error for unknown names.
 wavecomb::OpenPbr openpbr_of(const std::string& material, const nanobind::dict& values);
 
-/// Throws Error unless index `i` is less than `count`.
+/// Throws `Error` unless the index `i` is less than `count`. The message names `kind`, such as
+/// "material".
 void check_index(const char* kind, uint32_t i, size_t count);
 
-/// Returns the index of a name among `choices`, or nullopt if it is not a string or unknown.
+/// Returns the index of a name among `choices`. Returns nullopt if the value is not a string or not
+/// among `choices`.
 std::optional<uint32_t> index_in(const std::vector<const char*>& choices, nanobind::handle value);
-/// Returns the names as "a, b, c".
+/// Joins the names with commas, such as "a, b, c".
 std::string listed(std::span<const char* const> choices);
 
 /// Convert a transform to a row-vector matrix of 4 x 4 numbers (USD convention), and back.
-/// matrix_of throws Error that begins with `what` for other values.
+/// `matrix_of` throws an `Error` whose message begins with `what` if the value is not a 4 x 4
+/// matrix.
 nanobind::list matrix(const wavecomb::Affine& m);
 wavecomb::Affine matrix_of(const std::string& what, nanobind::handle value);
 
@@ -54,8 +57,9 @@ nanobind::list program_rows();
 /// range.
 nanobind::dict material_dict(const wavecomb::Scene& scene, uint32_t material);
 
-/// Converts the arguments of Renderer.edit(). Values that are not given stay unchanged. Throws
-/// Error that names the object and the invalid value.
+/// Converts the arguments of the Python method Renderer.edit(). Parameters that the dicts do not
+/// contain stay unchanged. Throws an `Error` that names the object and the parameter if a value is
+/// invalid.
 wavecomb::SceneEdit scene_edit(const wavecomb::Scene& scene, const nanobind::object& camera,
                                const nanobind::dict& materials, const nanobind::dict& lights,
                                const nanobind::dict& moves);

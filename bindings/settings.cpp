@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Settings in Python: an attribute per row of setting_table(), plus aovs and region.
+/// Python class Settings, with an attribute for each row of setting_table() and the attributes
+/// `aovs` and `region`.
 #include "settings.h"
 
 #include <nanobind/stl/optional.h>
@@ -115,7 +116,7 @@ SettingValue from_python(const SettingInfo& setting, nb::handle value) {
 /// Names indexed by SettingGroup.
 constexpr const char* kGroups[] = {"picture", "work", "order"};
 
-/// Returns a row as the dict that wavecomb.options reads.
+/// Converts a row of setting_table() to the dict that the Python module wavecomb.options reads.
 nb::dict row_dict(const SettingInfo& setting) {
   const SettingValue value = setting.get(Settings{});
   const char* kind = !setting.choices.empty()                     ? "choice"

@@ -6,10 +6,11 @@
 
 #include "wavecomb/render/statistics/render_statistics.h"
 
-/// Returns the `texture_store` entry of docs/statistics.md.
+/// Converts statistics of the texture store to the dict `texture_store` that docs/statistics.md
+/// describes.
 nanobind::dict texture_store_dict(const wavecomb::StoreStatistics& statistics);
 
-/// Returns the keys of docs/statistics.md that the core provides. `image_bytes` is the memory of
-/// the image, or 0 if there is no image yet.
+/// Converts statistics of a render to the dict that docs/statistics.md describes, without the keys
+/// that Python code adds. `image_bytes` is the memory of the image, or 0 before the first image.
 nanobind::dict statistics_dict(const wavecomb::RenderStatistics& statistics,
                                const nanobind::dict& settings, size_t image_bytes);

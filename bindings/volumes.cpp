@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Bindings of voxel grids, and of SceneBuilder for volumes.
+/// Bindings of voxel grids, and of the methods of SceneBuilder that add volumes.
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
@@ -21,7 +21,7 @@ namespace {
 
 using AnyArray = nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>;
 
-/// Grid with its transform to the object space of the volume.
+/// Voxel grid with its transform to the volume's object space.
 struct TransformedVoxels {
   VolumeField field;
 };

@@ -39,13 +39,14 @@ nb::dict status_dict(const RenderStatus& s) {
   return d;
 }
 
-/// Returns an array view of memory that is valid while the callback runs.
+/// Returns a NumPy array that refers to memory without owning it. The memory is valid until the
+/// Python callback returns.
 nb::object view(const void* data, size_t size) {
   return nb::cast(nb::ndarray<nb::numpy, const uint8_t>(data, {size}, nb::handle()),
                   nb::rv_policy::reference);
 }
 
-/// Returns an array that owns `bytes`.
+/// Moves `bytes` into a NumPy array.
 nb::object owned(std::vector<std::byte> bytes) {
   auto* own = new std::vector<std::byte>(std::move(bytes));
   const nb::capsule owner(own,
@@ -69,7 +70,8 @@ nb::dict state_dict(const Snapshot& s) {
   return d;
 }
 
-/// Snapshot in Python; its accessors throw once the callback that received it has returned.
+/// Python object for a `Snapshot` of a render. The methods throw after the callback that received
+/// the object has returned.
 class LiveSnapshot {
  public:
   LiveSnapshot(const Snapshot& snapshot, const nb::dict& settings)
@@ -88,8 +90,8 @@ class LiveSnapshot {
   nb::dict settings_;
 };
 
-/// Returns a NumPy array of the film's size that owns its values; arrays of one channel have two
-/// axes.
+/// Moves pixel values of the film's size into a NumPy array of shape (height, width, channels), or
+/// (height, width) if there is one channel.
 template <typename T>
 nb::object image(const Film& film, std::vector<T> values, size_t channels) {
   auto* own = new std::vector<T>(std::move(values));
@@ -124,8 +126,8 @@ Request request_of(const nb::object& answer) {
               "'; it must be None, \"snapshot\" or \"stop\"");
 }
 
-/// Returns the bytes of one entry of a checkpoint state. Throws Error unless the entry has `size`
-/// bytes.
+/// Returns the bytes of the item `key` of a checkpoint's state. Throws `Error` unless the item has
+/// `size` bytes.
 Bytes bytes_of(const nb::dict& state, const std::string& key, size_t size) {
   if (!state.contains(key.c_str()))
     throw Error("the checkpoint has no '" + key + "'; it is from another build");
@@ -182,7 +184,7 @@ std::function<std::vector<std::byte>(Film&, PassState&)> resumed_from(const nb::
     const auto active = nb::cast<Bytes>(state["pass.active"]);
     if (active.size() != 0) bytes_of(state, "pass.active", film.pixel_count());
     pass.active.assign(active.data(), active.data() + active.size());
-    // Checkpoints of older versions lack the entries of features that did not exist yet.
+    // Checkpoints from older versions of Wavecomb have no `pass.light_target`.
     if (state.contains("pass.light_target")) {
       const Bytes light = bytes_of(state, "pass.light_target", sizeof(uint32_t));
       std::memcpy(&pass.light_target, light.data(), sizeof(uint32_t));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Callbacks to Python during a render: status, snapshots, and state for resuming.
+/// Python callbacks during a render, which receive its status, snapshots of the image, and the
+/// state from which the render can be resumed.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -9,14 +10,15 @@
 #include "wavecomb/render/statistics/render_statistics.h"
 #include "wavecomb/scene/scene.h"
 
-/// Returns options with callbacks to Python's `progress(done, total)` and `watcher`, either of
-/// which may be None. The statistics of snapshots include `settings`. The callbacks acquire the
-/// GIL; all three arguments must outlive the render.
+/// Returns render options that call the Python objects `progress(done, total)` and `watcher`,
+/// either of which may be None. The statistics of each snapshot include `settings`. The callbacks
+/// acquire the GIL. All three arguments must exist until the render ends.
 wavecomb::RenderOptions watched_by(const nanobind::object& progress,
                                    const nanobind::object& watcher, const nanobind::dict& settings);
-/// Returns the training data (RenderOptions::learned) of the render that produced the checkpoint
-/// `state`, or an empty vector.
+/// Returns the training data that the checkpoint `state` contains, for `RenderOptions::learned`.
+/// Returns an empty vector if the checkpoint has none.
 std::vector<std::byte> learned_in(const nanobind::dict& state);
-/// Returns RenderOptions::resume for `state`, the result of an earlier Snapshot.state().
+/// Returns a function for `RenderOptions::resume` that restores the checkpoint `state`, which an
+/// earlier call of Snapshot.state() returned.
 std::function<std::vector<std::byte>(wavecomb::Film&, wavecomb::PassState&)> resumed_from(
     const nanobind::dict& state);

@@ -2,10 +2,10 @@
 # Defines the target OpenSubdiv::osdCPU, OpenSubdiv's CPU library. Searches for files, because the
 # CMake package of Debian 12 and Ubuntu refers to static libraries that it does not install.
 #
-# OpenSubdiv_ROOT: an additional folder to search.
-# OpenSubdiv_NEEDS_OPENMP: set if the library is linked with libgomp.
-# OpenSubdiv_SOURCE: folder of OpenSubdiv's sources. If set, the required parts of OpenSubdiv are
-# compiled with Wavecomb's flags, for another CPU or standard library than the distribution's.
+# OpenSubdiv_ROOT: an additional folder to search. OpenSubdiv_NEEDS_OPENMP: whether the library is
+# linked with libgomp. OpenSubdiv_SOURCE: folder of OpenSubdiv's source code. If set, the required
+# parts of OpenSubdiv are compiled with Wavecomb's flags. Builds for another CPU or standard library
+# than the Linux distribution's need this.
 
 # _osd_version(FOLDER): sets OpenSubdiv_VERSION from the headers in FOLDER.
 function(_osd_version folder)
@@ -22,7 +22,8 @@ if(OpenSubdiv_SOURCE)
   target_include_directories(wavecomb_opensubdiv SYSTEM PUBLIC "${OpenSubdiv_SOURCE}")
   target_compile_features(wavecomb_opensubdiv PUBLIC cxx_std_14)
   target_compile_options(wavecomb_opensubdiv PRIVATE -w)
-  # An imported target, so that exported targets refer to OpenSubdiv by the same name.
+  # Create an imported target, so that the installed CMake package of Wavecomb refers to OpenSubdiv
+  # by the same name.
   add_library(OpenSubdiv::osdCPU INTERFACE IMPORTED)
   set_target_properties(OpenSubdiv::osdCPU PROPERTIES INTERFACE_LINK_LIBRARIES wavecomb_opensubdiv)
   set(OpenSubdiv_LIBRARY wavecomb_opensubdiv)

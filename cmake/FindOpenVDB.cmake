@@ -1,6 +1,6 @@
-# SPDX-License-Identifier: Apache-2.0
-# Defines the target OpenVDB::openvdb. Searches for files, because OpenVDB's own module requires the
-# packages of Boost and Imath, which are not needed here.
+# SPDX-License-Identifier: Apache-2.0 Defines the target OpenVDB::openvdb. Searches for header and
+# library files, because OpenVDB's own CMake module requires the packages of Boost and Imath, which
+# Wavecomb does not need.
 #
 # OpenVDB_ROOT: if set, the only folder to search.
 set(_vdb_where "")
@@ -9,7 +9,7 @@ if(OpenVDB_ROOT)
 endif()
 find_path(OpenVDB_INCLUDE_DIR openvdb/openvdb.h ${_vdb_where})
 find_library(OpenVDB_LIBRARY openvdb ${_vdb_where})
-# OpenVDB's headers convert halves with a table in Imath.
+# OpenVDB's headers use a table of the Imath library to convert 16-bit floats.
 find_library(OpenVDB_IMATH_LIBRARY Imath ${_vdb_where})
 if(OpenVDB_INCLUDE_DIR)
   file(STRINGS "${OpenVDB_INCLUDE_DIR}/openvdb/version.h" OpenVDB_VERSION

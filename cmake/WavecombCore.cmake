@@ -1,9 +1,10 @@
-# SPDX-License-Identifier: Apache-2.0
-# wavecomb_add_core adds the core as a library. The function is called once for this tree, and once
-# more for each instruction set in WAVECOMB_ISAS.
+# SPDX-License-Identifier: Apache-2.0 The function wavecomb_add_core adds Wavecomb's C++ core as a
+# library target. The build calls the function once, and once more for each instruction set in
+# WAVECOMB_ISAS.
 
 file(GLOB_RECURSE core_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/*.cpp")
-# wavecomb_read_rows(VAR FILE PATTERN): sets VAR to the matches in a header of src/wavecomb.
+# wavecomb_read_rows(VAR FILE PATTERN) sets VAR to the list of matches of the regular expression
+# PATTERN in FILE, a header of src/wavecomb.
 function(wavecomb_read_rows var file pattern)
   set(file "${PROJECT_SOURCE_DIR}/src/wavecomb/${file}")
   file(READ "${file}" text)
@@ -12,8 +13,8 @@ function(wavecomb_read_rows var file pattern)
   set(${var} ${rows} PARENT_SCOPE)
 endfunction()
 
-# Rows of WAVECOMB_PROGRAMS: "X(name, Class, ...)" or "P(name, Class, ...)". Each program has a
-# header with its name.
+# Read the shading programs from the rows "X(name, Class, ...)" and "P(name, Class, ...)" of the
+# macro WAVECOMB_PROGRAMS. The code of each program is in a header with the program's name.
 wavecomb_read_rows(programs material/description/programs.h "\n  [XP]\\([a-z_0-9]+, ")
 list(TRANSFORM programs REPLACE "^.*\\(([a-z_0-9]+), $" "\\1")
 file(GLOB program_headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/material/programs/*.h")
@@ -30,12 +31,13 @@ foreach(program IN LISTS program_headers)
       "(src/wavecomb/material/description/programs.h) has no row for it")
   endif()
 endforeach()
-# Programs of media: rows of WAVECOMB_MEDIUM_PROGRAMS, "M(name, Class, ...)". Kernels of
-# media have no separate compilation units.
+# Read the medium programs from the rows "M(name, Class, ...)" of the macro
+# WAVECOMB_MEDIUM_PROGRAMS.
 wavecomb_read_rows(media material/description/programs.h " M\\([a-z_0-9]+, ")
 list(TRANSFORM media REPLACE "^.*\\(([a-z_0-9]+), $" "\\1")
-# Variants as "name:program": first the full programs, then rows of WAVECOMB_VARIANTS, "X(name,
-# program, parts)".
+# List of program variants in the form "name:program". The list begins with the unreduced programs.
+# The reduced variants follow, which are read from the rows "X(name, program, parts)" of the macro
+# WAVECOMB_VARIANTS.
 wavecomb_read_rows(reduced material/description/variants.h "\n  X\\([a-z_0-9]+, [a-z_0-9]+, ")
 list(TRANSFORM reduced REPLACE "^.*\\(([a-z_0-9]+), ([a-z_0-9]+), $" "\\1:\\2")
 set(variants ${programs} ${media})
@@ -44,19 +46,19 @@ list(APPEND variants ${reduced})
 set(lane_sources ${core_sources})
 list(FILTER lane_sources INCLUDE REGEX "\\.lanes\\.cpp$")
 list(FILTER core_sources EXCLUDE REGEX "\\.lanes\\.cpp$|/render/lane_kernels\\.cpp$")
-# Sources excluded from unity batches (WAVECOMB_BATCH), because their local names collide with names
-# in other sources: lights, bare_traversal.cpp and ears.cpp.
+# The sources of light kinds and light filters, bare_traversal.cpp and ears.cpp are excluded from
+# unity batches (WAVECOMB_BATCH), because their local names collide with names in other sources.
 file(GLOB alone "${PROJECT_SOURCE_DIR}/src/wavecomb/light/kinds/*.cpp" "${PROJECT_SOURCE_DIR}/src/wavecomb/light/filters/*.cpp")
 list(APPEND alone "${PROJECT_SOURCE_DIR}/src/wavecomb/accel/bare_traversal.cpp" "${PROJECT_SOURCE_DIR}/src/wavecomb/geometry/tessellation/ears.cpp")
 set(refiner "${PROJECT_SOURCE_DIR}/src/wavecomb/geometry/tessellation/subdivision.cpp")
 set_source_files_properties(${alone} ${refiner} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 if(WAVECOMB_SANITIZE)
-  # Sanitizers triple the time to optimise OpenSubdiv's templates.
+  # With sanitizers, compiling OpenSubdiv's templates with optimisation takes three times as long.
   set_source_files_properties(${refiner} PROPERTIES COMPILE_OPTIONS -O0 SKIP_PRECOMPILE_HEADERS ON)
 endif()
-# Sources that take a negligible part of the render time (descriptions, checks, tables, the plan of
-# a render) are compiled with -O1, in two thirds of the compile time. Sources with loops over
-# vertices, texels, pixels or training samples keep full optimisation.
+# Sources whose functions take a negligible part of the render time, such as scene descriptions and
+# checks of parameters, are compiled with -O1, which takes two thirds of the compile time of -O3.
+# Sources with loops over vertices, texels, pixels or training samples keep full optimisation.
 set(cold ${core_sources})
 list(FILTER cold INCLUDE REGEX
   "/src/wavecomb/(core|scene|render|(light|material|medium)/description|light/(tree|calibration)|geometry/mesh|graph/parameters|light_paths/render)/([a-z_]+/)?[a-z_]+\\.cpp$")
@@ -79,17 +81,18 @@ file(GLOB_RECURSE core_headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wave
 # which are common in kernels.
 set(core_warnings -Wfloat-conversion)
 
-# Third-party headers that nearly every unit includes. Parsing them is half of the compile time of a
-# small unit.
+# Third-party headers that nearly every source file includes. Parsing these headers takes half of
+# the compile time of a small source file.
 set(wavecomb_pch <algorithm> <array> <chrono> <cmath> <cstring> <functional> <limits> <memory> <numeric>
   <optional> <span> <string> <utility> <vector> <drjit/packet.h>)
 
-# Rows of WAVECOMB_KERNELS as "kind:set:widths:reduced".
+# Read the rows of the macro WAVECOMB_KERNELS as a list in the form "kind:set:widths:reduced".
 wavecomb_read_rows(kernels wave/kernels/kernel_matrix.h "\n  X\\([a-z]+, [a-z]+, [a-z]+, [a-z]+, ")
 list(TRANSFORM kernels REPLACE "^.*\\(([a-z]+), ([a-z]+), ([a-z]+), ([a-z]+), $" "\\1:\\2:\\3:\\4")
 
-# wavecomb_kernel_units(VAR KIND SET WIDTH): generates the units of a row of WAVECOMB_KERNELS for
-# WIDTH lanes in the build tree. SET is `programs`, `variants` or `first` (the first program).
+# wavecomb_kernel_units(VAR KIND SET WIDTH) generates the source files of a row of WAVECOMB_KERNELS
+# for WIDTH lanes in the build directory. SET is `programs`, `variants` or `first` (the first
+# program).
 function(wavecomb_kernel_units var kind set width)
   file(GLOB_RECURSE template "${PROJECT_SOURCE_DIR}/src/wavecomb/${kind}.lanes.cpp.in")
   if(NOT template)
@@ -106,7 +109,7 @@ function(wavecomb_kernel_units var kind set width)
         AND (NOT set STREQUAL "first" OR index EQUAL 0))
       set(unit "${PROJECT_BINARY_DIR}/lanes/${kind}_${member}_${width}.cpp")
       configure_file("${template}" "${unit}" @ONLY)
-      # With WAVECOMB_BATCH there is a unit for each program and width.
+      # With WAVECOMB_BATCH, all kernels of a program and lane width are compiled as one unit.
       set_source_files_properties("${unit}" PROPERTIES UNITY_GROUP "${program}")
       list(APPEND units "${unit}")
     endif()
@@ -115,9 +118,10 @@ function(wavecomb_kernel_units var kind set width)
   set(${var} ${units} PARENT_SCOPE)
 endfunction()
 
-# wavecomb_lane_units(VAR WIDTH WIDEST REDUCED): generates the units for WIDTH lanes in a build
-# whose widest lanes are WIDEST: the units of WAVECOMB_KERNELS (with its column `reduced` if
-# REDUCED), and one unit for each *.lanes.cpp. Units of different widths differ in WAVECOMB_LANES.
+# wavecomb_lane_units(VAR WIDTH WIDEST REDUCED) generates the source files for WIDTH lanes in a
+# build whose largest lane width is WIDEST. These are the files for all rows of WAVECOMB_KERNELS (as
+# their column `reduced` states if REDUCED is true), and one file for each *.lanes.cpp. The value of
+# WAVECOMB_LANES distinguishes files of different widths.
 function(wavecomb_lane_units var width widest reduced)
   set(all "")
   foreach(row IN LISTS kernels)
@@ -156,8 +160,8 @@ function(wavecomb_lane_units var width widest reduced)
 endfunction()
 
 # wavecomb_add_core(NAME FLAGS [STATIC]): adds the library NAME, compiled with FLAGS from
-# wavecomb_add_flags. The library always contains scalar units, whose kernels the reference
-# integrator uses.
+# wavecomb_add_flags. The library always contains the kernels for one lane, since the reference
+# integrator uses them.
 function(wavecomb_add_core name flags)
   add_library(${name} ${ARGN} ${core_sources} ${core_headers})
   target_compile_features(${name} PUBLIC cxx_std_20)
@@ -169,7 +173,8 @@ function(wavecomb_add_core name flags)
     OpenSubdiv::osdCPU)
   get_target_property(widths ${flags} WAVECOMB_WIDTHS)
   set_target_properties(${name} PROPERTIES UNITY_BUILD ${WAVECOMB_BATCH} UNITY_BUILD_BATCH_SIZE 10
-    DEFINE_SYMBOL "")  # so that precompiled headers of other targets match
+    # with the default define symbol, precompiled headers of other targets would not match
+    DEFINE_SYMBOL "")
   set(cold_target ${name}_cold)
   add_library(${cold_target} OBJECT ${cold})
   target_include_directories(${cold_target} PRIVATE "${PROJECT_SOURCE_DIR}/src")
@@ -196,7 +201,7 @@ function(wavecomb_add_core name flags)
     list(APPEND packets ${units})
   endforeach()
   wavecomb_lane_units(scalar 1 ${widest} ${reduced})
-  # lane_kernels() lists the lane widths of this library.
+  # Compile lane_kernels.cpp, which lists the lane widths of this library.
   set(table ${name}_lane_kernels)
   add_library(${table} OBJECT "${PROJECT_SOURCE_DIR}/src/wavecomb/render/lane_kernels.cpp")
   target_include_directories(${table} PRIVATE "${PROJECT_SOURCE_DIR}/src")
@@ -214,10 +219,12 @@ function(wavecomb_add_core name flags)
     target_compile_options(${lanes} PRIVATE ${core_warnings})
     target_link_libraries(${lanes} PRIVATE ${flags} embree TBB::tbb)
     target_sources(${name} PRIVATE $<TARGET_OBJECTS:${lanes}>)
-    # The kernels of a program are compiled together: they instantiate the same templates.
+    # All kernels of a shading program are compiled as one unit, since they instantiate the same
+    # templates.
     set_target_properties(${lanes} PROPERTIES UNITY_BUILD ${WAVECOMB_BATCH} UNITY_BUILD_MODE GROUP)
   endforeach()
-  # Headers that units of kernels include, except programs and code specific to each kernel.
+  # Headers that all source files of kernels include. Headers of shading programs and of single
+  # kernels are left out.
   set(kernel_pch ${wavecomb_pch} <wavecomb/wave/kernels/shared_kernels.h> <wavecomb/wave/wave.h>
     <wavecomb/wave/stages/order_rays.h>)
   foreach(step IN ITEMS interact emit sample_light scatter survive)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 # Finds Embree 4, oneTBB, OpenSubdiv, Dr.Jit's headers, Python, and optionally OpenVDB.
 #
-# Embree comes from the distribution, or else from .deps/embree, where tools/setup_embree stages it.
-# oneTBB comes from the same source as Embree, so that a process has one scheduler: from the
-# distribution with its Embree, or from the wheels (tbb, tbb-devel) with the staged Embree.
+# Embree comes from a package of the Linux distribution, or else from .deps/embree, where
+# tools/setup_embree installs it. The distribution's Embree is used with the distribution's oneTBB,
+# and the Embree in .deps/embree with the oneTBB of the Python wheels tbb and tbb-devel, so that a
+# process has only one copy of oneTBB.
 
 if(NOT DEFINED Python_EXECUTABLE AND EXISTS "${PROJECT_SOURCE_DIR}/.venv/bin/python")
   set(Python_EXECUTABLE "${PROJECT_SOURCE_DIR}/.venv/bin/python")
@@ -58,7 +59,7 @@ set(TBB_FIND_RELEASE_ONLY ON)
 if(WAVECOMB_EMBREE_IS_STAGED)
   find_package(TBB CONFIG QUIET COMPONENTS tbb PATHS "${_hint_tbb}" NO_DEFAULT_PATH)
 else()
-  # Ignore PATH, which may contain the bin directory of the environment.
+  # Ignore PATH, which may contain the bin directory of a Python environment with another oneTBB.
   find_package(TBB CONFIG QUIET COMPONENTS tbb NO_SYSTEM_ENVIRONMENT_PATH NO_CMAKE_ENVIRONMENT_PATH)
 endif()
 if(NOT TBB_FOUND)
@@ -75,7 +76,7 @@ else()
   set(WAVECOMB_TBB_IS_WHEEL FALSE)
 endif()
 
-# Wavecomb uses Far and Sdc of OpenSubdiv, not its evaluators or OpenGL.
+# Wavecomb uses OpenSubdiv's libraries Far and Sdc, but not its evaluators or its OpenGL support.
 list(APPEND CMAKE_MODULE_PATH "${PROJECT_SOURCE_DIR}/cmake")
 find_package(OpenSubdiv 3.4 MODULE QUIET)
 if(NOT OpenSubdiv_FOUND)
@@ -83,8 +84,8 @@ if(NOT OpenSubdiv_FOUND)
     "package (libosd-dev, opensubdiv-devel, opensubdiv), or pass -DOpenSubdiv_ROOT=.")
 endif()
 
-# OpenVDB, for the plug-in that reads volumes (WavecombVdb.cmake). OpenVDB must be linked with the
-# oneTBB above, so it comes from the same source as Embree.
+# The plug-in that reads volumes (WavecombVdb.cmake) needs OpenVDB. OpenVDB must use the same copy
+# of oneTBB as Embree, so both come from the Linux distribution, or both from .deps.
 option(WAVECOMB_VDB "Python: build the plug-in that reads volumes, where OpenVDB is found" ON)
 set(WAVECOMB_STAGED_OPENVDB "${PROJECT_SOURCE_DIR}/.deps/openvdb")
 if(WAVECOMB_PYTHON AND WAVECOMB_VDB)

@@ -1,6 +1,5 @@
-# SPDX-License-Identifier: Apache-2.0
-# wavecomb_private: compile options of every translation unit of this tree (core, tests, benchmarks,
-# bindings).
+# SPDX-License-Identifier: Apache-2.0 The target wavecomb_private holds the compile options of all
+# C++ files of this repository (core, tests, benchmarks, bindings).
 #
 # All units use the same floating-point options, so that a formula gives the same bits wherever it
 # is inlined.
@@ -10,21 +9,21 @@ include(CheckCXXSourceCompiles)
 set(WAVECOMB_LANE_WIDTHS "" CACHE STRING
   "Lane widths to build, of 1;4;8;16 (default: 1 and the widest that the target has); all: every width it has")
 
-# Compile options for every instruction set.
+# Compile options that are the same for all instruction sets.
 add_library(wavecomb_common INTERFACE)
 target_compile_features(wavecomb_common INTERFACE cxx_std_20)
 target_compile_options(wavecomb_common INTERFACE
   -ffp-contract=off -fno-strict-aliasing -fno-math-errno -fno-trapping-math
   -Wall -Wextra -Wpedantic $<$<CXX_COMPILER_ID:GNU>:-Wshadow=local> -Wnon-virtual-dtor -Woverloaded-virtual -Wextra-semi -Wno-psabi
-  # Masks of scalar lanes are of type bool, and kernels combine masks by & and |.
+  # In code for one lane, masks have the type bool, and kernels combine masks with & and |.
   $<$<CXX_COMPILER_ID:Clang,AppleClang>:-Wno-bitwise-instead-of-logical>
-  # Once inlined, GCC 12's own intrinsics cause false warnings of uninitialized and out-of-bounds
-  # vectors.
+  # GCC 12 gives false warnings about uninitialized and out-of-bounds vectors for inlined SIMD
+  # intrinsics.
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-maybe-uninitialized;-Wno-uninitialized;-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>
   $<$<BOOL:${WAVECOMB_WERROR}>:-Werror>)
 # Sanitizer checks of every reference and of every scope double the compile time of kernels and
-# containers, and quadruple the compile time of packets. WAVECOMB_SANITIZE=all, as in `make
-# test-long`, enables them.
+# containers, and quadruple the compile time of SIMD code. Only WAVECOMB_SANITIZE=all, which `make
+# test-long` sets, enables these checks.
 if(WAVECOMB_SANITIZE)
   if(WAVECOMB_SANITIZE STREQUAL "thread")
     set(_sanitize -fsanitize=thread -fno-omit-frame-pointer)
@@ -38,8 +37,8 @@ if(WAVECOMB_SANITIZE)
   target_link_options(wavecomb_common INTERFACE ${_sanitize})
 endif()
 
-# _wavecomb_has(VAR ARCH EXPRESSION): sets VAR to whether a preprocessor expression holds with
-# -march=ARCH.
+# _wavecomb_has(VAR ARCH EXPRESSION) sets VAR to true if the preprocessor expression EXPRESSION is
+# true with the compiler option -march=ARCH.
 function(_wavecomb_has var arch expression)
   set(CMAKE_REQUIRED_QUIET TRUE)
   if(arch)
@@ -50,10 +49,10 @@ function(_wavecomb_has var arch expression)
   set(${var} "${${key}}" PARENT_SCOPE)
 endfunction()
 
-# wavecomb_add_flags(NAME ARCH): adds the interface library NAME for code compiled with -march=ARCH
-# (empty: the compiler's default). Properties: WAVECOMB_WIDTHS, the lane widths to build;
-# WAVECOMB_LABEL, the name of the library in messages. The interface library NAME_widths defines
-# WAVECOMB_HAS_LANES_<width>.
+# wavecomb_add_flags(NAME ARCH) adds an interface library NAME, whose users are compiled with
+# -march=ARCH, or without -march if ARCH is empty. Its property WAVECOMB_WIDTHS lists the lane
+# widths to build, and WAVECOMB_LABEL is the library's name in messages. A second interface library
+# NAME_widths defines WAVECOMB_HAS_LANES_<width> for each of the lane widths.
 function(wavecomb_add_flags name arch)
   _wavecomb_has(_isa_4 "${arch}" "defined(__SSE4_2__) || defined(__ARM_NEON)")
   _wavecomb_has(_isa_8 "${arch}" "defined(__AVX2__) && defined(__FMA__)")
@@ -88,7 +87,8 @@ function(wavecomb_add_flags name arch)
     set(label default)
   endif()
   add_library(${name} INTERFACE)
-  # Sanitized builds have fewer kernels that contain the same code (wave/kernels/kernel_matrix.h).
+  # Builds with sanitizers leave out kernels whose code other kernels also contain (see
+  # wave/kernels/kernel_matrix.h).
   set(reduced 0)
   if(WAVECOMB_SANITIZE AND NOT WAVECOMB_SANITIZE STREQUAL "all")
     set(reduced 1)
@@ -102,8 +102,8 @@ function(wavecomb_add_flags name arch)
   endif()
   target_compile_definitions(${name} INTERFACE WAVECOMB_MAX_LANES=${most}
     WAVECOMB_REDUCED_KERNELS=${reduced})
-  # Only units that list the lane widths use these definitions. All other units compile to the same
-  # objects for any set of widths.
+  # Only source files that list the lane widths of the build use these definitions, so that changing
+  # the set of widths does not recompile any other file.
   add_library(${name}_widths INTERFACE)
   foreach(width IN LISTS widths)
     target_compile_definitions(${name}_widths INTERFACE WAVECOMB_HAS_LANES_${width}=1)

@@ -36,7 +36,8 @@ Python_add_library(wavecomb_cpu MODULE "${PROJECT_SOURCE_DIR}/bindings/cpu/cpu.c
 target_compile_definitions(wavecomb_cpu PRIVATE Py_LIMITED_API=0x030A0000)
 target_link_libraries(wavecomb_cpu PRIVATE wavecomb_common)
 if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
-  # wavecomb._cpu calls no libc function, but auditwheel determines the libc from this dependency.
+  # Link wavecomb._cpu with libc although it calls no libc function, since auditwheel determines the
+  # wheel's libc from this dependency.
   target_link_libraries(wavecomb_cpu PRIVATE "-Wl,--push-state,--no-as-needed" -l:libc.so.6 "-Wl,--pop-state")
 endif()
 set_target_properties(wavecomb_cpu PROPERTIES OUTPUT_NAME _cpu CXX_VISIBILITY_PRESET hidden

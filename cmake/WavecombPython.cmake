@@ -1,18 +1,19 @@
-# SPDX-License-Identifier: Apache-2.0
-# Adds the Python module wavecomb._core and the libraries that are installed with it. All rules use
-# the install component `python`, relative to site-packages.
+# SPDX-License-Identifier: Apache-2.0 Adds the Python module wavecomb._core and the libraries that
+# are installed with it. All install rules belong to the component `python`, and their destinations
+# are relative to site-packages.
 #
 # Without WAVECOMB_ISAS, there is one module, wavecomb/_core. With WAVECOMB_ISAS, each instruction
-# set has a module wavecomb/lib/<isa>/_core, wavecomb/_cpu reports which of them this CPU supports,
-# and python/wavecomb/isa.py chooses.
+# set has a module wavecomb/lib/<isa>/_core. The module wavecomb/_cpu reports the instruction sets
+# that the CPU supports, and python/wavecomb/isa.py chooses the module to load.
 
 execute_process(COMMAND "${Python_EXECUTABLE}" -m nanobind --cmake_dir
   OUTPUT_VARIABLE nanobind_ROOT OUTPUT_STRIP_TRAILING_WHITESPACE)
 find_package(nanobind CONFIG REQUIRED)
 
-# A stable-ABI module serves every Python from 3.10, with nanobind in the wheel nanobind-backend.
-# With libc++ a stable-ABI module works on macOS only (see nb_defs.h). With libc++ on other systems,
-# nanobind is linked statically, for the current Python version only.
+# The module uses Python's stable ABI, so that it works with all Python versions from 3.10. It loads
+# nanobind from the wheel nanobind-backend. With libc++ a stable-ABI module works on macOS only (see
+# nb_defs.h). With libc++ on other systems, nanobind is linked statically, and the module works only
+# with the Python version that it was built for.
 check_cxx_source_compiles("#include <version>
 #ifndef _LIBCPP_VERSION
 #error no
@@ -46,7 +47,8 @@ foreach(_group IN ITEMS "camera;geometry;lights;materials;meshes" "graphs;scene;
   set_source_files_properties(${_group} PROPERTIES UNITY_GROUP ${_name})
 endforeach()
 
-# An Embree that is neither staged nor in a system folder (embree_ROOT) needs an rpath.
+# If Embree is neither in .deps/embree nor in a system folder (embree_ROOT names its folder), the
+# module needs an rpath to find it.
 set(_embree_rpath "")
 if(NOT WAVECOMB_EMBREE_IS_STAGED)
   get_target_property(_embree_library embree LOCATION)
@@ -57,33 +59,35 @@ if(NOT WAVECOMB_EMBREE_IS_STAGED)
   endif()
 endif()
 
-# Install OpenSubdiv with the module, and the OpenMP runtime if OpenSubdiv is linked with it, since
-# no wheel provides them.
+# Install the OpenSubdiv library with the module, since no wheel provides it. The OpenMP runtime is
+# also installed if OpenSubdiv is linked with it.
 get_filename_component(_osd_library "${OpenSubdiv_LIBRARY}" REALPATH)
 set(_osd_link "")
 if(OpenSubdiv_NEEDS_OPENMP AND CMAKE_SYSTEM_NAME STREQUAL "Linux")
   execute_process(COMMAND "${CMAKE_CXX_COMPILER}" -print-file-name=libgomp.so.1
     OUTPUT_VARIABLE _gomp_library OUTPUT_STRIP_TRAILING_WHITESPACE)
-  # As a direct dependency of the module, the OpenMP runtime is found by the module's rpath, and is
-  # already loaded when OpenSubdiv needs it.
+  # Link the module with the OpenMP runtime, so that the module's rpath finds the runtime before
+  # OpenSubdiv is loaded, which needs it.
   set(_osd_link "-Wl,--push-state,--no-as-needed" gomp "-Wl,--pop-state")
 endif()
 
-# wavecomb_add_module(NAME CORE FLAGS FOLDER): adds wavecomb/FOLDER/_core, which uses the core
-# library CORE.
+# wavecomb_add_module(NAME CORE FLAGS FOLDER) adds the Python module wavecomb/FOLDER/_core, which
+# uses the core library CORE.
 function(wavecomb_add_module name core flags folder)
   wavecomb_nanobind_module(${name} ${binding_sources})
   target_compile_definitions(${name} PRIVATE WAVECOMB_VERSION="${PROJECT_VERSION}")
   target_link_libraries(${name} PRIVATE ${core} ${flags} TBB::tbb ${_osd_link})
   target_precompile_headers(${name} PRIVATE ${wavecomb_pch} <nanobind/nanobind.h> <nanobind/ndarray.h>)
-  # Export only the entry point, so that no other library binds to code for this instruction set.
+  # Export only the entry point of the module, so that other libraries never call functions that
+  # were compiled for this instruction set.
   if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
     target_link_options(${name} PRIVATE "-Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/python_exports.map")
     set_property(TARGET ${name} APPEND PROPERTY LINK_DEPENDS "${PROJECT_SOURCE_DIR}/cmake/python_exports.map")
   endif()
-  # In site-packages/wavecomb, `lib` holds the installed libraries, and ../../.. is <venv>/lib with
-  # libtbb.so.12 of the tbb wheel (omitted if oneTBB is the distribution's). In the build tree, the
-  # linked directories suffice.
+  # The rpath of the installed module contains site-packages/wavecomb/lib, which holds the installed
+  # libraries, and <venv>/lib, where the tbb wheel installs libtbb.so.12 (left out if the
+  # distribution's oneTBB is used). In the build directory, the rpath lists the folders of the
+  # linked libraries.
   string(REGEX REPLACE "[^/]+" ".." up "${folder}")
   if(up)
     string(APPEND up "/")
@@ -105,7 +109,7 @@ if(WAVECOMB_ISAS)
   include(cmake/WavecombIsas.cmake)
 else()
   wavecomb_add_module(wavecomb_python wavecomb_core wavecomb_private "")
-  # Target wavecomb_stub: the stub generated from the module, to compare with
+  # The target wavecomb_stub generates a stub file from the module, for comparison with
   # python/wavecomb/_core.pyi.
   nanobind_add_stub(wavecomb_stub EXCLUDE_FROM_ALL MODULE _core OUTPUT "${PROJECT_BINARY_DIR}/_core.pyi"
     PYTHON_PATH $<TARGET_FILE_DIR:wavecomb_python> DEPENDS wavecomb_python)

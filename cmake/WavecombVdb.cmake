@@ -24,7 +24,7 @@ set_target_properties(wavecomb_vdb PROPERTIES UNITY_BUILD ${WAVECOMB_BATCH} UNIT
   INSTALL_RPATH "${_vdb_rpath}"
   INSTALL_RPATH_USE_LINK_PATH OFF)
 if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
-  # DT_RPATH also applies to the dependencies of OpenVDB; DT_RUNPATH does not.
+  # Use DT_RPATH, since DT_RUNPATH does not apply to the libraries that OpenVDB depends on.
   target_link_options(wavecomb_vdb PRIVATE "-Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/vdb_exports.map"
     "-Wl,--disable-new-dtags")
   set_property(TARGET wavecomb_vdb APPEND PROPERTY LINK_DEPENDS "${PROJECT_SOURCE_DIR}/cmake/vdb_exports.map")
@@ -32,7 +32,7 @@ endif()
 install(TARGETS wavecomb_vdb LIBRARY DESTINATION wavecomb COMPONENT python)
 add_dependencies(wavecomb_python wavecomb_vdb)
 
-# Install the staged libraries with the module.
+# If OpenVDB comes from .deps/openvdb, install its libraries with the module.
 string(FIND "${OpenVDB_LIBRARY}" "${WAVECOMB_STAGED_OPENVDB}/" _at)
 if(_at EQUAL 0)
   install(DIRECTORY "${WAVECOMB_STAGED_OPENVDB}/lib/" DESTINATION wavecomb/lib COMPONENT python

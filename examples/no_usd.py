@@ -25,7 +25,7 @@ ground = np.array([[-4, 0, 4], [4, 0, 4], [4, 0, -4], [-4, 0, -4]], np.float32)
 panel = np.array([[-1, 0, -1], [1, 0, -1], [1, 1.6, -1.4], [-1, 1.6, -1.4]], np.float32)
 for points, material, name in ((ground, floor, "Ground"), (panel, gold, "Panel")):
     mesh = builder.add_mesh(points, triangles, material=material, name=name)
-    builder.add_to_group(0, mesh)  # group 0 is the world
+    builder.add_to_group(0, mesh)  # group 0 contains the objects in world space
 
 builder.add_light("sphere", at(1.5, 2.5, 1.0), name="Key", color=(30, 28, 25), radius=0.3)
 builder.add_light("dome", np.eye(4), name="Sky", color=(0.2, 0.25, 0.35))

@@ -19,19 +19,19 @@ struct Soup {
   std::vector<uint32_t> indices;
 };
 
-/// Build and traversal options of a scene.
+/// Options for building and tracing an Embree scene.
 struct Mode {
   const char* name;
   bool robust = true, filter = true;
   uint32_t width = 16;
   const char* device = nullptr;  ///< configuration string of the Embree device
   RTCBuildQuality quality = RTC_BUILD_QUALITY_MEDIUM;
-  bool merged = false;          ///< all meshes in one geometry
-  bool only_triangles = false;  ///< requests only triangle support from Embree
+  bool merged = false;          ///< whether all meshes are merged into one Embree geometry
+  bool only_triangles = false;  ///< whether scenes are built for triangles only
   bool coherent = false;
 };
 
-/// A scene built in a mode.
+/// An Embree scene that was built with the options of a `Mode`.
 class Built {
  public:
   Built(const std::vector<Soup>& soups, const Mode& mode) : mode_(mode) {

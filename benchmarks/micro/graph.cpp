@@ -1,7 +1,7 @@
-// SPDX-License-Identifier: Apache-2.0
-// Cost of value graphs per record: the parameters of program "openpbr" as constants, and driven by
-// a graph of 20 operations (an image, gradient noise, sums, mixes and sines of three components).
-// The lanes of a packet have one material or four different materials.
+// SPDX-License-Identifier: Apache-2.0 Cost per queued hit of evaluating the parameters of program
+// "openpbr" from constants, and from a value graph of 20 operations (an image, gradient noise,
+// sums, mixes and sines of three components). The hits of a packet have one material or four
+// different materials.
 #include <random>
 
 #include "scene_testing.h"

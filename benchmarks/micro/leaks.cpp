@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Counts rays that escape from closed rooms, with and without Embree's robust mode.
 //
-//      micro_leaks MILLIONS     rays of each kind and room, in millions
+//      micro_leaks MILLIONS     traces that many million rays per ray kind and room
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -21,7 +21,8 @@ Soup soup_of(const MeshData& mesh) {
           {mesh.indices.begin(), mesh.indices.end()}};
 }
 
-/// A closed tube along x with `n` sides of two long triangles each; vertices are shared.
+/// Makes a closed tube along x with `n` sides. Each side consists of two long triangles, which
+/// share vertices with the neighbouring sides.
 Soup tube(uint32_t n, float half_length, float radius) {
   Soup s;
   for (uint32_t i = 0; i < n; ++i)
@@ -55,8 +56,8 @@ void leaks(double millions) {
   struct Room {
     const char* name;
     Soup soup;
-    /// Fraction of the rays to trace; below 1 where long triangles with overlapping bounds make
-    /// Embree slow.
+    /// Fraction of the requested rays that are traced in this room. The fraction is below 1 in
+    /// rooms of long triangles, whose overlapping bounds make Embree slow.
     double share = 1;
   };
   const Room rooms[] = {{"box", soup_of(box({-1, -1, -1}, {1, 1, 1}))},

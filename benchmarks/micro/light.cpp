@@ -14,7 +14,8 @@ using namespace light_testing;
 
 constexpr size_t kSamples = 4096;
 
-/// Makes four lights of a kind, or two lights of every kind if `kind` is kLightKindCount.
+/// Makes four lights of the kind `kind`, or two lights of every kind if `kind` is
+/// `kLightKindCount`.
 Lights make_lights(uint32_t kind) {
   std::vector<Light> lights;
   std::vector<EmissiveTriangle> triangles;

@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: Apache-2.0
-// Loads and stores of rows of scattered records: word by word (gather, scatter) and row by row.
+// SPDX-License-Identifier: Apache-2.0 Cost of loading and storing records at random positions of an
+// array with SIMD instructions: by gathering and scattering 32-bit words, and by copying whole
+// records and transposing.
 #include <algorithm>
 #include <array>
 #include <random>
@@ -12,7 +13,8 @@
 namespace wavecomb::micro {
 namespace {
 
-// As many as in a wave; 16-word records take 256 KB, which fits the second-level cache.
+// Number of records, which equals the number of rays in a wave. Records of 16 words take 256 KB,
+// which fits the second-level cache.
 constexpr uint32_t kRecords = 4096;
 
 struct Records {

@@ -1,6 +1,6 @@
-// SPDX-License-Identifier: Apache-2.0
-// Cost of ordering a queue: sorting keys, and moving records compared with reading them by index.
-// The reported times are per record.
+// SPDX-License-Identifier: Apache-2.0 Cost of ordering a queue of hits: sorting the keys, and
+// either moving the queued hits into sorted order or reading them through sorted indices. The
+// reported times are per queued hit.
 
 #include <algorithm>
 #include <numeric>
@@ -15,7 +15,8 @@
 namespace wavecomb::micro {
 namespace {
 
-/// Keys of policy "material": program in the top byte, material below.
+/// Returns sorting keys as the scheduling policy "material" computes them: the shading program is
+/// in the top byte, and the material in the bytes below.
 std::vector<uint64_t> material_keys(size_t n, uint32_t materials) {
   std::mt19937 random(1);
   std::vector<uint64_t> keys(n);
@@ -69,7 +70,7 @@ void std_stable_sort(benchmark::State& state) {
 }
 BENCHMARK(std_stable_sort)->RangeMultiplier(16)->Range(256, 1 << 20);
 
-/// Fills a queue with n records in the order of random materials.
+/// Fills a queue with `n` hits of random materials and sorts it by material.
 void fill(ShadingQueue& queue, size_t n) {
   const std::vector<uint64_t> keys = material_keys(n, 24);
   RadixSorter sorter(n);
@@ -78,9 +79,9 @@ void fill(ShadingQueue& queue, size_t n) {
   queue.ordered = sorter.sort(n, queue.sorted_indices);
 }
 
-constexpr size_t kWords = 8;  ///< 32-bit words per record, as in a wave
+constexpr size_t kWords = 8;  ///< 32-bit words per queued hit, as in a wave
 
-/// Reads every record's row and ids once, in lanes, like a very inexpensive shader.
+/// Reads the data and ids of every queued hit once with SIMD loads, like a very inexpensive shader.
 float read_all(const ShadingQueue& queue) {
   constexpr size_t kLanes = WAVECOMB_MAX_LANES;
   using F = Lanes<kLanes>;

@@ -1,8 +1,8 @@
-// SPDX-License-Identifier: Apache-2.0
-// Cost of shading a record by program and lane width, with full packets and with packets filled to
-// 35 %, as arrival order fills packets of 16 on the Mixed stage. Includes hit set-up, material,
-// light sample, bounce and roulette, as in a wave, for synthetic hits (time_material) and a rect
-// light.
+// SPDX-License-Identifier: Apache-2.0 Cost of shading a queued hit, by shading program and lane
+// width. Packets are full or filled to 35 %, which is the mean for packets of 16 unsorted hits of
+// the Mixed scene. As in a render, shading includes the hit's surface data, the material, a light
+// sample, a bounce and Russian roulette. The hits are synthetic (`time_material`), and the light is
+// a rect light.
 #include "wave_testing.h"
 #include "widths.h"
 
@@ -12,11 +12,12 @@ namespace {
 using namespace scene_testing;
 
 constexpr uint32_t kRecords = 4096;
-constexpr uint32_t kEdge = 1024;  // edge of the textures in texels
+constexpr uint32_t kEdge = 1024;  // width and height of the textures in texels
 
-/// Features of a material: textures (1: base colour; 4: also roughness, a metallic map of zeros and
-/// an opacity map of ones; 5: also specular colour and normal) and a layer. `odd`: constant maps
-/// have one differing texel, so that they cannot be replaced by constants.
+/// Textures and layers of a material. `textures` is 1 for a base colour map, 4 for roughness,
+/// metallic (all zeros) and opacity (all ones) maps as well, and 5 for specular colour and normal
+/// maps as well. If `odd` is true, one texel of each constant map differs, so that no map is
+/// replaced by a constant.
 struct Look {
   const char* name;
   uint32_t textures;
@@ -48,7 +49,7 @@ TextureUse image(SceneBuilder& b, uint32_t channels, bool srgb, float low, float
                             Wrap::kRepeat, Wrap::kRepeat}));
 }
 
-/// Makes a constant image, with one differing texel if `odd`.
+/// Adds a texture with the same value in all texels. If `odd` is true, one texel has another value.
 TextureUse silent(SceneBuilder& b, uint8_t value, bool odd) {
   std::vector<uint8_t> bytes(size_t{kEdge} * kEdge, value);
   if (odd) bytes.back() = 127;

@@ -13,13 +13,14 @@ namespace {
 
 constexpr size_t kLookups = 1 << 16;
 
-/// Texture coordinates, and filter widths between two levels, so that both are read.
+/// Texture coordinates of the lookups, and a filter width between two mip levels, so that each
+/// lookup reads two levels.
 struct Queries {
   std::vector<float> s, t;
   float width;
 };
 
-/// Makes a texture of edge x edge texels of 8 bits, sRGB: edge^2 * 4 bytes at the finest level.
+/// Makes an 8-bit sRGB texture of edge x edge texels. Its finest level takes edge^2 * 4 bytes.
 /// Returns the previous texture if it has the same size.
 const Texture& texture_of(uint32_t edge) {
   static std::unique_ptr<Texture> made;
@@ -32,7 +33,8 @@ const Texture& texture_of(uint32_t edge) {
   return *made;
 }
 
-/// Coherent: along rows, a texel apart, as camera rays hit a plane. Otherwise: random positions.
+/// Makes lookups at consecutive texels along rows if `coherent` is true, as camera rays on a plane
+/// would, and at random positions otherwise.
 Queries make_queries(uint32_t edge, bool coherent) {
   Queries q;
   q.width = 1.4f / static_cast<float>(edge);
@@ -69,7 +71,8 @@ void texture(benchmark::State& state, uint32_t edge, bool coherent) {
 }
 
 const bool registered = [] {
-  // 4 bytes per texel: 16 KiB, 256 KiB, 4 MiB, 64 MiB, 256 MiB, plus a third for the mip levels.
+  // With 4 bytes per texel, the finest levels of these textures take 16 KiB, 256 KiB, 4 MiB, 64 MiB
+  // and 256 MiB.
   for (const uint32_t edge : {64u, 256u, 1024u, 4096u, 8192u})
     for (const bool coherent : {true, false})
       for_each_width([&]<size_t W>() {

@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-// Cost of tracing a ray: the rays of a render, traced by Embree alone and as the render does.
+// SPDX-License-Identifier: Apache-2.0 Cost of tracing a ray. Rays recorded from a render are traced
+// with Embree alone, and with the renderer's own traversal.
 #include <map>
 
 #include "scene_testing.h"
@@ -17,8 +17,9 @@ ScenePtr make_scene(bool large) {
   return large ? spheres(256) : cornell();
 }
 
-/// Rays of an image of 128 x 128 with 16 samples and diffuse bounces, in slot order or sorted by
-/// direction; recorded on first use.
+/// Returns the rays of a render with diffuse bounces, 128 x 128 pixels and 16 samples per pixel, in
+/// the order of path slots or sorted by direction. The first call for a scene and order renders and
+/// records them.
 RayRecording& recording(bool large, RayOrder order) {
   static std::map<std::pair<bool, RayOrder>, std::unique_ptr<RayRecording>> made;
   auto& rays = made[{large, order}];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Helpers of lane benchmarks: loops over lane widths, and time per item.
+/// Helpers for benchmarks of SIMD code: loops over lane widths, and a counter of the time per item.
 #pragma once
 
 #include <benchmark/benchmark.h>
@@ -31,7 +31,8 @@ inline std::string lanes_label(size_t width) {
   return "/lanes:" + std::to_string(width);
 }
 
-/// Adds the counter `seconds_per_<item>` for `n` items per iteration.
+/// Adds a counter `seconds_per_<item>` to the benchmark's output. Each iteration processes `n`
+/// items.
 inline void count_items(benchmark::State& state, const char* item, size_t n) {
   using benchmark::Counter;
   state.counters[std::string("seconds_per_") + item] =

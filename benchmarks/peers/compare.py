@@ -60,7 +60,7 @@ def prepare(scene: str, size: int, args: argparse.Namespace) -> Job:
     else:
         stage = Path(scene)
     recorded = args.cache / f"{label(scene, args)}-recorded"
-    # Always record again, because the loader may have changed.
+    # Always record the scene again, because the USD loader may have changed.
     scene_record = record(stage)
     write_volumes(scene_record, recorded)
     scene_record.save(recorded)

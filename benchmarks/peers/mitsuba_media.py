@@ -59,7 +59,8 @@ class Media:
         values, box = dense(volume["density"])
         box = box @ volume["to_world"]
         scale = float(extinction.max())
-        # Mitsuba's arrays are indexed z, y, x; one channel suffices if extinction is grey.
+        # Mitsuba's arrays are indexed z, y, x; a grid of one channel suffices if the extinction is
+        # grey.
         grid = np.ascontiguousarray(values.T)[..., None]
         if np.ptp(extinction) > 0.0:
             grid = grid * (extinction / scale).astype(np.float32)

@@ -123,7 +123,7 @@ class Recorded:
             for mesh in self.meshes
         ]
         scene["groups"] = [plain(asdict(group)) for group in self.groups]
-        # Written last: its presence means that the folder is complete.
+        # Write scene.json last, so that a folder with scene.json is complete.
         (folder / "scene.json").write_text(json.dumps(scene))
 
 

@@ -40,7 +40,8 @@ def open_wavecomb(args: argparse.Namespace, options: dict[str, Any]) -> Opened:
     import wavecomb
     from wavecomb import _core
 
-    # A scene keeps no state between renders: each render calibrates light shares anew.
+    # Wavecomb's scene keeps no state between renders, so each render calibrates the light selection
+    # probabilities again.
     stage = wavecomb.load(args.stage).scene
     settings = {
         "filter": "box",
@@ -76,7 +77,7 @@ def open_mitsuba(args: argparse.Namespace, options: dict[str, Any]) -> Opened:
     scene = MitsubaScene(mi, load(args.recorded), settings)
 
     def render(spp: int, seed: int) -> tuple[Any, int, int | None]:
-        picture = scene.render(spp, seed)  # returns only once the image is complete
+        picture = scene.render(spp, seed)  # `render` returns when the image is complete
         return picture, scene.scene.sensors()[0].sampler().sample_count(), None
 
     return render, {"version": mi.__version__, "settings": {"variant": variant, **vars(settings)}}

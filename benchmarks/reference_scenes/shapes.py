@@ -76,8 +76,8 @@ def as_rectangle(points: NDArray[Any], faces: NDArray[Any]) -> tuple[Matrix, flo
 def write_checker(file: Path, first: Sequence[float], second: Sequence[float]) -> None:
     """Write a checkerboard of two by two cells; the first colour is at uv 0 and at uv 1."""
     cells = np.indices((2, 2)).sum(axis=0) % 2
-    # Image rows are stored from top to bottom and v increases upwards, so the last row starts with
-    # the first colour.
+    # Row 0 of an image is at the top and v increases upwards, so the last row of the checkerboard
+    # starts with the first colour.
     colours = np.array([first, second], np.float32)
     image = colours[cells[::-1]]
     write_exr(file, image.repeat(CHECKER_TEXELS, axis=0).repeat(CHECKER_TEXELS, axis=1))

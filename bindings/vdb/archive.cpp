@@ -40,7 +40,8 @@ struct Entry {
   const std::string& name() const { return descriptor.gridName(); }
 };
 
-/// Part of a grid to read: the tree without voxel values, or everything.
+/// Part of a grid to read: the tree without voxel values (`kTopology`) or the whole grid
+/// (`kWhole`).
 enum class Part { kTopology, kWhole };
 
 class Archive final : public GridFile, private vio::Archive {
@@ -70,7 +71,7 @@ class Archive final : public GridFile, private vio::Archive {
   }
 
  private:
-  /// Calls read() and returns its result. Converts exceptions of OpenVDB to BrokenFile.
+  /// Calls `read` and returns its result. Throws `BrokenFile` if OpenVDB throws an exception.
   template <typename Read>
   static auto guarded(Read&& read) {
     try {
@@ -84,10 +85,10 @@ class Archive final : public GridFile, private vio::Archive {
 
   static std::string one_line(const char* text);
   void read_entries(int64_t size);
-  /// Sets the stream properties that OpenVDB reads, and discards the properties of the previous
-  /// grid.
+  /// Attaches the file's version and compression to the stream, where OpenVDB reads them, and
+  /// removes the properties of the previous grid.
   void tag_stream();
-  /// Creates a grid with its metadata and transform. The next read from the stream yields the
+  /// Creates a grid and reads its metadata and transform. Leaves the stream at the start of the
   /// grid's tree. Returns null if OpenVDB does not know the grid's type.
   openvdb::GridBase::Ptr begin(const Entry& entry);
   const Entry& instance_parent(const Entry& entry) const;
@@ -102,7 +103,8 @@ class Archive final : public GridFile, private vio::Archive {
 };
 
 Archive::Archive(const std::string& path) {
-  // Reads past the end must throw, since OpenVDB does not check.
+  // Reading past the end of the stream must throw, since OpenVDB does not check the state of the
+  // stream.
   const uintmax_t size = open_to_read(stream_, path);
   guarded([&] {
     readHeader(stream_);
@@ -131,7 +133,8 @@ void Archive::read_entries(int64_t size) {
     entry.descriptor.read(stream_);
     const auto& d = entry.descriptor;
     const int64_t here = stream_.tellg();
-    // A truncated file lacks its last grids. Offsets must increase, so that no table forms a cycle.
+    // Grids of a truncated file end beyond the file's size. Offsets must increase, so that no
+    // sequence of grid offsets forms a cycle.
     if (d.getEndPos() > size) throw BrokenFile("the file ends too early");
     if (d.getGridPos() < here || d.getBlockPos() < d.getGridPos() ||
         d.getEndPos() < d.getBlockPos())

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Grid values as bricks of 8^3 voxels: leaf nodes, and active tiles of higher levels split into
-/// bricks.
+/// Conversion of OpenVDB and NanoVDB grids to bricks of 8^3 voxels. A leaf node becomes one brick,
+/// and an active tile of a higher tree level is split into bricks.
 #pragma once
 
 #include <algorithm>
@@ -26,11 +26,11 @@ struct BrickFormat {
   size_t brick_bytes() const { return kBrickVoxels * voxel_bytes() + 3 * sizeof(int32_t); }
 };
 
-/// Statistics of the values of a grid.
+/// Statistics of a grid's voxel values.
 struct BrickFacts {
   uint64_t not_finite = 0;
   uint64_t negative = 0;
-  /// Smallest and largest finite value; the range always includes 0.
+  /// Smallest and largest finite value of the grid, where 0 always counts as a value.
   float least = 0.0f;
   float greatest = 0.0f;
   /// Number of bricks that held only zeros and were left out.
@@ -47,7 +47,8 @@ struct BrickFacts {
   }
 };
 
-/// Bricks of one grid: origins (n, 3) and values (n, 8, 8, 8, channels).
+/// Bricks of one grid. The array `origins` has the shape (n, 3), and `values` has the shape (n, 8,
+/// 8, 8, channels).
 struct Bricks {
   BrickFormat format;
   size_t count = 0;
@@ -81,12 +82,13 @@ void check_size(uint64_t bricks, const BrickFormat& format, uint64_t max_bytes);
 /// Converts floats that are exactly representable in 16 bits.
 void to_halves(const float* values, size_t count, uint16_t* halves);
 
-/// Fills bricks one after another. The caller converts values to float.
+/// Writer that appends bricks to an array. The caller converts voxel values to float.
 class BrickWriter {
  public:
   using Origin = std::array<int32_t, 3>;
 
-  /// Allocates memory for at most `most` bricks. Throws TooLarge, std::bad_alloc.
+  /// Allocates memory for at most `most` bricks. Throws `TooLarge` if the bricks exceed the limit
+  /// of `options`, and `std::bad_alloc` if the allocation fails.
   BrickWriter(uint64_t most, const BrickFormat& format, const BrickOptions& options);
 
   /// Buffer for the values of the next brick, x slowest, channels fastest.

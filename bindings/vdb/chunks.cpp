@@ -2,9 +2,9 @@
 /// Decompression of chunks in OpenVDB files that checks sizes before it writes.
 ///
 /// OpenVDB's functions read as many bytes as the file claims and check afterwards whether the
-/// buffer was large enough, so a broken file overwrites memory. The functions here have the same
-/// names and take precedence, since the plug-in loads the library (cmake/vdb_exports.map exports
-/// them).
+/// buffer was large enough, so a broken file overwrites memory. This file defines functions of the
+/// same names. cmake/vdb_exports.map exports them, so that the OpenVDB library calls these
+/// functions and not its unchecked ones.
 #include <openvdb/io/Compression.h>
 
 #include <cstdint>
@@ -15,10 +15,11 @@
 
 namespace {
 
-/// Maximum size increase of incompressible data.
+/// Maximum number of bytes by which a chunk of incompressible data may exceed its unpacked size.
 constexpr uint64_t kOverhead = 1024;
 
-/// Reads the next chunk, of `bytes` bytes when unpacked. Skips the chunk if `data` is null.
+/// Reads the next chunk of the stream and unpacks it to `bytes` bytes at `data`. Skips the chunk if
+/// `data` is null.
 template <typename Unpack>
 void read_chunk(std::istream& is, char* data, size_t bytes, Unpack&& unpack) {
   int64_t size = 0;

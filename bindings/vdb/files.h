@@ -21,7 +21,7 @@ class GridFile {
 
   virtual size_t size() const = 0;
   virtual Head head(size_t number) const = 0;
-  /// Describes a grid. Returns false if the library does not know the grid's type.
+  /// Describes a grid. Returns false if OpenVDB or NanoVDB does not know the grid's type.
   virtual bool describe(size_t number, GridFacts& facts) = 0;
   /// Reads a grid's values. Throws BrokenFile if the grid's type is not supported, and TooLarge if
   /// the bricks exceed options.max_bytes.

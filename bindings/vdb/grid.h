@@ -47,19 +47,21 @@ struct IndexBox {
   }
 };
 
-/// Properties of a grid that do not require voxel values.
+/// Properties of a grid that are known without reading voxel values.
 struct GridFacts {
   /// Whether bricks can be made from a grid of this type.
   bool is_read = false;
   /// Grid class: "fog volume", "level set", "staggered" or "unknown".
   std::string kind;
-  /// Row-major matrix of p' = p M; empty if the transform is not affine.
+  /// Row-major 4 x 4 matrix M that transforms index coordinates to object coordinates as p' = p M.
+  /// Empty if the transform is not affine.
   std::optional<std::array<double, 16>> index_to_object;
-  /// Background value: 1 or 3 components; empty if the type is not supported.
+  /// Background value of the grid, with 1 or 3 components. Empty if the grid's type is not
+  /// supported.
   std::vector<float> background;
   /// Number of active voxels.
   uint64_t voxels = 0;
-  /// Bounds of the active voxels; empty if there are none.
+  /// Bounds of the active voxels. Empty if the grid has no active voxels.
   std::optional<IndexBox> box;
   std::vector<std::pair<std::string, std::string>> metadata;
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Python module wavecomb._vdb: reading of .vdb and .nvdb files, and writing of .vdb files.
-/// Documented in python/wavecomb/_vdb.pyi. Loaded only for stages with volumes.
+/// Python module wavecomb._vdb: reading of .vdb and .nvdb files, and writing of .vdb files. The
+/// stub file python/wavecomb/_vdb.pyi documents the module. The USD loader imports the module only
+/// for stages with volumes.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
@@ -24,7 +25,8 @@ namespace nb = nanobind;
 
 namespace {
 
-/// Returns (4, 4) rows of p' = p M, or None if the transform is not affine.
+/// Converts the matrix M of a transform p' = p M to a list of four rows, or to None if the
+/// transform is not affine.
 nb::object rows_of(const std::optional<std::array<double, 16>>& matrix) {
   if (!matrix) return nb::none();
   nb::list rows;

@@ -44,7 +44,8 @@ static_assert(sizeof(GridHead) == 176);
 
 constexpr char kMagic[] = "NanoVDB";
 constexpr char kMagicOfOthers[] = "BDVonaN";
-/// Unpacked size of the chunks in which Blosc compresses a grid.
+/// Maximum unpacked size of a chunk of Blosc data. NanoVDB compresses a grid as a sequence of such
+/// chunks.
 constexpr uint64_t kNanoChunk = uint64_t{1} << 30;
 /// Upper bound of the compression ratios of zlib and Blosc.
 constexpr uint64_t kMaxPacked = 1100;

@@ -68,9 +68,9 @@ const auto* leaf_at(const Buffer& buffer, uint64_t at) {
   return leaf;
 }
 
-/// Traversal of a grid's nodes from the root. Depends only on the value type, so that quantised and
-/// plain leaves share one instantiation. The number of visited nodes is limited to those that fit
-/// in the buffer, which bounds the cost of a cycle of offsets.
+/// Traversal of a grid's nodes from the root. The template depends only on the type of voxel
+/// values, so that grids with and without quantised leaves use the same code. Traversal stops after
+/// as many nodes as fit into the buffer, so that it ends even if node offsets form a cycle.
 template <typename Value>
 class NanoTreeTraversal {
  public:
@@ -118,7 +118,7 @@ class NanoTreeTraversal {
  private:
   using Tile = typename Root::Tile;
 
-  /// Returns the entries of the root, sorted by origin.
+  /// Returns the tiles of the root node with their origins, sorted by origin.
   std::vector<std::pair<Origin, const Tile*>> root_tiles() const {
     const uint32_t count = root_->mTableSize;
     const Tile* tiles = buffer_.at<Tile>(at_root_ + sizeof(Root), count);
@@ -134,8 +134,8 @@ class NanoTreeTraversal {
     return found;
   }
 
-  /// Visits children and active tiles of an inner node with 2^Log2 entries per edge, each of `edge`
-  /// voxels per side.
+  /// Visits the children and active tiles of the inner node at the offset `at`. The node has
+  /// 2^`Log2` entries along each axis, and an entry covers `edge` voxels along each axis.
   template <typename Node, int Log2, typename OnTile, typename OnChild>
   void visit_inner(uint64_t at, const Origin& origin, int32_t edge, OnTile&& on_tile,
                    OnChild&& on_child) const {
@@ -161,11 +161,13 @@ class NanoTreeTraversal {
   const Root* root_ = nullptr;
 };
 
-/// Grid of a given value type. A function for the grid's build type reads its leaf nodes.
+/// NanoVDB grid whose voxel values have the type `Value`. A function that was chosen for the grid's
+/// build type reads its leaf nodes.
 template <typename Value>
 class NanoGrid {
  public:
-  /// Voxels of a leaf. `is_outside` is true for inactive voxels that hold the background value.
+  /// Voxel values of a leaf node. `is_on` is true for active voxels, and `is_outside` for inactive
+  /// voxels that hold the background value.
   struct LeafValues {
     std::array<float, kChannels<Value> * kBrickVoxels> values;
     std::array<bool, kBrickVoxels> is_on, is_outside;
@@ -189,7 +191,7 @@ class NanoGrid {
   NanoGrid(const Buffer& buffer, const LeafKind& kind)
       : buffer_(buffer), kind_(kind), tree_(buffer, kind.bytes) {}
 
-  /// Sets the background value, and the number and bounds of active voxels.
+  /// Sets the background value, the number of active voxels and their bounds in `facts`.
   void describe(GridFacts& facts) const {
     facts.background.resize(kChannels<Value>);
     put(tree_.background(), facts.background.data());
@@ -288,7 +290,8 @@ const char* kind_of(const nanovdb::GridData& data) {
   }
 }
 
-/// Returns the header of a grid after checking it against the file's table.
+/// Returns the header of a grid. Throws `BrokenFile` if the header is invalid or does not match the
+/// grid's entry in the file's table.
 const nanovdb::GridData& head_of(const Buffer& whole, uint32_t type) {
   const auto* data = whole.at<nanovdb::GridData>(0);
   if (std::memcmp(&data->mMagic, "NanoVDB", 7) != 0)
@@ -300,8 +303,8 @@ const nanovdb::GridData& head_of(const Buffer& whole, uint32_t type) {
   return *data;
 }
 
-/// Calls `use` with the value and leaf types of a nanovdb::GridType. Returns false if the GridType
-/// is not supported.
+/// Calls `use` with the value type and leaf node type of the nanovdb::GridType `type`. Returns
+/// false if grids of this type are not supported.
 template <typename Use>
 bool with_build(uint32_t type, Use&& use) {
   switch (static_cast<nanovdb::GridType>(type)) {

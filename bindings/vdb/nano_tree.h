@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Grids in NanoVDB's memory layout: description and bricks, without OpenVDB.
+/// Functions that describe grids in NanoVDB's memory layout and convert them to bricks, without
+/// using OpenVDB.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +9,8 @@
 
 namespace vdb {
 
-/// Returns the major version of the layout that this build reads, or 0 if built without NanoVDB.
+/// Returns the major version of NanoVDB's memory layout that this build reads, or 0 if Wavecomb was
+/// built without NanoVDB.
 uint32_t nano_major_version();
 
 /// Returns whether grids of a nanovdb::GridType are supported.
@@ -18,11 +20,13 @@ bool is_nano_type_read(uint32_t type);
 /// "fp8".
 const char* nano_type_word(uint32_t type);
 
-/// Describes a grid of `size` bytes, which must be aligned to 32; `type` is the grid type from the
-/// file's table. Reads nothing outside these bytes. Throws BrokenFile for invalid data.
+/// Describes the grid in the `size` bytes at `bytes`, an address that must be a multiple of 32.
+/// `type` is the grid type from the file's table. Reads nothing outside these bytes. Throws
+/// `BrokenFile` for invalid data.
 GridFacts nano_facts(const unsigned char* bytes, uint64_t size, uint32_t type);
 
-/// Makes bricks of a grid. Throws TooLarge, std::bad_alloc.
+/// Converts a grid to bricks. Throws `TooLarge` if the bricks exceed options.max_bytes, and
+/// `std::bad_alloc` if the allocation fails.
 Bricks nano_bricks(const unsigned char* bytes, uint64_t size, uint32_t type,
                    const BrickOptions& options);
 

@@ -26,8 +26,8 @@ Origin origin_of(const openvdb::Coord& xyz) {
   return {xyz.x(), xyz.y(), xyz.z()};
 }
 
-/// Calls `use` with the grid as its concrete type. Returns false if bricks are not supported for
-/// grids of this type. Each supported type costs about one second of compile time.
+/// Casts `grid` to its concrete type and calls `use` with it. Returns false if grids of this type
+/// cannot be converted to bricks. Each supported type costs about one second of compile time.
 template <typename Use>
 bool with_grid(const openvdb::GridBase& grid, Use&& use) {
   const auto as = [&]<typename Value>() {

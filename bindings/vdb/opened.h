@@ -11,8 +11,8 @@
 
 namespace vdb {
 
-/// Opens a file and returns its size in bytes. Later reads past the end of the file throw. Throws
-/// std::system_error.
+/// Opens a file and returns its size in bytes. Throws std::system_error if the file cannot be
+/// opened. The stream throws an exception when code reads past the end of the file.
 inline uintmax_t open_to_read(std::ifstream& stream, const std::string& path) {
   std::error_code code;
   const auto size = std::filesystem::file_size(path, code);

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Decompression that checks all sizes before it writes.
+/// Decompression of zlib and Blosc data. The functions check all sizes before they write.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 
-// Functions of Blosc and zlib, declared here because the headers of these two libraries, which
-// OpenVDB links, may not be installed.
+// Declarations of functions of Blosc and zlib. OpenVDB links these libraries, but their headers may
+// not be installed.
 extern "C" {
 int blosc_decompress_ctx(const void* from, void* to, size_t size, int threads);
 int uncompress(unsigned char* to, unsigned long* size, const unsigned char* from,

@@ -17,11 +17,12 @@ struct FilledBox {
   float value = 0.0f;
 };
 
-/// Grid to be written. Voxels other than +0 are active, and the background is +0, so that all bits
-/// are preserved. Contract: the arrays outlive the call of write_file().
+/// Grid that write_file() writes. Voxels are active unless their value is +0, and the background is
+/// +0, so that a reader gets the exact bits of all values. The arrays must exist until write_file()
+/// returns.
 struct WrittenGrid {
   std::string name;
-  /// Components of a value: 1 or 3.
+  /// Number of components of a voxel value, 1 or 3.
   uint32_t channels = 1;
   bool is_half = false;
   size_t bricks = 0;
@@ -29,16 +30,17 @@ struct WrittenGrid {
   const int32_t* origins = nullptr;
   /// (bricks, 8, 8, 8, channels), x slowest.
   const float* values = nullptr;
-  /// Rows of p' = p M, which has an inverse.
+  /// Rows of the invertible 4 x 4 matrix M that transforms index coordinates to object coordinates
+  /// as p' = p M.
   std::array<double, 16> index_to_object{};
-  /// Boxes are written before the bricks. Brick voxels of value +0 leave the voxels of a box
-  /// unchanged.
+  /// Boxes of voxels that are written before the bricks. Where a box and a brick overlap, voxels
+  /// with the value +0 in the brick keep the value of the box.
   std::vector<FilledBox> boxes;
   /// Whether nodes in which all voxels have the same value are stored as tiles.
   bool has_tiles = false;
 };
 
-/// Writes a file. Throws std::system_error.
+/// Writes grids to a .vdb file. Throws std::system_error if the file cannot be written.
 void write_file(const std::string& path, const std::vector<WrittenGrid>& grids);
 
 }  // namespace vdb

@@ -99,7 +99,7 @@ def __getattr__(name: str) -> Any:
     elif name == "cryptomatte":
         from wavecomb.image import cryptomatte as value
     elif name == "scenes":
-        # `from wavecomb import scenes` would call this function again.
+        # The statement `from wavecomb import scenes` would call this function again, without end.
         from importlib import import_module
 
         value = import_module("wavecomb.scenes")

@@ -774,8 +774,10 @@ class Settings:
     """Renders passes of 1, 1, 2, 4, ... samples per pixel, so that the whole image appears soon.
     Default: False."""
     # ---- to here ----
-    region: tuple[int, int, int, int] | None  # x0, y0, x1, y1: the pixels rendered, end excluded
-    # Names of aov_table(); "light_NAME" for one light group, "lpe:NAME=EXPRESSION".
+    # pixel rectangle x0, y0, x1, y1 to render, without row y1 and column x1
+    region: tuple[int, int, int, int] | None
+    # AOVs to render: names from aov_table(), "light_NAME" for the light group NAME, and
+    # "lpe:NAME=EXPRESSION" for a light path expression.
     aovs: list[str]
     def __init__(self, **settings: Any) -> None: ...
     def check(self) -> None:

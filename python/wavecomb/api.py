@@ -250,7 +250,7 @@ def _asked_for(
     region = choice.region(*chosen)
     if region is not None and "region" not in settings:
         settings["region"] = region
-        # Write files with the data window that the stage defines.
+        # Files get the data window that the stage's render settings define.
         settings.setdefault("crop", True)
     return chosen, choice.aovs if aovs is None else aovs
 

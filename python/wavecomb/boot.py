@@ -91,7 +91,8 @@ class PackageFinder:
         own = os.path.join(PACKAGE, "__init__.py")
         origin = None if found is None else found.origin
         if origin is not None and os.path.realpath(origin) == os.path.realpath(own):
-            # The import spec of an editable installation lists further folders of the package.
+            # Use the import spec that was found, since the spec of an editable installation lists
+            # further folders of the package.
             return found
         return spec_from_file_location(name, own, submodule_search_locations=[PACKAGE])
 

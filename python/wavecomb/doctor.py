@@ -200,7 +200,7 @@ def _embree_version() -> str:
     device = embree.rtcNewDevice(b"threads=1")
     if not device:
         raise WavecombError("Embree makes no device")
-    version = embree.rtcGetDeviceProperty(device, 0)  # 0 is RTC_DEVICE_PROPERTY_VERSION
+    version = embree.rtcGetDeviceProperty(device, 0)  # property 0 is RTC_DEVICE_PROPERTY_VERSION
     embree.rtcReleaseDevice(device)
     return f"{version // 10000}.{version // 100 % 100}.{version % 100}"
 

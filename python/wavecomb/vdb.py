@@ -148,7 +148,7 @@ def nano_version() -> int | None:
 
 
 def _plugin() -> Any:
-    # Import the core first, since it loads the process's only oneTBB.
+    # Import the core first, since it loads oneTBB, and OpenVDB must use the same copy of oneTBB.
     importlib.import_module("wavecomb._core")
     return importlib.import_module("wavecomb._vdb")
 
@@ -199,7 +199,7 @@ def read(
     """
     plugin = _needed(path)
     with _errors(plugin, path, head.name):
-        # The tree and its bricks are in memory at the same time.
+        # Reading a grid needs memory for OpenVDB's tree and for the bricks at the same time.
         found = plugin.bricks(
             str(path), head.number, memory.available_bytes() // 2, background_is_zero, not whole
         )

@@ -111,8 +111,8 @@ def view(
         words += ["--spp", str(spp)]
     words += ["--denoise"] * denoise + arguments(options)
     words += [] if path is None else ["--", os.fspath(path)]
-    # The window's process continues after this program ends, and does not receive a Ctrl-C for this
-    # program.
+    # The window's process continues after this program ends, and pressing Ctrl-C in this program's
+    # terminal does not end it.
     said = tempfile.TemporaryFile("w+", errors="replace")  # noqa: SIM115
     command = processes.command("wavecomb", "view", *words)
     process = processes.popen(command, stdin=subprocess.DEVNULL, stderr=said)

@@ -215,7 +215,7 @@ def run_lines(command: Sequence[str], text: str, *, fds: tuple[int, ...] = ()) -
         out, err = process.communicate(text)
     except BaseException:
         with contextlib.suppress(ProcessLookupError):
-            # Also ends the child processes of the process group.
+            # Kill the process group, so that child processes of the process end, too.
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
         raise

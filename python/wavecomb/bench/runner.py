@@ -185,8 +185,9 @@ class Sitting:
             if not path.exists():
                 self._prepares("stage", config.stage)
                 generate(config.source, path)
-        # The renderer whose name is last in alphabetical order makes the golden image of its
-        # family: the llvm variant of Mitsuba, not its scalar variant.
+        # Variants of a renderer share one golden image, which the variant that comes last in
+        # alphabetical order renders. For Mitsuba, this is the variant llvm, which is faster than
+        # scalar.
         by_name = sorted(configs, key=lambda config: config.renderer, reverse=True)
         goldens = {self.jobs.golden(c): c for c in by_name if c.golden}
         for path, config in goldens.items():

@@ -60,7 +60,7 @@ def run(job: Job) -> dict[str, Any]:
     if profile is not None:
         settings["costs"] = profile
     for _ in range(int(job.get("warm", 0))):
-        # The warm-up keeps no data for the timed render.
+        # The timed render reuses no training data of this warm-up render.
         api.render(stage.scene, size=size, spp=1, **settings)
     switch = Switch(job.get("perf"))
     switch.start()

@@ -15,7 +15,8 @@ def _stop(number: int, frame: Any) -> None:
     os._exit(130)
 
 
-# An exception raised in the middle of an import would print a traceback.
+# During imports, Ctrl-C ends the process without raising KeyboardInterrupt, which would print a
+# traceback.
 _handles = (
     threading.current_thread() is threading.main_thread()
     and signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -59,6 +60,6 @@ def main() -> None:
     Exit codes: 0 done, 1 pictures differ (compare), 2 an error, 130 stopped by Ctrl-C.
     `wavecomb COMMAND --help` says more.
     """
-    # NumPy multiplies only 3 x 3 matrices here. The thread pool of the library would only compete
-    # with Wavecomb's for cores.
+    # Keep OpenBLAS, which NumPy uses, to one thread. Wavecomb multiplies only small matrices with
+    # NumPy, and OpenBLAS's threads would compete with the render threads for cores.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

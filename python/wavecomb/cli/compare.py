@@ -122,8 +122,8 @@ def compare_command(
     from wavecomb.image.files.output_file import check_writable
     from wavecomb.image.thumbnails import DisplayOptions
 
-    # Pages and wipes show the beauty, not the denoised layer, because the metrics compare the
-    # beauty.
+    # The HTML page and the wipe image show the beauty layer and not the denoised layer, because the
+    # metrics compare the beauty layers.
     look = DisplayOptions(denoised=False, exposure=exposure, tone_map=tone_map)
     for name, file, ending in (("--page", page, ".html"), ("--wipe", wipe, ".png")):
         if file is not None and not file.lower().endswith(ending):

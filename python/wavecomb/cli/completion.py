@@ -31,7 +31,7 @@ def completion_command(shell: str) -> None:
     made = get_completion_class(shell)
     assert made is not None
     root = click.get_current_context().find_root().command
-    # click checks the version of bash by starting it when ``source`` is called. Filling in the
-    # template here skips this check, which every bash in use would pass.
+    # click's method ``source`` starts bash to check its version. This function fills in click's
+    # template itself to avoid that start, since all bash versions in use are new enough.
     template = made(root, {}, PROGRAM, VARIABLE)
     click.echo(template.source_template % template.source_vars())

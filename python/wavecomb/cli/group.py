@@ -103,7 +103,7 @@ class Commands(click.Group):
             if os.environ.get("WAVECOMB_DEBUG"):
                 raise
             if was_interrupted() and not isinstance(error, WavecombError):
-                # Some libraries turn a KeyboardInterrupt into another exception.
+                # Some libraries catch a KeyboardInterrupt and raise another exception instead.
                 click.echo("stopped", err=True)
                 sys.exit(INTERRUPTED)
             _fail(describe(error))

@@ -58,7 +58,8 @@ def render_command(part: str | None, **values: Any) -> None:
         render_tile(options, part)
         return
     enter_to_render(options)
-    # Large modules are loaded in the child process.
+    # Import large modules here, after the child process has started, so that the parent process
+    # stays small.
     from wavecomb.cli.frames import open_frames, render_sequence
     from wavecomb.cli.job import FrameShot, Still, how_far
     from wavecomb.cli.planning import prepare
@@ -81,7 +82,7 @@ def render_command(part: str | None, **values: Any) -> None:
                 shot = FrameShot(shared, frame, product=product, size=size)
             prepared.opened = None
             done = job.run(shot, prepared.resumed)
-            del shot  # free the scene, which is not needed for writing files
+            del shot  # free the scene's memory before the files are written
             if done.stopped is not None and not done.samples:
                 click.echo("stopped before the first sample; nothing was written", err=True)
                 raise click.exceptions.Exit(128 + done.stopped)

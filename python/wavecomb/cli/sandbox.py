@@ -38,8 +38,8 @@ def enter_to_render(
         trees = [(os.path.dirname(os.path.abspath(n)), os.path.splitext(n)[1]) for n in given]
         filled = []
     elif numbers:
-        # The list also keeps the file name patterns without a frame number, since a later check
-        # tests whether they can be written.
+        # The list contains the file name patterns as well as the names with frame numbers, since a
+        # later check tests whether files can be created at the patterns' paths.
         filled = [*given, *(fill(name, frame) for name in given for frame in numbers)]
     else:
         filled = given

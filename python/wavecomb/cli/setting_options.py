@@ -60,8 +60,8 @@ def setting_options(only: Iterable[str] | None = None) -> Callable[[F], F]:
 
 def _option(row: Setting) -> click.Option:
     """Returns the option of a setting."""
-    # The core checks ranges. The command line only rejects negative numbers, and 0 where 0 is
-    # invalid.
+    # The core checks that values are in range. The command line itself rejects only negative
+    # numbers, and the value 0 for settings that must be positive.
     return row_option(
         [row.option, row.name],
         _Steps(row, _offered(row)) if row.steps else row.kind,
@@ -265,7 +265,8 @@ def option(usage: str, kind: str | click.ParamType, text: str, **more: Any) -> C
     if "name" in more:
         names.append(more.pop("name"))
     given = _TYPES[kind] if isinstance(kind, str) else kind
-    if kind == "flag":  # with is_flag=False an option would not take "-1" as its value
+    # do not pass is_flag=False for other kinds, since click would then reject the value "-1"
+    if kind == "flag":
         more["is_flag"] = True
     return click.option(*names, type=given, metavar=metavar, help=text, **more)
 

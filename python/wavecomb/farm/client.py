@@ -120,7 +120,8 @@ class Run:
 
     def _choose_machine(self, images: list[int]) -> str:
         """Chooses the machine class of this run: most finished tiles first, then most workers."""
-        # waits until workers that start together have all registered
+        # Wait until all workers that were started at the same time have registered with the
+        # scheduler.
         time.sleep(_TURN_S if self._cluster.wait_s else 0.0)
         self._workers.query(0.0)
         found = self._workers.classes()
@@ -271,7 +272,8 @@ class Run:
             self._out.failed.append((self._job.title(image, tile), line))
         self._again([t for t in batch.tiles if t not in done and (t.image, t.tile) not in bad])
         if done:
-            # Use the last batch, because the times of the first batches include opening the stage.
+            # Estimate the time of a tile from the last batch, because the times of the first
+            # batches include opening the stage.
             self._seconds = result["seconds"] / len(done)
 
     def _note_done(self, task: Task) -> None:
@@ -304,9 +306,9 @@ class Run:
             line = f"its worker ended {self._job.tries} times: a crash, or too little memory"
         else:
             line = " ".join(str(error).split()) or type(error).__name__
-        if batch.is_plan:  # the tiles report what is wrong, or succeed without a plan
+        if batch.is_plan:  # render the tiles without a plan; failing tiles report the error
             self._tiles.extend(self._unplanned.pop(batch.image))
-        elif len(batch.tiles) > 1:  # the other tiles of the batch may still succeed
+        elif len(batch.tiles) > 1:  # retry each tile of the batch alone, since most may succeed
             self._again(batch.tiles)
         elif batch.tiles:
             one = batch.tiles[0]
@@ -389,7 +391,7 @@ def run(
         try:
             at_work.work(left)
         except (OSError, RuntimeError, TimeoutError) as error:
-            cluster.check(False)  # check() raises a clearer error if the scheduler has ended
+            cluster.check(False)  # `check` raises an error that states if the scheduler has ended
             raise WavecombError(f"{cluster.what}: {' '.join(str(error).split())}") from error
         outcome.stopped = outcome.stopped or is_stopped()
     return outcome

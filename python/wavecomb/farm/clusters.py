@@ -250,7 +250,8 @@ class _SlurmWorkers(Cluster):
             there = len(_ask("squeue", "--noheader", "--array", "--jobs", ids).split("\n")) - 1
         except WavecombError as error:
             if "Invalid job id" not in str(error):
-                return  # ignore other errors: the next call of check() queries Slurm again
+                # other errors may be temporary; the next call of this method queries Slurm again
+                return
             there = 0
         if there >= self._count:
             return

@@ -23,7 +23,7 @@ def answer(text: str) -> str:
             if options.get(name) is not None:
                 options[name] = tuple(options[name])
         folder = submit(told["stage"], told["output"], **options)
-    except Exception as error:  # the program that called this module shows the error
+    except Exception as error:  # the calling program displays the error message
         return json.dumps({"error": describe(error)})
     return json.dumps({"job": str(folder.path)})
 

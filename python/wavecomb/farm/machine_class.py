@@ -46,7 +46,8 @@ def library_hash() -> str:
     with contextlib.suppress(OSError):
         lines = Path("/proc/self/maps").read_text(errors="replace").splitlines()
         mapped = {line.split(maxsplit=5)[-1] for line in lines if " /" in line}
-        # Wheels of other packages contain copies that Wavecomb does not use.
+        # Ignore copies of these libraries in the wheels of other packages, which Wavecomb does not
+        # use.
         mapped = {path for path in mapped if not _OTHERS.search(path)}
         files |= {path for path in mapped if _LIBRARIES.match(os.path.basename(path))}
     told = hashlib.sha256()

@@ -43,7 +43,8 @@ def template(folder: Folder) -> dict[str, Any]:
         "specificationVersion": "jobtemplate-2023-09",
         "name": "Wavecomb render",
         "parameterDefinitions": [
-            # A parameter of type PATH would have to be inside the folder of the template.
+            # The job folder has the type STRING, since a parameter of type PATH must be inside the
+            # folder of the job template.
             {"name": "Job", "type": "STRING", "default": str(folder.path)},
             {"name": "Python", "type": "STRING", "default": processes.interpreter()},
         ],

@@ -105,7 +105,8 @@ class FarmPlugin(WorkerPlugin):
     def _watch(self) -> None:
         while not self._ended.wait(_LOOK_S):
             if progress.is_busy and time.monotonic() - progress.at > self._hang_s:
-                os._exit(1)  # Dask's nanny starts another worker, which gets the task
+                # Dask's nanny process starts a new worker, and the scheduler assigns the task again
+                os._exit(1)
 
 
 def retry_unrunnable(dask_scheduler: Any) -> None:

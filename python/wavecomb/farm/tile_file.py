@@ -198,7 +198,8 @@ def _write(
     good = output.open(str(file), spec) and output.write_image(pixels)
     why = "" if good else problem_of(output)
     if not (output.close() and good):
-        # Writing the file again without OpenImageIO raises an OSError that states the reason.
+        # Write the file again without OpenImageIO, because Python then raises an OSError that
+        # states why writing fails.
         file.write_bytes(bytes(pixels.nbytes))
         raise OSError(
             f"{called}: cannot be written: {one_line(why or problem_of(output), str(file))}"
@@ -282,7 +283,8 @@ def has_tile(path: Path, key: str, tile: Rectangle, checks: int = 0) -> bool:
 def _read(name: str, size: tuple[int, int] | None) -> tuple[dict[str, Any], NDArray[np.float32]]:
     import OpenImageIO as oiio
 
-    # open() raises errors with an errno, which OpenImageIO's errors lack.
+    # Open the file with Python first, whose exceptions have an errno. OpenImageIO's errors have
+    # none.
     with open(name, "rb") as file:
         if file.read(4) != b"\x76\x2f\x31\x01":
             raise ValueError("it is not an OpenEXR file")

@@ -99,7 +99,8 @@ class HistoryActions(QObject):
         self._tell(self._redo, what)
 
     def _tell(self, action: QAction, what: str) -> None:
-        if shiboken6.isValid(action):  # An undo stack emits signals even while Qt destroys it.
+        # The undo stack emits signals even while Qt destroys it and its actions.
+        if shiboken6.isValid(action):
             action.setText(f"{self._texts[action]} {what.replace('&', '&&')}".rstrip())
 
 

@@ -83,11 +83,12 @@ def run(
         (one, signal.signal(one, lambda *_: window.close()))
         for one in (signal.SIGINT, signal.SIGTERM)
     ]
-    # Python handles signals only while its interpreter runs, so a timer wakes it regularly.
+    # Python handles signals only while its interpreter runs, so a timer regularly runs a Python
+    # function.
     beat = QTimer(window)
     beat.start(200)
     # USD also reports problems during edits and when panels read the stage. The timer therefore
-    # adds USD's messages to the notes regularly.
+    # regularly moves USD's messages to the notes panel.
     listening = DiagnosticListener()
     beat.timeout.connect(lambda: window.session.note_words(listening.take()))
     window.show()

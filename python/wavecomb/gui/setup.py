@@ -127,7 +127,8 @@ class Setup(_Rows):
             layers = aov_names.with_others(self.layers(), aov_names.GUIDES if preview else ())
         if preview:
             values |= {name: settings()[name].default for name in NOT_IN_PREVIEWS}
-            # Measuring material costs or light weights would take longer than the preview.
+            # Previews use modelled material costs and light weights by power, since measuring costs
+            # and calibrating weights would take longer than the preview.
             values |= {"costs": "model", "light_weights": "power"}
             values["max_depth"] = min(self.max_depth, depth)
         else:

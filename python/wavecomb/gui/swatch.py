@@ -43,7 +43,7 @@ def swatch(colour: Colour, size: int, wide: int = 1) -> QIcon:
         painter.setPen(theme.dim())
         painter.drawRect(0, 0, wide * size - 1, size - 1)
     icon = QIcon(pixmap)
-    # Without this second mode, Qt tints the icon of a selected row.
+    # Use the same pixmap for selected rows, since Qt would tint the icon otherwise.
     icon.addPixmap(pixmap, QIcon.Mode.Selected)
     return icon
 

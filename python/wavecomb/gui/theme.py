@@ -12,7 +12,8 @@ from PySide6.QtWidgets import QApplication, QToolTip
 SYSTEM, DARK, LIGHT = "system", "dark", "light"
 CHOICES = (SYSTEM, DARK, LIGHT)
 
-# Colours of window, base, alternate base, button, text, dimmed text, lines, highlight, link.
+# For each colour scheme, the colours of Qt's palette roles: window, base, alternate base, button,
+# text, dimmed text, lines, highlight and link.
 _COLOURS = {
     DARK: (
         "#333333", "#202020", "#262626", "#454545", "#e2e2e2", "#939393", "#181818", "#3f74b5",
@@ -23,7 +24,8 @@ _COLOURS = {
         "#1a5cc8",
     ),
 }  # fmt: skip
-# Distinguishable in greyscale and with common colour deficiencies (Okabe and Ito 2008, adapted).
+# Colours of plotted curves, which are distinguishable in greyscale and with common colour vision
+# deficiencies. They are adapted from Okabe and Ito 2008.
 _SERIES = {
     DARK: ("#56b4e9", "#e69f00", "#2fbf8f", "#f0e442", "#d98cc0", "#ff7f50", "#9aa7ff", "#c0c5cc"),
     LIGHT: ("#0072b2", "#c67a00", "#00835f", "#8a7d00", "#a8508a", "#c04a00", "#4a54c4", "#5a6068"),

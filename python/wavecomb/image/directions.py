@@ -43,7 +43,7 @@ def map_directions(
     """
     up = np.asarray(up, np.float64)
     flat = np.asarray(ahead, np.float64) - up * (np.asarray(ahead, np.float64) @ up)
-    # Looking straight up or down, any horizontal direction works.
+    # If the view direction is vertical, use an arbitrary horizontal direction.
     if np.linalg.norm(flat) < 1e-6:
         flat = np.eye(3)[np.argmin(np.abs(up))]
         flat = flat - up * (flat @ up)

@@ -218,8 +218,8 @@ def heat(
     usable = wide[finite & (wide > 0.0)] if logarithmic else wide[finite]
     if usable.size == 0:
         usable = np.array([1.0])
-    # Logarithmic scales exclude 1 % at both ends, so that one bright pixel does not darken all
-    # others.
+    # The range of a logarithmic scale excludes the lowest and highest 1 % of the values, so that a
+    # few bright pixels do not darken all other pixels.
     ends = np.percentile(usable, (1.0, 99.0)) if logarithmic else (usable.min(), usable.max())
     least = float(ends[0]) if low is None else low
     most = float(ends[1]) if high is None else high

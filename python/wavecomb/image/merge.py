@@ -160,9 +160,10 @@ def _check_fit(first: _Source, other: _Source) -> None:
     rows = known_settings()
     for key in expectation():
         if key == "overscan":
-            # Overscan is checked below together with the image size.
+            # The overscan is compared below, together with the image size.
             continue
-        # Files of an earlier version lack settings that did not exist yet.
+        # A setting that is missing in a file has its default value, since older versions of
+        # Wavecomb did not have all settings.
         a, b = (one.settings.get(key, rows[key].default) for one in (first, other))
         if a != b:
             refuse(key, a, b)
@@ -243,7 +244,7 @@ def _add(
         if name in of_kind("nearest"):
             sums[name] = np.where(had, sums[name], layer) if name in sums else layer
             continue
-        # Pixels without samples may hold any value.
+        # Set pixels without samples to 0, since their values are undefined.
         values = np.where(samples > 0, layer, 0).astype(np.float64)
         if name in SQUARED:
             values = values * samples**2
@@ -293,7 +294,8 @@ def _merge_ranks(weighted: list[NDArray[Any]], samples: NDArray[np.float64]) -> 
         ids = np.ascontiguousarray(row[:, 0::2]).view(np.uint32)
         same = ids[:, :, None] == ids[:, None, :]
         counts = (same * row[:, None, 1::2].astype(np.float64)).sum(axis=2)
-        # The first of several equal ids holds their total count.
+        # If an id occurs several times in a pixel, its first entry gets the total count, and the
+        # count of its other entries becomes 0.
         repeated = (same & np.tri(ids.shape[1], k=-1, dtype=bool)).any(axis=2)
         counts[repeated] = 0
         order = np.lexsort((ids, -counts), axis=1)[:, :ranks]

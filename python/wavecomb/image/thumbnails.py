@@ -49,7 +49,8 @@ def encode_image(codes: NDArray[np.uint8], kind: Kind = "png") -> bytes:
     if kind == "jpeg":
         spec.attribute("Compression", _QUALITY)
         spec.attribute("jpeg:subsampling", "4:4:4")
-    # Use a file instead of a folder, since a sandboxed process may create only files.
+    # Create a temporary file and not a temporary folder, since a sandboxed process may only create
+    # files.
     number, name = tempfile.mkstemp(suffix=f".{kind}")
     os.close(number)
     try:

@@ -152,7 +152,7 @@ class Watcher:
             if not (snapshot.finished or sink.is_due()):
                 continue
             if not snapshot.status["samples_done"]:
-                # The render was stopped before it had any sample.
+                # Do not write an image if the render was stopped before its first sample.
                 continue
             warning = sink.take(snapshot)
             if warning is None:

@@ -84,7 +84,7 @@ class FrameReader:
             WavecombError: The stage cannot be rendered.
         """
         self._before = None
-        # The stage was opened with these options, so do not apply them again.
+        # These options were applied when the stage was opened, so do not apply them again.
         here = replace(options, mask=(), payloads=(), session_layer=None, variants=None)
         self._before = load_stage(self._stage, here, cache=self._cache, **how)
         return self._before
@@ -109,14 +109,14 @@ class FrameReader:
         if not self._cache.varying.is_view_only and before.frame != number:
             return None
         if before.leaves_out_levels:
-            # Some mip levels were left out for the previous view, and a different view may need
-            # them.
+            # Load the stage again, since the loaded textures lack mip levels that the new view may
+            # need.
             return None
         report = LoadReport()
         settings = view_settings(self._stage, options, report)
         if before.camera_path is None or settings.camera is None:
-            # The default view frames the geometry; it does not apply if an authored camera is
-            # invalid.
+            # Without a camera in the stage, the default view is used, which shows all geometry. The
+            # loaded scene can be kept only if both views are the default view.
             is_same = before.camera_path is None and settings.camera is None
             if not is_same or before.render != settings.choice:
                 return None

@@ -223,7 +223,8 @@ class ProgressBar(Silent):
         from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
         width = bar_width(console.width)
-        # The fixed width is the width of the title, the bar and the percentage, each with a space.
+        # The title, the bar and the percentage have a fixed width, and a space follows each of
+        # them. The rest of the line is for the text after the percentage.
         self._space = console.width - (len(title) + 1) - (width + 1) - 5
         self._bar = Progress(
             TextColumn(title, markup=False),

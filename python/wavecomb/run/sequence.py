@@ -78,7 +78,8 @@ class Frames:
         """
         started = time.perf_counter()
         options = LoadOptions.of(self._options, {**changes, "frame": frame})
-        # If a stage has shadow catchers, its separate renders contain different sets of prims.
+        # A stage with shadow catchers is rendered several times per frame, with different sets of
+        # prims.
         is_same = self._renderer is not None and options.catch == self._caught
         self._caught = options.catch
         loaded = self._with_camera(options) if is_same else None

@@ -16,15 +16,20 @@ if TYPE_CHECKING:
 DEFAULT_SIZE = (600, 600)
 MAX_EDGE = 65536
 MAX_SPP = 1 << 24
-# Memory of adaptive renders: sums and layers of errors, and buffers for estimating errors.
+# Memory per pixel of error estimates in adaptive renders: the sums, the error layers and temporary
+# buffers.
 _ERROR_BYTES_PER_PIXEL = 100
-# Memory of firefly reweighting: brightness cascades and the unbiased layer.
+# Memory per pixel of firefly reweighting: the brightness cascades and the layer without
+# reweighting.
 _CASCADE_BYTES_PER_PIXEL = 96 + 12
-# Memory of light splats, for the beauty and for each layer that receives splats.
+# Memory per pixel of light splats, for the beauty layer and for each other layer that receives
+# splats.
 _SPLAT_BYTES_PER_PIXEL = 48
-# Memory of merging light paths: the visible point of a pixel and its entries in the hash grid.
+# Memory per pixel of light path merging: the pixel's visible point and its entries in the hash
+# grid.
 _VISIBLE_BYTES_PER_PIXEL = 64 + 48
-# Upper bound of the memory of deep images: sums in the film and samples in the image.
+# Upper bound of the memory per pixel of deep images: the sums in the film and the samples in the
+# image.
 _DEEP_BYTES_PER_PIXEL = 1 + 4
 _DEEP_BYTES_PER_SAMPLE = 40 + 24
 
@@ -140,7 +145,7 @@ def image_bytes(settings: Settings, aovs: Sequence[str], light_groups: int = 1) 
     may_have_splats = settings.transport != "auto" or settings.quality != "plain"
     if settings.transport != "path" and may_have_splats:
         sums = 1 + has_error_layers(settings) + aov_names.splat_layers(aovs, light_groups)
-        # Each pixel also stores the sample count of its light path.
+        # The last 4 bytes are the sample number of the light path that starts with the pixel.
         each += _SPLAT_BYTES_PER_PIXEL * sums + 4
         each += _VISIBLE_BYTES_PER_PIXEL * (settings.merge_radius > 0)
     if aov_names.DEEP in settings.aovs:

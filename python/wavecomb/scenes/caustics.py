@@ -74,7 +74,8 @@ _POOL = (3.0, 2.0)
 0."""
 _DEPTH, _RIM = 1.3, 0.12
 _WAVES = (
-    # Columns: direction in degrees, wavelength and height in metres, phase in radians.
+    # Waves on the water: direction in degrees, wavelength in metres, height in metres and phase in
+    # radians.
     (20.0, 1.30, 0.020, 0.4),
     (75.0, 0.85, 0.012, 1.9),
     (-35.0, 0.62, 0.008, 3.1),

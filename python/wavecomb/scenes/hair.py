@@ -243,7 +243,8 @@ def hair_strands(rng: np.random.Generator, count: int) -> FloatArray:
         curl = 0.30 * t * np.sin(2.2 * math.pi * t + phase) * waves
         heading = normalized(heading) + np.array([0.0, -0.8, 0.0]) + 0.3 * comb * (1.0 - t)
         q = p + step * normalized(heading + curl + frizz)
-        # Keep the strand close outside of the head and, below the head, no wider than the head.
+        # Keep the strand outside of the head and close to its surface. Below the head, keep the
+        # strand within the head's width.
         out = np.linalg.norm(q, axis=1, keepdims=True)
         way = q / np.maximum(out, 1e-9)
         near = head_radius(way)[:, None] * (lift if k else 1.0 + 0.5 * (lift - 1.0))
@@ -260,7 +261,8 @@ def hair_strands(rng: np.random.Generator, count: int) -> FloatArray:
 def build_head(writer: StageWriter, options: SceneOptions) -> None:
     """Builds a smooth head, without a detailed face, and its hair."""
     rng = np.random.default_rng([options.seed, 22])
-    # The skin is covered by a thin film of oil. Mean free paths are in decimetres.
+    # The coat of the skin's material models a thin film of oil. The mean free paths of the skin are
+    # in decimetres.
     skin = {"specular_roughness": 0.48, "specular_ior": 1.4, "coat_weight": 0.25,
             "coat_roughness": 0.3, "coat_ior": 1.45}  # fmt: skip
     below_surface(writer, "Head", (0.76, 0.5, 0.38), (0.037, 0.014, 0.007), **skin)

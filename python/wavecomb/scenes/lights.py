@@ -114,8 +114,8 @@ def _mesh(
     half = np.array([0.25, 0.4, 0.03]) if kind == "Sign" else np.array([0.04, 0.0, 0.6])
     half = half * size
     area = 8.0 * (half[0] * half[1] + half[1] * half[2] + half[0] * half[2])
-    # Emissive triangles emit from both sides, but the inner sides of a closed box illuminate
-    # nothing.
+    # Emissive triangles emit from both sides, but only the outer sides of a closed box illuminate
+    # the scene.
     wanted = power / (np.pi * area * (1.0 if kind == "Sign" else 0.5))
     step = round(2.0 * np.log2(wanted))
     hue = int(rng.integers(_SIGN_COLOURS))

@@ -296,7 +296,7 @@ def build_clouds(writer: StageWriter, options: SceneOptions) -> None:
     sun.CreateColorAttr(Gf.Vec3f(1.0, 0.78, 0.52))
     sun.AddRotateXYZOp().Set(Gf.Vec3f(-14.0, 62.0, 0.0))
     writer.dome_light("Sky", 30.0, 0.6)
-    # A fill light, so that the shadows are not black.
+    # Add a weak fill light, so that the shadows are not black.
     writer.rect_light("Glow", (0.0, 40.0, 0.0), 30.0, 30.0, (0.25, 0.3, 0.4))
     writer.camera((0.0, 5.5, 26.0), (0.0, 7.5, 0.0), 50.0, options.aspect or 16.0 / 9.0)
 

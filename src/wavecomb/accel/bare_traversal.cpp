@@ -12,7 +12,7 @@ namespace {
 
 constexpr float kUnbounded = std::numeric_limits<float>::infinity();
 
-/// Embree types and functions for packets of W rays.
+/// Embree's ray type and query functions for packets of `W` rays.
 template <uint32_t W>
 struct Packet;
 template <>
@@ -89,8 +89,8 @@ void query(Arguments& args, bool coherent) {
   args.flags = coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
 }
 
-/// Calls trace(base, n, valid) for each packet of rays; n < W only in the last packet. Returns the
-/// sum of the results of trace().
+/// Calls `trace(base, n, valid)` for each packet of rays. `n` is the number of rays in the packet,
+/// which is `W` except in the last packet. Returns the sum of the results of `trace`.
 template <uint32_t W, typename Trace>
 size_t for_each_packet(size_t size, Trace&& trace) {
   alignas(64) int valid[W];

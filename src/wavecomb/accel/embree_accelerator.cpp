@@ -33,7 +33,7 @@ struct PacketTypes<16> {
   using RayHit = RTCRayHit16;
 };
 
-/// Returns the Embree arguments for closest-hit queries and initialises `context`.
+/// Initialises `context`, and returns the arguments with which Embree's closest-hit queries use it.
 RTCIntersectArguments intersect_arguments(QueryContext& context, const SceneView& scene,
                                           const PresenceKeys& keys, uint32_t first_world,
                                           uint32_t first_light, bool coherent) {
@@ -70,8 +70,8 @@ bool is_mostly_hair(const Scene& scene) {
 
 }  // namespace
 
-/// BVH, which edited scenes share, and the view of one scene, whose materials determine the opacity
-/// of surfaces.
+/// The BVH, which accelerators of edited scenes share, and a view of the scene whose materials
+/// determine the opacity of surfaces.
 struct EmbreeAccelerator::Impl {
   std::shared_ptr<const Scene> scene;
   std::shared_ptr<const EmbreeHierarchy> hierarchy;
@@ -79,7 +79,7 @@ struct EmbreeAccelerator::Impl {
   RTCScene top;
   uint32_t first_world, first_light;  ///< as in EmbreeHierarchy
   uint32_t native;                    ///< number of rays in the widest native packet
-  /// List that replaces the BVH in small scenes; null in other scenes.
+  /// List of triangles that replaces the BVH in small scenes. Null if the BVH is used.
   std::unique_ptr<const TriangleList> list;
   bool is_hair;  ///< whether most primitives are curve segments
 
@@ -100,8 +100,8 @@ struct EmbreeAccelerator::Impl {
     const float *u, *v;
     const unsigned *prim, *geom, *inst;
   };
-  /// Converts the Embree ids of the first `n` rays of a packet to scene ids, in a loop that
-  /// compilers vectorise. Stores the hits in `out` from index `base` on.
+  /// Stores the hits of the first `n` rays of a packet in `out`, starting at index `base`. Converts
+  /// Embree's ids to scene ids in a loop that compilers vectorise.
   void store_hits(const PacketHits& hits, const HitSpan& out, size_t base, size_t n) const {
     const auto [t, u, v, prim, geom, inst] = hits;
     for (size_t i = 0; i < n; ++i) {
@@ -147,7 +147,8 @@ struct EmbreeAccelerator::Impl {
   template <uint32_t W, typename Ray>
   static void load_rays(Ray& ray, int* valid, const RaySpan& rays, size_t base, size_t n) {
     for (uint32_t i = 0; i < W; ++i) valid[i] = i < n ? -1 : 0;
-    // Columns are padded by a packet, so reads may go past their end.
+    // The arrays of a `RaySpan` are padded, so all `W` values can be copied even if the packet has
+    // fewer rays.
     std::memcpy(ray.org_x, rays.ox + base, 4 * W);
     std::memcpy(ray.org_y, rays.oy + base, 4 * W);
     std::memcpy(ray.org_z, rays.oz + base, 4 * W);
@@ -222,11 +223,12 @@ struct EmbreeAccelerator::Impl {
     }
   }
 
-  /// Returns the number of rays per packet. Embree splits packets wider than the native width and
-  /// calls filters with single rays, whose position in the packet is unknown, so the native width
-  /// is the limit. Moving instances use single rays, since Embree inverts their transform with
-  /// different operations for packets and single rays, which changes hits. Incoherent rays in hair
-  /// also use single rays, because rays of a packet soon traverse different BVH nodes.
+  /// Returns the number of rays per packet, which is at most the native width. Embree would split
+  /// wider packets and call filters with single rays, whose position in the packet is unknown. In
+  /// scenes with moving instances, rays are traced singly, since Embree inverts the transforms of
+  /// moving instances with different rounding in packets and single rays. Incoherent rays are also
+  /// traced singly in scenes of hair, because the rays of a packet would soon traverse different
+  /// BVH nodes.
   uint32_t packet(uint32_t width, bool coherent, const PresenceKeys& keys) const {
     const bool parts = is_hair && !coherent && !keys.object;
     return parts || view.motion.instances ? 1 : std::min(width, native);

@@ -11,18 +11,21 @@ struct RTCSceneTy;  // Embree's scene type
 
 namespace wavecomb {
 
-/// Rays to trace, in SoA layout. Directions are unit vectors; tnear is 0.
+/// Rays to trace, as one array per component. Directions are unit vectors, and rays start at
+/// distance 0.
 struct RaySpan {
   const float *ox, *oy, *oz, *dx, *dy, *dz;
   const float* tfar;     ///< maximum distance of each ray; null means no limit
-  const uint32_t* slot;  ///< path slots for PresenceKeys; null means that the ray index is the slot
+  const uint32_t* slot;  ///< slot of each ray's path, an index into the arrays of `PresenceKeys`;
+                         ///< null means that ray i belongs to slot i
   size_t size;
   const float* time = nullptr;  ///< shutter time of each ray in [0, 1]; null means 0
 };
 
-/// Output columns for hits. The barycentrics u and v are defined as in HitBuffer. `inst` is an
-/// index into SceneView::instances and `geom` a geometry within its group; or `inst` is kLightShape
-/// and `geom` the index of the light record, or `inst` is kNoHit.
+/// Arrays to which hits are written. The barycentric coordinates `u` and `v` are defined as in
+/// `HitBuffer`. If a ray hits a mesh, `inst` is an index into `SceneView::instances` and `geom` the
+/// index of a geometry in the instance's group. If a ray hits a light, `inst` is `kLightShape` and
+/// `geom` the index of the light record. If a ray hits nothing, `inst` is `kNoHit`.
 struct HitSpan {
   float *t, *u, *v;
   uint32_t *prim, *geom, *inst;
@@ -30,67 +33,72 @@ struct HitSpan {
 inline constexpr uint32_t kNoHit = 0xffffffffu;
 inline constexpr uint32_t kLightShape = 0xfffffffeu;
 
-/// Returns a hash of an instanced mesh for PresenceKeys::object. Two objects of a scene collide
-/// with probability 2^-32, which matters from some ten thousand instances on.
+/// Returns a hash that identifies an instanced mesh in `PresenceKeys::object`. Two objects of a
+/// scene have the same hash with probability 2^-32, so collisions are likely only with tens of
+/// thousands of instances.
 template <typename U>
 inline U object_of(const U& inst, const U& mesh) {
   return U(inst * 0x9e3779b1u) + mesh;
 }
 
-/// Per-path data that decides whether a surface with partial presence stops a ray. The random
-/// numbers are keyed by the path, so that traversal order has no effect. The arrays are indexed by
-/// path slot.
+/// Data of each path that decides whether a surface with partial presence stops a ray. The decision
+/// is a hash of the path's sample and the primitive, so that it does not depend on the order of
+/// traversal. The arrays are indexed by path slot.
 struct PresenceKeys {
   const uint32_t* pixel_hash = nullptr;
   const uint32_t* sample = nullptr;
-  uint32_t stride = 1;  ///< distance between the values of consecutive slots, in 32-bit words
-  /// Differs for each depth and for shadow rays, so that crossings are independent.
+  uint32_t stride = 1;  ///< distance between the values of consecutive slots in `pixel_hash` and
+                        ///< `sample`, in 32-bit words
+  /// Input of the hash that differs for each depth, and for shadow rays, so that decisions along a
+  /// path are independent.
   uint32_t salt = 0;
-  /// For shadow rays with light linking: 1 + index of the set of geometry that casts shadows, or 0
-  /// for all geometry. The pointer is null without light linking.
+  /// For each shadow ray, 1 + the index of the set of geometry that casts shadows from the ray's
+  /// light, or 0 if all geometry casts shadows. Null if the scene has no light linking.
   const uint32_t* shadow_set = nullptr;
   uint32_t shadow_stride = 0;
   uint32_t ray_kind = kVisibleToCamera;  ///< a RayVisibility flag
-  /// The only object that each ray can hit, as a value of object_of(), with the same stride as
-  /// pixel_hash. Rays that are restricted to one object hit no lights. A null pointer means that
-  /// rays hit all objects.
+  /// The only object that each ray can hit, as a result of `object_of`, with the same stride as
+  /// `pixel_hash`. Such rays hit no lights. A null pointer means that rays can hit all objects.
   const uint32_t* object = nullptr;
 };
 
 /// Rule by which traversal chooses among hits at the same distance.
 enum class HitRule : uint8_t {
-  kCanonical,  ///< the same hit for all packets and orders (docs/decisions/canonical-hits.md)
-  kList,       ///< like kCanonical, but small static scenes use triangle_list.h; the default
-  kEmbree,     ///< the hit that Embree keeps without filters; for BareTraversal only
+  kCanonical,  ///< the same hit for any packet width and order of rays
+               ///< (docs/decisions/canonical-hits.md)
+  kList,    ///< the same as kCanonical, but small static scenes use a `TriangleList`; the default
+  kEmbree,  ///< the hit that Embree finds without filter functions; for `BareTraversal` only
 };
 
-/// Two-level bounding volume hierarchy. Each group of meshes is built once and instanced any number
-/// of times; the meshes of the world group are in the top level.
+/// Two-level bounding volume hierarchy. A BVH is built once for each group of meshes, which can be
+/// instanced any number of times. The meshes of group 0, in world space, are in the top level.
 ///
-/// Contract: reads the Scene's arrays without copies and shares its ownership; tracing is
-/// thread-safe.
+/// Contract: the accelerator reads the scene's arrays without copying them and keeps the scene
+/// alive. Several threads can trace rays at the same time.
 class EmbreeAccelerator {
  public:
   /// Builds the acceleration structure with up to `threads` threads; 0 means all threads. Throws
   /// Error if Embree fails, for example if out of memory.
   EmbreeAccelerator(std::shared_ptr<const Scene> scene, uint32_t threads,
                     HitRule rule = HitRule::kList);
-  /// Creates an accelerator for an edited version of the scene of `origin`. Shares the BVH with
-  /// `origin`, or the groups whose meshes are unchanged. Groups are rebuilt if the presence
-  /// filtering or hair status of a mesh changes; then, or if an object moves or the shape or
-  /// position of a light changes, the top level is rebuilt.
+  /// Creates an accelerator for an edited version of the scene of `origin`. The new accelerator
+  /// uses the BVHs of `origin` as far as they are valid for the edited scene. The BVH of a group is
+  /// rebuilt if the edit changes whether hits on one of its meshes are filtered or whether rays hit
+  /// a mesh from outside only. The top level is rebuilt if a group is rebuilt, an object moves, or
+  /// the shape or position of a light changes.
   EmbreeAccelerator(std::shared_ptr<const Scene> edited, const EmbreeAccelerator& origin,
                     uint32_t threads);
   ~EmbreeAccelerator();
 
-  /// Finds closest hits. `width`: rays per packet, 1, 4, 8 or 16, limited to the native width.
-  /// `coherent`: the rays of a packet have similar directions and are traversed together. Hits do
-  /// not depend on width or order, nor on `coherent` if the rays share an origin; otherwise hits at
-  /// edges may differ (docs/decisions/canonical-hits.md). Scenes with motion ignore `coherent`;
-  /// scenes with moving instances trace single rays (docs/decisions/motion.md).
+  /// Finds the closest hits of rays. `width` is the number of rays per packet: 1, 4, 8 or 16, but
+  /// at most the native width. If `coherent` is true, the rays of a packet should have similar
+  /// directions, and Embree traverses them together. The hits do not depend on `width` or the order
+  /// of rays. They do not depend on `coherent` either if all rays have the same origin; otherwise,
+  /// hits at edges may differ (docs/decisions/canonical-hits.md). `coherent` is ignored in scenes
+  /// with motion, and `width` in scenes with moving instances (docs/decisions/motion.md).
   void intersect(const RaySpan& rays, const HitSpan& hits, uint32_t width, bool coherent,
                  const PresenceKeys& keys) const;
-  /// Writes occluded[i] = 1 if ray i hits something before tfar, else 0.
+  /// Sets `occluded[i]` to 1 if ray `i` hits something before its `tfar`, and to 0 otherwise.
   void occluded(const RaySpan& rays, uint32_t* occluded, uint32_t width, bool coherent,
                 const PresenceKeys& keys) const;
 

@@ -16,9 +16,10 @@ const CurveGeometry& curves_of(const void* user) {
   return *static_cast<const CurveGeometry*>(user);
 }
 
-/// Calls found(i, primitive, hit) for each ray of a packet and each primitive of the BVH node, with
-/// the first hit that is present for the ray's path, or with any hit, depending on `query`.
-/// wants(slot) returns whether the ray of a path slot may hit these curves at all.
+/// Intersects the rays of a packet with the curve segments of a BVH node. Calls `found(i,
+/// primitive, hit)` for ray `i` and each segment that it hits. `query` selects the first hit that
+/// is present for the ray's path, or any such hit. `wants(slot)` returns whether the ray of a path
+/// slot may hit the curves of this mesh.
 template <bool kBare, typename Arguments, typename Wants, typename Found>
 void for_hits(const Arguments& args, RTCRayN* rays, CurveQuery query, const Wants& wants,
               const Found& found) {
@@ -79,7 +80,8 @@ bool wants_all(unsigned) {
   return true;
 }
 
-/// Embree callback that keeps the closest hit by the rule of closest_filter.
+/// Intersection callback of Embree that chooses the closest hit by the same rule as
+/// `closest_filter`.
 void intersect_curves(const RTCIntersectFunctionNArguments* args) {
   auto* best = reinterpret_cast<QueryContext*>(args->context);
   const unsigned n = args->N, inst = args->context->instID[0];
@@ -102,8 +104,8 @@ void intersect_curves(const RTCIntersectFunctionNArguments* args) {
   for_hits<false>(*args, RTCRayHitN_RayN(args->rayhit, n), CurveQuery::kFirst, wants, found);
 }
 
-/// Embree callback for queries of BareTraversal, which have no QueryContext: keeps the closest hit
-/// without a rule for ties.
+/// Intersection callback of Embree for queries of `BareTraversal`, which have no `QueryContext`. If
+/// several hits have the same distance, the callback keeps any of them.
 void intersect_curves_bare(const RTCIntersectFunctionNArguments* args) {
   for_hits<true>(
       *args, RTCRayHitN_RayN(args->rayhit, args->N), CurveQuery::kFirst, wants_all,

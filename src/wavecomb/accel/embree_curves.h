@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Curves and points as Embree user geometries.
+/// Embree user geometries for meshes of curves and points.
 #pragma once
 
 #include <embree4/rtcore.h>
@@ -11,14 +11,14 @@
 
 namespace wavecomb {
 
-/// User data of a curve geometry; must outlive the geometry.
+/// User data of an Embree geometry of curves, which must exist as long as the geometry.
 struct CurveGeometry {
   const Mesh* mesh;
   uint32_t id;       ///< mesh index
   bool is_filtered;  ///< whether presence, visibility or light linking may reject hits
   bool is_fibre;     ///< whether rays hit the curves from outside only
-  /// Curve BVH nodes, each of which is a primitive for Embree. Null for points and deforming
-  /// curves: each point or curve segment is then a primitive.
+  /// BVH nodes of the curves, each of which is one primitive for Embree. Null for points and
+  /// deforming curves, whose primitives are the points or curve segments.
   std::unique_ptr<const CurveBvhNodes> nodes;
 };
 

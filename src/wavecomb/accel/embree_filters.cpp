@@ -10,11 +10,12 @@
 namespace wavecomb {
 namespace {
 
-/// Makes the closest hit independent of the order in which triangles are tested. If two hits are
-/// equally far up to rounding (on shared edges, or where surfaces intersect or coincide), Embree
-/// keeps the hit tested last, and in a packet the order of tests depends on the other rays. This
-/// filter keeps the smaller distance, and for equal distances the smaller id. The filter sets tfar
-/// slightly beyond the closest hit (kSlack), so that traversal tests all candidates.
+/// Filter function that makes the closest hit independent of the order in which triangles are
+/// tested. If two hits have the same distance up to rounding (on shared edges, or where surfaces
+/// intersect or coincide), Embree alone would keep the hit that it tests last, and the order of
+/// tests depends on the other rays of the packet. This filter keeps the hit with the smaller
+/// distance, and at equal distances the hit with the smaller id. The filter sets `tfar` slightly
+/// beyond the closest hit (`kSlack`), so that Embree tests all candidates.
 template <unsigned N>
 inline void keep_closest(const RTCFilterFunctionNArguments* args) {
   auto* best = reinterpret_cast<QueryContext*>(args->context);
@@ -37,7 +38,7 @@ inline void keep_closest(const RTCFilterFunctionNArguments* args) {
   store(valid, select(Mask<U>(take), U(0xffffffffu), U(0u)));
 }
 
-/// Rejects hits on other objects than PresenceKeys::object.
+/// Rejects hits on objects other than the ray's `PresenceKeys::object`.
 [[gnu::noinline, gnu::cold]] void reject_other_objects(const RTCFilterFunctionNArguments& args) {
   const auto& context = *reinterpret_cast<const QueryContext*>(args.context);
   const SceneView& scene = *context.scene;
@@ -58,8 +59,8 @@ inline void keep_closest(const RTCFilterFunctionNArguments* args) {
   }
 }
 
-/// Intersects ray i of a packet with the light in a geometry's user pointer. Returns the distance
-/// to the light, or 0 for a miss.
+/// Intersects ray `i` of a packet with the light that the user pointer of an Embree geometry refers
+/// to. Returns the distance to the light, or 0 for a miss.
 float intersect_light_shape(const void* user, RTCRayN* ray, unsigned n, unsigned i) {
   const float o[3] = {RTCRayN_org_x(ray, n, i), RTCRayN_org_y(ray, n, i), RTCRayN_org_z(ray, n, i)};
   const float d[3] = {RTCRayN_dir_x(ray, n, i), RTCRayN_dir_y(ray, n, i), RTCRayN_dir_z(ray, n, i)};

@@ -16,8 +16,9 @@
 
 namespace wavecomb {
 
-/// Embree device. Hierarchies of one device may share geometries, so they are built one at a time;
-/// rays may be traced in finished hierarchies meanwhile.
+/// Embree device with its memory statistics. Hierarchies of the same device may share geometries,
+/// so only one hierarchy is built at a time. Rays can be traced in finished hierarchies at the same
+/// time.
 struct EmbreeDevice {
   RTCDevice handle = rtcNewDevice(nullptr);
   std::atomic<int64_t> bytes{0};

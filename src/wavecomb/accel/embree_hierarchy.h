@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Embree objects of an accelerator, which edited scenes share.
+/// The Embree device, geometries and scenes of an accelerator, which accelerators of edited scenes
+/// share.
 #pragma once
 
 #include <embree4/rtcore.h>
@@ -18,13 +19,14 @@ struct EmbreeDevice;
 
 /// Embree geometries of meshes, scenes of groups, and the top-level scene with light shapes.
 ///
-/// Contract: immutable. The hierarchy keeps the mesh arrays alive. The hierarchy depends on
-/// materials only by the choice of meshes that need the presence filter; the filter reads the
-/// materials of the traced scene.
+/// Contract: the object is immutable and keeps the mesh arrays alive. Materials affect it only in
+/// the choice of meshes whose hits are filtered. The filter reads the materials of the scene in
+/// which rays are traced.
 class EmbreeHierarchy {
  public:
-  /// `origin`: hierarchy of a scene with the same meshes, whose device, geometries and groups are
-  /// shared if unchanged; may be null. `threads`: 0 uses all. Throws Error if Embree fails.
+  /// Builds the hierarchy with up to `threads` threads; 0 means all threads. `origin` is null or
+  /// the hierarchy of a scene with the same meshes, whose device and unchanged geometries and
+  /// groups are shared. Throws `Error` if Embree fails.
   EmbreeHierarchy(const Scene& scene, HitRule rule, const EmbreeHierarchy* origin,
                   uint32_t threads);
   ~EmbreeHierarchy();
@@ -37,7 +39,7 @@ class EmbreeHierarchy {
   HitRule rule() const { return rule_; }
   RTCDevice device() const;
   RTCScene top() const { return top_; }
-  /// Embree geometry id of the world's first mesh.
+  /// Embree geometry id of the first mesh of group 0, which is in world space.
   uint32_t first_world() const { return first_world_; }
   uint32_t first_light() const { return first_light_; }  ///< Embree geometry id of light record 0
   /// Returns the memory of all hierarchies of the device in bytes.

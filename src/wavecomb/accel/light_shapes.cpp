@@ -9,9 +9,10 @@
 namespace wavecomb {
 namespace {
 
-/// Returns the distance along d to the parallelogram of a light record, from either side, with the
-/// conventions of LightKindInfo::intersect. Solves o + t d = a u + b v (T. Moller and B. Trumbore,
-/// "Fast, Minimum Storage Ray-Triangle Intersection", 1997).
+/// Returns the distance along `d` to the parallelogram of a light record, which rays hit from both
+/// sides. Distances have the same unit and range as results of `LightKindInfo::intersect`. Solves o
+/// + t d = a u + b v (T. Moller and B. Trumbore, "Fast, Minimum Storage Ray-Triangle Intersection",
+/// 1997).
 double intersect_parallelogram(const LightRecord& light, const double (&o)[3],
                                const double (&d)[3]) {
   const auto cross = [](const double* a, const double* b, double (&c)[3]) {
@@ -33,7 +34,7 @@ double intersect_parallelogram(const LightRecord& light, const double (&o)[3],
   return dot(v, ou) / det;
 }
 
-/// Returns the bounds of a light in its rest pose.
+/// Returns the bounds of a light at mid-shutter.
 Bounds box_at_mid_shutter(const LightGeometry& shape) {
   const LightRecord& l = shape.light;
   if (shape.kind->box) return shape.kind->box(l);

@@ -15,23 +15,22 @@ struct LightGeometry {
   /// Light record, of which only kind, p, u, v and radius are set.
   LightRecord light{};
   const LightKindInfo* kind = nullptr;  ///< null for kNone
-  LightMotion motion{};                 ///< motion of the light, if any; moving lights use
-                                        ///< LightShape::kCustom
+  LightMotion motion{};                 ///< motion of a moving light, whose shape is kCustom
   std::vector<LightStep> steps;
 
   bool operator==(const LightGeometry& other) const;
 };
 
-/// Returns the shape of each light record; kNone if rays do not hit the light.
+/// Returns the geometry of each light record. The shape is `kNone` if rays cannot hit the light.
 std::vector<LightGeometry> light_shapes(const Scene& scene);
 
 /// Returns conservative bounds of a custom shape over its whole motion.
 Bounds custom_shape_bounds(const LightGeometry& shape);
 
-/// Returns the distance along `dir` to a custom shape in units of |dir|, or 0 if it is not in
-/// front. The test handles one ray at a time in double precision, so that hits do not depend on
-/// other rays: Embree's spheres and discs round differently in packets and single rays. `time`:
-/// shutter time in [0, 1].
+/// Returns the distance along `dir` to a light of shape `kCustom` in units of |dir|, or 0 if the
+/// ray misses the light. The function tests one ray at a time in double precision, so that hits do
+/// not depend on other rays. Embree's own spheres and discs round differently in packets and single
+/// rays. `time`: shutter time in [0, 1].
 float intersect_custom_shape(const LightGeometry& shape, const float (&origin)[3],
                              const float (&dir)[3], float time);
 

@@ -12,7 +12,7 @@
 namespace wavecomb {
 namespace {
 
-/// Marks meshes that are invisible to some kind of ray in some instance.
+/// Marks the meshes that are invisible to at least one kind of ray in at least one instance.
 void mark_invisible(const Scene& scene, std::vector<uint8_t>& filtered) {
   const SceneGeometry& geometry = *scene.geometry();
   const SceneView view = scene.view();
@@ -24,8 +24,8 @@ void mark_invisible(const Scene& scene, std::vector<uint8_t>& filtered) {
   }
 }
 
-/// Returns whether a surface of the given opacity is present, by a random number keyed by the path
-/// and the primitive.
+/// Decides at random whether a surface is present. The probability is `opacity`, and the random
+/// number is a hash of the path and the primitive.
 bool is_present_sample(float opacity, const PresenceQuery& at, const PresenceKeys& keys) {
   if (opacity >= 1.f) return true;
   if (!(opacity > 0.f)) return false;
@@ -74,7 +74,8 @@ std::vector<uint8_t> fibre_meshes(const Scene& scene) {
   const auto is_other = [&](uint32_t m) {
     return !has_trait(materials[m].program, program_trait::kFibre);
   };
-  // Meshes without a material inherit the material of their instance; the world is instance 0.
+  // Meshes without a material inherit the material of their instance. Instance 0 contains the
+  // objects in world space.
   std::vector<uint8_t> group_inherits(geometry.groups.size(), 0), mesh_inherits(fibres.size(), 0);
   for (size_t i = 0; i < geometry.instance_records.size(); ++i)
     if (is_other(geometry.instance_records[i].material))
@@ -104,8 +105,8 @@ bool is_present(const SceneView& scene, const PresenceQuery& at, const PresenceK
         gaussian_splat_alpha(gaussian_splat_of(scene, at.mesh, at.prim), at.u, at.v), at, keys);
   const uint32_t material =
       hit_material<float>(scene, scene.instances[at.instance].material, at.mesh, at.prim, true);
-  // The transmittance of shadow rays handles medium boundaries separately
-  // (medium/nested/nested_media.h).
+  // Medium boundaries do not stop shadow rays. The transmittance of a shadow ray is computed
+  // separately (medium/nested/nested_media.h).
   if (keys.ray_kind == kVisibleToShadowRays && scene.nested_media.is_bound(material)) return false;
   if (!has_presence<float>(scene.materials, material, true)) return true;
   const float opacity =

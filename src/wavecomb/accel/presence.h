@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Presence: whether a surface with partial opacity stops a ray.
+/// Decisions about presence: whether a surface with partial opacity stops a ray.
 #pragma once
 
 #include <cstdint>
@@ -16,24 +16,27 @@ struct PresenceQuery {
   uint32_t geom;      ///< index of the geometry within the instance's group
   uint32_t mesh, prim;
   float u, v;     ///< position on the primitive; for triangles, barycentric coordinates
-  uint32_t slot;  ///< slot of the path
+  uint32_t slot;  ///< slot of the path, an index into the arrays of `PresenceKeys`
 };
 
-/// Returns whether the material is present: always for opacity 1, never for 0, otherwise by a
-/// random number keyed by path, ray, instance and primitive, so that traversal order and packets
-/// have no effect. Does not read `geom`.
+/// Returns whether a surface stops a ray. Surfaces of opacity 1 always do, and surfaces of opacity
+/// 0 never. Otherwise, the decision is random with the opacity as probability. The random number is
+/// a hash of the path, ray, instance and primitive, so that it does not depend on packets and the
+/// order of traversal. Does not read `geom`.
 bool is_present(const SceneView& scene, const PresenceQuery& at, const PresenceKeys& keys);
 
-/// Returns, by mesh, 1 if hits must be filtered: the mesh may be partially present or invisible to
-/// some rays in some instance, bounds a medium, is made of splats, or light linking is in use.
+/// Returns a value for each mesh, which is 1 if hits on the mesh must be filtered. This is the case
+/// if the mesh is partially present or invisible to some rays in at least one instance, bounds a
+/// medium, or consists of Gaussian splats, or if the scene has light linking.
 std::vector<uint8_t> filtered_meshes(const Scene& scene);
 
-/// Returns, by mesh, 1 for curves and points with hair materials only, in all instances. The BSDF
-/// models scattering inside the fibre, so rays hit such meshes from outside only.
+/// Returns a value for each mesh, which is 1 for curves and points that have only hair materials in
+/// all instances. A hair BSDF includes scattering inside the fibre, so rays hit such meshes from
+/// outside only.
 std::vector<uint8_t> fibre_meshes(const Scene& scene);
 
-/// Returns whether geometry `geom` of an instance blocks the shadow ray of a path slot, given the
-/// light linking in `keys`.
+/// Returns whether light linking lets geometry `geom` of an instance block the shadow ray of a path
+/// slot.
 bool casts_shadow(const SceneView& scene, uint32_t instance, uint32_t geom, uint32_t slot,
                   const PresenceKeys& keys);
 
@@ -44,9 +47,9 @@ inline bool is_of_object(const PresenceKeys& keys, uint32_t instance, uint32_t m
   return !keys.object || keys.object[size_t{slot} * keys.stride] == object_of(instance, mesh);
 }
 
-/// Returns whether the ray of a path slot hits the point: the ray may hit the point's object, the
-/// surface is present and visible to this kind of ray, and for shadow rays it casts a shadow from
-/// their light.
+/// Returns whether the ray of a path slot hits the surface at a point. This requires that the ray
+/// is not restricted to another object and that the surface is present and visible to this kind of
+/// ray. For a shadow ray, the surface must also cast shadows from the ray's light.
 bool accepts_hit(const SceneView& scene, const PresenceQuery& at, const PresenceKeys& keys);
 
 }  // namespace wavecomb

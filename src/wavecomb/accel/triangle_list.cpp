@@ -17,7 +17,7 @@ namespace {
 
 constexpr float kUnbounded = std::numeric_limits<float>::infinity();
 
-/// Stores the first `n` lanes, or all lanes if the packet has fewer than `n`.
+/// Stores the first `n` lanes of `value` at `p`, or all lanes if `value` has fewer than `n` lanes.
 template <typename T>
 void store_first(void* p, const T& value, size_t n) {
   if (n >= kWidth<T>) {
@@ -31,14 +31,15 @@ void store_first(void* p, const T& value, size_t n) {
 
 }  // namespace
 
-/// Intersection of a packet of rays with a triangle list.
+/// Functions that intersect packets of rays with a triangle list.
 struct ListTracer {
   const TriangleList& list;
   const SceneView& scene;
   const RaySpan& rays;
   const PresenceKeys& keys;
 
-  /// Intersection of rays with a plane, at distance height / slope with slope >= 0.
+  /// Intersection of rays with a plane, at the distance `height / slope`, where `slope` is at least
+  /// 0.
   template <typename F>
   struct Plane {
     F height, slope;
@@ -51,11 +52,12 @@ struct ListTracer {
     Mask<F> in;  ///< inside the triangle
   };
 
-  /// Packet of the rays [base, base + width), with data that all triangle tests use.
+  /// The rays from index `base` to `base` + lane width - 1, and the vertex coordinates that all
+  /// triangle tests of these rays use.
   template <typename F>
   struct Packet {
     Vec3<F> o, d;
-    /// Coordinates of the vertices in each ray's frame.
+    /// Coordinates of all vertices in a frame around each ray.
     std::array<F, TriangleList::kMaxVertices> x, y;
 
     Packet(const TriangleList& list, const RaySpan& rays, size_t base)
@@ -80,7 +82,8 @@ struct ListTracer {
 
     WAVECOMB_INLINE Crossing<F> cross(const TriangleList::Triangle& t) const {
       const auto [i, j, k] = t.vertex;
-      // No fma, so that both triangles of a shared edge compute the same products.
+      // Do not use fused multiply-add, so that the two triangles of a shared edge compute the same
+      // products.
       const F a = x[k] * y[j] - y[k] * x[j], b = x[i] * y[k] - y[i] * x[k],
               c = x[j] * y[i] - y[j] * x[i];
       const F sum = a + b + c;
@@ -89,7 +92,7 @@ struct ListTracer {
     }
   };
 
-  /// Returns the lanes whose hits on triangle `entry` are accepted by accepts_hit().
+  /// Returns a mask of the lanes whose hits on the triangle `entry` are accepted by `accepts_hit`.
   template <typename F>
   Mask<F> accepted(const Mask<F>& in, uint32_t entry, const F& b, const F& c, const F& sum,
                    size_t base) const {
@@ -112,7 +115,8 @@ struct ListTracer {
     return in & Mask<F>(load<UInt<F>>(keep.data()) != UInt<F>(0u));
   }
 
-  /// Returns distances to a light shape for lanes that pass near its bounding sphere; 0 for a miss.
+  /// Returns the distance of each ray to a light shape, or 0 if the ray misses the shape. Tests
+  /// only rays that pass near the shape's bounding sphere.
   template <typename F>
   F intersect_shape(const TriangleList::Shape& shape, const Packet<F>& packet, const F& limit,
                     const Mask<F>& active) const {
@@ -212,7 +216,7 @@ struct ListTracer {
 
 namespace {
 
-/// Calls trace() with the lane type for `width` lanes, passed as a null pointer of that type.
+/// Calls `trace` with a null pointer to `Lanes<width>`, from which `trace` derives its lane type.
 template <typename Trace>
 void in_lanes(uint32_t width, const Trace& trace) {
   switch (width) {
@@ -227,7 +231,7 @@ void in_lanes(uint32_t width, const Trace& trace) {
   }
 }
 
-/// Returns a light shape with its bounding sphere.
+/// Returns a light's geometry together with its bounding sphere.
 TriangleList::Shape in_sphere(const LightGeometry& light_geometry) {
   const Bounds box = custom_shape_bounds(light_geometry);
   const Vec3<float> centre = (box.lo + box.hi) * 0.5f, half = (box.hi - box.lo) * 0.5f;
@@ -268,7 +272,8 @@ std::unique_ptr<const TriangleList> TriangleList::make(const Scene& scene) {
       ++geom;
     }
   };
-  // The order matches the tie rule of Embree's ids: instances, world, lights.
+  // Add instances first, then the objects in world space, and then the lights. In this order, hits
+  // at equal distance are chosen as `closest_filter` chooses them by Embree's ids.
   for (uint32_t i = 0; i < geometry.instances.size(); ++i)
     add_group(geometry.instances[i].group, i + 1, geometry.instances[i].to_world);
   add_group(0, 0, Affine{});

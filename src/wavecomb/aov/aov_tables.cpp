@@ -28,7 +28,8 @@ AovTables::AovTables(const Scene& scene, const Settings& settings) {
     throw Error(
         "the AOV motion does not support latlong cameras; leave it out, or use another projection");
   check_id_layers(layout.set, scene.instances().size() + 1, scene.materials().size());
-  // Object ids need the Cryptomatte tables; ids of instances and materials do not.
+  // The AOVs of object ids need the Cryptomatte tables. The AOVs of instance and material ids do
+  // not need them.
   if (layout.set.has(AovKind::kCoverage)) crypto = CryptoTables(scene, layout.set);
   if (layout.set.has(Aov::kLightGroups)) add_groups(scene, settings);
   if (layout.set.has(Aov::kExpressions)) add_expressions(scene, settings);

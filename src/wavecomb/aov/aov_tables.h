@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Tables that map scene indices to the objects, groups and expressions of AOVs.
+/// Tables that map indices of the scene to the object ids, light groups and light path expressions
+/// of AOVs.
 #pragma once
 
 #include <cstdint>
@@ -16,27 +17,29 @@ namespace wavecomb {
 
 class Scene;
 
-/// Index that means that a light group has no layer.
+/// Value of a layer index for a light group without a layer.
 inline constexpr uint32_t kNoGroup = 0xffffffffu;
 
 /// AOV tables of a render. The tables are built once and read by all waves.
 struct AovTables {
   AovLayout layout;
   CryptoTables crypto;
-  /// Index of each light's group among the film's groups, or kNoGroup.
+  /// For each light, the index of its light group among the film's light groups, or `kNoGroup`.
   std::vector<uint32_t> film_group;
-  /// Index of the light group for emission that belongs to no light.
+  /// Index of the light group for emission of surfaces and volumes that are no lights, or
+  /// `kNoGroup`.
   uint32_t group_of_rest = kNoGroup;
   /// Names of the film's light groups, followed by the names of its expressions.
   std::vector<std::string> layer_names;
   PathAutomaton automaton;  ///< automaton of the light path expressions
-  /// Automaton for light paths, if the render traces light paths.
+  /// Automaton that matches expressions along light paths, for renders that trace light paths.
   BackwardAutomaton backward;
-  /// Argument `end_of_light` of PathExpressions; empty without expressions.
+  /// Argument `end_of_light` of `PathExpressions`. Empty if the render has no light path
+  /// expressions.
   std::vector<uint32_t> end_of_light;
-  /// Argument `multipliers` of PathExpressions; empty if unused.
+  /// Argument `multipliers` of `PathExpressions`. Empty if no expression needs multipliers.
   std::vector<float> multipliers;
-  /// Whether the cost AOV holds modelled costs, which are reproducible, instead of measured time.
+  /// Whether the cost AOV contains modelled costs, which are reproducible, and not measured times.
   bool models_cost = false;
   bool connects = false;  ///< whether camera paths connect to light paths
 
@@ -60,7 +63,8 @@ struct AovTables {
     return crypto.first_object.empty() ? U(kNoHitId) : U(volume + crypto.first_volume);
   }
 
-  /// Throws Error for unknown light groups, and for AOVs that the scene does not support.
+  /// Builds the tables. Throws `Error` if a light group is unknown or the scene does not support a
+  /// requested AOV.
   AovTables(const Scene& scene, const Settings& settings);
 
  private:

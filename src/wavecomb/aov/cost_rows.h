@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Cost of paths for the cost AOV: measured time, or modelled cost (docs/aovs.md).
+/// Cost of each path for the cost AOV, which is a measured time or a modelled cost (docs/aovs.md).
 #pragma once
 
 #include <chrono>
@@ -9,14 +9,14 @@
 
 namespace wavecomb {
 
-/// Modelled cost of a ray in nanoseconds, about the time to trace a ray in a scene of a million
-/// triangles.
+/// Modelled cost of a ray in nanoseconds. It is close to the time of tracing a ray in a scene of a
+/// million triangles.
 inline constexpr float kModelRayNs = 250;
 
-/// Cost of each path.
+/// Array with the cost of each path, for the cost AOV.
 ///
-/// Contract: used only as a base class of PathAovs. Slots must be below the capacity, which is 0
-/// without a cost AOV.
+/// Contract: the class is used only as a base class of `PathAovs`. Path slots must be below the
+/// capacity, which is 0 if the render has no cost AOV.
 class PathCostRows {
  public:
   PathCostRows() = default;
@@ -24,14 +24,14 @@ class PathCostRows {
       : cost_ns_(capacity > 0 ? SlotRows(capacity, 1) : SlotRows()), models_(models) {}
 
   bool wants_cost() const { return bool(cost_ns_); }
-  /// Returns whether costs come from the model instead of being measured.
+  /// Returns whether the cost AOV contains modelled costs and not measured times.
   bool models_cost() const { return wants_cost() && models_; }
   bool wants_time() const { return wants_cost() && !models_cost(); }
   /// Adds a modelled cost in nanoseconds to a path. The caller adds the costs of a path in the
   /// order of its vertices.
   void add_cost(size_t slot, float ns) const { cost_ns_.rows[slot] += ns; }
-  /// Adds the modelled cost of a ray to each path in slots slot(0) ... slot(n - 1), if costs are
-  /// modelled.
+  /// Adds the modelled cost of a ray to each path in the slots `slot(0)` to `slot(n - 1)`. Does
+  /// nothing if costs are measured.
   template <typename Slot>
   void charge_rays(size_t n, const Slot& slot) const {
     for (size_t i = 0; models_cost() && i < n; ++i) add_cost(slot(i), kModelRayNs);
@@ -39,8 +39,8 @@ class PathCostRows {
   PhaseClock::Clock::time_point start_time() const {
     return wants_time() ? PhaseClock::Clock::now() : PhaseClock::Clock::time_point();
   }
-  /// Adds the time since `start` in equal parts to the paths in slots slot(0) ... slot(n - 1), if
-  /// times are measured. The measured time of a path is therefore the mean over its batch.
+  /// Distributes the time since `start` equally over the paths in the slots `slot(0)` to `slot(n -
+  /// 1)`. Does nothing if costs are modelled.
   template <typename Slot>
   void spread_time(size_t n, PhaseClock::Clock::time_point start, const Slot& slot) const {
     if (!wants_time() || n == 0) return;

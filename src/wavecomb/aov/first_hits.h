@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// First hits of camera rays for AOVs, recorded before shading.
+/// Values of AOVs that are known at the first hit of a camera ray, before shading.
 #pragma once
 
 #include <limits>
@@ -10,14 +10,14 @@
 
 namespace wavecomb {
 
-/// AOV rows of camera rays and their first hits.
+/// Arrays with AOV values of camera rays and of their first hits, indexed by path slot.
 ///
-/// Contract: used only as a base class of PathAovs. Slots must be below the capacity.
+/// Contract: the class is used only as a base class of `PathAovs`. Path slots must be below the
+/// capacity.
 class PathFirstHits {
  public:
   PathFirstHits() = default;
-  /// Allocates the rows for the AOVs in `set`. `tables` may be null if no AOV in `set` needs
-  /// tables.
+  /// Allocates arrays for the AOVs in `set`. `tables` may be null if no AOV in `set` needs tables.
   PathFirstHits(size_t capacity, const AovSet& set, const AovTables* tables)
       : names_(tables), transmits_(set.has(Aov::kTransmittance)) {
     const auto rows = [&](SlotRows& block, bool wanted, size_t words) {
@@ -31,7 +31,8 @@ class PathFirstHits {
     rows(alpha_, set.has(Aov::kAlpha), 1);
   }
 
-  /// Records the start of camera rays; `r` are their sample values.
+  /// Records the start of camera rays. `r` contains the sample values with which the rays were
+  /// generated.
   template <typename F>
   void begin(const CameraSetup& camera, const Sample4<F>& r, const UInt<F>& slot,
              const Mask<F>& active) const {
@@ -98,7 +99,8 @@ class PathFirstHits {
         {Vec3<F>(F(0.f)), object, volume_event.material, UInt<F>(kNoHitId), far, far}, active);
   }
   bool wants_transmittance() const { return transmits_; }
-  /// Records the transmittance `through` of volumes along the camera ray; 0 if the path scattered.
+  /// Records `through`, the transmittance of volumes along the camera ray, which is 0 if the path
+  /// scattered in a volume.
   template <typename F>
   void pass(const UInt<F>& slot, const Color<F>& through, const Mask<F>& active) const {
     scatter_words<F>(end_.rows, through,
@@ -113,7 +115,7 @@ class PathFirstHits {
       n += block->bytes();
     return n;
   }
-  /// Clears the rows of the first `slots` path slots.
+  /// Sets the AOV values of the first `slots` path slots to 0.
   void clear_hits(size_t slots) const {
     alpha_.zero(slots);
     motion_.zero(slots);
@@ -129,7 +131,7 @@ class PathFirstHits {
   SlotRows depth_, end_, hits_;
   SlotRows motion_;  ///< in pixels, x and y
   SlotRows centre_;  ///< squared distance of the sample from the pixel's centre, in pixels
-  SlotRows alpha_;   ///< alpha: 1 if the camera ray hit something opaque
+  SlotRows alpha_;   ///< 1 if the camera ray hit something opaque, else 0
 
  private:
   /// Stores the depth at which a camera ray ends, and whether a volume stopped the ray, in the

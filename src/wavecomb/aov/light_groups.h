@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Contributions by light group. The functions run only if the render has light groups.
+/// Functions that add radiance to light groups, which run only if the render has light group AOVs.
 #pragma once
 
 #include "wavecomb/aov/aov_tables.h"
@@ -7,8 +7,8 @@
 
 namespace wavecomb {
 
-/// Returns for each lane the film's index of its light's group; kNoGroup if the group has no layer
-/// or the light is kNoLight.
+/// Returns the index of each light's group among the film's light groups. Returns `kNoGroup` if the
+/// group has no layer or the light is `kNoLight`.
 template <typename F>
 inline UInt<F> film_group(const uint32_t* kept, const UInt<F>& light, const Mask<F>& active) {
   using U = UInt<F>;
@@ -16,9 +16,10 @@ inline UInt<F> film_group(const uint32_t* kept, const UInt<F>& light, const Mask
   return select(known, gather<U>(kept, light, known), U(kNoGroup));
 }
 
-/// Splits the result of environment_emission by light: calls add(light, colour) for each infinite
-/// light with is_wanted(light). The lights' contributions are clamped by the same factor as their
-/// sum, so that they add up to the sum. The function is defined in path/steps/escape.h.
+/// Splits the result of `environment_emission` by light: calls `add(light, colour)` for each
+/// infinite light for which `is_wanted(light)` is true. Clamping scales all contributions by the
+/// same factor, so that they add up to the clamped sum. The function is defined in
+/// path/steps/escape.h.
 template <typename F, typename IsWanted, typename Add>
 void split_environment(const SceneView& scene, const ShadeSettings& settings, uint32_t depth,
                        const PathState<F>& path, const Mask<F>& active, const IsWanted& is_wanted,

@@ -10,7 +10,7 @@ void add_to(double* sums, const Vec3<float>& v) {
   sums[2] += double{v.z};
 }
 
-/// Adds the difference of the colours `all` and `before` (rgb) to `sums`. Does nothing if `sums` is
+/// Adds `all` - `before`, the difference of two RGB colours, to `sums`. Does nothing if `sums` is
 /// null.
 void add_difference(double* sums, const float* all, const float* before) {
   for (size_t c = 0; c < 3 && sums; ++c) sums[c] += double{all[c]} - double{before[c]};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// AOV values of paths. Both integrators own a PathAovs object with one row for each path slot, and
-/// call its member functions for the events of a path:
+/// AOV values of paths. Each integrator owns a `PathAovs` object, which stores AOV values for each
+/// path slot. The integrator calls these member functions for the events of a path:
 ///
 ///   begin      a camera ray starts (first_hits.h)
 ///   hit_light, hit_surface   the camera ray has its first hit
@@ -9,9 +9,9 @@
 ///   end_depth  the radiance includes the emission at vertex `depth`, but not its light sample
 ///   resolve    the path's values are added to the film
 ///
-/// The rows of a path contain only the requested AOVs. Splitting the radiance into emission, direct
-/// and indirect light costs nothing in shading, since it needs only copies of the radiance before
-/// the light samples of the first two vertices.
+/// Only the requested AOVs are stored. Splitting the radiance into emission, direct and indirect
+/// light adds no work to shading, since it only needs copies of the radiance before the light
+/// samples of the first two vertices.
 #pragma once
 
 #include <array>
@@ -31,8 +31,8 @@
 
 namespace wavecomb {
 
-/// Calls put(aov, value) for each AOV of the first vertex whose source is kVertex. `value` has the
-/// channels of the AOV, and `path` is the path's state before the vertex.
+/// Calls `put(aov, value)` for each AOV whose source is `kVertex`, with values of the first vertex.
+/// `value` has the channels of the AOV, and `path` is the path's state before the vertex.
 template <typename F, typename Put>
 inline void for_each_vertex_value(const VertexAovs<F>& v, const PathState<F>& /*path*/,
                                   const Put& put) {
@@ -41,13 +41,14 @@ inline void for_each_vertex_value(const VertexAovs<F>& v, const PathState<F>& /*
   put(Aov::kUv, v.uv);
 }
 
-/// AOV rows of the paths of a wave.
+/// AOV values of the paths of a wave, in arrays indexed by path slot.
 ///
-/// Contract: owned by a single wave or reference integrator. Slots must be below the capacity.
+/// Contract: the object belongs to a single wave or reference integrator. Path slots must be below
+/// the capacity.
 class PathAovs : public PathFirstHits, public PathCostRows {
  public:
   PathAovs() = default;
-  /// Allocates the rows for the AOVs in `layout`. `tables` may be null if no AOV in `layout` needs
+  /// Allocates arrays for the AOVs in `layout`. `tables` may be null if no AOV in `layout` needs
   /// tables.
   PathAovs(size_t capacity, const AovLayout& layout, const AovTables* tables)
       : PathFirstHits(capacity, layout.set, tables),
@@ -84,7 +85,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
 
   // ---- before the first ray ---------------------------------------------------------------------
 
-  /// Clears the rows of the first `slots` path slots.
+  /// Sets the AOV values of the first `slots` path slots to 0.
   void clear(size_t slots) {
     for (const Block* block :
          {&vertex_, &guides_, &groups_, &light_samples_, &bounces_, &early_connections_})
@@ -112,7 +113,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     return (depth == 0 && vertex_) || guides_ || wants_lights() || bounces_;
   }
 
-  /// Records a shaded vertex. `path` is the path's state before the vertex.
+  /// Records the AOV values of a shaded vertex. `path` is the path's state before the vertex.
   template <typename F>
   void vertex(uint32_t depth, const UInt<F>& slot, const VertexAovs<F>& v, const PathState<F>& path,
               const Mask<F>& active) const {
@@ -126,12 +127,12 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     if (guides_) store_guides<F>(slot, v, path, active);
     if (bounces_) add_bounce<F>(slot, v, active);
   }
-  /// Records the survival probability `q` of roulette before a vertex, for paths at `depth`.
+  /// Records `q`, the survival probability of Russian roulette before the vertex at `depth`.
   template <typename F>
   void survive(uint32_t depth, const UInt<F>& slot, const F& q, const Mask<F>& active) const {
     if (!bounces_ || depth == 0) return;
     BounceRow<F> row = load_row<BounceRow, F>(bounces_.rows, slot, active);
-    // add_bounce() has already counted the bounce with survival probability 1.
+    // `add_bounce` has already added a survival probability of 1 for this bounce.
     row.survived += q - 1.f;
     store_row<BounceRow, F>(bounces_.rows, slot, row, active);
   }
@@ -147,29 +148,29 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     return film_group<F>(tables_->film_group.data(), light, active);
   }
   const PathExpressions& expressions() const { return expressions_; }
-  /// Adds a contribution of `light`, or kNoLight, to the paths in the active lanes' slots, which
-  /// must be distinct.
+  /// Adds `c`, a contribution of the light `light`, to the paths of the active lanes, whose slots
+  /// must be distinct. `light` may be `kNoLight`.
   template <typename F>
   void add_light(const UInt<F>& slot, const UInt<F>& light, const Color<F>& c,
                  const Mask<F>& active) const {
     if (groups_) add<F>(slot, group_of<F>(light, active), c, active);
     if (expressions_) expressions_.add<F>(slot, light, c, active);
   }
-  /// Adds the emission of volumes to paths.
+  /// Adds `c`, the emission of volumes, to paths.
   template <typename F>
   void add_volume_emission(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
     if (groups_) add<F>(slot, UInt<F>(tables_->group_of_rest), c, active);
     if (expressions_) expressions_.add_volume_emission<F>(slot, c, active);
   }
-  /// Adds the contribution `c` of the light sample at the last vertex; the sampled light is in
-  /// light group `group`.
+  /// Adds `c`, the contribution of a light sample at the last vertex, to paths. The sampled light
+  /// belongs to the light group `group`.
   template <typename F>
   void add_direct(const UInt<F>& slot, const UInt<F>& group, const Color<F>& c,
                   const Mask<F>& active) const {
     if (groups_) add<F>(slot, group, c, active);
     if (expressions_) expressions_.add_light_sample<F>(slot, c, active);
   }
-  /// Adds the contribution `c` to light group `group` only.
+  /// Adds the contribution `c` to the light group `group`, but not to other AOVs.
   template <typename F>
   void add(const UInt<F>& slot, const UInt<F>& group, const Color<F>& c,
            const Mask<F>& active) const {
@@ -178,15 +179,16 @@ class PathAovs : public PathFirstHits, public PathCostRows {
       add_radiance<F>(groups_.rows, slot * layout_.light_groups + group, c, grouped);
   }
   bool wants_light_samples() const { return bool(light_samples_); }
-  /// Adds the contribution `c` of light samples to the paths in the active lanes' slots, which must
-  /// be distinct.
+  /// Adds `c`, the contribution of light samples, to the paths of the active lanes, whose slots
+  /// must be distinct.
   template <typename F>
   void add_light_sample(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
     add_radiance<F>(light_samples_.rows, slot, c, active);
   }
   bool wants_connections() const { return early_connections_ || wants_lights() || light_samples_; }
   /// Adds the contribution `c` of connections between vertices at `depth` and vertices of light
-  /// paths from `light`. light_path_aovs.h adds it to light path expressions.
+  /// paths from `light`. Light path expressions are not changed; light_path_aovs.h adds connections
+  /// to them.
   template <typename F>
   void add_connection(uint32_t depth, const UInt<F>& slot, const UInt<F>& light, const Color<F>& c,
                       const Mask<F>& active) const {
@@ -194,7 +196,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     if (groups_) add<F>(slot, group_of<F>(light, active), c, active);
     if (light_samples_) add_light_sample<F>(slot, c, active);
   }
-  /// Adds the environment's light to the paths of the active lanes.
+  /// Adds the emission of infinite lights to the paths of the active lanes, which hit no geometry.
   template <typename F>
   void add_environment(const SceneView& scene, const ShadeSettings& settings, uint32_t depth,
                        const UInt<F>& slot, const PathState<F>& path, const Mask<F>& active) const {
@@ -230,17 +232,18 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     expressions_.scale(exposure, slots);
     scale(light_samples_, kRadianceWords);
   }
-  /// Adds the values of the paths in slots [begin, end) to `pixel`, in the order of slots.
-  /// `radiance` holds the RadianceRow of each slot.
+  /// Adds the values of the paths in the slots [begin, end) to the pixel `pixel` of the film, in
+  /// the order of slots. `radiance` points to an array with a `RadianceRow` for each slot.
   void resolve(AovFilm& film, size_t pixel, size_t begin, size_t end, const float* radiance) const;
 
-  // Returns the rows of light groups, or null; for tests.
+  // Returns the radiance of light groups by path slot, or null if there are no light groups. Only
+  // tests call this function.
   const float* group_rows() const { return groups_.rows; }
 
  private:
   using Block = SlotRows;
 
-  /// Range of the slots with paths of one pixel.
+  /// Range [begin, end) of slots, whose paths belong to the same pixel.
   struct SlotRange {
     uint32_t begin, end;
     template <typename Each>
@@ -248,16 +251,16 @@ class PathAovs : public PathFirstHits, public PathCostRows {
       for (uint32_t slot = begin; slot < end; ++slot) each(slot);
     }
   };
-  // Steps of resolve(), which add to the film: ends of camera rays; values of vertices and first
-  // hits; radiance by source; bounces and costs.
+  // Parts of resolve(). In this order, they add the ends of camera rays, values of vertices and
+  // first hits, radiance by source, and bounces and costs to the film.
   void resolve_ends(AovFilm& film, size_t pixel, const SlotRange& slots,
                     const float* radiance) const;
   void resolve_vertices(AovFilm& film, size_t pixel, const SlotRange& slots) const;
   void resolve_light(AovFilm& film, size_t pixel, const SlotRange& slots,
                      const float* radiance) const;
   void resolve_work(AovFilm& film, size_t pixel, const SlotRange& slots) const;
-  /// Calls put(aov, words) for each stored vertex AOV of a kind. `words` points to the AOV's first
-  /// word in the row of slot 0.
+  /// Calls `put(aov, words)` for each AOV of the kind `kind` that is stored in `vertex_`. `words`
+  /// points to the AOV's first word for slot 0.
   template <typename Put>
   void for_each_vertex_aov(AovKind kind, const Put& put) const;
 
@@ -266,7 +269,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
             &groups_, &guides_,   &light_samples_, &bounces_};
   }
 
-  /// Value in vertex_at_ for AOVs that vertex_ does not store.
+  /// Value in `vertex_at_` for AOVs that `vertex_` does not store.
   static constexpr uint32_t kNoWords = 0xffffffffu;
   static constexpr std::array<uint32_t, kAovCount> no_words() {
     std::array<uint32_t, kAovCount> at{};
@@ -274,7 +277,8 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     return at;
   }
 
-  /// Stores the denoiser inputs of paths that have met only clear surfaces so far.
+  /// Stores the denoiser's guide values (albedo and normal) of paths whose previous vertices were
+  /// all clear surfaces, such as glass and mirrors.
   template <typename F>
   void store_guides(const UInt<F>& slot, const VertexAovs<F>& v, const PathState<F>& path,
                     const Mask<F>& active) const {
@@ -286,7 +290,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
                            {g.albedo, g.normal, select(v.is_clear, F(0.f), F(1.f))}, updates);
   }
 
-  /// Counts the bounce of a vertex, if the vertex has a bounce.
+  /// Adds the bounce of a vertex to the sums over bounces, if the vertex has a bounce.
   template <typename F>
   void add_bounce(const UInt<F>& slot, const VertexAovs<F>& v, const Mask<F>& active) const {
     const Mask<F> has_survival = active & (v.survival >= 0.f);
@@ -301,13 +305,14 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   AovLayout layout_;
   const AovTables* tables_ = nullptr;
   Block vertex_;
-  /// Index of each AOV's first word in a row of vertex_, or kNoWords.
+  /// For each AOV, the index of its first word in a row of `vertex_`, or `kNoWords`.
   std::array<uint32_t, kAovCount> vertex_at_ = no_words();
   std::array<Block, 2> parts_;  ///< radiance before the light samples of vertices 0 and 1
-  /// Contributions of connections at the first vertices of camera paths. These contributions are
-  /// indirect light, although they are added between the two radiance copies in parts_.
+  /// Contributions of connections at the first vertices of camera paths. These contributions count
+  /// as indirect light. They must be stored, since the difference of the two radiance copies in
+  /// `parts_` includes them in direct light.
   Block early_connections_;
-  Block groups_;  ///< radiance by light group; the groups of a slot are adjacent
+  Block groups_;  ///< radiance of each light group; the values of a slot are adjacent
   Block guides_, bounces_;
   PathExpressions expressions_;
   Block light_samples_;  ///< contributions of light samples

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Radiance of paths by light path expressions (core/path_expressions/path_expression.h). The
-/// functions run only if the render has light path expressions.
+/// Radiance of paths for each light path expression (core/path_expressions/path_expression.h). The
+/// functions of this file run only if the render has light path expressions.
 ///
-/// A path stores an automaton state for each of its three colours. At a scattering event whose
-/// diffuse fraction in a colour is s, the automaton takes the diffuse event for that colour with
-/// probability s, and the glossy event otherwise; all three colours use the same random number.
-/// Later contributions are added in full to the expressions that match the state, so that
-/// complementary layers add up to the beauty and each layer has the correct mean. Light samples are
-/// split in proportion to s, without a random choice. Emission that a bounce hits is also split
-/// directly if the light has different diffuse and specular multipliers.
+/// A path stores an automaton state for each colour component (red, green, blue). If a fraction s
+/// of the scattered light in a colour component is diffuse, the automaton of this component takes
+/// the diffuse event with probability s, and the glossy event otherwise. All three components use
+/// the same random number. Later contributions are added without weights to all expressions that
+/// match the state. Complementary layers therefore add up to the beauty, and the mean of each layer
+/// is correct. Light samples are split in proportion to s, without a random choice. The emission of
+/// a light that a bounce hits is split in the same way if the light has different diffuse and
+/// specular multipliers.
 #pragma once
 
 #include <array>
@@ -23,23 +24,24 @@
 
 namespace wavecomb {
 
-/// Row with the state of a path for light path expressions.
+/// State of a path for light path expressions, as a row of 32-bit words.
 template <typename F>
 struct ExpressionRow {
-  UInt<F> states;  ///< automaton states of the three colours, ten bits each
-  // Current light sample: automaton states before the scattering, scattering event, path end, and
-  // diffuse fraction.
+  UInt<F> states;  ///< automaton states of the three colour components, ten bits each
+  // Values of the current light sample: the automaton states before scattering, the scattering
+  // event, the path end, and the diffuse fraction of the scattered light.
   UInt<F> light_states, light_event, light_end;
   Color<F> light_diffuse;
-  // Last bounce, for lights with multipliers: automaton states before the bounce, its event plus 1
-  // (0 for a specular bounce and before the first bounce), and its diffuse fraction.
+  // Values of the last bounce, for lights with multipliers: the automaton states before the bounce,
+  // the scattering event plus 1 (0 for a specular bounce and before the first bounce), and the
+  // diffuse fraction of the scattered light.
   UInt<F> from_states, bounce;
   Color<F> bounce_diffuse;
   WAVECOMB_FIELDS(states, light_states, light_event, light_end, light_diffuse, from_states, bounce,
                   bounce_diffuse)
 };
 
-/// Calls each(index, value) for the three colours.
+/// Calls `each(index, value)` for the three components of a colour.
 template <typename F, typename Each>
 inline void for_each_colour(const Color<F>& c, const Each& each) {
   each(0u, c.x);
@@ -47,7 +49,7 @@ inline void for_each_colour(const Color<F>& c, const Each& each) {
   each(2u, c.z);
 }
 
-/// Automaton states of the three colours in one word, and their transitions.
+/// Functions for the automaton states of the three colour components, which are packed in one word.
 struct ColourStates {
   static constexpr uint32_t kBits = 10, kMask = 1023;
   static_assert(PathAutomaton::kMaxStates <= kMask + 1);
@@ -56,8 +58,8 @@ struct ColourStates {
   static UInt<F> of(const UInt<F>& states, uint32_t colour) {
     return (states >> (kBits * colour)) & kMask;
   }
-  /// Returns the automaton state after a scattering event, from the automaton's table `next`.
-  /// Scatterings in volumes and subsurface bodies have no diffuse or glossy lobes.
+  /// Returns the automaton state after a scattering event. `table` is the automaton's transition
+  /// table. Events in volumes and subsurface random walks have no diffuse and glossy variants.
   template <typename F>
   static UInt<F> next(const uint32_t* table, const UInt<F>& state, const UInt<F>& event,
                       const UInt<F>& lobe, const Mask<F>& active) {
@@ -82,16 +84,17 @@ struct ColourStates {
   }
 };
 
-/// Light path expression states and sums of the paths of a wave.
+/// States and radiance of the paths of a wave for all light path expressions.
 ///
-/// Contract: owned by a PathAovs object. Slots must be below the capacity, and the slots of the
-/// active lanes must be distinct.
+/// Contract: the object belongs to a `PathAovs` object. Path slots must be below the capacity, and
+/// the slots of active lanes must be distinct.
 class PathExpressions {
  public:
   PathExpressions() = default;
-  /// `end_of_light` holds the path end (path_end()) of each light, followed by the path ends of
-  /// other surfaces and of volumes. `multipliers` holds the diffuse and specular multiplier of each
-  /// light; empty means that all are 1.
+  /// `end_of_light` contains the path end of each light, as a result of `path_end`, followed by the
+  /// path end of other emissive surfaces and the path end of volumes. `multipliers` contains the
+  /// diffuse and the specular multiplier of each light. If `multipliers` is empty, all multipliers
+  /// are 1.
   PathExpressions(size_t capacity, const PathAutomaton& automaton,
                   const std::vector<uint32_t>& end_of_light, const std::vector<float>& multipliers)
       : automaton_(&automaton),
@@ -104,10 +107,10 @@ class PathExpressions {
 
   explicit operator bool() const { return automaton_ != nullptr; }
   size_t bytes() const { return rows_.bytes() + sums_.bytes(); }
-  /// Returns the radiance of the path in `slot`: rgb for each expression.
+  /// Returns the radiance of the path in `slot` as three RGB values for each expression.
   const float* sums(size_t slot) const { return sums_.floats(0) + slot * words_; }
 
-  /// Clears the rows of the first `slots` path slots.
+  /// Resets the states and the radiance of the first `slots` path slots.
   void clear(size_t slots) {
     if (!*this) return;
     std::memset(rows_.floats(0), 0, slots * kRowWords<ExpressionRow> * sizeof(float));
@@ -117,7 +120,7 @@ class PathExpressions {
     for (size_t i = 0; *this && i < slots * words_; ++i) sums_.floats(0)[i] *= factor;
   }
 
-  /// Adds a contribution of `light`, or kNoLight, to the paths.
+  /// Adds `c`, a contribution of the light `light`, to the paths. `light` may be `kNoLight`.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void add(const UInt<F>& slot, const UInt<F>& light,
                                         const Color<F>& c, const Mask<F>& active) const {
@@ -130,7 +133,7 @@ class PathExpressions {
     add_to<F>(slot, row.states, end, c, whole);
   }
 
-  /// Adds emission of volumes to the paths.
+  /// Adds `c`, the emission of volumes, to the paths.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void add_volume_emission(const UInt<F>& slot, const Color<F>& c,
                                                         const Mask<F>& active) const {
@@ -139,8 +142,8 @@ class PathExpressions {
     add_to<F>(slot, states, UInt<F>(end_of_light_[lights_ + 1]), c, active);
   }
 
-  /// Records a shaded vertex; `v` contains the classification of its scattering events.
-  /// `has_shadow` marks the lanes with a light sample.
+  /// Updates the automaton states at a shaded vertex. `v` contains the kind of scattering of the
+  /// light sample and of the bounce. `has_shadow` marks the lanes with a light sample.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void scatter(uint32_t depth, const UInt<F>& slot,
                                             const SampleKey<F>& key, const VertexAovs<F>& v,
@@ -161,7 +164,7 @@ class PathExpressions {
     store_row<ExpressionRow, F>(rows_.floats(0), slot, row, active);
   }
 
-  /// Records a random walk through a medium inside a mesh.
+  /// Updates the automaton states after a random walk through a medium inside a mesh.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void walk(const UInt<F>& slot, const Mask<F>& active) const {
     using U = UInt<F>;
@@ -215,9 +218,10 @@ class PathExpressions {
   }
 
  private:
-  /// Adds the emission that a bounce hits, for lights whose two multipliers differ. Splits `c`
-  /// between the diffuse and glossy lobes of the bounce in proportion to their contributions.
-  /// Returns the lanes whose lights have two different multipliers.
+  /// Adds `c`, the emission of a light that a bounce hits, if the light's diffuse and specular
+  /// multipliers differ. Splits `c` between the diffuse and glossy events of the bounce in
+  /// proportion to their contributions. Returns a mask of the lanes whose lights have different
+  /// multipliers.
   template <typename F>
   [[gnu::noinline, gnu::cold]] Mask<F> add_by_parts(const UInt<F>& slot,
                                                     const ExpressionRow<F>& row,
@@ -244,7 +248,7 @@ class PathExpressions {
     add_part(kGlossyEvent, c - diffuse);
     return here;
   }
-  /// Returns the automaton states of all three colours after a scattering event.
+  /// Returns the automaton states of all three colour components after a scattering event.
   template <typename F>
   UInt<F> next_of_all(const UInt<F>& states, const UInt<F>& event, const UInt<F>& lobe,
                       const Mask<F>& active) const {
@@ -260,7 +264,8 @@ class PathExpressions {
     return gather<U>(end_of_light_, select(Mask<U>(light == U(kNoLight)), U(lights_), light),
                      Mask<U>(active));
   }
-  /// Adds `c`, colour by colour, to the expressions that match the states and the path end `end`.
+  /// Adds each component of `c` to the expressions that match the component's automaton state and
+  /// the path end `end`.
   template <typename F>
   void add_to(const UInt<F>& slot, const UInt<F>& states, const UInt<F>& end, const Color<F>& c,
               const Mask<F>& active) const {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Rows of AOV values that paths keep until they are added to the film (path_aovs.h).
+/// Structs of AOV values that are stored for each path until the path's values are added to the
+/// film (path_aovs.h).
 #pragma once
 
 #include <cstring>
@@ -10,17 +11,17 @@
 
 namespace wavecomb {
 
-/// First hit of a camera ray, before shading. Indices are kNoHitId if the ray hit nothing.
+/// AOV values of the first hit of a camera ray. Indices are `kNoHitId` if the ray hit nothing.
 template <typename F>
 struct FirstHitRow {
   Vec3<F> position;
   UInt<F> object, material, instance;
-  F depth, distance;  ///< distance along the camera's axis, and from the camera's position
+  F depth, distance;  ///< distances along the camera's axis and from the camera's position
   WAVECOMB_FIELDS(position, object, material, instance, depth, distance)
 };
 
-/// Volume event of a path: the index of the volume, or instance_geometry() of the mesh that the
-/// medium fills, and the material.
+/// Scattering event of a path in a medium: the material, and the index of the volume or the result
+/// of `instance_geometry` for the mesh that the medium fills.
 template <typename F>
 struct VolumeHit {
   UInt<F> volume, object, material;
@@ -30,20 +31,21 @@ struct VolumeHit {
 /// Geometry and material that a camera ray hits first.
 template <typename F>
 struct FirstSurface {
-  UInt<F> inst, geom;  ///< instance, and index of the geometry within its group
+  UInt<F> inst, geom;  ///< instance, and index of the geometry within the instance's group
   UInt<F> material;
 };
 
-/// End of a camera ray.
+/// AOV values of the end point of a camera ray.
 template <typename F>
 struct RayEndRow {
-  F depth;           ///< depth of the end point; infinite if the ray hits nothing
-  F in_volume;       ///< 1 if a volume stopped the ray, else 0
-  Color<F> through;  ///< transmittance of the volumes before the hit; 0 if they stopped the ray
+  F depth;      ///< depth of the end point; infinite if the ray hits nothing
+  F in_volume;  ///< 1 if a volume stopped the ray, else 0
+  Color<F>
+      through;  ///< transmittance of the volumes in front of the hit; 0 if a volume stopped the ray
   WAVECOMB_FIELDS(depth, in_volume, through)
 };
 
-/// Calls put(aov, value) for each AOV of the nearest sample whose source is kHit.
+/// Calls `put(aov, value)` for each AOV of kind `kNearest` whose source is `kHit`.
 template <typename Put>
 inline void for_each_hit_value(const FirstHitRow<float>& hit, const Put& put) {
   put(Aov::kPosition, hit.position);
@@ -53,25 +55,25 @@ inline void for_each_hit_value(const FirstHitRow<float>& hit, const Put& put) {
   put(Aov::kDistance, hit.distance);
 }
 
-/// Denoiser inputs of a path: albedo and normal of the first vertex that is not clear, or of the
-/// last vertex so far.
+/// Inputs of the denoiser: albedo and normal of the path's first vertex on a surface that is not
+/// clear, or of the last vertex so far if all surfaces were clear.
 template <typename F>
 struct GuideRow {
   Color<F> albedo;
   Vec3<F> normal;
-  F is_final;  ///< 1 if the path had a vertex that is not clear
+  F is_final;  ///< 1 if the path had a vertex on a surface that is not clear, else 0
   WAVECOMB_FIELDS(albedo, normal, is_final)
 };
 
-/// Sums over the bounces of a path: probabilities that the guiding field sampled the direction,
-/// survival probabilities of roulette, and number of bounces.
+/// Sums over the bounces of a path: the probabilities that directions were sampled from the guiding
+/// field, the survival probabilities of Russian roulette, and the number of bounces.
 template <typename F>
 struct BounceRow {
   F guided, survived, bounces;
   WAVECOMB_FIELDS(guided, survived, bounces)
 };
 
-/// Rows of `words` 32-bit words, one for each slot.
+/// Array with a row of `words` 32-bit words for each path slot.
 struct SlotRows {
   SoaBlock owner;
   float* rows = nullptr;
@@ -87,7 +89,8 @@ struct SlotRows {
   size_t bytes() const { return owner.bytes(); }
 };
 
-/// Stores the words of `value` one after another, starting at word `at`.
+/// Stores the components of `value` in consecutive words of `rows`, starting at the word `at` of
+/// each lane.
 template <typename F>
 inline void scatter_words(float* rows, const F& value, const UInt<F>& at, const Mask<F>& active) {
   scatter<F>(rows, value, at, active);

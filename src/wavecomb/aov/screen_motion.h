@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Motion of the camera ray's hit across the image while the shutter is open.
+/// Motion of a camera ray's hit point across the image while the shutter is open.
 #pragma once
 
 #include "wavecomb/geometry/hit/surface.h"
@@ -8,9 +8,9 @@
 
 namespace wavecomb {
 
-/// Returns the image position of a point at a shutter time, in pixels from the upper left corner,
-/// seen through the centre of a lens without distortion. The function does not support latlong
-/// cameras.
+/// Projects a point to the image at a shutter time, through the centre of the lens and without lens
+/// distortion. Returns the position in pixels from the upper left corner. Latlong cameras are not
+/// supported.
 template <typename F>
 inline Vec2<F> project_to_image(const CameraSetup& camera, const Vec3<F>& p, const F& time,
                                 const Mask<F>& active) {
@@ -39,8 +39,8 @@ inline Vec2<F> screen_motion(const CameraSetup& camera, const Vec3<F>& first, co
   return {select(valid, x, F(0.f)), select(valid, y, F(0.f))};
 }
 
-/// Returns the screen motion of the points that are at `p` on lights `light` at shutter time
-/// `time`.
+/// Returns the screen motion of a point of the light `light`, whose position at shutter time `time`
+/// is `p`.
 template <typename F>
 inline Vec2<F> screen_motion_of_light(const LightView& lights, const CameraSetup& camera,
                                       const UInt<F>& light, const Vec3<F>& p, const F& time,
@@ -53,7 +53,7 @@ inline Vec2<F> screen_motion_of_light(const LightView& lights, const CameraSetup
   return screen_motion<F>(camera, at(0.f), at(1.f), active);
 }
 
-/// Returns the motion of the surface point of a hit.
+/// Returns the screen motion of the surface point that a camera ray hits.
 template <typename F>
 [[gnu::noinline, gnu::cold]] Vec2<F> screen_motion_of_hit(const SceneView& scene,
                                                           const CameraSetup& camera, MeshHit<F> hit,

@@ -6,7 +6,8 @@
 
 namespace wavecomb {
 
-/// Affine transform x -> A x + t for column vectors. The struct stores the rows of A, then t.
+/// Affine transform x -> A x + t for column vectors. The struct stores the rows of A, followed by
+/// t.
 struct Affine {
   Vec3<float> row[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   Vec3<float> t{0, 0, 0};

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Arbitrary output variables (AOVs): layers that a render can store beside the beauty, as a table
-/// (docs/aovs.md).
+/// Table of arbitrary output variables (AOVs), which are layers that a render can store in addition
+/// to the beauty (docs/aovs.md).
 ///
 /// To add an AOV, add a row at the end of WAVECOMB_AOVS and a line that provides its value
-/// (aov/path_aovs.h). Film storage, layer, checkpoint block, and the names in Python, on the
-/// command line and in the window follow from the row.
+/// (aov/path_aovs.h). The film's storage, the image layer, the checkpoint entry, and the names in
+/// Python, on the command line and in the window are derived from the row.
 #pragma once
 
 #include <bit>
@@ -15,12 +15,13 @@
 
 namespace wavecomb {
 
-/// Reduction of a pixel's samples to its value.
+/// Method by which the samples of a pixel are combined to the pixel's value.
 enum class AovKind : uint8_t {
   kMean,         ///< the mean over all samples of the pixel
   kMeanOfHits,   ///< the mean over samples that hit something; infinite if no sample did
-  kNearest,      ///< value of the sample nearest to the pixel centre, for values without a mean
-  kCoverage,     ///< Cryptomatte: ids, and the fraction of the pixel that each id covers
+  kNearest,      ///< the value of the sample nearest to the pixel centre, for values that cannot be
+                 ///< averaged
+  kCoverage,     ///< Cryptomatte ids, and the fraction of the pixel that each id covers
   kGroups,       ///< one layer for each light group, with the means of samples
   kExpressions,  ///< one layer for each light path expression, with the means of samples
   kSum,          ///< the sum over all samples of the pixel
@@ -28,32 +29,34 @@ enum class AovKind : uint8_t {
   kMedian,       ///< the estimated median of the pixel's samples (film/median.h); may be infinite
 };
 
-/// Point in a path's evaluation at which an AOV's value is known.
+/// Point in the evaluation of a path at which the value of an AOV is known.
 enum class AovSource : uint8_t {
   kHit,     ///< The value is known at the hit of the camera ray, before shading.
   kVertex,  ///< The value is known after the first vertex has been shaded.
   kGuide,   ///< The value is known after the last vertex that provides denoiser features.
   kLight,   ///< The value changes whenever light contributes to the path.
-  kMis,     ///< The value changes whenever light contributes, separated by sampling technique.
+  kMis,     ///< The value changes whenever light contributes to the path, and depends on whether a
+            ///< light sample or a bounce found the light.
   kTime,    ///< The value is a time measured with the clock.
   kBounce,  ///< The value accumulates over all bounces of the path.
 };
 
-/// Meaning of the numbers in a layer, which determines how files store the layer and how the window
-/// displays it.
+/// Meaning of the numbers in a layer. It determines how image files store the layer and how the
+/// window displays the layer.
 enum class AovContent : uint8_t {
   kLight,      ///< radiance, which is displayed with exposure and tone mapping
   kColour,     ///< reflectance or transmittance, 0 to 1
   kDirection,  ///< unit vector
   kId,         ///< index of an object or material, or hashes of names
-  kExact,      ///< number that lossy compression would make useless
-  kValue,      ///< number of another kind, which the window displays in false colours
+  kExact,      ///< number that must be stored without lossy compression
+  kValue,      ///< any other number, which the window displays in false colours
 };
 
-/// Rows X(enumerator, name, channels, letters, content, kind, source, title). The order of the rows
-/// determines the bit of each AOV. `channels` is 0 for AOVs that are not numeric or have several
-/// layers. `letters` are the names of the channels in files, or "" if the channels have no names.
-/// `title` is the label of the layer in the window; "" hides the layer in the window.
+/// Table of the AOVs with rows `X(enumerator, name, channels, letters, content, kind, source,
+/// title)`. The position of a row in the table determines the AOV's bit. `channels` is 0 for AOVs
+/// that are not numeric or have several layers. `letters` are the names of the channels in files,
+/// or "" if the channels have no names. `title` is the label of the layer in the window, which does
+/// not show layers with the title "".
 // clang-format off
 #define WAVECOMB_AOVS(X)                                                                         \
   X(Albedo, "albedo", 3, "RGB", kColour, kMean, kVertex, "Albedo")                               \
@@ -105,7 +108,7 @@ enum class Aov : uint32_t {
 #undef WAVECOMB_AOV
 };
 
-/// AOV of the light splats: light that the paths of other pixels contribute to a pixel.
+/// AOV of light splats, which are the light that paths of other pixels contribute to a pixel.
 inline constexpr Aov kSplatAov = Aov::kByLightPaths;
 
 /// Row of the AOV table.
@@ -160,7 +163,8 @@ constexpr uint32_t aov_bits(AovSource source) {
 
 /// A set of AOVs.
 struct AovSet {
-  /// AOVs stored by default, which have members in Film::Layers and in images.
+  /// AOVs that are stored by default. `Film::Layers` and `RenderedImage` have a member for each of
+  /// them.
   static constexpr uint32_t kStoredByDefault = Aov::kAlbedo | Aov::kNormal | Aov::kDepth;
   /// AOVs that add up to the beauty: emission, direct and indirect light.
   static constexpr uint32_t kParts = Aov::kEmission | Aov::kDirect | Aov::kIndirect;
@@ -179,7 +183,8 @@ struct AovSet {
 
   /// Returns the names of the AOVs in the set, without light path expressions.
   std::vector<std::string> names() const;
-  /// Returns the AOV of a name. Throws Error that lists the known names.
+  /// Returns the AOV with the given name. Throws an `Error` that lists the known names if the name
+  /// is unknown.
   static Aov parse(std::string_view name);
 };
 
@@ -189,7 +194,7 @@ inline constexpr uint32_t kMaxDeepSamples = 64;
 /// Limits on the deep samples of a pixel.
 struct DeepLimits {
   uint32_t most = 16;  ///< maximum number of deep samples per pixel
-  /// Deep samples whose distance is below this fraction of their depth are merged.
+  /// Two deep samples are merged if their depths differ by less than this fraction of the depth.
   float tolerance = 0.01f;
 };
 

@@ -9,9 +9,9 @@
 
 namespace wavecomb {
 
-/// Scope guard that flushes denormal floats to zero on this thread. Denormals are slow and do not
-/// matter in rendering, and all workers must treat denormals the same way so that they produce the
-/// same image.
+/// Scope guard that flushes denormal floats to zero on this thread. Arithmetic with denormals is
+/// slow, and denormals do not matter in rendering. All threads must treat denormals in the same
+/// way, so that the image does not depend on the distribution of work.
 class DenormalsOff {
  public:
   DenormalsOff() : saved_(control()) { set_control(saved_ | kFlush); }
@@ -20,13 +20,14 @@ class DenormalsOff {
   DenormalsOff& operator=(const DenormalsOff&) = delete;
 
  private:
-  // Floating-point control word of the thread, and the bits of it that flush results and operands.
+  // Access to the floating-point control word of the thread. `kFlush` contains the bits that flush
+  // denormal results and operands to zero.
 #if defined(__SSE__)
   static constexpr uint64_t kFlush = 0x8040;
   static uint64_t control() { return _mm_getcsr(); }
   static void set_control(uint64_t word) { _mm_setcsr(static_cast<unsigned>(word)); }
 #elif defined(__aarch64__)
-  static constexpr uint64_t kFlush = uint64_t{1} << 24;  // FPCR.FZ flushes results and operands.
+  static constexpr uint64_t kFlush = uint64_t{1} << 24;  // bit FZ of the register FPCR
   static uint64_t control() {
     uint64_t word;
     asm volatile("mrs %0, fpcr" : "=r"(word));

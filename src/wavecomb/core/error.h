@@ -6,8 +6,8 @@
 
 namespace wavecomb {
 
-/// Error caused by bad input. The message is one line that names the prim, file or option and
-/// states what to do.
+/// Exception for errors that invalid input causes. The message is one line that names the prim,
+/// file or option and states what to do.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -6,8 +6,8 @@
 
 namespace wavecomb {
 
-/// Orthonormal basis (s, t, n), right-handed unless make_frame() is called with handedness -1.
-/// Local directions have z along n.
+/// Orthonormal basis (s, t, n). The z axis of local coordinates is n. The basis is right-handed
+/// unless `make_frame` is called with handedness -1.
 template <typename F>
 struct Frame {
   Vec3<F> s, t, n;
@@ -34,8 +34,8 @@ WAVECOMB_INLINE Frame<F> make_frame(const Vec3<F>& n) {
 
 /// Returns a frame around the unit vector `n` where s is `tangent` made orthogonal to n and t is
 /// cross(n, s) times `handedness` (1 or -1). Falls back to make_frame(n) if the tangent is parallel
-/// to n (within 1e-3), zero or not finite. The threshold is far above rounding errors, which would
-/// otherwise determine s.
+/// to n (within 1e-3), zero or not finite. This threshold is far above rounding errors, so that
+/// rounding errors never determine s.
 template <typename F>
 inline Frame<F> make_frame(const Vec3<F>& n, const Vec3<F>& tangent, const F& handedness = F(1.f)) {
   const Vec3<F> s = fma(n, F(-dot(n, tangent)), tangent);
@@ -47,7 +47,8 @@ inline Frame<F> make_frame(const Vec3<F>& n, const Vec3<F>& tangent, const F& ha
   return {sx, select<F>(valid, cross(n, sx) * handedness, other.t), n};
 }
 
-/// Trigonometry of a local direction w with respect to n = (0, 0, 1).
+/// Cosines and sines of the spherical coordinates of a local direction `w`. The polar axis is n =
+/// (0, 0, 1).
 template <typename F>
 inline F cos_theta(const Vec3<F>& w) {
   return w.z;

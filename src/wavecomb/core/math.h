@@ -2,11 +2,11 @@
 /// Elementary functions that give the same bits for floats and packets of floats.
 ///
 /// Range reductions and minimax polynomials follow S. Moshier, Cephes Mathematical Library (single
-/// precision). Errors are a few ulp over the range of each function, as tests against double
-/// precision show.
+/// precision). Tests against double precision show errors of a few ulp over the range of each
+/// function.
 ///
-/// Functions that also exist in Dr.Jit repeat its template parameters plus a constraint (hence
-/// `bool = true`), which makes them the better match.
+/// Functions that also exist in Dr.Jit have the same template parameters as in Dr.Jit (hence `bool
+/// = true`) and a constraint, so that the compiler prefers them to Dr.Jit's functions.
 #pragma once
 
 #include "wavecomb/core/lanes/lanes.h"
@@ -41,15 +41,16 @@ inline SinCos<F> sincos_2pi(const F& x) {
   const Mask<F> swap = Mask<F>((q & 1u) == UInt<F>(1u));
   const F sin_abs = select(swap, c, s);
   const F cos_abs = select(swap, s, c);
-  // Sign bits by quadrant: sin is negative in 2 and 3, cos in 1 and 2.
+  // Sign bits of the results: the sine is negative in the quadrants 2 and 3, and the cosine in the
+  // quadrants 1 and 2.
   const UInt<F> sin_sign = (q & 2u) << 30;
   const UInt<F> cos_sign = ((q + 1u) & 2u) << 30;
   return {bits_float<F>(float_bits<F>(sin_abs) ^ sin_sign),
           bits_float<F>(float_bits<F>(cos_abs) ^ cos_sign)};
 }
 
-/// Returns the arc tangent of y / x over the whole circle, in [-pi, pi]; 0 if both are 0. |x| + |y|
-/// must be finite.
+/// Returns the arc tangent of y / x over the whole circle, in [-pi, pi]. Returns 0 if x and y are
+/// 0. |x| + |y| must be finite.
 template <LaneValue F>
 inline F atan2(const F& y, const F& x) {
   const F ax = abs(x), ay = abs(y);
@@ -75,7 +76,7 @@ inline F acos(const F& x) {
   return atan2(safe_sqrt(F((1.f - c) * (1.f + c))), c);
 }
 
-/// Returns e^x; 0 below -87.3, clamped above 88.
+/// Returns e^x. Returns 0 if x is below -87.3, and clamps x to 88.
 template <LaneValue F, bool = true>
 inline F exp(const F& x) {
   const F c = clamp(x, F(-88.f), F(88.f));
@@ -122,7 +123,7 @@ inline F log2(const F& x) {
   return log(x) * 1.44269504088896341f;
 }
 
-/// Returns x^y for x >= 0; 0 if x is 0 or denormal and y > 0.
+/// Returns x^y, where x must not be negative. Returns 0 if x is 0 or denormal and y is positive.
 template <LaneValue F>
 inline F pow(const F& x, const F& y) {
   return select(x < 1.17549435e-38f, F(0.f), exp(F(y * log(max(x, F(1.17549435e-38f))))));

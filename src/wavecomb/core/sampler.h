@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Counter-based random numbers: each sample value is a function of (pixel, sample, set, seed)
-/// only, so that it does not depend on scheduling.
+/// Sample values in [0, 1), which depend only on the pixel, sample index, sample set and seed, and
+/// therefore not on scheduling.
 ///
-/// The sampler uses hash-based Owen-scrambled Sobol points, four dimensions at a time; sets are
-/// padded by independent shuffles (Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4) 2020).
-/// Direction numbers are from Joe and Kuo, 2008.
+/// The sampler uses hash-based Owen-scrambled Sobol points. A sample set has four dimensions.
+/// Different sets use the same points in independently shuffled orders (Burley, "Practical
+/// Hash-based Owen Scrambling", JCGT 9(4) 2020). The direction numbers of the Sobol sequence are
+/// from Joe and Kuo, 2008.
 #pragma once
 
 #include "wavecomb/core/encoding/hash.h"
@@ -13,7 +14,7 @@
 
 namespace wavecomb {
 
-/// Key of a path's sample values: a hash of (pixel, seed), and the sample index.
+/// Key of the sample values of a path: a hash of the pixel and the seed, and the sample index.
 template <typename F>
 struct SampleKey {
   UInt<F> pixel_hash;
@@ -32,25 +33,26 @@ struct Sample4 {
   F x, y, z, w;
 };
 
-/// Sets of four dimensions that a path uses once: for the film position and lens, and for the
-/// shutter time.
+/// Indices of the sample sets that a path uses once: `kCameraSet` for the position on film and
+/// lens, and another set for the shutter time.
 inline constexpr uint32_t kCameraSet = 0;
 inline constexpr uint32_t kTimeSet = 0xffffffffu;
 
 /// Sample sets that a path uses at each vertex. Each step of a vertex has a named sample set, so
 /// that adding or removing a step does not change the random numbers of other steps.
 enum class VertexSet : uint32_t {
-  kLight,     ///< light sampling (selection of a light, u, v) and Russian roulette
+  kLight,     ///< selection of a light, (u, v) on the light, and Russian roulette
   kBsdf,      ///< BSDF sampling: lobe, u, v
-  kFlight,    ///< sampling along the ray segment to the vertex (path/media.h)
+  kFlight,    ///< distance sampling in media along the ray segment to the vertex (path/media.h)
   kShadow,    ///< transmittance along the vertex's shadow ray
   kEmission,  ///< start of a light path, at depth 0: choice of the light, and time
 };
 /// Upper limit of path depths that have distinct sample sets.
 inline constexpr uint32_t kSetDepths = 1u << 23;
 
-/// Returns the index of a sample set at a depth of the path. The indices of the first two vertex
-/// sets alternate with depth, starting at 1; each other vertex set has a separate block of indices.
+/// Returns the index of the sample set `name` at a depth of the path. The index of the sets
+/// `kLight` and `kBsdf` is 1 + 2 * depth and 2 + 2 * depth. Each other vertex set has a separate
+/// block of indices.
 inline constexpr uint32_t vertex_set(VertexSet name, uint32_t depth) {
   const auto i = static_cast<uint32_t>(name);
   return i < 2 ? 1 + i + 2 * depth : (i << 24) + depth;
@@ -58,8 +60,9 @@ inline constexpr uint32_t vertex_set(VertexSet name, uint32_t depth) {
 
 namespace detail {
 
-/// Laine-Karras permutation: bit k of the result depends only on bits 0..k, so that it is an Owen
-/// scramble of bit-reversed values (constants from Burley 2020, section 4).
+/// Laine-Karras permutation. Bit k of the result depends only on the bits 0 to k of the input, so
+/// that the permutation is an Owen scramble of bit-reversed values (constants from Burley 2020,
+/// section 4).
 template <typename U>
 WAVECOMB_INLINE U laine_karras(U x, const U& seed) {
   x += seed;
@@ -70,7 +73,7 @@ WAVECOMB_INLINE U laine_karras(U x, const U& seed) {
   return x;
 }
 
-/// Number of bits of the sample index in use: sequences of up to 2^20 samples per pixel.
+/// Number of bits of a sample index, for up to 2^20 samples per pixel.
 inline constexpr int kIndexBits = 20;
 
 /// Generator matrices of Sobol dimensions 2 and 3, with bit-reversed columns. Primitive
@@ -116,11 +119,11 @@ template <typename F>
 WAVECOMB_INLINE Sample4<F> sobol_4d(const SampleKey<F>& key, uint32_t set) {
   using U = UInt<F>;
   const U seed = hash_u32<U>(key.pixel_hash, U(set));
-  // Shuffles the order of points, so that sets are mutually independent.
+  // Shuffle the order of the points, so that different sample sets are independent.
   const U index = reverse_bits<U>(laine_karras<U>(reverse_bits<U>(key.sample), seed)) &
                   ((1u << kIndexBits) - 1u);
-  // Dimension 0 reversed is the index; dimension 1 reversed is a product with Pascal's matrix mod
-  // 2.
+  // The bit-reversed value of dimension 0 is the index, and that of dimension 1 the product of
+  // Pascal's matrix modulo 2 with the index.
   U d1 = index;
   d1 ^= d1 >> 16;
   d1 ^= (d1 & 0xff00ff00u) >> 8;
@@ -142,7 +145,7 @@ inline Sample4<F> independent_4d(const SampleKey<F>& key, uint32_t set) {
 
 }  // namespace detail
 
-/// Returns the sample values of one set for each path.
+/// Returns the four sample values of a sample set for the path in each lane.
 template <typename F>
 WAVECOMB_INLINE Sample4<F> sample_4d(SamplerKind kind, const SampleKey<F>& key, uint32_t set) {
   return kind == SamplerKind::kSobol ? detail::sobol_4d<F>(key, set)

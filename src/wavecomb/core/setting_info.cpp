@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Conversion and checks of the values of a setting.
+/// Functions that convert and check the value of a setting.
 #include <algorithm>
 
 #include "wavecomb/core/encoding/number_text.h"

@@ -16,57 +16,64 @@ namespace wavecomb {
 enum class SamplerKind : uint8_t { kSobol, kIndependent };
 enum class FilterKind : uint8_t { kBox, kGaussian, kBlackmanHarris };
 
-/// Returns the default full width of a filter in pixels: 1 for the box, which covers one pixel; 3
-/// for a Gaussian (sigma 1/2, as in pbrt) and for a Blackman-Harris window (as in Cycles).
+/// Returns the default full width of a pixel filter in pixels. The width is 1 for the box filter,
+/// and 3 for the Gaussian (sigma 1/2, as in pbrt) and the Blackman-Harris window (as in Cycles).
 constexpr float default_filter_width(FilterKind kind) {
   return kind == FilterKind::kBox ? 1.f : 3.f;
 }
 
 enum class IntegratorKind : uint8_t { kWavefront, kReference };
-/// Whether pilot renders before the first pass decide about path guiding and light paths, if
-/// Settings::guiding or Settings::transport is kAuto. kPlain: no pilot renders; kAuto then means
-/// neither path guiding nor light paths.
+/// Whether pilot renders decide on path guiding and light paths, where `Settings::guiding` and
+/// `Settings::transport` are `kAuto`. With `kAuto`, pilot renders are made before the first pass.
+/// With `kPlain`, no pilot renders are made, and neither path guiding nor light paths are used.
 enum class Quality : uint8_t { kAuto, kPlain };
-/// Where paths start. kPath: at the camera. kLight: also one light path per camera path, combined
-/// by multiple importance sampling (docs/light-paths.md). kAuto: kLight if a pilot render predicts
-/// a gain (light_paths/render/transport_choice.h). kBdpt: as kLight, and vertices of camera paths
-/// are also connected to vertices of light paths.
+/// Light transport method. With `kPath`, all paths start at the camera. With `kLight`, a light path
+/// is traced for each camera path, and both are combined by multiple importance sampling
+/// (docs/light-paths.md). `kBdpt` also connects vertices of camera paths to vertices of light
+/// paths. `kAuto` uses `kLight` if a pilot render predicts a gain, and `kPath` otherwise
+/// (light_paths/render/transport_choice.h).
 enum class Transport : uint8_t { kPath, kLight, kAuto, kBdpt };
-/// Treatment of samples that are too bright and too rare to be reliable: keep them, or reduce their
-/// weight (film/cascades.h).
+/// Treatment of fireflies, which are very bright and rare samples: keep their full weight, or
+/// reduce it (film/cascades.h).
 enum class Firefly : uint8_t { kKeep, kReweight };
-/// How a vertex chooses a light to sample: by power, or with a light tree
-/// (light/sampling/tree_choice.h). kAuto: by tree if there are enough lights to benefit.
+/// Method by which a vertex selects a light to sample: by power, or with a light tree
+/// (light/sampling/tree_choice.h). `kAuto` uses a light tree if the scene has enough lights for a
+/// tree to reduce noise.
 enum class LightSelection : uint8_t { kAuto, kTree, kPower };
-/// Selection weights of lights: by their contribution to the image, measured by a calibration
-/// before the first pass (render/pilots/light_calibration.h), or by power.
+/// Weights with which lights are selected. `kCalibrated` uses the contribution of each light to the
+/// image, which is measured before the first pass (render/pilots/light_calibration.h). `kPower`
+/// uses the power of each light.
 enum class LightWeights : uint8_t { kCalibrated, kPower };
-/// Russian roulette (path/steps/survive.h). kAuto: kEfficient if bounces are guided, else
-/// kThroughput.
+/// Method of Russian roulette (path/steps/survive.h). `kAuto` uses `kEfficient` in renders with
+/// path guiding, and `kThroughput` in other renders.
 enum class RouletteKind : uint8_t { kAuto, kOff, kThroughput, kCostAware, kEfficient };
 /// Sorting of rays before traversal.
 enum class RayOrder : uint8_t { kSlot, kMorton, kMortonOctant, kDirection, kAuto };
-/// Source of material costs. kAuto: measured for shading order, and the fixed model for roulette,
-/// so that images are reproducible.
+/// Source of the shading costs of materials. `kAuto` uses measured costs for the shading order, and
+/// the fixed cost model for Russian roulette, so that images are reproducible.
 enum class CostSource : uint8_t { kAuto, kMeasured, kModel };
-/// How rays are passed to the accelerator: in packets or singly.
+/// Whether rays are passed to Embree in packets or singly.
 enum class Traversal : uint8_t { kPackets, kSingle };
-/// Texture filtering. kAuto: full filtering at the camera's hits, one random texel after bounces
-/// (docs/decisions/one-texel.md). kWhole: full filtering everywhere.
+/// Texture filtering method. With `kAuto`, hits of camera rays use full filtering, and hits after
+/// bounces read one random texel (docs/decisions/one-texel.md). With `kWhole`, all hits use full
+/// filtering.
 enum class TextureFilter : uint8_t { kAuto, kWhole };
 /// Distribution of a render's samples over pixels (render/passes/allotment.h).
 enum class Allocate : uint8_t { kEven, kError, kEfficiency };
-/// Path guiding with a field trained before the first pass (render/pilots/guiding_training.h).
-/// kAuto: if a pilot render predicts a gain, and paths start at the camera only.
+/// Path guiding, with a guiding field that is trained before the first pass
+/// (render/pilots/guiding_training.h). `kAuto` turns path guiding on if a pilot render predicts a
+/// gain and no light paths are used.
 enum class Guiding : uint8_t { kAuto, kOn, kOff };
-/// Whether records are moved into shading order. kAuto: off, which is faster.
+/// Whether queued hits are moved in memory into shading order, or read by index. `kAuto` means
+/// `kOff`, which is faster.
 enum class Materialize : uint8_t { kAuto, kOn, kOff };
 
 /// Maximum width or height of an image, and maximum number of pixels.
 inline constexpr uint32_t kMaxSize = 65535;
 inline constexpr uint32_t kMaxPixels = 1u << 28;
 
-/// Rectangle of pixels: columns x0 to x1 - 1 of rows y0 to y1 - 1; row 0 is at the top.
+/// Rectangle of pixels with the columns x0 to x1 - 1 and the rows y0 to y1 - 1. Row 0 is at the top
+/// of the image.
 struct Region {
   uint32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 
@@ -79,7 +86,7 @@ struct Region {
   size_t index(uint32_t x, uint32_t y) const { return size_t{y - y0} * width() + (x - x0); }
 };
 
-/// Settings of a render. The image depends only on the members above the separator line.
+/// Settings of a render. The members below the separator line do not change the image.
 struct Settings {
   uint32_t width = 600, height = 600;  ///< pixels
   uint32_t spp = 64;                   ///< samples per pixel, 1 to 2^20
@@ -87,12 +94,12 @@ struct Settings {
   uint32_t seed = 0;
   SamplerKind sampler = SamplerKind::kSobol;
   FilterKind filter = FilterKind::kBlackmanHarris;
-  /// Full width of the pixel filter in pixels; default_filter_width() if not set.
+  /// Full width of the pixel filter in pixels. If not set, `default_filter_width` gives the width.
   std::optional<float> filter_width;
   RouletteKind roulette = RouletteKind::kAuto;
-  uint32_t roulette_depth = 2;  ///< first vertex at which roulette may terminate a path
-  /// Costs affect the image only through cost-aware roulette; kMeasured then makes it vary from run
-  /// to run.
+  uint32_t roulette_depth = 2;  ///< first vertex at which Russian roulette may terminate a path
+  /// Source of material costs. Only cost-aware roulette lets costs change the image. With
+  /// `kMeasured`, such images vary from run to run.
   CostSource costs = CostSource::kAuto;
   float clamp_indirect = 0;  ///< maximum luminance of an indirect contribution; 0 means no limit
   bool schlick_fresnel = false;
@@ -100,17 +107,18 @@ struct Settings {
   LightSelection light_selection = LightSelection::kAuto;
   LightWeights light_weights = LightWeights::kCalibrated;
   Guiding guiding = Guiding::kAuto;
-  /// Also use equiangular sampling of distances in homogeneous volumes
+  /// Whether distances in homogeneous volumes are also sampled by equiangular sampling
   /// (medium/volume/equiangular.h).
   bool equiangular = false;
   Quality quality = Quality::kAuto;
-  uint32_t learn_memory_mb = 64;  ///< memory limit of training data
-  /// Sample every non-delta bounce from a cosine lobe.
+  uint32_t learn_memory_mb = 64;  ///< memory limit of training data in MB
+  /// Whether the directions of all bounces except delta bounces are sampled from a cosine
+  /// distribution.
   bool cosine_sampling = false;
   IntegratorKind integrator = IntegratorKind::kWavefront;
   Transport transport = Transport::kAuto;
-  /// Aim light paths at regions where training light paths, traced before the first pass,
-  /// contributed to the image (light_paths/render/light_aiming.h).
+  /// Whether light paths are aimed at regions where light paths of a training render before the
+  /// first pass contributed to the image (light_paths/render/light_aiming.h).
   bool light_aim = true;
   /// Merge radius in pixels, within which light paths end at points that the camera sees by
   /// specular reflection or refraction (light_paths/merge_grid.h). 0 means no merging.
@@ -118,25 +126,27 @@ struct Settings {
   Firefly firefly = Firefly::kKeep;
   /// AOVs to store; the beauty does not depend on them.
   AovSet aovs;
-  /// Names of the light groups to store for Aov::kLightGroups; empty means all.
+  /// Names of the light groups that `Aov::kLightGroups` stores. An empty list means all light
+  /// groups.
   std::vector<std::string> light_groups;
-  std::vector<NamedExpression> expressions;       ///< for Aov::kExpressions
-  uint32_t deep_samples = DeepLimits{}.most;      ///< maximum samples of a deep pixel
+  std::vector<NamedExpression> expressions;  ///< for Aov::kExpressions
+  uint32_t deep_samples =
+      DeepLimits{}.most;  ///< maximum number of samples in a pixel of the deep image
   float deep_tolerance = DeepLimits{}.tolerance;  ///< depth tolerance of deep images
-  /// Adaptive sampling: stop sampling a pixel when its error (ErrorMap::error) is at most this
-  /// value. 0 means off.
+  /// Error limit for adaptive sampling: sampling of a pixel stops when the pixel's error
+  /// (`ErrorMap::error`) is at most this value. 0 means no limit.
   float adaptive = 0;
-  /// Adaptive sampling: stop when the image's mean relative error is at most this value. 0 means
-  /// off. This setting cannot be combined with `adaptive`.
+  /// Error limit of the whole image: the render stops when the mean relative error of the image is
+  /// at most this value. 0 means no limit. This setting cannot be combined with `adaptive`.
   float noise = 0;
   uint32_t min_spp = 16;  ///< adaptive sampling: samples before the first error estimate
   /// Distribution of samples over pixels in renders whose total sample count is set by spp or a
   /// time limit.
   Allocate allocate = Allocate::kEven;
-  /// Time limit of rendering in seconds; 0 means none. After the time limit, the image has the
-  /// samples done so far.
+  /// Time limit of rendering in seconds. The image then consists of the samples that were
+  /// completed. 0 means no limit.
   float time_limit = 0;
-  /// Make domes and distant lights transparent to the camera, for compositing.
+  /// Whether dome lights and distant lights are transparent to the camera, for compositing.
   bool alpha = false;
   bool error = false;  ///< whether to store error and variance estimates even if no setting needs
                        ///< them
@@ -144,23 +154,26 @@ struct Settings {
   /// pixels have the same values as in a render of the whole image, except in adaptive renders,
   /// which estimate errors within the region only.
   std::optional<Region> region;
-  /// Pixels along each edge beyond the camera window; included in width and height.
+  /// Number of additional pixels at each edge outside of the camera window. `width` and `height`
+  /// include these pixels.
   uint32_t overscan = 0;
-  bool crop = false;  ///< restrict the film and the image to the region
+  bool crop = false;  ///< whether the film and the image contain only the pixels of `region`
   // ---- below: how the image is computed; never changes it ----
   uint32_t threads = 0;    ///< number of threads; 0 means all threads that the process may use
   uint32_t wave_size = 0;  ///< paths per wave, 64 to 2^20; 0 means the default
   /// Lane width of kernels: 1, 4, 8 or 16; 0 means the largest width in the build.
   uint32_t lanes = 0;
-  /// Packets are faster than single rays and find bit-identical hits
-  /// (docs/decisions/canonical-hits.md).
+  /// Whether rays are traced in packets, which are faster than single rays and find bit-identical
+  /// hits (docs/decisions/canonical-hits.md).
   Traversal traversal = Traversal::kPackets;
   std::string policy = "code";
-  /// KAuto: do not move records, but read them by index, which is faster.
+  /// Whether queued hits are moved into shading order. `kAuto` reads them by index, which is
+  /// faster.
   Materialize materialize = Materialize::kAuto;
   RayOrder ray_order = RayOrder::kAuto;     ///< for bounce rays
   RayOrder shadow_order = RayOrder::kAuto;  ///< for shadow rays
-  /// Render passes of 1, 1, 2, 4, ... samples per pixel, so that the whole image appears soon.
+  /// Whether the first passes have 1, 1, 2, 4, ... samples per pixel, so that the whole image
+  /// appears soon.
   bool progressive = false;
   float cost_weight = 0.3f;  ///< weight of a pass in the moving average of costs, 0 to 1
 
@@ -168,7 +181,8 @@ struct Settings {
   bool joins_light() const { return transport == Transport::kLight || connects(); }
   /// Returns whether vertices of camera paths are connected to vertices of light paths.
   bool connects() const { return transport == Transport::kBdpt; }
-  /// Returns whether light paths merge at points seen by specular reflection or refraction.
+  /// Returns whether light paths are merged with points that the camera sees by specular reflection
+  /// or refraction.
   bool merges() const { return transport == Transport::kLight && merge_radius > 0; }
   bool is_adaptive() const { return adaptive > 0 || noise > 0; }
   /// Returns the pixels that are rendered.
@@ -179,25 +193,26 @@ struct Settings {
   bool needs_error() const { return error || is_adaptive() || allocates_samples(); }
   [[deprecated("use allocates_samples()")]] bool allots() const { return allocates_samples(); }
   [[deprecated("use needs_error()")]] bool keeps_error() const { return needs_error(); }
-  /// Throws Error that names the option and its valid values if a setting is invalid.
+  /// Throws an `Error` that names the option and its valid values if a setting is invalid.
   void check() const;
   bool operator==(const Settings&) const = default;
 };
 
-/// Setting that light paths cannot be combined with, and the value to use instead; `what` is empty
+/// Setting that cannot be combined with light paths, and the value to use instead. `what` is empty
 /// if there is no such setting.
 struct LightPathConflict {
   std::string what, instead;
 };
 using LightPathRefusal [[deprecated("use LightPathConflict")]] = LightPathConflict;
-/// Returns the first setting that light paths cannot be combined with, if any.
+/// Returns the first setting of `settings` that cannot be combined with light paths. `what` of the
+/// result is empty if there is none.
 LightPathConflict light_path_conflict(const Settings& settings);
 [[deprecated("use light_path_conflict()")]] inline LightPathConflict light_path_refusal(
     const Settings& settings) {
   return light_path_conflict(settings);
 }
-/// Returns the Error for a setting that light paths cannot be combined with; `settings` must use
-/// light paths.
+/// Returns an `Error` with a message for a setting that cannot be combined with light paths.
+/// `settings` must use light paths.
 Error light_path_error(const Settings& settings, const LightPathConflict& conflict);
 
 }  // namespace wavecomb

@@ -63,8 +63,8 @@ SettingInfo number(const char* name, const char* label, double least, double mos
   info.zero = zero;
   return info;
 }
-/// Returns the table row of a numeric setting whose default depends on other settings; `used`
-/// returns the value that a render uses.
+/// Returns the table row of a numeric setting whose default depends on other settings. The function
+/// `used` returns the value that a render with given settings uses.
 template <auto kMember>
 SettingInfo number_or_unset(const char* name, const char* label, double least, double most,
                             const char* help, SettingValue (*used)(const Settings&)) {
@@ -107,19 +107,19 @@ SettingInfo with_steps(SettingInfo info, std::vector<double> steps, const char* 
   return info;
 }
 
-/// Marks a setting as changing the expected value of the image.
+/// Marks a setting that changes the expected value of the image.
 SettingInfo in_expectation(SettingInfo info) {
   info.changes_expectation = true;
   return info;
 }
 
-/// Marks a setting as leaving the image bit-identical at equal sample counts.
+/// Marks a setting that does not change the image if all pixels have the same sample counts.
 SettingInfo same_bits(SettingInfo info) {
   info.changes_bits = false;
   return info;
 }
 
-/// Returns the settings that define the image.
+/// Returns the rows of the settings that define the image.
 std::vector<SettingInfo> image_settings() {
   using S = Settings;
   return {
@@ -182,7 +182,7 @@ std::vector<SettingInfo> image_settings() {
   };
 }
 
-/// Returns the settings that control the work for each sample.
+/// Returns the rows of the settings that control the work for each sample.
 std::vector<SettingInfo> work_settings() {
   using S = Settings;
   return {
@@ -242,7 +242,7 @@ std::vector<SettingInfo> work_settings() {
   };
 }
 
-/// Returns the settings of the choice of lights and directions.
+/// Returns the rows of the settings that control how lights and directions are sampled.
 std::vector<SettingInfo> choice_settings() {
   using S = Settings;
   return {
@@ -278,7 +278,7 @@ std::vector<SettingInfo> choice_settings() {
   };
 }
 
-/// Returns the settings that control the number of samples.
+/// Returns the rows of the settings that control the number of samples.
 std::vector<SettingInfo> sample_settings() {
   using S = Settings;
   return {
@@ -306,7 +306,8 @@ std::vector<SettingInfo> sample_settings() {
   };
 }
 
-/// Returns the settings that control how the image is computed, and in which order.
+/// Returns the rows of the settings that control the order and the method of computation, but not
+/// the image.
 std::vector<SettingInfo> order_settings() {
   using S = Settings;
   std::vector<SettingInfo> settings = {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Table of settings with one row per member of Settings. Wavecomb derives checks, Python
 /// attributes and keywords, command line options, form fields and checkpoint headers from the
-/// table. To add a setting, add a member to Settings, a row here, and its use.
+/// table. To add a setting, add a member to `Settings`, a row to settings_table.cpp, and the code
+/// that uses the member.
 #pragma once
 
 #include <cstdint>
@@ -15,28 +16,31 @@
 
 namespace wavecomb {
 
-/// Value of a setting as callers pass it; for settings with choices, the name of a choice. The
-/// value None (monostate) selects a default that depends on other settings.
+/// Value of a setting as callers pass it. If the setting has a list of choices, the value is the
+/// name of a choice. The value None (`std::monostate`) selects a default that depends on other
+/// settings.
 using SettingValue = std::variant<std::monostate, bool, int64_t, double, std::string>;
 
-/// Value of a setting with choices.
+/// One of the allowed values of a setting that has a list of choices.
 struct SettingChoice {
   std::string name;
   const char* help;  ///< one sentence
 };
 
-/// Group of a setting: it defines the image, the amount of work, or the order of computation.
+/// Groups of settings: settings that define the image, the amount of work, or the order of
+/// computation.
 enum class SettingGroup : uint8_t { kImage, kWork, kOrder };
 
 /// Row of the settings table.
 ///
 /// Contract: a row exists as long as the program runs.
 struct SettingInfo {
-  const char* name = "";   ///< attribute name; command line options contain - instead of _
+  const char* name =
+      "";  ///< name of the Python attribute; the command line option has - in place of _
   const char* label = "";  ///< label in a form
   const char* help = "";   ///< one sentence
-  /// Whether the image depends on the setting; otherwise the setting affects only how the image is
-  /// computed.
+  /// Whether the image depends on the setting. If not, the setting affects only the computation of
+  /// the image, such as the number of threads.
   bool changes_image = true;
   /// Whether the setting changes the bits of the beauty image if each pixel has the same sample
   /// count.
@@ -46,28 +50,29 @@ struct SettingInfo {
   /// and work.
   bool changes_expectation = false;
   SettingGroup group = SettingGroup::kImage;
-  /// Least and greatest allowed number; no limits if least > most.
+  /// Smallest and largest allowed number. There are no limits if `least` exceeds `most`.
   double least = 0, most = -1;
   const char* zero = "";  ///< meaning of the value 0, if it is special
   /// Allowed values besides 0; an empty list allows all values.
   std::vector<double> steps;
   std::vector<SettingChoice> choices;  ///< names of the choices in the order of the enum
 
-  /// Whether None is allowed, which selects a default that depends on other settings.
+  /// Whether the value None is allowed, which selects a default that depends on other settings.
   bool may_be_none = false;
 
   SettingValue (*read)(const Settings&) = nullptr;
   void (*write)(Settings&, const SettingValue&) = nullptr;
 
   SettingValue get(const Settings& settings) const;
-  /// Throws Error if the value has a wrong type or is not one of the choices.
+  /// Sets the member in `settings`. Throws `Error` if the value has a wrong type or is not one of
+  /// the choices.
   void set(Settings& settings, const SettingValue& value) const;
-  /// Throws Error that names the setting if its value is out of range.
+  /// Throws an `Error` that names the setting if its value in `settings` is out of range.
   void check(const Settings& settings) const;
 };
 
-/// Returns all settings except aovs and region, which are not single values, in the order of
-/// Settings.
+/// Returns the rows of all settings in the order of `Settings`, except `aovs` and `region`, which
+/// are not single values.
 std::span<const SettingInfo> setting_table();
 /// Returns the row of a setting, or null if the name is unknown.
 const SettingInfo* find_setting(std::string_view name);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Happens-before annotations of tasks for ThreadSanitizer, which cannot see into oneTBB.
+/// Annotations that inform ThreadSanitizer about the order of tasks. ThreadSanitizer cannot derive
+/// this order, since the oneTBB library is not instrumented.
 #pragma once
 
 #if defined(__SANITIZE_THREAD__)
@@ -11,9 +12,9 @@
 
 namespace wavecomb {
 
-/// Annotations of one parallel loop: code before the loop happens before the loop's tasks, and the
-/// tasks happen before join(). The tasks of a loop are not ordered among each other. TaskOrder does
-/// nothing in builds without ThreadSanitizer.
+/// Annotations of a parallel loop. They state that code before the loop happens before the loop's
+/// tasks, and that the tasks happen before the call of join(). They state no order between the
+/// tasks of the loop. TaskOrder does nothing in builds without ThreadSanitizer.
 ///
 ///     const TaskOrder order;
 ///     tbb::parallel_for(size_t{0}, n, order.around([&](size_t i) { ... }));
@@ -26,7 +27,7 @@ class TaskOrder {
 
   /// Wraps `body`, the loop's body, as an annotated task.
   ///
-  /// Contract: this object and `body` outlive the task.
+  /// Contract: this object and `body` must exist until the task ends.
   template <typename Body>
   auto around(const Body& body) const {
     // ThreadSanitizer must not instrument this function, since the captures are read before the
@@ -59,7 +60,8 @@ class TaskOrder {
   char begun_ = 0, ended_ = 0;
 };
 
-/// Annotation for tasks of one worker, which run one after another; `worker` identifies the worker.
+/// Annotation of a worker's tasks, which run one after another. The address `worker` identifies the
+/// worker.
 class WorkerOrder {
  public:
 #if defined(__SANITIZE_THREAD__)

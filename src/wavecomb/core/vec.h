@@ -25,7 +25,7 @@ WAVECOMB_INLINE Vec3<F> cross(const Vec3<F>& a, const Vec3<F>& b) {
   return {fma(a.y, b.z, F(-(a.z * b.y))), fma(a.z, b.x, F(-(a.x * b.z))),
           fma(a.x, b.y, F(-(a.y * b.x)))};
 }
-/// Returns a / |a|; NaN for the zero vector.
+/// Returns a / |a|. The result for the zero vector is NaN.
 template <typename F>
 WAVECOMB_INLINE Vec3<F> normalize(const Vec3<F>& a) {
   return a * F(1.f / length(a));
@@ -65,7 +65,8 @@ WAVECOMB_INLINE Mask<F> is_black(const Vec3<F>& c) {
   return (c.x == 0.f) & (c.y == 0.f) & (c.z == 0.f);
 }
 
-/// Gathers a vector from three consecutive floats at 3 * index in an array.
+/// Loads a vector in each lane, from the three consecutive floats of an array that start at 3 *
+/// `index`.
 template <typename F>
 inline Vec3<F> gather_vec3(const float* base, const UInt<F>& index, const Mask<F>& active) {
   const UInt<F> i = index * 3u;

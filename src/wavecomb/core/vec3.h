@@ -19,7 +19,7 @@ struct Vec3 {
   Vec3() = default;
   explicit Vec3(const F& s) : x(s), y(s), z(s) {}
   Vec3(const F& x_, const F& y_, const F& z_) : x(x_), y(y_), z(z_) {}
-  /// Broadcasts a scalar vector to all lanes.
+  /// Creates a packet vector with the same vector in all lanes.
   template <typename G = F, typename = std::enable_if_t<!std::is_same_v<G, float>>>
   explicit Vec3(const Vec3<float>& v) : x(v.x), y(v.y), z(v.z) {}
 

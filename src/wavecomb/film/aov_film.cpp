@@ -15,7 +15,8 @@ constexpr const char* kLightPrefix = "light_";
 /// Prefix of the layer names of light path expressions.
 constexpr const char* kExpressionPrefix = "lpe_";
 
-/// Returns a layer; write(i, pointer) writes the values of pixel i.
+/// Makes an image layer. The function `write(i, pointer)` writes the values of pixel `i` to
+/// `pointer`.
 template <typename Write>
 AovLayer make_layer(std::string name, uint32_t channels, size_t pixels, const Write& write) {
   AovLayer layer{std::move(name), channels, std::vector<float>(pixels * channels)};
@@ -201,7 +202,8 @@ std::vector<uint32_t> crypto_ids(const AovLayer& pairs) {
   for (size_t i = 0; i + 1 < pairs.values.size(); i += 2) {
     if (pairs.values[i + 1] <= 0) continue;
     const auto id = std::bit_cast<uint32_t>(pairs.values[i]);
-    // Neighbouring pixels mostly have the same ids, so occasional deduplication bounds the list.
+    // Neighbouring pixels mostly have the same ids, so removing duplicates from time to time keeps
+    // the list short.
     if (ids.empty() || ids.back() != id) ids.push_back(id);
     if (ids.size() < limit) continue;
     sort_unique(ids);

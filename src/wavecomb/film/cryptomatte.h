@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Cryptomatte: hashed ids of names, and bounded per-pixel lists of ids and coverage (J. Friedman
+/// Cryptomatte ids, which are hashes of names, and lists of ids and coverage per pixel (J. Friedman
 /// and A. Jones, "Fully Automatic ID Mattes with Support for Motion Blur and Transparency",
 /// SIGGRAPH 2015 poster; specification 1.2.0).
 #pragma once
@@ -25,17 +25,17 @@ uint32_t murmur3_32(std::string_view text, uint32_t seed);
 /// Generation").
 uint32_t crypto_id(std::string_view name);
 
-/// Ids seen in one pixel with their sample counts, in bounded memory.
+/// Ids of the samples of one pixel with their sample counts, in constant memory.
 ///
 /// Sample counts are exact while a pixel has at most kIds ids. A further id replaces the id with
 /// the fewest samples and inherits its count (A. Metwally, D. Agrawal, A. El Abbadi, "Efficient
-/// Computation of Frequent and Top-k Elements in Data Streams", 2005). Hence counts always add up
-/// to the number of samples that hit something, no count is too small, and every id with more than
-/// 1 / kIds of the samples is present.
+/// Computation of Frequent and Top-k Elements in Data Streams", 2005). Therefore, the counts always
+/// add up to the number of samples that hit something, no count is too small, and every id with
+/// more than 1 / kIds of the samples is in the list.
 struct CryptoPixel {
   static constexpr uint32_t kIds = 8;
   uint32_t id[kIds] = {};
-  /// Sample count of each id; 0 marks a free entry, and free entries come last.
+  /// Sample count of each id. Unused entries have the count 0 and are at the end.
   uint32_t count[kIds] = {};
 
   void add(uint32_t new_id) {
@@ -57,10 +57,11 @@ struct CryptoPixel {
   }
 };
 
-/// Cryptomatte ids of the object and material indices that kernels use. The tables are built once
-/// per render, if Cryptomatte is requested.
+/// Tables that map object indices and material indices to Cryptomatte ids. The tables are built
+/// once per render if a Cryptomatte AOV is requested.
 struct CryptoTables {
-  /// Indexed by instance; object index = first_object[instance] + geometry.
+  /// Object index of the first geometry of each instance. The object index of geometry `geom` is
+  /// `first_object[instance] + geom`.
   std::vector<uint32_t> first_object;
   uint32_t first_light = 0;                   ///< object index of light record 0
   uint32_t first_volume = 0;                  ///< object index of volume 0
@@ -71,8 +72,9 @@ struct CryptoTables {
   CryptoTables(const Scene& scene, AovSet aovs);
 };
 
-/// Returns (name, id) pairs, sorted by name, for the names of `level` whose ids are in `ids`. `ids`
-/// must be sorted. If the hashes of several names collide, all these names are included.
+/// Returns pairs of a name and an id, sorted by name, for the names of the Cryptomatte level
+/// `level` whose ids are in `ids`. `ids` must be sorted. If the hashes of several names collide,
+/// all these names are included.
 std::vector<std::pair<std::string, uint32_t>> crypto_manifest(const Scene& scene, Aov level,
                                                               const std::vector<uint32_t>& ids);
 

@@ -15,7 +15,7 @@ namespace {
 
 static_assert(kMaxDeepSamples <= 255, "counted in a byte");
 
-/// Returns the length of a depth range relative to its far end.
+/// Returns the length of a depth range divided by the depth of its far end.
 float spread(float front, float back) {
   return back > 0 ? (back - front) / back : 0.f;
 }

@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Deep image under construction: the samples of each pixel binned by depth (docs/deep.md).
+/// Sums of a deep image during rendering, in which the samples of each pixel are grouped in bins by
+/// depth (docs/deep.md).
 ///
 /// A camera ray that hits a surface or scatters in a volume gives its pixel one sample: a depth and
 /// the radiance of its path. Samples of similar depth share a bin. The bins of a pixel are disjoint
-/// depth ranges in ascending order; a bin stores the number n of its samples, of the pixel's N, and
-/// the sum C of their radiance. With the coverage s = n / N, and r the coverage that the bins in
-/// front leave free,
+/// depth ranges in ascending order. A bin stores the number n of its samples and the sum C of their
+/// radiance. N is the number of samples of the pixel. The coverage of a bin is s = n / N, and r is
+/// the part of the pixel that the bins in front of it do not cover:
 ///   r_0 = 1,  r_{i+1} = r_i - s_i,   alpha_i = s_i / r_i,   color_i = C_i / (N r_i).
-/// Compositing the bins with "over", sum_i color_i prod_{j<i} (1 - alpha_j), then gives sum_i C_i /
-/// N, the flat colour of everything that covers the pixel; the composited alpha is the covered
-/// fraction.
+/// Compositing the bins with "over", sum_i color_i prod_{j<i} (1 - alpha_j), gives sum_i C_i / N,
+/// which is the colour of the pixel in the flat image, and the covered fraction of the pixel as
+/// alpha.
 ///
-/// Memory is bounded by `most` bins per pixel. If a sample would exceed this limit, the two
-/// neighbouring bins whose joint depth range is smallest relative to its depth are merged.
+/// A pixel has at most `DeepLimits::most` bins. If a sample would exceed this limit, two
+/// neighbouring bins are merged, whose common depth range is the smallest relative to its depth.
 #pragma once
 
 #include <cstddef>
@@ -35,8 +36,8 @@ struct DeepBin {
   uint32_t in_volume = 0;      ///< number of samples that scattered in a volume
 };
 
-/// Allocator of zeroed memory that uses calloc, so that untouched pages take no physical memory.
-/// Suitable only for types whose default value is all zero bytes.
+/// Allocator that gets zeroed memory from calloc, so that pages take no physical memory until they
+/// are written. The default value of the element type must consist of zero bytes.
 template <typename T>
 struct ZeroedMemory {
   using value_type = T;
@@ -56,12 +57,13 @@ struct ZeroedMemory {
   bool operator==(const ZeroedMemory&) const = default;
 };
 
-/// Deep samples of an image, row by row of its window.
+/// Deep samples of an image, in row-major order of the pixels.
 struct DeepLayer {
-  /// Channels of a sample: R, G, B, A, Z, ZBack. Colours are premultiplied.
+  /// Number of channels of a deep sample: R, G, B, A, Z and ZBack. Colours are multiplied by alpha.
   static constexpr size_t kChannels = 6;
-  std::vector<uint32_t> counts;  ///< number of samples of each pixel
-  /// KChannels values per sample; the samples of a pixel are in order of increasing depth.
+  std::vector<uint32_t> counts;  ///< number of deep samples of each pixel
+  /// `kChannels` values for each deep sample. The samples of a pixel are in order of increasing
+  /// depth.
   std::vector<float> values;
   bool empty() const { return counts.empty(); }
 };
@@ -73,21 +75,24 @@ struct DeepLayer {
 class DeepFilm {
  public:
   DeepFilm() = default;
-  /// Throws std::bad_alloc if memory for `limits.most` bins per pixel is not available.
+  /// Allocates memory for `limits.most` bins per pixel. Throws std::bad_alloc if the allocation
+  /// fails.
   DeepFilm(size_t pixels, const DeepLimits& limits);
 
   bool empty() const { return used_.empty(); }
-  /// Adds a sample of depth z >= 0. `rgb` is the radiance of the path. `in_volume` is true if the
-  /// camera ray scattered in a volume.
+  /// Adds a sample to the pixel with the index `pixel`. `z` is its depth, which must not be
+  /// negative. `rgb` is the radiance of the path. `in_volume` is true if the camera ray scattered
+  /// in a volume.
   void add(size_t pixel, float z, bool in_volume, const float* rgb);
-  /// Returns the deep samples of all pixels. `samples`: sample count of each pixel.
+  /// Returns the deep samples of all pixels. `samples` is the sample count of each pixel.
   DeepLayer layer(const std::vector<uint32_t>& samples) const;
-  /// Returns the state of the deep image for checkpoints: one byte per pixel with its number of
-  /// bins, then the bins in use, pixel by pixel.
+  /// Returns the state of the deep image for checkpoints. It begins with one byte per pixel, the
+  /// number of its bins, followed by the bins of all pixels.
   std::vector<std::byte> packed() const;
-  /// Restores the state from packed() bytes. Throws Error if the bytes do not fit this image.
+  /// Restores the state that packed() returned. Throws `Error` if the bytes do not match the size
+  /// of this image.
   void unpack(std::span<const std::byte> bytes);
-  /// Upper bound of the memory use in bytes.
+  /// Returns an upper bound of the memory use in bytes.
   size_t bytes() const { return used_.size() * (1 + limits_.most * sizeof(DeepBin)); }
 
  private:
@@ -97,8 +102,8 @@ class DeepFilm {
 
   DeepLimits limits_;
   std::vector<uint8_t> used_;  ///< number of bins in use for each pixel
-  /// Bin 0 of all pixels, then bin 1 of all pixels, and so on, so that the memory of bins that no
-  /// pixel uses stays unmapped.
+  /// Bin 0 of all pixels, followed by bin 1 of all pixels, and so on. In this order, bins that no
+  /// pixel uses take no physical memory.
   std::vector<DeepBin, ZeroedMemory<DeepBin>> bins_;
 };
 

@@ -7,7 +7,7 @@
 namespace wavecomb {
 namespace {
 
-/// Returns the filter value at x in [-1, 1], for a filter with half width 1.
+/// Returns the value of a pixel filter of half width 1 at x in [-1, 1].
 double filter_value(FilterKind kind, double x) {
   constexpr double kPi = 3.14159265358979323846;
   switch (kind) {
@@ -44,8 +44,8 @@ FilterTable::FilterTable(FilterKind kind, float width)
     offsets_[bin] = static_cast<float>(((step + within) / kSteps - 0.5) * width);
   }
   offsets_[kBins + 1] = offsets_[kBins];
-  // Tabulate the density of the interpolated offsets, which differs from the filter's density in
-  // the tails.
+  // Tabulate the density of offsets that are interpolated from the table. In the tails, this
+  // density differs from the density of the filter.
   uint32_t from = 0;
   const auto share_below = [&](double x) {
     while (from + 1 < kBins && double{offsets_[from + 1]} <= x) ++from;

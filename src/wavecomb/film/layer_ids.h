@@ -8,11 +8,13 @@
 
 namespace wavecomb {
 
-/// Largest number of ids that a float layer can distinguish: integers up to 2^24 are exact.
+/// Largest number of ids that a layer of floats can distinguish, since floats represent integers
+/// only up to 2^24 exactly.
 inline constexpr uint64_t kMaxLayerIds = uint64_t{1} << 24;
 
-/// Throws Error that names the layer if `set` includes an id layer and the scene has more instances
-/// (including the world) or materials than kMaxLayerIds.
+/// Throws an `Error` that names the layer if `set` includes a layer of instance or material ids and
+/// the scene has more than `kMaxLayerIds` instances or materials. The number of instances includes
+/// instance 0, which contains objects in world space.
 void check_id_layers(const AovSet& set, uint64_t instances, uint64_t materials);
 
 }  // namespace wavecomb

@@ -9,11 +9,11 @@
 
 namespace wavecomb {
 
-/// Estimate of the median of a stream of values with five markers (P^2: Jain and Chlamtac, "The P2
-/// Algorithm for Dynamic Calculation of Quantiles and Histograms Without Storing Observations",
-/// 1985). The values d are positive or infinite. The markers estimate quantiles of d / (d + s),
-/// which is at most 1; s is the first finite value. The caller owns the state of kWords doubles,
-/// which must be 0 initially.
+/// Estimate of the median of a stream of values with the five markers of the P^2 algorithm (Jain
+/// and Chlamtac, "The P2 Algorithm for Dynamic Calculation of Quantiles and Histograms Without
+/// Storing Observations", 1985). The values d must be positive or infinite. The markers estimate
+/// quantiles of d / (d + s), which is at most 1, where s is the first finite value. The caller
+/// provides the memory of the state, which is an array of `kWords` doubles with initial values 0.
 ///
 /// Contract: the result depends only on the values and their order.
 class MedianSketch {
@@ -55,7 +55,7 @@ class MedianSketch {
     if (i == 0) return 0;
     return i + 1 == kMarkers ? s_[kCount] - 1 : s_[kPositions + i - 1];
   }
-  /// Moves marker `i` by one position if it is at least one away from its ideal position.
+  /// Moves marker `i` by one position if its distance from the ideal position is at least one.
   void adjust(uint32_t i) {
     double* const q = s_ + kHeights;
     const double at = marker_position(i), before = marker_position(i - 1),
@@ -78,8 +78,8 @@ class MedianSketch {
   double* s_;
 };
 
-/// Returns the median estimate of a MedianSketch state. The estimate is infinite if more than half
-/// of the values were infinite, or if there are no values.
+/// Returns the median that the state of a `MedianSketch` estimates. The estimate is infinite if
+/// more than half of the values were infinite, or if there are no values.
 inline double median_of(const double* state) {
   using S = MedianSketch;
   const double infinity = std::numeric_limits<double>::infinity();

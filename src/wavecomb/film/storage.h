@@ -7,7 +7,7 @@
 
 namespace wavecomb {
 
-/// Returns 1 / n, or 0 if n is 0: the factor that turns a sum of n samples into a mean.
+/// Returns 1 / n, the factor between the sum and the mean of n samples. Returns 0 if n is 0.
 inline double inverse_count(uint32_t n) {
   return n == 0 ? 0.0 : 1.0 / n;
 }

@@ -204,7 +204,8 @@ def varying(cells: Sequence[dict[str, Any]]) -> list[str]:
     The value of a factor is included if no other setting distinguishes groups. A renderer may use a
     smaller value than the suite requests, for example if a wave is larger than the image.
     """
-    # columns that the heading already shows, or that follow from another column
+    # Names of columns that a report's heading already shows, or that are functions of another
+    # column.
     redundant = ("experiment", "height", "factor", "factor_value")
     names = [name for name in (*SETTINGS, "variant") if name not in redundant]
     differ = [n for n in names if len({str(cell.get(n, "")) for cell in cells}) > 1]

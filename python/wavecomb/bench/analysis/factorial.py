@@ -65,8 +65,8 @@ def effects(runs: pd.DataFrame, metric: str) -> pd.DataFrame:
         for level in known if level != base[f]
     ]  # fmt: skip
     pairs = [pair for pair in itertools.combinations(others, 2) if pair[0][0] != pair[1][0]]
-    # An effect is a linear function of the logarithmic times, so its values at unit vectors are its
-    # weights.
+    # An effect is a linear function of the logarithms of run times, so evaluating the effect for
+    # unit vectors gives the weight of each run time.
     unit = pandas.DataFrame(np.eye(table.shape[1]), columns=table.columns)
     terms, weights = [], []
     for term in ((one,) for one in others), pairs:

@@ -223,7 +223,9 @@ def regrets(runs: pd.DataFrame, metric: str = "render_s") -> pd.DataFrame:
                 "policy": policy,
                 "n": estimate.n,
                 "regret": estimate.value - 1.0,
-                # Fixed policies cannot be better than the best of them, but "adaptive" can.
+                # The regret of a fixed policy relative to the best fixed policy is never negative.
+                # The policy "adaptive" can be better than every fixed policy, so its regret can be
+                # negative.
                 "low": np.maximum(estimate.low, 0.0 if policy == "adaptive" else 1.0) - 1.0,
                 "high": estimate.high - 1.0,
                 "best": best,

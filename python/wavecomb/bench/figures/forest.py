@@ -334,7 +334,7 @@ def difference_figure(
         for text, pixels in pictures
     ]
     limit = float(np.quantile(np.abs([values for _, values in maps]), 0.99)) or 1e-6
-    # At least two columns, since a single map would fill the page width.
+    # Lay out at least two columns of maps, since a single map would fill the page width.
     columns = min(3, max(2, len(maps)))
     lines = -(-len(maps) // columns)
     height, width = reference.shape

@@ -134,7 +134,8 @@ def _curves(out: Writer, key: str, runs: pd.DataFrame) -> None:
 
     factor = str(runs["factor"].iloc[0])
     if factor and runs["factor_value"].notna().all():
-        # The name of a stage with a varied option ends with the value of that option.
+        # The suite varies an option of a generated stage. The name of each generated stage ends
+        # with the name and value of that option.
         bases = runs["stage"].map(lambda stage: stage.partition(f"-{factor}-")[0])
         curves(bases, "factor_value", factor.replace("_", " "), "curve")
         return
@@ -181,7 +182,7 @@ def _policies(out: Writer, name: str, runs: pd.DataFrame) -> None:
     title = "Times by policy, ratio of means to none"
     out.add(ratio_table(title, metrics, "policy", note))
     if (runs["factor"] != "").any():
-        return  # a scaling experiment already shows these values as curves
+        return  # curves of a scaling experiment already show these ratios
     key = key_of(name)
     for words, end in (("shade", "shade"), ("shade + order", "policies")):
         title = f"{words.capitalize()} time by policy"

@@ -61,7 +61,8 @@ def suite_infos() -> list[SuiteInfo]:
         try:
             found.append(suite_info(name))
         except WavecombError:
-            continue  # The suite depends on a property of the machine that cannot be determined.
+            # Skip a suite that depends on a property of the machine that cannot be determined.
+            continue
     return sorted(found, key=lambda info: info.seconds * info.repetitions)
 
 

@@ -214,7 +214,8 @@ class BenchPanel(TakesFiles, QWidget):
 
     def _end_suite(self, code: int, text: str, error: str) -> None:
         self._measuring = False
-        # "stopped" means that the user stopped the viewport's render.
+        # Resume the viewport's render, which was paused for the benchmark, unless the user has
+        # stopped it.
         if self._session.state != "stopped":
             self._session.resume()
         self._enable(True)

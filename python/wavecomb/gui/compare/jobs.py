@@ -132,7 +132,8 @@ class Jobs(QObject):
         if ask.figures() in self._flip:
             found = self._with_flip(ask, found)
         elif before is not None and before.flip is not None and (ask.a.live or ask.b.live):  # type: ignore[union-attr]
-            # FLIP of the previous frame, until the new value is known.
+            # Show the FLIP value of the previous frame until the value of this frame has been
+            # computed.
             found = found.with_flip(before.flip)
         self._numbers = found
         self.numbers.emit(found)
@@ -155,7 +156,7 @@ class Jobs(QObject):
             self.numbers.emit(self._numbers)
         self._want_map()
         if self._ask is not None and self._ask.figures() not in self._flip:
-            # The images have changed since the last request.
+            # Compute FLIP again, since the images have changed since the last computation.
             self._want_flip(self._ask, high_range=False)
 
     def _with_flip(self, ask: Ask, found: Numbers) -> Numbers:

@@ -59,7 +59,8 @@ def picture_key(setup: Mapping[str, Any], revision: Hashable) -> tuple[Hashable,
     if setup.get("roulette") == "cost-aware":
         if setup.get("costs") == "measured":
             return None
-        # With cost-aware roulette, measured costs decide which paths are terminated.
+        # With cost-aware roulette, the image depends on the costs of materials, because the costs
+        # decide which paths are terminated.
         costs = (setup.get("costs"), repr(setup.get("profile")))
         return (revision, costs, *(_plain(setup.get(name)) for name in BITS))
     return (revision, *(_plain(setup.get(name)) for name in BITS))

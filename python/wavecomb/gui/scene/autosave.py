@@ -90,7 +90,8 @@ class Autosave(QObject):
             if not self._waits:
                 self.discard()
             return
-        self._waits = False  # New edits replace saved edits that were not restored.
+        # New edits overwrite edits in the autosave file that the user did not restore.
+        self._waits = False
         with contextlib.suppress(WavecombError, OSError):
             save_edits(self._edits.edits.stage, self._file)
 
@@ -148,7 +149,8 @@ class Autosave(QObject):
 
     def _on_clean(self, clean: bool) -> None:
         if clean and not self._waits:
-            # Closing a stage stops the timer, so its unsaved edits stay in the file.
+            # Save with a timer: closing a stage stops the timer, so that the file keeps the unsaved
+            # edits of the closed stage.
             self._timer.start(0)
 
 

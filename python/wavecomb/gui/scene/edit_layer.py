@@ -34,7 +34,8 @@ def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:
         name = str(base)
     name = Path(name).as_posix()
     layer.subLayerPaths = [name if name.startswith(("../", "/")) else f"./{name}"]
-    # USD reads up axis, units, default prim and times only from the strongest layer, so copy them.
+    # USD reads the up axis, units, default prim and time range only from the strongest layer, so
+    # copy these values to the edit layer.
     for key in root.pseudoRoot.ListInfoKeys():
         if key not in _NOT_REPEATED and not layer.pseudoRoot.HasInfo(key):
             layer.pseudoRoot.SetInfo(key, root.pseudoRoot.GetInfo(key))

@@ -34,8 +34,8 @@ class EditCommand(QUndoCommand):
     ) -> None:
         super().__init__(step.label)
         self.step, self.stretch, self.typing, self.moment = step, stretch, typing, moment
-        # Qt owns the undo commands. A strong reference in a command would keep the history, and
-        # thus its undo stack, alive.
+        # Qt owns the undo commands. If a command held a strong reference to the history, the
+        # history and its undo stack would never be deleted.
         self._history = weakref.ref(history)
 
     def redo(self) -> None:

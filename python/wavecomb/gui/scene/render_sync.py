@@ -211,7 +211,8 @@ class RenderSync:
             return
         emission = any("emissi" in what for _, what in step.after)
         if emission and not stage.lights:
-            # The emission of materials decides if the loader adds a default dome to an unlit stage.
+            # The loader adds a default dome light to a stage without lights and emissive materials.
+            # Load the stage again, since the edit may have changed this condition.
             self.session.rebuild(step.label)
         for prim in step.prims:
             for light in {one for one in stage.light_paths if light_prim(one) == prim}:
@@ -238,7 +239,8 @@ class RenderSync:
                 continue
             have = scene.material(number)
             have |= have.get("openpbr", {})
-            # A primvar of a mesh may replace a value that a graph reads by name.
+            # Leave out values that a value graph computes, since a primvar of a mesh may replace
+            # them.
             values = {
                 name: value
                 for name, value in wanted.items()
@@ -246,7 +248,8 @@ class RenderSync:
             }
             if values:
                 self.session.edit_material(number, **values)
-            # The stage holds the edit, so the next loading of the stage includes it.
+            # The edit is in the USD stage, so it need not be repeated after the stage is loaded
+            # again.
             self.session.material_edits.pop(have["name"], None)
 
     def _sync_light(self, path: str) -> None:

@@ -133,7 +133,8 @@ class SceneEdits(QObject, RenderSync):
             for other in lights:
                 if other != path and not uneditable(self.prim(other)):
                     opinions[(Sdf.Path(other), ".visibility")] = _word("invisible")
-            # The light that was shown alone before is now hidden, but only in the session layer.
+            # If another light was shown alone before, this light is hidden in the session layer.
+            # Replace that opinion, so that the light is visible.
             opinions.pop((Sdf.Path(path), ".visibility"), None)
             for at, word in show(self.prim(path), self.time).items():
                 opinions[(at, ".visibility")] = _word(word)
@@ -269,7 +270,8 @@ class SceneEdits(QObject, RenderSync):
         self.stage_edits.time = code_of(loaded.frame)
         self.placements = Placements(usd, self.stage_edits.time, self.placements.refused)
         self.scene_changed.emit()
-        # Edits that were made or undone during loading are not in the scene yet.
+        # Apply edits that were made or undone while the stage was loading, since the loaded scene
+        # does not contain them.
         for prim in {path for path, _ in self.stage_edits.edited()} | self._touched:
             self.show_step(Step("", {}, {(prim, ""): None}))
         self._touched = set()

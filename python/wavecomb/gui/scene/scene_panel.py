@@ -53,7 +53,8 @@ class ScenePanel(QWidget):
         self.materials = MaterialsPanel(self.edits)
         self.lights = LightsPanel(self.edits)
         self.notes = NotesPanel(session)
-        self._layer: tuple[Path | None, str] | None = None  # Stage and edit file of the last save.
+        # Stage file and edit file of the last save.
+        self._layer: tuple[Path | None, str] | None = None
         self.tabs = QTabWidget()
         self.tabs.setObjectName("scene-tabs")
         self.tabs.setDocumentMode(True)

@@ -236,8 +236,8 @@ class ColourField(Field):
         numbers = QHBoxLayout()
         numbers.setSpacing(theme.em(0.2))
         self.spins = [_Spin(bounds, f"{name}, {part}") for part in ("red", "green", "blue")]
-        # Exact values of the three components. The boxes show rounded values; the exact values
-        # change only if the user types new values.
+        # Exact values of the three colour components. The input fields show rounded values, and
+        # change an exact value only if the user types another value.
         self._parts = [0.0, 0.0, 0.0]
         for part, spin in enumerate(self.spins):
             spin.setButtonSymbols(QDoubleSpinBox.ButtonSymbols.NoButtons)

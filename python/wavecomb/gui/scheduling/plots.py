@@ -75,7 +75,7 @@ class Plot(pg.PlotWidget):
             axis.setPen(theme.dim())
             axis.setTextPen(theme.text())
             axis.setTickPen(theme.grid())
-            axis.setZValue(-1000)  # Draws grid lines behind bars and curves.
+            axis.setZValue(-1000)  # draws grid lines behind bars and curves
         colour = theme.text().name()
         self.getPlotItem().setTitle(html.escape(self._title), color=colour, size=_points())
 

@@ -71,19 +71,24 @@ class Rounds(QObject):
 
     def _begin(self) -> None:
         session = self._session
-        self._version = -1  # Marks the following change of settings as made by this object.
+        # With the version -1, the handler of setting changes ignores the following change, which
+        # this object makes.
+        self._version = -1
         version = session.version
         if not session.change(**self._steps[self._done]):
-            return  # The signal `failed` ends the sequence of renders.
+            # The change failed, and the signal `failed` of the session has ended the sequence of
+            # renders.
+            return
         if session.version == version:
-            session.restart()  # The render already has these settings, so start it again.
+            # The render already has these settings, so it must be restarted explicitly.
+            session.restart()
         self._version = session.version
         self._timer.start(LIMIT_MS)
 
     def _look(self, frame: Frame) -> None:
         ours = self.running and frame.version == self._version
         if ours and frame.final and frame.scale == 1 and not frame.status.get("cancelled"):
-            self._version = -1  # Ignore later denoised versions of the same frame.
+            self._version = -1  # Ignore frames that show the same render after denoising.
             self._timer.start(0)
 
     def _next(self) -> None:

@@ -85,7 +85,8 @@ class Run:
         look = take_look(stats)
         self.stats = stats
         if look.seconds <= self.last.seconds:
-            return  # No time has passed since the previous snapshot of the statistics.
+            # Ignore statistics whose render time is not later than that of the previous ones.
+            return
         self.looks.append(look)
         if len(self.looks) > MAX_LOOKS:
             self.looks = [*self.looks[:-1:2], look]
@@ -186,7 +187,8 @@ class RunLog:
             series.runs.append(Run())
         elif not series.run.continues(look):
             if series.run.finished and look.samples == series.run.last.samples:
-                return series  # The finished run has reported its final statistics once more.
+                # Ignore statistics that the viewport sends again after the end of a run.
+                return series
             self._end_run()
             if series not in self.series:
                 self.series.append(series)

@@ -25,8 +25,8 @@ MIN_SECONDS = 1.0
 MIN_REPEATS = 3
 _MAX_STRETCHES = 20
 
-# 97.5 % quantiles of Student's t for 1 ... 30 degrees of freedom. With more degrees of freedom, the
-# normal quantile is used.
+# 97.5 % quantiles of Student's t distribution for 1 to 30 degrees of freedom. For more than 30
+# degrees of freedom, the quantile of the normal distribution is used.
 _T975 = (
     12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228,
     2.201, 2.179, 2.160, 2.145, 2.131, 2.120, 2.110, 2.101, 2.093, 2.086,
@@ -161,8 +161,8 @@ def compare_runs(run: Run, base: Run) -> Ratio:
     ends = [samples * k / n for k in range(n + 1)]
     mine = [time_of(run, b) - time_of(run, a) for a, b in pairwise(ends)]
     theirs = [time_of(base, b) - time_of(base, a) for a, b in pairwise(ends)]
-    # The ratio is estimated by value = sum(theirs) / sum(mine). Its variance follows from the
-    # variance of theirs - value * mine.
+    # The ratio of the times is estimated as value = sum(theirs) / sum(mine). The variance of this
+    # estimate is computed from the variance of theirs - value * mine.
     rest = [b - value * a for a, b in zip(mine, theirs, strict=True)]
     error = math.sqrt(sum(r * r for r in rest) * n / (n - 1)) / sum(mine)
     half = t975(n - 1) * error / value

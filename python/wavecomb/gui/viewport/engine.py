@@ -154,7 +154,9 @@ class Engine:
         """Stops the current task; its image stays visible."""
         with self._condition:
             if self._task is not None:
-                self._task.moving = True  # a reduced image suffices to apply the task's edits
+                # render only a reduced image, which is enough to apply the task's edits to the
+                # scene
+                self._task.moving = True
             self._end_running()
 
     def _end_running(self) -> None:

@@ -79,7 +79,7 @@ class Gizmo(QObject):
 
     @property
     def _view(self) -> PictureView:
-        # A view stored in an attribute would form a reference cycle.
+        # The view is not stored in an attribute, because that would form a reference cycle.
         return cast("PictureView", self.parent())
 
     def set_mode(self, mode: str) -> None:
@@ -178,7 +178,7 @@ class Gizmo(QObject):
         self._handle = self._hit(place)
         self._start, self._change = place, np.eye(4)
         if self._handle and self._anchor is not None and self._anchor.live:
-            self._edits.history.set_typing(True)  # The whole drag becomes one undo step.
+            self._edits.history.set_typing(True)  # the whole drag becomes one undo step
         return bool(self._handle)
 
     def drag(self, place: QPointF) -> None:

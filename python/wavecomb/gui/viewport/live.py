@@ -147,13 +147,15 @@ class Live(QObject):
         self._awaiting = False
         self._is_reduced = False  # Whether the current task renders only a reduced image.
         self._submitted = 0.0
-        # Sample counts of the last denoised image and of the image being denoised.
+        # Number of samples in the last denoised image, and number of samples in the image that is
+        # being denoised.
         self._denoised = self._denoising = 0
         self._settle = QTimer(self)
         self._settle.setSingleShot(True)
         self._settle.setInterval(SETTLE_MS)
         self._settle.timeout.connect(self.settle)
-        # The render thread must not hold Qt objects, so it reports to a News object.
+        # The render thread must not hold references to Qt objects, so it reports through a News
+        # object.
         self._news = News(port(self._receive))
         self._engine = Engine(self._news)
         self._denoiser = Worker("denoise", self)
@@ -221,7 +223,8 @@ class Live(QObject):
         if self._moving:
             self._settle.start()
             if self._awaiting and now - self._submitted < WAIT_S:
-                # Shows the current image first, so that frequent edits do not suppress all images.
+                # Wait until the current image is shown. Otherwise, frequent edits would replace
+                # every image before it is shown.
                 return
         self._flush()
 
@@ -231,7 +234,8 @@ class Live(QObject):
         if self._moving:
             self._moving = False
             if self._pending or not (self._awaiting and self._is_reduced):
-                # Otherwise _flush() follows the reduced image, which is being rendered.
+                # If this branch is not taken, a reduced image is being rendered, and `_flush` is
+                # called when the image is complete.
                 self._flush()
 
     def restart(self) -> None:
@@ -278,8 +282,8 @@ class Live(QObject):
 
     def _submit(self, task: Task) -> None:
         self.version = task.version = next(self._numbers)
-        # While the camera moves, accept the previous image, which may not have reached the screen
-        # yet.
+        # While the camera moves, also accept images of the previous version, because the last of
+        # them may not have reached the screen yet.
         last = self.last_frame.version if self.last_frame is not None else self.version
         self.oldest = last if task.moving else self.version
         self._is_reduced = task.moving
@@ -330,8 +334,8 @@ class Live(QObject):
         self._awaiting = False
         last = self.last_frame
         if last is not None and (last.version, last.scale) == (frame.version, frame.scale):
-            # Until a denoised image of this version exists, show the reduced denoised image, as
-            # long as the frame has few samples.
+            # While the frame has few samples and its first denoised image is not ready, show the
+            # reduced denoised image of the previous frame.
             if self._denoised or frame.samples_done <= LATE * frame.width * frame.height:
                 frame = replace(frame, denoised=last.denoised)
         else:

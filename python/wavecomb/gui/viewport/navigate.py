@@ -126,7 +126,7 @@ def orbit(pose: Pose, pivot: Vector, yaw: float, pitch: float, up_axis: str) -> 
     """
     up = np.array(UPS[up_axis])
     elevation = math.asin(float(np.clip(pose.back @ up, -1.0, 1.0)))
-    # A camera that is already steeper may only rotate towards the horizon.
+    # If the camera is already steeper than `STEEPEST`, it can only rotate towards the horizon.
     low, high = min(-STEEPEST, elevation), max(STEEPEST, elevation)
     pitch = min(max(elevation + pitch, low), high) - elevation
     turn = rotation(pose.right, -pitch) @ rotation(up, yaw)
@@ -198,7 +198,7 @@ def opposite(pose: Pose, pivot: Vector, up_axis: str) -> Pose:
 def _framed(pose: Pose, axes: Matrix, points: Matrix, aspect: float) -> Pose:
     low, high = points.min(axis=0), points.max(axis=0)
     centre = 0.5 * (low + high)
-    if pose.projection == "latlong":  # a latlong camera at the centre sees all points
+    if pose.projection == "latlong":  # a latlong camera at the centre of the bounds sees all points
         return _placed(pose, axes, centre)
     x0, x1, y0, y1 = pose.fitted(round(1000 * aspect), 1000)
     half = 0.5 * (x1 - x0), 0.5 * (y1 - y0)
@@ -212,7 +212,8 @@ def _framed(pose: Pose, axes: Matrix, points: Matrix, aspect: float) -> Pose:
     else:
         place = fit(points, axes, half)
         distance = depth = float((place - centre) @ axes[2])
-    # The centre of an off-axis camera window is not on the viewing axis, so shift the camera.
+    # If the camera window is off-axis, its centre is not on the viewing axis, so shift the camera
+    # sideways.
     shift = -0.5 * (x0 + x1) * depth * axes[0] - 0.5 * (y0 + y1) * depth * axes[1]
     framed = _placed(pose, axes, place + shift)
     near = min(framed.value("near_clip"), 1e-3 * distance)

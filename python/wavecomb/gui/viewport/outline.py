@@ -77,7 +77,7 @@ class Outline(QObject):
 
     @property
     def _view(self) -> PictureView:
-        # A view stored in an attribute would form a reference cycle.
+        # The view is not stored in an attribute, because that would form a reference cycle.
         return cast("PictureView", self.parent())
 
     def close(self) -> None:

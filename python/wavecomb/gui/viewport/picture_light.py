@@ -103,8 +103,8 @@ class PictureLight(QWidget):
         self, key: Any, place: Any, settings: dict[str, Any], version: int, mark: str
     ) -> None:
         verdict = self.book.add(key, place, mark, settings)
-        # If there is nothing to compare the new image with, keep the verdict of an earlier image
-        # with fewer samples.
+        # If no earlier image is comparable to the new image, keep the verdict for the previous
+        # image with fewer samples.
         weaker = verdict.kind == "first" and self.verdict.kind in ("same", "different")
         if verdict.kind == "different" or (version == self._session.version and not weaker):
             self._show(verdict)

@@ -157,7 +157,8 @@ class PictureView(QWidget):
         middle = QPointF(self.width() / 2, self.height() / 2) + self._shift
         corner = middle - QPointF(wide / 2, high / 2)
         ratio = self.devicePixelRatioF()
-        # Aligns the image with device pixels, so that a zoom of 100 % is exact.
+        # Align the image with device pixels, so that each image pixel covers exactly one device
+        # pixel at a zoom of 100 %.
         x, y = round(corner.x() * ratio) / ratio, round(corner.y() * ratio) / ratio
         return QRectF(x, y, wide, high)
 

@@ -141,7 +141,7 @@ class Session(Live):
             return
         usd = self.usd
         if usd is None:
-            return  # The stage is already being loaded.
+            return  # a thread is already loading the stage
         usd.GetSessionLayer().Clear()
         self.usd = None
         self.closing.emit()

@@ -52,11 +52,12 @@ class Watch:
         start = time.perf_counter()
         said = self._send(snapshot)
         now = time.perf_counter()
-        # Snapshots take at most a tenth of the time, but are made at least once per second.
+        # Limit the time for making snapshots to a tenth of the render time, but make at least one
+        # snapshot per second.
         pause = max(10.0 * (now - start), 0.1 if now - self._begun < 5.0 else 0.4)
         self._next = now + min(pause, 1.0)
         if self._engine.paused:
-            if not said:  # The render was paused while this frame was made.
+            if not said:  # The render was paused after this frame was rejected, so send it again.
                 self._send(snapshot)
             self._stand_still()
 

@@ -52,8 +52,8 @@ def read_archive(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:
                 }
         except ArchiveError:
             raise
-        # Deeply nested JSON raises RecursionError; unsupported kinds of zip files raise
-        # NotImplementedError or RuntimeError.
+        # RuntimeError includes the RecursionError of deeply nested JSON, and the
+        # NotImplementedError and RuntimeError of unsupported zip files.
         except (
             ValueError, KeyError, TypeError, AttributeError, EOFError, OSError, OverflowError,
             MemoryError, RuntimeError, SyntaxError, struct.error, zipfile.BadZipFile, zlib.error,

@@ -288,7 +288,8 @@ def _check_size(name: str, spec: Any) -> None:
     """Raises OSError if an image has no pixels or needs more memory than the machine has."""
     if min(spec.width, spec.height, spec.nchannels) < 1 or spec.depth > 1 or spec.deep:
         raise OSError(f"{name}: has no pixels, or several in depth")
-    # Memory for the float image, its copy by layers, and the buffers of OpenImageIO.
+    # Reading needs memory for the float image, for a copy of it that is split into layers, and for
+    # OpenImageIO's buffers.
     needed = 3 * 4 * spec.width * spec.height * spec.nchannels
     there = memory_bytes()
     if there is not None and needed > there:

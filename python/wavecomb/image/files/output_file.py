@@ -57,7 +57,8 @@ class PrivateFolder:
                 raise
             if _try_lock(self._lock) is not False and _is_linked(self._lock):
                 return
-            # ``remove_abandoned`` removed the lock file before this process locked it.
+            # Try again with a new lock file, since ``remove_abandoned`` has removed the file before
+            # it was locked.
             os.close(self._lock)
 
     def close(self) -> None:

@@ -35,8 +35,8 @@ def _of_group() -> int | None:
     """Returns the lowest memory limit of this process's control groups, or None without a limit."""
     limits: list[int] = []
     for place, name in _groups():
-        # Inside a container, the control group's path is its path on the host, but the container's
-        # group is mounted as the root.
+        # Inside a container, /proc names the control group by its path on the host, but the
+        # container sees its group at the root of the cgroup file system.
         for group in (place, *place.parents):
             if not group.is_relative_to(_CGROUP):
                 break

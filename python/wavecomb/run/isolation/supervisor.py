@@ -197,7 +197,8 @@ def run_in_sandbox(outputs: Outputs, *, gpu: bool = False, program: str = COMMAN
         if group is not None:
             group.close()
     code = os.waitstatus_to_exitcode(status)
-    # bubblewrap reports a signal as 128 plus its number; Wavecomb itself exits with 130 or 143.
+    # If a signal ends the sandboxed process, bubblewrap exits with 128 plus the signal's number.
+    # The codes 130 and 143 are Wavecomb's own exit codes.
     if code > 128 and code not in (128 + signal.SIGINT, 128 + signal.SIGTERM):
         code = 128 - code
     _end(code, sent, page, words)
@@ -264,8 +265,8 @@ def become_child(given: str) -> None:
     _is_child = True
     found = json.loads(given)
     channel = socket.socket(fileno=found["channel"])
-    # Send a message, to which the kernel attaches the id of this process in the PID namespace of
-    # the parent.
+    # Send a message to the parent process. The kernel adds the id that this process has in the
+    # parent's PID namespace.
     channel.sendall(b"h")
     # Wait until the parent has added this process to its control group.
     channel.recv(1)

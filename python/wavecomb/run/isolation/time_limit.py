@@ -74,7 +74,7 @@ def _watch(file: Path, done: threading.Event) -> None:
         now, so_far = time.monotonic(), time.process_time()
         busy += min(now - clock, so_far - computed)
         clock, computed = now, so_far
-        # Layer sizes are queried only once the minimum time limit has passed.
+        # Query the sizes of the loaded layers only after the minimum time limit has passed.
         if busy < (BASE_S if limit_s is None else limit_s):
             continue
         layers, size = loaded_layers()

@@ -244,7 +244,8 @@ def sky(width: int, height: int, seed: int) -> Image:
     image *= 0.55 + 0.75 * facing**2
     glow = np.maximum(to_sun, 0.0)[..., None]
     image += np.array([1.0, 0.62, 0.30]) * (0.9 * glow**14 + 2.5 * glow**110)
-    # Clouds are noise on a plane above the viewer, so that they are denser towards the horizon.
+    # The clouds are a noise texture on a horizontal plane above the viewer. In perspective, they
+    # are denser towards the horizon.
     reach = 1.0 / np.maximum(up, 0.03)
     px = (0.11 * reach * np.sin(theta) * np.cos(phi) + 0.5) % 1.0
     py = (0.11 * reach * np.sin(theta) * np.sin(phi) + 0.5) % 1.0

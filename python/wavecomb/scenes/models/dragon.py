@@ -23,8 +23,8 @@ from wavecomb.scenes.models.sweep import Tube, spline, tube_extent, tube_mesh
 MIN_TRIANGLES = 10_000
 MAX_TRIANGLES = 20_000_000
 
-# Cross sections of the body from the tip of the tail to the nape: x, y, z, half width, half height,
-# up direction of the back.
+# Cross sections of the dragon's body from the tip of the tail to the nape. Each row contains the
+# centre (x, y, z), half width, half height, and the direction (x, y, z) of the back.
 _BODY = np.array(
     [
         [-0.80, 0.86, -0.10, 0.004, 0.004, 0.2, 1.0, 0.2],
@@ -46,8 +46,8 @@ _BODY = np.array(
         [0.74, 1.06, 0.00, 0.080, 0.084, -0.1, 1.0, 0.0],
     ]
 )
-# The two fore legs, then the two hind legs: hip, knee, ankle, foot, direction of the toes, radius
-# of the thigh.
+# The two fore legs and the two hind legs of the dragon. Each row contains the points of hip, knee,
+# ankle and foot, the direction of the toes, and the radius of the thigh.
 _LEGS = (
     ((0.44, 0.34, 0.08), (0.30, 0.25, 0.25), (0.47, 0.13, 0.31), (0.51, 0.055, 0.32), -0.25, 0.088),
     ((0.40, 0.34, -0.10), (0.44, 0.27, -0.33), (0.60, 0.14, -0.33), (0.65, 0.055, -0.33),

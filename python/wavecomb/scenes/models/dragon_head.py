@@ -89,7 +89,8 @@ _TONGUE = (
     (0.2, -0.14, 0.0, 0.08, 0.03), (0.45, -0.21, 0.0, 0.07, 0.025),
     (0.7, -0.24, 0.02, 0.05, 0.02), (0.95, -0.14, 0.03, 0.005, 0.004),
 )  # fmt: skip
-# Add the parts that exist on both sides of the head, with z pointing away from the middle.
+# Cross sections of parts that exist on both sides of the dragon's head. The z axis points away from
+# the middle of the head.
 _BROW = (
     (0.56, 0.09, 0.09, 0.02, 0.02), (0.45, 0.20, 0.17, 0.045, 0.04),
     (0.33, 0.235, 0.215, 0.055, 0.045), (0.20, 0.24, 0.25, 0.05, 0.045),

@@ -48,7 +48,7 @@ def load_dragon(path: Path) -> Mesh:
     if not path.is_file():
         raise SceneError(f"{path}: no such mesh file")
     try:
-        with np.errstate(invalid="ignore"):  # _check() reports NaN indices
+        with np.errstate(invalid="ignore"):  # `_check` reports indices that are NaN
             raw = _read(path)
         _check(raw)
     except (OSError, EOFError, zlib.error, UnicodeDecodeError, OverflowError) as error:
@@ -112,7 +112,8 @@ def _cylinder(points: np.ndarray) -> FloatArray:
     """Computes a cylindrical projection about Y, (n, 2), with about one repeat per half unit."""
     radius = float(np.hypot(points[:, 0], points[:, 2]).mean())
     repeats = max(1, round(2.0 * np.pi * radius / _TEXTURE_LENGTH))
-    # A triangle wave has no seam, so no triangle spans the whole texture.
+    # The coordinate u is a triangle wave of the angle about Y. It has no seam, where a triangle
+    # would span the whole texture.
     turn = np.abs(np.arctan2(points[:, 2], points[:, 0])) / np.pi
     return np.stack([turn * repeats, points[:, 1] / _TEXTURE_LENGTH], axis=1)
 

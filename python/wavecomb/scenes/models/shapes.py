@@ -200,8 +200,8 @@ def pillow(width: float, depth: float, thickness: float, cells: int = 20) -> Mes
         0.5 * depth * y * (1.0 - pinch * (1.0 - x * x)),
     ]
     swell = 0.5 * thickness * np.sqrt((1.0 - x**4) * (1.0 - y**4))
-    # Texture coordinates follow the arc length along the middle, so that the cloth is not
-    # stretched.
+    # Texture coordinates are arc lengths along the middle lines of the cushion, so that the texture
+    # is not stretched.
     middle = np.stack([flat[0][cells // 2], swell[cells // 2]], axis=1)
     upright = np.stack([flat[1][:, cells // 2], swell[:, cells // 2]], axis=1)
     uv = np.stack(np.meshgrid(_lengths(middle), _lengths(upright)), axis=2)

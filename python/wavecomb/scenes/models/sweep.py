@@ -208,11 +208,12 @@ def tube_mesh(tube: Tube, rings: int, columns: int) -> Mesh:
     """
     profile = _profile(tube)
     radius_dense = 0.5 * (profile.width + profile.height)
-    # Rings are closer where the tube is thin, but not in proportion to its radius.
+    # The distance of neighbouring rings is smaller where the tube is thin. It is proportional to
+    # the radius to the power of 0.4.
     thin = np.maximum(radius_dense, 0.15 * radius_dense.max()) ** -0.4
     measure = np.concatenate([[0.0], np.cumsum(np.diff(profile.length) * thin[1:])])
     targets = np.linspace(0.0, measure[-1], rings + 2)
-    # The outermost rings keep a distance of half a step from the poles.
+    # The first and last ring have a distance of about half a step from the poles of the tube.
     targets[1:-1] = (np.arange(rings) + 0.75) / (rings + 0.5) * measure[-1]
     t = np.interp(targets, measure, profile.t)
     t[0], t[-1] = 0.0, 1.0
@@ -231,7 +232,8 @@ def tube_mesh(tube: Tube, rings: int, columns: int) -> Mesh:
     around = np.linspace(0.0, 1.0, columns + 1)
     angle = 2.0 * np.pi * around - 0.5 * np.pi
     cosine, sine = np.cos(angle), np.sin(angle)
-    # The two seam columns must be bitwise equal.
+    # The first and the last column of the grid coincide at the seam and must have bitwise equal
+    # coordinates.
     cosine[-1], sine[-1] = cosine[0], sine[0]
     lower = np.where(sine < 0.0, tube.belly, 1.0)
     across = width[:, None] * cosine

@@ -27,8 +27,8 @@ from wavecomb.scenes.models.mesh import (
 _CIRCLE = 0.56
 """Newell's rounded Bezier constant of a quarter circle (the exact value would be 0.5523)."""
 
-# Bezier control points (radius, height) of the bodies of revolution. A patch has four points and
-# shares its last point with the next patch.
+# Bezier control points (radius, height) of the profiles of the teapot's surfaces of revolution. A
+# patch has four control points and shares the last of them with the next patch.
 _RIM = np.array(
     [[1.4, 2.4], [1.3375, 2.53125], [1.4375, 2.53125], [1.5, 2.4]],
 )
@@ -43,8 +43,8 @@ _KNOB_ROW = 1
 _KNOB_CIRCLE = 0.5625
 """Circle constant of the widest row of the lid's knob, published as 0.45 / 0.8 instead of 0.56."""
 
-# Control points of handle and spout, which are swept along a curve: x and z of one side, x and z of
-# the other side, half width in y.
+# Control points of handle and spout, which are tubes along a curve. Each row contains x and z of
+# one side of the tube, x and z of the opposite side, and the half width in y.
 _HANDLE = np.array(
     [
         [-1.6, 2.025, -1.5, 2.25, 0.3],
@@ -110,8 +110,8 @@ def _swept(rows: FloatArray) -> FloatArray:
         for sign in (1.0, -1.0):
             y = np.stack([zero, sign * half, sign * half, zero], axis=1)
             patch = np.stack([x, y, z], axis=2)
-            # One half of the tube is reversed, so that both halves have the same orientation and
-            # form a full turn.
+            # The half of the tube at negative y is reversed, so that the two halves form one full
+            # turn with the same orientation.
             patches.append(patch[:, ::-1] if sign < 0.0 else patch)
     return np.array(patches) + 0.0
 
@@ -177,7 +177,8 @@ def _tessellate(patches: FloatArray, turns: int, level: int, repeats: float) -> 
     for index, patch in enumerate(patches):
         row, turn = divmod(index, turns)
         points, normals = _evaluate(patch, t, t)
-        # At a pole one derivative vanishes, so the normal is the limit from inside the patch.
+        # At a pole, one of the two derivatives of the patch is zero. There, use the normal of a
+        # point slightly inside the patch.
         _, near = _evaluate(patch, inner, inner)
         size = np.linalg.norm(normals, axis=2, keepdims=True)
         normals = np.where(size > 1e-9 * size.max(), normals, near)

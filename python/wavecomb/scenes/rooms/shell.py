@@ -117,7 +117,8 @@ def _skirting(writer: StageWriter) -> None:
         ((NEXT_X, NEXT_HIGH - deep), (-PARTITION, NEXT_HIGH)),
         ((NEXT_X, NEXT_LOW), (-PARTITION, NEXT_LOW + deep)),
     ]
-    hidden = 0.004  # skirting boards are sunk into wall and floor, to avoid coincident faces
+    # depth in metres by which skirting boards reach into wall and floor, to avoid coincident faces
+    hidden = 0.004
     boards = []
     for (x0, z0), (x1, z1) in runs:
         low, high = (x0 - hidden, -hidden, z0 - hidden), (x1 + hidden, height, z1 + hidden)

@@ -106,7 +106,7 @@ def _near_the_outside(
     if radii is not None:
         reached += radii[::step]
     whole = len(points) // _RUN * _RUN
-    # NumPy reduces over the last axis quickly, so the coordinate axis comes first.
+    # Transpose the points, since NumPy computes minima and maxima fastest over the last axis.
     runs = np.ascontiguousarray(points[:whole].T).reshape(3, -1, _RUN)
     low, high = runs.min(axis=2), runs.max(axis=2)
     most = 0.5 * (directions @ (low + high) + np.abs(directions) @ (high - low))

@@ -87,8 +87,8 @@ class Cage:
             kind = "faceVarying"
             corners = np.repeat(np.arange(len(self.counts), dtype=np.int32), self.counts)
         elif kind == "faceVarying" and index is not None:
-            # Keep authored indices: corners with different indices are separate even if their
-            # values are equal.
+            # Keep the authored indices, since corners with different indices stay separate in
+            # subdivision even if their values are equal.
             corners, table = index, np.zeros((int(index.max()) + 1, values.shape[1]), np.float32)
             table[index] = values
             values = table
@@ -209,8 +209,8 @@ class ViewSize:
         half = 0.5 * (x1 - x0), 0.5 * (y1 - y0)
         self.centre = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
         self.half = half
-        # For pixels that are not square, use the finer direction, which refines more rather than
-        # less.
+        # If pixels are not square, use the direction with the smaller pixel size, so that the mesh
+        # is refined enough in both directions.
         shape = pixel_aspect(view.options, *size)
         self.pixels = size[0] / (2.0 * half[0]) * (shape if shape > 1.0 + 1e-5 else 1.0)
         self.projection = str(view.options.get("projection", "perspective"))

@@ -280,7 +280,8 @@ class MeshReader:
             return authored
         edges = None
         if "creaseIndices" in names:
-            # If the mesh is subdivided, the reader of its subdivision cage reports invalid creases.
+            # If the mesh is subdivided, do not report invalid creases here, since the reader of the
+            # subdivision cage reports them.
             report = LoadReport() if self.subdivide else self.report
             edges = sharp_edges(prim, topology.point_count, self.time, report)
         return smooth_normals(points, topology, edges)

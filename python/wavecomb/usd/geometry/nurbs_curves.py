@@ -148,7 +148,7 @@ def nurbs_strands(
 
     orders = numbers("order", 1)[:, 0].astype(np.intp)
     if len(orders) == 1:
-        # Many exporters write a single order for all curves.
+        # Many exporters write a single order, which applies to all curves.
         orders = np.repeat(orders, len(counts))
     if len(orders) != len(counts):
         raise MeshError(f"{len(counts)} curves have {len(orders)} orders")
@@ -178,7 +178,8 @@ def nurbs_strands(
     if not good.all():
         whys = list(dict.fromkeys(one for one in found if isinstance(one, str)))
         _report_invalid(prim, report, good, "; ".join(whys[:3]))
-    # Excluded curves are still counted, so that primvar arrays for all curves fit.
+    # The segment counts include the excluded curves, since primvar arrays have values for all
+    # authored curves.
     segments = np.array(
         [max(counts[i] - orders[i] + 1, 0) if isinstance(one, str) else len(one.shares)
          for i, one in enumerate(found)], np.intp,

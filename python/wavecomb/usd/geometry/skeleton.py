@@ -198,7 +198,7 @@ class Skeletons:
 
     def needs_own_prototype(self, instance: Usd.Prim, prototype: Usd.Prim) -> bool:
         """Returns whether an instance needs a separate prototype because of its animation."""
-        # The root prim of a prototype has no type; the instance has it.
+        # Check the instance's type, since the root prim of a prototype has no type.
         apart = (
             instance.GetTypeName() == "SkelRoot"
             or prototype.GetPath() in self._holders(prototype.GetStage())

@@ -214,7 +214,8 @@ class Strands:
             kind = "varying"
         if len(values) == self.sizes.get(kind):
             return values, kind
-        # A single value without authored interpolation is common and applies to all curves.
+        # Many files contain a primvar with a single value and without authored interpolation. The
+        # value applies to all curves.
         if len(values) == 1:
             return values, "constant"
         raise PrimvarError(
@@ -234,8 +235,8 @@ class Strands:
             if self.periodic:
                 return np.asarray(values[start + i % size], np.float64)
             out = np.asarray(values[start + np.clip(i, 0, size - 1)], np.float64)
-            # Pinned curves get a reflected point before their first and after their last point, so
-            # that they reach their end points.
+            # Extend a pinned curve by one point at each end, the reflection of its second or
+            # next-to-last point at the end point, so that the curve reaches its end points.
             for outside, end, inner in ((i < 0, 0, 1), (i >= size, size - 1, size - 2)):
                 where = np.flatnonzero(outside)
                 if len(where):

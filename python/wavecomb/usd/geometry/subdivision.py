@@ -125,7 +125,7 @@ class SubdivisionSurfaces:
 
     def is_displaced(self, draw: DrawItem) -> bool:
         """Returns whether a material that is bound to a mesh displaces its points."""
-        # Nearly all meshes have no GeomSubsets.
+        # Handle meshes without GeomSubsets first, since nearly all meshes have none.
         if not draw.subsets:
             material = draw.material
             return material is not None and bool(self.materials.surface(material).displacement)
@@ -207,7 +207,8 @@ class SubdivisionSurfaces:
         levels = Counter(surface.level for surface in self._all if surface.cage.scheme != "none")
         waiting = deque(surface for surface in self._all if surface.level or surface.moves)
         if self.cache is None:
-            # Release unrefined cages now, and all other cages after refinement.
+            # Release the subdivision cages of surfaces that are not refined. The cages of refined
+            # surfaces are released after refinement.
             self._all = []
         while waiting:
             self._refine(self._next_batch(waiting))

@@ -25,7 +25,8 @@ class MeshError(ValueError):
     """A mesh is invalid; the message gives the reason in a few words."""
 
 
-# Not frozen, since a frozen dataclass takes three times as long to create.
+# The dataclass is not frozen, since creating an object of a frozen dataclass takes three times as
+# long.
 @dataclass(slots=True, eq=False)
 class Topology:
     """Triangles with their source corners and faces.
@@ -101,7 +102,8 @@ def triangulate(
         raise MeshError(
             f"the face counts add up to {total}, but there are {len(indices)} face indices"
         )
-    # Negative indices are large when read as unsigned.
+    # Read as unsigned integers, negative indices are large, so one comparison finds all invalid
+    # indices.
     if total and int(np.maximum.reduce(indices.view(np.uint32))) >= len(points):
         raise MeshError("a face index is out of range")
     has_holes = holes is not None and len(holes) > 0
@@ -187,7 +189,8 @@ def _split_rings(
         return pairs.reshape(-1, 2, 3), 0
     p = points.take(indices[ring], axis=0).astype(np.float64)
     p -= p[:, :1]
-    # Newell's normal; a fan is valid if all of its triangles have the same orientation.
+    # Compute the face's normal by Newell's method. A triangle fan is valid if all of its triangles
+    # have the orientation of this normal.
     normal = cross(p, np.roll(p, -1, axis=1)).sum(axis=1)
     areas = np.einsum("fkc,fc->fk", cross(p[:, 1:-1], p[:, 2:]), normal)
     bad = areas.min(axis=1) < -1e-9 * np.einsum("ij,ij->i", normal, normal)
@@ -272,7 +275,8 @@ def smooth_normals(
         face = cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
         where = index[3 * first : 3 * (first + _TRIANGLES)]
         for axis in range(3):
-            # Normals are added in the order of the triangles, independent of the block size.
+            # Add the normals in the order of the triangles, so that the rounded sums do not depend
+            # on the block size.
             np.add.at(total[axis], where, np.repeat(face[:, axis], 3))
     normals = _unit(np.ascontiguousarray(total.T))
     return normals[index].reshape(-1, 3, 3) if sharp else normals
@@ -282,8 +286,8 @@ def _smoothing_groups(
     triangles: NDArray[np.int64], creases: NDArray[np.int64], point_count: int
 ) -> NDArray[np.int64]:
     """Returns corner labels (3 m,), equal for corners of a point that meet across smooth edges."""
-    # For every half-edge, the corners at its end with the lower point index and at its end with the
-    # higher point index.
+    # Each half-edge has a corner at the end with the lower point index and a corner at the end with
+    # the higher point index.
     corner = np.arange(triangles.size).reshape(-1, 3)
     a, b = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     ca, cb = corner.ravel(), np.roll(corner, -1, axis=1).ravel()

@@ -138,8 +138,8 @@ class GroupBuilder:
             return
         if scope.alias is not None:
             prims = [self._proxy(prim, scope.alias) for prim in prims]
-        # Use one Python object per material, since dict lookups are faster by identity than by
-        # path.
+        # Use the same Python object for all occurrences of a material, since dict lookups of
+        # identical objects are faster than comparisons of paths.
         known = self._known
         bound = found.bind(
             None if material is None else known.setdefault(material.GetPath(), material)

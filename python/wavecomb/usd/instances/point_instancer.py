@@ -190,7 +190,8 @@ def _linear(
     scales = as_array(instancer.GetScalesAttr().Get(time))
     if scales is not None and len(scales):
         if scales.shape == (count, 3):
-            # ``are_valid`` removes instances with invalid scales.
+            # Ignore NumPy's warnings about invalid scales, since ``are_valid`` removes instances
+            # with such scales.
             with np.errstate(invalid="ignore"):
                 out = out * scales.astype(np.float64)[:, :, None]
         else:

@@ -110,7 +110,8 @@ def _targets(prim: Usd.Prim) -> Iterator[Sdf.Path]:
     for relation in prim.GetAuthoredRelationships():
         if relation.GetName().startswith(_FOLLOWED):
             for target in relation.GetTargets():
-                # Skip collections: membership in a collection does not make a prim necessary.
+                # Skip targets that are collections. A prim need not be loaded just because it
+                # belongs to a collection.
                 if target.IsPrimPath():
                     yield target
     for attribute in prim.GetAuthoredAttributes():

@@ -165,8 +165,8 @@ def _image_coordinates(
     Also returns the lowest and highest (u, v) that bilinear samples may read.
     """
     if form == "mirroredBall":
-        # The normal of the mirrored ball is halfway between the direction and the viewing direction
-        # +z.
+        # The normal of the mirrored ball is halfway between the reflected direction (x, y, z) and
+        # the direction +z to the viewer.
         length = np.sqrt(np.maximum(2.0 + 2.0 * z, 1e-30))
         return 0.5 + 0.5 * x / length, 0.5 - 0.5 * y / length, (0.0, 0.0), (1.0, 1.0)
     if form == "angular":
@@ -182,8 +182,9 @@ def _cross(x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats, Any, Any]:
     along_y = ~along_x & (ay > az)
     along_z = ~along_x & ~along_y
     faces = (
-        # For each face of the cube map: mask of its directions, column and row in the image,
-        # coordinate to the right, coordinate upwards.
+        # Each row describes a face of the cube map: the mask of directions that hit the face, the
+        # column and row of the face in the image, the coordinate to the right and the coordinate
+        # upwards.
         (along_z & (z > 0), 1, 1, -x, y),
         (along_y & (y > 0), 1, 0, -x, -z),
         (along_y & (y <= 0), 1, 2, -x, z),

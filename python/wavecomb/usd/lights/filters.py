@@ -174,8 +174,9 @@ class FilterReader:
                 for end in ends.get(flap, ("top", "bottom"))
             )
             edge = inputs.number(f"barndoor_{flap}_edge", 0.0)
-            # Coordinates in the filter's square: `across` is the direction in which the barn door
-            # moves, `along` the direction of its edge.
+            # `across` and `along` are linear functions that compute coordinates in the filter's
+            # square: `across` in the direction in which the barn door moves, and `along` in the
+            # direction of the door's edge.
             across, along = (
                 ((0.0, -0.5 / size, 0.5), (0.5 / size, 0.0, 0.5))
                 if flap in ends

@@ -125,12 +125,13 @@ def _expand_c(vertical: Floats, horizontal: Floats, candela: Floats) -> IesProfi
 
     def mirrored(about: float) -> None:
         nonlocal horizontal, candela
-        # Mirror all vertical planes except the plane of symmetry itself.
+        # Mirror all planes of constant horizontal angle except the plane of symmetry.
         inner = slice(-2, None, -1)
         horizontal = np.append(horizontal, 2 * about - horizontal[inner])
         candela = np.append(candela, candela[inner], axis=0)
 
-    # With this symmetry, intensities at the angles phi and 180 - phi are equal.
+    # If the horizontal angles range from 90 to 270 degrees, the intensities at the angles phi and
+    # 180 - phi are equal.
     if (first, last) == (90, 270):
         both = np.append(horizontal, (180 - horizontal) % 360)
         horizontal, rows = np.unique(both, return_index=True)
@@ -165,7 +166,8 @@ def _resample(vertical: Floats, horizontal: Floats, candela: Floats, kind: str) 
     a direction are
         A: tan H = x / z, sin V = y        B: sin H = x, tan V = y / z.
     """
-    # The file holds one half of the angles; the other half is its mirror image.
+    # If the horizontal angles begin at 0, the file contains only one half of the distribution. The
+    # other half is its mirror image.
     if horizontal[0] == 0 and horizontal[-1] > 0:
         horizontal = np.append(-horizontal[:0:-1], horizontal)
         candela = np.append(candela[:0:-1], candela, axis=0)

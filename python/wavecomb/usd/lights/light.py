@@ -236,7 +236,8 @@ class LightReader:
         point = prim.GetAttribute("treatAsPoint")
         if radius > 0 and not (point and point.Get(self.time)):
             return
-        # The sphere's intensity is L times its disk pi r^2; normalised radiance is L / (4 pi r^2).
+        # The intensity of a sphere of radiance L is L pi r^2. With `normalize`, the radiance is
+        # divided by the area 4 pi r^2.
         area = 0.25 if normalize or radius == 0 else math.pi * (scale * radius) ** 2
         options["radius"] = 0.0
         options["color"] = tuple(area * value for value in options["color"])

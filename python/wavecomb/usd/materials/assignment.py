@@ -83,8 +83,8 @@ class Assigner:
             return BoundMaterials(self.table.add(surface))
         primvars = _Primvars(draw, mesh, self.time, self.report)
         sets = self.uv_names(draw)
-        # If materials read several UV sets, the mesh's texture coordinates are the first of these
-        # sets that the mesh has.
+        # If the materials of the mesh read several UV sets, use the first of these sets that exists
+        # on the mesh as its texture coordinates.
         if len(sets) > 1:
             primvars.own_uv = next((n for n in sets if primvars.find(n, 2) is not None), "")
         if surface is None or surface.stand_in:
@@ -130,8 +130,8 @@ class Assigner:
         self, draw: DrawItem, material: UsdShade.Material, surface: Surface
     ) -> Surface:
         values: dict[str, Any] = {}
-        # A primvar's value may be the name of another primvar; two passes resolve one level of such
-        # references.
+        # The value of a primvar may be the name of another primvar. The second pass reads the
+        # primvars that the first pass found in this way.
         for _ in range(2):
             new = [name for name in surface.object_reads if name not in values]
             if not new:
@@ -301,7 +301,8 @@ class _Primvars:
         self, draw: DrawItem, mesh: MeshArrays | CurveArrays, time: Usd.TimeCode, report: LoadReport
     ) -> None:
         self.read: dict[str, PrimvarRequest] = {}
-        # Primvar of the mesh's texture coordinates, if materials read several UV sets.
+        # Name of the primvar that contains the mesh's texture coordinates. Set if the materials
+        # read several UV sets.
         self.own_uv = ""
         self._draw = draw
         self._mesh = mesh
@@ -352,7 +353,8 @@ class _Primvars:
         if primvar is None or len(primvar.values) == 0:
             return None
         primvar = in_linear(primvar, self._report, self.path)
-        # Implicit shapes have no topology and take a single value.
+        # Shapes without topology, such as implicit surfaces, can only have a single value per
+        # primvar.
         if self._mesh.topology is None:
             primvar = replace(primvar, values=primvar.values[:1], interpolation="constant")
         check_fit(primvar, self._mesh, width)

@@ -125,7 +125,8 @@ def halve(pixels: NDArray[Any], srgb: bool) -> NDArray[Any]:
     """
     height, width, channels = pixels.shape
     out = np.empty((max(height // 2, 1), max(width // 2, 1), channels), pixels.dtype)
-    # Bands of even height can be filtered independently; an odd height needs the whole image.
+    # An image of even height is filtered in bands of even height, which are independent. An image
+    # of odd height is filtered as a whole.
     band = 256 if height % 2 == 0 else height
     colours = (channels - 1) if channels % 2 == 0 else channels
     for first in range(0, height, band):

@@ -59,7 +59,7 @@ def surface_source(material: UsdShade.Material) -> tuple[str, UsdShade.Shader]:
     The kind is ``PREVIEW`` or a MaterialX shading model; "" if Wavecomb supports no surface output.
     """
     shader = material.ComputeSurfaceSource()[0]
-    # If a material offers both, the MaterialX surface precedes the preview surface.
+    # If a material has a MaterialX surface and a preview surface, use the MaterialX surface.
     others = (one for _, one in surface_outputs(material))
     for candidate in chain((material.ComputeSurfaceSource("mtlx")[0], shader), others):
         name = shader_id(candidate)
@@ -140,7 +140,8 @@ class MaterialTable:
         if surface is None:
             surface = self.surface(material)
             shader = surface_source(material)[1]
-            # The first reading of the material has already reported most problems.
+            # Discard the messages of this second reading, since the first reading of the material
+            # has reported the same problems.
             again = LoadReport()
             prim = material.GetPrim()
             reader = PreviewReader(prim, self.time, self._textures, again, primvars)

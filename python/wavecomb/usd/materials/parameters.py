@@ -184,7 +184,7 @@ class _Tracer:
         self, parameter: str, value: Any, attribute: Usd.Attribute | None, space: str
     ) -> Parameter:
         """Returns a colour that cannot be edited because it is authored in another colour space."""
-        # The loader of the image reports unknown colour spaces.
+        # Ignore unknown colour spaces here, since the material reader reports them.
         with contextlib.suppress(ValueError):
             value = linear_colour(value, attribute)
         return Parameter(parameter, value, reason=f"it is in the colour space {space}")

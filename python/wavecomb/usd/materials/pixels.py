@@ -157,7 +157,7 @@ def _unpacked(data: Any, name: str) -> Iterator[str]:
         finally:
             os.close(descriptor)
         return
-    # Packages may contain any file name, so only known extensions are used.
+    # Use only known extensions for the temporary file, since file names in packages are arbitrary.
     ending = ending if ending in _BY_ENDING else ""
     descriptor, file = tempfile.mkstemp(suffix=ending, prefix="wavecomb-")
     try:
@@ -204,11 +204,11 @@ def _read_file(
     path: str, stamp: Stamp | None, header_only: bool = False, called: str | None = None
 ) -> Image:
     """Reads an image file; ``called`` is its name in messages."""
-    # Imported only when an image is read, since loading the library takes 30 MB.
+    # Import OpenImageIO only when an image is read, since the library takes 30 MB of memory.
     import OpenImageIO as oiio
 
     progress_notes.note("decoding", called or path, "image")
-    # Read colours as stored, not premultiplied by alpha.
+    # Read colours as they are stored in the file, without multiplying them by alpha.
     config = oiio.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(path, config)
@@ -349,8 +349,8 @@ class ReadAhead:
         try:
             return future.result()
         finally:
-            # The future's exception refers to this stack frame, and this reference cycle would keep
-            # the stage open.
+            # Delete the future, whose exception refers to this stack frame. The reference cycle
+            # would keep the stage open.
             del future
             self._start()
 
@@ -376,7 +376,7 @@ class ReadAhead:
                 header = read_header(path)
                 bytes_ = header.size[0] * header.size[1] * header.channels * header.dtype.itemsize
             except (TextureError, OSError, ValueError):
-                # Reading the image later will report the error.
+                # Ignore the error here. It is reported when the image is read for the scene.
                 bytes_ = 0
             self._sizes[path] = bytes_
         return self._sizes[path] + self.bytes <= self._limit_bytes

@@ -178,7 +178,8 @@ class PreviewReader:
             what = "displacement that the material's displacement output does not lead to: ignored"
             self.report.note(what, self.material.GetPath())
             return None
-        # Geometry is displaced once per material, so values cannot differ between objects.
+        # The displacement of a material is the same for all objects, so its inputs cannot be read
+        # from primvars of objects.
         self._by_object = False
         value = self._input("displacement", source, 0.0)
         texture = self.textured.pop("displacement", None)

@@ -149,7 +149,7 @@ class TextureTable:
         self._reuse = reuse
         self._unchanged: dict[str, Image | None] = {}
         self._builder, self._report = context.builder, context.report
-        # Images that are read ahead count as texture memory.
+        # Images that are decoded in advance may take a quarter of the texture store's memory limit.
         self._ahead = ReadAhead(
             context.options.threads, None if store is None else store.limit_bytes // 4
         )
@@ -188,7 +188,7 @@ class TextureTable:
                     if found is path:
                         others.append(path)
             except (OSError, ValueError):
-                # Reading the file later will report the error.
+                # Ignore the error here. It is reported when the file is read for the scene.
                 pass
             self._twins[path] = found
         return found
@@ -327,8 +327,8 @@ class TextureTable:
         return pixels
 
     def _add(self, path: str, image: Image, space: str, wrap_s: str, wrap_t: str) -> int:
-        # The pixels were released once they were in the scene; for a second use, the file is read
-        # again.
+        # The image's pixels are released after the image is added to the scene. If the image is
+        # used again with other options, read the file again.
         here = image if image.is_here else read_image(path)
         pixels = self._as_stored(path, here, space, (wrap_s, wrap_t))
         if self.store is not None:
@@ -337,7 +337,7 @@ class TextureTable:
             return self._builder.add_texture(
                 pixels, srgb=space == CURVE, wrap_s=wrap_s, wrap_t=wrap_t, name=path
             )
-        # add_texture() raises ValueError if the texture store has no room.
+        # `add_texture` raises ValueError if the texture store has no space left.
         except ValueError as error:
             raise WavecombError(str(error)) from None
         finally:

@@ -87,7 +87,7 @@ class Graphs:
         for owner in (nodedef, graph):
             for item in [] if owner is None else owner.getActiveInputs():
                 self._give(self._prims.port(prim, "inputs", item.getName(), item.getType()), item)
-                # The sources of a graph's inputs are siblings of the graph.
+                # The nodes that a graph's inputs are connected to are siblings of the graph.
                 self._join(prim, item, GRAPHS, self._document.root)
         for node in graph.getNodes():
             self._node(node, path, graph)

@@ -141,8 +141,8 @@ def flat_graph(identifier: str, primitives: Collection[str]) -> FlatGraph | None
         found = nodedef.getImplementation()
         if found is None or not found.isA(mx.NodeGraph):
             return None
-        # Copy the graph to a document that may be modified. Nested graphs that do not implement a
-        # definition keep their references to interface inputs.
+        # Copy the graph to a document that may be modified. Flattening the copy does not change
+        # nested graphs that do not implement a node definition.
         document = mx.createDocument()
         document.setDataLibrary(library())
         graph = document.addNodeGraph("flat")

@@ -119,7 +119,8 @@ class Prims:
             text, is_bare = image_file(element, self.file)
             if is_bare:
                 self.report.note("MaterialX fileprefix is not a folder (left out)", self.file)
-            # Like OpenUSD, does not apply a document-wide linear Rec. 709 colour space to images.
+            # Do not apply a document-wide linear Rec. 709 colour space to images, since OpenUSD
+            # does not either.
             is_said = space not in _PLAIN_SPACES or element.hasColorSpace()
             if makes_colour and is_said:
                 port.SetInfo("colorSpace", "raw" if space == "none" else space)

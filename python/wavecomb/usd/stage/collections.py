@@ -47,8 +47,8 @@ class Collections:
         collection = Usd.CollectionAPI(prim, name)
         try:
             query = collection.ComputeMembershipQuery()
-            # The path rule map is empty if the collection is defined by an expression, and complete
-            # if it is defined by relationships.
+            # The path rule map is empty if the collection is defined by a membership expression.
+            # Otherwise, the map contains all rules of the collection's relationships.
             if _has_expression(collection) and not query.GetAsPathExpansionRuleMap():
                 return self._of_expression(collection, query)
         except Tf.ErrorException as error:

@@ -146,8 +146,9 @@ def problem_of(bounds: NDArray[Any], matrix: Gf.Matrix4d, *, in_world: bool) -> 
         return INSTANCED
     move = matrix.GetRow3(3)
     p, q, r = 0.5 * (a + x) - move[0], 0.5 * (b + y) - move[1], 0.5 * (c + z) - move[2]
-    # Distance and size of the prim are both in the units of its group, so their ratio is valid in
-    # object space. Chained comparisons are used for speed, since this runs for every prim.
+    # The prim's distance and its size are both in the units of the prim's group, so their ratio can
+    # be compared with a constant. Chained comparisons are used for speed, since this runs for every
+    # prim.
     far = size * (_COARSE / _STEP)
     if -far <= p <= far and -far <= q <= far and -far <= r <= far:
         return None

@@ -85,7 +85,7 @@ class DrawModes:
             self._stage = Usd.Stage.CreateInMemory()
         made = self._made(prim, mode)
         if made is not None:
-            # The kind of the model is needed to find the asset of the prim.
+            # Copy the kind of the model, by which the prim's asset is found.
             Usd.ModelAPI(made.prim).SetKind(Usd.ModelAPI(prim).GetKind())
         return made
 

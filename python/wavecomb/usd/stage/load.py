@@ -100,7 +100,8 @@ def load_stage(
     report, file = LoadReport(), _file_of(source)
     if cache is not None:
         reuse = cache.textures
-    # Readers handle values that are not finite, so NumPy's warnings are disabled.
+    # Disable NumPy's warnings about values that are not finite, since the readers of prims handle
+    # such values.
     with capture_diagnostics(report), np.errstate(all="ignore"), without_collection():
         store = None
         if builder_factory is None:
@@ -114,7 +115,7 @@ def load_stage(
             load = _Load(source, builder, chosen, report, reuse, store, editable)
             facts = load.run(cache, progress)
             textures = load.textures
-            # Deleting `load` closes the stage if this call opened it.
+            # If this call opened the stage, deleting `load` closes it.
             del load
         except UnicodeDecodeError:
             raise WavecombError(f"{file}: {NOT_TEXT}") from None
@@ -304,8 +305,9 @@ class _Load:
             bounds, points = box.ComputeAlignedRange(), None
             if not bounds.IsEmpty():
                 ends = np.array([bounds.GetMin(), bounds.GetMax()])
-                # Frame the inscribed ball of the bounding box, since the final camera is never
-                # closer.
+                # Compute a preliminary view of the inscribed ball of the bounding box. The final
+                # view is computed from the geometry, and its camera is never closer than this
+                # preliminary camera.
                 points = ends.mean(axis=0) + (corners(ends) - ends.mean(axis=0)) / np.sqrt(3.0)
             view = frame_points(points, c.up_axis, settings.lens, c.options.size)
         limit = float(c.options.texture_limit or 0) * MEGABYTE

@@ -94,10 +94,10 @@ class LoadedStage:
         from wavecomb import _core
 
         kept = None
-        # Another thread may be using the kept renderer, so the list may be empty.
+        # Reuse the kept renderer. The list is empty while another thread uses this renderer.
         with contextlib.suppress(IndexError):
             kept = self._kept.pop()
-        # A renderer of an earlier version of the scene cannot be used.
+        # Make a new renderer if the kept one was made for an earlier version of the scene.
         is_new = kept is None or kept.scene is not self.scene
         renderer = _core.Renderer(self.scene, threads) if kept is None or is_new else kept
         try:

@@ -275,7 +275,8 @@ def _pass_on(trap: Any, report: LoadReport) -> None:
     """Moves the messages of a diagnostic trap to a report."""
     texts = [_text(item) for item in (*trap.GetErrors(), *trap.GetWarnings())]
     lines = sorted({plain(text) for text in texts if not _SAID.search(text)})
-    # Reworded messages are grouped in the report, so they do not count towards the limit.
+    # Messages of USD that Wavecomb rewords are grouped in the report, so they do not count towards
+    # the limit of messages.
     known = [line for line in lines if any(f.search(line) for f, words in _FORMS if words)]
     for line in known:
         _add_to_report(report, line)

@@ -176,8 +176,9 @@ class Traversal:
         proxies = Usd.TraverseInstanceProxies(
             Usd.PrimDefaultPredicate if predicate is None else predicate
         )
-        # Entry for a prim to visit: the prim, transform and animated transform of its parent,
-        # purpose, inherited primvars, predicate for its children, parent, draw mode.
+        # Each entry describes a prim to visit: the prim, the transform and the animated transform
+        # of its parent, its purpose, inherited primvars, the predicate for its children, its
+        # parent, and its draw mode.
         stack: list[
             tuple[Usd.Prim, Gf.Matrix4d, Track | None, str, Sequence[Any], Any, Parent | None, str]
         ]

@@ -11,11 +11,12 @@ namespace wavecomb {
 struct FixedPoint {
   int exponent = -24;
 
-  /// Largest magnitude of a value, in units, so that a sum of 2^21 values cannot overflow.
+  /// Largest magnitude of a value, in multiples of 2^exponent. With this limit, a sum of 2^21
+  /// values cannot overflow.
   static constexpr int64_t kMax = int64_t{1} << 41;
 
-  /// Converts a real number to the nearest fixed-point number, ties to even. Magnitudes above kMax
-  /// are clamped; NaN becomes 0.
+  /// Converts a real number to the nearest fixed-point number, and to the even one if two are
+  /// equally near. Clamps the result to [-kMax, kMax] and converts NaN to 0.
   int64_t from(float x) const {
     const double units = std::ldexp(double{x}, -exponent);
     constexpr auto most = static_cast<double>(kMax);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Integer hashes over lanes: every random number is a hash of (pixel, sample, dimension, seed).
+/// Integer hash functions. Every random number of a render is a hash of the pixel, sample,
+/// dimension and seed.
 #pragma once
 
 #include "wavecomb/core/lanes/lanes.h"
@@ -17,9 +18,9 @@ inline U hash_u32(U x) {
   return x;
 }
 
-/// Hashes two 32-bit words, of which the second may be the same in all lanes. For a fixed value of
-/// one argument, the hash is bijective in the other argument, so that no two pixels share random
-/// numbers for a given seed.
+/// Hashes two 32-bit words; the second may be the same in all lanes. If one word is fixed, the hash
+/// is a bijective function of the other word, so that two pixels never have the same random numbers
+/// for the same seed.
 template <typename U>
 inline U hash_u32(const U& a, const std::type_identity_t<U>& b) {
   return hash_u32<U>(hash_u32<U>(a) + b * 0x9e3779b9u);

@@ -40,7 +40,7 @@ inline U morton_3(const U& x, const U& y, const U& z) {
   return spread_bits_3(x) | (spread_bits_3(y) << 1) | (spread_bits_3(z) << 2);
 }
 
-/// Gathers the even bits of x; the inverse of spread_bits_2().
+/// Moves the even bits of x to the low 16 bits. The function is the inverse of `spread_bits_2`.
 inline uint32_t compact_bits_2(uint32_t x) {
   x &= 0x55555555u;
   x = (x | (x >> 1)) & 0x33333333u;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Unit vectors in 32 bits by octahedral mapping: a point of the octahedron |x| + |y| + |z| = 1 is
-/// unfolded to a square with 16 bits per axis (Z. Cigolle et al., "A Survey of Efficient
-/// Representations for Independent Unit Vectors", JCGT 3(2), 2014). The maximum error of the
-/// encoding is 6e-5.
+/// Encoding of unit vectors in 32 bits by octahedral mapping. The vector is projected to the
+/// octahedron |x| + |y| + |z| = 1, which is unfolded to a square with 16 bits per axis (Z. Cigolle
+/// et al., "A Survey of Efficient Representations for Independent Unit Vectors", JCGT 3(2), 2014).
+/// The maximum error of the encoding is 6e-5.
 #pragma once
 
 #include <cmath>
@@ -12,10 +12,10 @@
 
 namespace wavecomb {
 
-/// Octahedral code that means "no direction".
+/// Code for a missing direction, which no unit vector has.
 inline constexpr uint32_t kNoDirection = 0x80008000u;
 
-/// Encodes the direction of `v`, or returns kNoDirection if it is zero or not finite.
+/// Encodes the direction of `v`. Returns `kNoDirection` if `v` is zero or not finite.
 inline uint32_t encode_direction(const Vec3<float>& v) {
   const float size = std::abs(v.x) + std::abs(v.y) + std::abs(v.z);
   if (!(size > 0) || !std::isfinite(size)) return kNoDirection;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Arithmetic and masks for lane types; part of core/lanes/lanes.h.
+/// Arithmetic and masks for lane types. Include core/lanes/lanes.h instead of this file.
 #pragma once
 
 #include <bit>
@@ -11,8 +11,8 @@
 
 namespace wavecomb {
 
-/// Logical not that also works for `bool` (`~true` is not `false`) and for `bool & bool`, which is
-/// an int.
+/// Returns the negation of a mask. For a single lane, the mask is a `bool`, or an `int` if it
+/// results from `bool & bool`, so the operator ~ would give a wrong result.
 template <typename M>
 inline auto not_(const M& m) {
   if constexpr (std::is_same_v<M, bool> || std::is_same_v<M, int>)
@@ -21,7 +21,7 @@ inline auto not_(const M& m) {
     return ~m;
 }
 
-/// Returns a < b ? a : b in every lane; b if either is NaN.
+/// Returns `a < b ? a : b` in every lane, which is b if a or b is NaN.
 template <LaneValue F>
 inline F min(const F& a, const std::type_identity_t<F>& b) {
   if constexpr (kIsScalar<F>) {
@@ -39,7 +39,7 @@ inline F min(const F& a, const std::type_identity_t<F>& b) {
   }
 }
 
-/// Returns a > b ? a : b in every lane; b if either is NaN.
+/// Returns `a > b ? a : b` in every lane, which is b if a or b is NaN.
 template <LaneValue F>
 inline F max(const F& a, const std::type_identity_t<F>& b) {
   if constexpr (kIsScalar<F>) {
@@ -62,8 +62,8 @@ inline F clamp(const F& x, const F& lo, const F& hi) {
   return min(max(x, lo), hi);
 }
 
-/// Returns a b + c, rounded once if the target has FMA and twice otherwise. Scalars and packets
-/// give the same result.
+/// Returns a b + c. The result is rounded once if the target CPU has fused multiply-add
+/// instructions, and twice otherwise, both for scalars and for packets.
 template <LaneValue F>
 inline F fma(const F& a, const std::type_identity_t<F>& b, const std::type_identity_t<F>& c) {
 #if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
@@ -110,7 +110,7 @@ inline F sqr(const F& x) {
   return x * x;
 }
 
-/// Reinterprets a float as its bits, and back.
+/// Converts between floats and unsigned integers with the same bits.
 template <typename F>
 inline UInt<F> float_bits(const F& x) {
   if constexpr (kIsScalar<F>)
@@ -168,11 +168,11 @@ template <typename M>
 inline uint32_t mask_bits(const M& m) {
   if constexpr (requires { m.k; }) {
     return static_cast<uint32_t>(m.k) & ((1u << M::Size) - 1u);
-  } else if constexpr (requires { m.a1; }) {  // Dr.Jit splits a wide packet into two halves
+  } else if constexpr (requires { m.a1; }) {  // Dr.Jit stores a wide packet as two halves
     return mask_bits(m.a1) | (mask_bits(m.a2) << M::Size1);
   } else {
 #if defined(__aarch64__)
-    // Dr.Jit has no bitmask_() on this target. Each lane of a mask is all ones or all zeros.
+    // Dr.Jit has no function `bitmask_` for this CPU. All bits of a mask's lane are equal.
     static_assert(M::Size == 4 && sizeof(m.m) == 16);
     constexpr uint32_t kBits[4] = {1, 2, 4, 8};
     return vaddvq_u32(vandq_u32(std::bit_cast<uint32x4_t>(m.m), vld1q_u32(kBits)));
@@ -183,7 +183,7 @@ inline uint32_t mask_bits(const M& m) {
 }
 }  // namespace detail
 
-/// Returns a mask as bits, one per lane, with lane 0 in the lowest bit.
+/// Converts a mask to an integer with one bit per lane. Lane 0 is the lowest bit.
 template <typename F>
 inline uint32_t lane_bits(const Mask<F>& m) {
   if constexpr (kIsScalar<F>)

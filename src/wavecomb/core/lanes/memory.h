@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Loads and stores of lanes, and access to single lanes; part of core/lanes/lanes.h.
+/// Loads and stores of packets, and access to single lanes. Include core/lanes/lanes.h instead of
+/// this file.
 #pragma once
 
 #include <bit>
@@ -32,8 +33,8 @@ inline void store(void* p, const T& value) {
 }
 
 namespace detail {
-/// Copy of a packet's lanes in memory. Replaces Dr.Jit's entry(), which violates strict aliasing
-/// when it reads integer registers, so that GCC 12 miscompiles it.
+/// Copy of a packet in memory, from which single lanes can be read. Dr.Jit's function `entry`
+/// violates strict aliasing when it reads integer registers, and GCC 12 miscompiles it.
 template <typename T>
 struct InMemory {
   using Value = std::conditional_t<
@@ -50,7 +51,7 @@ struct InMemory {
 template <typename T, typename Index, typename M>
 inline T gather_words(const void* base, const Index& index, const M& active) {
 #if defined(__AVX2__)
-  if constexpr (requires { active.a1; })  // Dr.Jit splits a wide packet into two halves
+  if constexpr (requires { active.a1; })  // Dr.Jit stores a wide packet as two halves
     return T(gather_words<typename T::Array1>(base, drjit::low(index), active.a1),
              gather_words<typename T::Array2>(base, drjit::high(index), active.a2));
   else
@@ -121,8 +122,8 @@ inline uint32_t compress_store(void* p, const T& value, const Mask<T>& active) {
     if (bits) std::memcpy(p, &value, sizeof(T));
 #if defined(__AVX512F__)
   } else if constexpr (kWidth<T> == 16) {
-    // Compresses in the register and stores the whole register: a compressing store to memory is
-    // far slower on Zen 4.
+    // Compress the lanes in a register and store the whole register, since the instruction that
+    // compresses to memory is far slower on Zen 4.
     const __m512i v = std::bit_cast<__m512i>(value.m);
     _mm512_storeu_si512(p, _mm512_maskz_compress_epi32(static_cast<__mmask16>(bits), v));
 #endif
@@ -141,7 +142,7 @@ inline uint32_t compress_store(void* p, const T& value, const Mask<T>& active) {
   return static_cast<uint32_t>(std::popcount(bits));
 }
 
-/// Returns table[index] of 16 words in each lane; index < 16.
+/// Returns `table[index]` in each lane. The table has 16 words.
 template <typename U>
 inline U lookup16(const uint32_t* table, const U& index) {
   if constexpr (kIsScalar<U>) {
@@ -165,14 +166,14 @@ inline U lookup16(const uint32_t* table, const U& index) {
   }
 }
 
-/// Returns table[index] of 256 floats in each lane; index < 256. With AVX-512, the function
-/// permutes registers, which takes a third of the time of a gather on Zen 4.
+/// Returns `table[index]` in each lane. The table has 256 floats. With AVX-512, the function
+/// permutes registers, which takes a third of the time of a gather instruction on Zen 4.
 template <typename F>
 inline F lookup256(const float* table, const UInt<F>& index) {
 #if defined(__AVX512F__)
   if constexpr (!kIsScalar<F> && kWidth<F> == 16) {
-    // Each permutation selects among 32 entries by the low five bits; the upper bits select the
-    // table.
+    // Each permutation selects one of 32 entries by the low five bits of the index. The upper bits
+    // select the group of 32 entries.
     const __m512i part = _mm512_srli_epi32(index.m, 5);
     __m512 value =
         _mm512_permutex2var_ps(_mm512_loadu_ps(table), index.m, _mm512_loadu_ps(table + 16));
@@ -195,7 +196,8 @@ template <typename U>
 inline U reverse_bits(U x) {
 #if defined(__AVX512BW__) && defined(__GFNI__)
   if constexpr (kWidth<U> == 16) {
-    // Reverses the bits of each byte by a matrix product over GF(2), then the order of the bytes.
+    // Reverse the bits of each byte by a matrix product over GF(2), and then reverse the order of
+    // the bytes.
     const __m512i matrix = _mm512_set1_epi64(static_cast<long long>(0x8040201008040201ull));
     const __m512i order =
         _mm512_broadcast_i32x4(_mm_setr_epi8(3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12));
@@ -203,7 +205,8 @@ inline U reverse_bits(U x) {
   } else
 #elif defined(__AVX2__)
   if constexpr (kWidth<U> == 8) {
-    // Reverses the order of bytes, then the bits of both nibbles with a table.
+    // Reverse the order of the bytes, and then reverse the bits of each byte with a table of
+    // four-bit values.
     const __m256i order = _mm256_broadcastsi128_si256(
         _mm_setr_epi8(3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12));
     const __m256i reversed = _mm256_broadcastsi128_si256(

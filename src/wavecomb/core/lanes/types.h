@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lane types; part of core/lanes/lanes.h. Only core/lanes/types.h includes Dr.Jit.
+/// Definitions of the lane types. Include core/lanes/lanes.h instead of this file. No other file
+/// includes Dr.Jit.
 #pragma once
 
 #include <drjit/packet.h>
@@ -11,9 +12,9 @@
 #include <cstring>
 #include <type_traits>
 
-/// Forces inlining of kernels that are called once or twice per packet. Inlining keeps the results
-/// of kernels in registers and removes unused results. Without the attribute, compilers do not
-/// inline kernels, because their caller is large.
+/// Forces inlining of functions that are called once or twice per packet. Inlining keeps the
+/// functions' results in registers and removes unused results. Without this attribute, compilers do
+/// not inline the functions, because the calling kernel is large.
 #define WAVECOMB_INLINE inline __attribute__((always_inline))
 /// Forces inlining of a lambda.
 #define WAVECOMB_INLINE_LAMBDA __attribute__((always_inline))
@@ -36,7 +37,8 @@ struct LaneType<1> {
 template <size_t W>
 using Lanes = typename LaneType<W>::type;
 
-/// Unsigned, signed, mask and 64-bit types that match a lane type, and its width.
+/// Types with the same number of lanes as the lane type `F`: unsigned and signed integers, masks
+/// and 64-bit integers. `kWidth` is the number of lanes.
 template <typename F>
 using UInt = drjit::uint32_array_t<F>;
 template <typename F>
@@ -67,16 +69,17 @@ inline constexpr bool kIsScalar = kWidth<T> == 1;
 template <typename F>
 using UInt64 = typename detail::Width<F>::U64;
 
-/// Concept of the types of lane values. Argument-dependent lookup also finds Dr.Jit's functions of
-/// the same names. Dr.Jit's functions have no constraint, so this constraint makes Wavecomb's
-/// functions the better match.
+/// Concept of scalars and packets. Wavecomb's functions require this concept where Dr.Jit has a
+/// function of the same name, which argument-dependent lookup also finds. Since Dr.Jit's functions
+/// have no constraint, the compiler prefers Wavecomb's functions.
 template <typename T>
 concept LaneValue = std::is_arithmetic_v<T> || drjit::is_array_v<T>;
 
 using drjit::select;
 
-/// Dr.Jit divides a packet by a number by multiplying with its reciprocal, which differs in the
-/// last bit from scalar division. Divide by a packet instead: `x / F(number)`.
+/// Deleted, since Dr.Jit divides a packet by a scalar by multiplying with the scalar's reciprocal.
+/// The result may differ from scalar division in the last bit. Divide by a packet instead: `x /
+/// F(number)`.
 template <template <typename, size_t> typename P, typename T, size_t W, typename Number>
   requires std::is_floating_point_v<T> && std::is_arithmetic_v<Number>
 void operator/(const P<T, W>&, const Number&) = delete;
@@ -85,8 +88,7 @@ template <template <typename, size_t> typename P, typename T, size_t W, typename
 void operator/=(P<T, W>&, const Number&) = delete;
 
 #if defined(__AVX512F__)
-// Dr.Jit 1.x compares unsigned lanes as signed at width 16 only; these overloads are better
-// matches.
+// Comparison operators for 16 unsigned lanes, since Dr.Jit 1.x compares them as signed integers.
 namespace detail {
 using U16 = UInt<FloatP<16>>;
 using U16Mask = drjit::mask_t<U16>;

@@ -9,7 +9,7 @@
 namespace wavecomb {
 namespace {
 
-/// Bits of the matched expressions, by state of the forward automaton.
+/// For each state of the forward automaton, a bit set of the expressions that match.
 using MatchedFrom = std::vector<uint32_t>;
 
 }  // namespace

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Automaton that evaluates light path expressions for light paths, in reverse order.
+/// Automaton that evaluates light path expressions along light paths, which run from the light
+/// towards the camera.
 ///
-/// The events between a vertex and the light act on a PathAutomaton as a function f: it maps the
-/// state of a camera path before these events to the set of matched expressions. A light path
-/// stores the index of f. A further event x on the camera side of these events changes f to f'(q) =
-/// f(next(q, x)). The functions that are reachable from the functions of all ends form the minimal
-/// automaton of the reversed expressions (J. Brzozowski, "Canonical regular expressions and minimal
-/// state graphs for definite events", 1962).
+/// The events between a vertex and the light define a function f, which maps the state of a camera
+/// path's `PathAutomaton` before these events to the set of matched expressions. A light path
+/// stores the index of f. Adding an event x on the camera side changes f to f'(q) = f(next(q, x)).
+/// The functions that are reachable from the functions of all path ends are the states of the
+/// minimal automaton of the reversed expressions (J. Brzozowski, "Canonical regular expressions and
+/// minimal state graphs for definite events", 1962).
 #pragma once
 
 #include <cstdint>
@@ -16,21 +17,24 @@
 
 namespace wavecomb {
 
-/// Automaton of the reversed expressions.
+/// Minimal deterministic automaton of the reversed light path expressions.
 ///
 /// Contract: immutable.
 struct BackwardAutomaton {
   static constexpr uint32_t kMaxStates = PathAutomaton::kMaxStates;
 
   BackwardAutomaton() = default;
-  /// Throws Error if the automaton would have more than kMaxStates states.
+  /// Builds the automaton. Throws `Error` if it would have more than `kMaxStates` states.
   explicit BackwardAutomaton(const PathAutomaton& forward);
 
   uint32_t forward_states = 0;
-  std::vector<uint32_t> begin;  ///< [end]: initial state of a light path that starts at this end
-  /// Transition table [state][event], with PathAutomaton::kNextWords words per state.
+  std::vector<uint32_t>
+      begin;  ///< initial state of a light path, indexed by the path end where it starts
+  /// Transition table, indexed by state and event, with `PathAutomaton::kNextWords` words per
+  /// state.
   std::vector<uint32_t> next;
-  /// Matched expressions [state][forward state], with one bit per expression.
+  /// Bit sets of the matched expressions, indexed by the state of this automaton and the state of
+  /// the forward automaton.
   std::vector<uint32_t> matched;
   uint32_t states() const { return static_cast<uint32_t>(next.size() / PathAutomaton::kNextWords); }
 };

@@ -14,7 +14,7 @@ namespace {
 constexpr uint32_t kMaxNfaStates = 2000;
 /// Maximum number of states of the deterministic automaton before minimisation.
 constexpr size_t kMaxSets = 4096;
-using StateSet = std::vector<uint32_t>;  ///< state numbers in ascending order
+using StateSet = std::vector<uint32_t>;  ///< set of states as their numbers in ascending order
 
 /// Nondeterministic automaton of all expressions (Thompson 1968).
 class PathNfa {
@@ -87,7 +87,8 @@ class PathNfa {
     }
     return to;
   }
-  /// Returns the epsilon closure: adds all states reachable without a symbol.
+  /// Returns the epsilon closure of a set: the set and all states that are reachable without a
+  /// symbol.
   StateSet closed(StateSet states) const {
     std::vector<uint8_t> seen(edges_.size(), 0);
     for (const uint32_t s : states) seen[s] = 1;
@@ -106,14 +107,14 @@ class PathNfa {
   std::vector<uint32_t> finals_;
 };
 
-/// Transition row of a state of the automaton before minimisation.
+/// Transitions and matched expressions of a state of the automaton before minimisation.
 struct PathStateRow {
   std::vector<uint32_t> next, matched;
   auto operator<=>(const PathStateRow&) const = default;
 };
 
-/// Subset construction: returns the reachable deterministic states; the first one is the state
-/// after the camera event.
+/// Makes a deterministic automaton by subset construction and returns its reachable states. The
+/// first state is the state after the camera event.
 std::vector<PathStateRow> reached_rows(const PathNfa& nfa, uint32_t ends) {
   std::map<StateSet, uint32_t> numbers;
   std::vector<StateSet> sets;
@@ -136,7 +137,8 @@ std::vector<PathStateRow> reached_rows(const PathNfa& nfa, uint32_t ends) {
   return rows;
 }
 
-/// Minimises the automaton by merging equivalent states (Moore 1956); the first state stays first.
+/// Minimises an automaton by merging equivalent states (Moore 1956). The first state remains the
+/// first.
 std::vector<PathStateRow> minimal_rows(const std::vector<PathStateRow>& rows) {
   std::vector<uint32_t> classes(rows.size(), 0);
   std::vector<PathStateRow> least;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Light path expressions: regular expressions over the events of a path that select the light in a
-/// layer (docs/light-path-expressions.md), and the automaton built from all expressions of a
-/// render.
+/// Light path expressions, which are regular expressions over the events of a path and select the
+/// light in a layer (docs/light-path-expressions.md). An automaton is built from all expressions of
+/// a render.
 ///
-/// A path consists of the camera, scattering events, and the emitter. Kernels do not use the text
-/// of expressions: a path stores an automaton state, which each event changes. When light reaches
-/// the path, a table gives the expressions that match, by state and emitter.
+/// A path consists of the camera, scattering events, and the emitter. A path stores an automaton
+/// state, which each event changes. When a light contributes to the path, a table gives the
+/// matching expressions for the state and the kind of light.
 #pragma once
 
 #include <cstdint>
@@ -21,9 +21,9 @@ struct NamedExpression {
   bool operator==(const NamedExpression&) const = default;
 };
 
-/// Scattering event: reflection or transmission by a diffuse, glossy or singular (mirror) lobe,
-/// scattering in a volume, or entering a surface for a subsurface random walk that leaves by a
-/// reflection.
+/// Scattering event of a path: reflection or transmission by a diffuse, glossy or singular (mirror)
+/// lobe, scattering in a volume, or the entry into a subsurface random walk, whose exit follows as
+/// a diffuse reflection.
 enum class PathEvent : uint32_t {
   kReflection = 0,
   kTransmission = 3,
@@ -37,7 +37,7 @@ inline constexpr uint32_t kDiffuseEvent = 0, kGlossyEvent = 1, kSingularEvent = 
 /// Emitter at the end of a path: a light, a dome light, or an emissive object or volume.
 enum class PathEnd : uint32_t { kLight, kBackground, kObject, kVolume };
 inline constexpr uint32_t kPathEnds = 4;
-/// Returns the index of a path end whose light belongs to light group `key`.
+/// Returns the index of a path end of kind `end` whose light belongs to the light group `key`.
 constexpr uint32_t path_end(PathEnd end, uint32_t key) {
   return kPathEnds * key + static_cast<uint32_t>(end);
 }
@@ -52,20 +52,21 @@ struct PathAutomaton {
   static constexpr uint32_t kNextWords = 8;
 
   PathAutomaton() = default;
-  /// `keys`: names of the light groups by index. Throws Error that gives the position if a text is
-  /// not a valid expression or uses an unknown key.
+  /// Builds the automaton. `keys` contains the names of the light groups. Throws an `Error` that
+  /// states the position in the text if an expression is invalid or uses an unknown light group.
   PathAutomaton(std::span<const NamedExpression> expressions, std::span<const std::string> keys);
 
   uint32_t expressions = 0;  ///< number of expressions
   uint32_t ends = 0;         ///< number of path ends, as indexed by path_end()
-  /// Transition table [state][event], with kNextWords words per state.
+  /// Transition table, indexed by state and event, with `kNextWords` words per state.
   std::vector<uint32_t> next;
-  std::vector<uint32_t> matched;  ///< matched expressions [state][end], with one bit per expression
+  std::vector<uint32_t>
+      matched;  ///< bit sets of the matched expressions, indexed by state and path end
   uint32_t states() const { return static_cast<uint32_t>(next.size() / kNextWords); }
 };
 
-/// Throws Error with a one-line message that gives the position if a text is not a valid
-/// expression, or if a layer name is invalid or repeated. The check ignores light group keys.
+/// Throws an `Error` if an expression is invalid, or if a layer name is invalid or repeated. The
+/// one-line message states the position in the text. Names of light groups are not checked.
 void check_expressions(std::span<const NamedExpression> expressions);
 
 }  // namespace wavecomb

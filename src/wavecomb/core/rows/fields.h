@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Rows with named fields. A row is a struct template on the float type: Row<float> is the memory
-/// layout, and Row<packet> holds one row per lane. WAVECOMB_FIELDS lists the fields of a row, and
-/// loads, stores and field offsets follow from the list.
+/// Rows of 32-bit words with named fields. A row type is a struct template whose parameter is the
+/// float type. `Row<float>` is the layout of a row in memory, and `Row<F>` with a packet type `F`
+/// contains one row per lane. The macro WAVECOMB_FIELDS lists the fields of a row. Loads, stores
+/// and field offsets are derived from this list.
 ///
 ///   template <typename F>
 ///   struct Ray {
@@ -11,8 +12,8 @@
 ///   };
 ///   Ray<F> ray = load_row<Ray, F>(rows, index, active);
 ///
-/// A field is F, UInt<F>, Vec2<F>, Vec3<F>, or a struct with fields. Rows are kRowWords<Row> words
-/// apart, a power of two, so that no row crosses a cache line boundary.
+/// A field is F, UInt<F>, Vec2<F>, Vec3<F>, or a struct with fields. The distance between rows in
+/// memory is `kRowWords<Row>` words, a power of two, so that no row crosses a cache line boundary.
 #pragma once
 
 #include <array>
@@ -83,8 +84,8 @@ WAVECOMB_INLINE void from_word(const F& word, T& field) {
     field = float_bits<F>(word);
 }
 
-/// Calls one(word, value) for each word of `value`, whose first word has index `At`. `value` has
-/// type F or UInt<F>.
+/// Calls `one(word, value)` for each word of the field `value`, with the index and the value of the
+/// word. The first word has the index `At`.
 template <size_t At, typename F, typename T, typename One>
 WAVECOMB_INLINE void for_each_word(T& value, const One& one);
 
@@ -118,8 +119,8 @@ inline constexpr size_t kFieldWords = detail::WordsOf<Row<float>>::value;
 template <template <typename> class Row>
 inline constexpr size_t kRowWords = std::bit_ceil(kFieldWords<Row>);
 
-/// Returns the word index of a member in a row or record: word_of(&Row<float>::slot). Compilers
-/// evaluate word_of() to a constant.
+/// Returns the word index of a member in a row or record, for example `word_of(&Row<float>::slot)`.
+/// Compilers replace the call by a constant.
 template <typename Record, typename Member>
 WAVECOMB_INLINE uint32_t word_of(Member Record::* member) {
   static_assert(std::is_trivially_copyable_v<Record>);
@@ -128,7 +129,8 @@ WAVECOMB_INLINE uint32_t word_of(Member Record::* member) {
   return static_cast<uint32_t>((address(kRecord.*member) - address(kRecord)) / 4);
 }
 
-/// Returns the words of a row, by lane, for store_rows. Words after the last field are 0.
+/// Returns the words of the rows in all lanes as an array, for `store_rows`. Words after the last
+/// field are 0.
 template <template <typename> class Row, typename F>
 WAVECOMB_INLINE std::array<F, kRowWords<Row>> words_of_row(const Row<F>& row) {
   static_assert(sizeof(Row<float>) == 4 * kFieldWords<Row>, "WAVECOMB_FIELDS lists all fields");
@@ -164,9 +166,9 @@ inline constexpr bool kIsHead =
     detail::IsHead<decltype(std::declval<Head<float>&>().fields()),
                    decltype(std::declval<Row<float>&>().fields())>::value;
 
-/// Loads the leading fields Head of row `index` in an array of rows at `base`, for each active
-/// lane; other lanes get 0. Reads only the words of the fields in Head, rounded up to a power of
-/// two.
+/// Loads the first fields of row `index` in the array of rows at `base`, for each active lane;
+/// other lanes get 0. `Head` is a row type with only these fields. Reads the words of these fields,
+/// and further words up to a power of two.
 template <template <typename> class Head, template <typename> class Row, typename F>
 WAVECOMB_INLINE Head<F> load_head(const void* base, const UInt<F>& index, const Mask<F>& active) {
   static_assert(sizeof(Head<float>) == 4 * kFieldWords<Head>, "WAVECOMB_FIELDS lists all fields");
@@ -186,7 +188,8 @@ WAVECOMB_INLINE Row<F> load_row(const void* base, const UInt<F>& index, const Ma
   return load_head<Row, Row, F>(base, index, active);
 }
 
-/// Stores one row per active lane at the index of the lane; the indices must be distinct.
+/// Stores the row of each active lane as row `index` of the array at `base`. The indices of active
+/// lanes must be distinct.
 template <template <typename> class Row, typename F>
 WAVECOMB_INLINE void store_row(void* base, const UInt<F>& index, const Row<F>& row,
                                const Mask<F>& active) {
@@ -248,7 +251,8 @@ WAVECOMB_INLINE Vec3<F> gather_member(const Record* base, float (Record::*member
           gather<F>(base, first + 2u, active)};
 }
 
-/// Stores the leading fields of rows in SoA layout: word k of all lanes goes to columns[k] + at.
+/// Stores the fields of `head` as one array per word: word k of all lanes is stored at `columns[k]
+/// + at`.
 template <template <typename> class Head, typename F, size_t C>
 WAVECOMB_INLINE void store_columns(const Head<F>& head, float* const (&columns)[C], size_t at) {
   static_assert(C == kFieldWords<Head>);

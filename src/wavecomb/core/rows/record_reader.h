@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Reader of records of 32-bit words in lanes: uses one scalar load if all active lanes share the
-/// record, and gathers otherwise.
+/// Reader of records of 32-bit words. Each lane may read a different record. If all active lanes
+/// read the same record, the reader uses scalar loads, and gather instructions otherwise.
 #pragma once
 
 #include <bit>
@@ -24,7 +24,7 @@ struct RecordReader {
   const std::byte* shared;
   Mask<F> active;
 
-  /// Reads a member of the record: reader[&MaterialRecord::roughness].
+  /// Reads a member of the record, for example `reader[&MaterialRecord::roughness]`.
   template <typename Record>
   F operator[](float Record::* member) const {
     return word<F, float>(word_of(member));

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Loads and stores of rows: each lane has a row of N consecutive words, and lane i of value k is
-/// word k of lane i's row.
+/// Loads and stores of rows. A row consists of N consecutive 32-bit words in memory. Each lane
+/// accesses its own row: lane i of packet k holds word k of the row of lane i.
 ///
-/// A gather or scatter instruction accesses memory once per lane and word. The functions of this
-/// file access whole rows and transpose the rows in registers: loading 16 rows of 16 words this way
-/// takes a fifth of the time of 16 gathers (docs/decisions/path-rows.md).
+/// Gather and scatter instructions access memory once per lane and word. The functions of this file
+/// load and store whole rows and transpose them in registers. Loading 16 rows of 16 words in this
+/// way takes a fifth of the time of 16 gather instructions (docs/decisions/path-rows.md).
 #pragma once
 
 #include <array>
@@ -25,8 +25,8 @@ struct VectorOf {
 template <size_t W>
 using Vector = typename VectorOf<W>::type;
 
-/// Calls f(i) for i < N with i as a compile-time constant. Arrays that are indexed only by
-/// compile-time constants become registers and are never stored in memory.
+/// Calls `f(i)` for each `i` below `N`, where `i` is a compile-time constant. Compilers keep arrays
+/// in registers if all indices are compile-time constants.
 template <size_t N, typename Function>
 WAVECOMB_INLINE void unrolled(const Function& f) {
   [&]<size_t... I>(std::index_sequence<I...>) WAVECOMB_INLINE_LAMBDA {
@@ -34,7 +34,8 @@ WAVECOMB_INLINE void unrolled(const Function& f) {
   }(std::make_index_sequence<N>());
 }
 
-/// One step of a transposition: swaps blocks of S words between `a` and `b`.
+/// Performs one step of a transposition, which swaps blocks of S words between the registers `a`
+/// and `b`.
 template <size_t W, size_t S, size_t... I>
 WAVECOMB_INLINE void swap_blocks(Vector<W>& a, Vector<W>& b, std::index_sequence<I...>) {
   const Vector<W> low = __builtin_shufflevector(a, b, ((I & S) == 0 ? I : W + I - S)...);
@@ -43,8 +44,8 @@ WAVECOMB_INLINE void swap_blocks(Vector<W>& a, Vector<W>& b, std::index_sequence
   b = high;
 }
 
-/// Transposes adjacent N x N blocks in N registers of W words (Eklundh 1972); it is its own
-/// inverse.
+/// Transposes each of the adjacent N x N blocks in N registers of W words (Eklundh 1972). Calling
+/// the function twice restores the registers.
 template <size_t N, size_t W, size_t S = N / 2>
 WAVECOMB_INLINE void transpose_blocks(std::array<Vector<W>, N>& r) {
   unrolled<N>([&](auto i) WAVECOMB_INLINE_LAMBDA {
@@ -57,8 +58,8 @@ WAVECOMB_INLINE void transpose_blocks(std::array<Vector<W>, N>& r) {
 template <size_t N>
 inline constexpr size_t kRowBlock = std::bit_ceil(N);
 
-/// Loads N <= B words at p into a register of B words and zeroes the rest. Reads only the N words
-/// at p.
+/// Loads N words at `p` into a register of B words, where N <= B, and sets the other words to 0.
+/// Reads no memory after the N words.
 template <size_t N, size_t B>
 WAVECOMB_INLINE Vector<B> load_words(const float* p) {
   if constexpr (N == B) {
@@ -85,12 +86,12 @@ WAVECOMB_INLINE Vector<2 * B> join_two(const Vector<B>& a, const Vector<B>& b,
                                        std::index_sequence<I...>) {
   return __builtin_shufflevector(a, b, I...);
 }
-/// Concatenates small vectors to a wide one.
+/// Concatenates several vectors to a wider vector.
 template <size_t B, size_t W>
 WAVECOMB_INLINE Vector<W> join(const Vector<B>* parts) {
   if constexpr (B == W) return parts[0];
 #if defined(__AVX__)
-  // Without this special case, compilers move both halves of the vector needlessly.
+  // For two vectors of four words, compilers generate needless moves from the general code.
   else if constexpr (B == 4 && W == 8)
     return std::bit_cast<Vector<8>>(
         _mm256_set_m128(std::bit_cast<__m128>(parts[1]), std::bit_cast<__m128>(parts[0])));
@@ -99,12 +100,13 @@ WAVECOMB_INLINE Vector<W> join(const Vector<B>* parts) {
     return join_two<W / 2>(join<B, W / 2>(parts), join<B, W / 2>(parts + W / B / 2),
                            std::make_index_sequence<W>());
 }
-/// Returns sizeof...(I) elements of a vector, from element Start on.
+/// Returns `sizeof...(I)` consecutive elements of a vector, starting with the element `Start`.
 template <size_t Start, size_t W, size_t... I>
 WAVECOMB_INLINE Vector<sizeof...(I)> part(const Vector<W>& v, std::index_sequence<I...>) {
   return __builtin_shufflevector(v, v, (Start + I)...);
 }
-/// Splits `v` into parts of N words and stores part j to at[j * N], starting with part J.
+/// Splits `v` into parts of N words and stores part j at the address `at[j * N]`, for all j from J
+/// on.
 template <size_t N, size_t W, size_t J = 0>
 WAVECOMB_INLINE void store_parts(const Vector<W>& v, float* const* at) {
   const Vector<N> one = part<J * N, W>(v, std::make_index_sequence<N>());
@@ -122,7 +124,7 @@ WAVECOMB_INLINE std::array<F, N> rows_at(const float* const* at) {
   std::array<F, N> out;
   if constexpr (kIsScalar<F>) {
     std::memcpy(out.data(), at[0], 4 * N);
-  } else if constexpr (!InOneRegister<F>) {  // Dr.Jit splits a wide packet into two halves
+  } else if constexpr (!InOneRegister<F>) {  // Dr.Jit stores a wide packet as two halves
     const auto low = rows_at<N, typename F::Array1>(at);
     const auto high = rows_at<N, typename F::Array2>(at + F::Size1);
     unrolled<N>([&](auto k) WAVECOMB_INLINE_LAMBDA { out[k] = F(low[k], high[k]); });
@@ -137,7 +139,7 @@ WAVECOMB_INLINE std::array<F, N> rows_at(const float* const* at) {
     transpose_blocks<B, W>(r);
     unrolled<N>([&](auto k)
                     WAVECOMB_INLINE_LAMBDA { out[k].m = std::bit_cast<decltype(F::m)>(r[k]); });
-  } else {  // loads W columns at a time, since the rows are longer than a register
+  } else {  // the rows are longer than a register, so load W words of each row at a time
     static_assert(N % W == 0);
     unrolled<N / W>([&](auto block) WAVECOMB_INLINE_LAMBDA {
       constexpr size_t c = block * W;
@@ -189,8 +191,9 @@ alignas(64) inline constexpr float kNoRow[16] = {};
 
 }  // namespace detail
 
-/// Loads words [word, word + N) of the array at `base` for each active lane; other lanes get 0. N
-/// is 2 to 16. Reads only the words [word, word + N) of each row.
+/// Loads the words [word, word + N) of an array at `base` for each active lane, where `word` may
+/// differ between lanes. Other lanes get 0. N is 2 to 16. Reads only the words [word, word + N) of
+/// each row.
 template <size_t N, typename F>
 WAVECOMB_INLINE std::array<F, N> load_rows(const void* base, const UInt<F>& word,
                                            const Mask<F>& active) {
@@ -209,8 +212,8 @@ WAVECOMB_INLINE std::array<F, N> load_rows(const void* base, const UInt<F>& word
   return detail::rows_at<N, F>(at);
 }
 
-/// Loads rows from a different array in each lane: `array(i)` returns the array of lane i and is
-/// called for active lanes only.
+/// Loads rows of N words from a separate array in each lane. The function `array(i)` returns the
+/// array of lane i. It is called for active lanes only.
 template <size_t N, typename F, typename Array>
 WAVECOMB_INLINE std::array<F, N> load_rows_of(const Array& array, const UInt<F>& word,
                                               const Mask<F>& active) {
@@ -225,7 +228,7 @@ WAVECOMB_INLINE std::array<F, N> load_rows_of(const Array& array, const UInt<F>&
   return detail::rows_at<N, F>(at);
 }
 
-/// Variant of load_rows_of() for all lanes active, without branches.
+/// Variant of `load_rows_of` without branches, for packets in which all lanes are active.
 template <size_t N, typename F, typename Array>
 WAVECOMB_INLINE std::array<F, N> load_all_rows_of(const Array& array, const UInt<F>& word) {
   constexpr size_t W = kWidth<F>;
@@ -237,8 +240,8 @@ WAVECOMB_INLINE std::array<F, N> load_all_rows_of(const Array& array, const UInt
   return detail::rows_at<N, F>(at);
 }
 
-/// Stores the row of each active lane; the lanes must have distinct rows. The row length N must be
-/// a power of two.
+/// Stores a row of N words for each active lane. The rows of active lanes must not overlap, and N
+/// must be a power of two.
 template <size_t N, typename F>
 WAVECOMB_INLINE void store_rows(void* base, const UInt<F>& word, const std::array<F, N>& values,
                                 const Mask<F>& active) {

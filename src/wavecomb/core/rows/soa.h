@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Structure-of-arrays storage of 32-bit values.
+/// Storage of 32-bit values as a structure of arrays.
 #pragma once
 
 #include <cstddef>
@@ -10,8 +10,9 @@
 
 namespace wavecomb {
 
-/// Columns of floats or uint32 of equal length in one allocation. Each column is aligned to 64
-/// bytes and padded, so that a packet may be read or written at any index below the capacity.
+/// Arrays (columns) of equal length in one allocation, with elements of type float or uint32_t.
+/// Each column is aligned to 64 bytes and padded, so that a packet may be read or written at any
+/// index below the capacity.
 class SoaBlock {
  public:
   /// Number of values of padding past the capacity of a column.

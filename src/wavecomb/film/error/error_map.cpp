@@ -9,10 +9,10 @@
 namespace wavecomb {
 namespace {
 
-/// Error terms of one pixel, summed over rgb: `light` is the pixel mean, `difference` the absolute
-/// difference between the full mean and the half mean. `camera_paths2` and `light_splats2` are
-/// squared differences of the pixel's own samples and of light splats. `known` is false until both
-/// halves have at least one full block of samples.
+/// Error terms of one pixel, summed over red, green and blue. `light` is the mean of all samples.
+/// `difference` is the absolute difference between this mean and the mean of one half of the
+/// samples. `camera_paths2` and `light_splats2` are the squared differences of camera paths and of
+/// light splats alone. `known` is false until both halves have at least one full block of samples.
 struct PixelError {
   double light = 0, difference = 0, camera_paths2 = 0, light_splats2 = 0;
   bool known = false;
@@ -22,11 +22,12 @@ PixelError pixel_error(const Film& film, size_t pixel) {
   const Film::Pixel& p = film.pixel(pixel);
   const ErrorSums& e = film.error(pixel);
   const uint32_t n = p.samples, in_half = ErrorSums::half_count(n);
-  // There is no estimate until the second half has a full block of samples.
+  // The error is unknown until both halves have a full block of samples.
   if (n < 2 * ErrorSums::kHalfBlock) return {};
   const double sums[3] = {p.r, p.g, p.b};
-  // For n samples of variance var, of which `half` are in A, Var(I - A) = var (1 / half - 1 / n).
-  // The scale turns this into var / n, the variance of the mean.
+  // Let I be the mean of n samples of variance var, and A the mean of the m samples in one half.
+  // Then Var(I - A) = var (1 / m - 1 / n). Multiplied by the square of `scale`, this is var / n,
+  // the variance of I.
   const double scale = std::sqrt(static_cast<double>(in_half) / (n - in_half));
   PixelError out;
   std::array<double, 3> splats{}, light_splat_difference{};
@@ -46,8 +47,8 @@ PixelError pixel_error(const Film& film, size_t pixel) {
   return out;
 }
 
-/// Replaces each value by the sum over a window of 2 kErrorWindow + 1 values around it, along lines
-/// of `length` values that are `step` apart.
+/// Replaces each value by the sum of the 2 * kErrorWindow + 1 values around it on the same line of
+/// the image. A line has `length` values, whose distance in `values` is `step`.
 void sum_along(std::vector<float>& values, size_t lines, size_t line_step, size_t length,
                size_t step) {
   std::vector<float> line(length);

@@ -11,20 +11,22 @@
 
 namespace wavecomb {
 
-/// Wrap-around of a panoramic image: points repeat after a full turn in x, and beyond a pole they
-/// appear upside down and half a turn away. `pixels` of 0 means that the image does not wrap.
+/// Wrap-around of a panoramic image. Points repeat after a full turn in x. A point beyond a pole
+/// appears mirrored in y and half a turn away in x. If `pixels` is 0, the image does not wrap
+/// around.
 struct ImageWrap {
   float pixels = 0;            ///< width of a full turn in pixels
   float north = 0, south = 0;  ///< y coordinates of the poles in pixels
 };
 
-/// Distributes a light splat over pixels. A splat at (x, y), in pixels from the upper left corner
-/// of the image, contributes to each pixel with the filter density at its offset from the pixel
-/// centre. This weight equals the density with which filter importance sampling would place the
-/// pixel's own samples, all of weight 1, at the splat's position.
+/// Distributes light splats over pixels with the pixel filter. The position (x, y) of a splat is in
+/// pixels from the upper left corner of the image. The splat's weight in a pixel is the density of
+/// the filter at its offset from the pixel centre, which is also the density with which filter
+/// importance sampling chooses the positions of the pixel's camera rays.
 class LightSplatFilter {
  public:
-  /// `rendered`: pixels that receive light splats.
+  /// Creates a filter for light splats. `rendered` is the rectangle of pixels that receive light
+  /// splats.
   LightSplatFilter(const FilterTable& filter, const Region& rendered, const ImageWrap& turn = {})
       : filter_(filter), rendered_(rendered), turn_(turn) {}
 
@@ -39,7 +41,8 @@ class LightSplatFilter {
             wraps_into_image<F>(half));
   }
 
-  /// Calls add(pixel, weight) for each pixel (Film::index) to which a splat at (x, y) contributes.
+  /// Calls `add(pixel, weight)` for each pixel to which a splat at (x, y) contributes. `pixel` is
+  /// the result of `Film::index`.
   template <typename Add>
   void spread(const Film& film, float x, float y, const Add& add) const {
     if (turn_.pixels == 0) [[likely]] {
@@ -62,8 +65,8 @@ class LightSplatFilter {
   Mask<F> contains_row(const F& y) const {
     return (y >= low(rendered_.y0)) & (y < high(rendered_.y1));
   }
-  /// Shifts x by whole turns of the panorama into the interval from left() to one turn to the right
-  /// of it.
+  /// Shifts `x` by whole turns of the panorama, so that it lies between `left()` and `left()` plus
+  /// one turn.
   template <typename F>
   F after_left(const F& x) const {
     return x - floor(F(F(x - left()) * (1.f / turn_.pixels))) * turn_.pixels;

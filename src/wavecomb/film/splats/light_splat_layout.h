@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Layout of the light splats of AOV layers within a pixel.
+/// Order of the sums of light splats of different AOV layers within a pixel.
 #pragma once
 
 #include <cstdint>
@@ -8,16 +8,16 @@
 
 namespace wavecomb {
 
-/// Position of each layer among the splat sums of a pixel. A light path that reaches the camera has
-/// scattered at least once, so a splat is direct light (one scattering) or indirect light (several
-/// scatterings), but never emission.
+/// Position of each AOV layer among the sums of light splats in a pixel. A light path that reaches
+/// the camera has scattered at least once, so a splat is direct light (one scattering) or indirect
+/// light (several scatterings), but never emission.
 struct LightSplatLayout {
-  /// Position that means that the layer is not stored.
+  /// Position of layers that are not stored.
   static constexpr uint32_t kNotStored = 0xffffffffu;
 
   uint32_t direct = kNotStored, indirect = kNotStored;
   uint32_t first_group = kNotStored, first_expression = kNotStored;
-  uint32_t count = 0;  ///< number of splat sums per pixel
+  uint32_t count = 0;  ///< number of sums of light splats per pixel
 
   LightSplatLayout() = default;
   explicit LightSplatLayout(const AovLayout& layout) {
@@ -32,8 +32,8 @@ struct LightSplatLayout {
     first_expression = allocate(layout.set.has(Aov::kExpressions), layout.expressions);
   }
 
-  /// Returns the position of an AOV with a single layer, or of layer `which` of an AOV with several
-  /// layers.
+  /// Returns the position of layer number `which` of an AOV. `which` is 0 for AOVs with a single
+  /// layer.
   uint32_t of(Aov aov, uint32_t which = 0) const {
     const uint32_t first = aov == Aov::kDirect        ? direct
                            : aov == Aov::kIndirect    ? indirect

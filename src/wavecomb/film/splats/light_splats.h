@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Light splats: contributions of light paths, which may land on any pixel.
+/// Light splats, which are contributions of light paths and may belong to any pixel of the image.
 ///
-/// Sums are integers, so that the result does not depend on order and any wave may add to any pixel
-/// at any time. Each wave collects its light splats in a LightSplatList. Between wave stages, the
-/// wave's worker adds the list to the film's LightSplatLayer.
+/// The sums of light splats are integers, so that they do not depend on the order of additions and
+/// any wave can add splats to any pixel at any time. Each wave collects its light splats in a
+/// LightSplatList. Between wave stages, the wave's worker adds the list to the film's
+/// LightSplatLayer.
 #pragma once
 
 #include <algorithm>
@@ -18,21 +19,22 @@
 
 namespace wavecomb {
 
-/// Bounded buffer of light splats.
+/// Buffer of light splats with a fixed capacity.
 ///
-/// Contract: owned by one worker; allocates only on construction.
+/// Contract: the list belongs to a single worker. Only the constructor allocates memory.
 class LightSplatList {
  public:
   struct LightSplat {
     uint32_t pixel;  ///< Film::index
     float r, g, b;
-    bool in_half = false;  ///< result of LightSplatLayer::is_in_half() for the light path's sample
+    bool in_half =
+        false;  ///< result of `LightSplatLayer::is_in_half` for the sample index of the light path
   };
 
   LightSplatList() = default;
   explicit LightSplatList(size_t capacity) { splats_.reserve(capacity); }
 
-  /// Adds a light splat. Returns false if the list is full; the splat is then not stored.
+  /// Adds a light splat. Returns false and does not add the splat if the list is full.
   [[nodiscard]] bool add(const LightSplat& splat) {
     if (splats_.size() == splats_.capacity()) return false;
     splats_.push_back(splat);
@@ -48,16 +50,19 @@ class LightSplatList {
 
 /// Fixed-point sums of light splats.
 ///
-/// A single 64-bit sum cannot cover the range of splat values. Values of at least `kMinCoarse`
-/// units are added to a second sum whose unit is 2^kCoarseExponent times as large.
+/// A single 64-bit sum cannot represent the range of values of light splats. Values of at least
+/// `kMinCoarse` units are therefore added to a second sum, whose unit is larger by the factor
+/// 2^kCoarseExponent.
 ///
-/// Contract: add() may be called concurrently; all other members only while no thread adds.
+/// Contract: several threads may call add() at the same time. Other members may be called only
+/// while no thread calls add().
 class LightSplatSums {
  public:
-  /// Sums of red, green and blue in fine units, then of red, green and blue in coarse units.
+  /// Sums of red, green and blue in the smaller unit, followed by the sums of red, green and blue
+  /// in the larger unit.
   using Sum = std::array<int64_t, 6>;
-  /// Logarithm to base 2 of the ratio of coarse to fine unit, and the smallest value, in fine
-  /// units, that is added to the coarse sum.
+  /// `kCoarseExponent` is the base-2 logarithm of the ratio between the larger and the smaller
+  /// unit. `kMinCoarse` is the smallest value that is added to the second sum, in the smaller unit.
   static constexpr int kCoarseExponent = 20;
   static constexpr double kMinCoarse = 0x1p40;
 
@@ -67,7 +72,7 @@ class LightSplatSums {
 
   bool empty() const { return sums_.empty(); }
   size_t bytes() const { return sums_.size() * sizeof(Sum); }
-  /// Atomically adds a value to a sum.
+  /// Adds a colour atomically to the sum with the index `sum_index`.
   void add(size_t sum_index, float r, float g, float b) {
     const FixedPoint coarse{unit_.exponent + kCoarseExponent};
     Sum& sum = sums_[sum_index];
@@ -80,7 +85,7 @@ class LightSplatSums {
         plus(sum[c + 3], coarse.from(rgb[c]));
     }
   }
-  /// Returns a sum as a floating-point number in the unit of the added values.
+  /// Returns one channel of a sum as a floating-point number.
   double value(size_t sum_index, size_t channel) const {
     const FixedPoint coarse{unit_.exponent + kCoarseExponent};
     const Sum& sum = sums_[sum_index];
@@ -99,8 +104,9 @@ class LightSplatSums {
   std::vector<Sum> sums_;
 };
 
-/// Scale that turns sums of light splats into pixel values: the number of light paths per pixel
-/// sample (`numbers`) divided by the number of light paths traced (`paths`).
+/// Factor by which sums of light splats are multiplied to get pixel values. The factor is the
+/// number of light paths per pixel sample (`numbers`) divided by the number of traced light paths
+/// (`paths`).
 struct LightSplatScale {
   double numbers = 1, paths = 0;
 
@@ -111,17 +117,19 @@ struct LightSplatScale {
   }
 };
 
-/// Light splats of the beauty, by pixel, and counts of the light paths traced.
+/// Sums of the light splats of each pixel for the beauty, and the numbers of traced light paths.
 ///
-/// Contract: add() and done() may be called concurrently, done() by one thread per light path
-/// index; all other members only while no thread adds.
+/// Contract: several threads may call add() and done() at the same time, but only one thread calls
+/// done() for a light path index. Other members may be called only while no thread calls add() or
+/// done().
 class LightSplatLayer {
  public:
   using Sum = LightSplatSums::Sum;
 
   LightSplatLayer() = default;
-  /// `paths`: number of light path indices, each of which represents `scale` light paths per
-  /// sample. If `with_error`, one half of the samples is also summed separately.
+  /// Allocates the sums. `paths` is the number of light path indices, each of which represents
+  /// `scale` light paths per sample. If `with_error` is true, the splats of one half of the samples
+  /// are also summed separately, for error estimates.
   LightSplatLayer(size_t pixels, FixedPoint unit, size_t paths = 0, double scale = 1,
                   bool with_error = false)
       : sums_(pixels, unit),
@@ -138,30 +146,33 @@ class LightSplatLayer {
       if (s.in_half && has_error()) half_.add(s.pixel, s.r, s.g, s.b);
     }
   }
-  /// Adds the light splats of `list`, which were collected from `paths` light paths.
+  /// Adds the light splats of `list` to the sums, and adds `paths` to the number of traced light
+  /// paths.
   void add(const LightSplatList& list, uint32_t paths) {
     add(list);
     LightSplatSums::plus(paths_[0], paths);
   }
-  /// Returns whether a sample of a light path is also summed in the half for error estimates. Every
-  /// second sample is, since each sample of all light paths uses a separate sequence
+  /// Returns whether the splats of a light path with the sample index `sample` also belong to the
+  /// half of the samples for error estimates. This is true for every second sample. The two halves
+  /// are independent, since light paths of different sample indices use separate sequences
   /// (light_paths/light_path.h).
   static bool is_in_half(uint32_t sample) { return sample % 2 == 0; }
-  /// Records that light path index `path` was traced for samples [first, first + count).
+  /// Records that light paths with the index `path` were traced for the samples `first` to `first +
+  /// count - 1`.
   void done(size_t path, uint32_t first, uint32_t count) {
     samples_[path] += count;
     LightSplatSums::plus(paths_[0], count);
     if (has_error()) LightSplatSums::plus(paths_[1], (first + count + 1) / 2 - (first + 1) / 2);
   }
-  /// Returns the number of samples traced, by light path index.
+  /// Returns the number of traced samples of each light path index.
   const std::vector<uint32_t>& samples() const { return samples_; }
-  /// Returns the scale that turns the current sums into means.
+  /// Returns the factor by which the current sums are multiplied to get means.
   LightSplatScale scale() const { return scale_of(paths_[0]); }
-  /// Returns the mean rgb contribution of light paths to a pixel.
+  /// Returns the mean RGB contribution of light paths to a pixel.
   std::array<double, 3> mean(size_t pixel) const { return scale().of(sums_, pixel); }
-  /// Returns the mean of all samples minus the mean of the half, scaled so that its expected square
-  /// is the variance of the mean (the halves are independent). Returns zero if either half has no
-  /// light paths.
+  /// Returns the mean of all samples minus the mean of one half of the samples, multiplied by a
+  /// factor that makes the expected square equal to the variance of the mean. Returns 0 if one of
+  /// the two halves has no light paths.
   std::array<double, 3> difference(size_t pixel) const {
     if (!has_error() || paths_[1] == 0 || paths_[1] == paths_[0]) return {};
     std::array<double, 3> out = mean(pixel);
@@ -175,7 +186,7 @@ class LightSplatLayer {
   size_t bytes() const {
     return sums_.bytes() + half_.bytes() + samples_.size() * sizeof(uint32_t);
   }
-  /// Calls block(name, values) for each vector of sums, to write or read checkpoints.
+  /// Calls `block(name, values)` for each vector of sums, to write or read checkpoints.
   template <typename Block>
   void for_each_block(const Block& block) {
     if (empty()) return;
@@ -192,7 +203,7 @@ class LightSplatLayer {
   }
 
   LightSplatSums sums_, half_;
-  /// Numbers of light paths: in total, and in the half.
+  /// Total number of traced light paths, and number of light paths in the half for error estimates.
   std::vector<int64_t> paths_ = std::vector<int64_t>(2);
   std::vector<uint32_t> samples_;
   double scale_ = 1;

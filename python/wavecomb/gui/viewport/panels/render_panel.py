@@ -73,7 +73,8 @@ class RenderPanel(QWidget):
         values = {name: value}
         setup = self._session.setup
         if name == "noise" and value:
-            # The render has one error target at a time, and the core requires spp >= min_spp.
+            # A render can have only one error target, so the other target is set to 0. The core
+            # requires that min_spp is at most spp.
             values |= {"adaptive": 0.0, "min_spp": min(setup.min_spp, setup.spp)}
         if name == "spp" and (setup.noise or setup.adaptive):
             values["min_spp"] = min(setup.min_spp, value)

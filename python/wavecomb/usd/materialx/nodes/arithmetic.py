@@ -135,7 +135,8 @@ def _if(n: NodeCall) -> Value:
         condition = m.op("less", b, a)
     else:
         condition = m.sub(1.0, m.op("less", a, b))
-    # In the boolean variant of the node, the result is the condition itself.
+    # The variant of the node with boolean output has no values to choose from. Its result is the
+    # condition.
     if "_boolean" in n.identifier:
         return condition
     return m.op("select", condition, n.value("in1"), n.value("in2"))
@@ -153,7 +154,7 @@ def _same(n: NodeCall) -> Value:
 @_node("convert")
 def _convert(n: NodeCall) -> Value:
     """Converts between types: new components are 0 (the fourth is 1), and a number is repeated."""
-    words = n.identifier.split("_")  # identifiers are such as ND_convert_color3_color4
+    words = n.identifier.split("_")  # an identifier is ND_convert_color3_color4, for example
     return n.value("in", 0.0, WIDTHS.get(words[2], 0) if len(words) > 3 else 0)
 
 
@@ -231,6 +232,8 @@ def _create(n: NodeCall) -> Value:
     result: Value = ()
     for i in range(size):
         row = n.value(f"in{i + 1}", rows[i * size : (i + 1) * size])
-        # In a 4 x 4 matrix, rows with three components are directions; the last row is a point.
+        # The rows of a 4 x 4 matrix may have three components. The first three rows are then
+        # directions, whose fourth component is 0, and the last row is a point, whose fourth
+        # component is 1.
         result += row if len(row) == size else (*row[: size - 1], float(i == size - 1))
     return result

@@ -228,7 +228,7 @@ def _hextiled_image(n: NodeCall) -> Value:
     m, grid = n.make, _Grid(n)
     copies = grid.copies()
     texels = _texels(n, grid, copies, is_raw=False)
-    # A constant is the default value of the node, which replaces a missing file.
+    # If the file is missing, the texel is a constant, which is the default value of the node.
     if is_constant(texels[0]):
         return texels[0]
     luma, contrast = n.value("lumacoeffs", LUMA, 3), n.value("falloffcontrast", 0.5, 1)
@@ -255,7 +255,8 @@ def _hextiled_normal_map(n: NodeCall) -> Value:
         v = m.sub(m.mul(fit(texel, 3), 2.0), 1.0)
         if flips:
             v = v[:1] + m.sub(0.0, v[1:2]) + v[2:]
-        # Rotate the tangent vectors by -turn, because the copy of the tile is rotated by turn.
+        # Rotate the tangent-space normals by -copy.turn, because this copy of the tile is rotated
+        # by copy.turn.
         back = m.sub(0.0, copy.turn)
         across = _turned(m, m.mul(v[:2], strength), m.op("sin", back), m.op("cos", back))
         steep = m.op("max", m.op("abs", v[2:]), 1e-3)

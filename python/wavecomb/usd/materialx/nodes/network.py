@@ -356,5 +356,6 @@ class InstancedGraphs:
         prim = end.GetPrim()
         if UsdShade.Output.IsOutput(end) or not prim.IsInstanceProxy():
             return str(end.GetPath())
-        # All instances share the value inside the prototype.
+        # Return the path inside the prototype, since all instances of a prototype have the same
+        # value.
         return str(prim.GetPrimInPrototype().GetPath().AppendProperty(end.GetName()))

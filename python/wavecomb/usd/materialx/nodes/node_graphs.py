@@ -55,7 +55,8 @@ class ExpandedGraph:
         """Returns the value of an output of the graph."""
         result = self._graph.results.get(name) or next(iter(self._graph.results.values()))
         nodes, interfaces = self._needed(result)
-        # Evaluates interface inputs and nodes in order, so that long graphs need no deep recursion.
+        # Evaluate interface inputs first and then nodes in order of their dependencies, which
+        # avoids deep recursion in long graphs.
         for interface, kind in interfaces:
             self.call.inputs.find(interface, kind)
         for node, output, kind in nodes:

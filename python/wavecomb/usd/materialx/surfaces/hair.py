@@ -56,7 +56,8 @@ class HairReader(SurfaceReader):
             parameters["ior"] = 1.55
         self._roughness(shader)
         self._colour(shader)
-        # MaterialX's cuticle angle has the opposite sign, and 0.5 means no tilt.
+        # MaterialX's cuticle angle ranges from 0 to 1, where 0.5 means no tilt, and has the
+        # opposite sign of Wavecomb's cuticle tilt in degrees.
         angle = self._number(shader, "cuticle_angle", 0.5)
         parameters["cuticle_tilt"] = min(max(90.0 - 180.0 * angle, -90.0), 90.0)
         for lobe in _LOBES:

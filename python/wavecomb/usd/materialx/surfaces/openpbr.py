@@ -222,8 +222,8 @@ def _read(row: Row, inputs: LayerInputs) -> Any:
 def _standard_surface(i: LayerInputs, found: dict[str, Any]) -> dict[str, Any]:
     specular = found["specular_weight"]
     if specular < 1.0 and i.number("metalness", 0.0) >= 1.0:
-        # In Standard Surface this dims only the edge tint of a metal; OpenPBR's weight would dim
-        # all of it.
+        # On metals, Standard Surface's specular weight dims only the edge tint, but OpenPBR's
+        # weight dims the whole reflection, so use 1.
         specular = 1.0
     return {"specular_weight": specular, "film_weight": float(found["film_thickness"] > 0)}
 
@@ -374,7 +374,7 @@ class LayerInputs:
     def ignored(self, *names: str) -> None:
         """Reports authored inputs that have no effect in Wavecomb."""
         for name in names:
-            # Material interfaces connect all inputs, including inputs without a value.
+            # Do not report inputs that are connected to a material input without a value.
             if source_of(self._shader, name, self._reader.time) is not None:
                 self._reader.missing(f"MaterialX {self._model} input {name} (ignored)")
 
