@@ -26,9 +26,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Folder:
     """Job of a caustic with just enough samples for pilot renders."""
     path = tmp_path_factory.mktemp("plans")
     write_scene("caustics", path / "caustics.usdc", plain=True)
-    return submit(
-        path / "caustics.usdc", path / "a.exr", size=(160, 160), spp=128, tiles="10x10"
-    )
+    return submit(path / "caustics.usdc", path / "a.exr", size=(160, 160), spp=128, tiles="10x10")
 
 
 @pytest.fixture
