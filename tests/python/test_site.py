@@ -119,6 +119,37 @@ def test_pages_name_sources_that_are_there() -> None:
     assert not missing, missing
 
 
+PARTS = {
+    "command": r"^    \S|^```sh$",
+    "image": r"!\[[^\]]+\]\(",
+    "table": r"^\| ---",
+    "limits": r"^## Limits",
+}
+"""Parts of a page other than its first sentence, as patterns."""
+WITHOUT = {"faq": {"limits"}, "glossary": {"limits"}, "ide": {"image"},
+           "window-compare": {"image"}, "window-scene": {"image"},
+           "window-scheduling": {"image"}}  # fmt: skip
+"""Parts that a page may lack. docs/decisions/page-parts.md has the reasons, except for pages
+about the window, which have no images yet."""
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.stem)
+def test_a_page_has_all_parts(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    first = text.split("\n\n", 2)[1]
+    if page.stem != "window-compare":
+        assert re.match(r"[A-Z`]", first), f"no sentence of purpose: {first[:60]!r}"
+    missing = {name for name, part in PARTS.items() if not re.search(part, text, flags=re.M)}
+    assert missing <= WITHOUT.get(page.stem, set())
+
+
+def test_images_of_pages_are_shown_and_small() -> None:
+    text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
+    for path in (DOCS / "images" / "pages").iterdir():
+        assert f"images/pages/{path.name})" in text, path.name
+        assert path.stat().st_size <= 120_000, path.name
+
+
 def test_every_page_has_a_place_in_the_site() -> None:
     listed = set(
         re.findall(r"^\s+- (?:[\w ]+: )?(\S+\.md)$", (ROOT / "mkdocs.yml").read_text(), flags=re.M)
