@@ -69,8 +69,9 @@ const auto* leaf_at(const Buffer& buffer, uint64_t at) {
 }
 
 /// Traversal of a grid's nodes from the root. The template depends only on the type of voxel
-/// values, so that grids with and without quantised leaves use the same code. Traversal stops after
-/// as many nodes as fit into the buffer, so that it ends even if node offsets form a cycle.
+/// values, so that grids with and without quantised leaves use the same code. Throws `BrokenFile`
+/// after visiting more nodes than fit into the buffer, since node offsets of a broken file may form
+/// a cycle.
 template <typename Value>
 class NanoTreeTraversal {
  public:
