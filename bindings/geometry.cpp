@@ -260,8 +260,8 @@ nb::object plain_mesh(const Array<float>& points, const Array<int32_t>& counts,
   return nb::make_tuple(size, positions, box_of(*bounds), quads, faces);
 }
 
-/// Returns transformed points, normals and bounds of a shape, or None if a point is not finite or
-/// too far away.
+/// Returns the transformed points, normals and bounds of a shape. Returns None if a transformed
+/// point is not finite or its coordinates exceed `limit`.
 nb::object transform_shape(const Array<float>& points, const Array<float>& normals,
                            const Array<double>& matrix, const Array<double>& inverse,
                            double limit) {

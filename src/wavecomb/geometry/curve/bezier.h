@@ -42,8 +42,9 @@ struct RaySpace {
     y = {b, sign + z.y * z.y * a, -z.y};
   }
   V vector(const V& v) const { return {dot_d(v, x), dot_d(v, y), dot_d(v, z)}; }
-  /// Converts a vector to world space.
+  /// Converts a point from world space to the coordinate system of the ray.
   V point(const V& p) const { return vector(p - o); }
+  /// Converts a vector from the coordinate system of the ray to world space.
   V back(const V& v) const { return x * v.x + y * v.y + z * v.z; }
 };
 
