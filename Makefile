@@ -13,8 +13,8 @@ BATCH ?= ON
 # Lane widths to compile: "default" means scalar code and the widest vectors of the target CPU, and
 # "all" means every supported width. Later builds keep the lane widths of the last build.
 LANES ?= $(shell cat build/.lanes 2> /dev/null || echo default)
-# C++ tests that make test-asan builds: ON for the tests that need no optimised code, or all for
-# every test.
+# C++ tests that make test-asan builds: ON for the tests in which sanitizers can find errors, or all
+# for every test.
 CHECKS ?= ON
 ASAN := build/asan$(if $(filter all,$(CHECKS)),-all)
 TSAN := build/tsan
@@ -140,8 +140,8 @@ test-fast: ## Lint, C++ tests, pytest without slow tests
 test-long: ## All tests with 10^6 samples, 500 random scenes, 100 kills, all sanitizers (over an hour)
 	@python3 tools/run_parts $@
 
-# Run the C++ tests that need a build with compiler optimisation. test-asan runs all other C++ tests
-# (tests/cpp/CMakeLists.txt).
+# Run the C++ tests in an optimised build, except the tests that only sanitizers make useful.
+# test-asan runs these (tests/cpp/CMakeLists.txt).
 test-cpp: build build/.setup-test ## C++ tests of values, lanes and whole renders
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet
 	$(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error

@@ -93,7 +93,7 @@ def measure(texture_mb: float, args: argparse.Namespace) -> dict[str, Any]:
     times: dict[str, list[dict[str, float]]] = {}
     picture: np.ndarray | None = None
     spread = 0.0
-    # Warm-up: fills the caches and the allocator's pools.
+    # Render once before the measurements, to fill the caches and the allocator's memory pools.
     render(stage, args, lanes=0, policy="program")
     for turn in range(args.rounds):
         cases = [(width, policy) for width in LANES for policy in settings()["policy"].choices]

@@ -73,10 +73,8 @@ def turn(stage: Path, size: int, threads: int) -> dict[str, Any]:
             check=True,
             capture_output=True,
             text=True,
-            env={
-                **os.environ,
-                "OPENBLAS_NUM_THREADS": "1",
-            },  # the wavecomb command sets the same value
+            # The wavecomb command sets the same number of threads.
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
         )
         end = time.monotonic()
     got = json.loads(run.stdout)
@@ -88,8 +86,8 @@ def turn(stage: Path, size: int, threads: int) -> dict[str, Any]:
     record["peak_mb"] = got["peak_bytes"] / 1e6
     record["parts_mb"] = parts / 1e6
     # Ratio of the peak memory of loading and rendering to the sum of the memory that the statistics
-    # report. If the scene has no images, the peak includes the library that reads image files,
-    # since the library is loaded after `imports_bytes` is measured.
+    # report. If the scene has no images, the peak does not include the library for image files,
+    # which is then loaded only when the rendered image is saved.
     record["ratio"] = (got["render_peak_bytes"] - got["imports_bytes"]) / parts
     record["memory_bytes"] = got["memory_bytes"]
     return record

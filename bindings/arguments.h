@@ -20,8 +20,8 @@ inline wavecomb::Vec3<float> vec3(const Color3& c) {
   return {std::get<0>(c), std::get<1>(c), std::get<2>(c)};
 }
 
-/// Returns the enum value of a name. Throws an `Error` whose message begins with `what` if the name
-/// is unknown.
+/// Returns the enum value that belongs to a name in `choices`. Throws an `Error` whose message
+/// begins with `what` if the name is unknown.
 template <typename Enum>
 Enum choose(const std::string& what, const std::string& value,
             std::initializer_list<std::pair<const char*, Enum>> choices) {

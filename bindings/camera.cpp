@@ -20,7 +20,7 @@ using namespace wavecomb;
 
 namespace {
 
-/// Names indexed by CameraValueKind.
+/// Python names of the values of `CameraValueKind`.
 constexpr const char* kKinds[] = {"number", "choice", "four", "planes"};
 
 [[noreturn]] void fail(const std::string& name, const std::string& wanted) {

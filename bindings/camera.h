@@ -15,7 +15,7 @@ void set_camera(
     const nanobind::ndarray<nanobind::c_contig, nanobind::device::cpu, nanobind::ro>& transform,
     const nanobind::kwargs& values);
 
-/// Returns all camera parameters by name, and to_world.
+/// Returns a dict with all parameters of the scene's camera and its transform `to_world`.
 nanobind::dict camera_dict(const wavecomb::Scene& scene);
 
 /// Returns a copy of the scene's camera with changed values. Throws an `Error` that names the

@@ -276,8 +276,8 @@ nb::tuple plain_meshes(const Array<float>& points, const Array<int32_t>& counts,
       array_of(std::move(meshes.uses_all_points), 0));
 }
 
-/// Returns transformed points, normals and bounds of a shape, or None if a point is not finite or
-/// too far away.
+/// Returns the transformed points, normals and bounds of a shape. Returns None if a transformed
+/// point is not finite or its coordinates exceed `limit`.
 nb::object transform_shape(const Array<float>& points, const Array<float>& normals,
                            const Array<double>& matrix, const Array<double>& inverse,
                            double limit) {

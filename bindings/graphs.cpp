@@ -97,7 +97,7 @@ nb::ndarray<nb::numpy, float, nb::ndim<2>> run_points(const nb::bytes& ops,
                                                       const Names& attributes, const Points& points,
                                                       uint32_t lanes) {
   Graph graph = make_graph(ops, constants, images, outputs, attributes);
-  // Replace all images by a texture of one white texel.
+  // Replace all images of the graph by a texture of one white texel.
   for (GraphImage& image : graph.images) image.texture = 0;
   check_graph(graph, "a graph to run", 1, ~uint32_t{0});
   GraphSet set;

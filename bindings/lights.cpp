@@ -103,7 +103,8 @@ nb::object to_python(const LightParameter& p, const LightValue& value) {
       value);
 }
 
-/// Returns the names of the light parameters for which `is_known` returns true, for error messages.
+/// Returns a list of the light parameters for which `is_known` returns true, as text for error
+/// messages.
 template <typename Known>
 std::string names(const Known& is_known) {
   std::string list;

@@ -173,7 +173,8 @@ nb::dict aovs_dict(nb::handle owner) {
   return d;
 }
 
-/// Returns sample counts (h, w) and samples (n, 6), or None without a deep image.
+/// Returns the deep image as an array of sample counts (h, w) and an array of samples (n, 6).
+/// Returns None if the render has no deep image.
 nb::object deep_pair(nb::handle owner) {
   const RenderedImage& p = nb::cast<const Result&>(owner).image;
   if (p.deep.empty()) return nb::none();

@@ -21,7 +21,7 @@ struct Result {
   wavecomb::RenderStatistics statistics;
   wavecomb::CostProfile profile;
   nanobind::dict settings;
-  /// Training data from wavecomb::packed_training(); empty without training.
+  /// Training data that `wavecomb::packed_training` returned. Empty if the render had no training.
   std::vector<std::byte> learned;
 };
 

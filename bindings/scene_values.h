@@ -50,7 +50,7 @@ wavecomb::Affine matrix_of(const std::string& what, nanobind::handle value);
 void read_parameters(wavecomb::Material& material, const nanobind::kwargs& values);
 /// Returns material_table() as a list of dicts.
 nanobind::list material_rows();
-/// Returns which inputs each program reads, as a list of dicts.
+/// Returns a list of dicts that state which inputs each shading program reads.
 nanobind::list program_rows();
 
 /// Returns a material as a dict in the format of add_material. Throws Error if the index is out of

@@ -25,10 +25,10 @@ namespace {
 
 /// Prefix of light group names in AOV and layer names.
 constexpr const char* kLightPrefix = "light_";
-/// Prefix of light path expressions: "lpe:NAME=EXPRESSION".
+/// Prefix of light path expressions, which are written as "lpe:NAME=EXPRESSION".
 constexpr const char* kExpressionPrefix = "lpe:";
 
-/// Returns Settings::aovs, light_groups and expressions as names.
+/// Returns the names that select the AOVs, light groups and light path expressions of `settings`.
 std::vector<std::string> aov_names(const Settings& s) {
   std::vector<std::string> names = s.aovs.names();
   if (!s.light_groups.empty()) std::erase(names, "light_groups");
@@ -38,7 +38,7 @@ std::vector<std::string> aov_names(const Settings& s) {
   return names;
 }
 
-/// Parses "lpe:NAME=EXPRESSION".
+/// Parses a light path expression of the form "lpe:NAME=EXPRESSION".
 NamedExpression to_expression(const std::string& aov) {
   const std::string rest = aov.substr(std::string(kExpressionPrefix).size());
   const size_t equals = rest.find('=');
@@ -47,7 +47,8 @@ NamedExpression to_expression(const std::string& aov) {
   return {rest.substr(0, equals), rest.substr(equals + 1)};
 }
 
-/// Sets the AOVs by name. "light_groups" selects all light groups, "light_NAME" the group NAME.
+/// Sets the AOVs by name. The name "light_groups" selects all light groups, and "light_NAME" the
+/// light group NAME.
 void set_aovs(Settings& s, const std::vector<std::string>& names) {
   AovSet set{0};
   std::vector<std::string> groups;
@@ -113,7 +114,7 @@ SettingValue from_python(const SettingInfo& setting, nb::handle value) {
               nb::cast<std::string>(value.type().attr("__name__")));
 }
 
-/// Names indexed by SettingGroup.
+/// Python names of the values of `SettingGroup`.
 constexpr const char* kGroups[] = {"picture", "work", "order"};
 
 /// Converts a row of setting_table() to the dict that the Python module wavecomb.options reads.

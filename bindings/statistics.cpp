@@ -12,8 +12,8 @@ using namespace wavecomb;
 
 namespace {
 
-/// Returns lists indexed by path depth: rays, shadow rays, shading records, and number of paths
-/// that ended at that depth.
+/// Returns lists that are indexed by path depth: the numbers of rays, of shadow rays, of shaded
+/// hits, and of paths that ended at this depth.
 nb::dict depths_dict(const RenderStatistics& s) {
   nb::dict d;
   std::vector<uint64_t> ended;

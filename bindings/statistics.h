@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Statistics of a render as dicts.
+/// Conversion of a render's statistics to Python dicts.
 #pragma once
 
 #include <nanobind/nanobind.h>

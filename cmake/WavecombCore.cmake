@@ -159,9 +159,9 @@ function(wavecomb_lane_units var width widest reduced)
   set(${var} ${all} PARENT_SCOPE)
 endfunction()
 
-# wavecomb_add_core(NAME FLAGS [STATIC]): adds the library NAME, compiled with FLAGS from
-# wavecomb_add_flags. The library always contains the kernels for one lane, since the reference
-# integrator uses them.
+# wavecomb_add_core(NAME FLAGS [STATIC]) adds the library NAME. FLAGS is a target of
+# wavecomb_add_flags that contains the compile options. The library always contains the kernels for
+# one lane, since the reference integrator uses them.
 function(wavecomb_add_core name flags)
   add_library(${name} ${ARGN} ${core_sources} ${core_headers})
   target_compile_features(${name} PUBLIC cxx_std_20)

@@ -24,7 +24,8 @@ if(WAVECOMB_HAS_LIBCXX AND NOT APPLE)
   set(WAVECOMB_PYTHON_ABI "")
 endif()
 
-# wavecomb_nanobind_module(NAME ARGUMENTS...): like nanobind_add_module.
+# wavecomb_nanobind_module(NAME ARGUMENTS...) calls nanobind_add_module, with the stable ABI unless
+# WAVECOMB_PYTHON_ABI is empty.
 function(wavecomb_nanobind_module name)
   if(WAVECOMB_PYTHON_ABI)
     nanobind_add_module(${name} BACKEND_MODULE nanobind_backend STABLE_ABI_VERSION ${WAVECOMB_PYTHON_ABI}

@@ -13,7 +13,7 @@ namespace wavecomb::micro {
 
 inline constexpr float kUnbounded = std::numeric_limits<float>::infinity();
 
-/// Triangle soup of several meshes.
+/// Triangles of a mesh, with vertex positions and vertex indices.
 struct Soup {
   std::vector<float> positions;  ///< 3 per vertex
   std::vector<uint32_t> indices;

@@ -41,7 +41,7 @@ Soup tube(uint32_t n, float half_length, float radius) {
   return s;
 }
 
-/// Rotates the soup so that no wall is parallel to an axis.
+/// Rotates all triangles, so that no wall is parallel to an axis.
 Soup turned(Soup s) {
   for (size_t i = 0; i + 2 < s.positions.size(); i += 3) {
     float* p = &s.positions[i];
@@ -78,7 +78,7 @@ void leaks(double millions) {
       const auto uniform = [&] { return static_cast<float>(random() >> 7) * 0x1p-24f; };
       const auto& s = room.soup;
       const size_t triangles = s.indices.size() / 3;
-      /// A random point on an edge, or inside a triangle.
+      /// Computes a random point of a triangle, which is on an edge if `edge` is true.
       const auto point = [&](bool edge, float* out) {
         const uint32_t* i = &s.indices[3 * (random() % triangles)];
         float a = uniform(), b = edge ? 0.f : uniform();

@@ -52,7 +52,7 @@ void light(benchmark::State& state, uint32_t kind) {
   std::vector<float> columns[6];
   for (auto& column : columns)
     for (size_t i = 0; i < kSamples; ++i) column.push_back(std::min(uniform(random), 0.9999f));
-  // Random numbers that are multiples of 2^-24, as samplers return them.
+  // Round the random numbers to multiples of 2^-24, since samplers return such numbers.
   for (float& pick : columns[3]) pick = std::floor(pick * 0x1p24f) * 0x1p-24f;
   for (auto _ : state) {
     F sum(0.f);

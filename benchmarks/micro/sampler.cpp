@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-// Cost of the sample values of a path vertex: one set of four dimensions per path.
+// SPDX-License-Identifier: Apache-2.0 Cost of computing one sample set, which consists of four
+// sample values, for each path.
 #include <vector>
 
 #include "wavecomb/core/sampler.h"

@@ -57,7 +57,7 @@ TextureUse silent(SceneBuilder& b, uint8_t value, bool odd) {
                             Wrap::kRepeat, Wrap::kRepeat}));
 }
 
-/// A sphere of one material under a light.
+/// Makes a scene of a sphere with one material under a light.
 ScenePtr make_scene(ProgramId program, const Look& look) {
   SceneBuilder b;
   Material material = make_material(program, {0.6f, 0.5f, 0.4f}, 0.4f);

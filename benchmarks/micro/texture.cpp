@@ -21,7 +21,7 @@ struct Queries {
 };
 
 /// Makes an 8-bit sRGB texture of edge x edge texels. Its finest level takes edge^2 * 4 bytes.
-/// Returns the previous texture if it has the same size.
+/// Returns the texture of the previous call if that has the same size.
 const Texture& texture_of(uint32_t edge) {
   static std::unique_ptr<Texture> made;
   if (made && made->view().levels[0].width == edge) return *made;

@@ -10,7 +10,7 @@
 
 namespace wavecomb::micro {
 
-/// Calls f.operator()<W>() for each lane width in the build.
+/// Calls `f.operator()<W>()` for each lane width `W` in the build.
 template <typename Function>
 void for_each_width(const Function& f) {
 #ifdef WAVECOMB_HAS_LANES_1

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Python module wavecomb._cpu: instruction sets of this CPU. The module is compiled for the
-/// compiler's baseline, so that it runs on any CPU before a library for a specific instruction set
-/// is loaded.
+/// Python module wavecomb._cpu, which reports the instruction sets of this CPU. The module is
+/// compiled for the compiler's baseline, so that it runs on any CPU before a library for a specific
+/// instruction set is loaded.
 #include <Python.h>
 
 #include <array>
@@ -9,7 +9,8 @@
 
 namespace {
 
-/// Returns the WAVECOMB_ISAS that this CPU and system support, best first; unused entries are null.
+/// Returns the names of the instruction sets in WAVECOMB_ISAS that this CPU and operating system
+/// support, best first. Unused entries are null.
 std::array<const char*, 4> runnable() {
   std::array<const char*, 4> names{};
   size_t count = 0;

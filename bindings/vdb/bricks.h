@@ -17,7 +17,8 @@ namespace vdb {
 constexpr int kBrickEdge = 8;
 constexpr size_t kBrickVoxels = kBrickEdge * kBrickEdge * kBrickEdge;
 
-/// Storage of a voxel: 1 or 3 components of 2 bytes (half) or 4 bytes (float).
+/// Storage format of a voxel, which has 1 or 3 components of 2 bytes (half) or 4 bytes (float)
+/// each.
 struct BrickFormat {
   uint32_t channels = 1;
   bool is_half = false;
@@ -79,7 +80,7 @@ std::string limit_message(const std::string& what, uint64_t bytes, uint64_t max_
 /// Throws TooLarge if the given number of bricks takes more than `max_bytes`.
 void check_size(uint64_t bricks, const BrickFormat& format, uint64_t max_bytes);
 
-/// Converts floats that are exactly representable in 16 bits.
+/// Converts floats to 16-bit floats. The values must be exactly representable in 16 bits.
 void to_halves(const float* values, size_t count, uint16_t* halves);
 
 /// Writer that appends bricks to an array. The caller converts voxel values to float.
@@ -91,7 +92,8 @@ class BrickWriter {
   /// of `options`, and `std::bad_alloc` if the allocation fails.
   BrickWriter(uint64_t most, const BrickFormat& format, const BrickOptions& options);
 
-  /// Buffer for the values of the next brick, x slowest, channels fastest.
+  /// Buffer for the values of the next brick. In memory, the channel index varies fastest and the x
+  /// coordinate slowest.
   float* scratch() { return scratch_; }
   /// Appends the brick whose values are in the buffer scratch().
   void add(const Origin& origin);

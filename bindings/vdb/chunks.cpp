@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Decompression of chunks in OpenVDB files that checks sizes before it writes.
+/// Functions that decompress the chunks of OpenVDB files and check all sizes before they write.
 ///
 /// OpenVDB's functions read as many bytes as the file claims and check afterwards whether the
 /// buffer was large enough, so a broken file overwrites memory. This file defines functions of the

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Interface of open grid files, written by OpenVDB or NanoVDB.
+/// Common interface of .vdb and .nvdb files that are open for reading.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,8 @@
 
 namespace vdb {
 
-/// Open file of grids. Functions throw BrokenFile, std::system_error and std::bad_alloc.
+/// Open .vdb or .nvdb file, which contains grids. Functions throw BrokenFile, std::system_error and
+/// std::bad_alloc.
 class GridFile {
  public:
   GridFile() = default;
@@ -34,7 +35,7 @@ std::unique_ptr<GridFile> open_file(const std::string& path);
 /// Opens a .vdb file (archive.cpp).
 std::unique_ptr<GridFile> open_archive(const std::string& path);
 
-/// Registers OpenVDB's grid types. Call once before opening files.
+/// Registers OpenVDB's grid types. Must be called once before files are opened.
 void initialize_openvdb();
 
 /// Returns the version of OpenVDB, such as "10.0.1".

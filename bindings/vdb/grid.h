@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Description of a grid in a file, and errors of reading a grid. Independent of OpenVDB and
-/// NanoVDB.
+/// Description of a grid in a file, and errors of reading a grid. This header does not depend on
+/// OpenVDB or NanoVDB.
 #pragma once
 
 #include <array>
@@ -13,14 +13,14 @@
 
 namespace vdb {
 
-/// Error: the file is not a volume file, is truncated, or has invalid contents. The message is one
-/// line that says what is wrong.
+/// Exception for a file that is not a volume file, is truncated, or has invalid contents. The
+/// message is one line that says what is wrong.
 struct BrokenFile : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Error: reading needs more memory than allowed. The message states in one line how much memory is
-/// needed.
+/// Exception for reading a grid that needs more memory than allowed. The message states in one line
+/// how much memory is needed.
 struct TooLarge : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -30,7 +30,8 @@ struct Head {
   std::string name;
   /// Position of the grid among the grids of the same name, in the order of the file.
   uint32_t index = 0;
-  /// OpenVDB's name of the type, "Tree_float_5_4_3"; "Tree_fp8_5_4_3" for quantised grids.
+  /// OpenVDB's name of the grid's type, such as "Tree_float_5_4_3", or "Tree_fp8_5_4_3" for a
+  /// quantised grid.
   std::string type;
   bool is_half = false;
 };

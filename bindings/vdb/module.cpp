@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Python module wavecomb._vdb: reading of .vdb and .nvdb files, and writing of .vdb files. The
-/// stub file python/wavecomb/_vdb.pyi documents the module. The USD loader imports the module only
-/// for stages with volumes.
+/// Python module wavecomb._vdb, which reads .vdb and .nvdb files and writes .vdb files. The stub
+/// file python/wavecomb/_vdb.pyi documents the module. The USD loader imports the module only for
+/// stages with volumes.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
@@ -86,7 +86,7 @@ nb::list grids(const std::string& path, bool heads) {
   return found;
 }
 
-/// Converts a buffer to an array that owns it.
+/// Moves a buffer into a NumPy array, which owns the buffer.
 template <typename T>
 nb::object array_of(std::unique_ptr<T[]>&& values, std::initializer_list<size_t> shape,
                     nb::dlpack::dtype dtype) {

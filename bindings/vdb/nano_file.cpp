@@ -81,7 +81,7 @@ struct NanoEntry {
   uint32_t index = 0;
   /// Type of the grid, a nanovdb::GridType.
   uint32_t type = 0;
-  /// Compression: 0 is none, 1 zlib, 2 Blosc.
+  /// Compression of the grid: 0 means none, 1 zlib, and 2 Blosc.
   uint16_t codec = 0;
   /// Unpacked size of the grid in bytes, its size in the file, and its offset in the file.
   uint64_t size = 0, file_size = 0, offset = 0;
@@ -120,7 +120,8 @@ class NanoFile final : public GridFile {
   }
 
  private:
-  /// Returns OpenVDB's name of the type, with the bits of quantised grids: "Tree_fp8_5_4_3".
+  /// Returns OpenVDB's name of a grid type. For quantised grids, the name contains the number of
+  /// bits, such as "Tree_fp8_5_4_3".
   static std::string type_name(const NanoEntry& entry) {
     return std::string("Tree_") + nano_type_word(entry.type) + "_5_4_3";
   }

@@ -28,7 +28,8 @@ class Buffer {
 
   uint64_t size() const { return size_; }
 
-  /// Returns `count` structures at an offset. Throws BrokenFile if the buffer is too small.
+  /// Returns a pointer to `count` structures at an offset of the buffer. Throws BrokenFile if the
+  /// buffer is too small.
   template <typename T>
   const T* at(uint64_t offset, uint64_t count = 1) const {
     if (offset > size_ || offset % alignof(T) != 0 || count > (size_ - offset) / sizeof(T))
@@ -68,9 +69,10 @@ const auto* leaf_at(const Buffer& buffer, uint64_t at) {
   return leaf;
 }
 
-/// Traversal of a grid's nodes from the root. The template depends only on the type of voxel
-/// values, so that grids with and without quantised leaves use the same code. Traversal stops after
-/// as many nodes as fit into the buffer, so that it ends even if node offsets form a cycle.
+/// Traversal of the nodes of a NanoVDB grid, starting at the root. The template depends only on the
+/// type of voxel values, so that grids with and without quantised leaves use the same code. Throws
+/// `BrokenFile` after visiting more nodes than fit into the buffer, since node offsets of a broken
+/// file may form a cycle.
 template <typename Value>
 class NanoTreeTraversal {
  public:

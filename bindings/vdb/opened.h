@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Input files whose streams throw at the end of file.
+/// Function that opens an input file with a stream that throws at the end of the file.
 #pragma once
 
 #include <cerrno>

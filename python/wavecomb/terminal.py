@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 _CONTROL = re.compile(
-    # Control characters: the C0 set without tab and newline, delete, and the C1 set.
+    # Control characters that are removed from text: the C0 set except tab and newline, the delete
+    # character, and the C1 set.
     "[\x00-\x08\x0b-\x1f\x7f-\x9f"
     "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff"  # text direction and separators
     "\ud800-\udfff]"  # bytes of file names that are not UTF-8

@@ -232,7 +232,8 @@ def write(path: str | Path, made: Sequence[Mapping[str, Any]]) -> None:
     with _errors(plugin, path):
         written = [_described(grid) for grid in made]
         plugin.write(str(path), written)
-        # OpenVDB writes a random identifier; a hash makes files reproducible.
+        # Replace the random identifier that OpenVDB writes by a hash of the grids, so that files
+        # are reproducible.
         digest = hashlib.sha256()
         for grid in written:
             digest.update(repr([grid[name] for name in sorted(grid)]).encode())

@@ -260,7 +260,8 @@ def finish_image(folder: Folder, image: int, machine: str, threads: int = 0) -> 
         return {"again": again, "checks": error.passes + _MORE_CHECKS}
     except InvalidTile:
         if is_finished(folder, image):
-            return {"files": []}  # another client finished the image and removed its tiles
+            # another client has finished the image and removed the image's tiles
+            return {"files": []}
         again = [
             task.tile
             for task, tile in tasks

@@ -245,7 +245,7 @@ class Run:
         """
         result = None
         if future.status == "finished":
-            with contextlib.suppress(Exception):  # _take() reports the error of a failed task
+            with contextlib.suppress(Exception):  # `_take` reports the error of a failed task
                 result = future.result()
         self._ended.put((future, result))
 

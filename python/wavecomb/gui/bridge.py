@@ -43,7 +43,8 @@ class Mailbox:
 
     def wake(self) -> None:
         """Wakes the thread that reads the queue."""
-        # Ignore a full socket buffer: its unread bytes already wake the reading thread.
+        # Ignore the error if the socket's buffer is full, since its unread bytes already wake the
+        # reading thread.
         with contextlib.suppress(OSError):
             self._writer.send(b"\0")
 

@@ -41,7 +41,8 @@ def denoise(
     with oidn.Device() as device:
         if threads > 0:
             device.set_int("numThreads", threads)
-        # Pinned threads would wait for the threads of a render that runs at the same time.
+        # Do not bind the denoiser's threads to cores, where they would wait for the threads of a
+        # render that runs at the same time.
         device.set_bool("setAffinity", False)
         device.commit()
         guides = {"albedo": _clean(albedo, 0.0, 1.0), "normal": _clean(normal, -1.0, 1.0)}

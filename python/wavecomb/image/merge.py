@@ -106,7 +106,7 @@ def merge(paths: Sequence[str | os.PathLike[str]]) -> MergedImage:
     shapes: dict[str, tuple[int, ...]] = {}
     for source in sources:
         layers = read_layers(source.name)
-        # Drop the denoised layer, which would have to be computed anew from the merged image.
+        # Leave out the denoised layer, since it would have to be computed from the merged image.
         layers.pop("denoised", None)
         _check_shapes(source, layers, shapes)
         _check_layers(first.name, sums, source.name, layers, pairs)

@@ -21,7 +21,8 @@ CHROMATICITIES = {
 """Chromaticities x, y of red, green, blue and white, for EXR headers. Rec.709 has no entry, since
 it is the default."""
 
-# AP1 to Rec.709 with Bradford adaptation of the white point: S-2014-004, TB-2014-004 (ACES).
+# Matrix from the colour space AP1 to linear Rec.709, with Bradford adaptation of the white point
+# (ACES documents S-2014-004 and TB-2014-004).
 _ACESCG_TO_REC709 = np.array(
     [
         [1.7050509, -0.6217921, -0.0832588],

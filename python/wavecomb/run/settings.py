@@ -145,7 +145,7 @@ def image_bytes(settings: Settings, aovs: Sequence[str], light_groups: int = 1) 
     may_have_splats = settings.transport != "auto" or settings.quality != "plain"
     if settings.transport != "path" and may_have_splats:
         sums = 1 + has_error_layers(settings) + aov_names.splat_layers(aovs, light_groups)
-        # The last 4 bytes are the sample number of the light path that starts with the pixel.
+        # Each pixel also needs 4 bytes for the number of traced samples of a light path index.
         each += _SPLAT_BYTES_PER_PIXEL * sums + 4
         each += _VISIBLE_BYTES_PER_PIXEL * (settings.merge_radius > 0)
     if aov_names.DEEP in settings.aovs:

@@ -200,8 +200,8 @@ def colours(points: FloatArray, normals: FloatArray, rng: np.random.Generator) -
     lit = np.maximum((normals * normalized(_LAMP - points)).sum(1), 0.0)
     sky = 0.22 + 0.16 * normals[:, 1]
     shine = paint * (0.62 * lit + 0.8 * sky)[:, None]
-    # Splats are brighter when seen from above and from the light's side, as a linear function of
-    # direction.
+    # The brightness of a splat is a linear function of the viewing direction. It is highest along
+    # the half vector between the splat's normal and the direction to the light.
     half = normalized(normalized(_LAMP - points) + normals)
     sheen = -0.18 * half * lit[:, None]
     out = np.empty((len(points), 4, 3))

@@ -123,8 +123,9 @@ void intersect_lights(const RTCIntersectFunctionNArguments* args) {
     if (args->valid[i] == 0) continue;
     const float t = intersect_light_shape(args->geometryUserPtr, ray, n, i);
     if (t == 0.f || t > best->t[i]) continue;
-    // Among hits at equal distance, the smaller instance id wins (the world has the largest id),
-    // then the smaller geometry id.
+    // Among hits at equal distance, choose the hit with the smaller instance id, and among hits on
+    // the same instance the hit with the smaller geometry id. Objects in world space have the
+    // largest instance id.
     if (t == best->t[i] && (RTCHitN_instID(hit, n, i, 0) != RTC_INVALID_GEOMETRY_ID ||
                             RTCHitN_geomID(hit, n, i) < args->geomID))
       continue;

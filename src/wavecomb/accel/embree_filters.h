@@ -20,7 +20,7 @@ struct alignas(64) QueryContext {
   RTCRayQueryContext base;
   const SceneView* scene;  ///< scene whose materials determine the opacity of hits
   const PresenceKeys* keys;
-  /// Embree geometry ids of the world's first mesh and of the first light.
+  /// Embree geometry ids of the first mesh in world space and of the first light.
   uint32_t first_world, first_light;
   const unsigned *inst, *geom, *prim;  ///< ids of the closest hits so far, one value per ray
   alignas(64) float t[16];             ///< exact distances of the closest hits so far

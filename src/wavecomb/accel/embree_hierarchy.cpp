@@ -23,7 +23,8 @@ struct EmbreeDevice {
   RTCDevice handle = rtcNewDevice(nullptr);
   std::atomic<int64_t> bytes{0};
   std::mutex building;
-  /// Annotations for ThreadSanitizer, since Embree's tasks call the memory monitor.
+  /// Annotations that inform ThreadSanitizer about the order of Embree's tasks, which call the
+  /// memory monitor.
   TaskOrder order;
 
   EmbreeDevice() {

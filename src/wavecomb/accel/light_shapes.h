@@ -24,7 +24,7 @@ struct LightGeometry {
 /// Returns the geometry of each light record. The shape is `kNone` if rays cannot hit the light.
 std::vector<LightGeometry> light_shapes(const Scene& scene);
 
-/// Returns conservative bounds of a custom shape over its whole motion.
+/// Returns bounds that contain a light of shape `kCustom` during its whole motion.
 Bounds custom_shape_bounds(const LightGeometry& shape);
 
 /// Returns the distance along `dir` to a light of shape `kCustom` in units of |dir|, or 0 if the

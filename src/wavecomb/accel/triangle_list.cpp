@@ -44,7 +44,7 @@ struct ListTracer {
   struct Plane {
     F height, slope;
   };
-  /// Intersection of rays with a triangle's plane relative to its edges.
+  /// Position of the rays relative to the edges of a triangle.
   template <typename F>
   struct Crossing {
     F b, c;      ///< barycentric coordinates of the second and third vertex, times `sum`
@@ -123,7 +123,7 @@ struct ListTracer {
     const Vec3<F> to(Vec3<float>{shape.centre[0], shape.centre[1], shape.centre[2]});
     const Vec3<F> p = to - packet.o;
     const F along = dot(p, packet.d), distance2 = length_squared(p);
-    // Enlarges the bounding sphere by a bound of the rounding error.
+    // Enlarge the bounding sphere by an upper bound of the rounding error.
     const F reach = fma(F(abs(along) + shape.radius), F(1e-3f), F(shape.radius));
     const Mask<F> near =
         active & (distance2 - along * along <= reach * reach) & (along + reach >= 0.f);

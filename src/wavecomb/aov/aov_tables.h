@@ -29,7 +29,7 @@ struct AovTables {
   /// Index of the light group for emission of surfaces and volumes that are no lights, or
   /// `kNoGroup`.
   uint32_t group_of_rest = kNoGroup;
-  /// Names of the film's light groups, followed by the names of its expressions.
+  /// Names of the film's light groups, followed by the names of its light path expressions.
   std::vector<std::string> layer_names;
   PathAutomaton automaton;  ///< automaton of the light path expressions
   /// Automaton that matches expressions along light paths, for renders that trace light paths.

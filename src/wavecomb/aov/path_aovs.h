@@ -214,7 +214,8 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     if (depth < parts_.size() && parts_[depth])
       std::memcpy(parts_[depth].rows, radiance, slots * kRadianceWords * sizeof(float));
   }
-  /// Copies the radiance of ended paths as the radiance at `depth` and at all later vertices.
+  /// Copies the radiance of paths that have ended. The copy is used for the vertex at `depth` and
+  /// for all later vertices.
   void end_path(uint32_t depth, const float* radiance, size_t slots) const {
     for (; depth < parts_.size(); ++depth) end_depth(depth, radiance, slots);
   }

@@ -68,7 +68,7 @@ enum class Guiding : uint8_t { kAuto, kOn, kOff };
 /// `kOff`, which is faster.
 enum class Materialize : uint8_t { kAuto, kOn, kOff };
 
-/// Maximum width or height of an image, and maximum number of pixels.
+/// Upper limits of the width and height of an image, and of the number of pixels.
 inline constexpr uint32_t kMaxSize = 65535;
 inline constexpr uint32_t kMaxPixels = 1u << 28;
 
@@ -111,7 +111,7 @@ struct Settings {
   /// (medium/volume/equiangular.h).
   bool equiangular = false;
   Quality quality = Quality::kAuto;
-  uint32_t learn_memory_mb = 64;  ///< memory limit of training data in MB
+  uint32_t learn_memory_mb = 64;  ///< memory limit of training data, in MB
   /// Whether the directions of all bounces except delta bounces are sampled from a cosine
   /// distribution.
   bool cosine_sampling = false;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Table of settings with one row per member of Settings. Wavecomb derives checks, Python
-/// attributes and keywords, command line options, form fields and checkpoint headers from the
-/// table. To add a setting, add a member to `Settings`, a row to settings_table.cpp, and the code
-/// that uses the member.
+/// Table of the settings of a render, with one row for each member of `Settings`. Wavecomb derives
+/// checks, Python attributes and keywords, command line options, form fields and checkpoint headers
+/// from the table. To add a setting, add a member to `Settings`, a row to settings_table.cpp, and
+/// the code that uses the member.
 #pragma once
 
 #include <cstdint>

@@ -185,8 +185,9 @@ class AovFilm {
   std::array<std::vector<double>, kAovCount> sums_;
   std::array<std::vector<float>, kAovCount> nearest_;
   std::array<std::vector<CryptoPixel>, kCryptoLevels> crypto_;
-  LightSplatSums splats_;  ///< index: pixel * light_splat_layout_.count + sum index; empty without
-                           ///< light splats
+  /// Sums of light splats, with the index pixel * light_splat_layout_.count + sum index. Empty if
+  /// the render has no light splats.
+  LightSplatSums splats_;
   LightSplatScale light_splat_scale_;
   DeepFilm deep_;
   std::vector<uint32_t> hits_;  ///< number of samples per pixel that hit something

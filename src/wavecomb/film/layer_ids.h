@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Check that ids fit into float layers.
+/// Check that the ids of a scene can be represented in layers of floats.
 #pragma once
 
 #include <cstdint>

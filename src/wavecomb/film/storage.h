@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Helpers for per-pixel sums.
+/// Helper functions for the sums of pixels.
 #pragma once
 
 #include <cstdint>

@@ -35,7 +35,8 @@ MAX_PANELS = 12
 WIDTH = 7.4
 """Width of a figure in inches, equal to a column of text in print."""
 
-# Okabe and Ito 2008, "Color universal design", without yellow, which is hardly visible on white.
+# Colours of Okabe and Ito 2008, "Color universal design", without yellow, which is hardly visible
+# on white.
 BLUE, SKY, ORANGE, RED = "#0072b2", "#56b4e9", "#e69f00", "#d55e00"
 GREEN, PURPLE, BROWN = "#009e73", "#cc79a7", "#8c6d1f"
 CYCLE = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, BROWN)

@@ -149,8 +149,8 @@ class Autosave(QObject):
 
     def _on_clean(self, clean: bool) -> None:
         if clean and not self._waits:
-            # Save with a timer: closing a stage stops the timer, so that the file keeps the unsaved
-            # edits of the closed stage.
+            # The timer calls `write`, which removes the file. Closing a stage also makes the undo
+            # stack clean, but stops the timer, so that the file keeps the unsaved edits.
             self._timer.start(0)
 
 

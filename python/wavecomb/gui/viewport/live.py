@@ -334,8 +334,8 @@ class Live(QObject):
         self._awaiting = False
         last = self.last_frame
         if last is not None and (last.version, last.scale) == (frame.version, frame.scale):
-            # While the frame has few samples and its first denoised image is not ready, show the
-            # reduced denoised image of the previous frame.
+            # Keep showing the previous denoised image. If it comes from the reduced image, keep it
+            # only while the frame has few samples.
             if self._denoised or frame.samples_done <= LATE * frame.width * frame.height:
                 frame = replace(frame, denoised=last.denoised)
         else:

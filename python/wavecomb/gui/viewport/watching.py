@@ -57,7 +57,9 @@ class Watch:
         pause = max(10.0 * (now - start), 0.1 if now - self._begun < 5.0 else 0.4)
         self._next = now + min(pause, 1.0)
         if self._engine.paused:
-            if not said:  # The render was paused after this frame was rejected, so send it again.
+            # The render was paused while the last frame was made, so send a frame that states the
+            # pause.
+            if not said:
                 self._send(snapshot)
             self._stand_still()
 

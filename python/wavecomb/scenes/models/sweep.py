@@ -209,11 +209,13 @@ def tube_mesh(tube: Tube, rings: int, columns: int) -> Mesh:
     profile = _profile(tube)
     radius_dense = 0.5 * (profile.width + profile.height)
     # The distance of neighbouring rings is smaller where the tube is thin. It is proportional to
-    # the radius to the power of 0.4.
+    # the radius to the power of 0.4, where a radius of less than 15 % of the largest radius counts
+    # as 15 %.
     thin = np.maximum(radius_dense, 0.15 * radius_dense.max()) ** -0.4
     measure = np.concatenate([[0.0], np.cumsum(np.diff(profile.length) * thin[1:])])
     targets = np.linspace(0.0, measure[-1], rings + 2)
-    # The first and last ring have a distance of about half a step from the poles of the tube.
+    # The first and last ring have a distance of three quarters of a step from the poles of the
+    # tube.
     targets[1:-1] = (np.arange(rings) + 0.75) / (rings + 0.5) * measure[-1]
     t = np.interp(targets, measure, profile.t)
     t[0], t[-1] = 0.0, 1.0

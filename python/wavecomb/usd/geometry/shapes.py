@@ -202,7 +202,8 @@ def _side(bottom: float, top: float, height: float) -> tuple[NDArray[Any], NDArr
     """Returns the profile of the side of a cylinder or truncated cone, and its normals."""
     half = 0.5 * height
     slope = np.array([height, bottom - top]) / (math.hypot(height, bottom - top) or 1.0)
-    # The side of a cone needs more rows, so that interpolated normals stay smooth at the tip.
+    # The side of a cone is divided into several rows, so that interpolated normals are smooth near
+    # the tip.
     s = np.linspace(0.0, 1.0, 2 if bottom and top else 9)[:, None]
     return (1 - s) * (bottom, -half) + s * (top, half), np.tile(slope, (len(s), 1))
 

@@ -270,7 +270,7 @@ class Strands:
         end = base + step * self.segments
         out[end] = points[step][last]
         if lead:
-            # Start and end of a closed curve get bit-identical points.
+            # Use bit-identical points for the start and the end of a closed curve.
             out[end] = points[0][first]
             out[base - 1] = points[step - 1][last]
             out[end + 1] = points[1][first]

@@ -352,7 +352,7 @@ class SubdivisionSurfaces:
         """Describes polygons that are displaced without subdivision."""
         topology = cage.topology
         out: dict[str, Any] = {
-            # The refined triangles already have the correct winding.
+            # The triangles of the mesh already have the winding of right-handed meshes.
             "left_handed": False,
             "triangles": topology.triangles,
             "triangle_faces": np.ascontiguousarray(topology.face_ids(), np.uint32),

@@ -84,7 +84,7 @@ def _fifos() -> Iterator[tuple[str, str]]:
         try:
             named = [layer.ComputeAbsolutePath(n) for n in layer.GetCompositionAssetDependencies()]
             name = layer.realPath or layer.identifier
-        # The layer has expired, because the thread that composes the stage has released it.
+        # Skip a layer that the thread that composes the stage has released.
         except Exception:
             continue
         for path in named:

@@ -127,7 +127,7 @@ class MaterialTable:
             if is_cloudy(surface):
                 self.scattering_interiors.append(surface.name)
             self._report.tally("materials")
-        # Store the material with its id, the key, so that Python does not reuse the id.
+        # Keep the material alive, so that Python does not reuse its id, the key.
         self._by_object[id(material)] = material, surface
         return surface
 
@@ -175,7 +175,7 @@ class MaterialTable:
             what = f"shading network too large for primvars ({error}): left out"
             self._report.missing(what, surface.name)
             varied = surface
-        # The key contains id(surface); storing the surface keeps that id from being reused.
+        # Keep the surface alive, so that Python does not reuse its id in the key.
         self._varied[id(surface), varying] = surface, varied
         return varied
 
@@ -201,7 +201,7 @@ class MaterialTable:
             if brightest > 0:
                 self._emitting.add(number)
                 self._emission[number] = (surface, 0.0)
-        # Store the surface with its id, the key, so that Python does not reuse the id.
+        # Keep the surface alive, so that Python does not reuse its id, the key.
         self._surface_ids[id(surface)] = (surface, number)
         return number
 

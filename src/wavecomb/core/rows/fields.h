@@ -68,7 +68,7 @@ struct WordsOf<Vec3<F>> {
   static constexpr size_t value = 3;
 };
 
-/// Converts a field of a row to the word type of loads and stores, and back.
+/// Convert a field of a row to the type with which words are loaded and stored, and back.
 template <typename F, typename T>
 WAVECOMB_INLINE F to_word(const T& field) {
   if constexpr (std::is_same_v<T, F>)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Curve segments in ray space, in double precision.
+/// Bezier curve segments in the coordinate system of a ray, in double precision.
 #pragma once
 
 #include <cmath>
@@ -26,10 +26,12 @@ inline Vec3<float> narrow(const V& a) {
   return {static_cast<float>(a.x), static_cast<float>(a.y), static_cast<float>(a.z)};
 }
 
-/// Right-handed orthonormal frame with its origin at the ray origin and z along the ray.
+/// Coordinate system of a ray: a right-handed orthonormal frame whose origin is the ray origin and
+/// whose z axis is along the ray.
 struct RaySpace {
   V o, x, y, z;
-  double length;  ///< length of the ray direction; t = z / length
+  double
+      length;  ///< length of the ray direction; a point at `z` has the ray parameter t = z / length
 
   RaySpace(const float (&origin)[3], const float (&dir)[3]) : o(vec(origin)) {
     const V d = vec(dir);
@@ -40,12 +42,13 @@ struct RaySpace {
     y = {b, sign + z.y * z.y * a, -z.y};
   }
   V vector(const V& v) const { return {dot_d(v, x), dot_d(v, y), dot_d(v, z)}; }
-  /// Converts a vector to world space.
+  /// Converts a point from world space to the coordinate system of the ray.
   V point(const V& p) const { return vector(p - o); }
+  /// Converts a vector from the coordinate system of the ray to world space.
   V back(const V& v) const { return x * v.x + y * v.y + z * v.z; }
 };
 
-/// Control points and radii of a cubic Bezier segment; lines are converted to cubics.
+/// Control points and radii of a cubic Bezier segment, which may also represent a line.
 struct Bezier {
   V p[4];
   double r[4];
@@ -68,14 +71,15 @@ struct Bezier {
     return (c[1] - c[0]) * (3 * w * w) + (c[2] - c[1]) * (6 * w * u) + (c[3] - c[2]) * (3 * u * u);
   }
   template <typename T>
-  /// Converts a line from c[0] to c[1] to cubic control points.
+  /// Replaces the end points `c[0]` and `c[1]` of a line by the four control points of a cubic
+  /// curve.
   static void line(T* c) {
     c[3] = c[1];
     c[1] = c[0] + (c[3] - c[0]) * (1.0 / 3);
     c[2] = c[0] + (c[3] - c[0]) * (2.0 / 3);
   }
-  /// Replaces curve c by its first or second half (De Casteljau's algorithm), with the same results
-  /// as split().
+  /// Replaces the curve `c` by its first or second half (De Casteljau's algorithm). The result has
+  /// the same bits as the result of split().
   template <typename T, typename S = double>
   static void keep_half(T* c, bool second, S half = 0.5) {
     const T a = (c[0] + c[1]) * half, m = (c[1] + c[2]) * half, b = (c[2] + c[3]) * half;

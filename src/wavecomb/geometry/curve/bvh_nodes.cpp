@@ -18,21 +18,23 @@ namespace {
 using NodeLanes = FloatP<CurveBvhNodes::kMaxSubSegments>;
 
 constexpr float kCells = 65535.f;
-/// Largest cell coordinate in use, which leaves room below kCells for rounding.
+/// Largest cell coordinate that positions are mapped to. It is below `kCells`, so that coordinates
+/// stay in range after rounding.
 constexpr float kLargestCell = 65000.f;
-/// Segments whose length exceeds this multiple of their radius are split.
+/// Segments are split if their length exceeds this multiple of their radius.
 constexpr float kSlender = 32.f;
 constexpr size_t kManySegments = size_t{1} << 20;
 constexpr float kNodeRounding = 4e-6f;  ///< bound of the relative error of dot products in float
 
-/// Capsule that contains a sub-segment: a line from a to b with a radius.
+/// Capsule that contains a sub-segment: all points whose distance from the line from `a` to `b` is
+/// at most `radius`.
 struct SegmentCapsule {
   Vec3<float> a, b;
   float radius = 0;
 };
 
-/// Number of sub-segment nodes per segment. The number of a sub-segment is kNodesPerSegment *
-/// segment + node.
+/// Upper bound of the node indices of sub-segments. A sub-segment of a mesh has the number
+/// `kNodesPerSegment` * segment + node.
 constexpr uint32_t kNodesPerSegment = SubSegment::kNodes;
 
 /// Returns the distance of a point from the line segment ab.
@@ -42,8 +44,8 @@ float distance_to_line(const Vec3<float>& p, const Vec3<float>& a, const Vec3<fl
   return length(Vec3<float>(v - c * at));
 }
 
-/// Returns the capsule of a sub-segment. The distance to a line is a convex function, so the
-/// distances of the control points bound the distance of the curve.
+/// Returns a capsule that contains a sub-segment. The distance to a line is a convex function, so
+/// no point of the curve is farther from the line than the farthest control point.
 SegmentCapsule sub_segment_capsule(const Mesh& mesh, uint32_t number) {
   std::array<Vec3<float>, 4> p;
   std::array<float, 4> r;
@@ -68,8 +70,8 @@ SegmentCapsule sub_segment_capsule(const Mesh& mesh, uint32_t number) {
   return {p[0], p[3], *std::max_element(r.begin(), r.end()) + bend};
 }
 
-/// Returns how many times to halve a segment. Shorter sub-segments have tighter bounds and, if the
-/// curve is bent, thinner capsules, but take more memory.
+/// Returns the number of times that a segment is halved. Shorter sub-segments have tighter bounds,
+/// and thinner capsules if the curve is bent, but they take more memory.
 uint32_t halvings(const Mesh& mesh, uint32_t segment, const SegmentCapsule& whole) {
   if (!(length(Vec3<float>(whole.b - whole.a)) > kSlender * whole.radius)) {
     const float r = mesh.radii[mesh.indices[segment] & kCurveFirstPoint];
@@ -78,8 +80,8 @@ uint32_t halvings(const Mesh& mesh, uint32_t segment, const SegmentCapsule& whol
   return mesh.indices.size() <= kManySegments ? 2 : 1;
 }
 
-/// Entry for a sub-segment, or for a whole segment by its first sub-segment: twice the midpoint of
-/// its axis, and its number.
+/// Sub-segment in a list that is sorted by position: twice the midpoint of its axis, and its
+/// number. A whole segment is represented by its first sub-segment.
 struct SubSegmentEntry {
   std::array<float, 3> middle;
   uint32_t number;
@@ -90,7 +92,7 @@ SubSegmentEntry entry_of(const SegmentCapsule& line, uint32_t number) {
   return {{m.x, m.y, m.z}, number};
 }
 
-/// Calls work(i) for first <= i < end, in parallel tasks of at most `grain` calls.
+/// Calls `work(i)` for each `i` in [first, end), in parallel tasks of at most `grain` calls each.
 template <typename Work>
 void for_range(size_t first, size_t end, size_t grain, const CurveBvhNodes::RunBoth& run_both,
                const Work& work) {
@@ -102,8 +104,8 @@ void for_range(size_t first, size_t end, size_t grain, const CurveBvhNodes::RunB
   for (size_t i = first; i < end; ++i) work(i);
 }
 
-/// Partitions entries by their midpoints along the longest axis until each part has at most `full`
-/// entries; all parts but the last have exactly `full`.
+/// Partitions entries recursively by their midpoints along the longest axis, until each part has at
+/// most `full` entries. All parts except the last have exactly `full` entries.
 void partition_entries(std::span<SubSegmentEntry> entries, size_t full,
                        const CurveBvhNodes::RunBoth& run_both) {
   constexpr size_t kMany = 1u << 15;
@@ -131,13 +133,14 @@ void partition_entries(std::span<SubSegmentEntry> entries, size_t full,
   second();
 }
 
-/// Returns the number of sub-segments of a segment, which equals the node index of the first of
-/// them.
+/// Returns the number of sub-segments of a segment, which equals the node index of its first
+/// sub-segment.
 uint32_t sub_segment_count(const SubSegmentEntry& segment) {
   return segment.number % kNodesPerSegment;
 }
 
-/// Returns all segments, ordered so that groups of `group` segments are compact in space.
+/// Returns all segments in an order in which `group` consecutive segments are close together in
+/// space.
 std::vector<SubSegmentEntry> segments_of(const Mesh& mesh, size_t group,
                                          const CurveBvhNodes::RunBoth& run_both) {
   std::vector<SubSegmentEntry> out(mesh.indices.size());
@@ -158,7 +161,7 @@ float l1_norm(const float* v) {
 }  // namespace
 
 CurveBvhNodes::CurveBvhNodes(const Mesh& mesh, const RunBoth& run_both) : mesh_(mesh) {
-  // Sub-segments are created group by group to limit memory.
+  // Create the sub-segments of one group of segments after another, to limit the memory use.
   constexpr size_t kGroup = 1u << 16;
   const std::vector<SubSegmentEntry> segments = segments_of(mesh, kGroup, run_both);
   const size_t groups = (segments.size() + kGroup - 1) / kGroup;
@@ -213,7 +216,8 @@ CurveBvhNodes::Node CurveBvhNodes::make(const uint32_t* first, uint32_t n) const
     const float b[3] = {sub_segment.b.x, sub_segment.b.y, sub_segment.b.z};
     for (uint32_t axis = 0; axis < 3; ++axis)
       out.cells[axis][k] = cell(a[axis], axis) | cell(b[axis], axis) << 16;
-    // Covers the rounding of positions to cells, which moves a point by less than one cell.
+    // Enlarge the radius by one cell, since rounding positions to cells moves a point by less than
+    // one cell.
     out.radius[k] = static_cast<uint16_t>(std::ceil(cells(1.0001f * sub_segment.radius)) + 1.f);
   }
   return out;
@@ -258,7 +262,8 @@ uint32_t CurveBvhNodes::may_hit(uint32_t node, const CurveRay& ray, float tfar) 
   decode(0, cell_a.x, cell_b.x);
   decode(1, cell_a.y, cell_b.y);
   decode(2, cell_a.z, cell_b.z);
-  // Transforms the ends of the capsules to ray space, where the ray is the z axis.
+  // Transforms the ends of the capsules to the ray's coordinate system, where the ray is the z
+  // axis.
   const auto to_ray_space = [&](uint32_t n, const Vec3<F>& cell) {
     const auto& e = ray.axis[n];
     const F start(e[0] * from[0] + e[1] * from[1] + e[2] * from[2]);

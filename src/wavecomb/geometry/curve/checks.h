@@ -8,7 +8,8 @@
 
 namespace wavecomb {
 
-/// Throws Error that begins with `name` if array sizes, control points or radii are invalid.
+/// Throws an `Error` whose message begins with `name` if array sizes, control points or radii are
+/// invalid.
 void check_curves(const Mesh& mesh, const std::string& name);
 
 /// Returns the MeshFlags of a mesh of curves or points, except the flags of texture coordinates.

@@ -46,11 +46,11 @@ class SegmentTest {
     Bezier::line(normal_);
   }
 
-  /// Finds hits on the sub-segment with index `node`. If `outside`, hits on the inside of the tube
-  /// are skipped.
+  /// Finds hits on the sub-segment with index `node`. Skips hits on the inside of the tube if
+  /// `outside` is true.
   void run(bool outside, uint32_t node) {
     side_ = -1;
-    // The search includes entry points behind the ray origin, since the ray may start inside the
+    // Search for entry points behind the ray origin as well, since the ray may start inside the
     // tube.
     if (mesh_.is_ribbon() || outside) z_near_ = 0;
     // A ray that starts inside the tube may leave it in another sub-segment, so search the whole
@@ -68,7 +68,7 @@ class SegmentTest {
 
  private:
   /// Returns the number of halvings after which sub-segments deviate from straight lines by less
-  /// than a fraction of the radius (bound by Wang, 1984), and sets bulge_.
+  /// than a fraction of the radius (bound by Wang, 1984). Sets `bulge_` to this deviation.
   int depth() {
     double bend = 0;
     for (int i = 0; i < 2; ++i) {
@@ -85,7 +85,8 @@ class SegmentTest {
     return halvings;
   }
 
-  /// Returns whether the ray passes the convex hull of a sub-segment on either side of its chord.
+  /// Returns whether the ray misses the convex hull of a sub-segment because all of the hull is on
+  /// one side of the ray, perpendicular to the chord.
   static bool passes_by(const Bezier& sub_segment, double r) {
     const double x = sub_segment.p[3].x - sub_segment.p[0].x,
                  y = sub_segment.p[3].y - sub_segment.p[0].y;
@@ -111,7 +112,7 @@ class SegmentTest {
     search(sub_segment, u0, u1, halvings);
   }
 
-  /// Bisects a sub-segment recursively while the ray may hit its hull.
+  /// Halves a sub-segment recursively as long as the ray may hit its convex hull.
   void search(const Bezier& sub_segment, double u0, double u1, int halvings) {
     const double r = *std::max_element(sub_segment.r, sub_segment.r + 4);
     if (passes_by(sub_segment, r)) return;
@@ -137,7 +138,8 @@ class SegmentTest {
     search(b, middle, u1, halvings - 1);
   }
 
-  /// Splits a sub-segment of a tube into straight sub-segments and tests all of them at once.
+  /// Splits a sub-segment of a tube into nearly straight sub-segments and tests all of these at
+  /// once.
   void search_sub_segments(const Bezier& sub_segment, double r, double u0, double u1,
                            int halvings) {
     uint32_t left = sub_segments_near(sub_segment, halvings, r, bulge_, z_near_, z_far_);
@@ -150,26 +152,27 @@ class SegmentTest {
   }
 
   /// Returns a step in u towards the entry or exit of a tube. The ray intersects the sphere of
-  /// parameter u at z(u) -+ sqrt(h(u)), h = r^2 - x^2 - y^2. The ray enters the tube where z -
-  /// sqrt(h) is minimal (side -1) and leaves the tube where z + sqrt(h) is maximal (side 1). If
-  /// curve and radius are linear around u, the condition at u + w is
+  /// parameter u at z(u) -+ sqrt(h(u)), where h = r^2 - x^2 - y^2. The ray enters the tube where z
+  /// - sqrt(h) is minimal (side -1) and leaves the tube where z + sqrt(h) is maximal (side 1). If
+  /// the curve and its radius are linear near u, the condition for an extremum at u + w is
   ///   A w + B = -side z' sqrt(h),  A = r'^2 - x'^2 - y'^2,  B = r r' - x x' - y y'.
-  /// This linear approximation is a cone with spherical ends; at w = 0 the condition is exact.
+  /// In this approximation, the tube is a cone with spherical ends. The condition is exact at w =
+  /// 0.
   double step(double u, int side) const {
     const V c = curve_.at(u), d = curve_.along(u);
     const double r = curve_.radius(u), dr = curve_.widening(u);
     const double a = dr * dr - d.x * d.x - d.y * d.y, b = r * dr - c.x * d.x - c.y * d.y;
     const double h = r * r - c.x * c.x - c.y * c.y, k = d.z * d.z - a;
-    // Each sphere contains the next one, so there is no side.
+    // The spheres are nested, so the tube has no lateral surface here.
     if (!(k > 0)) return dr > 0 ? kFar : -kFar;
     const double discriminant = b * b - a * h;
     if (discriminant < 0) {
-      // The ray misses this cone; step to where it is closest.
+      // The ray misses this cone, so step to the parameter where the distance is smallest.
       if (a < 0) return -b / a;
-      return side * d.z > 0 ? kFar : -kFar;  // the ray runs along the inside of the cone
+      return side * d.z > 0 ? kFar : -kFar;  // the ray stays inside the cone
     }
     const double q = -side * d.z * std::sqrt(discriminant / k);
-    // Of two formulas for the root, choose the one without cancellation.
+    // Choose the formula for the root that has no cancellation.
     double w = 0;
     if (q * b > 0)
       w = (b * b - d.z * d.z * h) / (k * (q + b));
@@ -180,8 +183,8 @@ class SegmentTest {
     return r + dr * w >= 0 ? w : std::copysign(kFar, dr);
   }
 
-  /// Adds the hit at the extremum of `side` in [u0, u1] if the steps from u0 and u1 both lead into
-  /// the interval. The ends of the whole curve may also be extrema.
+  /// Adds the hit at the entry (`side` -1) or exit (`side` 1) in [u0, u1], if the steps from u0 and
+  /// u1 both lead into the interval. The hit may also be on a spherical end of the whole curve.
   void intersect_tube(double u0, double u1, int side) {
     const double s0 = step(u0, side), s1 = step(u1, side);
     if (s0 > 0 && s1 < 0)
@@ -192,8 +195,8 @@ class SegmentTest {
       intersect_tube_at(1, side);
   }
 
-  /// Returns the root of step() between u0 and u1 by a bracketed secant method; step() is s0 > 0 at
-  /// u0 and s1 < 0 at u1.
+  /// Returns the root of step() between u0 and u1, by a bracketed secant method. The value of
+  /// step() is s0 > 0 at u0 and s1 < 0 at u1.
   double extreme_between(double u0, double s0, double u1, double s1, int side) const {
     double before = s0 < -s1 ? u0 : u1, step_before = s0 < -s1 ? s0 : s1;
     double u = u0 + (u1 - u0) * (s0 / (s0 - s1));
@@ -207,7 +210,7 @@ class SegmentTest {
       before = u;
       step_before = s;
       u = next;
-      // The secant method converges superlinearly, so the next step would be negligible.
+      // Stop here: the secant method converges superlinearly, so the next step would be negligible.
       if (std::abs(u - before) < kNear) break;
     }
     return u;
@@ -228,7 +231,8 @@ class SegmentTest {
       add_tube(z, u, ray_.back(n));
   }
 
-  /// Returns whether the normal n of the tube's end sphere points into the adjoining segment.
+  /// Returns whether the tube continues at an end and the normal `n` of the spherical end points
+  /// into the adjoining segment.
   bool continues_at(const V& n, uint32_t flag, int end, uint32_t next) const {
     if ((mesh_.indices[prim_] & flag) == 0) return false;
     const V d = ray_.point(widen(points_.position(next))) - curve_.p[end];
@@ -236,7 +240,7 @@ class SegmentTest {
     return dot_d(n, d) + dr > kSeam * std::sqrt(dot_d(d, d));
   }
 
-  /// Adds a hit on a tube with the surface coordinates from which shading reconstructs the point.
+  /// Adds a hit on a tube, with the coordinates (u, v) from which shading reconstructs the point.
   void add_tube(double z, double u, const V& normal) {
     if (query_ == CurveQuery::kAny) return add(z, 0, 0);
     CurveSegment<float> s;
@@ -257,9 +261,9 @@ class SegmentTest {
     add(z, along, atan2(n.y, n.x) * kInv2Pi);
   }
 
-  /// Signed offset of the ray from the ribbon's centre line c = (x, y, z) in the width direction b
-  /// = c' x n. The ray, which is the z axis, hits the ribbon at the parameter u where x b_y = y
-  /// b_x.
+  /// Returns the signed distance of the ray from the ribbon's centre line c = (x, y, z), measured
+  /// along the width direction b = c' x n. The ray, which is the z axis, hits the ribbon at the
+  /// parameter u where x b_y = y b_x.
   double across(double u) const {
     const V c = curve_.at(u), b = cross_d(curve_.along(u), Bezier::mix(normal_, u));
     return c.x * b.y - c.y * b.x;
@@ -268,8 +272,8 @@ class SegmentTest {
   void intersect_ribbon(double u0, double u1) {
     const double f0 = across(u0), f1 = across(u1);
     if ((f0 < 0) != (f1 < 0)) return intersect_ribbon_between(u0, f0, u1, f1);
-    // A ribbon seen nearly edge-on may be hit twice. Test whether across() changes sign at the
-    // extremum of the parabola through its values at both ends and the midpoint.
+    // A ray that is nearly parallel to a ribbon may hit it twice. Test whether across() changes
+    // sign at the extremum of the parabola through its values at both ends and the midpoint.
     const double slope = f1 - f0, bend = 2 * (f0 + f1) - 4 * across(0.5 * (u0 + u1));
     const double at = bend != 0 ? 0.5 - 0.5 * slope / bend : -1;
     if (!(at > 0 && at < 1)) return;
@@ -283,7 +287,8 @@ class SegmentTest {
   /// method (regula falsi).
   void intersect_ribbon_between(double u0, double f0, double u1, double f1) {
     double u = u0;
-    int kept = 0;  // end of the bracket that the last step kept: -1 lower, 1 upper
+    // end of the bracket that the last step did not change: -1 for the lower, 1 for the upper end
+    int kept = 0;
     for (int i = 0; i < kRibbonSteps && u1 - u0 > 1e-15; ++i) {
       u = std::clamp((f1 * u0 - f0 * u1) / (f1 - f0), u0, u1);
       const double f = across(u);
@@ -313,14 +318,14 @@ class SegmentTest {
     if (hit.t > 0) hits_.add(hit);
   }
 
-  /// Maximum deviation from a straight line, as a fraction of the radius.
+  /// Maximum deviation of the final sub-segments from straight lines, as a fraction of the radius.
   static constexpr double kStraight = 0.025;
   static constexpr int kMaxHalvings = 9, kRibbonHalvings = 3;
   static constexpr int kSteps = 40, kRibbonSteps = 100;
   /// Step size in u at which the search for an extremum ends.
   static constexpr double kNear = 1e-9;
-  static constexpr double kFar = 2;  ///< step in u that leads beyond both ends of the segment
-  /// Sine of the angle by which end caps overlap the joint with the next segment, to prevent gaps.
+  static constexpr double kFar = 2;  ///< step in u that leads out of the segment from any u
+  /// Sine of the angle by which the spherical ends of adjoining segments overlap, to prevent gaps.
   static constexpr double kSeam = 1e-3;
 
   const Mesh& mesh_;
@@ -334,9 +339,10 @@ class SegmentTest {
   Bezier curve_;
   V normal_[4];
   double bulge_ = 0;            ///< deviation of the final sub-segments from straight lines
-  double z_near_ = -kInfinity;  ///< smallest z of entry points that matter
-  int side_ = -1;               ///< extrema to find: -1 means entry points, 1 exit points
-  /// Whether the ray entered behind its origin or from the adjoining segment.
+  double z_near_ = -kInfinity;  ///< smallest z of entry points to search for
+  int side_ = -1;               ///< -1 to search for entry points, 1 for exit points
+  /// Whether the ray may start inside the tube, since it enters behind its origin or from the
+  /// adjoining segment.
   bool may_be_inside_ = false;
 };
 

@@ -22,7 +22,7 @@ struct CurveHit {
 /// Hits of a ray on one primitive, sorted by distance.
 class CurveHits {
  public:
-  static constexpr uint32_t kMax = 8;  ///< maximum number of hits; only the nearest are kept
+  static constexpr uint32_t kMax = 8;  ///< maximum number of hits; farther hits are dropped
 
   void add(const CurveHit& hit) {
     if (count_ == kMax && !(hit.t < hits_[kMax - 1].t)) return;
@@ -39,8 +39,8 @@ class CurveHits {
   uint32_t count_ = 0;
 };
 
-/// Sub-segment: node 1 is the whole segment; nodes 2 n and 2 n + 1 are the halves of n in
-/// parameter.
+/// Part of a curve segment, identified by a node of a binary tree. Node 1 is the whole segment, and
+/// the nodes 2 n and 2 n + 1 are the two halves of node n's parameter range.
 struct SubSegment {
   static constexpr uint32_t kNodes = 8;  ///< upper bound of node indices
 
@@ -48,18 +48,20 @@ struct SubSegment {
   uint32_t node = 1;
 };
 
-/// Type of query: the first hit, all hits, or whether there is any hit (for which u and v are not
-/// computed).
+/// Type of query: the first hit, all hits, or whether there is any hit. Queries for any hit do not
+/// compute u and v.
 enum class CurveQuery { kFirst, kAll, kAny };
 
-/// Returns conservative bounds of primitive `prim` of a mesh of curves or points at a motion step.
+/// Returns a bounding box that contains the primitive `prim` of a mesh of curves or points at the
+/// motion step `step`.
 Bounds curve_bounds(const Mesh& mesh, uint32_t prim, uint32_t step = 0);
 
-/// Returns hits with 0 < t <= tfar, t in units of |dir|, on the outside and inside of a primitive
-/// of a mesh of curves or points. End caps of tubes that lie inside the adjoining segment are not
-/// hit. `time` is in [0, 1], over the mesh's motion steps. If `outside`, hits on the inside of
-/// tubes are skipped. Returns all hits on the given sub-segment and possibly further hits on its
-/// segment; hits are bit-identical to the hits of a query for the whole segment.
+/// Returns the hits of a ray on a primitive of a mesh of curves or points. The distances satisfy 0
+/// < t <= tfar, in units of the length of the ray direction. Rays hit the outside and the inside of
+/// tubes, or only the outside if `outside` is true. They do not hit the parts of spherical ends
+/// that are inside the adjoining segment. `time` is the shutter time in [0, 1]. Returns all hits on
+/// the given sub-segment, and possibly other hits on its segment. The hits have the same bits as in
+/// a query for the whole segment.
 CurveHits intersect_curve(const Mesh& mesh, const SubSegment& sub_segment, const CurveRay& ray,
                           float tfar, CurveQuery query, float time = 0, bool outside = false);
 

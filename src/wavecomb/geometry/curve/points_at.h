@@ -11,8 +11,8 @@
 
 namespace wavecomb {
 
-/// Points and normals of a mesh at a given time; the values are bit-identical to those of
-/// detail::MovingRows, which shading uses.
+/// Points and normals of a mesh at a given time. The values have the same bits as the values of
+/// `detail::MovingRows`, which shading uses.
 class PointsAt {
  public:
   PointsAt(const Mesh& mesh, float time) : mesh_(mesh), place_(time, mesh.steps - 1) {}

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Ray with its frame, for curve intersection.
+/// Ray with a coordinate system, for intersection with curves.
 #pragma once
 
 #include <cstring>
@@ -8,7 +8,8 @@
 
 namespace wavecomb {
 
-/// Ray and its orthonormal frame with z along the ray, in double and rounded to float.
+/// Ray with an orthonormal frame whose z axis is along the ray. The frame is stored in double
+/// precision and rounded to float.
 struct CurveRay {
   CurveRay(const float (&from)[3], const float (&along)[3]) : space(from, along) {
     std::memcpy(origin, from, sizeof(origin));
@@ -23,8 +24,7 @@ struct CurveRay {
     }
   }
 
-  /// Returns whether the given origin and direction are bit-identical to the origin and direction
-  /// of this ray.
+  /// Returns whether this ray has the given origin and direction, bit by bit.
   bool is(const float (&from)[3], const float (&along)[3]) const {
     return std::memcmp(origin, from, sizeof(origin)) == 0 &&
            std::memcmp(dir, along, sizeof(dir)) == 0;

@@ -1,18 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Parametrisation of curves and points. Traversal computes the surface coordinates (u, v) of a
-/// hit, and shading reconstructs the surface from them.
+/// Parametrisation of curves and points. Ray traversal computes the coordinates (u, v) of a hit,
+/// from which shading reconstructs the surface point.
 ///
-/// A tube is the union of spheres of radius r(u) around the points c(u) of its curve. A normal n of
-/// the tube's side satisfies n . c' = -r', since |p - c|^2 - r^2 is stationary in u at surface
-/// points p; the tube's ends are parts of the first and last sphere. In a hit (u, v), v is the
-/// angle around the curve in turns, and u the parameter of the sphere that is touched. On the
-/// spherical ends, u continues below 0 and above 1 by the angle in radians between the normal and
-/// the nearest normal of the tube's side.
+/// A tube is the union of spheres of radius r(u) around the points c(u) of its curve. A unit normal
+/// n of the tube's lateral surface satisfies n . c' = -r', since |p - c|^2 - r^2 is stationary in u
+/// at surface points p. The ends of the tube are parts of the first and the last sphere. The
+/// coordinate u of a hit is the parameter of the sphere on which it lies, and v is the angle around
+/// the curve in turns. On the spherical ends, u is below 0 or above 1 by the angle in radians
+/// between the normal and the nearest normal of the lateral surface.
 ///
-/// A ribbon is c(u) + s r(u) b(u), |s| <= 1, where b is the unit vector along c' x n and n the
-/// authored normal. The coordinates of a hit are u and v = (s + 1) / 2.
+/// A ribbon consists of the points c(u) + s r(u) b(u) with |s| <= 1, where n is the authored normal
+/// and b the unit vector in the direction of c' x n. The coordinates of a hit are u and v = (s + 1)
+/// / 2.
 ///
-/// A hit on a sphere is given by its angles: u = phi / 2 pi around z, v = theta / pi from +z.
+/// The coordinates of a hit on a point's sphere are u = phi / (2 pi), where phi is the angle around
+/// the z axis, and v = theta / pi, where theta is the angle from +z.
 #pragma once
 
 #include <array>
@@ -23,16 +25,17 @@
 
 namespace wavecomb {
 
-/// Curve segment: four Bezier control points, or points 0 and 1 of a line.
+/// Curve segment with four Bezier control points, or with the end points of a line as points 0 and
+/// 1.
 template <typename F>
 struct CurveSegment {
   std::array<Vec3<F>, 4> p;
   std::array<F, 4> r;        ///< radii
   std::array<Vec3<F>, 4> n;  ///< normals, for ribbons
-  Mask<F> cubic;             ///< lanes with cubic segments; the segments in other lanes are lines
+  Mask<F> cubic;  ///< mask of the lanes with cubic segments; the segments in other lanes are lines
 };
 
-/// Point c and radius r of a curve at a parameter, and their derivatives.
+/// Point `c` and radius `r` of a curve at a parameter, and their derivatives.
 template <typename F>
 struct CurvePoint {
   Vec3<F> c, dc;
@@ -41,7 +44,8 @@ struct CurvePoint {
 
 namespace detail {
 
-/// Weights of the control points and of their differences at parameter u.
+/// Weights of the control points at a parameter u, and weights of their differences for the
+/// derivative.
 template <typename F>
 struct CurveWeights {
   std::array<F, 4> value;
@@ -58,8 +62,8 @@ struct CurveWeights {
   T at(const std::array<T, 4>& x) const {
     return x[0] * value[0] + x[1] * value[1] + x[2] * value[2] + x[3] * value[3];
   }
-  /// Returns the derivative at u. Differences of control points keep its precision if control
-  /// points are close together.
+  /// Returns the derivative at u. It is computed from differences of control points, which is
+  /// precise even if control points are close together.
   template <typename T>
   T along(const std::array<T, 4>& x) const {
     return (x[1] - x[0]) * slope[0] + (x[2] - x[1]) * slope[1] + (x[3] - x[2]) * slope[2];
@@ -75,16 +79,16 @@ inline CurvePoint<F> curve_point(const CurveSegment<F>& s, const F& u) {
   return {weights.at(s.p), weights.along(s.p), weights.at(s.r), weights.along(s.r)};
 }
 
-/// Frame of a tube at u with z along the curve, and the angle between z and the normals of the
-/// tube's side.
+/// Frame of a tube at a parameter u with z along the curve, and the angle between z and the normals
+/// of the lateral surface.
 template <typename F>
 struct TubeFrame {
   Frame<F> frame;
   F cos_side, sin_side;
 };
 
-/// Returns the tube frame of a segment at u. If control points coincide and the derivative is zero,
-/// the next control points give the direction.
+/// Returns the frame of a tube at a parameter u. If the derivative is zero because control points
+/// coincide, the direction of the curve is computed from the next control points.
 template <typename F>
 inline TubeFrame<F> tube_frame(const CurveSegment<F>& s, const CurvePoint<F>& at) {
   Vec3<F> d = at.dc;
@@ -128,9 +132,9 @@ inline Vec3<F> sphere_normal(const F& u, const F& v) {
   return {theta.sin * phi.cos, theta.sin * phi.sin, theta.cos};
 }
 
-/// Bits of Mesh::indices of curves: index of a segment's first control point, and whether the curve
-/// continues before or after the segment. If the curve continues, the adjacent control point gives
-/// the direction in which it continues.
+/// Bit masks for the values in `Mesh::indices` of a mesh of curves: the index of a segment's first
+/// control point, and flags that state whether the curve continues before and after the segment. If
+/// it does, the adjacent control point gives the direction in which it continues.
 inline constexpr uint32_t kCurveContinuesBefore = 0x80000000u, kCurveContinuesAfter = 0x40000000u;
 inline constexpr uint32_t kCurveFirstPoint = 0x3fffffffu;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Conservative test of a ray against the straight sub-segments of a tube.
+/// Conservative test of a ray against the nearly straight sub-segments of a tube.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace wavecomb {
 
-/// Maximum number of halvings for which all resulting sub-segments fit in the lanes of a vector.
+/// Maximum number of halvings for which one SIMD vector has a lane for each resulting sub-segment.
 inline constexpr int kLaneHalvings = 3;
 
 namespace detail {
@@ -37,10 +37,11 @@ inline constexpr std::array<SubSegmentWeights, kLaneHalvings + 1> kSubSegmentWei
 
 }  // namespace detail
 
-/// Returns a bit mask of the final sub-segments that the ray may hit with z_near <= z <= z_far.
-/// `sub_segment`: sub-segment in ray space, which is halved `halvings` times; `r`: maximum radius
-/// of the sub-segment; `bulge`: deviation of the final sub-segments from straight lines. The test
-/// runs in float with a margin for rounding errors, so that no hit is missed.
+/// Halves a sub-segment `halvings` times, and returns a bit mask of the resulting sub-segments that
+/// a ray may hit with z_near <= z <= z_far. `sub_segment` is in the ray's coordinate system, `r` is
+/// its maximum radius, and `bulge` is the deviation of the resulting sub-segments from straight
+/// lines. The test uses single precision with a margin for rounding errors, so that it never misses
+/// a hit.
 inline uint32_t sub_segments_near(const curve_math::Bezier& sub_segment, int halvings, double r,
                                   double bulge, double z_near, double z_far) {
   using F = FloatP<1 << kLaneHalvings>;

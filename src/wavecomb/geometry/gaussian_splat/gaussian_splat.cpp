@@ -12,9 +12,10 @@ namespace {
 using namespace curve_math;
 
 constexpr double kMaxDeviations = 3, kMinAlpha = 1.0 / 255;
-/// Spherical harmonics are addressed by 32-bit offsets.
+/// Maximum number of Gaussian splats in a mesh, since 32-bit offsets address 48 coefficients of
+/// spherical harmonics per splat.
 constexpr size_t kMaxGaussianSplats = 0xffffffffu / 48;
-/// Bounds of the scales of a Gaussian splat, whose products must stay within the range of float.
+/// Range of the scales of a Gaussian splat. Products of scales must stay within the range of float.
 constexpr float kMinScale = 1e-9f, kMaxScale = 1e9f;
 
 void need(const std::string& name, size_t has, size_t want, const char* what) {
@@ -35,7 +36,8 @@ void axes_of(const float* q, const std::string& name, V (&axis)[3]) {
   axis[2] = {2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)};
 }
 
-/// Transforms a vector to units of standard deviations along the axes of a Gaussian splat.
+/// Transforms a vector to the axes of a Gaussian splat, with the standard deviations along the axes
+/// as units.
 V whitened(const GaussianSplatRow& row, const V& v) {
   return {dot_d(vec(row.whiten), v), dot_d(vec(row.whiten + 3), v), dot_d(vec(row.whiten + 6), v)};
 }
@@ -61,7 +63,7 @@ std::vector<GaussianSplatRow> make_gaussian_splat_rows(std::span<const float> sc
     V axis[3];
     axes_of(&orientations[4 * i], name, axis);
     row.opacity = opacities[i];
-    // Invisible Gaussian splats also get a row, so that row indices equal splat indices.
+    // Make a row for invisible Gaussian splats as well, so that row indices equal splat indices.
     const double visible = 2 * std::log(std::max(opacities[i] / kMinAlpha, 1.0));
     const double cut = std::min(kMaxDeviations * kMaxDeviations, visible);
     row.cut = opacities[i] < static_cast<float>(kMinAlpha) ? -1.f : static_cast<float>(cut);
