@@ -130,6 +130,10 @@ def test_an_object_follows_the_drag_without_loading(moved, qtbot):
     QTest.mouseMove(view, at + QPoint(40, 0))
     qtbot.waitUntil(lambda: session.scene.bounds_of(BALL)[0][0] > before[0][0] + 0.2, timeout=20000)
     assert moved.scene.edits.history.stack.count() == 1, "the drag has not ended"
+    version = session.version
+    QTest.mouseMove(view, at + QPoint(30, 0))
+    QTest.mouseMove(view, at + QPoint(40, 0))
+    assert session.version <= version + 1, "waits until an image was shown"
     handle = view.gizmo.handles()["all"][0]
     assert np.allclose(handle, (at.x() + 40, at.y()), atol=2.0), "handles follow the cursor"
     QTest.mouseRelease(view, Qt.MouseButton.LeftButton, pos=at + QPoint(40, 0))

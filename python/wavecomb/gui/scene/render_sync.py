@@ -41,11 +41,13 @@ class RenderSync:
         session: The session whose rendered scene is updated.
         stage_edits: Edits of the session's open stage.
         placements: Prims that were moved since the stage was loaded.
+        dragging: Whether more changes of a transform follow, so that reduced images are enough.
     """
 
     session: Session
     stage_edits: StageEdits
     placements: Placements
+    dragging = False
 
     @property
     def time(self) -> Usd.TimeCode:
@@ -166,7 +168,7 @@ class RenderSync:
             if below and not self.light_reason(light):
                 now = light_transform(self.prim(light), self.time)
                 edit.lights[number] = {"transform": to_scene_space(now, stage.origin)}
-        self.session.edit_all(edit)
+        self.session.edit_all(edit, moving=self.dragging)
 
     def load_refused(self, reason: str) -> None:
         """Loads the stage again, because the scene could not follow a transform."""
@@ -281,7 +283,7 @@ class RenderSync:
                 if not np.allclose(now, have["transform"], rtol=1e-5, atol=1e-6):
                     values["transform"] = now
             if values:
-                self.session.edit_light(number, **values)
+                self.session.edit_light(number, moving=self.dragging, **values)
         self.session.light_edits.clear()
 
 

@@ -179,6 +179,7 @@ class Gizmo(QObject):
         self._start, self._change = place, np.eye(4)
         if self._handle and self._anchor is not None and self._anchor.live:
             self._edits.history.set_typing(True)  # the whole drag becomes one undo step
+            self._edits.dragging = True
         return bool(self._handle)
 
     def drag(self, place: QPointF) -> None:
@@ -199,6 +200,7 @@ class Gizmo(QObject):
                 self._author(self._anchor)
             if self._anchor.live:
                 self._edits.history.set_typing(False)
+        self._edits.dragging = False
         self._session.settle()
         if not self._is_late:
             self._refresh()

@@ -153,7 +153,7 @@ class Live(QObject):
         self._settle = QTimer(self)
         self._settle.setSingleShot(True)
         self._settle.setInterval(SETTLE_MS)
-        self._settle.timeout.connect(self.settle)
+        self._settle.timeout.connect(self._on_still)
         # The render thread must not hold references to Qt objects, so it reports through a News
         # object.
         self._news = News(port(self._receive))
@@ -222,11 +222,19 @@ class Live(QObject):
         self._moving = moving or now - self._submitted < BURST_S
         if self._moving:
             self._settle.start()
-            if self._awaiting and now - self._submitted < WAIT_S:
+            if self._awaiting and self._is_reduced and now - self._submitted < WAIT_S:
                 # Wait until the current image is shown. Otherwise, frequent edits would replace
                 # every image before it is shown.
                 return
         self._flush()
+
+    def _on_still(self) -> None:
+        """Ends a movement, but shows the image of it that is being rendered first."""
+        recent = time.perf_counter() - self._submitted < WAIT_S
+        if recent and self._pending and self._awaiting and self._is_reduced:
+            self._settle.start()
+        else:
+            self.settle()
 
     def settle(self) -> None:
         """Ends a series of edits and starts the full-size image."""
