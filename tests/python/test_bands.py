@@ -111,6 +111,7 @@ def test_a_cropped_picture_says_where_it_lies(stage: Path, whole: Path, tmp_path
             assert np.array_equal(read_layers(file)[name], layer[20:180, 30:110])
 
 
+@pytest.mark.slow
 def test_a_cropped_picture_in_memory(stage: Path) -> None:
     """Cropped and adaptive from Python: errors near the edges are those of a region."""
     region = (30, 20, 110, 180)

@@ -509,6 +509,7 @@ def test_from_scene_to_comparison(tmp_path: Path) -> None:
     assert wavecomb("compare", a, stage).returncode == 2
 
 
+@pytest.mark.slow
 def test_lane_widths_that_are_not_built(tmp_path: Path) -> None:
     from wavecomb import _core
 

@@ -469,6 +469,7 @@ def test_roulettes_are_different_estimates(scene_of: Any) -> None:
         assert not np.array_equal(a.beauty, b.beauty)
 
 
+@pytest.mark.slow
 def test_cost_aware_from_one_profile_is_reproducible(scene_of: Any) -> None:
     """Measured costs vary between runs, but not in a profile."""
     scene = scene_of("mixed")

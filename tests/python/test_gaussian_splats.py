@@ -368,6 +368,7 @@ def scenery(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_one_picture_for_all_schedules(tmp_path: Path) -> None:
     path = scenery(tmp_path)
     for shutter in ((0.0, 0.0), (0.0, 1.0)):

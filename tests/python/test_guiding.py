@@ -160,6 +160,7 @@ def test_more_samples_are_guided_as_those_before(cornell: Any, stopped: dict[str
     assert (more.samples == 160).all()
 
 
+@pytest.mark.slow
 def test_a_render_that_finds_it_does_not_pay_keeps_that(cornell: Any) -> None:
     part = as_settings(guiding="auto", spp=1000, region=(0, 0, 2, 1))
     stop = StopAt(1)

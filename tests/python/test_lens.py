@@ -110,6 +110,7 @@ def _st_map(path: Path, scale: float) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_an_st_map_moves_pixels(tmp_path: Path) -> None:
     stage = _stage(tmp_path)
     plain = _render(stage, spp=64).aovs["alpha"]

@@ -32,6 +32,7 @@ def render(stage: Any, **settings: Any) -> wavecomb.Picture:
     return wavecomb.render(stage, **(plain | settings))
 
 
+@pytest.mark.slow
 def test_one_aim_whatever_the_schedule(landscape: Path) -> None:
     stage = wavecomb.load(landscape)
     plain = render(stage)

@@ -47,6 +47,7 @@ def test_one_picture_whatever_the_schedule(
             assert got.tobytes() == want.tobytes(), (layer, way)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transport", ["light", "bdpt"])
 def test_the_error_is_that_of_both_kinds_of_paths(stage: Any, transport: str) -> None:
     """The reported error agrees with the deviation from the mean over seeds."""

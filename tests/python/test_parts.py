@@ -72,6 +72,7 @@ def run(inner: pytest.Pytester, *options: str) -> pytest.RunResult:
     return inner.runpytest_subprocess("-ra", "-p", "no:cacheprovider", *options)
 
 
+@pytest.mark.slow
 def test_a_user_sees_skips(inner: pytest.Pytester) -> None:
     inner.makepyfile(test_some=TESTS, test_module=MODULE)
     result = run(inner)

@@ -88,6 +88,7 @@ def parsed(mi: Any, folder: Path, text: str) -> Scene:
     return Scene(mi, file)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [PERSPECTIVE, ORTHOGRAPHIC], ids=["perspective", "orthographic"])
 def test_a_translated_scene_looks_as_mitsuba_renders_it(mi: Any, tmp_path: Path, text: str) -> None:
     stage = tmp_path / "scene.usda"

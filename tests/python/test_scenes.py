@@ -172,6 +172,7 @@ def test_mirror_sky_and_ground(experiment: dict[str, Usd.Stage], name: str) -> N
         assert abs(cache.ComputeWorldBound(prim).ComputeAlignedRange().GetMin()[1]) < 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["mixed", "dragon"])
 def test_lamps_stand_in_for_ceiling_and_sky(
     experiment: dict[str, Usd.Stage], tmp_path: Path, name: str

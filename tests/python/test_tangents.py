@@ -81,6 +81,7 @@ def brushed_cone(path: Path, sides: int, rows: int) -> None:
     stage.Save()
 
 
+@pytest.mark.slow
 def test_a_coarse_cone_shines_as_a_fine_one(tmp_path: Path) -> None:
     """With a constant tangent per triangle, highlights would break at every edge."""
     brushed_cone(tmp_path / "coarse.usda", 16, 2)

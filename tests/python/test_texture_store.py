@@ -308,6 +308,7 @@ def test_grids_leave_less_for_textures(smoky, stage):
     assert picture(stage, texture_limit=15.9).stats["texture_store"]["file_bytes"] == 0
 
 
+@pytest.mark.slow
 @needs_store
 @only_where(vdb.is_there(), "this build is without OpenVDB")
 def test_grids_that_alone_are_more_are_said(smoky, stage):

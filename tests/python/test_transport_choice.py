@@ -28,6 +28,7 @@ def chosen(stage: Any, **settings: Any) -> dict[str, Any]:
     return dict(picture.stats["transport"])
 
 
+@pytest.mark.slow
 def test_auto_uses_light_paths_for_caustics_alike_for_all_schedules(caustics: Path) -> None:
     stage = wavecomb.load(caustics)
     choice = chosen(stage)

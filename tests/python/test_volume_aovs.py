@@ -113,6 +113,7 @@ def test_transmittance_is_the_exponential(picture: wavecomb.Picture) -> None:
     assert (abs(seen.mean(axis=0) - np.exp(-2 * (ABSORPTION + SCATTERING))) < 4.2 * error).all()
 
 
+@pytest.mark.slow
 def test_opacity_is_half_where_it_should_be(tmp_path: Path, picture: wavecomb.Picture) -> None:
     """In thick fog, ln 2 / extinction beyond its face at distance 3; in thin fog, at the wall."""
     thick = _load(tmp_path, 1.5 - ABSORPTION)

@@ -174,6 +174,7 @@ def add_ball(builder: Any, radius: float, material: int) -> None:
     builder.add_to_group(0, number)
 
 
+@pytest.mark.slow
 def test_a_black_sphere_lets_through_what_misses_all_collisions() -> None:
     """Chords of a sphere in uniform light have the density l / (2 R^2)."""
     radius, free_paths = 1.0, (2.0, 1.0, 0.5)

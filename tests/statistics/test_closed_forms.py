@@ -221,6 +221,7 @@ def test_rect_light_shines_one_way(shot: Any) -> None:
     assert shot(camera((0, -5, 0), (0, 0, 0), half=0.01), up, spp=4).max() == 0.0
 
 
+@pytest.mark.slow
 def test_half_a_dome(shot: Any, tmp_path: Path) -> None:
     """Irradiance of a dome image equals the cosine-weighted sum of its pixels."""
     path = write_sky(tmp_path)

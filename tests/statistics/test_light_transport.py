@@ -248,6 +248,7 @@ def test_what_transmits_is_unbiased(ball: str, tmp_path: Path, beauty: Any) -> N
         compare(f"connections through {ball}", stage, beauty, transport="bdpt", max_depth=6)
 
 
+@pytest.mark.slow
 def test_shading_normals_are_unbiased(tmp_path: Path, beauty: Any) -> None:
     """Smooth normals on coarse facets, adjusted towards the viewer at silhouettes."""
     shape = sphere("Coarse", "Gloss", (-0.2, 0.6, 0.9), 0.5, rings=5, smooth=True)
