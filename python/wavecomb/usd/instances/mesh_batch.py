@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import islice, takewhile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +43,10 @@ _MOST = 1024
 
 _FEW = 4
 """Fewer meshes than this are added separately."""
+
+_APART = 16
+"""Number of meshes that are added separately from one that is not simple on, since such meshes
+often follow each other."""
 
 
 LoadProgress = Callable[[int, int], None]
@@ -108,15 +111,16 @@ class MeshBatches:
 
     def draw(self, draws: Sequence[DrawItem]) -> None:
         """Adds gprims to the group in order."""
-        start = 0
-        while start < len(draws):
-            run = list(takewhile(self._fits, islice(draws, start, None)))
-            start += len(run)
+        run: list[DrawItem] = []
+        for draw in draws:
+            if self._fits(draw):
+                run.append(draw)
+                continue
             self._draw_run(run)
             # Drawing a gprim may make the next ones fit, since its material is in use from then on.
-            if start < len(draws):
-                self._draw_one(draws[start])
-                start += 1
+            self._draw_one(draw)
+            run = []
+        self._draw_run(run)
 
     def _draw_one(self, draw: DrawItem) -> None:
         self._draw(self._group, draw, self._scope)
@@ -131,14 +135,15 @@ class MeshBatches:
             while start < end and (row := self._read(draws[start])) is not None:
                 rows.append(row)
                 start += 1
+            apart = 0 if start == end else 1 if len(rows) >= _FEW else _APART
             while rows:
                 added = self._add(rows) if len(rows) >= _FEW else 0
-                for row in rows[added : added + 1]:
+                for row in rows[added : added + _APART]:
                     self._draw_one(row.draw)
-                rows = rows[added + 1 :]
-            if start < end:
-                self._draw_one(draws[start])
-                start += 1
+                rows = rows[added + _APART :]
+            for draw in draws[start : start + apart]:
+                self._draw_one(draw)
+            start += apart
 
     def _fits(self, draw: DrawItem) -> bool:
         """Returns whether a gprim is a mesh that is likely to be simple; reads no values."""
@@ -157,20 +162,19 @@ class MeshBatches:
         path = str(prim.GetPath())
         progress_notes.note("reading", path)
         try:
-            if is_mesh_light(prim) or not self._is_static(prim):
+            if check_matrix(draw.matrix) or is_mesh_light(prim) or not self._is_static(prim):
                 return None
             if prim.GetAttribute("subdivisionScheme").Get(time) != "none":
                 return None
-            points = prim.GetAttribute("points").Get(time)
             counts = prim.GetAttribute("faceVertexCounts").Get(time)
             indices = prim.GetAttribute("faceVertexIndices").Get(time)
-            if (
-                type(points) is not Vt.Vec3fArray
-                or type(counts) is not Vt.IntArray
-                or type(indices) is not Vt.IntArray
-                or not 0 < len(points) <= _SMALL
-                or check_matrix(draw.matrix)
-            ):
+            if type(counts) is not Vt.IntArray or type(indices) is not Vt.IntArray:
+                return None
+            # Faces with different numbers of corners are not plain.
+            if len(counts) == 0 or len(indices) != len(counts) * counts[0]:
+                return None
+            points = prim.GetAttribute("points").Get(time)
+            if type(points) is not Vt.Vec3fArray or not 0 < len(points) <= _SMALL:
                 return None
         # The mesh is read again separately, which reports the error.
         except (Tf.ErrorException, MemoryError, MeshError):
