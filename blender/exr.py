@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 MAGIC = 20000630
-TYPES = {0: np.dtype("<u4"), 1: np.dtype("<f2"), 2: np.dtype("<f4")}
+TYPES: dict[int, np.dtype[Any]] = {0: np.dtype("<u4"), 1: np.dtype("<f2"), 2: np.dtype("<f4")}
 
 
 class ExrError(Exception):
