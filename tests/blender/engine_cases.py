@@ -162,9 +162,13 @@ def animation(folder: Path) -> None:
         original(*words)
 
     export.export_geometry = counted
+    textures = sys.modules["wavecomb_blender.textures"]
+    bakes: list[str] = []
+    bake = textures.run_blender
+    textures.run_blender = lambda script, words: bakes.append(script) or bake(script, words)
     scene.render.engine = "WAVECOMB"
     bpy.ops.render.render(animation=True)
-    emit(exports=count[0], frames=len(list(folder.glob("frame-*.exr"))))
+    emit(exports=count[0], bakes=len(bakes), frames=len(list(folder.glob("frame-*.exr"))))
     scene.frame_set(25)
     alone, _ = harness.render(scene, "WAVECOMB", 0)
     read = bpy.data.images.load(str(folder / "frame-0025.exr"))
@@ -263,8 +267,12 @@ def cryptomatte(folder: Path) -> None:
 
 
 def _deforming() -> None:
-    """Adds a cube whose shape keys move over the frames."""
-    thing = build.cube(build.principled("b", base_color=(0.2, 0.5, 0.2)), at=(0, 1.5, 0.5), size=1)
+    """Adds a cube whose shape keys move over the frames, with a texture that is baked."""
+    material = build.principled("b")
+    noise = build.add(material, "ShaderNodeTexNoise")
+    shader = build.shader_of(material)
+    build.wire(material, noise.outputs["Color"], shader.inputs["Base Color"])
+    thing = build.cube(material, at=(0, 1.5, 0.5), size=1)
     thing.shape_key_add(name="rest")
     key = thing.shape_key_add(name="wide")
     for point in key.data:

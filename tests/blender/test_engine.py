@@ -78,6 +78,7 @@ def test_animation_exports_geometry_once(blender: Run, tmp_path: Path) -> None:
     row = _rows(blender(str(HERE / "engine_cases.py"), "animation", str(tmp_path)))
     assert row["frames"] == 24
     assert row["exports"] == 1
+    assert row["bakes"] == 1
     assert float(str(row["difference"])) < 1e-6
 
 
