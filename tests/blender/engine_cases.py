@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import os
 import shutil
@@ -266,6 +268,23 @@ def cryptomatte(folder: Path) -> None:
     emit(passes=found)
 
 
+def report(folder: Path) -> None:
+    """Lists of nodes that depend on the viewer, which cannot be baked, and of displacement."""
+    scene, ball = _ball(1)
+    material = ball.material_slots[0].material
+    node = build.add(material, "ShaderNodeLightPath")
+    shader = build.shader_of(material)
+    build.wire(material, node.outputs["Is Camera Ray"], shader.inputs["Roughness"])
+    displace = build.add(material, "ShaderNodeDisplacement")
+    output = material.node_tree.get_output_node("CYCLES")
+    build.wire(material, displace.outputs[0], output.inputs["Displacement"])
+    material.displacement_method = "DISPLACEMENT"
+    lines = io.StringIO()
+    with contextlib.redirect_stdout(lines):
+        message = _message(scene)
+    emit(error=message, lines=[x for x in lines.getvalue().splitlines() if "wavecomb: " in x])
+
+
 def _deforming() -> None:
     """Adds a cube whose shape keys move over the frames, with a texture that is baked."""
     material = build.principled("b")
@@ -296,6 +315,7 @@ def blend(folder: Path) -> None:
 
 if __name__ == "__main__":
     CASES = {
-        one.__name__: one for one in (same, errors, full, cryptomatte, passes, animation, blend)
+        one.__name__: one
+        for one in (same, errors, full, report, cryptomatte, passes, animation, blend)
     }
     CASES[sys.argv[1]](Path(sys.argv[2]))

@@ -51,6 +51,16 @@ def test_full_disk_is_one_line(blender: Run, tmp_path: Path) -> None:
     assert row["alive"] is True
 
 
+def test_report_lists_what_is_missing(blender: Run, tmp_path: Path) -> None:
+    """A node that cannot be baked and an approximation are one line each, with their owner."""
+    row = _rows(blender(str(HERE / "engine_cases.py"), "report", str(tmp_path)))
+    assert row["error"] == ""
+    lines = row["lines"]
+    assert isinstance(lines, list) and len(lines) == 2, lines
+    assert "not supported: node Light Path" in lines[0] and "material" in lines[0]
+    assert "approximated: displacement (a bump instead): material" in lines[1]
+
+
 def test_cryptomatte_has_the_ids_of_cycles(blender: Run, tmp_path: Path) -> None:
     """Ids of the first rank, with the number of pixels, in two view layers."""
     row = _rows(blender(str(HERE / "engine_cases.py"), "cryptomatte", str(tmp_path)))
