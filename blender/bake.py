@@ -74,13 +74,11 @@ def _describe(tree: Any, lines: list[str]) -> None:
         lines.append(f"{node.bl_idname} {node.name} {node.mute}")
         for name, prop in node.bl_rna.properties.items():
             if prop.type in {"BOOLEAN", "INT", "FLOAT", "ENUM", "STRING"} and name != "select":
-                value = getattr(node, name)
-                shown = (
-                    list(value) if hasattr(value, "__len__") and prop.type != "STRING" else value
-                )
-                lines.append(f"{name} {shown!r}")
-        for socket in node.inputs:
-            value = getattr(socket, "default_value", None)
+                own = getattr(node, name)
+                is_list = hasattr(own, "__len__") and prop.type != "STRING"
+                lines.append(f"{name} {list(own) if is_list else own!r}")
+        for socket in (*node.inputs, *node.outputs):
+            value: Any = getattr(socket, "default_value", None)
             lines.append(repr(list(value) if hasattr(value, "__len__") else value))
         image = getattr(node, "image", None)
         if image is not None:

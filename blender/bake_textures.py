@@ -60,7 +60,7 @@ def _unwrap(things: list[Any]) -> None:
 
 
 def _write_coordinates(things: list[Any], file: str) -> None:
-    found = {}
+    found: dict[str, Any] = {}
     for i, thing in enumerate(things):
         layer = thing.data.uv_layers[LAYER]
         values = np.empty(2 * len(thing.data.loops), np.float32)

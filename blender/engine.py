@@ -13,7 +13,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from . import exr, settings
+from . import cryptomatte, exr, settings
 from .camera import NoCamera
 from .export import Exported, ExportError, Session, export_stage
 from .motion import sample, shutter_of
@@ -96,6 +96,8 @@ class WavecombRenderEngine(bpy.types.RenderEngine):
             print(f"wavecomb: {line}", flush=True)
         if os.path.exists(output):
             channels = exr.read(output)
+            if any("Crypto" in name for name in channels):
+                cryptomatte.rename(channels, exr.texts(output), cryptomatte.names_of(depsgraph))
             os.remove(output)
             self._fill(channels, layer, size, denoise)
 

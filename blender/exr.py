@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 MAGIC = 20000630
-TYPES = {0: np.dtype("<u4"), 1: np.dtype("<f2"), 2: np.dtype("<f4")}
+TYPES: dict[int, np.dtype[Any]] = {0: np.dtype("<u4"), 1: np.dtype("<f2"), 2: np.dtype("<f4")}
 
 
 class ExrError(Exception):
@@ -32,6 +32,21 @@ def read(file: str) -> dict[str, np.ndarray]:
         return _parsed(data)
     except (struct.error, ValueError, KeyError, IndexError) as error:
         raise ExrError(f"{file} is damaged or compressed: {error}") from error
+
+
+def texts(file: str) -> dict[str, str]:
+    """Returns the text attributes of a file.
+
+    Raises:
+        ExrError: The file is damaged or of another kind.
+    """
+    with open(file, "rb") as stream:
+        data = stream.read()
+    try:
+        kinds = _attributes(data)[0]
+    except (struct.error, ValueError, KeyError, IndexError) as error:
+        raise ExrError(f"{file} is damaged: {error}") from error
+    return {n: v.decode(errors="replace") for n, (kind, v) in kinds.items() if kind == "string"}
 
 
 def _parsed(data: bytes) -> dict[str, np.ndarray]:
@@ -57,13 +72,20 @@ def _parsed(data: bytes) -> dict[str, np.ndarray]:
 
 
 def _header(data: bytes) -> tuple[dict[str, bytes], int]:
+    found, at = _attributes(data)
+    return {name: value for name, (_, value) in found.items()}, at
+
+
+def _attributes(data: bytes) -> tuple[dict[str, tuple[str, bytes]], int]:
+    """Returns types and values of attributes, and the end of the header."""
     at, header = 8, {}
     while data[at]:
         end = data.index(0, at)
         name = data[at:end].decode("latin-1")
-        end = data.index(0, end + 1) + 1
+        start = end + 1
+        end = data.index(0, start) + 1
         (size,) = struct.unpack_from("<i", data, end)
-        header[name] = data[end + 4 : end + 4 + size]
+        header[name] = (data[start : end - 1].decode("latin-1"), data[end + 4 : end + 4 + size])
         at = end + 4 + size
     return header, at + 1
 

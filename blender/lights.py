@@ -244,7 +244,8 @@ def _links(into: Translation, thing: Any, prim: Prim) -> None:
 
 def _link(prim: Prim, collection: Any, name: str) -> None:
     """Writes a collection of Blender's light linking as a collection of UsdLux."""
-    included, excluded = [], []
+    included: list[str] = []
+    excluded: list[str] = []
     for rows, things in (
         (collection.collection_objects, collection.objects),
         (collection.collection_children, collection.children),

@@ -200,7 +200,7 @@ def _blended(n: Nodes, blend: str, a: Value, b: Value, factor: Value, clamp: boo
         made = g.mix(a, g.node("overlay_color3", "color3", fg=b, bg=a), factor)
     else:
         return None
-    return g.clamped(made) if clamp else made
+    return g.clamped(made) if clamp and made is not None else made
 
 
 def _ramp(n: Nodes, node: Any, socket: Any) -> Value | None:

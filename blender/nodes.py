@@ -53,7 +53,7 @@ class Nodes:
 
     @staticmethod
     def _constant(socket: Any, kind: str) -> Value:
-        value = getattr(socket, "default_value", 0.0)
+        value: Any = getattr(socket, "default_value", 0.0)
         if kind == "float":
             return number(value if not hasattr(value, "__len__") else value[0])
         return colour(value) if kind == "color3" else vector(value)

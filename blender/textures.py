@@ -19,7 +19,7 @@ from .usda import text_of
 
 LAYER = "wavecombBake"
 SIZE = 1024
-MOST_CORNERS = 4_000_000
+MOST_CORNERS = 1_000_000
 """Corners of faces of all baked objects together; more are not unwrapped."""
 
 _BY_VIEW = {"LAYER_WEIGHT", "FRESNEL", "LIGHT_PATH", "CAMERA", "PARTICLE_INFO", "HAIR_INFO"}

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import os
 import shutil
@@ -162,9 +164,13 @@ def animation(folder: Path) -> None:
         original(*words)
 
     export.export_geometry = counted
+    textures = sys.modules["wavecomb_blender.textures"]
+    bakes: list[str] = []
+    bake = textures.run_blender
+    textures.run_blender = lambda script, words: bakes.append(script) or bake(script, words)
     scene.render.engine = "WAVECOMB"
     bpy.ops.render.render(animation=True)
-    emit(exports=count[0], frames=len(list(folder.glob("frame-*.exr"))))
+    emit(exports=count[0], bakes=len(bakes), frames=len(list(folder.glob("frame-*.exr"))))
     scene.frame_set(25)
     alone, _ = harness.render(scene, "WAVECOMB", 0)
     read = bpy.data.images.load(str(folder / "frame-0025.exr"))
@@ -175,9 +181,117 @@ def animation(folder: Path) -> None:
     emit(difference=float(np.abs(last[..., :3] - alone[..., :3]).max()))
 
 
+def _layers(scene: Any, file: Path) -> dict[str, np.ndarray]:
+    """Renders all view layers and passes to a file; returns its channels."""
+    import bpy
+
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "MULTI_LAYER_IMAGE"
+    settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
+    settings.exr_codec = "NONE"
+    if hasattr(settings, "use_exr_interleave"):
+        settings.use_exr_interleave = True
+    scene.render.filepath = str(file.with_suffix(""))
+    bpy.ops.render.render(write_still=True)
+    return dict(sys.modules["wavecomb_blender.exr"].read(str(file)))
+
+
+def passes(folder: Path) -> None:
+    """All passes of two view layers, of which one lacks an object; a border; denoising."""
+    import bpy
+
+    scene, _ = _ball(4)
+    hidden = bpy.data.collections.new("hidden")
+    scene.collection.children.link(hidden)
+    cube = build.cube(build.principled("b", base_color=(0.1, 0.1, 0.8)), at=(0, -2, 0.4), size=0.8)
+    scene.collection.objects.unlink(cube)
+    hidden.objects.link(cube)
+    other = scene.view_layers.new("second")
+    other.layer_collection.children["hidden"].exclude = True
+    names = [n for n in dir(other) if n.startswith("use_pass_")]
+    supported = sys.modules["wavecomb_blender.passes"].PASSES
+    chosen = [one for one in supported if one.setting in names]
+    for layer in scene.view_layers:
+        for one in chosen:
+            setattr(layer, one.setting, True)
+    scene.wavecomb.denoise = True
+    found = _layers(scene, folder / "passes.exr")
+    first, second = (f"{layer.name}." for layer in scene.view_layers)
+    means = {n: float(np.nan_to_num(v, posinf=0.0).mean()) for n, v in found.items()}
+    absent = [
+        f"{layer}{one.name}.{channel}"
+        for layer in (first, second)
+        for one in chosen
+        for channel in one.channels
+        if f"{layer}{one.name}.{channel}" not in found
+    ]
+    noisy, clean = (found[f"{first}{n}.R"] for n in ("Noisy Image", "Combined"))
+    still = ("Emit", "Trans", "Vector")
+    empty = [n for n in means if means[n] == 0.0 and not any(one in n for one in still)]
+    emit(absent=absent, empty=empty, denoised=float(np.abs(noisy - clean).max()))
+    depth = [found[f"{layer}Depth.Z"] for layer in (first, second)]
+    emit(nearer=int((depth[0] < depth[1] - 0.1).sum()), farther=int((depth[0] > depth[1]).sum()))
+    scene.wavecomb.denoise = False
+    whole = _layers(scene, folder / "whole.exr")[f"{first}Combined.R"]
+    render = scene.render
+    render.use_border = True
+    render.border_min_x, render.border_max_x = 0.25, 0.75
+    render.border_min_y, render.border_max_y = 0.0, 0.5
+    part = _layers(scene, folder / "part.exr")[f"{first}Combined.R"]
+    height, width = whole.shape
+    inside = np.s_[height // 2 :, width // 4 : 3 * width // 4]
+    same = part if part.shape != whole.shape else part[inside]
+    emit(border=bool(np.array_equal(same, whole[inside])), shape=list(part.shape))
+
+
+def cryptomatte(folder: Path) -> None:
+    """Ids of objects, materials and assets are those of Cycles, in two view layers."""
+    scene, ball = _ball(4)
+    ball.name = "Ball é.001"
+    child = build.cube(build.principled("painted wood"), at=(2, 0, 0.5), size=0.8)
+    child.parent = ball
+    layer = scene.view_layers[0]
+    other = scene.view_layers.new("second")
+    for one in (layer, other):
+        for name in ("object", "material", "asset"):
+            setattr(one, f"use_pass_cryptomatte_{name}", True)
+    found: dict[str, Any] = {}
+    for engine in ("CYCLES", "WAVECOMB"):
+        scene.render.engine = engine
+        scene.cycles.samples = 4
+        for name, values in _layers(scene, folder / f"{engine}.exr").items():
+            if "Crypto" in name and name.endswith(("00.R", "00.r")):
+                ids, counts = np.unique(values.view(np.uint32), return_counts=True)
+                table = {f"{i:08x}": int(c) for i, c in zip(ids, counts, strict=True) if c > 20}
+                found.setdefault(name[:-2], {})[engine] = table
+    emit(passes=found)
+
+
+def report(folder: Path) -> None:
+    """Lists of nodes that depend on the viewer, which cannot be baked, and of displacement."""
+    scene, ball = _ball(1)
+    material = ball.material_slots[0].material
+    node = build.add(material, "ShaderNodeLightPath")
+    shader = build.shader_of(material)
+    build.wire(material, node.outputs["Is Camera Ray"], shader.inputs["Roughness"])
+    displace = build.add(material, "ShaderNodeDisplacement")
+    output = material.node_tree.get_output_node("CYCLES")
+    build.wire(material, displace.outputs[0], output.inputs["Displacement"])
+    material.displacement_method = "DISPLACEMENT"
+    lines = io.StringIO()
+    with contextlib.redirect_stdout(lines):
+        message = _message(scene)
+    emit(error=message, lines=[x for x in lines.getvalue().splitlines() if "wavecomb: " in x])
+
+
 def _deforming() -> None:
-    """Adds a cube whose shape keys move over the frames."""
-    thing = build.cube(build.principled("b", base_color=(0.2, 0.5, 0.2)), at=(0, 1.5, 0.5), size=1)
+    """Adds a cube whose shape keys move over the frames, with a texture that is baked."""
+    material = build.principled("b")
+    noise = build.add(material, "ShaderNodeTexNoise")
+    shader = build.shader_of(material)
+    build.wire(material, noise.outputs["Color"], shader.inputs["Base Color"])
+    thing = build.cube(material, at=(0, 1.5, 0.5), size=1)
     thing.shape_key_add(name="rest")
     key = thing.shape_key_add(name="wide")
     for point in key.data:
@@ -200,5 +314,8 @@ def blend(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    CASES = {"same": same, "errors": errors, "full": full, "animation": animation, "blend": blend}
+    CASES = {
+        one.__name__: one
+        for one in (same, errors, full, report, cryptomatte, passes, animation, blend)
+    }
     CASES[sys.argv[1]](Path(sys.argv[2]))

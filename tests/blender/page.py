@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes docs/blender-parity.md: ``python page.py FOLDER``, a folder of ``run.py``'s output.
+"""Writes docs/blender-parity.md: ``python page.py FOLDER [--update]``.
 
-Needs Pillow.
+FOLDER is the output of ``run.py``. With ``--update``, scenes that it lacks keep row and image.
+PARITY_SPP is that of ``run.py``. Needs Pillow.
 """
 
 from __future__ import annotations
 
 import json
+import os
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -18,7 +21,7 @@ PAGE = ROOT / "docs" / "blender-parity.md"
 HEAD = """# Blender: comparison with Cycles
 
 Scenes made by script, rendered by Cycles and by the [Blender extension](blender.md) with the same
-number of bounces, a box filter and no clamping. Blender {version}.
+number of bounces, a box filter and no clamping. Blender {version}{samples}.
 
     make setup-blender     # install Blender's wheels, 400 MB each
     make test-blender      # render and check all scenes; JSON and images go to out/blender
@@ -33,8 +36,30 @@ Each pair of images shows Cycles to the left and Wavecomb to the right.
 """
 
 
-def main(folder: Path) -> None:
-    """Writes the page and one sheet of images per group."""
+TILE = (192, 72)
+COLUMNS = 4
+Kept = dict[str, dict[str, str]]
+
+
+def kept_rows() -> Kept:
+    """Returns the rows of the page: lines of the table by group and scene."""
+    found: Kept = {}
+    group = ""
+    for line in PAGE.read_text().splitlines():
+        if line.startswith("## "):
+            group = line[3:]
+        elif match := re.match(r"\| `(\w+)` \|", line):
+            found.setdefault(group, {})[match[1]] = line
+    return found
+
+
+def main(folder: Path, kept: Kept) -> None:
+    """Writes the page and one sheet of images per group.
+
+    Args:
+        folder: Output of ``run.py``.
+        kept: Rows of scenes that it may lack.
+    """
     rows = {f.stem: json.loads(f.read_text()) for f in sorted(folder.glob("*.json"))}
     rows = {name: row for name, row in rows.items() if "ratio" in row and "group" in row}
     for name, row in rows.items():
@@ -42,19 +67,22 @@ def main(folder: Path) -> None:
         is_near = expected["low"] - noise <= row["ratio"] <= expected["high"] + noise
         if not is_near or row["outside"] > expected["outside"]:
             print(f"outside of its bounds: {name} {row['ratio']:.4f} {row['outside']:.3f}")
-    groups = list(dict.fromkeys(row["group"] for row in rows.values()))
     version = next(iter(rows.values()))["blender"]
-    text = [HEAD.format(version=version)]
-    for group in sorted(groups):
-        chosen = {name: row for name, row in rows.items() if row["group"] == group}
+    is_half = os.environ.get("PARITY_SPP") == "0.5"
+    samples = ", half of the tests' samples" if is_half else ""
+    text = [HEAD.format(version=version, samples=samples)]
+    for group in sorted({row["group"] for row in rows.values()} | set(kept)):
+        before = kept.get(group, {})
+        lines = {name: _line(name, row) for name, row in rows.items() if row["group"] == group}
+        lines = dict(sorted({**before, **lines}.items()))
         text.append(f"## {group}\n")
         image = f"images/blender-{group.lower()}.jpg"
-        _sheet(folder, list(chosen), PAGE.parent / image)
+        _sheet(folder, list(lines), list(before), PAGE.parent / image)
         text.append(f"![{group}, in the order of the table]({image})\n")
         text.append(
             "| scene | content | mean | blocks | difference |\n| --- | --- | --- | --- | --- |"
         )
-        text += [_line(name, row) for name, row in chosen.items()]
+        text += lines.values()
         text.append("")
     PAGE.write_text("\n".join(text))
 
@@ -68,17 +96,28 @@ def _line(name: str, row: dict[str, Any]) -> str:
     return f"| `{name}` | {about} | {row['ratio']:.4f} | {100 * row['outside']:.0f} % | {why} |"
 
 
-def _sheet(folder: Path, names: list[str], file: Path) -> None:
-    tiles = [Image.open(folder / f"{name}.png").convert("RGB") for name in names]
-    width, height = 192 + 6, 72 + 6
-    columns = 4
-    count = -(-len(tiles) // columns)
-    sheet = Image.new("RGB", (columns * width, count * height), (255, 255, 255))
-    for i, tile in enumerate(tiles):
-        tile = tile.resize((192, round(192 * tile.height / tile.width)))
-        sheet.paste(tile, ((i % columns) * width, (i // columns) * height))
+def _sheet(folder: Path, names: list[str], before: list[str], file: Path) -> None:
+    """Writes a sheet; tiles of scenes without an image come from the sheet as it was."""
+    old = Image.open(file).convert("RGB") if file.exists() else None
+    boxes = {name: _corner(i) for i, name in enumerate(before)}
+    count = -(-len(names) // COLUMNS)
+    size = (COLUMNS * (TILE[0] + 6), count * (TILE[1] + 6))
+    sheet = Image.new("RGB", size, (255, 255, 255))
+    for i, name in enumerate(names):
+        if (folder / f"{name}.png").exists():
+            tile = Image.open(folder / f"{name}.png").convert("RGB")
+            tile = tile.resize((TILE[0], round(TILE[0] * tile.height / tile.width)))
+        else:
+            assert old is not None, name
+            x, y = boxes[name]
+            tile = old.crop((x, y, x + TILE[0], y + TILE[1]))
+        sheet.paste(tile, _corner(i))
     sheet.save(file, quality=88)
 
 
+def _corner(index: int) -> tuple[int, int]:
+    return (index % COLUMNS * (TILE[0] + 6), index // COLUMNS * (TILE[1] + 6))
+
+
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), kept_rows() if "--update" in sys.argv else {})

@@ -187,6 +187,16 @@ def principled_subsurface_deep() -> None:
     )  # fmt: skip
 
 
+@scene("Principled", outside=0.1, why=BOUNDARY, spp=256)
+def principled_subsurface_skin() -> None:
+    """Subsurface scattering by the method for skin."""
+    material = _ball(
+        base_color=(0.8, 0.5, 0.4), subsurface_weight=1.0, subsurface_scale=0.1,
+        subsurface_radius=(1.0, 0.5, 0.25), roughness=0.6,
+    )  # fmt: skip
+    shader_of(material).subsurface_method = "RANDOM_WALK_SKIN"
+
+
 @scene("Principled")
 def principled_thin_film() -> None:
     """A thin film on glass-like plastic."""

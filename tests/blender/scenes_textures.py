@@ -282,3 +282,42 @@ def baked_displacement() -> None:
     output = material.node_tree.get_output_node("CYCLES")
     wire(material, node.outputs[0], output.inputs["Displacement"])
     wall(material)
+
+
+@scene("Baked")
+def baked_group() -> None:
+    """A noise in a node group, then colour curves."""
+    studio()
+    material = principled(roughness=1.0, specular_ior_level=0.0)
+    group = bpy.data.node_groups.new("spots", "ShaderNodeTree")
+    group.interface.new_socket("Size", in_out="INPUT", socket_type="NodeSocketFloat")
+    group.interface.new_socket("Colour", in_out="OUTPUT", socket_type="NodeSocketColor")
+    entry, leave = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+    noise = group.nodes.new("ShaderNodeTexNoise")
+    group.links.new(entry.outputs[0], noise.inputs["Scale"])
+    group.links.new(noise.outputs["Color"], leave.inputs[0])
+    node = add(material, "ShaderNodeGroup")
+    node.node_tree = group
+    node.inputs[0].default_value = 3.0
+    curves = add(material, "ShaderNodeRGBCurve")
+    curves.mapping.curves[3].points.new(0.5, 0.3)
+    curves.mapping.update()
+    wire(material, node.outputs[0], curves.inputs["Color"])
+    wire(material, curves.outputs[0], shader_of(material).inputs["Base Color"])
+    sphere(material)
+
+
+@scene("Baked")
+def baked_group_alone() -> None:
+    """A noise in a node group, without nodes after it."""
+    studio()
+    material = principled(roughness=1.0, specular_ior_level=0.0)
+    group = bpy.data.node_groups.new("spots", "ShaderNodeTree")
+    group.interface.new_socket("Value", in_out="OUTPUT", socket_type="NodeSocketFloat")
+    leave = group.nodes.new("NodeGroupOutput")
+    noise = group.nodes.new("ShaderNodeTexNoise")
+    group.links.new(noise.outputs[0], leave.inputs[0])
+    node = add(material, "ShaderNodeGroup")
+    node.node_tree = group
+    wire(material, node.outputs[0], shader_of(material).inputs["Base Color"])
+    sphere(material)

@@ -51,11 +51,44 @@ def test_full_disk_is_one_line(blender: Run, tmp_path: Path) -> None:
     assert row["alive"] is True
 
 
+def test_report_lists_what_is_missing(blender: Run, tmp_path: Path) -> None:
+    """A node that cannot be baked and an approximation are one line each, with their owner."""
+    row = _rows(blender(str(HERE / "engine_cases.py"), "report", str(tmp_path)))
+    assert row["error"] == ""
+    lines = row["lines"]
+    assert isinstance(lines, list) and len(lines) == 2, lines
+    assert "not supported: node Light Path" in lines[0] and "material" in lines[0]
+    assert "approximated: displacement (a bump instead): material" in lines[1]
+
+
+def test_cryptomatte_has_the_ids_of_cycles(blender: Run, tmp_path: Path) -> None:
+    """Ids of the first rank, with the number of pixels, in two view layers."""
+    row = _rows(blender(str(HERE / "engine_cases.py"), "cryptomatte", str(tmp_path)))
+    passes = row["passes"]
+    assert isinstance(passes, dict) and len(passes) == 6
+    for name, tables in passes.items():
+        assert tables["CYCLES"].keys() == tables["WAVECOMB"].keys(), name
+        for one, count in tables["CYCLES"].items():
+            assert abs(tables["WAVECOMB"][one] - count) <= 0.03 * count + 10, (name, one)
+
+
+def test_passes_of_two_view_layers(blender: Run, tmp_path: Path) -> None:
+    """Every pass is written and not empty; layers, denoising and border have an effect."""
+    row = _rows(blender(str(HERE / "engine_cases.py"), "passes", str(tmp_path)))
+    assert row["absent"] == []
+    assert row["empty"] == []
+    assert float(str(row["denoised"])) > 0.0
+    assert int(str(row["nearer"])) > 100
+    assert row["farther"] == 0
+    assert row["border"] is True, row["shape"]
+
+
 def test_animation_exports_geometry_once(blender: Run, tmp_path: Path) -> None:
     """Frames with motion blur reuse the exported geometry; each equals a frame rendered alone."""
     row = _rows(blender(str(HERE / "engine_cases.py"), "animation", str(tmp_path)))
     assert row["frames"] == 24
     assert row["exports"] == 1
+    assert row["bakes"] == 1
     assert float(str(row["difference"])) < 1e-6
 
 
