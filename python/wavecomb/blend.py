@@ -14,12 +14,11 @@ import os
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from wavecomb import processes
+from wavecomb import processes, terminal
 from wavecomb.errors import WavecombError
 
 LIMIT_S = 1800.0
@@ -153,7 +152,7 @@ def render(blend: str, frame: float | None, arguments: Sequence[str]) -> int:
     with tempfile.TemporaryDirectory(prefix="wavecomb-blend-") as folder:
         stage, options, messages = export(blend, folder, frame)
         for line in messages:
-            print(line, file=sys.stderr)
+            terminal.say(line, err=True)
         at = list(arguments).index(blend)
         words = [*arguments[:at], stage, *options, *arguments[at + 1 :]]
         command = processes.command("wavecomb", "render", *words, parent=os.getpid())

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Standard streams of commands: all text for a terminal passes through ``Stream``.
 
+Commands print each message with ``say`` or with a string for ``console``. Both escape newlines as
+well, so that a name or a path that contains a newline cannot forge a line. Only help, JSON and the
+code for completion are printed as several lines at once.
+
 Names of prims and files and messages of libraries may contain control characters, which would move
 the cursor, hide text or change the window's title. ``Stream`` writes control characters as escapes.
 A stream that is closed, whose reader has ended, or whose disk is full loses text but never ends a
@@ -37,6 +41,28 @@ def clean(text: str) -> str:
     ('a\\x1b[31mb', 'a\\xffb', '\\u202egpj.exe')
     """
     return _CONTROL.sub(_escape, text)
+
+
+def one_line(text: str) -> str:
+    r"""Escapes the control characters of a text including newlines.
+
+    >>> one_line("a\nwrote b.exr")
+    'a\\nwrote b.exr'
+    """
+    return clean(text).replace("\n", "\\n")
+
+
+def say(*lines: str, err: bool = False) -> None:
+    """Prints messages, each of which becomes one line.
+
+    Args:
+        *lines: The messages.
+        err: Whether to print on standard error.
+    """
+    stream = sys.stderr if err else sys.stdout
+    if stream is not None:
+        stream.write("".join(f"{one_line(line)}\n" for line in lines))
+        stream.flush()
 
 
 def _escape(match: re.Match[str]) -> str:
@@ -170,7 +196,7 @@ def write_error(text: str) -> None:
 
 
 def console(**options: Any) -> Console:
-    """Returns a Rich console that escapes control characters in text.
+    """Returns a Rich console that escapes control characters in strings, including newlines.
 
     Args:
         **options: Arguments of Rich's Console.
@@ -180,7 +206,7 @@ def console(**options: Any) -> Console:
 
     class Cleaning(Console):
         def render_str(self, text: str, **how: Any) -> Text:
-            return super().render_str(clean(text), **how)
+            return super().render_str(one_line(text), **how)
 
     stream = sys.stderr if options.get("stderr") else sys.stdout
     if isinstance(stream, Stream):

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import ast
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -143,6 +145,98 @@ def Camera "C" {{
             assert bad not in said, (words, said)
         assert forced or not has_controls(said), (words, said)
         assert "\\x1b" in said or "no camera" in said
+
+
+FORGED = "A\nwrote faked.exr"
+FORGED_STAGE = """#usda 1.0
+def Material "M" {
+    token outputs:surface.connect = </M/S.outputs:surface>
+    def Shader "S" {
+        uniform token info:id = "A\\nwrote faked.exr"
+        token outputs:surface
+    }
+}
+def Mesh "Quad" (prepend apiSchemas = ["MaterialBindingAPI"]) {
+    int[] faceVertexCounts = [3]
+    int[] faceVertexIndices = [0, 1, 2]
+    point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
+    rel material:binding = </M>
+}
+def Shader "T" {
+    asset inputs:file = @./t.<UDIM>.png@
+}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("forced", [False, True])
+def test_no_name_forges_a_line(tmp_path: Path, forced: bool) -> None:
+    """Newlines in names of files and in text of a stage start no line of the output."""
+    folder = tmp_path / f"folder {FORGED}"
+    folder.mkdir()
+    stage = folder / "a.usda"
+    stage.write_text(FORGED_STAGE)
+    (tmp_path / f"{FORGED}.usda").write_text(FORGED_STAGE)
+    env = {**os.environ, **({"FORCE_COLOR": "1", "COLUMNS": "400"} if forced else {})}
+    small = SMALL.split()
+    job = f"job {FORGED}"
+    for code, *words in (
+        (0, "render", stage, "-o", f"{FORGED}.exr", *small),
+        (0, "render", stage, "-o", f"{FORGED}.####.exr", "--frames", "1", *small),
+        (0, "render", f"{FORGED}.usda", "-o", "a.exr", "--png", f"{FORGED}.png", *small),
+        (0, "info", stage),
+        (0, "info", f"{FORGED}.usda"),
+        (2, "info", f"no{FORGED}.usda"),
+        (2, "render", stage, "-o", f"{FORGED}.gif", *small),
+        (2, "render", stage, f"--{FORGED}"),
+        (2, FORGED),
+        (0, "compare", f"{FORGED}.exr", f"{FORGED}.exr"),
+        (0, "sheet", f"{FORGED}.exr", "a.exr", "-o", f"{FORGED}-sheet.png"),
+        (0, "scene", "cornell", "-o", f"{FORGED}-scene.usda"),
+        (2, "farm", "submit", stage, "-o", "b.exr", "--on", "none", *small),
+        (0, "farm", "submit", stage, "-o", f"{FORGED}.exr", "--on", "none", "--no-strict",
+         "--job", job, *small),
+        (0, "farm", "status", job),
+    ):  # fmt: skip
+        done = forks.wavecomb(*words, cwd=tmp_path, env=env)
+        said = done.stdout + done.stderr
+        assert done.returncode == code, (words, said)
+        for line in re.sub("\x1b\\[[0-9;?]*[A-Za-z]", "", said).splitlines():
+            assert not line.strip().startswith("wrote faked"), (words, said)
+        is_error_or_figure = code == 2 or words[0] == "compare"
+        assert is_error_or_figure or "\\nwrote faked" in said, (words, said)
+
+
+def test_each_message_is_printed_as_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    terminal.say("a\nb", "c\x1b")
+    terminal.say("d\r\n", err=True)
+    out, err = capsys.readouterr()
+    assert (out, err) == ("a\\nb\nc\\x1b\n", "d\\x0d\\n\n")
+
+
+SEVERAL_LINES = (
+    "json.dumps(", "context.get_help()", "template.source_template", "error.format_message()",
+    "f'Wavecomb {version()} {_GREETING}'",
+)  # fmt: skip
+"""Arguments of click.echo that may have several lines: JSON, help, and code for completion."""
+
+
+def test_commands_print_messages_by_say() -> None:
+    package = Path(terminal.__file__).parent
+    problems = []
+    for path in sorted(package.rglob("*.py")):
+        text = path.read_text("utf-8")
+        if "echo(" not in text and "print(" not in text:
+            continue
+        for node in ast.walk(ast.parse(text)):
+            if not isinstance(node, ast.Call) or not node.args:
+                continue
+            called, printed = ast.unparse(node.func), ast.unparse(node.args[0])
+            if called == "click.echo" and not printed.startswith(SEVERAL_LINES):
+                problems.append(f"{path.relative_to(package)}: {printed}")
+            if called == "print" and path.name not in ("json_submission.py", "flip_process.py"):
+                problems.append(f"{path.relative_to(package)}: {printed}")
+    assert not problems, "print messages by terminal.say:\n" + "\n".join(problems)
 
 
 def test_lines_above_a_bar_are_clean() -> None:

@@ -15,6 +15,7 @@ import click
 
 from wavecomb.cli.options import examples
 from wavecomb.cli.setting_options import add_options, option
+from wavecomb.terminal import say
 
 _METRICS = (
     *("render_s", "shade_and_order_s", "shade_s", "load_s", "build_s"),
@@ -53,7 +54,7 @@ def list_command() -> None:
     for name in suite_names():
         suite = load_suite(find_suite(name))
         runs = len(configurations(suite, here)) * suite.repetitions
-        click.echo(f"{name:17} {runs:6} runs  {suite.title}")
+        say(f"{name:17} {runs:6} runs  {suite.title}")
 
 
 @bench_command.command("run")
@@ -118,11 +119,11 @@ def run_command(
     limit = time_limit * 60.0 if time_limit is not None else None
     options = Options(repetitions, only, threads, seed, limit, resume, only_these)
 
-    def say(line: str) -> None:
+    def tell(line: str) -> None:
         if not quiet or line.startswith("warning"):
-            click.echo(line, err=True)
+            say(line, err=True)
 
-    sitting = Sitting(chosen, ResultFolder(Path(output)), options, say)
+    sitting = Sitting(chosen, ResultFolder(Path(output)), options, tell)
     if progress == "json":
         sitting.event = _event
     if dry_run:
@@ -131,7 +132,7 @@ def run_command(
     with _stopped_by_sigterm():
         sitting.run()
     if not quiet and progress == "text":
-        click.echo(f"results are in {output}; `wavecomb bench report {output}` shows them")
+        say(f"results are in {output}; `wavecomb bench report {output}` shows them")
 
 
 def _event(name: str, /, **values: object) -> None:
@@ -167,9 +168,9 @@ def _dry_run(sitting: object) -> None:
     left = sitting.left() if sitting.options.resume else sitting.plan
     for config in sitting.configs:
         runs = sum(run.config is config for run in left)
-        click.echo(f"{config.name}: {runs} x {time_text(estimator.seconds(config))}")
+        say(f"{config.name}: {runs} x {time_text(estimator.seconds(config))}")
     basis = "results in the folder" if estimator.measured else "a short calibration; rough"
-    click.echo(
+    say(
         f"{len(left)} runs of {len(sitting.configs)} configurations, "
         f"about {time_text(estimator.total(left))} (from {basis}), "
         "plus the time for making stages and golden images"
@@ -198,9 +199,9 @@ def report_command(folder: str, markdown: str | None) -> None:
             f"bench report: {error.name} is missing; run `{install_command('bench')}`"
         ) from error
     page = Path(markdown) if markdown is not None else None
-    click.echo(f"wrote {build(Path(folder), page)}")
+    say(f"wrote {build(Path(folder), page)}")
     if page is not None:
-        click.echo(f"wrote {page}")
+        say(f"wrote {page}")
 
 
 @bench_command.command("compare")
@@ -225,4 +226,4 @@ def compare_command(before: str, after: str, metric: str, as_json: bool) -> None
         click.echo(json.dumps(found.to_dict(), indent=2))
         return
     for line in lines_of(found):
-        click.echo(line)
+        say(line)

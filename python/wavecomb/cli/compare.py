@@ -12,6 +12,7 @@ import click
 from wavecomb.cli.options import examples, isolate_option
 from wavecomb.cli.sandbox import enter_to_read
 from wavecomb.cli.setting_options import Real, add_options, option
+from wavecomb.terminal import say
 
 _METRICS = ("psnr", "ssim", "flip-ldr", "flip-hdr")
 _MAPS = ("absolute", "signed", "flip-ldr", "flip-hdr", "z")
@@ -176,10 +177,10 @@ def compare_command(
         click.echo(json.dumps(document, indent=2))
     else:
         for line in (*_lines(result), *_metric_lines(measured, test)):
-            click.echo(line)
+            say(line)
         if tolerance is not None and not result.equal:
             within = result.within(tolerance)
-            click.echo("within the tolerance" if within else "not within the tolerance")
+            say("within the tolerance" if within else "not within the tolerance")
     raise click.exceptions.Exit(0 if passed else 1)
 
 

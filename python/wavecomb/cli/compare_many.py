@@ -14,6 +14,7 @@ from wavecomb.image.compare.folders import FolderPair, PairResult, as_plain, pai
 from wavecomb.image.compare.heatmap import KINDS, Kind
 from wavecomb.image.files.output_file import replacing
 from wavecomb.image.thumbnails import DisplayOptions
+from wavecomb.terminal import say
 
 
 def compare_many(
@@ -33,7 +34,7 @@ def compare_many(
     for one in folders.compared():
         results.append(one)
         if not as_json:
-            click.echo(_line(one, tolerance))
+            say(_line(one, tolerance))
     good = sum(one.passed(tolerance) for one in results)
     passed = good == len(results) and not folders.only_a and not folders.only_b
     if page is not None:
@@ -46,10 +47,10 @@ def compare_many(
         return passed
     for label, names in (("A", folders.only_a), ("B", folders.only_b)):
         for name in names:
-            click.echo(f"{name}: only in {label}")
+            say(f"{name}: only in {label}")
     missing = len(folders.only_a) + len(folders.only_b)
     more = f"; {missing} have no other" if missing else ""
-    click.echo(f"{good} of {len(results)} pairs pass{more}")
+    say(f"{good} of {len(results)} pairs pass{more}")
     return passed
 
 

@@ -8,6 +8,7 @@ import json
 import click
 
 from wavecomb.cli.options import examples
+from wavecomb.terminal import say
 
 
 @click.command("doctor", epilog=examples("wavecomb doctor", "wavecomb doctor --json | jq .fit"))
@@ -22,6 +23,9 @@ def doctor_command(as_json: bool) -> None:
     from wavecomb.doctor import as_plain, examine, is_fit, lines
 
     found = examine()
-    click.echo(json.dumps(as_plain(found), indent=2) if as_json else "\n".join(lines(found)))
+    if as_json:
+        click.echo(json.dumps(as_plain(found), indent=2))
+    else:
+        say(*lines(found))
     if not is_fit(found):
         raise click.exceptions.Exit(2)

@@ -14,6 +14,7 @@ from wavecomb.cli.reporting import Done
 from wavecomb.errors import WavecombError
 from wavecomb.run.error_messages import describe
 from wavecomb.run.frame_names import frame_text
+from wavecomb.terminal import say
 
 
 def render_sequence(job: Job) -> tuple[Done | None, list[str]]:
@@ -47,7 +48,7 @@ def render_sequence(job: Job) -> tuple[Done | None, list[str]]:
                 so_far = f"{number - 1} of {len(wanted)} frames are written"
                 checkpoint = here.options.checkpoint
                 kept = f"; {checkpoint} continues it" if checkpoint else ""
-                click.echo(
+                say(
                     f"stopped in {place} {how_far(done)}, which is not written{kept}; {so_far}, "
                     "and --skip-existing continues after them",
                     err=True,

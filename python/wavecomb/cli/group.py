@@ -19,6 +19,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.run.error_messages import describe
 from wavecomb.run.isolation import supervisor
 from wavecomb.run.progress import keep_interrupts, was_interrupted
+from wavecomb.terminal import say
 
 ERROR = 2
 INTERRUPTED = 130
@@ -97,14 +98,14 @@ class Commands(click.Group):
         except click.ClickException as error:
             _fail(message_of(error), _help_of(error))
         except (click.Abort, KeyboardInterrupt):
-            click.echo("stopped", err=True)
+            say("stopped", err=True)
             sys.exit(INTERRUPTED)
         except Exception as error:
             if os.environ.get("WAVECOMB_DEBUG"):
                 raise
             if was_interrupted() and not isinstance(error, WavecombError):
                 # Some libraries catch a KeyboardInterrupt and raise another exception instead.
-                click.echo("stopped", err=True)
+                say("stopped", err=True)
                 sys.exit(INTERRUPTED)
             _fail(describe(error))
         lost = terminal.flush_streams()
@@ -112,7 +113,7 @@ class Commands(click.Group):
             line = f"standard output: {lost.strerror}"
             if _output_of(words) == "result":
                 _fail(f"{line}; the output is incomplete")
-            click.echo(f"warning: {line}; messages were lost", err=True)
+            say(f"warning: {line}; messages were lost", err=True)
         sys.exit(code if isinstance(code, int) else 0)
 
 
@@ -141,7 +142,7 @@ def print_version(ctx: click.Context, param: click.Parameter, value: bool) -> No
             text = library_text()
         except ImportError as error:
             text = describe(error)
-        click.echo(f"wavecomb {version()} ({text})")
+        say(f"wavecomb {version()} ({text})")
         ctx.exit()
 
 
@@ -154,7 +155,7 @@ def _fail(message: str, more: str | None = None) -> NoReturn:
     line = " ".join(message.split()).rstrip(".")
     if more:
         line += f" (`{more}` says more)"
-    click.echo(f"error: {line}", err=True)
+    say(f"error: {line}", err=True)
     sys.exit(ERROR)
 
 

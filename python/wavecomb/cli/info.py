@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from wavecomb import terminal
 from wavecomb.cli.options import (
     StageOptions,
     examples,
@@ -53,8 +54,6 @@ def info_command(stage: str | None, machine: bool, as_json: bool, **options: Any
     if as_json:
         click.echo(json.dumps(info, indent=2))
         return
-    from wavecomb import terminal
-
     warn(stage_warnings(loaded))
     print_info(info, loaded, terminal.console())
 
@@ -63,4 +62,7 @@ def _say_machine(as_json: bool) -> None:
     from wavecomb.info import machine_info, machine_lines
 
     info = machine_info()
-    click.echo(json.dumps(info, indent=2) if as_json else "\n".join(machine_lines(info)))
+    if as_json:
+        click.echo(json.dumps(info, indent=2))
+    else:
+        terminal.say(*machine_lines(info))

@@ -12,6 +12,7 @@ from wavecomb.cli.options import examples, isolate_option
 from wavecomb.cli.render_options import FileOptions
 from wavecomb.cli.sandbox import enter_to_read
 from wavecomb.cli.setting_options import option, options_of
+from wavecomb.terminal import say
 
 
 @click.command(
@@ -61,7 +62,7 @@ def merge_command(pictures: tuple[str, ...], output: str, png: str | None, **opt
         working = str(merged.metadata.get("wavecomb:working_space", "rec709"))
         write_png(png, to_rec709(merged.layers["beauty"], working))
     samples = merged.layers["samples"]
-    click.echo(
+    say(
         f"{len(pictures)} images, seeds {', '.join(map(str, merged.seeds))}: "
         f"{samples.mean():.0f} samples per pixel; wrote "
         + ", ".join([*map(str, written), *([png] if png else [])])

@@ -11,6 +11,7 @@ import click
 
 from wavecomb.cli.setting_options import Real, row_option
 from wavecomb.load_options import Row, rows
+from wavecomb.terminal import say
 
 if TYPE_CHECKING:
     from wavecomb.usd import LoadedStage
@@ -199,7 +200,7 @@ def _check_kept(row: Row, value: Any) -> None:
 def warn(lines: list[str]) -> None:
     """Prints warnings on stderr, each distinct line once."""
     for line in dict.fromkeys(lines):
-        click.echo(f"warning: {' '.join(line.split())}", err=True)
+        say(f"warning: {' '.join(line.split())}", err=True)
 
 
 def stage_warnings(loaded: LoadedStage) -> list[str]:

@@ -13,6 +13,7 @@ from wavecomb.cli.options import examples, isolation_options, stage_options
 from wavecomb.cli.render_options import RenderOptions, render_options
 from wavecomb.cli.sandbox import enter_to_render
 from wavecomb.cli.setting_options import option
+from wavecomb.terminal import say
 
 
 @click.command(
@@ -84,7 +85,7 @@ def render_command(part: str | None, **values: Any) -> None:
             done = job.run(shot, prepared.resumed)
             del shot  # free the scene's memory before the files are written
             if done.stopped is not None and not done.samples:
-                click.echo("stopped before the first sample; nothing was written", err=True)
+                say("stopped before the first sample; nothing was written", err=True)
                 raise click.exceptions.Exit(128 + done.stopped)
             done, files = job.write(done)
         if done is not None and options.costs is not None:
@@ -98,5 +99,5 @@ def render_command(part: str | None, **values: Any) -> None:
         job.reporter.finished(done, done.report, files)
         if done.stopped is not None:
             kept = f"{options.image} holds what was done"
-            click.echo(f"stopped {how_far(done)}; {kept}", err=True)
+            say(f"stopped {how_far(done)}; {kept}", err=True)
             raise click.exceptions.Exit(128 + done.stopped)

@@ -20,6 +20,7 @@ from wavecomb.run.progress import (
     loading_bar,
     progress_console,
 )
+from wavecomb.terminal import say
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -89,16 +90,16 @@ class Summary(Reporter):
 
     def ended(self, done: Done, files: Sequence[str]) -> None:
         """Prints a line with timings and files of a frame."""
-        click.echo(f"{self._frame}: {times_text(done.stats['seconds'])}; wrote {', '.join(files)}")
+        say(f"{self._frame}: {times_text(done.stats['seconds'])}; wrote {', '.join(files)}")
 
     def said(self, line: str) -> None:
         """Prints the line."""
-        click.echo(line)
+        say(line)
 
     def finished(self, done: Done, report: LoadReport, files: Sequence[str]) -> None:
         """Prints the summary, for a sequence with the figures of the last frame."""
         if self._frame:
-            click.echo(f"{self._frame}:")
+            say(f"{self._frame}:")
             files = [f"{len(files)} files"]
         print_summary(done.stats, report, files, verbose=self._verbose)
 

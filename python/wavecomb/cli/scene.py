@@ -10,6 +10,7 @@ import click
 
 from wavecomb.cli.options import examples
 from wavecomb.cli.setting_options import Real, add_options, option
+from wavecomb.terminal import say
 
 
 def _names(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
@@ -109,7 +110,7 @@ def scene_command(name: str | None, output: str | None, list_: bool, **options: 
     if list_:
         width = max(len(key) for key in SCENES)
         for key, info in SCENES.items():
-            click.echo(f"{key:{width}}  {info.summary}")
+            say(f"{key:{width}}  {info.summary}")
         return
     if name is None or output is None:
         raise click.UsageError("give a NAME and -o FILE, or --list")
@@ -121,4 +122,4 @@ def scene_command(name: str | None, output: str | None, list_: bool, **options: 
         write_scene(name, Path(output), **chosen)
     except ValueError as error:
         raise WavecombError(str(error)) from error
-    click.echo(f"wrote {output}")
+    say(f"wrote {output}")

@@ -11,6 +11,7 @@ import click
 from wavecomb.cli.options import examples, isolate_option
 from wavecomb.cli.sandbox import enter_to_read
 from wavecomb.cli.setting_options import Real
+from wavecomb.terminal import say
 
 
 @click.command(
@@ -88,7 +89,7 @@ def sheet_command(pictures: tuple[str, ...], output: str, **options: Any) -> Non
     else:
         title = options["title"] or os.path.basename(os.path.normpath(pictures[0]))
         _write_page(found, output, look, title, options)
-    click.echo(f"{len(found)} images; wrote {output}")
+    say(f"{len(found)} images; wrote {output}")
 
 
 def _write_sheet(found: dict[str, str], output: str, look: Any, options: dict[str, Any]) -> None:

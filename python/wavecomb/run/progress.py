@@ -279,7 +279,7 @@ def loading_bar(console: Console, title: str) -> Iterator[LoadProgress]:
         redirect_stderr=False,
     )
     with bar, terminal.lines_above(console):
-        task = bar.add_task(terminal.clean(title), total=None, figures="")
+        task = bar.add_task(terminal.one_line(title), total=None, figures="")
 
         def show(done: int, found: int) -> None:
             text = f"{done:,} of {found:,} prims"

@@ -15,6 +15,7 @@ from wavecomb.cli.farm.submit import ask_plan, plan_command, submit_command
 from wavecomb.cli.farm.tiles import assemble_tiles
 from wavecomb.cli.options import examples
 from wavecomb.errors import WavecombError
+from wavecomb.terminal import say
 
 if TYPE_CHECKING:
     from wavecomb.farm.folder import Folder
@@ -88,7 +89,7 @@ def resume_command(
     found = Job.of(ask_plan({"again": short.as_json()})["job"], job)
     changed = refresh(folder, replace(folder.job, files=found.files))
     if changed and not (quiet or as_json):
-        click.echo(f"{changed} files of the stage have changed, so all images are rendered again")
+        say(f"{changed} files of the stage have changed, so all images are rendered again")
     if where.kind == "none":
         raise WavecombError("--on none: renders nothing; give local:N, dask:ADDRESS or slurm:N")
     run_job(folder, where, threads=threads, dashboard=dashboard, as_json=as_json, quiet=quiet)
@@ -107,7 +108,7 @@ def status_command(job: str, maps: tuple[str, ...], as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps({"job": str(folder.path), **out.as_dict()}))
         return
-    click.echo(f"{folder.job.stage}: {out.state}: {how_far(out)}")
+    say(f"{folder.job.stage}: {out.state}: {how_far(out)}")
 
 
 @farm_command.command(
@@ -132,7 +133,7 @@ def task_command(job: str, image: int, tile: str, maps: tuple[str, ...]) -> None
     from wavecomb.farm.api import render_task
 
     for line in render_task(opened(job, maps), image, tile):
-        click.echo(f"warning: {line}", err=True)
+        say(f"warning: {line}", err=True)
 
 
 @farm_command.command(
@@ -169,9 +170,9 @@ def assemble_command(names: tuple[str, ...], maps: tuple[str, ...], as_json: boo
     if as_json:
         click.echo(json.dumps({"files": written}))
     elif written:
-        click.echo(f"wrote {', '.join(written)}")
+        say(f"wrote {', '.join(written)}")
     elif not wrong:
-        click.echo("all images are finished")
+        say("all images are finished")
     if wrong:
         more = f" and {len(wrong) - 1} more" if len(wrong) > 1 else ""
         raise WavecombError(f"{wrong[0]}{more}")
@@ -195,4 +196,4 @@ def export_command(job: str, **options: Any) -> None:
     from wavecomb.farm.openjd import write_template
 
     write_template(options["openjd"], opened(job))
-    click.echo(f"wrote {options['openjd']}")
+    say(f"wrote {options['openjd']}")

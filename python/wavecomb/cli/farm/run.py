@@ -14,6 +14,7 @@ import click
 from wavecomb.cli.options import warn
 from wavecomb.errors import WavecombError
 from wavecomb.run.progress import Interrupt, progress_console, time_text
+from wavecomb.terminal import say
 
 if TYPE_CHECKING:
     from wavecomb.farm.assembly import Outcome
@@ -61,20 +62,18 @@ def run_job(
 
     silent = as_json or quiet
     if not silent:
-        click.echo(f"job {folder.path}: {folder.job.task_count()} tasks")
+        say(f"job {folder.path}: {folder.job.task_count()} tasks")
     started = time.monotonic()
     with Interrupt() as interrupt, _shown(silent, as_json) as show:
         out = run(
             folder, where, threads=threads, dashboard=dashboard, show=show,
-            warn=lambda line: warn([line]), say=lambda line: click.echo(line, err=True),
+            warn=lambda line: warn([line]), say=lambda line: say(line, err=True),
             is_stopped=lambda: interrupt.requested,
         )  # fmt: skip
     if as_json:
         click.echo(json.dumps({"job": str(folder.path), **out.as_dict()}))
     if out.stopped and out.state != "done":
-        click.echo(
-            f"stopped: {how_far(out)}; `wavecomb farm resume {folder.path}` continues", err=True
-        )
+        say(f"stopped: {how_far(out)}; `wavecomb farm resume {folder.path}` continues", err=True)
         raise click.exceptions.Exit(128 + (interrupt.signal or 2))
     if out.failed:
         title, line = out.failed[0]
@@ -86,7 +85,7 @@ def run_job(
     if out.state != "done":
         raise WavecombError(f"{how_far(out)}; `wavecomb farm resume {folder.path}` continues")
     if not silent:
-        click.echo(f"{how_far(out)} in {time_text(time.monotonic() - started)}")
+        say(f"{how_far(out)} in {time_text(time.monotonic() - started)}")
 
 
 def how_far(out: Outcome) -> str:

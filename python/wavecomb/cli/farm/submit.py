@@ -20,6 +20,7 @@ from wavecomb.cli.render_options import RenderOptions, render_options
 from wavecomb.cli.sandbox import enter_to_read, enter_to_render
 from wavecomb.cli.setting_options import Real, SizeType
 from wavecomb.errors import WavecombError
+from wavecomb.terminal import say
 
 _PLAN_S = 4 * 3600.0
 """Time limit, in seconds, for reading and hashing all files of a stage."""
@@ -107,8 +108,10 @@ def submit_command(
     folder = Folder.create(path, Job.of(told["job"], path), learned)
     if where.kind == "none":
         tasks = folder.job.task_count()
-        said = {"job": str(folder.path), "tasks": tasks}
-        click.echo(json.dumps(said) if as_json else f"job {folder.path}: {tasks} tasks")
+        if as_json:
+            click.echo(json.dumps({"job": str(folder.path), "tasks": tasks}))
+        else:
+            say(f"job {folder.path}: {tasks} tasks")
         return
     run_job(folder, where, dashboard=dashboard, as_json=as_json, quiet=options["quiet"])
 
@@ -143,7 +146,7 @@ def ask_plan(request: dict[str, Any]) -> dict[str, Any]:
     if process.returncode:
         raise WavecombError((lines[-1] if lines else "the stage was not read")[len("error: ") :])
     for line in lines:
-        click.echo(line, err=True)
+        say(line, err=True)
     found: dict[str, Any] = json.loads(out)
     return found
 

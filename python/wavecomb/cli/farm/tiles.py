@@ -13,13 +13,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from wavecomb.cli.options import warn
 from wavecomb.cli.render_options import RenderOptions
 from wavecomb.cli.sandbox import enter_to_render
 from wavecomb.errors import WavecombError
 from wavecomb.run.guiding_file import BEFORE
+from wavecomb.terminal import say
 
 if TYPE_CHECKING:
     from wavecomb.cli.planning import Prepared
@@ -141,7 +140,7 @@ def render_tile(options: RenderOptions, tile: str) -> None:
         raise WavecombError("--tile: the stage has several render products; give --product")
     if not job.images:
         if not options.quiet:
-            click.echo("all images exist")
+            say("all images exist")
         return
     job = complete(job, tiles=layout(count, job.shots[0].region), learned=learned)
     renderer, written = Renderer(job, learned=learned), []
@@ -153,7 +152,7 @@ def render_tile(options: RenderOptions, tile: str) -> None:
         written.append(name)
     warn(list(renderer.warnings))
     if not options.quiet:
-        click.echo(f"wrote {', '.join(written)}")
+        say(f"wrote {', '.join(written)}")
 
 
 def assemble_tiles(output: str) -> list[str]:
