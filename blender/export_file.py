@@ -52,3 +52,6 @@ if __name__ == "__main__":
         line = " ".join(str(error).split()) or type(error).__name__
         print(f"error: {words[0]}: {line}", file=sys.stderr)
         sys.exit(1)
+    # Blender 4.2 may crash while its Python module is unloaded.
+    sys.stdout.flush()
+    os._exit(0)

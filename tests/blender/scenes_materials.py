@@ -166,7 +166,7 @@ def principled_alpha() -> None:
     _ball(base_color=(0.7, 0.3, 0.2), alpha=0.4)
 
 
-BOUNDARY = "half of the light enters by refraction in Cycles; the means agree"
+BOUNDARY = "light enters by refraction in Cycles, partly or wholly; the means agree"
 
 
 @scene("Principled", outside=0.1, why=BOUNDARY, spp=256)
