@@ -6,7 +6,7 @@ from the UsdPreviewSurface inputs below, so that other renderers show a similar 
 
 - diffuse: ``diffuseColor``.
 - metal: ``roughness``; ``diffuseColor`` is the reflectance at normal incidence; the optional
-``specularColor`` is the reflectance near 82 degrees.
+``specularColor`` is the F82 tint.
 - dielectric: ``ior``, ``roughness``, ``diffuseColor`` tints transmission.
 - plastic: ``diffuseColor`` of the base, ``ior`` and ``roughness`` of the coat.
 - emissive: ``emissiveColor``, radiance.

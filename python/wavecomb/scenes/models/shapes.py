@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Basic shapes of furniture, such as rounded boxes and tubes, and functions that place them.
+"""Basic shapes of furniture, such as rounded boxes and tubes, and how to add them to a stage.
 
 All shapes are closed meshes in metres. Texture coordinates are also in metres, with v along the
 grain.
