@@ -55,7 +55,7 @@ class Noise:
         return found
 
     def fractal(self, points: Points, octaves: int, gain: float = 0.5) -> NDArray[np.float32]:
-        """Sums octaves of noise to [0, 1], with weights that change by the factor ``gain``."""
+        """Sums octaves of noise to [0, 1]; ``gain`` is the ratio of successive weights."""
         found = np.zeros(len(points), np.float32)
         weight, weights = 1.0, 0.0
         for octave in range(octaves):

@@ -149,7 +149,7 @@ def read_rules(prim: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> dict[s
 
 
 SHARP = 1.0
-"""Crease sharpness above which an edge is shaded as a hard edge if the mesh is not subdivided."""
+"""Smallest crease sharpness that makes an edge hard if the mesh is not subdivided."""
 
 
 def sharp_edges(

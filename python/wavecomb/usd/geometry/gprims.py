@@ -42,8 +42,8 @@ memory."""
 class MemoryCheck:
     """Check that the meshes of one stage fit into memory.
 
-    Points of a .usdc file are loaded only when they are read, so that a stage may exceed the memory
-    later.
+    Points of a .usdc file are loaded only when they are read, so that a loaded stage may still turn
+    out too large.
     """
 
     def __init__(self, stage: Usd.Stage, time: Usd.TimeCode) -> None:

@@ -184,7 +184,7 @@ class Drivers:
     def value(self, shader: UsdShade.Shader, name: str, parameter: str) -> Value | None:
         """Returns the value of an input that drives a parameter; None if the input is not set.
 
-        Constants are in their authored colour space; varying colours are in the working space.
+        Constant colours are in linear Rec.709; varying colours are in the working space.
         """
         return self._read(parameter, lambda networks, kind: networks.input(shader, name, kind))
 

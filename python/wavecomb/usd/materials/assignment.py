@@ -33,7 +33,7 @@ class BoundMaterials:
     """The materials that are bound to a gprim.
 
     Attributes:
-        material: Material id of the faces without an entry in ``by_face``.
+        material: Material id of all faces that no GeomSubset binding covers.
         by_face: (face count,) material id of each face if the faces have different materials.
         reads: Primvars of the gprim that the materials read, by name.
     """
@@ -338,7 +338,7 @@ class _Primvars:
         return self._found[key]
 
     def highest(self, names: Iterable[str]) -> float:
-        """Returns the largest value of the named primvars that vary over the gprim, or 0."""
+        """Returns the largest value of the named primvars that materials read at hits, or 0."""
         return max((self.read[name].highest for name in names if name in self.read), default=0.0)
 
     def keep(self, wanted: PrimvarRequest) -> None:

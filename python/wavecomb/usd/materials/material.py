@@ -45,7 +45,7 @@ PREVIEW = "preview"
 """Kind of surface that ``surface_source`` returns for UsdPreviewSurface."""
 
 MIN_EMISSION = 1.0
-"""Emission above which a material counts as a light; a stage with such a material needs no dome."""
+"""Smallest emission of a material that counts as a light; such a stage gets no default dome."""
 
 _INSTEAD = "displayColor in its place"
 
