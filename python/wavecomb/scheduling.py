@@ -54,7 +54,8 @@ class SchedulingPolicy:
                 (largest texture, 0xffffffff for none), "material_texture_bytes" and
                 "material_graph" (value graph, 0xffffffff for none) have one entry per material id.
             costs: Estimated costs of shading a record in nanoseconds, constant during a pass:
-                "material_ns" by material id, "texture_ns" by texture id, and "mean_ns", the mean.
+                "material_ns" by material id, "texture_ns" by texture id, and "mean_ns", the mean
+                over measured records.
             keys: (records,) array of zeros that this method overwrites.
 
         Returns:

@@ -85,9 +85,9 @@ _is_child = False
 def can_fork() -> bool:
     """Returns whether a fork is safe.
 
-    A fork needs Linux, a single thread and unredirected standard streams; the last condition
-    excludes programs that call the command line in-process. If ``WAVECOMB_DEBUG`` is set, the
-    result is False, so that developers can debug the crash itself.
+    A fork needs Linux, a single thread and unredirected standard streams. This excludes programs
+    with threads or redirected output that call the command line in-process. If ``WAVECOMB_DEBUG``
+    is set, the result is False, so that developers can debug the crash itself.
     """
     return (
         sys.platform == "linux"

@@ -340,7 +340,7 @@ class StageWriter:
         light.AddTransformOp().Set(Gf.Matrix4d().SetRotate(turn))
 
     def dome_light(self, name: str, turn_degrees: float, intensity: float = 1.0) -> None:
-        """Adds an environment light with the procedural sky, at most 1024 x 512 texels."""
+        """Adds an environment light with a procedural sky, half as wide as large textures."""
         file, asset = self._texture_path("sky.exr")
         height = max(16, self._texture_size // 4)
         write_image(file, sky(2 * height, height, self._seed), "half")

@@ -329,8 +329,8 @@ class PreviewReader:
     def _coordinates(self, shader: UsdShade.Shader, parameter: str) -> tuple[float, ...]:
         """Returns the 2 x 3 matrix that transforms the mesh's texture coordinates.
 
-        The name of the UV primvar is added to ``uv_names``, and to ``texture_uvs`` if other
-        textures use another primvar. If the input ``st`` is not connected, the texture coordinates
+        The name of the UV primvar is added to ``uv_names``, and to ``texture_uvs`` if the first
+        texture uses another primvar. If the input ``st`` is not connected, the texture coordinates
         are constant: the authored value or (0, 0).
         """
         matrix: tuple[float, ...] = _IDENTITY_UV

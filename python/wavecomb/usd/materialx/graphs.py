@@ -150,7 +150,7 @@ class Graphs:
         return prim
 
     def _is_deep(self) -> bool:
-        """Returns whether a graph, with nested graphs, has more than ``MAX_EXPANDED`` nodes."""
+        """Returns whether any graph, with nested graphs, has over ``MAX_EXPANDED`` nodes."""
         return any(self._nodes_in(graph) > MAX_EXPANDED for graph in self._document.graphs)
 
     def _nodes_in(self, graph: Any) -> int:

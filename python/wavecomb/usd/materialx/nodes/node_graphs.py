@@ -31,7 +31,7 @@ NOT_NUMBERS = ("string", "filename", "geomname")
 
 
 _PLACES = ("texcoord", "st", "position", "normal", "index", "octaves", "style")
-"""Names of inputs that are never colours or normals, regardless of the use of the node's output."""
+"""Names of inputs that are read as plain numbers, whatever the node's output is used for."""
 
 
 def _kind(category: str, name: str, kind: str) -> str:
