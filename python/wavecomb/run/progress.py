@@ -87,7 +87,7 @@ def keep_interrupts() -> None:
     """Records Ctrl-C signals, so that the next ``Interrupt`` handles them if Python loses them.
 
     ``KeyboardInterrupt`` is lost if it is raised in a callback of a library that prints exceptions
-    and continues. Use this function in commands, which a ``KeyboardInterrupt`` ends, but not in a
+    and continues. Use this function in commands that end at Ctrl-C, but not in programs with a
     window. It also replaces the default action, which applies while the command is imported.
     """
 

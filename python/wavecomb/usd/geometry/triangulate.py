@@ -287,7 +287,7 @@ def smooth_normals(
 def _smoothing_groups(
     triangles: NDArray[np.int64], creases: NDArray[np.int64], point_count: int
 ) -> NDArray[np.int64]:
-    """Returns corner labels (3 m,), equal for corners of a point that meet across smooth edges."""
+    """Returns corner labels (3 m,); corners of a point with equal labels share a normal."""
     # Each half-edge has a corner at the end with the lower point index and a corner at the end with
     # the higher point index.
     corner = np.arange(triangles.size).reshape(-1, 3)

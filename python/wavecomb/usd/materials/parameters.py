@@ -185,7 +185,7 @@ class _Tracer:
     def _encoded(
         self, parameter: str, value: Any, attribute: Usd.Attribute | None, space: str
     ) -> Parameter:
-        """Returns a colour that cannot be edited because it is authored in another colour space."""
+        """Returns a colour parameter that is not editable because of its colour space."""
         # Ignore unknown colour spaces here, since the material reader reports them.
         with contextlib.suppress(ValueError):
             value = linear_colour(value, attribute)
