@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Interface of scheduling policies that are written in Python."""
+"""Base class for scheduling policies that are written in Python."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 COLUMNS = ("throughput", "position_key", "texture_key")
-"""Optional queue columns, which are computed only for policies that name them."""
+"""Optional columns of a queue of hits, which are computed only for policies that list them."""
 
 
 class SchedulingPolicy:
-    """Base of policies, which define the order in which the hits of a queue are shaded.
+    """Base class of scheduling policies, which choose the order in which queued hits are shaded.
 
-    Pass an object of a subclass to ``wavecomb.render``. ``order`` receives ids, keys and estimated
-    costs, and writes one 64-bit key per record. Records are shaded in ascending key order, with
-    equal keys in order of arrival. No policy can change the image; docs/writing-a-policy.md has an
-    example.
+    Pass an instance of a subclass to ``wavecomb.render``. The method ``order`` reads material ids
+    and estimated costs, and writes one 64-bit key per record (a queued hit). Records are shaded in
+    ascending order of keys; records with equal keys keep their order of arrival. A policy cannot
+    change the image. An example is in docs/writing-a-policy.md.
 
     Attributes:
-        name: Name in statistics.
+        name: Name of the policy in statistics.
         columns: Members of ``COLUMNS`` that ``order`` reads.
 
     >>> class CheapestFirst(SchedulingPolicy):
@@ -44,19 +44,19 @@ class SchedulingPolicy:
     ) -> bool | None:
         """Fills ``keys`` in place.
 
-        The render calls this method once per queue, from any thread (one at a time), so the result
-        must not depend on previous calls. An exception ends the render and is raised by the render
-        function.
+        The renderer calls this method once per queue, on any thread, but never concurrently. The
+        result must not depend on previous calls. If this method raises an exception, the render
+        ends and raises the exception.
 
         Args:
-            queue: Arrays with one entry per record, in order of arrival: "program", "material" and
-                the requested ``columns``; "depth", an int; and arrays by material id:
-                "material_texture" (its largest texture, 0xffffffff for none),
-                "material_texture_bytes" and "material_graph" (its value graph, 0xffffffff for
-                none).
-            costs: "material_ns" and "texture_ns", arrays by id, and "mean_ns": estimated cost of a
-                record in nanoseconds, constant during a pass.
-            keys: (records,) zeros to be overwritten.
+            queue: Arrays by name. "program", "material" and the requested ``columns`` have one
+                entry per record, in order of arrival. "depth" is an int. "material_texture"
+                (largest texture, 0xffffffff for none), "material_texture_bytes" and
+                "material_graph" (value graph, 0xffffffff for none) have one entry per material id.
+            costs: Estimated costs of shading a record in nanoseconds, constant during a pass:
+                "material_ns" by material id, "texture_ns" by texture id, and "mean_ns", the mean
+                over measured records.
+            keys: (records,) array of zeros that this method overwrites.
 
         Returns:
             False keeps the order of arrival without sorting; None or True sorts by the keys.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Standard streams of commands: all text for a terminal passes through ``Stream``.
+"""Standard output and error of commands; ``Stream`` cleans all text for a terminal.
 
 Commands print each message with ``say`` or with a string for ``console``. Both escape newlines as
 well, so that a name or a path that contains a newline cannot forge a line. Only help, JSON and the
@@ -7,8 +7,8 @@ code for completion are printed as several lines at once.
 
 Names of prims and files and messages of libraries may contain control characters, which would move
 the cursor, hide text or change the window's title. ``Stream`` writes control characters as escapes.
-A stream that is closed, whose reader has ended, or whose disk is full loses text but never ends a
-render.
+If a stream is closed, its reader has ended or the disk is full, text is lost, but the render
+continues.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class _Raw(io.FileIO):
     """A file descriptor wrapped so that writing never raises an exception.
 
     Attributes:
-        error: The first error of a write.
+        error: The first error that occurred while writing.
     """
 
     error: OSError | None = None
@@ -91,10 +91,10 @@ class _Raw(io.FileIO):
 
 
 class Stream(io.TextIOWrapper):
-    """Standard output or error.
+    """Standard output or standard error.
 
     Attributes:
-        plain: The same stream without escaping, for text with intended control characters.
+        plain: The same stream without escaping, for text whose control characters are intended.
     """
 
     def __init__(self, number: int, encoding: str, *, is_prompt: bool, owns: bool = False) -> None:
@@ -103,8 +103,8 @@ class Stream(io.TextIOWrapper):
         Args:
             number: The descriptor.
             encoding: Encoding of the text; ASCII is replaced by UTF-8.
-            is_prompt: Whether each line is written at once.
-            owns: Whether the descriptor is closed with the stream.
+            is_prompt: Whether each line is written immediately.
+            owns: Whether closing the stream also closes the descriptor.
         """
         self._raw = _Raw(number, "w", closefd=owns)
         if encoding.lower() in ("ascii", "us-ascii", "ansi_x3.4-1968", "646"):
@@ -132,7 +132,7 @@ class Stream(io.TextIOWrapper):
 
 
 class _Plain:
-    """A stream without escaping for Rich, whose control characters are intended."""
+    """A wrapper of a stream that does not escape control characters, for output of Rich."""
 
     def __init__(self, stream: Stream) -> None:
         self._stream = stream
@@ -150,8 +150,8 @@ _NAMES = ("stdout", "stderr")
 def guard_streams() -> None:
     """Replaces standard output and error by ``Stream`` objects, and opens closed descriptors.
 
-    A closed descriptor 0, 1 or 2 would be reused for the next opened file, which then would receive
-    messages. Streams that a program or a test has replaced are kept.
+    If descriptor 0, 1 or 2 were closed, the next opened file would get its number and receive
+    messages. Streams that a program or a test has already replaced stay unchanged.
     """
     for number in range(3):
         try:
@@ -181,7 +181,7 @@ _replaced: list[Any] = []
 
 
 def flush_streams() -> OSError | None:
-    """Flushes standard output and error; returns the reason why standard output lost text."""
+    """Flushes standard output and error; returns the error by which standard output lost text."""
     for stream in (sys.stdout, sys.stderr):
         if stream is not None:
             with contextlib.suppress(OSError, ValueError):
@@ -216,7 +216,7 @@ def console(**options: Any) -> Console:
 
 @contextlib.contextmanager
 def lines_above(console: Console) -> Iterator[None]:
-    """Prints lines of the standard streams above a progress bar while it is shown."""
+    """Prints text of standard output and error above a progress bar while the bar is shown."""
     from rich.file_proxy import FileProxy
 
     class Proxy(FileProxy):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Live view of a render in a notebook: a progress bar, figures, and the current image.
+"""Live view of a render in a notebook: progress bar, speed and remaining time, current image.
 
 Uses ipywidgets if it is installed, otherwise IPython's updatable output.
 """
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 PICTURE_EDGE = 480
 """Longer edge of the live image in pixels."""
 FIRST_S, EVERY_S = 1.0, 2.0
-"""Delay of the first image and interval of later ones in seconds; short renders show only a bar."""
+"""Seconds until the first image, and seconds between images."""
 BAR_EVERY_S = 0.25
 
 
 @dataclass(frozen=True)
 class ProgressDisplays:
-    """Progress displays of a render, for ``Watcher``."""
+    """Reporter and image sinks that show the progress of a render."""
 
     reporter: Silent
     sinks: Sequence[Sink] = ()
@@ -37,10 +37,10 @@ class ProgressDisplays:
 
 @contextlib.contextmanager
 def watching(asked: bool | None, space: str = "rec709") -> Iterator[ProgressDisplays | None]:
-    """Shows a render inside the block; yields None if there is no display.
+    """Shows the progress of a render in the ``with`` block; yields None if nothing is shown.
 
     Args:
-        asked: True shows the render in a notebook or terminal, None only in a notebook, False
+        asked: True shows progress in a notebook or terminal, None only in a notebook, False
             nowhere.
         space: Working colour space of the image.
     """
@@ -66,10 +66,10 @@ def in_notebook() -> bool:
 
 
 class View(Protocol):
-    """Interface of a live view in a notebook."""
+    """Interface of the live views for notebooks."""
 
     def bar(self, share: float, text: str) -> None:
-        """Shows the completed fraction of the render, 0 to 1, and text such as its speed."""
+        """Shows the completed fraction of the render, from 0 to 1, and a text such as its speed."""
 
     def picture(self, png: bytes) -> None:
         """Shows the current image."""
@@ -79,7 +79,7 @@ class View(Protocol):
 
 
 class WidgetView:
-    """Live view made of ipywidgets."""
+    """Live view that uses ipywidgets."""
 
     def __init__(self) -> None:
         import ipywidgets
@@ -107,7 +107,7 @@ class WidgetView:
 
 
 class IPythonView:
-    """Live view made of IPython's updatable output."""
+    """Live view that uses IPython's updatable output."""
 
     def __init__(self) -> None:
         from IPython.display import HTML, display
@@ -142,7 +142,7 @@ class IPythonView:
 
 
 def make_view() -> View:
-    """Returns the best view that is available."""
+    """Returns an ipywidgets view if ipywidgets is installed, otherwise an IPython view."""
     with contextlib.suppress(ImportError):
         return WidgetView()
     return IPythonView()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Progress on a terminal or as JSON, and handling of Ctrl-C that keeps finished work."""
+"""Progress output on a terminal or as JSON, and Ctrl-C handling that keeps finished samples."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _FORCED = ("FORCE_COLOR", "TTY_COMPATIBLE")
 
 
 def count_text(value: float) -> str:
-    """Formats a count with three digits and a unit.
+    """Formats a count with three significant digits and a suffix such as k or M.
 
     >>> count_text(1234567), count_text(999), count_text(0.5)
     ('1.23 M', '999', '0.5')
@@ -70,7 +70,7 @@ def speed(status: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def left_text(seconds: float) -> str:
-    """Formats a time left in whole seconds, rounded up.
+    """Formats the remaining time in seconds, rounded up.
 
     >>> left_text(0.2), left_text(59.1), left_text(7322)
     ('1 s left', '1 min 00 s left', '2 h 02 min left')
@@ -80,14 +80,14 @@ def left_text(seconds: float) -> str:
 
 
 _earlier: list[int] = []
-"""Signals that ``keep_interrupts`` recorded and no ``Interrupt`` has handled."""
+"""Signals that ``keep_interrupts`` has recorded and no ``Interrupt`` has handled yet."""
 
 
 def keep_interrupts() -> None:
-    """Records Ctrl-C signals, so that the next ``Interrupt`` handles signals that were lost.
+    """Records Ctrl-C signals, so that the next ``Interrupt`` handles them if Python loses them.
 
     ``KeyboardInterrupt`` is lost if it is raised in a callback of a library that prints exceptions
-    and continues. Use this function in commands, which a ``KeyboardInterrupt`` ends, but not in a
+    and continues. Use this function in commands that end at Ctrl-C, but not in programs with a
     window. It also replaces the default action, which applies while the command is imported.
     """
 
@@ -149,10 +149,11 @@ class Interrupt:
 
 
 def progress_console(*, quiet: bool = False) -> Console | None:
-    """Returns the console for progress (standard error), or None if it is not visible.
+    """Returns a console on standard error for progress, or None if standard error is no terminal.
 
-    Rich decides whether standard error is a terminal. To save time, Rich is loaded only if standard
-    error is a terminal or if an environment variable of Rich says that it is one.
+    Rich decides whether standard error is a terminal. Loading Rich takes time. It is therefore
+    loaded only if standard error is a terminal or if one of Rich's environment variables declares
+    it to be one.
     """
     is_terminal = sys.stderr is not None and sys.stderr.isatty()
     if quiet or not (is_terminal or any(name in os.environ for name in _FORCED)):
@@ -178,11 +179,12 @@ class Silent:
 
 
 def figures(status: Mapping[str, Any], columns: int = 200) -> list[str]:
-    """Returns the texts beside a progress bar: time left, error, samples and rays per second, pass.
+    """Returns the texts beside a progress bar, such as the time left and samples per second.
 
     Args:
         status: Values of ``Snapshot.status`` in _core.pyi.
-        columns: Width available for the texts; the last texts are left out if they do not fit.
+        columns: Width available for the texts, in columns; texts at the end that do not fit are
+            left out.
     """
     rates = speed(status)
     said = []
@@ -201,11 +203,11 @@ def figures(status: Mapping[str, Any], columns: int = 200) -> list[str]:
 
 
 MOST_BAR, LEAST_BAR = 40, 10
-"""Columns of a progress bar on a wide and on a narrow terminal."""
+"""Largest and smallest width of a progress bar, in columns."""
 
 
 def bar_width(columns: int) -> int:
-    """Returns the width of a progress bar on a terminal.
+    """Returns the width of a progress bar in columns on a terminal with ``columns`` columns.
 
     >>> bar_width(60), bar_width(100), bar_width(160)
     (15, 25, 40)
@@ -216,7 +218,7 @@ def bar_width(columns: int) -> int:
 class ProgressBar(Silent):
     """Progress bar with passes, samples and rays per second, error and time left.
 
-    The progress bar is a context manager.
+    Use the progress bar in a ``with`` statement.
     """
 
     def __init__(self, console: Console, title: str = "rendering") -> None:
@@ -261,12 +263,12 @@ class ProgressBar(Silent):
 
 
 LoadProgress = Callable[[int, int], None]
-"""Progress callback: progress(prims read, prims found so far)."""
+"""Callback with the number of prims read and the number of prims found so far."""
 
 
 @contextlib.contextmanager
 def loading_bar(console: Console, title: str) -> Iterator[LoadProgress]:
-    """Shows a progress bar while a stage is read; it pulses until the first callback."""
+    """Shows a progress bar while a stage is loaded; yields the callback that updates the bar."""
     from rich.progress import BarColumn, Progress, TextColumn
 
     bar = Progress(
@@ -289,7 +291,7 @@ def loading_bar(console: Console, title: str) -> Iterator[LoadProgress]:
 
 
 class ProgressLines(Silent):
-    """Reporter that writes JSON lines about once per second and per file, for wrapper programs."""
+    """Reporter that writes progress and the names of written files as JSON lines."""
 
     def __init__(self, write: Callable[[str], None], *, every: float = 1.0) -> None:
         self._write = write

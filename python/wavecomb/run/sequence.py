@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 
 
 class Frames:
-    """Frames of an open stage; each image is bit-identical to that of a separate render.
+    """Renders frames of an open stage, bit-identical to separate renders of the frames.
 
-    If only views change, this class keeps the scene with its acceleration structures and reads the
-    camera. If anything else changes, the stage is traversed again, but unchanged meshes and
-    textures of the previous frame are reused.
+    If only the camera changes between frames, the scene and its acceleration structures are kept.
+    Otherwise the stage is traversed again, and unchanged meshes and textures of the previous frame
+    are reused.
 
-    Contract: files of the stage must not change, except images.
+    Contract: the stage's layers must not change on disk while it is open; its images may.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class Frames:
         """Opens the stage.
 
         Args:
-            path: .usd, .usda, .usdc or .usdz.
+            path: USD file with ending .usd, .usda, .usdc or .usdz.
             options: Load options.
             **changes: Fields of ``LoadOptions`` that replace those of ``options``.
 
@@ -71,7 +71,7 @@ class Frames:
             frame: Time code; None means the start time code of the stage, or default values
                 if the stage has none.
             progress: Progress callback as in ``wavecomb.load``.
-            **changes: Fields of ``LoadOptions`` that replace the initial options.
+            **changes: Fields of ``LoadOptions`` that replace the options given to the constructor.
 
         Raises:
             WavecombError: The stage cannot be rendered.
@@ -96,7 +96,7 @@ class Frames:
     def _with_camera(self, options: LoadOptions) -> LoadedStage | None:
         """Returns the current scene with its camera at a frame.
 
-        The result is None if more than the camera changes.
+        The result is None if anything besides the camera differs at the frame.
         """
         before, renderer = self._loaded, self._renderer
         assert before is not None and renderer is not None
@@ -153,7 +153,7 @@ def render_frames(
     Each image is bit-identical to that of ``render(path, frame=...)``.
 
     Args:
-        path: .usd, .usda, .usdc or .usdz.
+        path: USD file with ending .usd, .usda, .usdc or .usdz.
         frames: "1-48", "1-48x2", "1,5,9", or numbers.
         size: Width and height in pixels, as in ``render``.
         spp: Samples per pixel, as in ``render``.

@@ -44,8 +44,7 @@ def prepare(
 ) -> tuple[Any, dict[str, dict[str, float]] | None, tuple[str, ...], Settings]:
     """Validates arguments of ``render``.
 
-    Returns the scheduling policy and the cost profile if they are custom (else None), the AOV names
-    and the settings.
+    Returns custom scheduling policy and cost profile (None if not custom), AOV names and settings.
     """
     own: Any = None
     if isinstance(policy, str):
@@ -92,8 +91,8 @@ def make_settings(
 ) -> Settings:
     """Returns validated settings; raises WavecombError or _core.Error with a one-line message.
 
-    ``size`` is the image size without overscan, and ``aovs`` are expanded. Also checks by ``fits``
-    (default: ``check_memory``) that the image fits into this machine's memory.
+    ``size`` is the image size without overscan, and ``aovs`` are expanded. The function ``fits``
+    (default: ``check_memory``) raises an error if the image needs too much memory.
     """
     from wavecomb import _core
     from wavecomb.errors import WavecombError
@@ -123,8 +122,8 @@ def check_memory(settings: Settings, aovs: Sequence[str], light_groups: int = 1)
     Args:
         settings: Settings of the render.
         aovs: Expanded AOVs.
-        light_groups: Number of light groups of the scene; if unknown, repeat the check after
-            loading.
+        light_groups: Number of light groups of the scene. If the number is unknown, call this
+            function again after loading.
     """
     from wavecomb.errors import WavecombError
 
@@ -155,7 +154,7 @@ def image_bytes(settings: Settings, aovs: Sequence[str], light_groups: int = 1) 
 
 
 def image_size(settings: Settings) -> tuple[int, int]:
-    """Returns width and height of the image, which may be cropped."""
+    """Returns width and height of the image in pixels, after cropping."""
     if not settings.crop or settings.region is None:
         return settings.width, settings.height
     x0, y0, x1, y1 = settings.region
@@ -163,7 +162,7 @@ def image_size(settings: Settings) -> tuple[int, int]:
 
 
 def has_error_layers(settings: Settings) -> bool:
-    """Returns whether a render with these settings writes error and variance layers."""
+    """Returns whether a render with these settings writes layers with its error and variance."""
     return bool(
         settings.adaptive or settings.noise or settings.error or settings.allocate != "even"
     )

@@ -34,7 +34,7 @@ PHASES = (
     "metrics",
 )
 SORTING = ("keys", "sort", "materialize")
-"""Phases that exist only to sort records before shading."""
+"""Render phases that only sort records (queued hits) before shading."""
 COUNTS = ("samples", "rays", "shadow_rays", "records")
 DEPTHS = ("rays", "shadow_rays", "records", "paths_ended")
 MEMORY = ("accelerator", "meshes", "textures", "records", "waves", "film", "picture")
@@ -51,11 +51,11 @@ def make_stats(
 ) -> dict[str, Any]:
     """Returns the statistics of a result, including stage, load time and machine.
 
-    ``resumed_s`` is the render time before this run continued from a checkpoint. Without
-    ``is_built`` the acceleration structures already existed, so that their build time is 0.
+    ``resumed_s`` is the render time before this run continued from a checkpoint. If ``is_built`` is
+    False, the acceleration structures existed before, and their build time is reported as 0.
 
-    Every key of the schema exists; figures that the core does not provide are 0. Values of the core
-    that the schema lacks are included.
+    The result has every key of the schema; values that the core does not provide are 0. The result
+    also has values of the core that are not in the schema.
     """
     core = dict(result.stats)
     seconds = dict(core.pop("seconds", {}))
@@ -130,7 +130,7 @@ def make_stats(
 
 
 def rendered_pixels(settings: Mapping[str, Any]) -> int:
-    """Returns the number of pixels for which a render with these settings has samples."""
+    """Returns the number of pixels that a render with these settings samples."""
     if settings.get("region") is None:
         return int(settings["width"] * settings["height"])
     x0, y0, x1, y1 = settings["region"]
@@ -138,7 +138,7 @@ def rendered_pixels(settings: Mapping[str, Any]) -> int:
 
 
 def sort_overhead(phases: Mapping[str, float]) -> float:
-    """Returns the fraction of ordered shading time that was spent on sorting.
+    """Returns the fraction of the time for sorting and shading that was spent on sorting.
 
     The fraction is (keys + sort + materialize) / (keys + sort + materialize + shade); 0 if nothing
     was shaded.
@@ -152,7 +152,7 @@ def sort_overhead(phases: Mapping[str, float]) -> float:
 
 
 def machine() -> dict[str, Any]:
-    """Returns a description of the machine that identifies neither it nor its user."""
+    """Returns a description of the machine without data that identifies the machine or its user."""
     return {
         "cpu": _cpu_name(),
         "cores": usable_cores(),

@@ -41,10 +41,10 @@ __all__ = ["SCENES", "SceneError", "SceneInfo", "SceneOptions", "cornell", "writ
 
 @dataclass(frozen=True)
 class SceneInfo:
-    """A scene that ``write_scene`` can write.
+    """Description of a procedural scene for ``write_scene``.
 
     Attributes:
-        summary: Description in one line, for a list.
+        summary: One line that describes the scene in a list of scenes.
         metres_per_unit: Length of a scene unit, in metres.
         build: Function that fills a stage.
     """
@@ -83,7 +83,7 @@ SCENES: dict[str, SceneInfo] = {
 
 
 def write_scene(name: str, path: Path, **options: Any) -> None:
-    """Writes a procedural stage, with textures and volumes in folders ``<stem>_...`` beside it.
+    """Writes a procedural stage; textures and volumes go to folders ``<stem>_...`` next to it.
 
     Args:
         name: A key of ``SCENES``.
@@ -91,8 +91,8 @@ def write_scene(name: str, path: Path, **options: Any) -> None:
         **options: Fields of ``SceneOptions``.
 
     Raises:
-        SceneError: The name, the file's ending, an option or an imported mesh is invalid, or a file
-            cannot be written. SceneError is also a ValueError.
+        SceneError: The scene name, the file's ending, an option or an imported mesh is invalid, or
+            a file cannot be written. SceneError is also a ValueError.
     """
     if name not in SCENES:
         raise SceneError(f"no scene {name!r}; there are {', '.join(SCENES)}")
@@ -115,7 +115,7 @@ def write_scene(name: str, path: Path, **options: Any) -> None:
 
 
 def cornell() -> Usd.Stage:
-    """Returns the Cornell box as a stage in memory, for a first image in three lines.
+    """Returns the Cornell box as a stage in memory.
 
     >>> import wavecomb
     >>> image = wavecomb.render(wavecomb.scenes.cornell())  # doctest: +SKIP

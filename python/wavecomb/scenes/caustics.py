@@ -30,7 +30,7 @@ def ball(radius: float, level: int) -> Mesh:
 
 
 def ring(radius: float, thickness: float, height: float, level: int) -> Mesh:
-    """Makes a finger ring on y = 0: an ellipse ``thickness`` wide, revolved about y."""
+    """Makes a finger ring on y = 0 by revolving an ellipse of width ``thickness`` about y."""
     across, around = 2 * level, 8 * level
     a = np.linspace(0.0, 2.0 * np.pi, across + 1)
     b = np.linspace(0.0, 2.0 * np.pi, around + 1)
@@ -43,7 +43,7 @@ def ring(radius: float, thickness: float, height: float, level: int) -> Mesh:
 
 
 def build_caustics(writer: StageWriter, options: SceneOptions) -> None:
-    """Builds a floor and a wall, a ball and a ring, and a small light."""
+    """Builds a glass ball and a gold ring under a small light, on a floor in front of a wall."""
     writer.material("Floor", materials.diffuse((0.62, 0.60, 0.57)))
     writer.material("Wall", materials.diffuse((0.35, 0.42, 0.50)))
     h = _HALF
@@ -87,12 +87,12 @@ LENS_FOCUS, _LENS_RADIUS = 2.0, 0.9
 so the lens images it at the same distance and size on the other side."""
 
 _LAND = 100.0
-"""Half extent of the landscape along x and z; the ring in the landscape has radius 1."""
+"""Half extent of the landscape along x and z; the glass ring that lies in it has radius 1."""
 _HILL = 6.0
 
 
 def land(cells: int) -> Mesh:
-    """Makes hills that are flat in the middle, with ``cells`` cells along each side."""
+    """Makes hills that are flat in the middle, as a grid of ``cells`` x ``cells`` cells."""
     x, z = np.meshgrid(*[np.linspace(-_LAND, _LAND, cells + 1)] * 2)
     far = np.clip(np.hypot(x, z) / (0.3 * _LAND) - 0.3, 0.0, 1.0)
     waves = 1.0 + np.sin(0.11 * x + 0.7) * np.cos(0.083 * z - 0.4)
@@ -104,7 +104,7 @@ def land(cells: int) -> Mesh:
 def build_landscape(writer: StageWriter, options: SceneOptions) -> None:
     """Builds wide hills in the sun, and a glass ring on the ground near the camera.
 
-    Nearly all light of the sun falls outside of the camera's view.
+    Nearly all sunlight falls on ground that the camera does not see.
     """
     writer.material("Soil", materials.diffuse((0.45, 0.40, 0.33)))
     writer.material("Glass", materials.CLEAR_GLASS)
@@ -119,7 +119,7 @@ def build_landscape(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def water(level: int) -> Mesh:
-    """Makes the water surface, with ``level`` cells per metre and analytic normals of the waves."""
+    """Makes the water surface of the pool, with ``level`` cells per metre and analytic normals."""
     x0, z0 = _POOL
     columns, rows = 2 * round(x0 * level) + 1, 2 * round(z0 * level) + 1
     x, z = np.meshgrid(np.linspace(-x0, x0, columns), np.linspace(-z0, z0, rows))
@@ -136,7 +136,7 @@ def water(level: int) -> Mesh:
 
 
 def _basin() -> tuple[FloatArray, list[list[int]]]:
-    """Returns points and faces of the pool's floor and walls, facing inwards, and of its rim."""
+    """Returns points and faces of the pool's floor, walls (facing inwards) and rim."""
     (x, z), low, high, out = _POOL, -_DEPTH, _RIM, 0.6
     corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
     points = [(sx * x, low, sz * z) for sx, sz in corners]
@@ -195,7 +195,7 @@ def lens(level: int) -> Mesh:
 
 
 def build_lens(writer: StageWriter, options: SceneOptions) -> None:
-    """Builds a lens between a small light and a wall, and a floor."""
+    """Builds a lens between a small light and a wall, above a floor."""
     writer.material("Matt", materials.diffuse((0.6, 0.6, 0.6)))
     writer.material("Dark", materials.diffuse((0.04, 0.04, 0.04)))
     writer.material("Glass", materials.CLEAR_GLASS)

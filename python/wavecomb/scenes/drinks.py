@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Three glasses for nested dielectrics; candles and a marble ball for subsurface scattering.
+"""Scenes: three drinks for nested dielectrics; candles and a marble ball for subsurface scattering.
 
-Each drink overlaps its glass, and the priorities of the materials determine the boundary.
+Each drink overlaps the wall of its glass, and material priorities decide which medium fills the
+overlap.
 """
 
 from __future__ import annotations
@@ -18,14 +19,14 @@ from wavecomb.scenes.options import SceneOptions
 
 _RADIUS, _HEIGHT, _WALL, _FOOT = 3.0, 10.5, 0.32, 1.0
 _OVERLAP = 0.1
-"""Overlap of drink and glass, in centimetres."""
+"""Depth by which a drink overlaps its glass, in centimetres."""
 _DRINKS: tuple[tuple[str, tuple[float, float, float], float, Colour, Colour, float], ...] = (
     ("Cordial", (-8.0, 0.0, -1.0), 8.2, (0.0, 0.0, 0.0), (0.08, 0.9, 0.75), 0.0),
     ("Juice", (0.0, 0.0, 0.5), 8.8, (1.6, 1.3, 0.7), (0.01, 0.16, 1.3), 0.6),
     ("Milk", (8.0, 0.0, -1.0), 7.0, (4.0, 4.2, 4.5), (0.001, 0.003, 0.012), 0.5),
 )
-"""Name, position and level of each drink, its scattering and absorption per centimetre, and its
-mean cosine."""
+"""Name, position and fill height of each drink, its scattering and absorption coefficients per
+centimetre, and the mean cosine of its phase function."""
 
 
 def _glassy(writer: StageWriter, name: str, ior: float, **inputs: tuple[str, object]) -> None:
@@ -40,12 +41,12 @@ def _glassy(writer: StageWriter, name: str, ior: float, **inputs: tuple[str, obj
 
 
 def _wall(height: float, inwards: float) -> tuple[float, float]:
-    """Returns a point of the tumbler's inclined side, ``inwards`` from its outer surface."""
+    """Returns a point of the tumbler's sloping wall, ``inwards`` from its outer surface."""
     return (_RADIUS * (0.86 + 0.14 * height / _HEIGHT) - inwards, height)
 
 
 def _rounded(corners: list[tuple[float, float]], radius: float) -> FloatArray:
-    """Rounds the inner corners of a polyline with curves of a radius."""
+    """Rounds the inner corners of a polyline with curves of radius ``radius``."""
     points = np.array(corners)
     line = [points[0]]
     for before, here, after in zip(points, points[1:], points[2:], strict=False):
@@ -79,7 +80,7 @@ def _serve(
 
 
 def build_drinks(writer: StageWriter, options: SceneOptions) -> None:
-    """Builds the glasses in front of a window."""
+    """Builds three glasses with drinks in front of a window."""
     writer.material("Table", materials.plastic((0.32, 0.26, 0.2), 0.35))
     writer.material("Wall", materials.diffuse((0.5, 0.52, 0.55)))
     _glassy(writer, "Glass", 1.52, dielectric_priority=("integer", 1))
@@ -124,7 +125,7 @@ def below_surface(
         name: Name of the material.
         colour: Diffuse reflectance of a flat surface of the material.
         radius: Mean free path of each colour channel, in scene units.
-        **inputs: Further inputs of the OpenPBR surface.
+        **inputs: Other inputs of the OpenPBR surface.
     """
     net = Network(writer.stage, f"/World/Looks/{name}")
     longest = max(radius)
@@ -163,7 +164,7 @@ def _candle(writer: StageWriter, name: str, at: tuple[float, float, float], radi
 
 
 def build_candles(writer: StageWriter, options: SceneOptions) -> None:
-    """Builds the table, the candles and the ball, in a dim room."""
+    """Builds a table with candles and a marble ball, in a dim room."""
     writer.material("Table", materials.plastic((0.17, 0.08, 0.045), 0.3))
     writer.material("Wick", materials.diffuse((0.03, 0.025, 0.02)))
     writer.material("Flame", materials.emissive(_FLAME))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fur and hair: strands on smooth bodies, combed and bent, as cubic curves.
+"""Scenes of fur and hair, with combed and bent strands as cubic curves on smooth bodies.
 
-NumPy grows all strands of a body together, point by point; 100,000 strands take about a second.
+NumPy computes one point of all strands at a time; 100,000 strands take about a second.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from wavecomb.scenes.models.shapes import turned
 from wavecomb.scenes.options import SceneOptions
 
 HEAD_LEVEL = 96
-"""Number of cells from pole to pole."""
+"""Number of mesh cells of the head from pole to pole."""
 
 _AXES = (0.78, 1.12, 0.98)
 _BUMPS = (
@@ -36,11 +36,11 @@ _BUMPS = (
     ((1.0, -0.05, -0.05), 0.16, 0.10),  # ears
     ((-1.0, -0.05, -0.05), 0.16, 0.10),
 )
-"""Direction, angular width and height of each bump or dent."""
+"""Direction, angular width and height of each bump of the head; negative heights are dents."""
 
 
 def head_radius(d: FloatArray) -> FloatArray:
-    """Returns the radius (n,) of the head in unit directions (n, 3)."""
+    """Returns the radius (n,) of the head along unit directions (n, 3)."""
     jaw = ramp(-d[:, 1], 0.1, 1.0)
     x, y, z = d[:, 0] / (_AXES[0] - 0.20 * jaw), d[:, 1] / _AXES[1], d[:, 2] / _AXES[2]
     radius = 1.0 / np.sqrt(x * x + y * y + z * z)
@@ -51,7 +51,7 @@ def head_radius(d: FloatArray) -> FloatArray:
 
 
 def is_scalp(d: FloatArray, chance: FloatArray) -> NDArray[np.bool_]:
-    """Returns whether hair grows in unit directions (n, 3), as (n,).
+    """Returns whether hair grows on the head in unit directions (n, 3); the result is (n,).
 
     Hair grows above a line from brow to neck, and sparser near the line.
     """
@@ -60,7 +60,7 @@ def is_scalp(d: FloatArray, chance: FloatArray) -> NDArray[np.bool_]:
 
 
 def head_mesh(level: int) -> Mesh:
-    """Makes the head as a mesh of ``level`` cells from pole to pole."""
+    """Makes the head as a mesh with ``level`` cells from pole to pole."""
     columns = 2 * level
     up = np.linspace(-0.5 * np.pi, 0.5 * np.pi, level + 1)
     turn = np.linspace(0.0, 2.0 * np.pi, columns + 1)
@@ -86,7 +86,7 @@ def _sphere(rng: np.random.Generator, count: int) -> FloatArray:
 
 
 def _waves(p: FloatArray, frequency: float, seed: float) -> FloatArray:
-    """Evaluates a smooth vector field around 0 at points ``p``, (n, 3)."""
+    """Evaluates a smooth random vector field with mean 0 at points ``p``, (n, 3)."""
     turns = np.array([[1.0, 0.7, -0.4], [-0.6, 1.1, 0.5], [0.3, -0.8, 1.2]]) * frequency
     return np.sin(p @ turns.T + seed * np.array([1.0, 2.3, 4.1]))
 
@@ -107,8 +107,8 @@ def add_strands(
         strands: Points of the strands, (n, points, 3), root first.
         width: Width at the root, in scene units.
         material: Name of the bound material.
-        primvars: Interpolation (uniform or varying) and values (numbers or colours) of each
-            primvar, by name.
+        primvars: For each primvar, its interpolation ("uniform" or "varying") and its values
+            (numbers or colours).
     """
     count, points = strands.shape[:2]
     flat = strands.reshape(-1, 3).astype(np.float32)
@@ -148,7 +148,7 @@ def _floor(writer: StageWriter, height: float) -> None:
 
 
 def _egg(d: FloatArray) -> FloatArray:
-    """Returns the points of an egg about the origin in directions ``d``."""
+    """Returns the points of an egg around the origin, in directions ``d``."""
     return d * np.array([0.95, 1.15, 0.95]) * (1.0 + 0.12 * d[..., 1:2] * (d[..., 1:2] - 1.0))
 
 
@@ -201,7 +201,7 @@ def build_fur(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def _fur(writer: StageWriter) -> str:
-    """Adds a hair material with the colour of each strand, paler towards the tip."""
+    """Adds a hair material that reads the colour of each strand, and is paler towards the tip."""
     net = Network(writer.stage, "/World/Looks/Fur")
     own = net.node(
         "geompropvalue", "color3",
@@ -220,7 +220,7 @@ def _fur(writer: StageWriter) -> str:
 
 
 def hair_strands(rng: np.random.Generator, count: int) -> FloatArray:
-    """Returns strands on the head, (count, points, 3): parted, combed to both sides, hanging."""
+    """Returns strands on the head, (count, points, 3), parted and combed to both sides."""
     roots = np.zeros((0, 3))
     while len(roots) < count:
         d = _sphere(rng, 2 * count)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A field of stones with materials as complex and as diverse as those of a production.
+"""A field of stones with materials as complex and diverse as in production scenes.
 
-Each material is a network of MaterialX nodes: separate images, mixed by fractal noise in space and
-colour-graded, which drive one of eight kinds of surface, from plain paint to all lobes at once. The
-first material reads one image; the last one mixes eight layers. The materials thus differ in
-shading program, lobes, textures and cost, without repeating work artificially.
+Each material is a network of MaterialX nodes. The network mixes images by fractal noise, grades
+their colour and drives one of eight kinds of surface, from paint to a surface with all lobes. The
+first material reads one image; the last one mixes eight layers. The materials therefore differ in
+shading program, lobes, textures and cost.
 """
 
 from __future__ import annotations
@@ -28,13 +28,14 @@ MAX_TEXTURE_MB = 8192.0
 LAYERS = 8
 """Number of layers of the most complex material."""
 _BYTES_PER_TEXEL = (4.0 + 4.0 + 1.0) * 4.0 / 3.0
-"""Bytes per texel of a material: two colour maps and a roughness map of 8 bits, with mip levels."""
+"""Texture bytes per texel of a material, for two colour maps and a roughness map of 8 bits with mip
+levels."""
 
 Inputs = dict[str, Any]
 
 
 def build_heavy(writer: StageWriter, options: SceneOptions) -> None:
-    """Builds the field with the number of materials and the texture memory in ``SceneOptions``."""
+    """Builds the field; ``SceneOptions`` sets the number of materials and the texture memory."""
     if options.plain:
         raise SceneError(
             "heavy has no plain form: UsdPreviewSurface cannot say what its MaterialX networks do"
@@ -69,8 +70,8 @@ _KINDS: tuple[dict[str, float | tuple[float, float]], ...] = (
     },
 )
 """Inputs of OpenPBR surfaces: paint, metal, lacquer, cloth, thin film, glass, and all lobes.
-Materials use the kinds of surface in turn, after a diffuse UsdPreviewSurface. A pair is a range for
-a random value."""
+Materials cycle through a diffuse UsdPreviewSurface and these kinds of surface. A pair of numbers is
+the range of a random value."""
 
 
 def _inputs(kind: dict[str, float | tuple[float, float]], rng: np.random.Generator) -> Inputs:
@@ -108,7 +109,7 @@ def _material(
 def _define(
     writer: StageWriter, name: str, edge: int, index: int, colour: np.ndarray | None
 ) -> str:
-    """Registers a colour or (if ``colour`` is None) roughness texture; returns its name."""
+    """Registers a texture for colour, or for roughness if ``colour`` is None; returns its name."""
 
     def made(size: int, source: np.random.Generator) -> Image:
         grey = grey_pattern(index, size, source)
@@ -127,7 +128,7 @@ def _layered(
     count: int,
     rng: np.random.Generator,
 ) -> UsdShade.Output:
-    """Mixes ``count`` layers of colour, each weighted by a fractal in world space."""
+    """Mixes ``count`` texture layers, each weighted by fractal noise in world space."""
 
     def image(which: str) -> UsdShade.Output:
         return net.node("image", "color3", file=("filename", writer.texture_file(maps[which])))

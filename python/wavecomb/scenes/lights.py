@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages for measuring light selection: a street at night, and a studio.
+"""Stages for measuring light selection: a street at night and a photo studio.
 
-The street has a chosen number of lights. The length and total power of the street do not depend on
-the number of lights; with more lights, each is smaller. The lights are of five kinds in turn, and
-their powers differ by a factor of up to 100:
+``SceneOptions.lights`` sets the number of lights of the street. The length and total power of the
+street do not depend on
+the number of lights; a larger number makes each light smaller. The lights cycle through five kinds,
+and their powers differ by a factor of up to 100:
 
 - windows: rectangles on the facades, facing the street;
 - lamps: disks that emit downwards;
@@ -110,7 +111,7 @@ def _mesh(
     power: float,
     rng: np.random.Generator,
 ) -> None:
-    """Adds an emissive mesh of about ``power`` W, rounded to one of a few radiances."""
+    """Adds an emissive mesh of about ``power`` W, with the radiance rounded to a few values."""
     half = np.array([0.25, 0.4, 0.03]) if kind == "Sign" else np.array([0.04, 0.0, 0.6])
     half = half * size
     area = 8.0 * (half[0] * half[1] + half[1] * half[2] + half[0] * half[2])
@@ -131,7 +132,7 @@ def _mesh(
 
 
 def _street(writer: StageWriter, rng: np.random.Generator) -> None:
-    """Adds the ground, facades with bays, and the end of the street."""
+    """Adds the ground, facades with bays, and a wall that closes the street."""
     writer.material("Asphalt", materials.diffuse((0.22, 0.22, 0.24)))
     far = _LENGTH + 2.0
     ground: list[list[float]] = [[-30, 0, 8], [30, 0, 8], [30, 0, -far], [-30, 0, -far]]
@@ -168,10 +169,10 @@ _LOOKS = {
 
 
 def build_studio(writer: StageWriter, options: SceneOptions) -> None:
-    """Builds 90 objects in rows on a matt floor, with key light, fill light and a dim, even dome.
+    """Builds 90 objects in rows on a matt floor, with key light, fill light and a dim uniform dome.
 
-    The dome has most of the power of the stage but contributes little light to the image, and BSDF
-    sampling finds this light as well.
+    The dome has most of the power of all lights, but contributes little to the image. BSDF sampling
+    also finds its light.
     """
     rng = np.random.default_rng([options.seed, 3])
     writer.material("Floor", materials.diffuse((0.35, 0.34, 0.33)))

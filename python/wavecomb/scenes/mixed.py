@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stages for tests and benchmarks: the Cornell box, and 90 instanced objects with a mirror.
 
-``SceneOptions.lamps`` replaces the usual lights by a key light, a fill light and a dim dome.
+If ``SceneOptions.lamps`` is set, a key light, a fill light and a dim dome replace the usual lights.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from wavecomb.scenes.models.teapot import teapot
 from wavecomb.scenes.options import SceneOptions
 
 _ROW_SIZES = (14, 13, 12, 11, 10, 9, 8, 7, 6)
-"""Number of objects in each row, from the back: a fan of 90 that fills the camera's view."""
+"""Number of objects in each row, from the back; the 90 objects form a fan that fills the view."""
 _PITCH_X = 2.65
 _PITCH_Z = 2.55
 _TEAPOT_SCALE = 0.36
@@ -178,7 +178,8 @@ _RED = materials.diffuse((0.63, 0.065, 0.05))
 _GREEN = materials.diffuse((0.14, 0.45, 0.091))
 _RADIANCE = (17.0, 12.0, 4.0)
 _LIGHT_GAP = 0.5
-"""Distance of the light from the ceiling, in mm. The original ceiling has a hole for the light."""
+"""Distance of the Cornell box's light from the ceiling, in mm. The original ceiling has a hole for
+the light."""
 
 _QUADS: dict[str, tuple[str, list[list[float]]]] = {
     "Floor": ("White", [[552.8, 0, 0], [0, 0, 0], [0, 0, 559.2], [549.6, 0, 559.2]]),
@@ -209,7 +210,7 @@ def _box(writer: StageWriter, aspect: float) -> None:
 
 
 def _block(writer: StageWriter, name: str) -> None:
-    """Adds one of the two blocks: a top and four sides.
+    """Adds one of the two blocks of the Cornell box as a top and four sides.
 
     The block stands on the floor, without a bottom.
     """
@@ -220,7 +221,7 @@ def _block(writer: StageWriter, name: str) -> None:
 
 
 def build_cornell(writer: StageWriter, options: SceneOptions) -> None:
-    """Builds the box with its two blocks."""
+    """Builds the Cornell box with its two blocks."""
     _box(writer, options.aspect or 1.0)
     for name in _BLOCKS:
         _block(writer, name)
@@ -235,7 +236,7 @@ DRAGON_MATERIALS = {
 
 
 def build_cornell_dragon(writer: StageWriter, options: SceneOptions) -> None:
-    """Builds the box with a dragon on its floor."""
+    """Builds the Cornell box with a dragon on its floor."""
     if options.material not in DRAGON_MATERIALS:
         raise SceneError(
             f"dragon material must be one of {', '.join(DRAGON_MATERIALS)}, "

@@ -13,34 +13,40 @@ from wavecomb.scenes.models.mesh import Mesh
 
 @dataclass(frozen=True)
 class SceneOptions:
-    """Options of ``write_scene``. A scene ignores options that do not apply to it.
+    """Options of ``write_scene``. Scenes ignore options that do not concern them.
 
     Attributes:
         dragon: OBJ, PLY or USD file that replaces the built-in dragon, or None.
-        triangles: Triangles of the built-in dragon, or of all stones of ``spread`` or ``heavy``.
-        teapot_level: Cells along each edge of the teapot's 32 patches. Bodies of revolution in
-            ``room`` have four times as many cells around their axis.
+        triangles: Triangles of the built-in dragon, or of all stones of the scenes ``spread`` and
+            ``heavy`` together.
+        teapot_level: Cells along each edge of the teapot's 32 patches. In the scene ``room``,
+            bodies of revolution have four times as many cells around their axis.
         seed: Random seed of the layout and of texture patterns.
-        texture_size: Edge of the largest textures, in texels; all others shrink in proportion.
+        texture_size: Edge of the largest textures, in texels; smaller textures are scaled in
+            proportion.
         aspect: Width / height of the image that the camera frames; None uses the scene's value.
-        material: Material of the dragon in ``cornell-dragon``: gold, copper, glass or jade.
-        materials: Number of materials in ``spread`` and ``heavy``.
-        programs: Number of kinds of material in ``spread``, 1 to 5.
-        texture_mb: Memory of all textures of ``spread`` or ``heavy``, in 1e6 bytes; 0 means no
-            textures.
-        shader_cost: Octaves of noise on the most expensive material of ``spread``. The octaves of
-            the materials grow geometrically from 1, which means no noise.
-        lights: Number of lights in ``lights``.
-        lamps: Whether a key, a fill and a dim dome light ``mixed`` and ``dragon``.
-        strands: Number of strands in ``fur`` and ``head``.
-        splats: Number of splats in ``splats``.
-        capture: PLY file of 3D Gaussian splats that replaces the contents of ``splats``, or None.
-        capture_linear: Whether the colours of the capture are linear. By default the colours of a
-            capture are sRGB, in which most captures are trained.
-        voxels: Voxels along the longest edge of the grids of ``smoke`` and ``clouds``, at least 16.
+        material: Material of the dragon in the scene ``cornell-dragon``: gold, copper, glass or
+            jade.
+        materials: Number of materials in the scenes ``spread`` and ``heavy``.
+        programs: Number of kinds of material in the scene ``spread``, from 1 to 5.
+        texture_mb: Memory of all textures of the scenes ``spread`` and ``heavy``, in 1e6 bytes; 0
+            means no textures.
+        shader_cost: Octaves of noise on the most expensive material of the scene ``spread``. The
+            number of octaves grows geometrically over the materials, from 1, which means no noise.
+        lights: Number of lights in the scene ``lights``.
+        lamps: Whether a key light, a fill light and a dim dome illuminate the scenes ``mixed`` and
+            ``dragon``.
+        strands: Number of strands in the scenes ``fur`` and ``head``.
+        splats: Number of Gaussian splats in the scene ``splats``.
+        capture: PLY file of 3D Gaussian splats that replaces the contents of the scene ``splats``,
+            or None.
+        capture_linear: Whether the colours in the PLY file of ``capture`` are linear. By default
+            they are sRGB, which most training programs use.
+        voxels: Voxels along the longest edge of the grids in the scenes ``smoke`` and ``clouds``,
+            at least 16.
         plain: Whether materials are written as by third-party exporters: UsdPreviewSurface in the
-            metallic workflow, without a program. Plain materials are not available for ``heavy``,
-            for hair, and for ``spread`` with a ``shader_cost`` above 1.
+            metallic workflow, without a program. Not available for the scene ``heavy``, for hair,
+            and for the scene ``spread`` if ``shader_cost`` is above 1.
     """
 
     dragon: Path | str | None = None
@@ -64,7 +70,7 @@ class SceneOptions:
     plain: bool = False
 
     def __post_init__(self) -> None:
-        """Raises SceneError for values that are invalid in all scenes."""
+        """Raises SceneError for values that are invalid for every scene."""
         if self.aspect is not None and not 0.01 <= self.aspect <= 100.0:
             raise SceneError(f"aspect must be from 0.01 to 100, not {self.aspect}")
         if not 16 <= self.voxels <= 4096:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A dragon of Gaussian splats in front of a mirror, like a capture but made from a mesh.
+"""A dragon of Gaussian splats in front of a mirror, made from a mesh.
 
-Splats are flat and lie on the mesh. The colours of the splats come from one light, with a
-view-dependent sheen.
+The splats are flat and lie on the surface of the mesh. Their colours are computed for one light,
+with a view-dependent sheen.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from wavecomb.scenes.models.ply import ply_vertices
 from wavecomb.scenes.options import SceneOptions
 
 _COUNTS = {0: 0, 9: 1, 24: 2, 45: 3}
-"""Degree of the spherical harmonics, by the number of ``f_rest_*`` coefficients in a PLY file."""
+"""Degree of the spherical harmonics by the number of ``f_rest_*`` properties in the PLY file."""
 _DIRECTIONS = 128
-"""Number of directions in which colours are evaluated."""
+"""Number of directions in which splat colours are evaluated."""
 _CHUNK = 1 << 15
-"""Number of splats whose colours are converted at once."""
+"""Number of splats whose colours are converted together."""
 
 
 @dataclass
 class Splats:
-    """Gaussian splats, with the attributes of UsdVol.
+    """Arrays of Gaussian splats, named like the attributes of UsdVol.
 
     Attributes:
         positions: (n, 3).
         scales: (n, 3), lengths.
         orientations: (n, 4) quaternions w, x, y, z.
         opacities: (n,) from 0 to 1.
-        harmonics: (n, k, 3), coefficients of the colour minus 0.5.
+        harmonics: (n, k, 3) spherical harmonics coefficients of the colour minus 0.5.
     """
 
     positions: FloatArray
@@ -52,8 +52,8 @@ class Splats:
 def read_capture(path: Path) -> Splats:
     """Reads a PLY file of 3D Gaussian splatting.
 
-    Columns are x, y, z, scale_* (logarithms), rot_*, opacity (a logit), f_dc_*, f_rest_* (by
-    channel).
+    The PLY properties are x, y, z, scale_* (logarithms), rot_*, opacity (a logit), f_dc_* and
+    f_rest_* (ordered by channel).
 
     Raises:
         SceneError: The file is not a capture of 3D Gaussian splatting.
@@ -91,7 +91,7 @@ def read_capture(path: Path) -> Splats:
 
 
 def basis(directions: FloatArray) -> FloatArray:
-    """Evaluates real spherical harmonics up to degree 3 in unit directions (n, 3): (n, 16).
+    """Evaluates real spherical harmonics up to degree 3, (n, 16), in unit directions (n, 3).
 
     Uses the Condon-Shortley phase, like geometry/gaussian_splat/harmonics.h.
     """
@@ -113,10 +113,10 @@ def basis(directions: FloatArray) -> FloatArray:
 
 
 def linear_harmonics(harmonics: FloatArray) -> FloatArray:
-    """Converts harmonics of sRGB colours to harmonics of linear light, (n, k, 3), both minus 0.5.
+    """Converts spherical harmonics (n, k, 3) of sRGB colours to linear colours, both minus 0.5.
 
-    Decodes the colours in directions all over the sphere, with negative values set to 0, and fits
-    harmonics by least squares.
+    Evaluates the colours in many directions, clamps them at 0, converts them to linear values and
+    fits spherical harmonics by least squares.
     """
     from wavecomb.image.files.image import linear_from_srgb
 
@@ -163,7 +163,7 @@ _LAMP = np.array([-3.2, 6.0, 4.5])
 
 
 def places(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Samples points (n, 3) of a mesh uniformly by area, and their normals."""
+    """Samples points (n, 3) and normals (n, 3) on a mesh, uniformly by area."""
     areas = np.asarray(face_areas(mesh.points, mesh.faces), np.float64)
     sums = np.cumsum(areas)
     wanted = (np.arange(count) + rng.uniform(size=count)) / count * sums[-1]
@@ -176,9 +176,9 @@ def places(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[FloatArray
 
 
 def turns_to(normals: FloatArray, spin: FloatArray) -> FloatArray:
-    """Returns quaternions w, x, y, z (n, 4) that rotate z to unit vectors.
+    """Returns quaternions (w, x, y, z), (n, 4), that rotate z to the given unit vectors.
 
-    A rotation about z by ``spin`` comes first.
+    Each quaternion first rotates about z by the angle ``spin``.
     """
     half = np.stack(
         [1.0 + normals[:, 2], -normals[:, 1], normals[:, 0], np.zeros(len(normals))], axis=1
@@ -191,7 +191,7 @@ def turns_to(normals: FloatArray, spin: FloatArray) -> FloatArray:
 
 
 def colours(points: FloatArray, normals: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Returns spherical harmonics (n, 4, 3) up to degree 1 of the splats' colours minus 0.5."""
+    """Returns the colours of the splats as spherical harmonics of degree 1 (n, 4, 3), minus 0.5."""
     height = np.maximum(points[:, 1] / points[:, 1].max(), 0.0)
     bands = 0.5 + 0.5 * np.sin(26.0 * height + 2.0 * np.sin(5.0 * points[:, 0]))
     low, high = np.array([0.06, 0.30, 0.26]), np.array([0.85, 0.55, 0.16])
@@ -213,7 +213,7 @@ def colours(points: FloatArray, normals: FloatArray, rng: np.random.Generator) -
 
 
 def build_splats(writer: StageWriter, options: SceneOptions) -> None:
-    """Builds floor, mirror, light and dragon, or a capture alone."""
+    """Builds a floor, a mirror, a light and a dragon, or only the splats of ``options.capture``."""
     if options.capture is not None:
         capture = read_capture(Path(options.capture))
         if not options.capture_linear:

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """A field of stones whose materials, textures, triangles and shading cost can be set separately.
 
-The stage measures how a renderer scales. Each stone is a separate mesh, not an instance, so that
-triangles need memory. Materials are assigned to stones at random, so that neighbours differ. Each
-material has a separate texture, over which the triangles of a stone are scattered like the charts
-of an atlas. Adjacent triangles thus read distant texels, and more visible triangles read more of
-the texture. Expensive materials multiply the texture by octaves of noise, in a network of MaterialX
-nodes.
+The stage is for measuring how a renderer scales. Each stone is a separate mesh instead of an
+instance, so that memory grows with the triangles. Materials are assigned to stones at random, so
+that neighbours differ. Each material has a separate texture, over which the triangles of a stone
+are scattered like the charts of an atlas. Adjacent triangles therefore read distant texels, and
+each further visible triangle reads another part of the texture. Expensive materials multiply the
+texture by octaves of noise, in a network of MaterialX nodes.
 """
 
 from __future__ import annotations
@@ -29,13 +29,14 @@ MAX_MATERIALS = 4096
 MAX_TEXTURE_MB = 4096.0
 MAX_COST = 1000.0
 _OCTAVES_OF_NODE = 8
-"""Largest number of octaves of one fractal node. More expensive materials add several nodes."""
+"""Largest number of octaves of one fractal noise node. Materials with more octaves sum several
+nodes."""
 _BYTES_PER_TEXEL = 4.0 * 4.0 / 3.0
-"""Bytes of a texel of 8-bit colour in the core, including mip levels."""
+"""Memory of a texel of 8-bit colour in the core, in bytes, including mip levels."""
 
 
 def build_spread(writer: StageWriter, options: SceneOptions) -> None:
-    """Builds the field with the sizes in ``SceneOptions``."""
+    """Builds the field of stones with the sizes in ``SceneOptions``."""
     check_field(
         "spread",
         options,
@@ -54,15 +55,15 @@ def build_spread(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def _edge(options: SceneOptions) -> int:
-    """Returns the edge of each material's texture in texels, or 0 without textures."""
+    """Returns the edge of each material's texture in texels, or 0 if there are no textures."""
     return texture_edge(options, _BYTES_PER_TEXEL, TILE) if options.texture_mb > 0.0 else 0
 
 
 def octaves(options: SceneOptions, index: int) -> int:
     """Returns the number of octaves of noise on material ``index``.
 
-    The octaves grow geometrically from 1 for the first material, which means no noise, to
-    ``shader_cost`` for the last.
+    The number of octaves grows geometrically from 1 for the first material, which means no noise,
+    to ``shader_cost`` for the last.
     """
     share = index / (options.materials - 1) if options.materials > 1 else 1.0
     return round(options.shader_cost**share)
@@ -79,8 +80,8 @@ _PROGRAMS = (
     lambda colour: materials.metal(colour, 0.25),
     lambda colour: materials.dielectric(colour, 0.1),
 )
-"""Functions that make a material from its colour. The first ``programs`` functions are used in
-turn."""
+"""Functions that make a material from a colour. Materials cycle through the first
+``SceneOptions.programs`` functions."""
 
 
 def _material(
@@ -101,7 +102,7 @@ def _material(
 
 
 def _texture(writer: StageWriter, index: int, edge: int, colour: tuple[float, ...]) -> str:
-    """Registers a texture with a pattern in a colour; returns the texture's name."""
+    """Registers a texture with a pattern in the given colour; returns the texture's name."""
 
     def tinted(size: int, source: np.random.Generator) -> Image:
         grey = grey_pattern(index, size, source)

@@ -2,7 +2,7 @@
 """Stages with volumes: smoke over an ember, clouds over the sea, and a street lamp in fog.
 
 Grids are made procedurally and written as .vdb files in ``<stem>_volumes/`` beside the stage.
-Materials are MaterialX's ``volume``, whose coefficients are per metre.
+Materials are MaterialX ``volume`` nodes with coefficients per metre.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from wavecomb.scenes.options import SceneOptions
 Points = NDArray[np.float32]
 
 _EDGE = 64
-"""Edge of the noise table: the noise repeats after this number of units."""
+"""Edge of the table of noise values; the noise repeats after this number of units."""
 
 
 class Noise:
-    """Value noise: random values at the points of a lattice, with smooth interpolation."""
+    """Value noise, which interpolates random values at the points of a lattice smoothly."""
 
     def __init__(self, seed: int, number: int = 0) -> None:
-        """Creates a noise. ``number`` distinguishes noises of the same seed."""
+        """Creates a noise. ``number`` distinguishes noise functions with the same seed."""
         rng = np.random.default_rng([seed, 977, number])
         self._table = rng.random((_EDGE, _EDGE, _EDGE), np.float32).ravel()
 
@@ -55,7 +55,7 @@ class Noise:
         return found
 
     def fractal(self, points: Points, octaves: int, gain: float = 0.5) -> NDArray[np.float32]:
-        """Sums octaves of noise to [0, 1], each with ``gain`` times the weight of the last."""
+        """Sums octaves of noise to [0, 1]; ``gain`` is the ratio of successive weights."""
         found = np.zeros(len(points), np.float32)
         weight, weights = 1.0, 0.0
         for octave in range(octaves):
@@ -71,10 +71,10 @@ Density = Callable[[Points], NDArray[np.float32]]
 def sampled(
     density: Density, low: Sequence[float], high: Sequence[float], voxels: int, half: bool = True
 ) -> dict[str, Any]:
-    """Samples a function of space to bricks for ``vdb.write``, leaving out bricks of zeros.
+    """Samples a function of space to bricks of voxels for ``vdb.write``, except bricks of zeros.
 
     Args:
-        density: Returns values at points (n, 3), 0 in empty space.
+        density: Function that returns values at points (n, 3), with 0 in empty space.
         low: Lower corner of the sampled box.
         high: Upper corner of the sampled box.
         voxels: Number of voxels along the longest edge.
@@ -105,7 +105,7 @@ def sampled(
 
 
 def _where(mask: NDArray[np.bool_], points: Points, of: Density) -> NDArray[np.float32]:
-    """Evaluates a function at the points of a mask; the result is 0 at all other points."""
+    """Evaluates a function at the points (n, 3) where a mask is true; the result is 0 elsewhere."""
     found = np.zeros(len(points), np.float32)
     if mask.any():
         found[mask] = of(points[mask])
@@ -129,11 +129,11 @@ class _Volumes:
         emission: Colour | None = None,
         glow: str = "",
     ) -> str:
-        """Adds a MaterialX volume, with coefficients per metre, scaled by named fields."""
+        """Adds a MaterialX volume; its coefficients are per metre and are scaled by grids."""
         net = Network(self._stage, f"/World/Looks/{name}")
 
         def coefficient(kind: str, value: Colour, field: str) -> Any:
-            """Returns a material input: a value, multiplied by a field if one is named."""
+            """Returns a constant material input, multiplied by the grid ``field`` if named."""
             if not field:
                 return kind, value
             reader = net.node("geompropvalue", "float", geomprop=("string", field))
@@ -162,7 +162,7 @@ class _Volumes:
         extent: tuple[Sequence[float], Sequence[float]],
         grids: dict[str, dict[str, Any]] | None = None,
     ) -> None:
-        """Adds a volume of grids by field name.
+        """Adds a volume with the given grids, by field name.
 
         Without grids, the volume is homogeneous and fills its extent.
         """
@@ -194,7 +194,7 @@ def _ground(writer: StageWriter, half: float, colour: Colour) -> None:
 
 
 def smoke_density(seed: int) -> Density:
-    """Returns the density of a plume, 4 m high, that swirls and widens; at most 1."""
+    """Returns the density (at most 1) of a plume, 4 m high, that swirls and widens."""
     swirl = [Noise(seed, number) for number in range(3)]
     detail = Noise(seed, 3)
 
@@ -223,7 +223,7 @@ def smoke_density(seed: int) -> Density:
 
 
 def _fire(points: Points, smoke: Density) -> NDArray[np.float32]:
-    """Returns temperatures, at most 1, in the lower part of the plume."""
+    """Returns the temperature (at most 1) in the lower part of the plume."""
     low = np.clip(1.0 - points[:, 1] / 0.9, 0.0, 1.0)
     return _where(low > 0, points, lambda some: smoke(some) ** np.float32(0.3)) * low
 
@@ -251,7 +251,7 @@ def build_smoke(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def cloud_density(seed: int) -> Density:
-    """Returns the density of cumulus clouds with flat bottoms, in units of 100 m; at most 1."""
+    """Returns the density (at most 1) of cumulus clouds with flat bottoms; a unit is 100 m."""
     rng = np.random.default_rng([seed, 41])
     place, size = [], []
     for _ in range(9):

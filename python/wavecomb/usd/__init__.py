@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads USD stages into scenes: ``load_stage("shot.usd").scene``.
 
-``layers`` opens stages, ``render_settings`` reads their settings, ``stage`` loads them into a
-scene, and ``instances`` builds groups. ``geometry``, ``lights``, ``cameras`` and ``volumes`` read
-one kind of prim each; ``materials``, ``graphs`` and ``materialx`` convert shader networks to
-programs with parameters.
+The module ``layers`` opens stages, ``render_settings`` reads their render settings, ``stage`` loads
+them into a scene, and ``instances`` builds groups of instanced objects. ``geometry``, ``lights``,
+``cameras`` and ``volumes`` each read one kind of prim; ``materials``, ``graphs`` and ``materialx``
+convert shader networks to programs with parameters.
 
-Names are imported on first use, since most of them load OpenUSD.
+The package imports names on first use, since most of them load OpenUSD.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Progress notes of an expendable process, in a page of memory shared with its parent."""
+"""Progress notes of a child process for its parent's crash report, in a page of shared memory."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _page: mmap.mmap | None = None
 
 
 def new_page() -> int:
-    """Creates an anonymous page for both processes and returns its descriptor."""
+    """Creates an anonymous page that parent and child share, and returns its file descriptor."""
     descriptor = os.memfd_create("wavecomb-trail", os.MFD_CLOEXEC)
     os.ftruncate(descriptor, _SLOT * len(_SLOTS))
     return descriptor
@@ -25,13 +25,13 @@ def open_page(descriptor: int) -> mmap.mmap:
 
 
 def start(descriptor: int) -> None:
-    """Starts writing progress notes to a page; from here on this process is expendable."""
+    """Starts writing progress notes to a page that the parent process reads after a crash."""
     global _page
     _page = open_page(descriptor)
 
 
 def is_expendable() -> bool:
-    """Returns whether a parent process outlives this one and reports its crash."""
+    """Returns whether this process has a parent that survives its crash and reports it."""
     return _page is not None
 
 
@@ -39,10 +39,10 @@ def note(what: str, place: object = "", slot: str = "at") -> None:
     """Writes a progress note; does nothing without a parent that reads it.
 
     Args:
-        what: Activity, as in "it crashed while ...".
-        place: Prim or file.
-        slot: "at" for the main activity, "image" for that of a decoding thread, or "limit" for the
-            memory limit in MB.
+        what: Activity of the process, which completes the message "it crashed while ...".
+        place: Path of the prim or file that the process works on.
+        slot: "at" for the activity of the main thread, "image" for the activity of a thread that
+            decodes images, or "limit" for the memory limit in MB.
     """
     if _page is None:
         return
@@ -52,13 +52,13 @@ def note(what: str, place: object = "", slot: str = "at") -> None:
 
 
 def slot(page: mmap.mmap, name: str) -> str:
-    """Returns the last note in a slot, or ""."""
+    """Returns the last note in a slot, or an empty string."""
     start = _SLOT * _SLOTS.index(name)
     return page[start : start + _SLOT].split(b"\0")[0].decode(errors="replace").strip()
 
 
 def read(page: mmap.mmap) -> str:
-    """Returns the last activity of the other process, or ""."""
+    """Returns the last activities of the process that wrote the page, or an empty string."""
     return ", ".join(filter(None, (slot(page, name) for name in ("at", "image"))))
 
 
@@ -69,17 +69,17 @@ _NO_MEMORY = (
     "Resource temporarily unavailable",
     "ut of memory",
 )
-"""Texts in library messages that mean lack of memory or threads."""
+"""Parts of error messages of libraries that ran out of memory or threads."""
 
 
 def crash_message(number: int, where: str, words: str, limit: str = "") -> str:
-    """Returns the message about a process that a signal terminated.
+    """Returns the error message for a child process that was terminated by a signal.
 
     Args:
         number: Number of the signal.
-        where: Last activity of the process, from ``read``.
-        words: Output of the process's libraries to stderr.
-        limit: Text about the memory limit of the process.
+        where: Last activity of the process, as returned by ``read``.
+        words: Output that libraries of the process wrote to stderr.
+        limit: Memory limit of the process as text; empty if the process has no limit.
     """
     try:
         name = signal.Signals(number).name

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sandbox for processes that read untrusted files, by bubblewrap (docs/decisions/sandbox.md)."""
+"""Runs processes that read untrusted files in a bubblewrap sandbox (docs/decisions/sandbox.md)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ MODES = ("auto", "on", "off")
 _PROGRAM = "bwrap"
 
 _HIDDEN = ("/tmp", "/var/tmp", "/run", "/dev/shm")
-"""Folders that are replaced by empty ones, since they hold sockets and files of other programs."""
+"""Folders that are empty inside the sandbox, since they hold sockets and files of other
+programs."""
 
 _SYSTEM = (
     "/usr", "/lib", "/lib32", "/lib64", "/bin", "/sbin", "/opt", "/nix/store", "/gnu/store",
@@ -25,14 +26,14 @@ _SYSTEM = (
     "/etc/ld.so.conf.d", "/etc/ld.so.preload", "/etc/localtime", "/etc/machine-id",
     "/etc/nsswitch.conf", "/etc/OpenCL", "/etc/passwd",
 )  # fmt: skip
-"""Files and folders that libraries read, for use with ``--sandbox-read``."""
+"""Files and folders that libraries read; ``--sandbox-read`` adds to them."""
 
 _SEARCHED = (
     "PXR_AR_DEFAULT_SEARCH_PATH", "PXR_PLUGINPATH_NAME", "PXR_MTLX_PLUGIN_SEARCH_PATHS",
     "PXR_MTLX_STDLIB_SEARCH_PATHS", "MATERIALX_SEARCH_PATH", "OIIO_LIBRARY_PATH", "OCIO",
     "LD_LIBRARY_PATH",
 )  # fmt: skip
-"""Environment variables with files and folders that libraries read."""
+"""Environment variables that list files and folders which libraries read."""
 
 _GPU = ("/dev/dri", "/dev/nvidiactl", "/dev/nvidia-uvm", "/dev/nvidia-uvm-tools", "/dev/kfd")
 
@@ -47,17 +48,18 @@ def command(
 ) -> list[str]:
     """Returns the command line that runs ``words`` in the sandbox.
 
-    All namespaces are unshared, the file system is read-only except for one folder, there is no
-    network and no capability, and the process ends with its parent.
+    The sandboxed process has separate namespaces, no network and no capabilities. Only the folder
+    ``private`` is writable. The process ends when its parent ends.
 
     Args:
         words: Command to run, with absolute paths.
         private: The only writable folder, which also holds temporary files.
-        inputs: Paths that the command line names. The inputs remain readable even if a hidden
+        inputs: Files and folders that are named on the command line. The inputs remain readable
+            even if a hidden
             folder (/tmp, /run) or ``reads`` would hide them.
-        reads: Folders of ``--sandbox-read``. With ``reads``, only these paths, the inputs and
-            libraries can be read; otherwise everything that the user may read.
-        gpu: Whether GPU devices can be used.
+        reads: Folders of ``--sandbox-read``. If there are any, only they, ``inputs`` and the
+            libraries are readable; otherwise all files of the user are.
+        gpu: Whether the sandboxed process can use GPU devices.
     """
     line = [_PROGRAM, "--unshare-all", "--die-with-parent", "--new-session", "--cap-drop", "ALL"]
     named, places = _existing(inputs), library_places()
@@ -84,7 +86,7 @@ def command(
 
 
 def _existing(paths: Iterable[str]) -> list[str]:
-    """Returns absolute paths of existing files, and the targets of symbolic links."""
+    """Returns the absolute paths of those paths that exist, and the targets of symbolic links."""
     found: dict[str, None] = {}
     for path in paths:
         if path and os.path.exists(path):
@@ -101,7 +103,7 @@ def _devices() -> list[str]:
 
 
 def library_places() -> list[str]:
-    """Returns folders of Python, its packages, and files that environment variables name."""
+    """Returns the folders of Python and of Wavecomb, and the paths in environment variables."""
     import wavecomb
 
     places = [sys.prefix, sys.base_prefix, sys.exec_prefix, sys.base_exec_prefix]
@@ -112,7 +114,7 @@ def library_places() -> list[str]:
 
 
 def inputs_of(words: Iterable[str]) -> list[str]:
-    """Returns paths in hidden folders that must stay readable for a command line.
+    """Returns the paths that must stay readable for a command line.
 
     For a file in /tmp/shot/usd the result is /tmp/shot, with all assets next to the stage. For a
     file directly in /tmp the result is all regular files there.
@@ -139,7 +141,7 @@ def _visible(path: str) -> list[str]:
 
 @functools.cache
 def obstacle() -> str | None:
-    """Returns the reason why this system has no sandbox; None if it has one.
+    """Returns the reason why this system has no sandbox, or None if a sandbox is available.
 
     Runs bubblewrap once.
     """
@@ -160,6 +162,6 @@ def obstacle() -> str | None:
 
 
 def describe() -> dict[str, Any]:
-    """Returns the sandbox state of this system for ``wavecomb info --machine`` and ``doctor``."""
+    """Returns whether this system has a sandbox, for ``wavecomb info --machine`` and ``doctor``."""
     why_not = obstacle()
     return {"available": why_not is None, "obstacle": why_not}

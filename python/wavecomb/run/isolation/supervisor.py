@@ -3,9 +3,9 @@
 
 The parent only waits; it forwards signals to the child and returns its exit code. With a sandbox
 the child is a new Python process that parses the same command line. Without a sandbox the child is
-a fork that is made before large modules are loaded. With or without a sandbox, the child has a
-separate process group, so that a signal from the terminal, which goes to a whole group, reaches it
-once.
+a fork that is made before large modules are loaded. The child always has a separate process group.
+A signal from the terminal goes to a whole process group, so the child receives it only once, from
+the parent.
 """
 
 from __future__ import annotations
@@ -46,9 +46,10 @@ CHATTER = (
     "failed call to posix_madvise",
     "UnicodeDecodeError: 'utf-8'",
 )
-"""First words of library messages that are dropped, since a warning reports the same problem."""
+"""Beginnings of library messages that are hidden, since a Wavecomb warning reports the same
+problem."""
 _NO_VALUE = "No to_python (by-value) converter"
-"""Boost.Python's message about a value that USD cannot read."""
+"""Boost.Python's message for a USD value that Python cannot read."""
 
 
 COMMAND = "from wavecomb.cli import main; main(prog_name='wavecomb')"
@@ -62,10 +63,10 @@ become_child(sys.argv.pop(1))
 
 @dataclass
 class Choices:
-    """Options of the child process.
+    """Command line options for the child process.
 
     Attributes:
-        isolate: ``--isolate``: "auto", "on" or "off".
+        isolate: Value of ``--isolate``, which is "auto", "on" or "off".
         sandbox: ``--sandbox``, one of ``sandbox.MODES``.
         reads: Folders of ``--sandbox-read``.
         words: Arguments of the command line.
@@ -82,10 +83,11 @@ _is_child = False
 
 
 def can_fork() -> bool:
-    """Returns whether a fork is safe: on Linux, with one thread and the standard streams.
+    """Returns whether a fork is safe.
 
-    Returns False for programs that call the command line in-process, and with ``WAVECOMB_DEBUG``,
-    so that developers see crashes where they happen.
+    A fork needs Linux, a single thread and unredirected standard streams. This excludes programs
+    with threads or redirected output that call the command line in-process. If ``WAVECOMB_DEBUG``
+    is set, the result is False, so that developers can debug the crash itself.
     """
     return (
         sys.platform == "linux"
@@ -100,8 +102,8 @@ def can_fork() -> bool:
 def enter(outputs: Outputs, *, gpu: bool = False) -> None:
     """Continues the command in a child process, before it reads any untrusted file.
 
-    In the parent this function ends the process when the child has ended. In the child, or without
-    a child, the function returns.
+    In the parent this function ends the process when the child has ended. In the child, or if no
+    child is started, the function returns.
 
     Args:
         outputs: Files that the command may write.
@@ -126,9 +128,9 @@ def enter(outputs: Outputs, *, gpu: bool = False) -> None:
 
 
 def supervise() -> None:
-    """Continues in a fork; the parent waits for it and exits with its status.
+    """Forks; the child returns from this function, and the parent exits with the child's status.
 
-    Contract: the process has one thread. Returns in the child only.
+    Contract: the process has one thread.
     """
     global _is_child
     terminal.flush_streams()
@@ -156,7 +158,7 @@ def run_in_sandbox(outputs: Outputs, *, gpu: bool = False, program: str = COMMAN
     """Runs the command line in the sandbox and exits with the child's status.
 
     Args:
-        outputs: Files that the child may have moved to their names.
+        outputs: Files that the child may write; the parent moves them to their final names.
         gpu: Whether the child uses GPU devices.
         program: Python code that the child runs.
     """
@@ -225,7 +227,7 @@ def _private_folder(outputs: Outputs) -> PrivateFolder:
 
 
 class _Child:
-    """State of the sandboxed process in the parent."""
+    """The parent's connection to its sandboxed child process."""
 
     def __init__(self, channel: socket.socket, mover: Mover, group: memory.Group | None) -> None:
         self._channel, self._mover, self._group = channel, mover, group
@@ -256,10 +258,10 @@ class _Child:
 
 
 def become_child(given: str) -> None:
-    """Turns this sandboxed process into the child of its parent.
+    """Sets up this sandboxed process as a child that reports to its parent.
 
     Args:
-        given: Values from ``run_in_sandbox`` as JSON.
+        given: Values that ``run_in_sandbox`` passes to the child, as JSON.
     """
     global _is_child
     _is_child = True
@@ -294,9 +296,9 @@ def _become_expendable(parent: int, page: int, words: int) -> None:
 
 
 def _redirect_stderr(descriptor: int) -> None:
-    """Redirects Python's stderr to the descriptor.
+    """Redirects Python's stderr to the file descriptor.
 
-    Output of libraries to descriptor 2 is captured.
+    Libraries still write to descriptor 2, whose output the parent captures.
     """
     stderr = sys.stderr
     sys.stderr = terminal.Stream(descriptor, stderr.encoding, is_prompt=True, owns=True)
@@ -312,7 +314,8 @@ def _wait(process: int, child: Callable[[], int]) -> tuple[int, set[int]]:
 
     Args:
         process: Process to wait for.
-        child: Returns the process that receives signals; 0 if there is none.
+        child: Function that returns the id of the process that receives the signals, or 0 if there
+            is none.
 
     Returns:
         Exit status and the forwarded signals.
@@ -344,7 +347,7 @@ def _end(code: int, sent: set[int], page: int, words: int) -> None:
         code: Exit code of the child; negative for a signal.
         sent: Forwarded signals.
         page: Descriptor of the page with progress notes.
-        words: Descriptor of the libraries' stderr output.
+        words: Descriptor of the file with the libraries' output to stderr.
     """
     text = os.pread(words, 1 << 20, 0).decode(errors="replace")
     if code < 0 and -code in sent:

@@ -2,8 +2,8 @@
 """Time limit for USD's composition of a stage.
 
 References that double at each level, or that are indirectly cyclic, can make composition take
-years, and USD offers no way to interrupt it. Therefore a thread watches an expendable process and
-ends it.
+years, and USD offers no way to interrupt it. Therefore a thread of the child process watches
+composition and ends the process if it takes too long.
 """
 
 from __future__ import annotations
@@ -19,19 +19,20 @@ from pathlib import Path
 from wavecomb.run.isolation import progress_notes
 
 BASE_S = 6.0
-"""Seconds that any stage may take, which suffices for some hundred thousand prims."""
+"""Time limit in seconds for an empty stage; suffices for stages of some hundred thousand prims."""
 
 BYTES_PER_S = 1_000_000
-"""Number of layer bytes per further second of the time limit; valid layers are read much faster."""
+"""Layer bytes that extend the time limit by one second; valid layers load much faster."""
 
 limit_s: float | None = None
-"""Limit in seconds that the user sets (0 disables it); None derives it from the layer size."""
+"""Time limit in seconds set by the user (0 disables it); None derives the limit from the layer
+size."""
 
 _TICK_S = 0.25
 
 
 def allowed_s(layer_bytes: int) -> float:
-    """Returns the time limit in seconds for layers of this size."""
+    """Returns the time limit in seconds for a stage whose layers have ``layer_bytes`` bytes."""
     return BASE_S + layer_bytes / BYTES_PER_S if limit_s is None else limit_s
 
 
@@ -43,12 +44,12 @@ def _end_with_message(message: str) -> None:
 
 
 end_process: Callable[[str], None] = _end_with_message
-"""Ends this expendable process with a message."""
+"""Function that ends this process with an error message."""
 
 
 @contextmanager
 def limit_composition(file: Path) -> Iterator[None]:
-    """Ends the process if the block, which composes a stage, takes too long.
+    """Ends the process if composing a stage inside the ``with`` block takes too long.
 
     The limit counts only CPU time of this process, not waiting for a slow disk or a busy machine.
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writing of generated stages: prims, materials, textures."""
+"""Modules that write generated stages: prims, materials and textures."""

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Materials of the generated stages: UsdPreviewSurface, with the name of a Wavecomb program.
+"""Materials of the generated stages, which are UsdPreviewSurface with a Wavecomb program.
 
-``wavecomb:program`` on the Material selects the shading program. The UsdPreviewSurface inputs are
-the parameters of the program, with values that look similar in other renderers:
+``wavecomb:program`` on the Material selects the shading program. The program reads its parameters
+from the UsdPreviewSurface inputs below, so that other renderers show a similar material:
 
 - diffuse: ``diffuseColor``.
-- metal: ``diffuseColor`` is the reflectance at normal incidence, ``roughness``, optional
-  ``specularColor`` is the tint near 82 degrees.
+- metal: ``roughness``; ``diffuseColor`` is the reflectance at normal incidence; the optional
+``specularColor`` is the F82 tint.
 - dielectric: ``ior``, ``roughness``, ``diffuseColor`` tints transmission.
-- plastic: ``diffuseColor`` under a coat of ``ior`` and ``roughness``.
+- plastic: ``diffuseColor`` of the base, ``ior`` and ``roughness`` of the coat.
 - emissive: ``emissiveColor``, radiance.
 - principled: all inputs.
 
-``plain`` returns the form that third-party exporters write: the metallic workflow without a
-program.
+``plain`` converts a material to what third-party exporters write: the metallic workflow without a
+Wavecomb program.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import numpy as np
 from pxr import Gf, Sdf, Usd, UsdShade
 
 Colour = tuple[float, float, float]
-"""Linear Rec. 709 red, green, blue."""
+"""Linear RGB colour with Rec. 709 primaries."""
 
 PROGRAMS = ("diffuse", "metal", "dielectric", "plastic", "emissive", "principled")
 
@@ -37,8 +37,8 @@ class MaterialInfo:
     Attributes:
         program: One of ``PROGRAMS``, or None for a UsdPreviewSurface without a program.
         inputs: Values of UsdPreviewSurface inputs by name.
-        textures: Names in ``textures.TEXTURES`` by input.
-        repeat: Texture repeats per unit of uv.
+        textures: Names of textures in ``textures.TEXTURES``, by the input that they drive.
+        repeat: Number of texture repeats per unit of texture coordinates.
     """
 
     program: str | None
@@ -78,7 +78,7 @@ def metal(
 
 
 def dielectric(colour: Colour, roughness: float, ior: float = 1.5) -> MaterialInfo:
-    """Makes glass. The low opacity makes the material look like glass in other renderers."""
+    """Makes glass. The opacity is low, so that other renderers show it as glass."""
     return MaterialInfo(
         "dielectric",
         {"diffuseColor": colour, "roughness": roughness, "ior": ior, "opacity": 0.1},
@@ -131,16 +131,16 @@ def preview(
 
 _SPECULAR_WORKFLOW = ("useSpecularWorkflow", "specularColor")
 _TINT_OPACITY = 0.4
-"""Opacity of plain glass with a fully saturated colour."""
+"""Opacity that ``plain`` gives to glass with a fully saturated colour."""
 
 
 def plain(info: MaterialInfo) -> MaterialInfo:
-    """Returns the same material without a program, in the metallic workflow.
+    """Converts a material to the metallic workflow without a Wavecomb program.
 
     Matt surfaces get the specular reflection that UsdPreviewSurface gives all dielectrics. Metals
-    lose the tint of their edges. Glass becomes specular reflection with straight transmission,
-    because UsdPreviewSurface has no refraction. Coloured glass gets some opacity instead, since
-    straight transmission cannot be tinted.
+    lose their reflectance at grazing angles (``specularColor``). Glass becomes a specular reflector
+    that transmits light without refraction, which UsdPreviewSurface does not have. Coloured glass
+    becomes partly opaque, since UsdPreviewSurface cannot tint transmitted light.
     """
     inputs = {key: value for key, value in info.inputs.items() if key not in _SPECULAR_WORKFLOW}
     if info.program == "dielectric":
@@ -211,12 +211,12 @@ _TYPES = {
     "vector2": Sdf.ValueTypeNames.Float2,
     "vector3": Sdf.ValueTypeNames.Float3,
 }
-"""Value types of USD by the names of MaterialX types."""
+"""USD value types of the MaterialX types, by MaterialX name."""
 _TOKEN = Sdf.ValueTypeNames.Token
 
 
 class Network:
-    """A material of MaterialX nodes."""
+    """Builder of a material from MaterialX nodes."""
 
     def __init__(self, stage: Usd.Stage, path: str) -> None:
         """Defines the material at ``path``."""
@@ -230,8 +230,10 @@ class Network:
 
         Args:
             kind: Category of the node, such as "mix".
-            output: Type of its output, such as "color3", or "color3FA" if one operand is a float.
-            **inputs: Outputs to connect, or (type, value) pairs; "in" is spelt ``in_``.
+            output: Output type of the node, such as "color3", or "color3FA" if one operand is a
+                float.
+            **inputs: Outputs of nodes to connect, or (type, value) pairs; the input "in" is written
+                ``in_``.
         """
         self._count += 1
         shader = self._shader(f"{kind}_{self._count:02d}", f"ND_{kind}_{output}", inputs)
@@ -256,7 +258,7 @@ class Network:
         Args:
             absorption: Node that computes absorption, without the type suffix:
                 ``chiang_hair_absorption_from_color`` or ``deon_hair_absorption_from_melanin``.
-            roughness: Inputs of ``chiang_hair_roughness``, in the form of the inputs of ``node``.
+            roughness: Inputs of ``chiang_hair_roughness``, given like the inputs of ``node``.
             **inputs: Inputs of the absorption node.
         """
         colour = self._shader("Absorption", f"ND_{absorption}", inputs)

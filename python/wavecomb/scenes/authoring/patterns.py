@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Components of procedural images: tileable noise, ramps and mixtures.
+"""Building blocks of procedural images: tileable noise, ramps and mixtures.
 
-Images are float32 arrays (height, width, channels), values are (height, width). Row 0 is on top.
+Colour images are float32 arrays (height, width, channels); scalar images are (height, width). Row 0
+is the top of the image.
 """
 
 from __future__ import annotations
@@ -14,13 +15,13 @@ Image = NDArray[np.float32]
 
 
 def grid(size: int) -> tuple[Image, Image]:
-    """Returns texel centres x (1, size) and y (size, 1) in 0 to 1; y grows downwards."""
+    """Returns the texel centres x (1, size) and y (size, 1), from 0 to 1; y grows downwards."""
     t = ((np.arange(size) + 0.5) / size).astype(np.float32)
     return t[None, :], t[:, None]
 
 
 def _cells(t: Image, cells: int) -> tuple[NDArray[np.int64], NDArray[np.int64], Image]:
-    """Returns the two lattice neighbours of positions 0 to 1, and the weight of the second."""
+    """Returns the lattice points before and after positions, and the weight of the second."""
     place = t * cells
     low = np.floor(place)
     f = (place - low).astype(np.float32)
@@ -31,14 +32,15 @@ def _cells(t: Image, cells: int) -> tuple[NDArray[np.int64], NDArray[np.int64], 
 def value_noise(
     x: Image, y: Image, cells: int, rng: np.random.Generator, rows: int | None = None
 ) -> Image:
-    """Evaluates tileable value noise, 0 to 1, with ``cells`` lattice cells per unit.
+    """Evaluates tileable value noise, from 0 to 1.
 
     Args:
-        x: Horizontal positions, of any shape; (1, w) with y (h, 1) is a grid, which is much faster.
+        x: Horizontal positions, of any shape; the shape (1, w), with y of shape (h, 1), is much
+            faster.
         y: Vertical positions.
         cells: Lattice cells per unit.
-        rng: Source of the lattice values.
-        rows: Vertical lattice cells per unit; None means as many as ``cells``.
+        rng: Random generator for the lattice values.
+        rows: Vertical lattice cells per unit; None uses ``cells``.
     """
     rows = rows or cells
     lattice = rng.random((rows, cells)).astype(np.float32)
@@ -61,7 +63,7 @@ def fractal(
     gain: float = 0.5,
     rows: int | None = None,
 ) -> Image:
-    """Sums octaves of tileable value noise, scaled to 0 to 1; ``rows`` is as in ``value_noise``."""
+    """Sums octaves of tileable ``value_noise`` to values from 0 to 1."""
     rows = rows or cells
     total = np.zeros(np.broadcast(x, y).shape, np.float32)
     weight = 1.0
@@ -74,7 +76,7 @@ def fractal(
 
 
 def shifted(image: Image, dx: Image, dy: Image) -> Image:
-    """Looks up a tileable (n, n) image bilinearly at texels offset by dx, dy (in image widths)."""
+    """Looks up a tileable (n, n) image bilinearly, displaced by dx, dy (in image widths)."""
     size = image.shape[0]
     columns = np.arange(size, dtype=np.float32)[None, :] + dx * size
     rows = np.arange(size, dtype=np.float32)[:, None] + dy * size
@@ -87,7 +89,7 @@ def shifted(image: Image, dx: Image, dy: Image) -> Image:
 
 
 def ramp(t: Image, stops: list[tuple[float, tuple[float, float, float]]]) -> Image:
-    """Maps values (h, w) to colours (h, w, 3) by linear interpolation between stops."""
+    """Maps values (h, w) to colours (h, w, 3) by linear interpolation between colour stops."""
     places = [place for place, _ in stops]
     return np.stack(
         [np.interp(t, places, [colour[k] for _, colour in stops]) for k in range(3)], axis=2
@@ -100,7 +102,7 @@ def mix(a: Image, b: Image, weight: Image) -> Image:
 
 
 def flat(colour: tuple[float, float, float]) -> Image:
-    """Makes an image of one texel."""
+    """Makes an image of one texel, with this colour."""
     return np.array(colour, np.float32).reshape(1, 1, 3)
 
 
@@ -115,7 +117,7 @@ def normal_map(height: Image, metres: float) -> Image:
 
     Args:
         height: Height of the surface at each texel, in metres.
-        metres: Edge of the image, in metres.
+        metres: Edge length of the area that the image covers, in metres.
     """
     per_metre = 0.5 * height.shape[0] / metres
     slope_x = (np.roll(height, -1, 1) - np.roll(height, 1, 1)) * per_metre

@@ -21,7 +21,7 @@ from wavecomb.scenes.models.mesh import FloatArray, Mesh
 SUFFIXES = (".usda", ".usdc", ".usd")
 BOX_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 BOX = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-"""Corners of a cube about the origin, (8, 3), and its faces, facing outwards."""
+"""Corners (8, 3) of a cube about the origin, and its faces, which face outwards."""
 _INPUT_TYPES = {
     "diffuseColor": Sdf.ValueTypeNames.Color3f,
     "specularColor": Sdf.ValueTypeNames.Color3f,
@@ -32,7 +32,7 @@ _INPUT_TYPES = {
 
 
 def _shine(light: Any, colour: Sequence[float]) -> None:
-    """Sets the intensity of a light, and a colour whose largest channel is 1."""
+    """Sets intensity and colour of a light so that the largest channel of the colour is 1."""
     peak = max(colour)
     light.CreateIntensityAttr(peak)
     light.CreateColorAttr(_vec([v / peak for v in colour]))
@@ -45,8 +45,8 @@ def _vec(values: Sequence[float] | FloatArray) -> Gf.Vec3f:
 class StageWriter:
     """Builder of a Y-up stage in memory. ``save`` writes the stage atomically.
 
-    Texture files are written as soon as a material needs them, to ``<stem>_textures/`` beside the
-    stage, and are referenced by relative paths.
+    The builder writes a texture file when the first material uses it. The files are in
+    ``<stem>_textures/`` next to the stage, which references them by relative paths.
     """
 
     def __init__(
@@ -62,9 +62,10 @@ class StageWriter:
         Args:
             path: File to write: .usda, .usdc or .usd (binary).
             metres_per_unit: Length of a scene unit, in metres.
-            texture_size: Edge of the largest textures in texels; all others shrink in proportion.
-            seed: Random seed of the patterns in textures.
-            is_plain: Whether materials are written in their plain form, see ``materials.plain``.
+            texture_size: Edge of the largest textures in texels; smaller textures are scaled in
+                proportion.
+            seed: Seed of the random patterns in textures.
+            is_plain: Whether ``materials.plain`` converts all materials before they are written.
         """
         if path.suffix.lower() not in SUFFIXES:
             raise SceneError(f"{path}: a stage's name must end in .usda, .usdc or .usd")
@@ -86,7 +87,7 @@ class StageWriter:
             UsdGeom.Scope.Define(self.stage, f"/World/{scope}")
 
     def save(self, comment: str) -> None:
-        """Writes the stage, replacing the file only when complete."""
+        """Writes the stage file atomically."""
         self.stage.GetRootLayer().comment = comment
         suffix = ".usdc" if self._path.suffix.lower() == ".usd" else self._path.suffix.lower()
         part = self._path.with_name(f".{self._path.stem}.part{suffix}")
@@ -101,7 +102,7 @@ class StageWriter:
                 part.unlink()
 
     def mesh(self, path: str, mesh: Mesh, material: str | None = None) -> UsdGeom.Mesh:
-        """Adds a triangle mesh with vertex normals and ``st``."""
+        """Adds a triangle mesh with vertex normals and the primvar ``st``."""
         prim = UsdGeom.Mesh.Define(self.stage, path)
         low, high = mesh.bounds
         prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(mesh.points))
@@ -129,7 +130,7 @@ class StageWriter:
         material: str | None = None,
         uv: FloatArray | None = None,
     ) -> UsdGeom.Mesh:
-        """Adds flat polygons with points (n, 3) and uv (n, 2)."""
+        """Adds flat polygons with points (n, 3) and texture coordinates (n, 2)."""
         prim = UsdGeom.Mesh.Define(self.stage, path)
         prim.CreatePointsAttr([_vec(p) for p in points])
         prim.CreateFaceVertexCountsAttr([len(p) for p in polygons])
@@ -158,7 +159,7 @@ class StageWriter:
     def floor(
         self, name: str, half: float, material: str, y: float = 0.0, uv: FloatArray | None = None
     ) -> None:
-        """Adds a horizontal square centred on the y axis, with a half width of ``half``."""
+        """Adds a horizontal square with edges of 2 * ``half``, centred on the y axis."""
         h = half
         corners = [[-h, y, h], [h, y, h], [h, y, -h], [-h, y, -h]]
         self.quad(f"/World/Set/{name}", corners, material, uv)
@@ -170,11 +171,11 @@ class StageWriter:
         half: Sequence[float] | FloatArray,
         material: str,
     ) -> None:
-        """Adds a box of flat polygons from its centre and half its edge lengths, each (3,)."""
+        """Adds a box of flat polygons from its centre (3,) and half its edge lengths (3,)."""
         self.polygons(path, np.asarray(middle) + BOX_CORNERS * np.asarray(half), BOX, material)
 
     def prototype(self, name: str, mesh: Mesh) -> str:
-        """Adds a class prim with one unbound mesh; returns its path for ``instance``."""
+        """Adds a class prim with a mesh and no material; returns its path for ``instance``."""
         path = f"/_Prototype_{name}"
         self.stage.CreateClassPrim(path).SetTypeName("Xform")
         self.mesh(f"{path}/Mesh", mesh)
@@ -205,7 +206,7 @@ class StageWriter:
         UsdShade.MaterialBindingAPI.Apply(prim).Bind(self._materials[material])
 
     def material(self, name: str, info: MaterialInfo) -> str:
-        """Adds a material with its textures, once for each name; returns the name."""
+        """Adds a material and its textures unless the name exists; returns the name."""
         if name in self._materials:
             return name
         if self._is_plain:
@@ -227,14 +228,14 @@ class StageWriter:
         return name
 
     def own_material(self, name: str, material: UsdShade.Material) -> str:
-        """Registers an existing material, so that ``bind`` finds it; returns the name."""
+        """Registers an existing material under a name for ``bind``; returns the name."""
         self._materials[name] = material
         return name
 
     def define_texture(self, name: str, info: TextureInfo) -> None:
-        """Registers a texture of the scene by name.
+        """Registers a texture under a name that materials can use.
 
-        ``info.size`` is the edge of the texture, which ``texture_size`` does not scale.
+        ``texture_size`` does not scale the texture; ``info.size`` is its edge in texels.
         """
         self._own[name] = info
 
@@ -282,7 +283,7 @@ class StageWriter:
         return folder / file_name, Sdf.AssetPath(f"./{folder.name}/{file_name}")
 
     def texture_file(self, name: str) -> Sdf.AssetPath:
-        """Writes a texture, once, and returns its asset path in the stage."""
+        """Writes a texture unless it has been written; returns its asset path in the stage."""
         file, asset = self._texture_path(f"{name}.png")
         if name not in self._written:
             if name in self._own:
@@ -329,7 +330,7 @@ class StageWriter:
             name: Name of the prim.
             way: Direction in which the light travels, (3,).
             angle: Angular diameter, in degrees.
-            radiant: Irradiance of a surface that faces the light, RGB.
+            radiant: Irradiance of a surface that faces the light, as RGB.
         """
         light = UsdLux.DistantLight.Define(self.stage, f"/World/Lights/{name}")
         light.CreateAngleAttr(angle)
@@ -339,7 +340,7 @@ class StageWriter:
         light.AddTransformOp().Set(Gf.Matrix4d().SetRotate(turn))
 
     def dome_light(self, name: str, turn_degrees: float, intensity: float = 1.0) -> None:
-        """Adds an environment with the procedural sky, 1024 x 512 at full texture size."""
+        """Adds an environment light with a procedural sky, half as wide as large textures."""
         file, asset = self._texture_path("sky.exr")
         height = max(16, self._texture_size // 4)
         write_image(file, sky(2 * height, height, self._seed), "half")
@@ -350,7 +351,7 @@ class StageWriter:
         light.AddRotateYOp().Set(turn_degrees)
 
     def even_dome(self, name: str, radiance: float) -> None:
-        """Adds a uniform white environment."""
+        """Adds a uniform white environment light."""
         light = UsdLux.DomeLight.Define(self.stage, f"/World/Lights/{name}")
         light.CreateIntensityAttr(radiance)
 
@@ -369,7 +370,8 @@ class StageWriter:
             target: Point in the middle of the image, (3,), in scene units.
             fov_degrees: Horizontal angle of view.
             aspect: Width / height of the image.
-            focal_mm: Focal length in mm; the aperture follows from it and the angle of view.
+            focal_mm: Focal length in mm; the aperture size is derived from ``focal_mm`` and
+                ``fov_degrees``.
         """
         camera = UsdGeom.Camera.Define(self.stage, "/World/Camera")
         # USD's camera units are tenths of a scene unit. Since only the ratio of focal length to

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Procedural, tileable images and a sky, written through OpenImageIO.
+"""Procedural, tileable images, and an image of a sky, written through OpenImageIO.
 
 Images are float32 arrays (height, width, channels) with row 0 on top. Colours are display-referred
-sRGB values from 0 to 1; data images (roughness, normals) are linear; the sky is linear radiance.
+sRGB values from 0 to 1; roughness and normal maps hold linear data; the sky holds linear radiance.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class TextureInfo:
     """Description of a procedural texture.
 
     Attributes:
-        make: Function of the size in texels and a random generator that returns the image.
+        make: Function that returns the image for a size in texels and a random generator.
         size: Edge in texels at full resolution.
         colour: True for sRGB colour, False for raw data.
         channels: Output of UsdUVTexture to use, "rgb" or "r".
@@ -108,9 +108,10 @@ _TILE_SEED = 77
 
 @functools.lru_cache(maxsize=1)
 def _tile_layout(size: int) -> tuple[Image, Image, Image, Image]:
-    """Returns joint mask, tone of each tile, fine grain and broad stains, each (size, size).
+    """Returns mask of joints, tone of each tile, fine grain and broad stains, each (size, size).
 
-    The seed is fixed, since the colour and roughness images of the tiles share the layout.
+    The seed is fixed, since the colour and the roughness image of the floor tiles must have the
+    same layout.
     """
     rng = np.random.default_rng(_TILE_SEED)
     x, y = grid(size)
@@ -216,8 +217,8 @@ def sky(width: int, height: int, seed: int) -> Image:
     """Makes a late afternoon sky as a latitude-longitude map, (height, width, 3).
 
     Values are linear radiance. Row 0 is the zenith (+Y). The sun is a soft disc of about 8 degrees,
-    24 degrees above the horizon, so that few texels hold most of the light and importance sampling
-    matters.
+    24 degrees above the horizon. A few texels hold most of the light, which makes importance
+    sampling necessary.
     """
     rng = np.random.default_rng([seed, 5])
     u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)

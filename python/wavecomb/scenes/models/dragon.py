@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A procedural dragon with any number of triangles.
 
-An eastern dragon without wings, its scaly body in an S above the ground, head raised. This dragon
-replaces the Stanford XYZRGB dragon, whose licence forbids shipping it. The dragon is a union of
-closed, overlapping tubes (see ``sweep``): body, head, jaw, limbs, claws, horns, fins. Relief is
-evaluated at the resolution of the mesh, so more triangles show finer detail: scales first, then
-their keels and growth rings, then grain.
+The dragon is eastern, without wings; its scaly body forms an S and its head is raised. This dragon
+replaces the Stanford XYZRGB dragon, whose licence forbids shipping it. It consists of closed,
+overlapping tubes (see ``sweep``) for body, head, jaw, limbs, claws, horns and fins. Surface relief
+is evaluated at the resolution of the mesh. With more triangles, first scales appear, then keels and
+growth rings of scales, then grain.
 
-Size in scene units: about 2.4 long, 1.6 high; Y up, standing on y = 0, facing +x.
+The dragon is about 2.4 scene units long and 1.6 high. It stands on y = 0 with Y up and faces +x.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ _SCALES_AROUND = 24
 
 
 def _placed(tube: Tube, scale: float, rotation: FloatArray, offset: FloatArray) -> Tube:
-    """Applies a similarity transform to a tube: rotation (3, 3), offset (3,)."""
+    """Rotates a tube by a matrix (3, 3), scales it and translates it by (3,)."""
     return Tube(
         tube.points @ rotation.T * scale + offset,
         tube.width * scale,
@@ -82,7 +82,7 @@ def _leg(
     """Makes a leg with foot, toes and claws.
 
     Args:
-        hip: Start, inside the body, (3,).
+        hip: Upper end of the leg, inside the body, (3,).
         knee: Knee or elbow, (3,).
         ankle: Ankle or wrist, (3,).
         foot: Middle of the foot, about 0.05 above the ground, (3,).
@@ -128,7 +128,7 @@ def _legs() -> list[Tube]:
 
 
 def _fins() -> list[Tube]:
-    """Makes fins along the back, lower towards both ends, and the flame at the tail's tip."""
+    """Makes fins along the back, lower towards both ends, and the tuft at the tail's tip."""
     parts = []
     t = np.linspace(0.06, 0.955, 58)
     place = spline(_BODY[:, :5], t)
@@ -170,7 +170,7 @@ def _fins() -> list[Tube]:
 
 
 def dragon_tubes() -> list[Tube]:
-    """Returns all parts of the dragon, the body first."""
+    """Returns all tubes of the dragon; the body is the first."""
     points, width, height, up = _BODY[:, :3], _BODY[:, 3], _BODY[:, 4], _BODY[:, 5:]
     body = Tube(points, width, height, up, scaly(_SCALES_AROUND, 0.13, 0.13), 0.94)
     c, s = np.cos(_HEAD_PITCH), np.sin(_HEAD_PITCH)
@@ -201,11 +201,12 @@ def dragon(triangles: int = 250_000) -> Mesh:
     """Makes the dragon.
 
     Args:
-        triangles: Number of triangles, from ``MIN_TRIANGLES`` to ``MAX_TRIANGLES``. The mesh
-            deviates from this number by at most one percent.
+        triangles: Number of triangles, from ``MIN_TRIANGLES`` to ``MAX_TRIANGLES``. The actual
+            number differs by at most one percent.
 
     Returns:
-        A mesh of closed, overlapping parts with outward faces, smooth normals and uv.
+        A mesh of closed, overlapping parts, with outward faces, smooth normals and texture
+        coordinates.
 
     Raises:
         SceneError: ``triangles`` is out of range.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The dragon's head, and spikes and balls that are also used for other parts."""
+"""Tubes of the dragon's head, and functions that make spikes and balls."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def spike(
 
     Args:
         root: Start point.
-        *path: Further control points; the last one is the tip.
+        *path: Control points after the root; the last one is the tip.
         radius: Half width along ``up`` at the root.
-        flat: Half width across as a fraction of ``radius``.
-        up: Direction of the broad side.
+        flat: Half width across ``up``, as a fraction of ``radius``.
+        up: Direction of the wider axis of the cross-section.
         relief: Displacement.
         bulge: Radius of the second control point relative to a straight taper.
     """
@@ -60,12 +60,12 @@ def tube(
     """Makes a tube from a table of control points.
 
     Args:
-        rows: Control points: x, y, z, half width, half height. Without the half height, the section
-            is round.
+        rows: Control points as (x, y, z, half width, half height). If the half height is missing,
+            the cross-section is round.
         relief: Displacement.
         belly: As in ``Tube``.
         detail: As in ``Tube``.
-        side: -1 mirrors the tube in z = 0.
+        side: Sign of the z coordinates; -1 mirrors the tube in the plane z = 0.
     """
     table = np.array(rows)
     points = table[:, :3] * np.array([1.0, 1.0, side])
@@ -122,7 +122,7 @@ _LOWER_TEETH = (
     (0.86, 0.13, 0.024), (0.76, 0.07, 0.018), (0.67, 0.065, 0.017), (0.58, 0.06, 0.016),
     (0.49, 0.05, 0.015),
 )  # fmt: skip
-"""x coordinate, length and radius of each tooth."""
+"""x coordinate, length and radius of each tooth of the dragon."""
 
 
 def head_tubes() -> list[Tube]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Triangle meshes as NumPy arrays, and common operations of the scene generators."""
+"""Triangle meshes as NumPy arrays, and operations on meshes that several scenes use."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-"""Any float64 array. The docstring of each function states the array's shape."""
+"""Any float64 array. The docstring of each function states the shapes of its arrays."""
 
 _CHUNK_FACES = 1 << 20
 
@@ -60,7 +60,7 @@ def merge(meshes: Iterable[Mesh]) -> Mesh:
 
 
 def face_areas(points: NDArray[np.floating], faces: NDArray[np.integer]) -> FloatArray:
-    """Computes areas of triangles: points (n, 3), faces (m, 3) -> float64 (m,)."""
+    """Computes the areas of triangles, float64 (m,), from points (n, 3) and faces (m, 3)."""
     corners = points.astype(np.float64)
     a, b, c = (corners[faces[:, k]] for k in range(3))
     return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
@@ -105,10 +105,10 @@ def smooth_normals(points: NDArray[np.floating], faces: NDArray[np.integer]) -> 
 
 
 def grid_faces(rows: int, columns: int) -> NDArray[np.int32]:
-    """Returns two triangles for each cell of a vertex grid of rows x columns, int32 (m, 3).
+    """Returns two triangles per cell of a grid of rows x columns vertices, as int32 (m, 3).
 
-    Vertex (i, j) has index ``i * columns + j``; the face normal points along (next row) x (next
-    column).
+    Vertex (i, j) has index ``i * columns + j``; the face normal is the cross product of the steps
+    to the next row and the next column.
     """
     i, j = np.meshgrid(np.arange(rows - 1), np.arange(columns - 1), indexing="ij")
     a = (i * columns + j).ravel()
@@ -124,13 +124,13 @@ def grid_mesh(
     *,
     reverse: bool = False,
 ) -> Mesh:
-    """Makes the mesh of a grid of vertices.
+    """Makes a triangle mesh from a grid of vertices.
 
     Args:
         points: Positions, (rows, columns, 3).
         uv: Texture coordinates, (rows, columns, 2).
         normals: Normals, (rows, columns, 3); None computes smooth normals.
-        reverse: Whether the face normal points along (next column) x (next row).
+        reverse: Whether to flip the faces.
     """
     faces = grid_faces(*points.shape[:2])
     if reverse:
@@ -144,7 +144,7 @@ def grid_mesh(
 
 
 def without_flat_faces(mesh: Mesh, tolerance: float = 1e-14) -> Mesh:
-    """Drops degenerate faces and unused points.
+    """Removes degenerate faces and unused points.
 
     A face is degenerate if its area is at most ``tolerance`` times the squared size of the mesh.
     """

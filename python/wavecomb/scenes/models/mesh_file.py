@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads a triangle mesh from OBJ, PLY (ASCII or binary, also .gz) or USD, to replace the dragon.
 
-The reader allows using the Stanford XYZRGB dragon, which Wavecomb may not ship.
+Users can thus render the Stanford XYZRGB dragon, which Wavecomb may not distribute.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ same diagonal."""
 _TEXTURE_LENGTH = 0.5
 _USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 MAX_UNPACKED = 1 << 31
-"""Largest number of bytes in a .gz after unpacking, ten times the largest dragon."""
+"""Largest unpacked size of a .gz file in bytes, ten times the size of the largest dragon."""
 
 
 def load_dragon(path: Path) -> Mesh:
-    """Reads a mesh and fits it into the place of the built-in dragon.
+    """Reads a mesh and scales and moves it to replace the built-in dragon.
 
-    The mesh is scaled to the dragon's size, centred over the origin, put on y = 0 and given smooth
-    normals. A mesh without uv gets a cylindrical projection about Y.
+    The mesh is scaled to the dragon's size, centred over the origin and put on y = 0. It gets
+    smooth normals. A mesh without texture coordinates gets a cylindrical projection about Y.
 
     Args:
-        path: .obj, .ply, either also with .gz, or .usd, .usda, .usdc, .usdz.
+        path: File with ending .obj, .ply, .obj.gz, .ply.gz, .usd, .usda, .usdc or .usdz.
 
     Raises:
-        SceneError: The file is missing, broken, empty or of another kind.
+        SceneError: The file is missing, damaged, empty or not a mesh file.
     """
     if not path.is_file():
         raise SceneError(f"{path}: no such mesh file")
@@ -109,7 +109,7 @@ def _check(raw: RawMesh) -> None:
 
 
 def _cylinder(points: np.ndarray) -> FloatArray:
-    """Computes a cylindrical projection about Y, (n, 2), with about one repeat per half unit."""
+    """Computes texture coordinates (n, 2) by cylindrical projection about Y."""
     radius = float(np.hypot(points[:, 0], points[:, 2]).mean())
     repeats = max(1, round(2.0 * np.pi * radius / _TEXTURE_LENGTH))
     # The coordinate u is a triangle wave of the angle about Y. It has no seam, where a triangle
@@ -119,7 +119,7 @@ def _cylinder(points: np.ndarray) -> FloatArray:
 
 
 def _read_obj(data: bytes) -> RawMesh:
-    """Reads Wavefront OBJ (v, vt and f); splits vertices whose texture coordinates differ."""
+    """Reads Wavefront OBJ (v, vt and f); duplicates vertices with several texture coordinates."""
     positions: list[bytes] = []
     textures: list[bytes] = []
     corners: list[bytes] = []
@@ -160,9 +160,10 @@ def _read_obj(data: bytes) -> RawMesh:
 
 
 def _read_usd(path: Path) -> RawMesh:
-    """Reads all meshes of a USD stage in world space, Y up.
+    """Reads all meshes of a USD stage as one mesh in world space, Y up.
 
-    The result has uv if every mesh has a primvar ``st`` with vertex interpolation.
+    The mesh has texture coordinates if every mesh of the stage has a primvar ``st`` with vertex
+    interpolation.
     """
     try:
         stage = Usd.Stage.Open(str(path))

@@ -12,7 +12,7 @@ from wavecomb.scenes.models.mesh import FloatArray
 
 @dataclass(frozen=True)
 class RawMesh:
-    """Mesh of a file: points float64 (n, 3), triangles int64 (m, 3), uv (n, 2) or None."""
+    """Mesh as read from a file, with or without texture coordinates."""
 
     points: FloatArray
     faces: np.ndarray
@@ -20,7 +20,7 @@ class RawMesh:
 
 
 def fans(counts: np.ndarray, indices: np.ndarray) -> np.ndarray:
-    """Splits polygons into triangle fans: counts (k,), indices (sum,) -> int64 (m, 3)."""
+    """Splits polygons with ``counts`` vertices each into triangles, (m, 3)."""
     counts = np.asarray(counts, np.int64)
     indices = np.asarray(indices, np.int64)
     if len(counts) and (counts.min() < 0 or counts.sum() != len(indices)):
@@ -58,9 +58,9 @@ _PLY_TYPES = {
 
 @dataclass
 class _Element:
-    """An element of a PLY file.
+    """Declaration of an element in the header of a PLY file.
 
-    Properties are (name, type, count type of a list or None for a scalar).
+    Each property is (name, type, count type); the count type is None unless the property is a list.
     """
 
     name: str
@@ -69,7 +69,7 @@ class _Element:
 
 
 def _ply_header(data: bytes) -> tuple[str, list[_Element], int]:
-    """Parses the header; returns the format, the elements and the offset of the body."""
+    """Parses a PLY header; returns the format, the elements and the byte offset of the body."""
     if not data.startswith(b"ply"):
         raise ValueError("it does not begin with 'ply'")
     end = data.find(b"end_header")
@@ -98,7 +98,7 @@ def _ply_header(data: bytes) -> tuple[str, list[_Element], int]:
 
 
 class _PlyBody:
-    """Reader of a file's body, element by element."""
+    """Reader of the body of a PLY file, element by element."""
 
     def __init__(self, data: bytes, offset: int, style: str) -> None:
         self._data = data
@@ -108,7 +108,7 @@ class _PlyBody:
         self._word = 0
 
     def scalars(self, element: _Element) -> dict[str, np.ndarray]:
-        """Reads an element without lists; returns its columns."""
+        """Reads an element without list properties; returns its columns."""
         names = [name for name, _, _ in element.properties]
         if self._words is not None:
             size = element.count * len(names)
@@ -149,7 +149,7 @@ class _PlyBody:
         return {name: (np.array(counts[name]), np.concatenate(values[name])) for name in counts}
 
     def _uniform(self, element: _Element) -> dict[str, tuple[np.ndarray, np.ndarray]] | None:
-        """Reads lists in one step if each has three entries, else returns None."""
+        """Reads the lists at once if every list has three entries, otherwise returns None."""
         if self._words is not None:
             if len(element.properties) != 1:
                 return None
@@ -198,7 +198,7 @@ class _PlyBody:
 
 
 def read_ply(data: bytes) -> RawMesh:
-    """Reads a mesh from PLY: vertex x, y, z, optional s, t or u, v, and faces of any size."""
+    """Reads a PLY mesh with polygons and optional texture coordinates (s, t or u, v)."""
     style, elements, offset = _ply_header(data)
     body = _PlyBody(data, offset, style)
     points: FloatArray | None = None
@@ -225,7 +225,7 @@ def read_ply(data: bytes) -> RawMesh:
 
 
 def ply_vertices(data: bytes) -> dict[str, np.ndarray]:
-    """Reads all scalar columns of the vertices of a PLY file, by name, float64 (n,)."""
+    """Reads all scalar properties of the vertices of a PLY file, by name, as float64 (n,)."""
     style, elements, offset = _ply_header(data)
     if not elements or elements[0].name != "vertex":
         raise ValueError("it does not begin with vertices")

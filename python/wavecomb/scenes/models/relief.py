@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reliefs of tubes: scales, plates, rings, folds and grain.
+"""Surface reliefs of the dragon's tubes: scales, plates, rings, folds and grain.
 
-A relief is evaluated on a tube's grid. Detail finer than the grid is left out, so that a coarse
-mesh is smooth instead of noisy, and a fine mesh shows more.
+A relief is a displacement that is evaluated on the grid of a tube. Detail finer than the grid is
+left out, so that a coarse
+mesh is smooth instead of noisy, and a fine mesh shows more detail.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ def ramp(x: FloatArray, low: float, high: float) -> FloatArray:
 
 
 def _visible(cells: FloatArray) -> FloatArray:
-    """Returns the weight of a feature by its wavelength in grid cells: 0 below 2.5, 1 above 5."""
+    """Returns the weight of a feature from its wavelength in grid cells: 0 below 2.5, 1 above 5."""
     return ramp(cells, 2.5, 5.0)
 
 
@@ -55,7 +56,7 @@ def _scale_height(row: FloatArray, column: FloatArray, edge: FloatArray) -> Floa
 
 
 def _grain(surface: Surface, around: int) -> FloatArray:
-    """Returns fine irregular grain, about -1 to 1: products of sines of unrelated frequencies."""
+    """Returns fine irregular grain, from about -1 to 1, made of products of sine waves."""
     a = 2.0 * np.pi * surface.around
     b = 2.0 * np.pi * surface.turns * around
     total = np.zeros(np.broadcast(a, b).shape)
@@ -72,14 +73,14 @@ def _grain(surface: Surface, around: int) -> FloatArray:
 def scaly(
     around: int, depth: float, belly: float, fade: Callable[[FloatArray], FloatArray] | None = None
 ) -> Relief:
-    """Makes a relief of scales above, transverse plates below, and grain.
+    """Makes a relief of scales on the back, transverse plates on the belly, and grain.
 
     Args:
         around: Number of scales around the tube.
-        depth: Height of a scale in local radii.
+        depth: Height of a scale as a fraction of the tube's local radius.
         belly: Fraction of the circumference, on each side of the underside, that has plates; 0 for
             none.
-        fade: Factor on the whole relief as a function of ``along``.
+        fade: Factor on the whole relief, as a function of the position ``along`` the tube.
     """
 
     def relief(surface: Surface) -> FloatArray:
@@ -102,7 +103,7 @@ def scaly(
 
 
 def ringed(rings: float, depth: float) -> Relief:
-    """Makes a relief for horns: rings across and fine grooves along."""
+    """Makes a relief for horns, with rings across the horn and fine grooves along it."""
 
     def relief(surface: Surface) -> FloatArray:
         ring = np.abs(np.sin(np.pi * rings * surface.along**0.8))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Basic shapes of furniture, such as rounded boxes and tubes, and objects of several shapes.
+"""Basic shapes of furniture, such as rounded boxes and tubes, and how to add them to a stage.
 
 All shapes are closed meshes in metres. Texture coordinates are also in metres, with v along the
 grain.
@@ -30,9 +30,9 @@ Vector = Sequence[float] | FloatArray
 """Sequence of two or three numbers."""
 
 _WELD_DIGITS = 6
-"""Number of decimals that points are rounded to, so that adjacent faces share points exactly."""
+"""Number of decimals of point coordinates; rounding makes adjacent faces share points exactly."""
 _TUBE_LENGTH = 0.5
-"""Length of a tube of ``sweep`` per unit of texture coordinates, in metres."""
+"""Length along a tube from ``sweep`` per unit of texture coordinates, in metres."""
 
 
 def turn_about(axis: int, degrees: float) -> FloatArray:
@@ -61,7 +61,7 @@ def grounded(mesh: Mesh) -> Mesh:
 
 
 def mapped_flat(mesh: Mesh, across: int, up: int) -> Mesh:
-    """Returns the mesh with texture coordinates from 0 to 1 over its bounds along two axes."""
+    """Maps texture coordinates from 0 to 1 to the mesh's bounds along two axes."""
     low, high = mesh.bounds
     axes = [across, up]
     uv = (mesh.points[:, axes] - low[axes]) / (high - low)[axes]
@@ -69,7 +69,7 @@ def mapped_flat(mesh: Mesh, across: int, up: int) -> Mesh:
 
 
 def tapered(mesh: Mesh, foot: float) -> Mesh:
-    """Returns the mesh scaled towards the y axis: by ``foot`` at its lowest point, by 1 on top."""
+    """Scales a mesh towards the y axis, by ``foot`` at its lowest point and by 1 at its top."""
     low, high = mesh.bounds
     height = (mesh.points[:, 1] - low[1]) / (high[1] - low[1])
     points = mesh.points.copy()
@@ -91,9 +91,9 @@ def rounded_box(
         low: Lower corner (3,).
         high: Upper corner (3,).
         radius: Radius of the edges; at most half of the thinnest side.
-        arc: Cells on an eighth of a circle.
-        bulge: Height of the bulge of the faces across x, y and z, for upholstery.
-        uv_offset: Added to texture coordinates (2,), so that boards differ.
+        arc: Number of cells on an eighth of a circle.
+        bulge: Height by which the faces across x, y and z bulge, for upholstery.
+        uv_offset: Offset of the texture coordinates (2,), so that boards look different.
     """
     low, high, swell = (np.asarray(v, float) for v in (low, high, bulge))
     half = 0.5 * (high - low)
@@ -127,7 +127,7 @@ def rounded_box(
 
 
 def _lengths(curve: FloatArray) -> FloatArray:
-    """Returns the length of a polyline (n, k) up to each of its points, (n,)."""
+    """Returns the arc length of a polyline (n, k) at each of its points, (n,)."""
     steps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])
 
@@ -139,7 +139,7 @@ def turned(profile: Sequence[Vector] | FloatArray, columns: int, steps: int = 4)
         profile: Control points (radius, height) of a spline from axis to axis, upwards on the
             outside. Repeating a control point makes the curve almost sharp there.
         columns: Cells around.
-        steps: Cells between two control points.
+        steps: Number of cells between two control points.
     """
     control = np.asarray(profile, float)
     curve = spline(control, np.linspace(0.0, 1.0, steps * (len(control) - 1) + 1))
@@ -158,7 +158,7 @@ def turned(profile: Sequence[Vector] | FloatArray, columns: int, steps: int = 4)
 
 
 def disc(radius: float, height: float, columns: int) -> Mesh:
-    """Makes a flat disc at a height, facing up."""
+    """Makes a flat disc that faces up."""
     return turned([(radius, height), (0.5 * radius, height), (0.0, height)], columns, 2)
 
 
@@ -174,11 +174,11 @@ def tube(
 
     Args:
         points: Control points of the centre line, (k, 3).
-        width: Half width: one number, or one for each point.
+        width: Half width, either one number or one for each point.
         columns: Cells around.
         rings: Cells along.
         height: Half height along ``up``; None makes it equal to the half width.
-        up: Direction that is not along the tube.
+        up: Any direction that is not parallel to the tube.
     """
     control = np.asarray(points, float)
     wide = np.broadcast_to(np.asarray(width, float), len(control)).copy()
@@ -215,7 +215,7 @@ def pillow(width: float, depth: float, thickness: float, cells: int = 20) -> Mes
 
 
 Part = tuple[Mesh, str]
-"""A mesh and the name of its material."""
+"""Part of an object: a mesh and the name of its material."""
 
 
 def add_object(
@@ -225,7 +225,7 @@ def add_object(
     position: Sequence[float] = (0.0, 0.0, 0.0),
     turn_degrees: float = 0.0,
 ) -> None:
-    """Adds an Xform, rotated about Y, with one mesh for each material of the given parts."""
+    """Adds an Xform, rotated about Y, with one mesh for each material of the parts."""
     _place(UsdGeom.Xform.Define(writer.stage, path), position, turn_degrees)
     _fill(writer, path, parts)
 

@@ -24,21 +24,21 @@ MIN_TRIANGLES = 32
 """Smallest number of triangles of a stone: a sphere of 4 x 4 cells."""
 MAX_TRIANGLES = 60_000_000
 TILE = 8
-"""Edges of textures are multiples of this number of texels."""
+"""Texture edges are rounded to a multiple of this number of texels."""
 _PITCH = 2.3
 _CHART_TEXELS = 4
 _PATTERNS = (marble, wood, weave)
 
 
 def stones_for(materials: int) -> int:
-    """Returns the number of stones for a number of materials."""
+    """Returns the number of stones of a field with this number of materials."""
     return max(STONES, materials)
 
 
 def check_field(scene: str, options: SceneOptions, **ranges: tuple[float, float]) -> None:
-    """Raises SceneError for an option outside of its range.
+    """Raises SceneError if an option is outside of its range.
 
-    The function also checks ``triangles``, whose range is the same for all fields.
+    The range of ``triangles`` is the same for all fields.
     """
     least = stones_for(options.materials) * MIN_TRIANGLES
     for name, (low, high) in {**ranges, "triangles": (least, MAX_TRIANGLES)}.items():
@@ -48,7 +48,7 @@ def check_field(scene: str, options: SceneOptions, **ranges: tuple[float, float]
 
 
 def texture_edge(options: SceneOptions, bytes_per_texel: float, least: int) -> int:
-    """Returns the edge in texels of textures that take ``texture_mb`` in total.
+    """Returns the edge in texels of textures that together take ``texture_mb``.
 
     Each material has ``bytes_per_texel``. Texels are stored in tiles of 8 x 8, so small textures
     take somewhat more than requested.
@@ -58,7 +58,7 @@ def texture_edge(options: SceneOptions, bytes_per_texel: float, least: int) -> i
 
 
 def grey_pattern(index: int, size: int, rng: np.random.Generator) -> Image:
-    """Returns the pattern of material ``index``, (size, size, 1), a lightness from about 0 to 1."""
+    """Returns the lightness pattern of material ``index``, (size, size, 1), from about 0 to 1."""
     make = _PATTERNS[index % len(_PATTERNS)]
     return np.asarray(make(max(size, 16), rng)[:size, :size].mean(axis=2, keepdims=True))
 
@@ -75,10 +75,10 @@ def build_field(
 
     Args:
         writer: Writer of the stage.
-        names: Materials, which the stage already has.
+        names: Names of materials that exist in the stage.
         triangles: Number of triangles of all stones together.
-        edge: Edge of the textures in texels, over which a stone's triangles are scattered like the
-            charts of an atlas; 0 means no texture coordinates.
+        edge: Edge of the textures in texels. The triangles of a stone are scattered over the
+            texture, like the charts of an atlas. 0 means no texture coordinates.
         aspect: Width / height of the image.
         rng: Source of random shapes and positions.
     """
@@ -107,7 +107,7 @@ def _cells(triangles: int) -> tuple[int, int]:
 def _stone(cells: tuple[int, int], rng: np.random.Generator) -> Mesh:
     """Makes a closed, bumpy ball of radius about 1 that stands on y = 0.
 
-    The relief is a sum of waves in space, so it has no gap at seam and poles.
+    The relief is a sum of waves in space, so it is continuous at the seam and the poles.
     """
     rows, columns = cells
     theta = np.linspace(0.0, np.pi, rows + 1)[:, None]
@@ -130,8 +130,8 @@ def _stone(cells: tuple[int, int], rng: np.random.Generator) -> Mesh:
 def _atlas(triangles: int, edge: int, rng: np.random.Generator) -> NDArray[np.float32]:
     """Returns texture coordinates of each corner, (triangles, 3, 2), one chart per triangle.
 
-    Charts are squares of 4 x 4 texels in random order. If there are more triangles than charts,
-    they share charts.
+    Charts are squares of 4 x 4 texels, which the triangles use in random order. If there are more
+    triangles than charts, several triangles use the same chart.
     """
     charts = edge // _CHART_TEXELS
     order = rng.permutation(charts * charts)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Closed tubes swept along a cubic B-spline, of which the dragon is made.
 
-A tube has a centre line, an elliptic section that changes along it, an "up" direction that keeps
-the section from twisting, and an optional relief, a displacement along the section's radius.
-Tubes and reliefs are evaluated on a grid of rings x columns in NumPy.
+A tube has a centre line, an elliptic cross-section that varies along the line, and an "up"
+direction that keeps the cross-section from twisting. An optional relief displaces the surface along
+the radius. Tubes and reliefs are evaluated on a grid of rings x columns in NumPy.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from wavecomb.scenes.models.mesh import FloatArray, Mesh, normalized
 
 _DENSE_SAMPLES = 1024
 _TEXTURE_LENGTH = 0.5
-"""Length along a tube, in scene units, per texture repeat."""
+"""Length along a tube, in scene units, that one texture repeat covers."""
 
 
 @dataclass(frozen=True)
 class Surface:
-    """Grid positions where a relief is evaluated.
+    """Grid positions at which a relief is evaluated.
 
     Attributes:
         along: Arc length divided by the tube's length, 0 to 1, (rings, 1).
-        turns: Arc length in units of local circumferences, (rings, 1).
-        around: Angle / 2 pi from the underside, 0 to 1; 0.5 is the ridge, (1, columns).
-        radius: Mean radius of the section, in scene units, (rings, 1).
-        cell: Grid spacing as a fraction of the local circumference. Relief finer than the grid
-            would alias.
+        turns: Arc length measured in local circumferences, (rings, 1).
+        around: Angle around the tube, from 0 to 1, (1, columns); 0 is the underside, 0.5 the ridge.
+        radius: Mean radius of the cross-section, in scene units, (rings, 1).
+        cell: Grid spacing as a fraction of the local circumference. Reliefs leave out detail finer
+            than this.
     """
 
     along: FloatArray
@@ -42,7 +42,7 @@ class Surface:
 
 
 Relief = Callable[[Surface], FloatArray]
-"""Displacement in local radii, (rings, columns)."""
+"""Returns the displacement as a fraction of the local radius, (rings, columns)."""
 
 
 @dataclass(frozen=True)
@@ -51,11 +51,11 @@ class Tube:
 
     Attributes:
         points: Control points of the centre line, (k, 3).
-        width: Half width across, at each control point, (k,). Zero makes a tip.
+        width: Half width across "up", at each control point, (k,). Zero makes a tip.
         height: Half height along "up", at each control point, (k,).
         up: Direction of the ridge, at each control point, (k, 3) or (3,).
-        relief: Displacement, or None for a smooth tube.
-        belly: Factor on the height below the centre line; 1 is a full ellipse.
+        relief: Function that computes the displacement, or None for a smooth tube.
+        belly: Factor on the height of the cross-section's lower half; 1 makes a full ellipse.
         detail: Factor on the density of triangles.
     """
 
@@ -99,7 +99,7 @@ def spline(control: FloatArray, t: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class _Profile:
-    """Dense samples of a tube: parameter, arc length, profile length, radii; each (n,)."""
+    """Dense samples along a tube; each array has shape (n,)."""
 
     t: FloatArray
     arc: FloatArray
@@ -109,7 +109,7 @@ class _Profile:
 
 
 def _rounding(arc: FloatArray, start: float, end: float) -> FloatArray:
-    """Returns the factor that closes both ends of a tube as ellipsoids, (n,).
+    """Returns the factor (n,) on the radius that rounds both ends of a tube to ellipsoids.
 
     ``arc`` holds arc lengths (n,); ``start`` and ``end`` are the lengths of the caps.
     """
@@ -142,10 +142,10 @@ def _perimeter(profile: _Profile) -> FloatArray:
 
 @dataclass(frozen=True)
 class Extent:
-    """Size of a tube, for distributing triangles among tubes.
+    """Size of a tube, from which its number of triangles is chosen.
 
     Attributes:
-        length: Length along its profile, in scene units.
+        length: Arc length of the tube's profile, in scene units.
         perimeter: Mean perimeter, in scene units.
         detail: Factor on the density of triangles.
     """
@@ -156,7 +156,7 @@ class Extent:
 
     @property
     def weight(self) -> float:
-        """Surface area without relief, times ``detail``."""
+        """Surface area of the tube without relief, times ``detail``."""
         return self.length * self.perimeter * self.detail
 
     def grid(self, density: float) -> tuple[int, int]:
@@ -203,8 +203,8 @@ def _tube_faces(rings: int, columns: int) -> np.ndarray:
 def tube_mesh(tube: Tube, rings: int, columns: int) -> Mesh:
     """Evaluates a tube on a grid, as a closed mesh of ``2 * rings * columns`` triangles.
 
-    The first and last column coincide (texture seam on the underside); the first and last row are
-    poles.
+    The first and last column coincide at the texture seam on the underside. The first and last row
+    are poles.
     """
     profile = _profile(tube)
     radius_dense = 0.5 * (profile.width + profile.height)
@@ -285,7 +285,7 @@ def _tangents(control: FloatArray, t: FloatArray) -> FloatArray:
 def _grid_normals(points: FloatArray, tangent: FloatArray) -> np.ndarray:
     """Returns unit normals of a grid, float32 (rows, columns, 3).
 
-    ``points`` have the same shape, ``tangent`` is (rows, 3).
+    ``points`` has the shape (rows, columns, 3), ``tangent`` the shape (rows, 3).
     """
     normals = np.empty(points.shape, np.float32)
     normals[0] = -tangent[0]

@@ -5,9 +5,9 @@ Source: M. E. Newell, "The Utilization of Procedure Models in Digital Image Synt
 University of Utah, 1975; numbers as published by F. Crow, "The Origins of the Teapot", IEEE CG&A
 7(1), 1987, with the bottom that was added later.
 
-The published list has 306 points, but most follow from symmetry: rim, body, lid and bottom are
-profiles turned in four patches; handle and spout are half sections mirrored in y = 0. The file
-holds only the numbers that generate the patches.
+The published list has 306 points, most of which follow from symmetry. Rim, body, lid and bottom are
+surfaces of revolution with four patches each around the axis; handle and spout are mirrored in y =
+0. This file has only the points from which the patches are generated.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from wavecomb.scenes.models.mesh import (
 )
 
 _CIRCLE = 0.56
-"""Newell's rounded Bezier constant of a quarter circle (the exact value would be 0.5523)."""
+"""Newell's rounded constant for a Bezier quarter circle (the exact value is 0.5523)."""
 
 # Bezier control points (radius, height) of the profiles of the teapot's surfaces of revolution. A
 # patch has four control points and shares the last of them with the next patch.
@@ -41,7 +41,8 @@ _LID = np.array(
 _BOTTOM = np.array([[1.5, 0.15], [1.5, 0.075], [1.425, 0], [0, 0]])
 _KNOB_ROW = 1
 _KNOB_CIRCLE = 0.5625
-"""Circle constant of the widest row of the lid's knob, published as 0.45 / 0.8 instead of 0.56."""
+"""Quarter circle constant of the widest row of the lid's knob, published as 0.45 / 0.8 instead of
+0.56."""
 
 # Control points of handle and spout, which are tubes along a curve. Each row contains x and z of
 # one side of the tube, x and z of the opposite side, and the half width in y.
@@ -69,14 +70,13 @@ _SPOUT = np.array(
 )
 
 _TEXTURE_LENGTH = 2.0 * np.pi
-"""Length of one texture repeat in teapot units. The circumference of the belly takes two
-repeats."""
+"""Length that one texture repeat covers, in teapot units; two repeats go around the belly."""
 
 
 def _turned(profile: FloatArray) -> FloatArray:
-    """Returns the patches (k, 4, 4, 3) of a profile of rows (radius, height).
+    """Returns the patches (k, 4, 4, 3) of the surface of revolution of a profile (radius, height).
 
-    One index runs along the profile, the other around the axis.
+    The first patch index runs along the profile, the second around the axis.
     """
     constants = np.full(len(profile), _CIRCLE)
     if profile is _LID:
@@ -97,9 +97,9 @@ def _turned(profile: FloatArray) -> FloatArray:
 
 
 def _swept(rows: FloatArray) -> FloatArray:
-    """Returns the patches (k, 4, 4, 3) of a mirrored tube.
+    """Returns the patches (k, 4, 4, 3) of a tube that is symmetric in y = 0.
 
-    The first index runs along the tube, the second around one half.
+    The first index of a patch runs along the tube, the second around one half of it.
     """
     patches = []
     for first in range(0, len(rows) - 1, 3):
@@ -126,7 +126,7 @@ def teapot_patches() -> FloatArray:
 
 
 def _bernstein(t: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Evaluates cubic Bernstein polynomials and derivatives at t (n,): two arrays (n, 4)."""
+    """Evaluates the cubic Bernstein polynomials (n, 4) and their derivatives (n, 4) at t (n,)."""
     s = 1.0 - t
     value = np.stack([s**3, 3 * s * s * t, 3 * s * t * t, t**3], axis=1)
     slope = np.stack([-3 * s * s, 3 * s * s - 6 * s * t, 6 * s * t - 3 * t * t, 3 * t * t], axis=1)
@@ -146,9 +146,9 @@ def _evaluate(
 
 
 def _arc_lengths(rows: FloatArray) -> FloatArray:
-    """Returns arc lengths at patch ends, ((k - 1) // 3 + 1,).
+    """Returns the arc lengths at the ends of the patches, ((k - 1) // 3 + 1,).
 
-    ``rows`` is a column of the control points, (k, 3).
+    ``rows`` are the control points of a profile or centre line, (k, 3).
     """
     t = np.linspace(0.0, 1.0, 65)
     value, _ = _bernstein(t)
@@ -160,10 +160,11 @@ def _arc_lengths(rows: FloatArray) -> FloatArray:
 
 
 def _tessellate(patches: FloatArray, turns: int, level: int, repeats: float) -> Mesh:
-    """Tessellates a part in Newell's coordinates.
+    """Tessellates one part of the teapot in Newell's coordinates.
 
     Args:
-        patches: Bezier patches (k, 4, 4, 3); each ``turns`` of them go once around the part.
+        patches: Bezier patches (k, 4, 4, 3); consecutive groups of ``turns`` patches go once around
+            the part.
         turns: Number of patches around the part.
         level: Cells along each patch edge.
         repeats: Texture repeats around the part.
@@ -196,7 +197,8 @@ def teapot(level: int = 16) -> Mesh:
         level: Cells along each patch edge, at least 1; yields about ``64 * level**2`` triangles.
 
     Returns:
-        The mesh with analytic normals, and uv that repeats once per 6.28 teapot units.
+        The mesh with analytic normals and texture coordinates; a texture repeat is 6.28 teapot
+        units long.
     """
     if level < 1:
         raise SceneError(f"teapot level must be at least 1, not {level}")

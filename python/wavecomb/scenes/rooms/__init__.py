@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rooms among the generated stages: a dining room and a kitchen."""
+"""Interiors among the generated stages: a dining room and a kitchen."""

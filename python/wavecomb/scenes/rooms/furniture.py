@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Furniture of the room: table, chairs, sofa, ottoman, lamp, side table, rug, plant.
 
-Each function returns parts that stand on y = 0 about the origin, with the front towards +z.
+Each function returns the parts of a piece of furniture on y = 0 at the origin, facing +z.
 """
 
 from __future__ import annotations
@@ -146,7 +146,7 @@ def _ring(radius: float, height: float, thick: float, columns: int) -> Mesh:
 
 
 def floor_lamp(columns: int) -> list[Part]:
-    """Makes a floor lamp, switched off: brass foot and pole, linen shade, bulb."""
+    """Makes a floor lamp without light, with brass foot and pole, a linen shade and a bulb."""
     foot = turned(
         [(0, 0), (0.15, 0), (0.15, 0), (0.152, 0.012), (0.14, 0.02), (0.03, 0.03), (0.014, 0.05),
          (0.011, 0.10), (0.011, 1.42), (0.011, 1.42), (0, 1.42)],

@@ -39,7 +39,7 @@ _SHELF, _HIGH = 1.45, 2.25
 """Lower and upper edge of the wall cupboards."""
 _CUPBOARD = 0.34
 _WINDOW = (1.35, 2.55, 1.12, 2.12)
-"""Extent of the window: lowest and highest x, lowest and highest y."""
+"""Extent of the window as lowest and highest x, then lowest and highest y."""
 _TILE, _GAP = 0.10, 0.003
 _OBJECTS = "/World/Objects"
 _TEAPOT_SCALE = 0.036
@@ -60,7 +60,7 @@ _LEFT = _Run("Left", (0.0, 0.0, _DEPTH), 90.0)
 
 
 def build_kitchen(writer: StageWriter, options: SceneOptions) -> None:
-    """Builds the kitchen. ``teapot_level`` sets the resolution of bodies of revolution."""
+    """Builds the kitchen; ``teapot_level`` sets the resolution of bodies of revolution."""
     rng = np.random.default_rng([options.seed, 7])
     columns = max(12, 4 * options.teapot_level)
     write_textures(writer, options)
@@ -137,7 +137,7 @@ def _tiles(writer: StageWriter, rng: np.random.Generator) -> None:
 
 
 def _on(run: _Run, at: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Converts a position from the local frame of a row of cupboards to world space."""
+    """Converts a position relative to a row of cupboards to world space."""
     turned = turn_about(1, run.turn) @ np.array(at)
     x, y, z = turned + np.array(run.place)
     return float(x), float(y), float(z)
@@ -150,7 +150,7 @@ def _put(writer: StageWriter, name: str, run: _Run, parts: list[Part]) -> None:
 def _front(
     x0: float, x1: float, y0: float, y1: float, z: float, look: str, grip: str
 ) -> list[Part]:
-    """Makes a door or drawer, with handle, for a cupboard whose front is at z."""
+    """Makes a door or drawer front with handle, for a cupboard whose front is at depth z."""
     gap = 0.002
     door = rounded_box((x0 + gap, y0 + gap, z - 0.002), (x1 - gap, y1 - gap, z + 0.02), 0.004, 3)
     wide = x1 - x0
@@ -187,7 +187,7 @@ def _high(x0: float, x1: float, look: str, grip: str) -> list[Part]:
 
 
 def _cupboards(writer: StageWriter) -> None:
-    """Adds cupboards, worktops, and the sink in one of the worktops."""
+    """Adds cupboards, worktops and the sink."""
     low: list[Part] = []
     for x0, x1, fronts in ((0.62, 1.22, 3), (1.22, 1.62, 1), (1.62, 2.30, 2), (2.30, 2.98, 3)):
         low += _low(x0, x1, fronts, "LacquerBlue")
@@ -313,7 +313,7 @@ def _things(writer: StageWriter, columns: int, options: SceneOptions) -> None:
 
 
 def _lamps(writer: StageWriter, columns: int) -> None:
-    """Adds light strips below the wall cupboards, pendants, and the sky outside."""
+    """Adds light strips below the wall cupboards, pendant lamps, and the sky outside."""
     warm, white = (75.0, 62.0, 46.0), (60.0, 52.0, 40.0)
     strips = ((0.80, 0.0), (2.83, 0.0))
     for k, (x, _) in enumerate(strips):

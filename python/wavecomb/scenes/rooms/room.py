@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A dining room that is lit through a door that stands ajar.
+"""A dining room lit through a door that stands ajar.
 
 The only light is in the next room, so that most of the visible light is indirect. Lengths are
-metres. Some 40 materials are UsdPreviewSurface without a Wavecomb program, as most exporters write
-them, and images repeat at the sizes of real boards, threads and grains.
+metres. About 40 materials are UsdPreviewSurface without a Wavecomb program, as most exporters write
+them. Textures repeat at the sizes of real boards, threads and grains.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from wavecomb.scenes.rooms.room_materials import write_materials
 from wavecomb.scenes.rooms.shell import DEPTH, HEIGHT, WIDTH, build_shell
 
 COLUMNS_A_LEVEL = 4
-"""Cells around a body of revolution, for each unit of ``SceneOptions.teapot_level``."""
+"""Number of cells around a body of revolution per unit of ``SceneOptions.teapot_level``."""
 _LAMP = (-1.6, 3.2)
-"""Centre of the light in the next room, x and z."""
+"""Coordinates x and z of the centre of the light in the next room."""
 _LAMP_SIZE = (1.2, 0.6)
 _RADIANCE = (1100.0, 1000.0, 860.0)
 _RUG_TOP = 0.011
@@ -40,7 +40,7 @@ _OBJECTS = "/World/Objects"
 
 
 def build_room(writer: StageWriter, options: SceneOptions) -> None:
-    """Builds the room. ``teapot_level`` sets the resolution of bodies of revolution."""
+    """Builds the room; ``teapot_level`` sets the resolution of bodies of revolution."""
     rng = np.random.default_rng([options.seed, 4])
     columns = max(12, COLUMNS_A_LEVEL * options.teapot_level)
     write_materials(writer, options)
@@ -132,7 +132,7 @@ def _table(writer: StageWriter, columns: int, options: SceneOptions) -> None:
 
 
 def _centred(parts: list[Part]) -> list[Part]:
-    """Moves parts so that their common centre is over the origin."""
+    """Moves parts so that the centre of their common bounds is above the origin."""
     low = np.min([mesh.bounds[0] for mesh, _ in parts], axis=0)
     high = np.max([mesh.bounds[1] for mesh, _ in parts], axis=0)
     middle = 0.5 * (low + high) * [1.0, 0.0, 1.0]
@@ -148,8 +148,8 @@ _ROWS = (
     (2, 0.0, 6, 9.0),
     (2, 0.40, 4, 0.0),
 )
-"""Rows of books in the bookcase, the lowest first: shelf, start in metres, number of books, and the
-lean of the last one in degrees."""
+"""Rows of books in the bookcase: shelf (0 is the lowest), start in metres, number of books, and the
+lean of the last book in degrees."""
 
 
 def _bookcase(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Materials of room and kitchen: UsdPreviewSurface without a Wavecomb program."""
+"""Materials of the dining room and the kitchen, as UsdPreviewSurface without a Wavecomb program."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.rooms import textures as images
 
 MARBLE_METRES = 0.45
-"""Edge of the area that the image ``marble`` covers in this scene, in metres."""
+"""Edge of the area that the texture ``marble`` covers in the dining room, in metres."""
 _FULL_SIZE = 2048
 _MIN_SIZE = 16
 
@@ -30,7 +30,7 @@ ROOM_TEXTURES = {
     "fields": TextureInfo(images.fields, 1024, True),
     "fern": TextureInfo(images.fern, 1024, True),
 }
-"""Images that only the room uses, in addition to ``textures.TEXTURES``."""
+"""Textures that only the dining room uses, in addition to ``textures.TEXTURES``."""
 
 _PLASTER = 1.0 / images.PLASTER_METRES
 _WEAVE = 1.0 / images.LINEN_METRES
@@ -48,7 +48,7 @@ def coated(
 ) -> MaterialInfo:
     """Makes a coloured surface under a clear coat.
 
-    ``textures`` and ``repeat`` are as in ``preview``.
+    ``textures`` and ``repeat`` have the same meaning as in ``preview``.
     """
     values: dict[str, float | int | Colour] = {
         "diffuseColor": colour,
@@ -111,11 +111,11 @@ MATERIALS: dict[str, MaterialInfo] = {
     "Fields": preview({"roughness": 0.6}, {"diffuseColor": "fields"}),
     "Fern": preview({"roughness": 0.8}, {"diffuseColor": "fern"}),
 }
-"""All materials of the room by name."""
+"""All materials of the dining room by name."""
 
 
 def write_textures(writer: StageWriter, options: SceneOptions) -> None:
-    """Registers the room's images, so that materials can use them."""
+    """Registers the textures of the dining room, so that materials can use them."""
     for name, info in ROOM_TEXTURES.items():
         size = max(_MIN_SIZE, info.size * options.texture_size // _FULL_SIZE)
         scaled = TextureInfo(info.make, size, info.colour, info.channels, info.normal)
@@ -123,18 +123,18 @@ def write_textures(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def write_materials(writer: StageWriter, options: SceneOptions) -> None:
-    """Adds all materials and the images that they read."""
+    """Adds all materials and the textures that they read."""
     write_textures(writer, options)
     for name, material in MATERIALS.items():
         writer.material(name, material)
 
 
 KITCHEN_MARBLE_METRES = 0.9
-"""Edge of the area that the image ``marble`` covers in the kitchen, in metres."""
+"""Edge of the area that the texture ``marble`` covers in the kitchen, in metres."""
 TILES = ("TileIvory", "TileMint", "TileJade")
-"""Glaze materials of the wall tiles."""
+"""Names of the glaze materials of the wall tiles."""
 JARS = ("Flour", "Lentils", "Paprika", "Coffee")
-"""Materials of the jars' contents."""
+"""Names of the materials inside the jars."""
 
 
 def _metal(colour: Colour, roughness: float) -> MaterialInfo:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Walls, floor, ceiling and door of the room, the objects at its walls, and the next room.
+"""Shell of the dining room: walls, floor, ceiling, door, wall decoration and the next room.
 
-Walls are solids that overlap floor, ceiling and one another, so that no ray finds a gap.
+Walls are solids that overlap each other, the floor and the ceiling, so that no ray finds a gap.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ HEIGHT, WIDTH, DEPTH = 2.7, 5.0, 4.0
 PARTITION = 0.12
 """Thickness of the wall with the door, which is at x < 0."""
 DOOR_LOW, DOOR_HIGH, DOOR_TOP = 2.4, 3.3, 2.05
-"""Doorway: start and end along z, and height."""
+"""Doorway as start and end along z, and height."""
 NEXT_X, NEXT_LOW, NEXT_HIGH = -3.2, 0.9, 4.6
-"""Next room: x of its far wall, and its start and end along z."""
+"""Next room as x of its far wall, and start and end along z."""
 DOOR_DEGREES = 25.0
 _THICK = 0.15
 _INTO = 0.05
@@ -64,7 +64,7 @@ def _walls(writer: StageWriter) -> None:
 def _solid(
     writer: StageWriter, path: str, low: FloatArray, high: FloatArray, material: str
 ) -> None:
-    """Adds a box of flat polygons with texture coordinates in metres; v is along x on top."""
+    """Adds a box of flat polygons with texture coordinates in metres; v runs along x on its top."""
     points: list[FloatArray] = []
     uv: list[FloatArray] = []
     polygons: list[list[int]] = []
@@ -82,9 +82,9 @@ def _solid(
 
 
 def _partition(writer: StageWriter, near: float, far: float) -> None:
-    """Adds the wall with the doorway: both faces and the reveal.
+    """Adds both faces of the wall with the doorway, and the reveal of the doorway.
 
-    The outer edges are hidden in floor and ceiling.
+    The outer edges of the wall are hidden inside floor and ceiling.
     """
     low, high = -_INTO, HEIGHT + _INTO
     outline = np.array(
@@ -105,7 +105,7 @@ def _partition(writer: StageWriter, near: float, far: float) -> None:
 
 
 def _skirting(writer: StageWriter) -> None:
-    """Adds skirting boards along the walls, which end at the casing of the door."""
+    """Adds skirting boards along the walls, up to the casing of the door."""
     height, deep, casing = 0.095, 0.016, 0.075
     runs = [
         ((0.0, 0.0), (WIDTH, deep)),
@@ -127,7 +127,7 @@ def _skirting(writer: StageWriter) -> None:
 
 
 def _door_frame(writer: StageWriter) -> None:
-    """Adds the lining of the doorway, casings on both sides, and a door stop."""
+    """Adds the lining of the doorway, casings on both sides, and the stop of the door."""
     deep = 0.006  # distance in metres by which the door casings project from the wall
     parts: list[Part] = []
 
@@ -154,7 +154,7 @@ def _door_frame(writer: StageWriter) -> None:
 
 
 def _door(writer: StageWriter, columns: int) -> None:
-    """Adds the door of stiles, rails and two sunk panels, with its handles."""
+    """Adds the door with stiles, rails, two sunk panels and handles."""
     wide = DOOR_HIGH - DOOR_LOW - 2.0 * (_LINING + _GAP)
     top = DOOR_TOP - _LINING - 2.0 * _GAP
     stile, lock, sunk = 0.11, 0.95, 0.012
@@ -197,7 +197,7 @@ def _handles(reach: float, height: float, columns: int) -> list[Part]:
 
 
 def build_shell(writer: StageWriter, columns: int) -> None:
-    """Adds walls and door; ``columns`` is the number of cells around bodies of revolution."""
+    """Adds walls and door; ``columns`` is the number of cells around a body of revolution."""
     _walls(writer)
     _skirting(writer)
     _door_frame(writer)
@@ -216,12 +216,12 @@ _BOARDS_Y = (0.07, 0.42, 0.75, SHELF_TOP - BOARD)
 
 
 def shelf_floor(row: int) -> float:
-    """Returns the height on which objects stand in a row of the bookcase; row 0 is the lowest."""
+    """Returns the height at which objects stand in a row of the bookcase; row 0 is the lowest."""
     return _BOARDS_Y[row] + BOARD
 
 
 def bookcase() -> list[Part]:
-    """Makes a low walnut bookcase with three rows, its back at z = 0, facing +z."""
+    """Makes a low walnut bookcase with three rows; its back is at z = 0 and it faces +z."""
     half, deep = 0.5 * SHELF_WIDTH, SHELF_DEPTH
     panel = rounded_box((-half + 0.01, 0.06, 0.0), (half - 0.01, SHELF_TOP - 0.005, 0.008), 0.001)
     parts = []
@@ -242,7 +242,7 @@ def bookcase() -> list[Part]:
 
 
 def book(width: float, height: float, thick: float, cover: str) -> list[Part]:
-    """Makes a book that stands on y = 0, its spine at z = 0 towards +z, x from 0 to ``thick``."""
+    """Makes a book on y = 0, with its spine at z = 0 facing +z, and x from 0 to ``thick``."""
     board, inset = 0.0025, 0.003
     parts: list[Part] = []
     for x in (0.0, thick - board):
@@ -271,18 +271,18 @@ def book(width: float, height: float, thick: float, cover: str) -> list[Part]:
 
 
 def _along_x(mesh: Mesh) -> Mesh:
-    """Returns the mesh with texture rows across x, because the pages are stacked along x."""
+    """Returns the mesh with texture rows across x, since the pages are stacked along x."""
     uv = np.stack([mesh.points[:, 1] + mesh.points[:, 2], mesh.points[:, 0]], axis=1)
     return Mesh(mesh.points, mesh.faces, mesh.normals, uv.astype(np.float32))
 
 
 def leaning(parts: list[Part], degrees: float) -> list[Part]:
-    """Turns a book so that it leans towards -x on its lower edge at x = 0."""
+    """Tilts a book towards -x about its lower edge at x = 0."""
     return [(placed(mesh, turn=turn_about(2, degrees)), material) for mesh, material in parts]
 
 
 def lying(parts: list[Part], thick: float, turn_degrees: float) -> list[Part]:
-    """Lays a book on its side, its spine still towards +z, and then rotates it about y."""
+    """Lays a book on its side with its spine towards +z, then rotates it about y."""
     turn = turn_about(1, turn_degrees) @ turn_about(2, -90.0)
     return [
         (placed(mesh, turn_about(1, turn_degrees) @ np.array([0.0, thick, 0.0]), turn), material)

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Objects on the room's table, such as cups and glasses, and in the kitchen, such as pots.
+"""Objects on the dining table, such as cups and glasses, and kitchenware, such as pots.
 
-Each function returns parts that stand on y = 0 about the origin, unless its docstring says
-otherwise.
+Each function returns parts on y = 0 at the origin, unless its docstring says otherwise.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ _BOWL = np.array(
      [0.05, 0.013], [0, 0.011]]
 )  # fmt: skip
 _BOWL_INSIDE = 8
-"""Index of the first row of ``_BOWL`` on the inside."""
+"""Index of the first point of the profile ``_BOWL`` on the inside."""
 
 
 def saucer(columns: int) -> list[Part]:
@@ -81,7 +80,7 @@ def bowl(columns: int) -> list[Part]:
 
 
 def _rest_height(out: float, radius: float) -> float:
-    """Returns the height of a ball's centre in the bowl, ``out`` metres from its axis."""
+    """Returns the height of a fruit's centre in the bowl, ``out`` metres from the bowl's axis."""
     inside = spline(_BOWL, np.linspace(0.0, 1.0, 400))
     inside = inside[int(400 * _BOWL_INSIDE / (len(_BOWL) - 1)) :]
     apart = np.abs(inside[:, 0] - out)
@@ -91,7 +90,7 @@ def _rest_height(out: float, radius: float) -> float:
 
 
 def fruit_places() -> list[FloatArray]:
-    """Returns the centres of three balls of radius ``FRUIT`` in the bowl and of one on top."""
+    """Returns the centres of four fruits of radius ``FRUIT``: three in the bowl and one on top."""
     out = 1.02 * 2.0 * FRUIT / math.sqrt(3.0)
     low = _rest_height(out, FRUIT)
     ring = [2.0 * math.pi * k / 3.0 + 0.5 for k in range(3)]
@@ -101,7 +100,7 @@ def fruit_places() -> list[FloatArray]:
 
 
 def apple(columns: int, tilt: float) -> list[Part]:
-    """Makes an apple about the origin, its stalk tilted by ``tilt`` degrees from vertical."""
+    """Makes an apple around the origin, with its stalk tilted ``tilt`` degrees from vertical."""
     r = FRUIT
     profile = [(0, -0.72 * r), (0.12 * r, -0.80 * r), (0.35 * r, -0.95 * r), (0.75 * r, -0.80 * r),
                (1.04 * r, -0.1 * r), (0.98 * r, 0.55 * r), (0.6 * r, 0.92 * r),
@@ -115,7 +114,7 @@ def apple(columns: int, tilt: float) -> list[Part]:
 
 
 def orange(columns: int) -> list[Part]:
-    """Makes an orange about the origin."""
+    """Makes an orange around the origin."""
     a = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 17)
     profile = np.column_stack([FRUIT * np.cos(a), 0.97 * FRUIT * np.sin(a)])
     profile[[0, -1], 0] = 0.0
@@ -169,7 +168,7 @@ def _bud(place: FloatArray, rng: np.random.Generator) -> Mesh:
 
 
 def statue(dragon: Mesh) -> list[Part]:
-    """Makes the dragon in bronze on a marble plinth, 0.38 m long, facing +x."""
+    """Makes a bronze dragon on a marble plinth, 0.38 m long, facing +x."""
     plinth = rounded_box((-0.185, 0.0, -0.075), (0.185, PLINTH, 0.075), 0.004, 3)
     low, high = dragon.bounds
     scale = 0.36 / float(high[0] - low[0])
@@ -222,7 +221,7 @@ def pot(columns: int, radius: float, material: str) -> list[Part]:
 
 
 def hanging_pan(columns: int, radius: float, material: str) -> list[Part]:
-    """Makes a pan that hangs from y = 0 by a hook, its inside towards +z."""
+    """Makes a pan that hangs by a hook from y = 0; its inside faces +z."""
     r = radius
     body = [(0, 0), (r - 0.012, 0), (r - 0.004, 0.004), (r, 0.045), (r + 0.003, 0.05),
             (r - 0.003, 0.05), (r - 0.008, 0.006), (0, 0.003)]  # fmt: skip
@@ -289,7 +288,7 @@ def knives() -> list[Part]:
 
 
 def faucet(columns: int) -> list[Part]:
-    """Makes a tall tap that bends towards +z, and its lever."""
+    """Makes a tall tap that bends towards +z, with a lever."""
     neck = [(0, 0.0, 0), (0, 0.20, 0), (0, 0.30, 0.03), (0, 0.31, 0.10), (0, 0.27, 0.15),
             (0, 0.22, 0.155)]  # fmt: skip
     base = turned([(0, 0), (0.026, 0), (0.026, 0.004), (0.018, 0.03), (0, 0.032)], columns)
@@ -301,7 +300,7 @@ def faucet(columns: int) -> list[Part]:
 def pendant(columns: int, cord: float) -> list[Part]:
     """Makes an enamel lampshade that hangs from y = 0 on a cord.
 
-    Callers should put the light of the pendant 0.11 m below the end of the cord.
+    Callers put the light of the lamp 0.11 m below the end of the cord.
     """
     shade = [
         (0, -0.005),

@@ -21,9 +21,9 @@ from wavecomb.scenes.authoring.patterns import (
 
 PLASTER_METRES, PLANKS_METRES, WALNUT_METRES = 1.6, 2.4, 0.5
 LINEN_METRES, LEATHER_METRES = 0.16, 0.18
-"""Edge of the area that an image covers, in metres."""
+"""Edge lengths of the areas that the images cover, in metres."""
 RUG_METRES = (2.7, 1.9)
-"""Width and height of the rug's image, which is not square, in metres."""
+"""Width and height of the area that the rug's image covers, in metres."""
 _BOARDS = 16
 _THREADS = 64
 _LAYOUT_SEED = 78
@@ -41,7 +41,7 @@ def plaster(size: int, rng: np.random.Generator) -> Image:
 
 
 def plaster_normal(size: int, rng: np.random.Generator) -> Image:
-    """Normal map of plaster: trowel strokes and grains of sand, up to a millimetre high."""
+    """Normal map of plaster, with trowel strokes and sand grains up to a millimetre high."""
     x, y = grid(size)
     strokes = fractal(x, y, 12, 4, rng, 0.5, rows=6)
     grains = fractal(x, y, 128, 3, rng, 0.6)
@@ -50,7 +50,7 @@ def plaster_normal(size: int, rng: np.random.Generator) -> Image:
 
 @functools.lru_cache(maxsize=1)
 def _planks(size: int) -> tuple[Image, Image, Image]:
-    """Returns joints, board tones and grain, (size, size), which the floor's images share."""
+    """Returns joints, tones of boards and grain, each (size, size), for all images of the floor."""
     rng = np.random.default_rng(_LAYOUT_SEED)
     x, y = grid(size)
     across = x * _BOARDS
@@ -83,7 +83,7 @@ def planks(size: int, rng: np.random.Generator) -> Image:
 
 
 def planks_roughness(size: int, rng: np.random.Generator) -> Image:
-    """Roughness of oiled boards: duller grain, matt joints, areas polished by steps."""
+    """Roughness of oiled boards, with duller grain, matt joints and areas polished by steps."""
     joint, tone, grain = _planks(size)
     x, y = grid(size)
     worn = step(fractal(x, y, 3, 4, rng), 0.4, 0.7)
@@ -123,7 +123,7 @@ def _threads(size: int, rng: np.random.Generator) -> tuple[Image, Image]:
 
 
 def linen(size: int, rng: np.random.Generator) -> Image:
-    """Undyed linen, near white. Materials tint the linen by the scale of the texture."""
+    """Undyed linen, near white. Materials tint it with the ``scale`` input of the texture."""
     height, strength = _threads(size, rng)
     shade = (0.55 + 0.45 * height) * (0.93 + 0.07 * strength)
     return np.clip(flat((0.80, 0.79, 0.76)) * shade[..., None], 0, 1).astype(np.float32)
@@ -177,7 +177,7 @@ def rug(size: int, rng: np.random.Generator) -> Image:
     picture = mix(red, navy, here)
 
     def lattice(pitch: float, reach: float) -> Image:
-        """Returns a mask of diamonds of half width ``reach`` on a grid, both in metres."""
+        """Returns a mask of diamonds on a grid; ``reach`` is half a diamond's width in metres."""
         u, v = (across / pitch) % 1.0 - 0.5, (down / pitch) % 1.0 - 0.5
         return ((np.abs(u) + np.abs(v)) * pitch < reach).astype(np.float32)
 

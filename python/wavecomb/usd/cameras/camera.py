@@ -30,17 +30,18 @@ _TENTH = 0.1
 """USD gives focal length and apertures in tenths of a scene unit."""
 
 _MAX_WINDOW = 1e30
-"""Largest coordinate of a camera's window on the plane z = -1."""
+"""Largest coordinate of the image rectangle ("window") of a camera on the plane z = -1."""
 
 _MIN_WINDOW = 2.0**-16
-"""Smallest size of a camera's window, relative to its largest coordinate: 128 float32 steps."""
+"""Smallest size of a camera's window as a fraction of its largest coordinate. Float32 has 128 steps
+in a window of this size."""
 
 ALL_ROUND = (-math.pi, math.pi, -0.5 * math.pi, 0.5 * math.pi)
-"""Window of a latlong camera in radians of longitude and latitude: all directions."""
+"""Window of a latlong camera that sees all directions, in radians of longitude and latitude."""
 
 MAX_STOPS = 60.0
 MAX_EXPOSURE = 1e12
-"""Limits of exposures, in stops and as a factor; larger values are ignored as mistakes."""
+"""Largest exposures in stops and as a factor; larger values are considered mistakes and ignored."""
 
 MAX_CLIP_PLANES = 16
 
@@ -64,10 +65,11 @@ class Lens:
         projection: One of ``PROJECTIONS``; None uses the camera's projection.
         exposure: Whether the camera's exposure scales the image radiance.
         depth_of_field: Whether the lens blurs objects that are out of focus.
-        conform: How the window is fitted if the aspect ratios of aperture and image differ.
+        conform: Rule that fits the camera's aperture to the image if their aspect ratios differ.
         pixel_aspect: Width of a pixel divided by its height.
         settings: Values of ``lens.ATTRIBUTES`` as text; they override the prim's attributes.
-        st_map: Path of an ST map that describes the lens distortion; it overrides coefficients.
+        st_map: Path of an ST map that describes the lens distortion; it overrides distortion
+            coefficients.
     """
 
     projection: str | None = None
@@ -84,7 +86,7 @@ class Lens:
         time: Usd.TimeCode | None = None,
         report: LoadReport | None = None,
     ) -> dict[str, Any]:
-        """Returns the keyword arguments of a ``View`` that differ from their defaults.
+        """Returns the lens options that differ from their defaults, for ``View.options``.
 
         Raises:
             WavecombError: A setting or the ST map is invalid.
@@ -132,7 +134,7 @@ def _is_camera(prim: Usd.Prim) -> bool:
 
 
 MAX_CAMERAS = 1000
-"""Maximum number of cameras that are listed, since instancing can multiply them."""
+"""Maximum number of cameras in a listing, since instancing can multiply cameras."""
 
 
 def all_cameras(stage: Usd.Stage) -> list[Usd.Prim]:
@@ -217,7 +219,7 @@ def read_camera(
 
 
 def _is_window(window: tuple[float, ...]) -> bool:
-    """Returns whether float32 can represent the window to about one pixel."""
+    """Returns whether float32 coordinates are precise enough for the window, to about one pixel."""
     x0, x1, y0, y1 = window
     largest, smallest = max(map(abs, window)), min(x1 - x0, y1 - y0)
     return largest <= _MAX_WINDOW and smallest >= max(_MIN_WINDOW * largest, 1.0 / _MAX_WINDOW)
@@ -246,7 +248,7 @@ def _exposure_scale(camera: UsdGeom.Camera, time: Usd.TimeCode, report: LoadRepo
 def _clip_planes(
     camera: UsdGeom.Camera, time: Usd.TimeCode, report: LoadReport
 ) -> list[tuple[float, ...]]:
-    """Reads the clipping planes (a, b, c, d) in camera space; warns about invalid ones."""
+    """Reads the clipping planes (a, b, c, d) in camera space; warns about invalid planes."""
     found = []
     for plane in camera.GetClippingPlanesAttr().Get(time) or ():
         numbers = tuple(map(float, plane))
@@ -293,8 +295,8 @@ def _rigid(to_world: Matrix) -> Matrix | None:
 def _frame_axes(up_axis: str) -> Matrix:
     """Returns the right, up and back axes of the default camera.
 
-    The camera looks at the front from slightly to the right and above. The front of the stage is
-    +Z, or -Y if Z is up.
+    The camera looks at the front of the stage from slightly right and above. The front of the stage
+    is +Z, or -Y if Z is up.
     """
     up = np.array({"X": (1.0, 0, 0), "Z": (0, 0, 1.0)}.get(up_axis, (0, 1.0, 0)))
     front = {"X": (0, 0, 1.0), "Z": (0, -1.0, 0)}.get(up_axis, (0, 0, 1.0))
@@ -314,7 +316,7 @@ def _frame_half(lens: Lens, size: tuple[int, int]) -> tuple[float, float]:
 
 
 def frame_planes(up_axis: str, lens: Lens, size: tuple[int, int]) -> Matrix:
-    """Returns the directions (4, 3) in which ``frame_points`` needs the extent of the geometry."""
+    """Returns directions (4, 3) in which ``frame_points`` needs the geometry's extent."""
     flat = lens.projection == "orthographic"
     return planes(_frame_axes(up_axis), None if flat else _frame_half(lens, size))
 

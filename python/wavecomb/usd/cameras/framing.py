@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Outlines of geometry (its extreme points), and camera positions that frame them."""
+"""Finds the outlines (extreme points) of geometry, and camera positions that frame them."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ Points = NDArray[np.float64]
 Matrices = NDArray[np.float64]
 
 FILLED = 0.9
-"""Fraction of the image that the geometry spans in the dimension that it fills first."""
+"""Fraction of the image width or height that the geometry spans, whichever is the larger
+fraction."""
 
 _DIRECTIONS = 162
-"""Number of outline directions; they find the silhouette of a sphere to within 1.5 %."""
+"""Number of directions in which outlines are exact; the error for a sphere is at most 1.5 %."""
 
 _BLOCK = 1 << 15
 """Number of points that are processed together, which bounds the memory used."""
@@ -26,13 +27,13 @@ _RUN = 256
 _SAMPLE = 4096
 
 _FEW_POINTS = 200
-"""Largest number of points that are all kept as an outline."""
+"""Number of points up to which an outline keeps all points."""
 
 MANY_POINTS = 1 << 16
-"""Number of points above which a set is reduced to its outline before points are added."""
+"""Size of a point set above which it is reduced to its outline before more points are added."""
 
 _FEW_PLACES = 512
-"""Of more instances than this number, only the extreme ones are processed."""
+"""Number of instances above which only the outermost instances contribute to an outline."""
 
 
 def _spread(count: int) -> Points:
@@ -44,16 +45,17 @@ def _spread(count: int) -> Points:
 
 
 DIRECTIONS = np.concatenate([np.eye(3), -np.eye(3), _spread(_DIRECTIONS - 6)])
-"""Directions of outlines; the six axes come first, so that boxes are framed exactly."""
+"""Directions in which outlines are exact; the six axis directions make the framing of boxes
+exact."""
 
 
 def with_directions(more: Points | None) -> Points:
-    """Returns ``DIRECTIONS`` followed by further directions (k, 3) in which outlines are exact."""
+    """Returns ``DIRECTIONS``, followed by the directions (k, 3) in ``more``."""
     return DIRECTIONS if more is None else np.concatenate([DIRECTIONS, more])
 
 
 def outline(points: NDArray[Any], more: Points | None = None) -> Points:
-    """Returns the points, of n given as (n, 3), that are extreme in at least one direction."""
+    """Returns those of the points (n, 3) that are extreme in at least one direction."""
     if len(points) <= _FEW_POINTS:
         return np.asarray(points, np.float64)
     directions = with_directions(more).astype(np.float32)
@@ -64,7 +66,7 @@ def outline(points: NDArray[Any], more: Points | None = None) -> Points:
 def outline_of_balls(
     points: NDArray[Any], radii: NDArray[Any], more: Points | None = None
 ) -> Points:
-    """Returns the extreme points of balls with centres (n, 3) and radii (n,) in all directions."""
+    """Returns the outline of balls with centres (n, 3) and radii (n,)."""
     directions = with_directions(more)
     directions = directions / np.linalg.norm(directions, axis=1)[:, None]
     some, size = np.asarray(points, np.float32), np.asarray(radii, np.float32)
@@ -75,7 +77,7 @@ def outline_of_balls(
 def _farthest(
     points: NDArray[np.float32], radii: NDArray[np.float32] | None, directions: NDArray[np.float32]
 ) -> NDArray[np.intp]:
-    """Returns the index of the point or ball that is extreme in each direction (k, 3)."""
+    """Returns the index of the point or ball that is extreme in each of the directions (k, 3)."""
     chosen = np.arange(len(points))
     if len(points) > _BLOCK:
         chosen = _near_the_outside(points, radii, directions)
@@ -98,8 +100,9 @@ def _near_the_outside(
 ) -> NDArray[np.intp]:
     """Returns indices of points that may be extreme.
 
-    Leaves out runs of consecutive points whose bounds lie inside the outline of a sample of points.
-    Consecutive points of a mesh are mostly close to each other, so runs have small bounds.
+    Runs of consecutive points are left out if their bounds lie inside the outline of a subset of
+    all points. Consecutive points of a mesh are mostly close to each other, so runs have small
+    bounds.
     """
     step = max(1, len(points) // _SAMPLE)
     reached = directions @ points[::step].T
@@ -123,7 +126,7 @@ def corners(bounds: NDArray[Any]) -> Points:
 
 
 def placed(points: Points, transforms: Matrices, more: Points | None = None) -> Points:
-    """Returns the outline of points (n, 3) that are instanced by transforms (k, 4, 4)."""
+    """Returns the outline of points (n, 3) that are instanced with transforms (k, 4, 4)."""
     if len(transforms) > _FEW_PLACES:
         centre = points.mean(axis=0)
         radius = float(np.linalg.norm(points - centre, axis=1).max())
@@ -143,9 +146,8 @@ def _farthest_places(
 ) -> NDArray[np.intp]:
     """Returns the index of the ball that is extreme in each direction.
 
-    ``middles`` are (k, 3) centres; ``sizes`` are (k,) radii, or (1,) for a common radius. Processes
-    blocks of balls, since the distances of millions of balls in all directions would take
-    gigabytes.
+    ``middles`` are (k, 3) centres; ``sizes`` are (k,) radii, or (1,) for a common radius. The balls
+    are processed in blocks, since all distances of millions of balls would take gigabytes.
     """
     columns = np.arange(len(directions))
     best, found = np.full(len(directions), -np.inf), np.zeros(len(directions), np.intp)
@@ -160,13 +162,13 @@ def _farthest_places(
 
 
 def joined(parts: Iterable[Points], more: Points | None = None) -> Points | None:
-    """Returns the outline of several point sets together; None if there are none."""
+    """Returns the outline of the union of point sets, or None if there are no sets."""
     known = list(parts)
     return outline(np.concatenate(known), more) if known else None
 
 
 def planes(axes: Matrices, half: tuple[float, float] | None) -> Points:
-    """Returns the plane normals (4, 3) that ``fit`` uses, or ``fit_flat`` if ``half`` is None."""
+    """Returns the normals (4, 3) of the four planes through the camera and the image edges."""
     return np.array(
         [
             sign * axes[axis] + (0.0 if half is None else FILLED * half[axis]) * axes[2]
@@ -182,8 +184,8 @@ def fit(
     """Computes the position from which a pinhole camera frames the points.
 
     A point (x, y, z) in camera axes is inside the image where |x - cx| <= half (cz - z), and the
-    same for y. The edges of the image are four planes; the tighter pair of opposite planes touches
-    the points, and the points are centred between both pairs.
+    same for y. The four edges of the image are planes through the camera. The points touch the pair
+    of opposite planes that is tighter, and are centred between the planes of each pair.
 
     Args:
         points: (n, 3).

@@ -28,16 +28,16 @@ ATTRIBUTES = {
     "rolling_shutter": ("wavecomb:lens:rollingShutter", f"{_ARNOLD}rolling_shutter"),
     "rolling_duration": ("wavecomb:lens:rollingDuration", f"{_ARNOLD}rolling_shutter_duration"),
 }
-"""Camera parameter of the core -> USD attributes; the first one that is authored is used."""
+"""USD attributes by camera parameter of the core; the first attribute that is authored is used."""
 
 MAP_NODES = 256
-"""Number of nodes of an ST map along each edge of the image."""
+"""Number of grid points of an ST map along each edge of the image."""
 
 
 def lens_values(
     prim: Usd.Prim | None, time: Usd.TimeCode | None, chosen: Mapping[str, str], report: LoadReport
 ) -> dict[str, Any]:
-    """Returns values of ``ATTRIBUTES`` for ``set_camera``; ``chosen`` overrides the prim.
+    """Returns lens parameters for ``set_camera``; ``chosen`` overrides the prim's attributes.
 
     Args:
         prim: The camera prim, or None.
@@ -62,7 +62,7 @@ def lens_values(
 
 
 def _authored(prim: Usd.Prim, name: str, time: Usd.TimeCode | None, report: LoadReport) -> Any:
-    """Returns the authored value of a parameter; None if it is missing or invalid."""
+    """Returns the authored value of a parameter, or None if it is missing or invalid."""
     for attribute in ATTRIBUTES[name]:
         there = prim.GetAttribute(attribute)
         given = there.Get(time or Usd.TimeCode.Default()) if there else None
@@ -76,7 +76,7 @@ def _authored(prim: Usd.Prim, name: str, time: Usd.TimeCode | None, report: Load
 
 
 def check_names(chosen: Mapping[str, str]) -> None:
-    """Raises WavecombError for a name that is not a lens setting."""
+    """Raises WavecombError if a name is not a lens setting."""
     for name in chosen:
         if name not in ATTRIBUTES:
             raise WavecombError(
@@ -90,7 +90,7 @@ def _kind(name: str) -> str:
 
 
 def _value(name: str, given: Any) -> Any:
-    """Converts a value of a parameter; returns None if it is invalid."""
+    """Converts a value of a lens parameter; returns None if the value is invalid."""
     row = camera_parameters()[name]
     if row.choices:
         return str(given) if str(given) in row.choices else None
@@ -105,9 +105,9 @@ def _value(name: str, given: Any) -> Any:
 def read_map(path: str) -> list[list[float]]:
     """Reads an ST map as the ``lens_map`` argument of ``set_camera``.
 
-    The red channel is s (rightwards) and the green channel is t (upwards). The two channels give
-    the position in the undistorted image that each pixel of the distorted image shows, from (0, 0)
-    at the lower left corner to (1, 1) at the upper right corner.
+    The red channel is s (rightwards) and the green channel is t (upwards). For each pixel of the
+    distorted image, (s, t) is the position in the undistorted image. Positions go from (0, 0) at
+    the lower left corner to (1, 1) at the upper right corner.
 
     Raises:
         WavecombError: The file lacks the red or green channel, or values are not finite.
@@ -129,7 +129,7 @@ def read_map(path: str) -> list[list[float]]:
 
 
 def _resampled(values: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
-    """Resamples pixels along an axis to nodes from edge to edge; extrapolates linearly at edges."""
+    """Resamples pixels along an axis to grid points from edge to edge; extrapolates at edges."""
     values = np.moveaxis(values, axis, 0)
     size = len(values)
     at = np.linspace(0.0, size, MAP_NODES) - 0.5

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Converts the primvars that materials read to mesh attributes of the core."""
+"""Converts primvars that materials read to mesh attributes of the core."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ MAX_WIDTH = 4
 """Maximum number of components of a mesh attribute."""
 
 Attributes = dict[str, tuple[str, NDArray[np.float32]]]
-"""Mesh attributes by name: (rate, values (k, c)), as ``SceneBuilder.add_mesh`` takes them."""
+"""Mesh attributes for ``SceneBuilder.add_mesh``: (rate, values (k, c)) by name."""
 
 
 @dataclass(frozen=True)
 class PrimvarRequest:
-    """A primvar that a bound material reads and that fits the mesh.
+    """A primvar that a material reads and whose values fit the mesh.
 
     Attributes:
-        primvar: The primvar; its values are finite.
+        primvar: The primvar, whose values are finite.
         width: Number of components that the material reads.
     """
 
@@ -41,7 +41,7 @@ class PrimvarRequest:
 
     @property
     def first(self) -> NDArray[np.float32]:
-        """(width,) first value of the primvar, which is every value if it is constant."""
+        """(width,) first value of the primvar."""
         return self.primvar.values[0, : self.width]
 
     @property
@@ -59,7 +59,7 @@ def check_fit(primvar: Primvar, mesh: MeshArrays | CurveArrays, width: int) -> N
     """Checks whether a primvar fits a gprim.
 
     Raises:
-        PrimvarError: The number of values or components does not fit.
+        PrimvarError: The number of values or of components does not match the gprim.
     """
     if isinstance(mesh, CurveArrays):
         mesh.topology.fit(primvar, width)
@@ -74,7 +74,7 @@ def on_shape(
 ) -> Attributes:
     """Converts primvars to attributes of triangles, curve segments or points.
 
-    ``mirrored`` says that the mesh's triangles have the reverse winding of its topology.
+    ``mirrored`` means that the triangles of the mesh and of its topology have opposite winding.
     """
     return {name: _on_shape(one, mesh, mirrored) for name, one in wanted.items()}
 
@@ -101,7 +101,7 @@ def _on_shape(
 
 
 class RefinedAttributes:
-    """Primvars of a cage, refined to the triangles of the subdivided mesh."""
+    """Primvars of a subdivision cage, evaluated for the triangles of the subdivided mesh."""
 
     def __init__(self, wanted: Mapping[str, PrimvarRequest]) -> None:
         self._wanted = wanted
@@ -112,7 +112,7 @@ class RefinedAttributes:
         ]
 
     def described(self, cage: Any, level: int) -> list[dict[str, Any]]:
-        """Returns the primvars to refine, in the form that ``SceneBuilder.make_surfaces`` takes."""
+        """Returns the primvars to subdivide, as descriptions for ``SceneBuilder.make_surfaces``."""
         chosen = [self._wanted[name] for name in self._refined]
         if level > 0:
             return [cage.primvar(one.primvar, one.width) for one in chosen]
@@ -125,7 +125,7 @@ class RefinedAttributes:
         return out
 
     def of(self, refined: Mapping[str, Any]) -> Attributes:
-        """Returns all mesh attributes for a result of ``SceneBuilder.make_surfaces``."""
+        """Returns the attributes of a mesh that ``SceneBuilder.make_surfaces`` subdivided."""
         out: Attributes = dict(zip(self._refined, refined["primvars"], strict=True))
         for name, one in self._wanted.items():
             if name in out:
@@ -139,6 +139,6 @@ class RefinedAttributes:
 
 
 def _packed(values: NDArray[Any], width: int) -> NDArray[np.float32]:
-    """Returns values as contiguous (k, width) float32."""
+    """Returns values as a contiguous float32 array, (k, width)."""
     cut = np.asarray(values)[..., :width]
     return np.ascontiguousarray(cut.reshape(-1, width), np.float32)

@@ -31,16 +31,17 @@ Floats = NDArray[np.float32]
 
 @dataclass
 class Cage:
-    """A mesh as authored, in object space.
+    """An authored mesh in object space, before subdivision and displacement.
 
     Attributes:
         points: (n, 3).
         counts: (faces,) number of corners of each face.
         indices: (corners,) point indices.
-        matrix: Transform from the mesh to its group.
+        matrix: Transform from mesh space to the space of its group (the world or a prototype).
         left_handed: Whether faces are clockwise when seen from outside.
-        scheme: One of ``SCHEMES``, or "none" for polygons that are only displaced.
-        rules: Boundary, crease, corner and hole arguments of ``SceneBuilder.make_surfaces``.
+        scheme: One of ``SCHEMES``, or "none" for polygons that are displaced but not subdivided.
+        rules: Arguments of ``SceneBuilder.make_surfaces`` for boundaries, creases, corners and
+            holes.
         uvs: Primvar of the texture coordinates.
         topology: Triangulation of the cage.
         smooth: Whether the polygons have smooth normals.
@@ -68,13 +69,13 @@ class Cage:
         return 2 * len(self.indices) * int(4 ** (level - 1))
 
     def over_shutter(self, description: dict[str, Any]) -> list[dict[str, Any]]:
-        """Returns a ``SceneBuilder.make_surfaces`` description for each shutter step."""
+        """Returns a description for ``SceneBuilder.make_surfaces`` at each shutter step."""
         if not self.steps:
             return [description]
         return [description | {"points": p, "matrix": np.array(m)} for p, m in self.steps]
 
     def primvar(self, primvar: Primvar, width: int) -> dict[str, Any]:
-        """Converts a valid primvar to the form that ``SceneBuilder.make_surfaces`` takes."""
+        """Converts a valid primvar to a description for ``SceneBuilder.make_surfaces``."""
         from wavecomb import _core
 
         values = np.nan_to_num(
@@ -148,13 +149,13 @@ def read_rules(prim: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> dict[s
 
 
 SHARP = 1.0
-"""Crease sharpness from which an unsubdivided mesh shows a hard edge."""
+"""Smallest crease sharpness that makes an edge hard if the mesh is not subdivided."""
 
 
 def sharp_edges(
     prim: Usd.Prim, point_count: int, time: Usd.TimeCode, report: LoadReport
 ) -> NDArray[np.int64] | None:
-    """Returns hard edges (k, 2) of a mesh that is drawn as polygons; None if it has no creases."""
+    """Returns hard edges (k, 2) of a mesh without subdivision; None if the mesh has no creases."""
     get = prim.GetAttribute
     indices = as_integers(get("creaseIndices").Get(time))
     lengths = as_integers(get("creaseLengths").Get(time))
@@ -169,12 +170,12 @@ def sharp_edges(
 def crease_pairs(
     indices: Ints, lengths: Ints, sharpness: Floats
 ) -> tuple[NDArray[np.int32], Floats] | None:
-    """Returns edges (k, 2) and sharpness (k,) of creases; None if the lengths do not fit.
+    """Returns crease edges (k, 2) and their sharpness (k,); None if array lengths do not match.
 
     Args:
         indices: Point indices of all creases, one crease after the other.
         lengths: Number of points of each crease.
-        sharpness: One value per crease or per edge.
+        sharpness: One value for each crease, or one value for each edge.
     """
     if len(lengths) == 0 or lengths.min() < 2 or lengths.sum(dtype=np.int64) != len(indices):
         return None
@@ -192,7 +193,7 @@ def crease_pairs(
 Matrices = NDArray[np.float64]
 
 NEAREST = 16
-"""Number of instances of a mesh, the largest in the image, whose edges are measured in pixels."""
+"""Number of instances of a mesh whose edges are measured in pixels, the largest in the image."""
 
 
 class ViewSize:
@@ -200,7 +201,7 @@ class ViewSize:
 
     Attributes:
         pixels: Pixels per unit of the camera's window.
-        per_length: Pixels per unit of length for points whose ``distances`` value is 1.
+        per_length: Pixels per unit of length at a point where ``distances`` returns 1.
     """
 
     def __init__(self, view: View, size: tuple[int, int]) -> None:
@@ -219,11 +220,11 @@ class ViewSize:
         self.to_camera = np.linalg.inv(np.asarray(view.transform, np.float64))
 
     def distances(self, points: NDArray[Any], to_world: Matrices) -> NDArray[np.float64]:
-        """Returns the factors (n,) by which lengths at points (n, 3) of a prim appear reduced.
+        """Returns divisors (n,) that convert lengths at points (n, 3) to projected lengths.
 
-        For a perspective camera, the factor is the depth of a point in front of the camera, or the
-        distance of a point behind the camera. For a latlong camera the factor is the distance, and
-        for an orthographic camera 1.
+        For a perspective camera, the divisor is the depth of a point in front of the camera, or the
+        distance of a point behind the camera. For a latlong camera it is the distance, and for an
+        orthographic camera 1.
         """
         if self.projection == "orthographic":
             return np.ones(len(points))
@@ -235,11 +236,11 @@ class ViewSize:
         return np.asarray(away, np.float64)
 
     def edges(self, cage: Cage, bounds: NDArray[Any], placed: Matrices) -> float:
-        """Returns the largest mean edge length of a cage in pixels (``_core.edge_pixels``).
+        """Returns the mean edge length of a cage in pixels, for the instance where it is largest.
 
         Args:
             cage: The cage.
-            bounds: (2, 3) bounds of the cage in the space of its group.
+            bounds: (2, 3) bounds of the cage in the space of its group (the world or a prototype).
             placed: (k, 4, 4) transforms from the cage's group to the world.
         """
         from wavecomb import _core
@@ -254,7 +255,7 @@ class ViewSize:
         )  # fmt: skip
 
     def _largest(self, bounds: NDArray[Any], placed: Matrices) -> NDArray[np.intp]:
-        """Returns the instances whose bounding spheres appear largest, visible ones first."""
+        """Returns indices of the instances with the largest bounding spheres in the image."""
         centre = 0.5 * (bounds[0] + bounds[1]).astype(np.float64)
         radius = 0.5 * float(np.linalg.norm(bounds[1] - bounds[0]))
         linear = placed[:, :3, :3]

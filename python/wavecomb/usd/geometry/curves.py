@@ -51,17 +51,20 @@ _OTHERS: dict[str, Callable[..., Strands]] = {
 
 @dataclass
 class CurveArrays:
-    """Curves or points in the space of their group.
+    """Curves or points in the space of their group (the world or a prototype).
 
     Attributes:
-        kind: linear-tube, cubic-tube, linear-ribbon or cubic-ribbon; sphere for points.
-        positions: (n, 3) control points or points, or (s, n, 3) at s steps over the shutter.
-        segments: (m,) 32-bit words that ``SceneBuilder.add_curves`` takes; None for points.
-        radii: (n,) radii of control points or points.
+        kind: "linear-tube", "cubic-tube", "linear-ribbon" or "cubic-ribbon" for curves; "sphere"
+            for points.
+        positions: (n, 3) control points of curves, or points; (s, n, 3) at s steps over the shutter
+            if animated.
+        segments: (m,) segments as 32-bit words for ``SceneBuilder.add_curves``; None for points.
+        radii: (n,) radii at control points, or radii of points.
         normals: (n, 3) or (s, n, 3) normals of ribbons; None for tubes and points.
-        uvs: (m, 2, 2) at both ends of segments, or (n, 2) for points; None if not needed.
+        uvs: (m, 2, 2) texture coordinates at both ends of segments, or (n, 2) of points; None if
+            not needed.
         bounds: (2, 3) lowest and highest coordinates.
-        topology: Layout that maps primvars of the prim to segments.
+        topology: Layout of the curves, which maps primvars to segments.
     """
 
     kind: str
@@ -75,7 +78,7 @@ class CurveArrays:
 
 
 def uniform_scale(matrix: Gf.Matrix4d) -> float | None:
-    """Returns the scale factor of a uniformly scaling transform; None for other transforms."""
+    """Returns the scale of a transform that scales uniformly; None for other transforms."""
     if matrix == IDENTITY:
         return 1.0
     linear = np.array(matrix)[:3, :3]
@@ -101,16 +104,17 @@ class CurveReader:
         inherited: Sequence[Any] = (),
         detail: StrandDetail | None = None,
     ) -> CurveArrays | None:
-        """Reads curves in the space of their group; returns None if there are none.
+        """Reads curves in the space of their group; returns None if the prim has no curves.
 
         Args:
             prim: A UsdGeomCurves.
-            matrix: Transform from the prim to its group; it has a ``uniform_scale``.
-            uv_names: Primvars for texture coordinates, of which the first existing one is used;
-                empty if no texture coordinates are needed.
+            matrix: Transform from the prim to its group (the world or a prototype), with uniform
+                scale.
+            uv_names: Names of primvars for texture coordinates; the first primvar that exists is
+                used. Empty if texture coordinates are not needed.
             inherited: Constant primvars of the prim's ancestors.
-            detail: Simplification that removes thin strands and widens the rest; the group must be
-                the world.
+            detail: Simplification that removes some thin strands and widens the remaining ones. The
+                group must be the world.
 
         Raises:
             MeshError: The curves are invalid.
@@ -151,7 +155,7 @@ class CurveReader:
         )
 
     def _without(self, bad: NDArray[np.bool_], strands: Strands, prim: Usd.Prim) -> Strands:
-        """Returns the layout without curves that use an invalid point."""
+        """Returns the layout of those curves whose points are all valid."""
         kept = strands.over_each(np.maximum, bad) == 0
         if not kept.any():
             raise MeshError("their points are not finite or too far away")
@@ -192,7 +196,7 @@ class CurveReader:
         return value
 
     def normals(self, prim: Usd.Prim, strands: Strands) -> Array | None:
-        """Returns normals at control points for ribbons; None for tubes."""
+        """Returns the normals at the control points of ribbons; None for tubes."""
         primvar = authored(prim, "normals", self.time)
         if primvar is None:
             return None
@@ -213,7 +217,7 @@ class CurveReader:
     def _uvs(
         self, prim: Usd.Prim, strands: Strands, names: Sequence[str], inherited: Sequence[Any]
     ) -> Array:
-        """Returns UVs at both ends of segments: authored, else u along the curve and v = 0."""
+        """Returns authored texture coordinates at both ends of segments, or u along curves."""
         found = read_uvs(prim, strands, names, inherited, self.time, self.report)
         if found is None:
             values = np.zeros((strands.sizes["varying"], 2))
@@ -232,14 +236,14 @@ class CurveReader:
 def over_shutter(
     prim: Usd.Prim, shape: CurveArrays, matrix: Gf.Matrix4d, motion: Motion, report: LoadReport
 ) -> CurveArrays:
-    """Returns curves or points with positions and normals at the shutter steps.
+    """Returns curves or points with their positions and normals at the shutter steps.
 
-    Widths and texture coordinates remain those of the frame.
+    Widths and texture coordinates are those at the time of the frame.
 
     Args:
         prim: Prim whose points are animated.
-        shape: Arrays of the prim at the frame.
-        matrix: Transform from the prim to its group.
+        shape: Arrays of the prim at the time of the frame.
+        matrix: Transform from the prim to its group (the world or a prototype).
         motion: The shutter.
         report: Collects warnings.
     """
@@ -271,10 +275,10 @@ def thick_extent(positions: Array, radii: Array) -> Array:
 
 
 def read_points(prim: Usd.Prim, time: Usd.TimeCode) -> Array | None:
-    """Returns the points (n, 3) of a prim; None if there are none.
+    """Returns the points (n, 3) of a prim; None if the prim has no points.
 
     Raises:
-        MeshError: The values are not triples.
+        MeshError: The points do not have three components each.
     """
     points = as_array(points_at_time(prim, time))
     if points is None or len(points) == 0:
@@ -285,7 +289,7 @@ def read_points(prim: Usd.Prim, time: Usd.TimeCode) -> Array | None:
 
 
 def authored(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | None:
-    """Returns ``primvars:name``, else the attribute ``name``; None if neither has values."""
+    """Returns the primvar ``name`` or else the attribute ``name``; None if both have no values."""
     primvar = None
     with contextlib.suppress(PrimvarError):
         primvar = read_primvar(prim, name, time)
@@ -297,7 +301,7 @@ def authored(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | None:
 def read_widths(
     prim: Usd.Prim, strands: Strands, time: Usd.TimeCode, report: LoadReport
 ) -> tuple[NDArray[Any], str]:
-    """Returns widths (n, 1) and their interpolation; a width of 1 if none are valid."""
+    """Returns widths (n, 1) and their interpolation; a single width of 1 if they are not valid."""
     one = np.ones((1, 1))
     primvar = authored(prim, "widths", time)
     if primvar is None:
@@ -324,7 +328,7 @@ def read_uvs(
     time: Usd.TimeCode,
     report: LoadReport,
 ) -> tuple[NDArray[Any], str] | None:
-    """Returns texture coordinates (n, 2) and their interpolation; None if none are valid."""
+    """Returns texture coordinates (n, 2) and their interpolation; None if they are not valid."""
     try:
         primvar = first_primvar(prim, names, inherited, time)
         if primvar is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads gprims of every kind into arrays, if they fit into memory, and adds them to the scene."""
+"""Reads gprims into arrays, checks that they fit into memory, and adds them to the scene."""
 
 from __future__ import annotations
 
@@ -28,19 +28,22 @@ if TYPE_CHECKING:
     from wavecomb import _core
 
 MIN_BYTES = 20
-"""Least memory per mesh point in bytes, rounded down.
+"""Lower bound of the memory per mesh point, in bytes.
 
-Half a triangle per point, with 12 bytes of indices and about 32 bytes of acceleration structure.
+A mesh has about half a triangle per point; a triangle has 12 bytes of indices and takes about 32
+bytes of the acceleration structure.
 """
 
 _SHARE = 8
-"""The check is skipped if layers are smaller than 1 / ``_SHARE`` of the available memory."""
+"""The memory check is skipped if the layers are smaller than 1 / ``_SHARE`` of the available
+memory."""
 
 
 class MemoryCheck:
     """Check that the meshes of one stage fit into memory.
 
-    Points of a .usdc file are not in memory until they are read.
+    Points of a .usdc file are loaded only when they are read, so that a loaded stage may still turn
+    out too large.
     """
 
     def __init__(self, stage: Usd.Stage, time: Usd.TimeCode) -> None:
@@ -50,7 +53,7 @@ class MemoryCheck:
         self.is_enabled = time_limit.loaded_layers()[1] > memory.available_bytes() // _SHARE
 
     def check(self, draws: Iterable[DrawItem]) -> None:
-        """Raises WavecombError if meshes that are not read yet need more memory than available."""
+        """Raises WavecombError if meshes that will be read need more memory than available."""
         if not self.is_enabled:
             return
         points = 0
@@ -71,16 +74,16 @@ WORDS = {
     "mesh": "mesh", "patch": "NURBS patch", "shape": "mesh", "curves": "curves", "points": "points",
     "splats": "splats",
 }  # fmt: skip
-"""Names of gprims in messages, by ``DrawItem.kind``."""
+"""Names of the kinds of gprims in messages, by ``DrawItem.kind``."""
 COUNTS = {
     "mesh": "meshes", "patch": "patches", "shape": "shapes", "curves": "curves", "points": "points",
     "splats": "splats",
 }  # fmt: skip
-"""Names of gprim counts in ``LoadReport``, by ``DrawItem.kind``."""
+"""Names under which ``LoadReport`` counts gprims, by ``DrawItem.kind``."""
 
 
 class GprimReader:
-    """Reader of the gprims of one stage at one time."""
+    """Reader of the gprims of one stage at one time code."""
 
     def __init__(
         self,
@@ -91,7 +94,7 @@ class GprimReader:
     ) -> None:
         """``surfaces`` handles subdivision and displacement, ``skeletons`` handles skinning.
 
-        ``cache`` stores arrays between frames.
+        ``cache`` stores the arrays of gprims between frames.
         """
         self.time, self.report, self.motion = context.time, context.report, context.motion
         self.surfaces = surfaces
@@ -117,13 +120,13 @@ class GprimReader:
         in_world: bool,
         detail: StrandDetail | None = None,
     ) -> MeshArrays | CurveArrays | None:
-        """Reads a gprim in the space of its group; reports and returns None if nothing is drawn.
+        """Reads a gprim in the space of its group; returns None if the gprim is not drawn.
 
-        Returns cached arrays of the previous frame if they are still valid.
+        Returns the cached arrays of the previous frame if the gprim has not changed.
 
         Args:
             draw: The gprim.
-            names: Primvars for texture coordinates; the first existing one is used.
+            names: Names of primvars for texture coordinates; the first primvar that exists is used.
             in_world: Whether the group of the gprim is the world.
             detail: Simplification of curves; it depends on the view, so its result is not cached.
 
@@ -204,8 +207,8 @@ def add_shape(
 ) -> int:
     """Adds the arrays of a gprim to the scene and returns the id of the new object.
 
-    ``options`` are keyword arguments common to ``add_mesh``, ``add_curves`` and ``add_points``, or
-    for splats those of ``add_splats``.
+    ``options`` are keyword arguments for ``add_splats`` if the gprim is splats. Otherwise they are
+    keyword arguments that ``add_mesh``, ``add_curves`` and ``add_points`` share.
     """
     # Pass only the arrays that exist. This saves time on stages with a hundred thousand gprims.
     if isinstance(shape, MeshArrays):

@@ -61,7 +61,7 @@ from wavecomb.usd.stage.report import LoadReport
 
 
 def _scheme(prim: Usd.Prim, names: frozenset[str], time: Usd.TimeCode) -> str | None:
-    """Returns the subdivisionScheme of a mesh whose authored properties are ``names``."""
+    """Returns the subdivision scheme of a mesh; ``names`` are the mesh's authored properties."""
     if "subdivisionScheme" not in names:
         return "none" if prim.GetTypeName() == TETRAHEDRA else "catmullClark"
     return word(prim.GetAttribute("subdivisionScheme").Get(time), "none")
@@ -86,10 +86,10 @@ class MeshReader:
         Args:
             time: Time code of the frame.
             report: Collects warnings.
-            subdivide: Whether subdivision meshes get a cage; their authored normals are then
-                ignored.
-            skeletons: Skeletons that deform bound meshes.
-            motion: The shutter over which shapes are read; None reads them at ``time`` only.
+            subdivide: Whether subdivision meshes get a control cage; their authored normals are
+                then ignored.
+            skeletons: Skeletons that deform the meshes bound to them.
+            motion: Shutter over which shapes are read; None reads shapes at ``time`` only.
         """
         self.time = time
         self.report = report
@@ -98,7 +98,7 @@ class MeshReader:
         self.motion = motion
 
     def shape(self, prim: Usd.Prim, matrix: Gf.Matrix4d, names: frozenset[str]) -> MeshArrays:
-        """Reads an implicit shape in the space of its group.
+        """Reads an implicit shape in the space of its group (the world or a prototype).
 
         ``names`` are the authored properties of the shape.
         """
@@ -119,14 +119,14 @@ class MeshReader:
         inherited: Sequence[Any] = (),
         displaced: bool = False,
     ) -> MeshArrays | None:
-        """Reads a mesh as polygons in the space of its group; returns None if it is empty.
+        """Reads a mesh as polygons in the space of its group; returns None if the mesh is empty.
 
         Args:
             prim: A UsdGeomMesh or UsdGeomTetMesh.
-            matrix: Transform from the mesh to its group.
-            uv_names: Primvars for texture coordinates, of which the first existing one is used;
-                empty if no texture coordinates are needed.
-            names: Names of properties with authored opinions (``authored_names``).
+            matrix: Transform from mesh space to the space of its group (the world or a prototype).
+            uv_names: Names of primvars for texture coordinates; the first primvar that exists is
+                used. Empty if texture coordinates are not needed.
+            names: Names of the mesh's authored properties, from ``authored_names``.
             inherited: Constant primvars of the mesh's ancestors.
             displaced: Whether the points of the mesh will be displaced.
 
@@ -209,13 +209,13 @@ class MeshReader:
     def over_shutter(
         self, prim: Usd.Prim, mesh: MeshArrays, matrix: Gf.Matrix4d, track: Track | None
     ) -> MeshArrays:
-        """Returns the arrays of ``mesh`` with the shape at the shutter steps.
+        """Returns the arrays of ``mesh`` with points and normals at the shutter steps.
 
         Args:
-            prim: A UsdGeomMesh for which ``deforms`` holds.
-            mesh: Arrays of the mesh at the frame.
-            matrix: Transform from the mesh to its group.
-            track: Animated transform; replaces ``matrix`` if there is one.
+            prim: A UsdGeomMesh that changes over time, for which ``deforms`` returns True.
+            mesh: Arrays of the mesh at the time of the frame.
+            matrix: Transform from mesh space to the space of its group (the world or a prototype).
+            track: Animated transform that replaces ``matrix``; None if the transform is static.
 
         Raises:
             MeshError: The mesh is invalid.
@@ -265,10 +265,10 @@ class MeshReader:
         scheme: str | None,
         names: frozenset[str],
     ) -> Array | None:
-        """Returns normals (n, 3) or (m, 3, 3); None for flat shading.
+        """Returns normals per point (n, 3) or per corner (m, 3, 3); None for flat shading.
 
-        Uses authored normals, else smooth ones for subdivision surfaces. Ignores authored normals
-        of meshes that are subdivided, as UsdGeomMesh requires.
+        Returns authored normals if there are any, otherwise smooth normals for subdivision
+        surfaces. As UsdGeomMesh requires, authored normals of subdivided meshes are ignored.
         """
         if scheme not in SCHEMES:
             if scheme not in (None, "none"):
@@ -289,7 +289,7 @@ class MeshReader:
     def _authored_normals(
         self, prim: Usd.Prim, points: Array, topology: Topology, names: frozenset[str]
     ) -> Array | None:
-        """Returns primvars:normals of the mesh, else normals; None if neither is valid."""
+        """Returns the mesh's ``primvars:normals`` or ``normals``; None if both are invalid."""
         if names.isdisjoint(_NORMALS):
             return None
         try:
@@ -320,7 +320,7 @@ class MeshReader:
         return np.ascontiguousarray(normals, np.float32)
 
     def _skinned_normals(self, prim: Usd.Prim, primvar: Primvar, topology: Topology) -> Primvar:
-        """Applies the mesh's skin to authored normals of points or corners."""
+        """Applies skinning to authored normals, which may be per point or per corner."""
         skin = self._skin(prim)
         corners = topology.indices if primvar.interpolation == "faceVarying" else None
         wanted = topology.point_count if corners is None else len(corners)
@@ -343,7 +343,8 @@ class MeshReader:
     ) -> Primvar | None:
         """Returns the primvar for texture coordinates.
 
-        All texture coordinates are (0, 0) if materials name primvars but the mesh has none.
+        If materials name primvars but the mesh has none of them, all texture coordinates are (0,
+        0).
         """
         try:
             primvar = first_primvar(prim, names, inherited, self.time)
@@ -365,7 +366,7 @@ class MeshReader:
     def _uvs(
         self, prim: Usd.Prim, topology: Topology, primvar: Primvar | None
     ) -> tuple[Array | None, Primvar | None]:
-        """Returns UVs (n, 2), (m, 3, 2) or None, and the primvar if it is valid."""
+        """Returns texture coordinates (n, 2), (m, 3, 2) or None, and their primvar if valid."""
         if primvar is None:
             return None, None
         try:
@@ -379,7 +380,7 @@ class MeshReader:
         return uvs, primvar
 
     def _any_coordinates(self, prim: Usd.Prim) -> Primvar | None:
-        """Returns the first authored primvar whose type is a texture coordinate."""
+        """Returns the first authored primvar whose type is a texture coordinate type."""
         for attribute in prim.GetAuthoredAttributes():
             name = attribute.GetName()
             coordinates = attribute.GetTypeName() == Sdf.ValueTypeNames.TexCoord2fArray
@@ -391,7 +392,7 @@ class MeshReader:
 
 
 def _reverse(values: Any) -> Any:
-    """Reverses the corners of each triangle in (m, 3, c) values; returns other values unchanged."""
+    """Reverses the corner order in values of shape (m, 3, c); returns other values unchanged."""
     if values is None or values.ndim != 3:
         return values
     return np.ascontiguousarray(values[:, ::-1])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mesh arrays in the space of their group: transforms, and removal of invalid points."""
+"""Mesh arrays in the space of the world or a prototype: transforms, removal of invalid points."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ Array = NDArray[np.float32]
 IDENTITY = Gf.Matrix4d(1.0)
 
 LIMIT = 1e18
-"""Largest valid coordinate of a point; Embree's own limit is 1.8e18."""
+"""Largest valid coordinate of a point; Embree's limit is 1.8e18."""
 
 UV_NAMES = ("st", "UVMap", "st0", "st1", "uv", "map1")
-"""Names of texture coordinates that are tried if no material names a primvar."""
+"""Names of primvars that are tried as texture coordinates if no material names a primvar."""
 
 _CHUNK = 1 << 18
 _NO_TURN = Gf.Matrix3d(1.0)
@@ -33,16 +33,18 @@ _NOWHERE = "a point is not finite or too far away"
 
 @dataclass
 class MeshArrays:
-    """A mesh in the space of its group.
+    """A mesh in the space of its group (the world or a prototype).
 
     Attributes:
-        positions: (n, 3) points, or (s, n, 3) at s steps over the shutter.
+        positions: (n, 3) points; (s, n, 3) at s steps over the shutter if animated.
         triangles: (m, 3) point indices, counter-clockwise when seen from outside.
-        normals: None or (n, 3), (m, 3, 3), with a leading axis of steps if positions have one.
+        normals: (n, 3) per point or (m, 3, 3) per corner, with a leading axis of steps if animated;
+            None for flat shading.
         uvs: (n, 2), (m, 3, 2) or None.
         bounds: (2, 3) lowest and highest coordinates.
         topology: Triangulation of the mesh's polygons; None for implicit shapes.
-        cage: Cage to subdivide or displace once the view is known; None if there is no such cage.
+        cage: Control cage for subdivision or displacement, which need the view; None if the mesh
+            needs neither.
     """
 
     positions: Array
@@ -60,7 +62,7 @@ def is_translation(matrix: Gf.Matrix4d) -> bool:
 
 
 def check_matrix(matrix: Gf.Matrix4d) -> bool:
-    """Returns whether a transform reverses the orientation.
+    """Returns whether a transform reverses the orientation of triangles.
 
     Raises:
         MeshError: The transform is singular or not finite.
@@ -91,11 +93,11 @@ def bake(points: Array, matrix: Gf.Matrix4d) -> Array:
 def bake_and_triangulate(
     points: Array, counts: NDArray[np.int32], indices: NDArray[np.int32], matrix: Gf.Matrix4d
 ) -> tuple[Array, Array, Topology] | None:
-    """Transforms and triangulates a mesh that consists only of triangles or only of quads.
+    """Transforms and triangulates a mesh that has only triangles or only quads.
 
-    Returns points, bounds and topology in one call, which is faster for stages with a hundred
-    thousand meshes. Returns None for any other or invalid mesh; ``triangulate`` and ``extent`` then
-    report errors.
+    Computes points, bounds and topology in one call, which saves time in stages with many meshes.
+    Returns None for other meshes and for invalid ones, whose errors ``triangulate`` and ``extent``
+    report.
     """
     found = _core.plain_mesh(points, counts, indices, matrix, limit=LIMIT)
     if found is None:
@@ -113,7 +115,7 @@ def transform_shape(
 ) -> tuple[Array, Array, Array]:
     """Transforms points and normals (n, 3) of a shape and returns them with their bounds (2, 3).
 
-    Equivalent to ``bake``, ``bake_normals`` and ``extent``, but in one call.
+    The result is the same as from ``bake``, ``bake_normals`` and ``extent``, but takes one call.
 
     Raises:
         MeshError: A point is not finite or too far away.
@@ -176,7 +178,7 @@ def read_faces(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Ints, Ints]:
 
 
 def _surface(prim: Usd.Prim, time: Usd.TimeCode) -> Ints:
-    """Returns authored surface triangles, else the faces that belong to only one tetrahedron."""
+    """Returns the authored surface triangles, or else the faces that only one tetrahedron has."""
     values = as_array(prim.GetAttribute("surfaceFaceVertexIndices").Get(time))
     if values is None or len(values) == 0:
         tetrahedra = as_array(prim.GetAttribute("tetVertexIndices").Get(time))
@@ -197,7 +199,7 @@ WHY = "they have points that are not finite or too far away"
 
 
 def invalid_point_mask(points: Array, matrix: Gf.Matrix4d = IDENTITY) -> Mask:
-    """Returns a mask (n,) of the points (n, 3) that are invalid under a transform."""
+    """Returns a mask (n,) of the points (n, 3) that a transform makes invalid."""
     there = points if matrix == IDENTITY else bake(points, matrix)
     return np.asarray(~(np.abs(there) < LIMIT).all(axis=1))
 
@@ -208,15 +210,15 @@ def remove_invalid_points(
     """Removes the faces of a mesh that use invalid points.
 
     Args:
-        points: (n, 3), some of which are invalid under ``matrix``.
-        matrix: Transform from the mesh to its group.
+        points: (n, 3) points, some of which are invalid when transformed by ``matrix``.
+        matrix: Transform from mesh space to the space of its group (the world or a prototype).
         counts: (faces,) number of corners of each face.
         indices: (corners,) point indices.
         holes: Indices of faces that are not drawn.
 
     Returns:
-        Points with replacements for the invalid ones, indices of all faces that are not drawn, and
-        a message, which is "" if no face uses an invalid point.
+        Points with invalid points replaced, the indices of all faces that are not drawn, and a
+        message (empty if no face uses an invalid point).
 
     Raises:
         MeshError: No face remains, or counts and indices are inconsistent.
@@ -229,7 +231,7 @@ def remove_invalid_points(
 
 
 def faces_with(bad: Mask, counts: Ints, indices: Ints) -> Ints:
-    """Returns the faces with at least 3 corners that use an invalid point.
+    """Returns indices of the faces with at least 3 corners that use an invalid point.
 
     Raises:
         MeshError: All faces use an invalid point, or counts and indices are inconsistent.
@@ -252,9 +254,9 @@ def faces_with(bad: Mask, counts: Ints, indices: Ints) -> Ints:
 
 
 def fill_invalid(points: Array, bad: Mask, counts: Ints, indices: Ints) -> Array:
-    """Replaces each invalid point by the mean of the valid points of its faces.
+    """Replaces each invalid point by the mean of the valid points in its adjacent faces.
 
-    The mean distorts adjacent faces least when they are subdivided.
+    With this choice, subdivision distorts adjacent faces least.
     """
     out = points.copy()
     good = np.flatnonzero(~bad)
@@ -278,10 +280,10 @@ def fill_invalid(points: Array, bad: Mask, counts: Ints, indices: Ints) -> Array
 
 
 def replace_invalid_steps(shapes: Sequence[Array]) -> list[Array]:
-    """Replaces invalid points at shutter steps by their value at the nearest valid step.
+    """Replaces points that are invalid at a shutter step by their value at the nearest valid step.
 
-    Points that are never valid become the first valid point. Arrays without invalid points remain
-    the same objects.
+    Points that are invalid at all steps are replaced by the first valid point. Arrays without
+    invalid points are returned unchanged.
     """
     masks = [invalid_point_mask(shape) for shape in shapes]
     if not any(mask.any() for mask in masks):

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Converts UsdGeomNurbsCurves and UsdGeomHermiteCurves to Bezier segments.
 
-A polynomial span of order up to 4 becomes one cubic and is exact. Rational spans and spans of
-higher order become ``PARTS`` cubics each, with exact points and tangents at their ends. Basis
-functions follow formulas 2.5 and 2.7 of L. Piegl and W. Tiller, The NURBS Book (1997), vectorised
-over all samples.
+A polynomial span of order up to 4 is converted exactly to one cubic segment. Other spans are
+approximated by ``PARTS`` cubic segments, whose end points and tangents are exact. Basis functions
+follow formulas 2.5 and 2.7 of L. Piegl and W. Tiller, The NURBS Book (1997), vectorised over all
+samples.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from wavecomb.usd.geometry.triangulate import MeshError
 from wavecomb.usd.stage.report import LoadReport
 
 PARTS = 8
-"""Number of cubics per knot span that is not a cubic itself."""
+"""Number of cubic segments for a knot span that cannot be converted exactly."""
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,8 @@ class _BezierConversion:
     """Conversion of one curve to Bezier segments.
 
     Attributes:
-        shares: (segments, 4, order) weights of control points in each Bezier point.
-        columns: (segments, order) indices of the control points that ``shares`` weights.
+        shares: (segments, 4, order) weights of the curve's control points for each Bezier point.
+        columns: (segments, order) indices of the control points to which ``shares`` applies.
     """
 
     shares: Floats
@@ -40,16 +40,16 @@ class _BezierConversion:
 
 @dataclass(frozen=True)
 class NurbsStrands(Strands):
-    """Curves whose Bezier points are linear combinations of their control points.
+    """NURBS curves, whose Bezier points are linear combinations of their control points.
 
     Attributes:
-        pieces: Bezier conversion of each curve.
+        pieces: Conversion of each curve to Bezier segments.
     """
 
     pieces: tuple[_BezierConversion, ...] = ()
 
     def only(self, kept: NDArray[np.bool_] | slice) -> NurbsStrands:
-        """Returns a subset of the curves."""
+        """Returns the curves that a mask or slice selects."""
         numbers = np.arange(len(self.pieces))[kept].tolist()
         fields = {name: getattr(self, name)[kept] for name in PER_CURVE}
         return replace(self, pieces=tuple(self.pieces[i] for i in numbers), **fields)
@@ -67,16 +67,16 @@ class NurbsStrands(Strands):
 
 @dataclass(frozen=True)
 class HermiteStrands(Strands):
-    """Cubic Hermite curves; other primvars are interpolated linearly between points.
+    """Cubic Hermite curves, whose primvars are interpolated linearly between points.
 
     Attributes:
-        tangents: (n, 3) tangent at each point of the prim.
+        tangents: (n, 3) tangents at the points of the prim.
     """
 
     tangents: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     def fit(self, primvar: Primvar, width: int) -> tuple[NDArray[Any], str]:
-        """Returns primvar values that fit the curves; vertex primvars are treated as varying."""
+        """Returns the values of a primvar; vertex interpolation is treated as varying."""
         values, kind = super().fit(primvar, width)
         return values, "varying" if kind == "vertex" else kind
 
@@ -97,7 +97,7 @@ def hermite_strands(
 ) -> HermiteStrands:
     """Reads the layout of a UsdGeomHermiteCurves prim with ``counts`` points per curve.
 
-    Leaves out curves with tangents that are not finite, with a warning.
+    Curves whose tangents are not finite are left out with a warning.
 
     Raises:
         MeshError: The number of tangents differs from the number of points, or no curve remains.
@@ -132,10 +132,10 @@ def nurbs_strands(
 ) -> NurbsStrands:
     """Reads the layout of a UsdGeomNurbsCurves prim with ``counts`` control points per curve.
 
-    Leaves out curves with invalid knots, order or weights, with a warning.
+    Curves with invalid knots, order or weights are left out with a warning.
 
     Raises:
-        MeshError: The number of knots, orders or weights does not fit, or no curve remains.
+        MeshError: The number of knots, orders or weights is wrong, or no curve remains.
     """
 
     def numbers(name: str, columns: int) -> Floats:
@@ -198,7 +198,7 @@ def nurbs_strands(
 
 
 def _bezier_conversion(spline: Spline, weights: Floats | None) -> _BezierConversion:
-    """Computes the conversion of a curve to Bezier segments."""
+    """Computes the weights that convert a curve to Bezier segments."""
     parts = 1 if spline.order <= 4 and weights is None else PARTS
     size = spline.ends[:, 1:] - spline.ends[:, :1]
     at = spline.ends[:, :1] + size * np.linspace(0.0, 1.0, parts + 1)
@@ -216,7 +216,7 @@ def _bezier_conversion(spline: Spline, weights: Floats | None) -> _BezierConvers
 Floats = NDArray[np.float64]
 
 MAX_ORDER = 32
-"""Largest order of a NURBS curve; higher orders are treated as mistakes."""
+"""Largest order of a NURBS curve; curves of higher order are considered mistakes."""
 
 
 @dataclass(frozen=True)
@@ -224,11 +224,11 @@ class Spline:
     """B-spline basis functions over a knot vector.
 
     Attributes:
-        knots: (count + order,) non-decreasing.
+        knots: (count + order,) knot values, non-decreasing.
         order: Degree + 1.
         count: Number of control points.
         spans: (k,) index of the first knot of each non-empty span.
-        ends: (k, 2) parameters at which each span begins and ends, clipped to the curve's range.
+        ends: (k, 2) parameters at the start and the end of each span, clipped to ``limits``.
     """
 
     knots: Floats
@@ -239,13 +239,13 @@ class Spline:
 
     @classmethod
     def of(cls, knots: Floats, order: int, count: int, limits: Floats | None = None) -> Spline:
-        """Validates the parameters and returns the basis.
+        """Creates the basis; raises MeshError if the parameters are invalid.
 
         Args:
             knots: (count + order,).
             order: Order of the curve.
             count: Number of control points.
-            limits: Parameter range; None means the full domain of the basis.
+            limits: Parameter range of the curve; None means the full domain of the basis.
 
         Raises:
             MeshError: The parameters do not define a curve.
@@ -270,8 +270,8 @@ class Spline:
     def weights(self, span: NDArray[np.intp], at: Floats) -> tuple[Floats, Floats]:
         """Evaluates basis functions and their derivatives at parameters on given spans.
 
-        Returns two (m, order) arrays for the control points of ``columns``; all other basis
-        functions are 0.
+        Returns two (m, order) arrays, for the control points whose indices ``columns`` returns; all
+        other basis functions are 0.
         """
         knots, degree = self.knots, self.order - 1
         values = lower = np.ones((len(at), 1))
@@ -292,15 +292,15 @@ class Spline:
         return values, slopes
 
     def columns(self, span: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Returns the (m, order) control point indices that ``weights`` refers to."""
+        """Returns the indices (m, order) of the control points that affect each parameter."""
         return span[:, None] - (self.order - 1) + np.arange(self.order)
 
 
 def rational(values: Floats, slopes: Floats, weights: Floats | None) -> tuple[Floats, Floats]:
-    """Converts basis functions and derivatives (m, order) to rational ones for given weights.
+    """Converts basis functions and derivatives (m, order) to rational basis functions with weights.
 
     Raises:
-        MeshError: The weighted sum vanishes somewhere.
+        MeshError: The weighted sum of the basis functions is 0 at some parameter.
     """
     if weights is None:
         return values, slopes

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Converts UsdGeomNurbsPatch to triangles with exact points and normals at their corners."""
+"""Converts UsdGeomNurbsPatch to triangles whose corners have exact points and normals."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ from wavecomb.usd.materials.network import number, word
 from wavecomb.usd.stage.report import LoadReport
 
 PARTS = 8
-"""Number of quads along each knot span of a patch."""
+"""Number of quads along each direction of a knot span."""
 
 MAX_QUADS = 1 << 24
-"""Maximum number of quads of a patch; spans of larger patches get fewer quads."""
+"""Maximum number of quads of a patch; in larger patches, knot spans get fewer quads."""
 
 
 @dataclass(frozen=True)
 class _Axis:
-    """Parametric direction of a patch, sampled at rows of points.
+    """One parametric direction of a patch and the parameters at which the patch is sampled.
 
     Attributes:
-        spline: B-spline basis of the direction.
-        closed: Whether both ends of the direction coincide.
-        span: (m,) knot span of each row of points.
-        at: (m,) parameter of each row of points.
-        joined: (m,) whether quads connect a row to the next one.
+        spline: B-spline basis in this direction.
+        closed: Whether the patch closes on itself in this direction.
+        span: (m,) knot span of each sample.
+        at: (m,) parameter of each sample.
+        joined: (m,) whether quads connect a sample to the next one.
     """
 
     spline: Spline
@@ -55,15 +55,15 @@ class _Axis:
 
     @property
     def place(self) -> Floats:
-        """(m,) parameters normalised to the range 0 to 1."""
+        """(m,) parameters of the samples, normalised to the range 0 to 1."""
         low, high = self.spline.ends[0, 0], self.spline.ends[-1, 1]
         return (self.at - low) / (high - low)
 
 
 def _axis(spline: Spline, closed: bool, parts: int) -> _Axis:
-    """Samples a parametric direction of a patch.
+    """Chooses samples along one parametric direction of a patch.
 
-    Adjacent spans share a row unless the surface may have a hard edge there.
+    Adjacent spans share a sample unless the surface may have a hard edge between them.
     """
     span, at, joined = [], [], []
     step = np.arange(parts) / parts
@@ -94,14 +94,15 @@ class PatchReader:
         inherited: Sequence[Any] = (),
         motion: Motion | None = None,
     ) -> MeshArrays | None:
-        """Reads a patch in the space of its group; returns None if it has no points.
+        """Reads a patch in the space of its group; returns None if the patch has no points.
 
         Args:
             prim: A UsdGeomNurbsPatch.
-            matrix: Transform from the patch to its group.
-            uv_names: Primvars for texture coordinates; without one, u and v run from 0 to 1.
+            matrix: Transform from the patch to its group (the world or a prototype).
+            uv_names: Names of primvars for texture coordinates; if none exists, u and v run from 0
+                to 1.
             inherited: Constant primvars of the patch's ancestors.
-            motion: The shutter over which points are read; None reads them at the frame.
+            motion: Shutter over which points are read; None reads them at the time of the frame.
 
         Raises:
             MeshError: The patch is invalid.
@@ -185,7 +186,7 @@ class PatchReader:
         names: Sequence[str],
         inherited: Sequence[Any],
     ) -> Array:
-        """Returns UVs (n, 2) from a primvar of the control points, else surface parameters."""
+        """Returns texture coordinates (n, 2) from a primvar of control points or from u and v."""
         u, v = axes
         try:
             primvar = first_primvar(prim, names, inherited, self.time)
@@ -206,7 +207,7 @@ class PatchReader:
 
 
 def _triangles(u: _Axis, v: _Axis, flip: bool) -> Topology:
-    """Returns two triangles per quad whose outside is in the direction du x dv."""
+    """Returns two triangles per quad, whose outside faces the direction du x dv."""
     width = len(u.at)
     rows, columns = np.flatnonzero(v.joined), np.flatnonzero(u.joined)
     a = (rows[:, None] * width + columns).ravel()
@@ -219,7 +220,7 @@ def _triangles(u: _Axis, v: _Axis, flip: bool) -> Topology:
 
 
 def _blend(axes: tuple[_Axis, _Axis], values: Floats) -> tuple[Floats, Floats, Floats]:
-    """Evaluates control point values (n, c) on the surface, with derivatives by u and by v."""
+    """Evaluates control point values (n, c) on the surface, and their derivatives by u and v."""
     u, v = axes
     grid = values.reshape(v.spline.count, u.spline.count, -1)
     along = [spline_sum(v, part, grid) for part in (0, 1)]
@@ -233,9 +234,9 @@ def _blend(axes: tuple[_Axis, _Axis], values: Floats) -> tuple[Floats, Floats, F
 
 
 def spline_sum(axis: _Axis, part: int, grid: Floats) -> Floats:
-    """Sums a grid over its first index, weighted by basis functions or their derivatives.
+    """Sums a grid over its first index, with basis functions or their derivatives as weights.
 
-    ``part`` is 0 for the basis functions and 1 for their derivatives.
+    ``part`` is 0 for basis functions and 1 for their derivatives.
     """
     shares, columns = axis.spline.weights(axis.span, axis.at)[part], axis.spline.columns(axis.span)
     out = np.zeros((len(axis.at), *grid.shape[1:]))
@@ -247,10 +248,10 @@ def spline_sum(axis: _Axis, part: int, grid: Floats) -> Floats:
 def _surface(
     axes: tuple[_Axis, _Axis], heavy: Floats, points: Floats, flip: bool, topology: Topology
 ) -> tuple[Floats, Array]:
-    """Evaluates points and unit normals (n, 3) of the surface.
+    """Evaluates points (n, 3) and unit normals (n, 3) on the surface.
 
     Raises:
-        MeshError: The weighted sum vanishes somewhere.
+        MeshError: The weighted sum of the basis functions is 0 at some point.
     """
     at, by_u, by_v = _blend(axes, np.concatenate([points * heavy, heavy], axis=1))
     total = at[:, 3:]
@@ -273,7 +274,7 @@ def _surface(
 
 
 def _together(points: Floats, normals: Array, near: float) -> Floats:
-    """Averages the normals of coincident points and normalises them."""
+    """Averages and normalises the normals of coincident points."""
     cells = np.round(points / (near or 1.0))
     _, cell = np.unique(cells, axis=0, return_inverse=True)
     total = np.zeros((len(points), 3))
@@ -284,7 +285,7 @@ def _together(points: Floats, normals: Array, near: float) -> Floats:
 
 
 def _joined(axes: tuple[_Axis, _Axis], place: Floats) -> Floats:
-    """Makes points bit-identical along both sides of hard edges and at the ends of closed forms."""
+    """Makes points bit-identical on both sides of hard edges and where closed patches meet."""
     u, v = axes
     grid = place.reshape(len(v.at), len(u.at), 3)
     for axis, view in ((v, grid), (u, np.swapaxes(grid, 0, 1))):

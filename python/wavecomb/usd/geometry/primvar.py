@@ -18,7 +18,7 @@ from wavecomb.usd.stage.report import LoadReport
 
 
 class PrimvarError(ValueError):
-    """A primvar does not fit its mesh; the message gives the reason in a few words."""
+    """Raised if a primvar does not fit its mesh; the message gives the reason."""
 
 
 @dataclass(frozen=True)
@@ -26,11 +26,11 @@ class Primvar:
     """Values of a primvar.
 
     Attributes:
-        values: (k, c), with indices already applied.
-        interpolation: constant, uniform, varying, vertex or faceVarying.
+        values: (k, c) values after applying the indices.
+        interpolation: "constant", "uniform", "varying", "vertex" or "faceVarying".
         name: Authored name.
         index: (k,) authored index of each value; None if no indices are authored.
-        space: Colour space of colour values; "" means linear Rec.709.
+        space: Colour space of colour values; an empty string means linear Rec.709.
     """
 
     values: NDArray[Any]
@@ -41,7 +41,7 @@ class Primvar:
 
 
 def as_array(value: Any) -> NDArray[Any] | None:
-    """Returns a VtArray, vector or number as (k, c), without a copy if possible."""
+    """Returns a VtArray, vector or number as an array (k, c), without a copy if possible."""
     if value is None:
         return None
     # Handle Vec3fArray first, since the points of nearly all meshes have this type.
@@ -62,7 +62,7 @@ def as_array(value: Any) -> NDArray[Any] | None:
 
 
 def as_integers(value: Any, dtype: Any = np.int32) -> NDArray[Any]:
-    """Returns integers (k,); an empty array if the value holds anything else."""
+    """Returns a value as integers (k,); an empty array if the value does not hold integers."""
     if type(value) is Vt.IntArray and dtype is np.int32:
         return np.asarray(value)
     array = as_array(value)
@@ -72,12 +72,12 @@ def as_integers(value: Any, dtype: Any = np.int32) -> NDArray[Any]:
 
 
 def authored_names(prim: Usd.Prim) -> frozenset[str]:
-    """Returns names of authored properties; one call costs as much as querying one attribute."""
+    """Returns the names of authored properties; a call takes as long as querying one attribute."""
     return frozenset(prim.GetAuthoredPropertyNames())
 
 
 def from_attribute(attribute: Usd.Attribute, name: str, time: Usd.TimeCode) -> Primvar | None:
-    """Reads a primvar and applies its indices; returns None if it has no value.
+    """Reads a primvar and applies its indices; returns None if the primvar has no value.
 
     Raises:
         PrimvarError: Indices are out of range.
@@ -119,7 +119,7 @@ def read_primvar(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | Non
 def find_primvar(
     prim: Usd.Prim, name: str, inherited: Sequence[Any], time: Usd.TimeCode
 ) -> Primvar | None:
-    """Returns a primvar of a prim, else the constant primvar that it inherits."""
+    """Returns a primvar of a prim, or else the constant primvar that the prim inherits."""
     own = read_primvar(prim, name, time)
     if own is not None or not inherited:
         return own
@@ -132,13 +132,13 @@ def find_primvar(
 def first_primvar(
     prim: Usd.Prim, names: Sequence[str], inherited: Sequence[Any], time: Usd.TimeCode
 ) -> Primvar | None:
-    """Returns the first of the named primvars that a prim has or inherits."""
+    """Returns the first of the named primvars that exists on a prim or that the prim inherits."""
     found = (find_primvar(prim, name, inherited, time) for name in names)
     return next((primvar for primvar in found if primvar is not None), None)
 
 
 def plain_attribute(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | None:
-    """Reads an attribute that is not a primvar as a vertex primvar; None if it has no values."""
+    """Reads an attribute as a primvar with vertex interpolation; None if it has no values."""
     attribute = prim.GetAttribute(name)
     values = as_array(attribute.Get(time)) if attribute.HasAuthoredValue() else None
     if values is None or len(values) == 0:
@@ -147,7 +147,7 @@ def plain_attribute(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | 
 
 
 def finite_uvs(uvs: NDArray[Any], report: LoadReport, place: object) -> NDArray[Any]:
-    """Returns texture coordinates, with values that are not finite set to 0 and reported."""
+    """Returns texture coordinates; sets values that are not finite to 0 and reports them."""
     if np.isfinite(uvs).all():
         return uvs
     report.warn("texture coordinates that are not finite: set to 0", place)
@@ -155,10 +155,10 @@ def finite_uvs(uvs: NDArray[Any], report: LoadReport, place: object) -> NDArray[
 
 
 def fitting(primvar: Primvar, topology: Topology, width: int) -> NDArray[np.float32]:
-    """Returns values (k, width) of a primvar that fits a mesh; cuts additional components.
+    """Returns the first ``width`` components (k, width) of a primvar that fits a mesh.
 
     Raises:
-        PrimvarError: The number of values or components does not fit.
+        PrimvarError: The number of values or of components does not match the mesh.
     """
     values, kind = primvar.values, primvar.interpolation
     if values.shape[1] < width:
@@ -184,15 +184,15 @@ def fitting(primvar: Primvar, topology: Topology, width: int) -> NDArray[np.floa
 def spread(primvar: Primvar, topology: Topology, width: int) -> tuple[NDArray[np.float32], str]:
     """Maps a primvar to triangles.
 
-    Returns ((n, c), "vertex"), ((m, 3, c), "corner") or ((1, c), "constant").
+    Returns an array (n, c) and "vertex", (m, 3, c) and "corner", or (1, c) and "constant".
 
     Args:
         primvar: The primvar.
         topology: Topology of the primvar's mesh.
-        width: Number of components c; additional ones are cut.
+        width: Number of components c to return.
 
     Raises:
-        PrimvarError: The number of values or components does not fit.
+        PrimvarError: The number of values or of components does not match the mesh.
     """
     values, kind = fitting(primvar, topology, width), primvar.interpolation
     if kind == "constant":
@@ -211,9 +211,9 @@ def spread(primvar: Primvar, topology: Topology, width: int) -> tuple[NDArray[np
 
 
 def _weld(values: NDArray[np.float32], topology: Topology) -> NDArray[np.float32] | None:
-    """Converts face-varying to per-point values.
+    """Converts values with face-varying interpolation to one value per point.
 
-    Returns None if corners of a point have different values.
+    Returns None if a point has different values at its corners.
     """
     indices = topology.indices
     probe = slice(0, 64)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Converts UsdGeom's implicit shapes to triangles with exact normals.
 
-Uses the absolute value of negative sizes. All surfaces are rendered on both sides, so
-``doubleSided`` is not read; ``orientation`` determines the outside.
+Uses the absolute value of negative sizes. The attribute ``doubleSided`` is not read, since all
+surfaces are rendered on both sides. ``orientation`` determines the outside.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ RINGS = 32
 
 @dataclass(frozen=True)
 class Shape:
-    """A shape: positions, normals (n, 3), uvs (n, 2) and triangles (m, 3).
+    """Triangles of an implicit shape.
 
-    Contract: prims of equal sizes share the arrays, which must not be modified.
+    Contract: prims of equal sizes share the arrays, so that callers must not modify them.
     """
 
     positions: Array
@@ -43,10 +43,10 @@ class Shape:
 
 
 def read_shape(prim: Usd.Prim, time: Usd.TimeCode, names: frozenset[str]) -> Shape | None:
-    """Returns the shape of a Sphere, Cube, Cylinder, Cone, Capsule or Plane; None for others.
+    """Returns the triangles of an implicit shape; None for prims of unsupported types.
 
-    ``names`` are the authored properties. Sizes are always read, since value clips may provide
-    them.
+    ``names`` are the prim's authored properties. Sizes are read even if they are not authored,
+    since value clips may define them.
     """
     kind = str(prim.GetTypeName())
     if kind not in _READERS:
@@ -98,7 +98,7 @@ def _cube(number: Number, token: Token) -> Shape:
 
 @lru_cache(maxsize=256)
 def _box(half: float) -> Shape:
-    """Returns a cube from -half to half."""
+    """Returns a cube with coordinates from -half to half."""
     positions, normals, uvs = [], [], []
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], np.float32)
     for axis in range(3):
@@ -127,7 +127,7 @@ def _plane(number: Number, token: Token) -> Shape:
 
 @lru_cache(maxsize=256)
 def _rectangle(w: float, h: float, axis: str) -> Shape:
-    """Returns a plane from (-w, -h) to (w, h) with its normal along an axis."""
+    """Returns a rectangle from (-w, -h) to (w, h) whose normal is along an axis."""
     corners = np.array([[-w, -h, 0], [w, -h, 0], [w, h, 0], [-w, h, 0]])
     normals = np.tile([0.0, 0.0, 1.0], (4, 1))
     uvs = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
@@ -147,7 +147,7 @@ def _turn_plane(values: NDArray[Any], axis: str) -> Array:
 
 
 def _to_axis(values: NDArray[Any], axis: str) -> Array:
-    """Rotates geometry from the Z axis to another axis by a cyclic permutation (right-handed)."""
+    """Rotates geometry from the Z axis to another axis by permuting coordinates cyclically."""
     order = {"X": [2, 0, 1], "Y": [1, 2, 0], "Z": [0, 1, 2]}[axis]
     return np.ascontiguousarray(values[:, order], np.float32)
 
@@ -199,7 +199,7 @@ def _revolve(kind: str, bottom: float, top: float, height: float, axis: str) -> 
 
 
 def _side(bottom: float, top: float, height: float) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Returns the profile of the side of a cylinder or truncated cone, and its normals."""
+    """Returns profile and profile normals of the side of a cylinder or truncated cone."""
     half = 0.5 * height
     slope = np.array([height, bottom - top]) / (math.hypot(height, bottom - top) or 1.0)
     # The side of a cone is divided into several rows, so that interpolated normals are smooth near

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Motion blur: the shutter, and transforms and sample times while it is open."""
+"""Motion blur: the shutter interval, and animated transforms sampled over it."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ MAX_STEPS = 64
 """Maximum number of motion steps that the user may request."""
 
 _CHOICES = (2, 3, 4, 5, 8)
-"""Numbers of motion steps that are tried in turn if none is requested."""
+"""Numbers of motion steps that are tried in ascending order if the user requests none."""
 
 _BEND = 5e-3
-"""Largest deviation of the motion from straight lines between steps, relative to the motion."""
+"""Largest deviation from linear motion between steps, as a fraction of the whole motion."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Blur:
     Attributes:
         shutter: Opening and closing time relative to the frame, in time codes; None uses the
             camera's.
-        steps: Motion steps of every animated object; None chooses up to 8 as needed.
+        steps: Number of motion steps of every animated object; None chooses up to 8 as needed.
         off: Whether motion blur is disabled.
     """
 
@@ -48,7 +48,7 @@ class Blur:
     def chosen(
         cls, shutter: Any = None, motion_blur: bool = True, steps: int | None = None
     ) -> Blur:
-        """Creates the options; raises WavecombError for invalid values."""
+        """Creates the options; raises WavecombError if values are invalid."""
         if shutter is not None:
             good = len(shutter) == 2 and all(np.isfinite(value) for value in shutter)
             if not good or shutter[1] < shutter[0]:
@@ -62,7 +62,7 @@ class Blur:
 
 
 class Track:
-    """An animated transform from a prim to its group."""
+    """Animated transform from a prim to its group (the world or a prototype)."""
 
     __slots__ = ("_above", "_known", "_motion", "_parent", "_prim")
 
@@ -85,21 +85,21 @@ class Track:
         return matrix
 
     def steps(self) -> Matrices | None:
-        """Returns (s, 4, 4) transforms at equal steps over the shutter; None if nothing moves."""
+        """Returns transforms (s, 4, 4) at equal steps over the shutter; None if all are equal."""
         return self._motion.steps(lambda time: np.array(self.at(time)))
 
 
 class Motion:
-    """The shutter interval and the sampling of animated values over it.
+    """The shutter interval, with functions that sample animated values over it.
 
     Attributes:
-        frame: Time code at which static values are read.
-        open, close: Time codes of the shutter.
+        frame: Time code of the frame, at which values that are not animated are read.
+        open, close: Time codes at which the shutter opens and closes.
         middle: Time code halfway between ``open`` and ``close``, at which lights are read.
     """
 
     def __init__(self, frame: float, interval: tuple[float, float], steps: int | None) -> None:
-        """``steps`` is the number of steps of every motion; None chooses up to 8 as needed."""
+        """``steps`` is the number of motion steps; None chooses up to 8 as needed."""
         self.frame = frame
         self.open, self.close = interval
         self.middle = 0.5 * (self.open + self.close)
@@ -112,7 +112,7 @@ class Motion:
         return self.open - self.frame, self.close - self.frame
 
     def xforms(self, time: float) -> UsdGeom.XformCache:
-        """Returns the transform cache of a time code."""
+        """Returns the cache of transforms at a time code."""
         cache = self._caches.get(time)
         if cache is None:
             cache = self._caches[time] = UsdGeom.XformCache(Usd.TimeCode(time))
@@ -123,26 +123,26 @@ class Motion:
 
         Args:
             prim: An Xformable prim.
-            parent: Animated transform of the prim's parent; None if the parent is static or if the
+            parent: Animated transform of the prim's parent; None if the parent is static or the
                 prim resets the transform stack.
-            above: Transform of a static parent.
+            above: Transform of the prim's parent if the parent is static.
         """
         if parent is None and not UsdGeom.Xformable(prim).TransformMightBeTimeVarying():
             return None
         return Track(self, prim, parent, above)
 
     def times(self, count: int) -> list[float]:
-        """Returns the time codes of ``count`` equal steps."""
+        """Returns the time codes of ``count`` equal steps from shutter opening to closing."""
         return [float(t) for t in np.linspace(self.open, self.close, count)]
 
     def sampled(self, attributes: Sequence[Usd.Attribute], least: int = 2) -> list[float]:
-        """Returns at most 8 step times that coincide with the attributes' samples if possible."""
+        """Returns at most 8 step times, which include the attributes' time samples if possible."""
         interval = Gf.Interval(self.open, self.close, False, False)
         inside = {t for a in attributes for t in a.GetTimeSamplesInInterval(interval)}
         return self.fitting(sorted(inside), least)
 
     def fitting(self, samples: Sequence[float], least: int = 2) -> list[float]:
-        """Returns the fewest step times that include all ``samples``; 8 if fewer do not suffice."""
+        """Returns the fewest equal steps that include all time ``samples``, or 8 steps."""
         if self._steps is not None:
             return self.times(self._steps)
         share = (np.asarray(samples, np.float64) - self.open) / (self.close - self.open)
@@ -153,10 +153,10 @@ class Motion:
         return self.times(_CHOICES[-1])
 
     def steps(self, matrices: Callable[[float], Matrices]) -> Matrices | None:
-        """Samples matrices (..., 4, 4) at equal steps; returns (s, ..., 4, 4), or None if static.
+        """Samples matrices (..., 4, 4) at s equal steps; returns None if they are static.
 
-        Uses the fewest steps whose linear interpolation is close to the motion, unless a number is
-        set.
+        Unless the user sets the number of steps, the function uses the fewest steps whose linear
+        interpolation is close to the motion.
         """
         choices = _CHOICES if self._steps is None else (self._steps,)
         for count in choices:
@@ -171,7 +171,7 @@ class Motion:
 
 
 def _is_straight(values: Matrices, between: Matrices) -> bool:
-    """Returns whether linear interpolation between steps is close to the values in between."""
+    """Returns whether linear interpolation between steps is close to the values ``between``."""
     off = np.abs(between - 0.5 * (values[1:] + values[:-1]))
     span = np.abs(values - values[:1])
     size = np.abs(values[..., :3, :3]).max()
@@ -185,12 +185,12 @@ def _is_straight(values: Matrices, between: Matrices) -> bool:
 def find_motion(
     camera: Usd.Prim | None, time: Usd.TimeCode, blur: Blur, report: LoadReport
 ) -> Motion | None:
-    """Returns the motion to be blurred; None if the shutter interval is empty.
+    """Returns the shutter interval; None if motion blur is off or the interval is empty.
 
     Args:
         camera: Camera whose shutter:open and shutter:close are used, relative to the frame.
         time: Time code of the frame.
-        blur: Options of the user that may override the shutter.
+        blur: Motion blur options, whose shutter overrides the camera's.
         report: Collects warnings.
     """
     shutter = blur.shutter

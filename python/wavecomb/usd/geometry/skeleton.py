@@ -43,7 +43,7 @@ class Skin:
             self._shapes = UsdSkel.BlendShapeQuery(UsdSkel.BindingAPI(self.prim))
 
     def varies(self) -> bool:
-        """Returns whether the animation or the skeleton-to-mesh transform may change."""
+        """Returns whether animation or skeleton-to-mesh transform may change over time."""
         animation = self.skeleton.GetAnimQuery()
         if animation and (
             animation.JointTransformsMightBeTimeVarying()
@@ -54,7 +54,7 @@ class Skin:
         return self.query.HasJointInfluences() and here != there
 
     def samples(self, interval: Gf.Interval) -> set[float]:
-        """Returns time codes of the animation's samples in an interval."""
+        """Returns the time codes of the animation's samples within an interval."""
         animation = self.skeleton.GetAnimQuery()
         if not animation:
             return set()
@@ -64,7 +64,7 @@ class Skin:
         }
 
     def transforms(self, time: float) -> Array:
-        """Returns (k, 4, 4) joint transforms, from which the number of motion steps is chosen."""
+        """Returns joint transforms (k, 4, 4), from which the number of motion steps is derived."""
         found = self.skeleton.ComputeSkinningTransforms(Usd.TimeCode(time))
         return np.zeros((1, 4, 4)) if found is None else np.array(found)
 
@@ -72,7 +72,7 @@ class Skin:
         """Returns deformed points (n, 3) in object space.
 
         Raises:
-            SkinError: The skinning data does not fit the mesh.
+            SkinError: The joint influences or the points do not match the mesh.
         """
         try:
             deformed = Vt.Vec3fArray(points)
@@ -91,12 +91,12 @@ class Skin:
     ) -> Array:
         """Returns deformed normals (n, 3).
 
-        The normals belong to ``count`` points, or to corners whose points are ``corners``. All
-        skinning methods use linear blending for normals; after normalisation the difference is
-        small.
+        The normals are those of ``count`` points; if ``corners`` is given, they are those of
+        corners whose points have these indices. Normals use linear blending even if the skinning
+        method is dual quaternion; the difference is small after normalisation.
 
         Raises:
-            SkinError: The skinning data does not fit the mesh.
+            SkinError: The joint influences do not match the mesh.
         """
         if not self.query.HasJointInfluences():
             return normals
@@ -148,23 +148,23 @@ class Skin:
             raise SkinError("blend shapes that do not fit")
 
     def _to_mesh(self, time: Usd.TimeCode) -> Gf.Matrix4d:
-        """Returns the transform from the skeleton's to the mesh's object space."""
+        """Returns the transform from the skeleton's object space to the mesh's object space."""
         xforms = UsdGeom.XformCache(time)
         inverse = xforms.GetLocalToWorldTransform(self.prim).GetInverse()
         return xforms.GetLocalToWorldTransform(self.skeleton.GetPrim()) * inverse
 
 
 MAX_SKINNED_INSTANCES = 100_000
-"""Maximum number of instances that are read separately, since nested instancing can multiply
+"""Maximum number of skinned instances with separate prototypes, since instancing can multiply
 them."""
 
 
 class SkinError(ValueError):
-    """Skinning data does not fit its mesh; the message gives the reason in a few words."""
+    """Raised if skinning data does not fit its mesh; the message gives the reason."""
 
 
 class Skeletons:
-    """The skins of a stage, collected as the traversal reaches SkelRoots."""
+    """The skinning data of a stage's meshes, collected as the traversal reaches SkelRoots."""
 
     def __init__(self, report: LoadReport) -> None:
         self.report = report
@@ -193,7 +193,7 @@ class Skeletons:
                     self._skins[query.GetPrim().GetPath()] = skin
 
     def of(self, prim: Usd.Prim) -> Skin | None:
-        """Returns the skin of a mesh; None if it is not deformed."""
+        """Returns the skinning data of a mesh; None if the mesh is not bound to a skeleton."""
         return self._skins.get(prim.GetPath()) if self._skins else None
 
     def needs_own_prototype(self, instance: Usd.Prim, prototype: Usd.Prim) -> bool:
@@ -220,7 +220,7 @@ class Skeletons:
         return any(above in self._roots for above in path.GetPrefixes())
 
     def _holders(self, stage: Usd.Stage) -> set[Sdf.Path]:
-        """Returns prototypes that contain a SkelRoot, also in nested instances."""
+        """Returns the prototypes that contain a SkelRoot, directly or in nested instances."""
         if self._holding is None:
             self._holding = containing_prototypes(
                 stage, lambda prim: prim.GetTypeName() == "SkelRoot"
@@ -229,7 +229,7 @@ class Skeletons:
 
 
 def skinned_points(skin: Skin, points: Any, time: Usd.TimeCode) -> Any:
-    """Returns skinned points of a mesh; if skinning fails, warns and returns the rest pose."""
+    """Returns skinned points of a mesh; warns and returns the rest pose if skinning fails."""
     try:
         return skin.points(points, time)
     except SkinError as error:
@@ -239,7 +239,7 @@ def skinned_points(skin: Skin, points: Any, time: Usd.TimeCode) -> Any:
 
 
 def _moving_above(prim: Usd.Prim) -> set[Sdf.Path]:
-    """Returns the paths of the prim and those ancestors whose transforms are animated."""
+    """Returns the paths of the prim and its ancestors that have animated transforms."""
     moving: set[Sdf.Path] = set()
     while prim:
         xformable = UsdGeom.Xformable(prim)
@@ -256,7 +256,7 @@ def _under(points: Array, matrix: Gf.Matrix4d) -> Array:
 
 
 def _normal_matrix(matrix: Gf.Matrix4d) -> Array:
-    """Returns the inverse transpose (3, 3) for normals as row vectors."""
+    """Returns the inverse transpose (3, 3), which transforms normals as row vectors."""
     linear = np.array(matrix)[:3, :3]
     if abs(np.linalg.det(linear)) < 1e-12:
         return np.eye(3)
@@ -277,7 +277,7 @@ def _has_velocities(prim: Usd.Prim) -> bool:
 
 
 def points_at_time(prim: Usd.Prim, time: Usd.TimeCode) -> Any:
-    """Returns the points at one time; velocities extrapolate from the preceding sample."""
+    """Returns the points at a time code; velocities extrapolate from the preceding time sample."""
     if frame_number(time) is not None and _has_velocities(prim):
         found = UsdGeom.PointBased(prim).ComputePointsAtTime(time, time)
         if found:
@@ -302,9 +302,10 @@ def step_times(prim: Usd.Prim, skin: Skin | None, motion: Motion) -> list[float]
 def points_at(
     prim: Usd.Prim, skin: Skin | None, times: list[float], frame: float, report: LoadReport
 ) -> list[Array] | None:
-    """Returns points (n, 3) at each time in object space; None and a note if their counts differ.
+    """Returns points (n, 3) in object space at each time; None if the number of points changes.
 
-    Velocities and accelerations precede interpolation between samples, as in UsdGeomPointBased.
+    If velocities or accelerations exist, they replace interpolation between samples, as
+    UsdGeomPointBased requires.
     """
     codes = [Usd.TimeCode(time) for time in times]
     found: list[Any] | None
@@ -325,5 +326,5 @@ def points_at(
 
 
 def matrix_at(track: Track | None, still: Gf.Matrix4d, time: float) -> Gf.Matrix4d:
-    """Returns the transform from a mesh to its group at a time code."""
+    """Returns the transform at a time code from a mesh to its group (the world or a prototype)."""
     return still if track is None else track.at(time)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads UsdGeomPoints as spheres, and Gaussian splats."""
+"""Reads UsdGeomPoints as spheres, and reads Gaussian splats."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _SH = "radiance:sphericalHarmonics"
 
 @dataclass
 class SplatArrays(CurveArrays):
-    """Gaussian splats in the space of their group; ``radii`` are those of bounding spheres.
+    """Gaussian splats in the space of their group; ``radii`` are the radii of bounding spheres.
 
     Attributes:
         scales: (n, 3) standard deviations along the splats' axes.
@@ -62,11 +62,11 @@ class SplatReader:
         self.report = report
 
     def splats(self, prim: Usd.Prim, matrix: Gf.Matrix4d) -> SplatArrays | None:
-        """Reads splats in the space of their group; returns None if there are none.
+        """Reads splats in the space of their group; returns None if the prim has no splats.
 
         Args:
             prim: A ParticleField3DGaussianSplat.
-            matrix: Transform from the prim to its group, which must be a translation.
+            matrix: Transform from the prim to its group, which may only translate.
 
         Raises:
             MeshError: The splats are invalid.
@@ -113,7 +113,7 @@ class SplatReader:
         )  # fmt: skip
 
     def _values(self, prim: Usd.Prim, name: str, width: int) -> NDArray[Any] | None:
-        """Returns the float values (n, width) of an attribute, else its half values.
+        """Returns the values (n, width) of a float attribute, or else of its half float variant.
 
         Returns None if neither attribute exists.
         """
@@ -128,7 +128,7 @@ class SplatReader:
     ) -> NDArray[Any]:
         """Returns the values of an attribute, (count, width).
 
-        As UsdVol requires, cuts longer arrays and ignores shorter ones.
+        Longer arrays are cut and shorter arrays are ignored, as UsdVol requires.
         """
         values = self._values(prim, name, len(otherwise))
         if values is not None and len(values) > count:
@@ -141,7 +141,7 @@ class SplatReader:
         return values[:count]
 
     def _harmonics(self, prim: Usd.Prim, count: int) -> Array:
-        """Returns colour harmonics (count, k, 3); grey if there are none that fit."""
+        """Returns spherical harmonics of colours, (count, k, 3); grey if there are none."""
         degree = prim.GetAttribute(f"{_SH}Degree").Get()
         degree = 3 if degree is None else int(degree)
         values = self._values(prim, f"{_SH}Coefficients", 3)
@@ -182,9 +182,9 @@ class PointReader:
         uv_names: Sequence[str],
         inherited: Sequence[Any] = (),
     ) -> CurveArrays | None:
-        """Reads points in the space of their group; returns None if there are none.
+        """Reads points in the space of their group; returns None if the prim has no points.
 
-        Arguments and errors are the same as for ``CurveReader.curves``.
+        Parameters and errors are the same as for ``CurveReader.curves``.
         """
         check_matrix(matrix)
         positions = read_points(prim, self.time)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Layout of a prim's curves as Bezier segments, and simplification of thin strands.
 
-Every basis and wrap mode becomes runs of Bezier control points (or points of polylines) that
-adjacent segments share, so that the core supports a single kind of cubic. The change of basis is
-exact up to rounding.
+Curves of every basis and wrap mode are converted to Bezier control points, or to the points of
+polylines. The core therefore needs only one kind of cubic curve. Adjacent segments share their end
+points. The conversion is exact up to rounding.
 """
 
 from __future__ import annotations
@@ -24,13 +24,14 @@ Index = NDArray[np.intp]
 
 GOES_ON_BEFORE = 0x80000000
 GOES_ON_AFTER = 0x40000000
-"""Segment flags: the curve continues before the segment's first (after its last) point."""
+"""Segment flags: another segment precedes the segment's first point, or follows its last point."""
 
 _TO_BEZIER: dict[str, NDArray[np.float64]] = {
     "bspline": np.array([[1, 4, 1, 0], [0, 4, 2, 0], [0, 2, 4, 0], [0, 1, 4, 1]]) / 6.0,
     "catmullRom": np.array([[0, 6, 0, 0], [-1, 6, 1, 0], [0, 1, 6, -1], [0, 0, 6, 0]]) / 6.0,
 }
-"""Matrix whose rows compute Bezier control points of a segment from its four authored points."""
+"""Matrix that computes the Bezier control points of a segment from four authored points, by
+basis."""
 
 
 PER_CURVE = ("kept", "counts", "starts", "segments", "varying_starts")
@@ -41,7 +42,7 @@ _AT_ONCE = 1 << 16
 
 
 def runs(counts: Index) -> tuple[Index, Index]:
-    """Returns the run index of each element and its position in the run, from the runs' lengths."""
+    """Returns the run of each element, and its index in the run, for runs of given lengths."""
     owner = np.repeat(np.arange(len(counts)), counts)
     starts = np.cumsum(counts) - counts
     return owner, np.arange(len(owner)) - starts[owner]
@@ -51,17 +52,17 @@ def runs(counts: Index) -> tuple[Index, Index]:
 class Strands:
     """The layout of a prim's curves, as authored and as Bezier segments.
 
-    The k curves of the layout exclude curves without segments.
+    Curves without segments are left out of the k curves of the layout.
 
     Attributes:
-        basis: linear, bezier, bspline or catmullRom.
-        wrap: nonperiodic, periodic or pinned.
-        kept: (k,) index of each curve in the prim.
+        basis: "linear", "bezier", "bspline" or "catmullRom".
+        wrap: "nonperiodic", "periodic" or "pinned".
+        kept: (k,) index of each curve among all curves of the prim.
         counts: (k,) number of authored points of each curve.
         starts: (k,) index of the first authored point of each curve.
         segments: (k,) number of segments of each curve.
         varying_starts: (k,) index of the first varying value of each curve.
-        sizes: Number of values of each primvar interpolation.
+        sizes: Required number of primvar values, by interpolation.
     """
 
     basis: str
@@ -75,7 +76,7 @@ class Strands:
 
     @property
     def cubic(self) -> bool:
-        """Whether segments have four control points."""
+        """Whether segments are cubic and have four control points."""
         return self.basis != "linear"
 
     @property
@@ -85,7 +86,7 @@ class Strands:
 
     @property
     def _step(self) -> int:
-        """Offset in control points from one segment to the next."""
+        """Number of control points from the start of a segment to the start of the next."""
         return 3 if self.cubic else 1
 
     @property
@@ -109,11 +110,11 @@ class Strands:
         return self.sizes["vertex"]
 
     def only(self, kept: NDArray[np.bool_] | slice) -> Strands:
-        """Returns a subset of the curves, given by a slice or a mask (k,)."""
+        """Returns the curves that a slice or a mask (k,) selects."""
         return replace(self, **{name: getattr(self, name)[kept] for name in PER_CURVE})
 
     def over_each(self, combine: np.ufunc, values: NDArray[Any]) -> NDArray[np.float64]:
-        """Reduces the values (n,) of each curve's authored points with ``combine``.
+        """Combines the values of each curve's authored points by a NumPy function such as maximum.
 
         Returns (k,).
         """
@@ -122,7 +123,7 @@ class Strands:
         return np.asarray(combine.reduceat(mine, np.cumsum(self.counts) - self.counts))
 
     def greatest(self, values: NDArray[Any], kind: str) -> NDArray[np.float64]:
-        """Returns the largest value (k,) on each curve of values (n, 1) with an interpolation."""
+        """Returns the largest value (k,) of a primvar with values (n, 1) on each curve."""
         if kind == "vertex":
             return self.over_each(np.maximum, values[:, 0])
         first, last = self.ends(values, kind)
@@ -130,7 +131,7 @@ class Strands:
         return np.asarray(np.maximum.reduceat(np.maximum(first, last)[:, 0], starts))
 
     def segment_words(self) -> NDArray[np.uint32]:
-        """Returns the first control point of each segment (count,), combined with flags."""
+        """Returns indices of the segments' first control points, combined with flags."""
         step, lead = self._step, self._lead
         sizes = self._run_sizes
         base = np.cumsum(sizes) - sizes + lead
@@ -141,11 +142,11 @@ class Strands:
         return words
 
     def controls(self, values: NDArray[Any], kind: str) -> Array:
-        """Interpolates values (n, c) of a primvar to every control point; returns float32.
+        """Interpolates primvar values (n, c) to all control points; returns float32.
 
         Args:
-            values: Authored values of the whole prim, ``sizes[kind]`` of them.
-            kind: constant, uniform, varying or vertex.
+            values: Authored values of the primvar for the whole prim, ``sizes[kind]`` in number.
+            kind: "constant", "uniform", "varying" or "vertex".
         """
         if kind == "vertex" and self.wrap == "nonperiodic" and self.basis in ("linear", "bezier"):
             if int(self.counts.sum()) == len(values):
@@ -177,14 +178,14 @@ class Strands:
         return out
 
     def at_controls(self, each: NDArray[Any]) -> Array:
-        """Returns a value (k,) per curve as float32 at all of its control points."""
+        """Repeats each curve's value (k,) at all its control points; returns float32."""
         first = np.repeat(np.asarray(each, np.float64), self.segments)[:, None]
         return self._pack([first] * (4 if self.cubic else 2))[:, 0]
 
     def ends(
         self, values: NDArray[Any], kind: str
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Interpolates values (n, c) of a primvar to the first and last point of each segment."""
+        """Interpolates primvar values (n, c) to the first and last point of each segment."""
         values = np.asarray(values, np.float64)
         curve, at = runs(self.segments)
         if kind == "constant":
@@ -201,10 +202,10 @@ class Strands:
         return first, last
 
     def fit(self, primvar: Primvar, width: int) -> tuple[NDArray[Any], str]:
-        """Returns values (n, width) of a primvar and the interpolation that their number fits.
+        """Returns values (n, width) of a primvar, and the interpolation that matches their number.
 
         Raises:
-            PrimvarError: The number fits no interpolation.
+            PrimvarError: The number of values or components matches no interpolation.
         """
         values, kind = primvar.values, primvar.interpolation
         if values.shape[1] < width:
@@ -224,7 +225,7 @@ class Strands:
         )
 
     def _bezier(self, values: NDArray[Any]) -> list[NDArray[np.float64]]:
-        """Returns the Bezier (or line) points of each segment as 4 (or 2) arrays (count, c)."""
+        """Returns the control points of each segment as 4 arrays (count, c); 2 arrays if linear."""
         curve, at = runs(self.segments)
         start, size = self.starts[curve], self.counts[curve]
         step = 3 if self.basis == "bezier" else 1
@@ -254,9 +255,9 @@ class Strands:
         ]
 
     def _pack(self, points: list[NDArray[np.float64]]) -> Array:
-        """Stores control points of segments as runs that adjacent segments share.
+        """Stores the control points of each curve in sequence; adjacent segments share end points.
 
-        Closed curves have one additional control point at each end.
+        Closed curves get one additional control point at each end.
         """
         step, lead = self._step, self._lead
         sizes = self._run_sizes
@@ -314,7 +315,7 @@ def lay_out(counts: Index, basis: str, wrap: str) -> Strands:
 
 
 def lay_out_points(count: int) -> Strands:
-    """Returns a layout that treats each point as a curve with one segment, for primvars."""
+    """Returns a layout in which each point is a curve of one segment, for primvars of points."""
     every = np.arange(count)
     one = np.ones(count, np.intp)
     sizes = {"constant": 1, "varying": count, "vertex": count}
@@ -322,20 +323,20 @@ def lay_out_points(count: int) -> Strands:
 
 
 MIN_SHARE = 1.0 / 256.0
-"""Smallest fraction of strands that is kept, however thin they are."""
+"""Smallest fraction of strands that is kept."""
 
 
 class StrandDetail:
-    """Simplification of thin strands for one view.
+    """Stochastic simplification of thin strands for one camera view.
 
     Strands narrower than ``pixels`` are kept with probability width / ``pixels`` and widened by the
-    inverse of the probability, which preserves coverage (stochastic simplification, Cook, Halstead,
-    Planck and Ryu 2007). The choice depends on the strand's index in the prim, so that with
-    distance the kept strands form a shrinking subset.
+    inverse of this probability, which preserves coverage (Cook, Halstead, Planck and Ryu 2007). The
+    choice depends on the strand's index in the prim, so that a larger distance only removes further
+    strands.
     """
 
     def __init__(self, view: ViewSize, pixels: float, report: LoadReport) -> None:
-        """``pixels`` is the width in pixels up to which strands are widened."""
+        """``pixels`` is the width in pixels below which strands are removed or widened."""
         self.view = view
         self.target = pixels
         self.report = report
@@ -348,7 +349,7 @@ class StrandDetail:
         widths: NDArray[Any],
         matrix: Gf.Matrix4d,
     ) -> tuple[Strands, NDArray[np.float64]]:
-        """Returns the kept strands and the factor by which each one is widened.
+        """Returns the strands that are kept, and the factor by which each of them is widened.
 
         Args:
             path: Path of the prim.
@@ -374,7 +375,7 @@ class StrandDetail:
         widths: NDArray[Any],
         matrix: Gf.Matrix4d,
     ) -> NDArray[np.float64]:
-        """Returns the widths of strands in pixels where they are closest to the camera."""
+        """Returns the width of each strand in pixels at its point closest to the camera."""
         to_world = np.array(matrix)
         size = np.cbrt(abs(np.linalg.det(to_world[:3, :3])))
         nearest = strands.over_each(np.minimum, self.view.distances(points, to_world))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Subdivides and displaces meshes once their size in the image is known."""
+"""Subdivides and displaces meshes after the camera, and so their size in the image, is known."""
 
 from __future__ import annotations
 
@@ -31,28 +31,28 @@ if TYPE_CHECKING:
     from wavecomb.usd.stage.frame_cache import RefinedCache
 
 TARGET_PIXELS = 2.0
-"""Target of the longest edge of refined faces, in pixels; edges are longer than half of it."""
+"""Largest edge length of refined faces in pixels that automatic levels aim at."""
 
 AUTO_LEVEL = 8
-"""Highest level that is chosen automatically; a requested level may be up to ``MAX_LEVEL``."""
+"""Highest level that is chosen automatically; users may request up to ``MAX_LEVEL``."""
 
 MAX_LEVEL = 10
 
 AUTO_TRIANGLES = 16_000_000
-"""Maximum number of triangles that all subdivided meshes together may have at automatic levels."""
+"""Maximum number of triangles of all subdivided meshes together at automatic levels."""
 
 BYTES_PER_TRIANGLE = 210
-"""Peak memory per refined triangle during refinement (measured); the scene keeps less."""
+"""Measured peak memory per triangle during subdivision, in bytes; less is kept in the scene."""
 
 _COARSE_FACES = 4096
-"""Faces of a cage above which framing uses the cage itself as the limit surface."""
+"""Number of cage faces above which camera framing uses the cage instead of the limit surface."""
 
 _BATCH_TRIANGLES = 4_000_000
-"""Triangles that are refined together, which bounds the memory of refinement."""
+"""Number of triangles that are refined together, which bounds the memory used."""
 
 
 def parse_level(text: str | int) -> str | int:
-    """Parses ``off``, ``auto`` or a level from 0 to ``MAX_LEVEL``.
+    """Parses "off", "auto" or a subdivision level from 0 to ``MAX_LEVEL``.
 
     Raises:
         WavecombError: The text is not a valid subdivision setting.
@@ -72,16 +72,16 @@ def parse_level(text: str | int) -> str | int:
 
 @dataclass
 class SubdivisionSurface:
-    """A mesh to be refined.
+    """A mesh to be subdivided or displaced.
 
     Attributes:
-        number: Id of the polygon mesh that represents this mesh in the scene before refinement.
-        draw: Prim of the mesh with its bindings.
-        cage: Polygons of the mesh.
-        bounds: (2, 3) bounds of the mesh in the space of its group.
-        materials: Material ids and the primvars that the materials read.
+        number: Id of the mesh's polygons in the scene, which subdivision replaces.
+        draw: Prim of the mesh with its material bindings.
+        cage: Control cage of the mesh.
+        bounds: (2, 3) bounds of the mesh in the space of its group (the world or a prototype).
+        materials: Material ids of the mesh and the primvars that these materials read.
         group: Group that contains the mesh.
-        moves: Displacements of the mesh: lengths or texture uses.
+        moves: Displacements of the mesh, each a length or a texture use.
         face_moves: (faces,) index into ``moves`` of each face; -1 means no displacement.
         level: Subdivision level of the mesh.
     """
@@ -98,12 +98,12 @@ class SubdivisionSurface:
 
     @property
     def is_plain(self) -> bool:
-        """Whether the refined mesh depends only on cage and level, not on materials."""
+        """Whether the subdivided mesh depends only on cage and level, not on its materials."""
         return not self.moves and not self.materials.reads
 
     @property
     def lowest(self) -> int:
-        """Lowest useful level; displaced subdivision surfaces need at least one."""
+        """Lowest useful level; displaced subdivision surfaces need at least level 1."""
         return 1 if self.moves and self.cage.scheme != "none" else 0
 
 
@@ -140,7 +140,7 @@ class SubdivisionSurfaces:
         mesh: MeshArrays,
         materials: BoundMaterials,
     ) -> None:
-        """Records a mesh that was added as polygons."""
+        """Registers a mesh that is in the scene as polygons for subdivision or displacement."""
         cage = mesh.cage
         if cage is None:
             return
@@ -153,9 +153,10 @@ class SubdivisionSurfaces:
             self.report.tally("subdivision meshes")
 
     def limit_points(self, cage: Cage) -> NDArray[np.float32] | None:
-        """Returns points near the limit surface of a cage that will be subdivided, or None.
+        """Returns points near the limit surface of a cage.
 
-        Returns None for a fine cage as well, since its own points are close to the limit surface.
+        Returns None if the cage will not be subdivided, or if it is so fine that its own points are
+        close to the limit surface.
         """
         if cage.scheme == "none" or not self.subdivide or self.choice == 0:
             return None
@@ -196,7 +197,7 @@ class SubdivisionSurfaces:
             surface.moves, surface.face_moves = moves, which
 
     def finish(self, world: Group, view: View) -> None:
-        """Chooses subdivision levels for a view and replaces polygons by refined meshes.
+        """Chooses subdivision levels for a view and replaces polygons by subdivided meshes.
 
         Raises:
             WavecombError: The requested level needs more memory than the machine has.
@@ -217,7 +218,7 @@ class SubdivisionSurfaces:
             self.report.note(f"subdivision meshes refined: {text}")
 
     def _next_batch(self, waiting: deque[SubdivisionSurface]) -> list[SubdivisionSurface]:
-        """Removes the next batch of meshes to refine together."""
+        """Removes the next meshes from the queue that are refined together."""
         batch: list[SubdivisionSurface] = []
         triangles = 0
         while waiting and triangles < _BATCH_TRIANGLES:
@@ -229,9 +230,10 @@ class SubdivisionSurfaces:
     def has_same_levels(
         self, world: Group, view: View, size: tuple[int, int] | None = None
     ) -> bool:
-        """Returns whether another view needs the levels that ``finish`` chose; requires a cache.
+        """Returns whether another view needs the same levels as the view given to ``finish``.
 
-        ``size`` is the size of the other image; None means that it is unchanged.
+        This function requires ``cache``. ``size`` is the image size of the other view; None means
+        that the size is unchanged.
         """
         size_before, self.size = self.size, self.size if size is None else size
         before = [surface.level for surface in self._all]
@@ -272,7 +274,7 @@ class SubdivisionSurfaces:
         self._keep_in_memory(chosen)
 
     def _keep_in_memory(self, chosen: list[SubdivisionSurface]) -> None:
-        """Lowers the levels of the largest meshes until all fit in ``AUTO_TRIANGLES``."""
+        """Lowers levels of the largest meshes until there are at most ``AUTO_TRIANGLES``."""
         counts = [s.cage.triangles_at(s.level) for s in chosen]
         total = sum(counts)
         heap = [(-count, i) for i, count in enumerate(counts) if chosen[i].level > chosen[i].lowest]
@@ -292,7 +294,7 @@ class SubdivisionSurfaces:
             self.report.note(what, chosen[i].draw.prim.GetPath())
 
     def _refine(self, batch: list[SubdivisionSurface]) -> None:
-        """Refines meshes in parallel and replaces the polygons that represent them."""
+        """Refines meshes in parallel and replaces their polygons in the scene."""
         fresh = []
         for surface in batch:
             known = self._cached(surface)
@@ -316,7 +318,7 @@ class SubdivisionSurfaces:
             self._take(surface, refined)
 
     def _cached(self, surface: SubdivisionSurface) -> dict[str, Any] | None:
-        """Returns the previous frame's refined mesh if it is still valid."""
+        """Returns the refined mesh of the previous frame if mesh and level have not changed."""
         if self.cache is None or not surface.is_plain:
             return None
         return self.cache.get(surface.cage, surface.level)
@@ -328,7 +330,7 @@ class SubdivisionSurfaces:
         self._replace(surface, refined)
 
     def _describe(self, surface: SubdivisionSurface) -> dict[str, Any]:
-        """Returns the description that ``SceneBuilder.make_surfaces`` takes."""
+        """Returns the description of a mesh for ``SceneBuilder.make_surfaces``."""
         cage = surface.cage
         out: dict[str, Any] = {
             "level": surface.level,
@@ -349,7 +351,7 @@ class SubdivisionSurfaces:
         return out
 
     def _polygons(self, cage: Cage) -> dict[str, Any]:
-        """Describes polygons that are displaced without subdivision."""
+        """Returns the description of polygons that are displaced without subdivision."""
         topology = cage.topology
         out: dict[str, Any] = {
             # The triangles of the mesh already have the winding of right-handed meshes.
@@ -387,7 +389,7 @@ class SubdivisionSurfaces:
 
 
 def _joined(steps: list[Any]) -> Any:
-    """Combines the refined meshes of all shutter steps; returns the first error, if any."""
+    """Combines the refined meshes of all shutter steps; returns an error message if one failed."""
     first = next((step for step in steps if isinstance(step, str)), steps[0])
     if len(steps) == 1 or isinstance(first, str):
         return first

@@ -15,33 +15,35 @@ _CHUNK = 1 << 17
 """Number of polygons that are split together, which bounds the memory used."""
 
 _EAR_STEPS = 1 << 26
-"""Limit of ear clipping steps for one polygon, about one second of work.
+"""Maximum number of ear clipping steps for one polygon, about one second of work.
 
-The worst known polygon of 100,000 corners takes two thirds of the limit.
+The slowest known polygon with 100,000 corners takes two thirds of these steps.
 """
 
 
 class MeshError(ValueError):
-    """A mesh is invalid; the message gives the reason in a few words."""
+    """Raised if a mesh is invalid; the message gives the reason."""
 
 
 # The dataclass is not frozen, since creating an object of a frozen dataclass takes three times as
 # long.
 @dataclass(slots=True, eq=False)
 class Topology:
-    """Triangles with their source corners and faces.
+    """Triangulation of a mesh, with the corners and faces that the triangles come from.
 
     Contract: the topology is not modified after creation.
 
     Attributes:
         triangles: (m, 3) point indices, uint32.
-        corners: (m, 3) positions in faceVertexIndices; None if triangle i has 3i, 3i+1, 3i+2.
-        faces: (m,) face of each triangle; None if every face has ``per_face`` triangles.
+        corners: (m, 3) positions in faceVertexIndices; None if triangle i has the positions 3i,
+            3i+1 and 3i+2.
+        faces: (m,) index of the face of each triangle; None if every face has ``per_face``
+            triangles.
         indices: (corner_count,) faceVertexIndices.
         point_count: Number of points.
         face_count: Number of faces of the mesh, including holes.
         per_face: Number of triangles of each face if ``faces`` is None.
-        hurried: Number of faces that cross themselves so often that their split is only
+        hurried: Number of faces that cross themselves so often that their triangulation is
             approximate.
     """
 
@@ -60,7 +62,7 @@ class Topology:
         return len(self.triangles)
 
     def corner_ids(self) -> NDArray[np.intp]:
-        """Returns (m, 3) positions in faceVertexIndices."""
+        """Returns the positions (m, 3) in faceVertexIndices of the triangles' corners."""
         if self.corners is None:
             return np.arange(3 * self.count).reshape(-1, 3)
         return self.corners
@@ -79,8 +81,8 @@ def triangulate(
 ) -> Topology:
     """Triangulates polygons.
 
-    Splits quads along the better diagonal, convex polygons as fans, and other polygons by clipping
-    ears.
+    Quads are split along the better diagonal, convex polygons into fans, and other polygons by ear
+    clipping.
 
     Args:
         points: (n, 3).
@@ -138,9 +140,9 @@ def _split(
     indices: NDArray[np.int32],
     faces: NDArray[np.intp],
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], int]:
-    """Returns corners (m, 3) and faces (m,) of the triangles of some faces, in face order.
+    """Returns the corners (m, 3) and faces (m,) of the triangles of given faces, in face order.
 
-    The third result is the number of faces whose split is only approximate.
+    The third result is the number of faces whose triangulation is approximate.
     """
     starts = np.cumsum(counts, dtype=np.intp) - counts
     sizes = counts[faces]
@@ -167,7 +169,7 @@ def _split(
 def _quads(
     points: NDArray[np.float32], indices: NDArray[np.int32], flip: bool
 ) -> tuple[NDArray[np.intp], NDArray[np.uint32]]:
-    """Returns corners and points (m, 3) of the triangles of a mesh that has only quads."""
+    """Returns the corners (m, 3) and point indices (m, 3) of the triangles of a mesh of quads."""
     corners = _core.split_quads(points, indices)
     if flip:
         corners = np.ascontiguousarray(corners[:, ::-1])
@@ -177,9 +179,9 @@ def _quads(
 def _split_rings(
     points: NDArray[np.float32], indices: NDArray[np.int32], ring: NDArray[np.intp]
 ) -> tuple[NDArray[np.intp], int]:
-    """Splits polygons of k corners, ring (faces, k), into triangles (faces, k - 2, 3).
+    """Splits polygons with k corners each, (faces, k), into triangles (faces, k - 2, 3).
 
-    The second result is the number of polygons whose split is only approximate.
+    The second result is the number of polygons whose triangulation is approximate.
     """
     size = ring.shape[1]
     if size == 3:
@@ -207,7 +209,7 @@ def _split_rings(
 
 
 def cross(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
-    """Returns the cross product along the last axis; np.cross is slow on small arrays."""
+    """Returns the cross product along the last axis, faster than np.cross for small arrays."""
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
     out = np.empty(a.shape, a.dtype)
@@ -222,8 +224,8 @@ def clip_ears(
 ) -> tuple[NDArray[np.intp], int]:
     """Splits one simple polygon (k, 3) into triangles (k - 2, 3) by clipping ears.
 
-    A polygon that crosses itself is split as well, into overlapping triangles. The second result is
-    the number of corners that were cut without a check after ``_EAR_STEPS`` steps.
+    A polygon that crosses itself is split into overlapping triangles. After ``_EAR_STEPS`` steps,
+    further corners are cut off without a check; the second result is their number.
     """
     drop = int(np.argmax(np.abs(normal)))
     axes = [(drop + 1) % 3, (drop + 2) % 3]
@@ -254,7 +256,7 @@ def smooth_normals(
     topology: Topology,
     creases: NDArray[np.int64] | None = None,
 ) -> NDArray[np.float32]:
-    """Computes area-weighted normals: (n, 3) per point, or (m, 3, 3) per corner with hard edges.
+    """Computes area-weighted normals, (n, 3) per point or, with hard edges, (m, 3, 3) per corner.
 
     Args:
         points: (n, 3).
@@ -285,7 +287,7 @@ def smooth_normals(
 def _smoothing_groups(
     triangles: NDArray[np.int64], creases: NDArray[np.int64], point_count: int
 ) -> NDArray[np.int64]:
-    """Returns corner labels (3 m,), equal for corners of a point that meet across smooth edges."""
+    """Returns corner labels (3 m,); corners of a point with equal labels share a normal."""
     # Each half-edge has a corner at the end with the lower point index and a corner at the end with
     # the higher point index.
     corner = np.arange(triangles.size).reshape(-1, 3)

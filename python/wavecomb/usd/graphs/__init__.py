@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Value graphs: typed expressions that are folded, shared and compiled to flat programs.
+"""Value graphs: typed shading expressions that are compiled to programs of the core.
 
-``values`` defines values and compiles them, ``surface_parameters`` maps them to surface parameters,
-and ``binding`` specialises them for one mesh.
+The module ``values`` defines and compiles values, ``surface_parameters`` assigns them to parameters
+of surfaces, and ``binding`` adapts them to a mesh.
 """

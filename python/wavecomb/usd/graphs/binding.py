@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Specialises value graphs for one mesh: inserts the mesh's primvars and transform."""
+"""Specialises value graphs for one mesh by inserting the mesh's primvars and transform."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _LOCAL, _AXES = OF_SPACE[:2], OF_SPACE[2:]
 
 _CONSTANTS = {*TEXTURED_PARAMETERS, "ior"} - {"normal"}
-"""Parameters, besides those of OpenPBR layers, that may become constants."""
+"""Parameters of surfaces, besides those of OpenPBR layers, that may become constants."""
 
 
 def bound(
@@ -45,9 +45,10 @@ def bound(
 
     Args:
         surface: A surface whose graph reads object space or primvars.
-        matrix: (4, 4) transform from the mesh to its group, for row vectors.
-        primvars: Values of constant primvars.
-        attributes: Number of components of varying primvars.
+        matrix: (4, 4) transform from the mesh to its group (the world or a prototype), for row
+            vectors.
+        primvars: Values of the mesh's constant primvars, by name.
+        attributes: Numbers of components of the mesh's varying primvars, by name.
     """
     graph = surface.graph
     if graph is None:
@@ -90,12 +91,13 @@ def bound(
 
 
 def with_uv_sets(surface: Surface, sets: Mapping[str, str], own: str) -> Surface:
-    """Returns the surface for a mesh whose default texture coordinates the surface does not read.
+    """Returns a surface that reads UV primvars instead of the mesh's default texture coordinates.
 
     Args:
-        surface: Result of ``bound`` if its graph reads primvars.
-        sets: UV primvar of each textured parameter.
-        own: UV primvar of the surface's graph; "" means the mesh's texture coordinates.
+        surface: The surface; if its graph reads primvars, a result of ``bound``.
+        sets: UV primvar of each textured parameter, by parameter.
+        own: UV primvar of the surface's graph; an empty string means the mesh's default texture
+            coordinates.
     """
     make = Expressions()
     mesh = make.input("uv")
@@ -118,7 +120,7 @@ def with_uv_sets(surface: Surface, sets: Mapping[str, str], own: str) -> Surface
 
 
 def _texel(make: Expressions, use: Mapping[str, Any], uv: Value, width: int) -> Value:
-    """Returns the value that a texture has for a parameter at other texture coordinates."""
+    """Returns the value that a texture use has at the texture coordinates ``uv``."""
     m = use["uv"]
     at = tuple(
         make.op("add", make.op("dot", uv, numbers(*row[:2])), numbers(row[2]))[0]
@@ -135,7 +137,7 @@ def _texel(make: Expressions, use: Mapping[str, Any], uv: Value, width: int) -> 
 
 
 def _in_object_space(make: Expressions, matrix: NDArray[np.float64]) -> dict[str, Value]:
-    """Expresses object-space position, normal and normal axes by the values in group space."""
+    """Expresses object-space inputs by the inputs in the space of the mesh's group."""
     inverse = np.linalg.pinv(matrix)
 
     def mapped(vector: Value, rows: NDArray[Any]) -> Value:

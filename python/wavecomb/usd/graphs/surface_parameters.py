@@ -37,11 +37,11 @@ from wavecomb.usd.materials.texture import TextureTable
 from wavecomb.usd.stage.report import LoadReport
 
 BASE, COLOUR, NUMBER, NORMAL = "base", "colour", "number", "normal"
-"""Ways to use a value: base colour, another colour, a number, or a tangent-space normal."""
+"""Uses of a value, as base colour, another colour, a number or a tangent-space normal."""
 COLOURS = (BASE, COLOUR)
 
 _SAMPLES = 8
-"""Sample points per axis of the texture at which a graph is evaluated for estimates."""
+"""Number of sample points along u and v at which graphs are evaluated for estimates."""
 
 
 class Networks(Protocol):
@@ -55,23 +55,24 @@ class Networks(Protocol):
     uv_names: list[str]
 
     def input(self, shader: UsdShade.Shader, name: str, kind: str) -> Value | None:
-        """Returns the value of an input; None if nothing valid is connected or authored."""
+        """Returns the value of an input; None if the input has no valid connection or value."""
 
     def node(self, shader: UsdShade.Shader, output: str, kind: str) -> Value | None:
         """Returns the value of a node's output."""
 
     def in_working_space(self) -> Networks:
-        """Returns a copy with constants in the working space; the copy reports nothing."""
+        """Returns a copy with constants in the working space, which reports no problems."""
 
 
 Replaced = Callable[[Node, tuple[Value, ...]], Value | None]
-"""Callback replaced(node, rebuilt operands); returns a new value, or None to keep the node."""
+"""Callback that gets a node and its rebuilt operands, and returns a new value or None to keep the
+node."""
 
 
 def substituted(make: Expressions, value: Value, replaced: Replaced) -> Value:
     """Rebuilds a value with some nodes replaced.
 
-    Primvar placeholders are always replaced by their default.
+    Placeholders of primvars are replaced by their default, unless the callback replaces them.
     """
     done: dict[Node, Value] = {}
 
@@ -121,7 +122,7 @@ def _is_uv(node: Node) -> bool:
 
 
 def sampled(value: Value) -> Any:
-    """Evaluates a value at sample points (n, components), with textures taken as white."""
+    """Evaluates a value at sample points, (n, components); textures count as white."""
     points = np.zeros((_SAMPLES * _SAMPLES, POINT_SIZE), np.float32)
     steps = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
     points[:, 0], points[:, 1] = (axis.ravel() for axis in np.meshgrid(steps, steps))
@@ -132,7 +133,7 @@ def sampled(value: Value) -> Any:
 
 
 def plain_use(value: Value, wide: bool) -> dict[str, Any] | None:
-    """Returns an equivalent texture use (texel * scale + bias, affine coordinates), or None."""
+    """Returns the texture use that equals a value (texel * scale + bias, affine UVs), or None."""
     found = [linear(part, lambda node: node.code == "image") for part in value]
     if any(one is None or len(one[0]) != 1 for one in found):
         return None
@@ -181,14 +182,14 @@ class Drivers:
         return tuple(dict.fromkeys(self.networks.uv_names))
 
     def value(self, shader: UsdShade.Shader, name: str, parameter: str) -> Value | None:
-        """Returns the value of an input that drives a parameter; None if there is none.
+        """Returns the value of an input that drives a parameter; None if the input is not set.
 
-        Constants have their authored values; varying colours are in the working space.
+        Constant colours are in linear Rec.709; varying colours are in the working space.
         """
         return self._read(parameter, lambda networks, kind: networks.input(shader, name, kind))
 
     def output(self, shader: UsdShade.Shader, output: str, parameter: str) -> Value | None:
-        """Returns the value of a node's output; the rules of ``value`` apply."""
+        """Returns the value of a node's output, in the same colour spaces as ``value``."""
         return self._read(parameter, lambda networks, kind: networks.node(shader, output, kind))
 
     def _read(self, parameter: str, read: Callable[[Networks, str], Value | None]) -> Value | None:
@@ -213,7 +214,7 @@ class Drivers:
         return self.networks.make.op("multiply", value, by)
 
     def put(self, parameter: str, value: Value) -> tuple[float, ...] | None:
-        """Assigns a value to a parameter; returns the value if it is constant."""
+        """Stores a parameter's value as texture or graph; returns a constant value instead."""
         width = PARAMETERS[parameter][1]
         value = fit(value, width)
         if is_constant(value):
@@ -226,7 +227,7 @@ class Drivers:
         return None
 
     def surface(self, program: str, parameters: dict[str, Any]) -> Surface:
-        """Returns the surface of the material with the given constants."""
+        """Returns the surface with these constants and the stored textures and graph."""
         return Surface(
             str(self.networks.material.GetPath()),
             program,
@@ -237,10 +238,10 @@ class Drivers:
         )
 
     def graph(self) -> SurfaceGraph | None:
-        """Returns the graph of parameters without constants or textures; None if there are none.
+        """Returns the graph of all parameters that neither constants nor plain textures drive.
 
-        If the graph is too large, reports this and leaves out parameters, starting with the last
-        one.
+        Returns None if there are no such parameters. If the graph is too large, the last parameters
+        are left out with a message.
         """
         left = dict(self._outputs)
         while left:
@@ -254,7 +255,7 @@ class Drivers:
 
 
 def graphs_of(outputs: Mapping[str, Value], primvars: tuple[str, ...]) -> SurfaceGraph | None:
-    """Compiles graphs of parameters, with primvars at their defaults; None if there are none.
+    """Compiles the graphs of parameters with primvars at their defaults; None without parameters.
 
     Raises:
         GraphTooLarge: The graph exceeds the size limit.
@@ -301,7 +302,7 @@ Linear = tuple[dict[tuple[Node, int], float], float]
 
 
 def linear(part: Part, is_leaf: Callable[[Node], bool]) -> Linear | None:
-    """Returns a component as a linear combination of leaf components plus a constant.
+    """Returns a component as a linear combination of components of other nodes plus a constant.
 
     Returns None if the component is not linear.
     """

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Creates values of shader graphs, folds constants, and compiles values to programs of the core.
 
-A value is a tuple of parts, one per component. A part is a number or a component of a node, so that
-swizzles, extractions and combinations need no operation.
+A value is a tuple of parts, one per component. Each part is a number or a component of a node.
+Swizzling, extracting and combining components therefore needs no operation.
 """
 
 from __future__ import annotations
@@ -18,21 +18,22 @@ from wavecomb import _core
 CODES = {name: number for number, name in enumerate(_core.GRAPH_CODES)}
 INPUTS = {name: number for number, name in enumerate(_core.GRAPH_INPUTS)}
 PARAMETERS: dict[str, tuple[int, int]] = dict(_core.GRAPH_PARAMETERS)
-"""Graph input -> (index of its first component, number of components)."""
+"""Index of the first component and number of components of each surface parameter."""
 
 POINT_SIZE = 3 * len(INPUTS) - 3
-"""Floats per evaluation point: uv and its filter width, then three each for position, local
-position, normal, local normal, tangent, view direction and the three normal axes."""
+"""Number of floats that describe an evaluation point: uv and its filter width, then three each for
+position, local position, normal, local normal, tangent, view direction and the three normal
+axes."""
 
 OF_SPACE = ("local_position", "local_normal", "normal_x", "normal_y", "normal_z")
-"""Inputs that depend on object space."""
+"""Graph inputs whose values are in object space."""
 
 PRIMVAR = "primvar"
-"""Code of a placeholder node for a primvar of the mesh."""
+"""Code of a node that stands for a primvar until the graph is bound to a mesh."""
 
 
 class GraphTooLarge(Exception):
-    """Raised if a graph needs more registers or operations than available."""
+    """Raised if a graph needs more registers or operations than the core has."""
 
 
 @dataclass(eq=False, slots=True)
@@ -48,7 +49,7 @@ class Node:
 
     @property
     def name(self) -> str:
-        """Name of the graph input; "" for other operations."""
+        """Name of the graph input that the node reads; empty for other operations."""
         return str(_core.GRAPH_INPUTS[self.number]) if self.code == "input" else ""
 
     @property
@@ -73,12 +74,12 @@ def is_constant(value: Value) -> bool:
 
 
 def numbers(*values: float) -> Value:
-    """Creates a constant in float32; values that are not finite become 0."""
+    """Creates a constant rounded to float32; values that are not finite become 0."""
     return tuple(float(np.float32(v)) if np.isfinite(v) else 0.0 for v in values)
 
 
 def fit(value: Value, width: int) -> Value:
-    """Changes the number of components: repeats a number, cuts or extends a vector."""
+    """Changes the number of components by repeating a number, or cutting or extending a vector."""
     if len(value) == width:
         return value
     if len(value) == 1:
@@ -118,9 +119,9 @@ _OP = np.dtype(
 
 @dataclass(frozen=True)
 class Graph:
-    """A compiled program in the form that ``SceneBuilder.add_graph`` takes.
+    """A compiled program for ``SceneBuilder.add_graph``.
 
-    ``attributes`` are names of primvars that the program reads, with numbers of components.
+    ``attributes`` has the name and the number of components of each primvar that the program reads.
     """
 
     ops: bytes
@@ -142,7 +143,7 @@ class Graph:
     def run(self, points: Any, lanes: int = 1) -> Any:
         """Evaluates the program at points (n, ``POINT_SIZE``) without a mesh.
 
-        Textures are taken as white.
+        Textures count as white.
         """
         array = np.ascontiguousarray(points, np.float32)
         return _core.run_graph(
@@ -151,7 +152,7 @@ class Graph:
 
 
 def assemble(outputs: dict[int, Part]) -> Graph:
-    """Compiles parts to a program; ``outputs`` maps component numbers to parts.
+    """Compiles parts to a program; ``outputs`` has the part of each component of a parameter.
 
     Raises:
         GraphTooLarge: The program needs more registers or operations than available.
@@ -160,7 +161,7 @@ def assemble(outputs: dict[int, Part]) -> Graph:
 
 
 class _Assembler:
-    """Compiler state: the registers of nodes, and the operations written so far."""
+    """State of the compiler: registers assigned to nodes, and operations written so far."""
 
     def __init__(self, outputs: dict[int, Part]) -> None:
         self._outputs = outputs
@@ -297,7 +298,7 @@ class Expressions:
         return self._all(self._node("image", 4, (uv,), 0, (texture, stretch)))
 
     def primvar(self, number: int, otherwise: Value) -> Value:
-        """Returns a placeholder for a primvar, replaced per mesh; ``otherwise`` is its default."""
+        """Returns a placeholder for a primvar of each mesh; ``otherwise`` is the default."""
         return self._all(self._node(PRIMVAR, len(otherwise), (otherwise,), number))
 
     def with_operands(self, node: Node, operands: tuple[Value, ...]) -> Value:
@@ -311,9 +312,9 @@ class Expressions:
         return self.op(node.code, *operands, number=node.number, width=node.width)
 
     def attribute(self, name: str, width: int, fallback: Value) -> Value:
-        """Returns a primvar that is read at hits.
+        """Returns the value of a primvar that varies over the mesh.
 
-        The value is ``fallback`` on meshes whose primvar is missing or has fewer components.
+        On meshes without this primvar, or with too few components, the value is ``fallback``.
         """
         return self._all(self._node("attribute", width, (fit(fallback, width),), 0, None, name))
 
@@ -334,7 +335,7 @@ class Expressions:
         return self.op("divide", a, b)
 
     def op(self, code: str, *given: Operand, number: int = 0, width: int = 0) -> Value:
-        """Returns an operation on values: per component, or on whole vectors for some codes.
+        """Applies an operation to values per component, or for some codes to whole vectors.
 
         ``width`` is the number of result components if the operands do not determine it.
         """

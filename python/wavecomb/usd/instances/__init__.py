@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Builds groups of the scene and instances them."""
+"""Builds groups of objects (the world and the prototypes) and instances them."""

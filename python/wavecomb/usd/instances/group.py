@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Groups of the scene during construction, material bindings of their instances, and emitters."""
+"""Groups of objects (the world and the prototypes) and the emitters in them."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ MAX_STEPS = 64
 """Maximum number of motion steps of an animated transform nested in another animated transform."""
 
 _MANY_BOXES = 1024
-"""Number of bounding boxes of a group above which they are merged."""
+"""Number of bounding boxes of a group above which the boxes are merged."""
 
 _MAX_SHOWN = 2048
-"""Number of bounding boxes of a group that are never merged."""
+"""Number of bounding boxes of a group that are kept without merging."""
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,11 @@ class AnimatedTransform:
 
 @dataclass(frozen=True)
 class Emitter:
-    """An emissive mesh in the space of its group.
+    """An emissive mesh in the space of its group (the world or a prototype).
 
     Attributes:
         centre: (3,) centre of the mesh's bounds.
-        areas: Total area of faces by material id.
+        areas: Total area of the mesh's faces with each material, by material id.
     """
 
     centre: NDArray[np.float64]
@@ -80,7 +80,7 @@ class Group:
         number: Id of the group in the scene, assigned when the first object is added.
         boxes: Bounds (2, 3) of the group's contents in group space.
         outlines: Extreme points of the group's contents in group space; see ``framing``.
-        root: Prim path with which the names of the group's contents begin.
+        root: Prim path that is the common beginning of the names of the group's contents.
         lights: Lights with their transforms in group space.
         volumes: Volumes with their transforms (4, 4) in group space.
         children: Instanced groups that contain lights, volumes or emitters, with their transforms.
@@ -89,7 +89,7 @@ class Group:
             emitters.
         sampled_light: Path of a mesh light in the group that must not move.
         emitters: Emissive meshes in the group; only collected for stages without lights.
-        shown: The first bounding boxes, which are never merged.
+        shown: The first bounding boxes of the group, which are never merged.
     """
 
     name: str
@@ -114,7 +114,7 @@ class Group:
         return self.number is None
 
     def grow(self, bounds: NDArray[Any]) -> None:
-        """Extends the bounds of the group by a box (2, 3)."""
+        """Extends the bounds of the group to contain a box (2, 3)."""
         self.boxes.append(bounds)
         if len(self.shown) < _MAX_SHOWN:
             self.shown.append(bounds)
@@ -153,12 +153,14 @@ class Scope:
     """State that a group inherits from its instances.
 
     Attributes:
-        inside: Whether the group is instanced, so that meshes may take their instance's material.
-        bound: Whether the instance has a bound material, which precedes display colours.
-        override: Whether a binding of an ancestor is stronger than all bindings in the group.
-        alias: (prototype, instance) paths if bindings are resolved on the instance's proxies.
+        inside: Whether the group is instanced, so that its meshes may use the material of their
+            instance.
+        bound: Whether a material is bound to the instance; this material overrides display colours.
+        override: Whether a material binding of an ancestor is stronger than the bindings in the
+            group.
+        alias: Paths of prototype and instance if bindings are resolved on the instance's proxies.
         root: Path of the native prototype that the group comes from.
-        material: Material for prims without a binding, if it reads primvars of these prims.
+        material: Material for prims without a binding, if it reads their primvars.
         inherited: Constant primvars of the instances.
     """
 
@@ -172,7 +174,7 @@ class Scope:
 
 
 def middle_transforms(motion: Matrices) -> Matrices:
-    """Returns (k, 4, 4) transforms at the middle of steps (k, s, 4, 4)."""
+    """Returns the transforms (k, 4, 4) at mid-shutter from those at steps (k, s, 4, 4)."""
     last = motion.shape[1] - 1
     middle: Matrices = 0.5 * (motion[:, last // 2] + motion[:, (last + 1) // 2])
     return middle
@@ -228,11 +230,11 @@ MIN_IRRADIANCE = 0.02
 """Irradiance from which an object counts as lit: a hundredth of the default dome's irradiance."""
 
 MAX_SAMPLED_EMITTERS = 2048
-"""Maximum number of objects, and of emitters, that are considered."""
+"""Maximum number of objects, and of emitters, for which irradiance is estimated."""
 
 
 def emitter_of(shape: MeshArrays, material: int, faces: NDArray[np.uint32] | None) -> Emitter:
-    """Returns the emitter of a mesh.
+    """Returns the emitter that describes a mesh.
 
     ``faces`` holds the material of each triangle if the materials differ.
     """
@@ -247,12 +249,12 @@ def emitter_of(shape: MeshArrays, material: int, faces: NDArray[np.uint32] | Non
 
 
 def is_lit_by_emitters(world: Group, materials: MaterialTable) -> bool:
-    """Returns whether the emitters light at least half of the objects with ``MIN_IRRADIANCE``.
+    """Returns whether the emitters illuminate at least half of the objects.
 
-    Treats an emitter as a point light at its centre, at the distance of the object's centre but no
-    closer than the object's radius. The estimate ignores shadows and indirect light. The result
-    does not depend on the camera or on the frame's samples, so that all frames of a shot and all
-    tasks of a farm agree.
+    An object counts as illuminated if its irradiance is at least ``MIN_IRRADIANCE``. Emitters are
+    treated as point lights at their centres, no closer to an object than the object's radius. The
+    estimate ignores shadows and indirect light. The result does not depend on the camera or on
+    random samples, so that all frames of a shot and all tasks of a render farm agree.
     """
     boxes = np.array(world.shown[:MAX_SAMPLED_EMITTERS], np.float64)
     powers, centres = _emitter_powers(world, materials)
@@ -284,11 +286,11 @@ def _emitter_powers(
 
 
 _MAX_PLACED = 1 << 20
-"""Maximum number of transforms of a group that are considered."""
+"""Maximum number of transforms of a group that are taken into account."""
 
 
 def placements(world: Group) -> dict[int, Matrices]:
-    """Returns world transforms of groups with meshes to refine: id of a group -> (k, 4, 4).
+    """Returns world transforms (k, 4, 4) by id of each group that has meshes to refine.
 
     Limits each group to ``_MAX_PLACED`` transforms, since nested instancing can multiply them.
     """
@@ -307,7 +309,7 @@ def placements(world: Group) -> dict[int, Matrices]:
 
 
 def _append_in_order(group: Group, met: set[int], order: list[Group]) -> None:
-    """Appends groups in topological order, each one before the groups that instance it."""
+    """Appends groups so that each group precedes the groups that instance it."""
     met.add(id(group))
     for child, _ in group.surfaced:
         if id(child) not in met:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Builds groups of the scene from traversed prims, and instances groups in other groups."""
+"""Builds groups of objects (the world and the prototypes) from prims, and instances them."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ from wavecomb.usd.stage.frame_cache import MeshCache
 from wavecomb.usd.stage.traversal import STRANDS, CollectedPrims, InstancePrim, Traversal
 
 _ANY = Usd.PrimIsActive & Usd.PrimIsLoaded
-"""Predicate for prototypes of point instancers, which may be overs or classes."""
+"""Predicate for prims in prototypes of point instancers; the prims may be overs or classes."""
 
 MAX_NESTING = 100
 """Deepest nesting of instances; each level is a recursive call of ``GroupBuilder``."""
 
 
 class GroupBuilder:
-    """Builder of the scene's groups from prims."""
+    """Builder of all groups of a scene (the world and the prototypes) from prims."""
 
     def __init__(
         self,
@@ -59,12 +59,12 @@ class GroupBuilder:
         detail: StrandDetail | None = None,
         notes_emitters: bool = False,
     ) -> None:
-        """Creates a builder for one load.
+        """Creates a builder for loading one scene.
 
         ``cache`` stores mesh arrays between frames. ``progress`` is the progress callback.
-        ``detail`` simplifies curves that are in the world group. ``notes_emitters`` makes groups
-        collect their emissive meshes; ``has_other_emission`` then says whether there is emission
-        from curves, points or materials of instances, which are not collected.
+        ``detail`` simplifies curves that are in the world group. If ``notes_emitters`` is set,
+        groups collect their emissive meshes. ``has_other_emission`` then tells whether curves,
+        points or materials of instances emit light, which groups do not collect.
         """
         self.notes_emitters = notes_emitters
         self.has_other_emission = False
@@ -102,7 +102,7 @@ class GroupBuilder:
         predicate: Any = None,
         base: Gf.Matrix4d = IDENTITY,
     ) -> None:
-        """Reads prims with their descendants into a group; ``base`` transforms to group space."""
+        """Reads prims and their descendants into a group after the transform ``base``."""
         found = self.traversal.walk(roots, purpose, predicate, scope.inherited, base)
         group.lights += found.lights
         self.memory_check.check(found.draws)
@@ -241,8 +241,9 @@ class GroupBuilder:
     ) -> None:
         """Adds a gprim as a separate instance with the transform ``matrix``.
 
-        Used for rigid motion with transforms ``steps`` (s, 4, 4), for curves or points under
-        non-uniform scale, and for rotated splats, whose colours depend on direction.
+        This function is for gprims with rigid motion (``steps`` are transforms (s, 4, 4)), for
+        curves or points with non-uniform scale, and for rotated splats, whose colours depend on
+        direction.
         """
         path = draw.prim.GetPath()
         child = Group(str(path), self.report.place(path))
@@ -271,9 +272,9 @@ class GroupBuilder:
         purpose: str,
         predicate: Any = None,
     ) -> Group | None:
-        """Returns the group that contains the given prims; builds each group only once.
+        """Returns the group that contains the given prims; each group is built only once.
 
-        Warns and returns None if the group contains itself.
+        Returns None with a warning if the group would contain itself.
         """
         known = self._groups.get(key)
         if known is not None:
@@ -295,7 +296,7 @@ class GroupBuilder:
     def _place_instances(
         self, parent: Group, instances: Sequence[InstancePrim], scope: Scope
     ) -> None:
-        """Adds native instances, grouped by prototype."""
+        """Adds native instances; instances of a prototype are added together."""
         batches: dict[tuple[int, int], tuple[Group, list[tuple[Any, ...]]]] = {}
         for instance in instances:
             child = self._instance_group(instance, scope)
@@ -335,7 +336,7 @@ class GroupBuilder:
         return self._group(key, str(prim.GetPath()), path, roots, inner, instance.purpose)
 
     def _place_instancer(self, parent: Group, instance: InstancePrim, scope: Scope) -> None:
-        """Adds a point instancer, grouped by prototype."""
+        """Adds the instances of a point instancer; instances of a prototype are added together."""
         prim = instance.prim
         path = prim.GetPath()
         targets = UsdGeom.PointInstancer(prim).GetPrototypesRel().GetForwardedTargets()

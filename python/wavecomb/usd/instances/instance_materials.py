@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Materials and primvars that differ between instances of a prototype.
 
-Instances with equal materials and primvars share a prototype. If materials read primvars of the
-instances, or if a material bound to the instance reads primvars of the meshes inside, the prototype
-is read once per distinct set of values.
+Instances with equal materials and primvars share a prototype. A prototype is read once for each
+distinct set of primvar values if materials read primvars of the instances, or if a material bound
+to an instance reads primvars of the prototype's meshes.
 """
 
 from __future__ import annotations
@@ -26,13 +26,14 @@ from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.traversal import InstancePrim, inherit
 
 MAX_COLOURS = 256
-"""Maximum number of materials that a varying colour is quantised to."""
+"""Maximum number of materials to which a varying display colour is quantised."""
 
 
 def quantise(colours: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Quantises colours (m, 3) to a palette (k, 3), k <= ``MAX_COLOURS``, and indices (m,) into it.
+    """Quantises colours (m, 3) to at most ``MAX_COLOURS``, and returns palette and indices (m,).
 
-    Quantisation steps are even in the square root, which is close to perceptually uniform.
+    Quantisation steps are uniform in the square root of the colour, which is nearly perceptually
+    uniform.
     """
     colours = np.nan_to_num(np.asarray(colours, np.float64), nan=0.0, posinf=1.0, neginf=0.0)
     colours = np.maximum(colours, 0.0)
@@ -51,7 +52,7 @@ def quantise(colours: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.int
 
 
 class InstanceMaterials:
-    """The materials of native instances and of point instancers."""
+    """Materials of native instances and of point instancers' instances."""
 
     def __init__(self, context: LoadContext, materials: MaterialTable) -> None:
         self.time, self.report = context.time, context.report
@@ -61,7 +62,7 @@ class InstanceMaterials:
     def of_proxies(self, instance: Usd.Prim) -> tuple[str, ...]:
         """Returns material paths of all prims below an instance.
 
-        Instances of a prototype with equal material paths may share a group.
+        Instances of a prototype with equal material paths may share one group of objects.
         """
         prims = [
             prim
@@ -87,7 +88,7 @@ class InstanceMaterials:
         return INHERIT_MATERIAL if scope.inside else self.materials.plain()
 
     def of_instancer(self, instance: InstancePrim, count: int, scope: Scope) -> NDArray[np.uint32]:
-        """Returns material ids (count,) of a point instancer's instances from displayColor."""
+        """Returns a material id (count,) per point instance, from displayColor."""
         if scope.bound or scope.override:
             return np.full(count, INHERIT_MATERIAL, np.uint32)
         inherited = inherit(instance.prim, instance.inherited)
@@ -118,7 +119,7 @@ class InstanceMaterials:
 
 
 MAX_VARIATIONS = 256
-"""Maximum number of variants of a prototype; primvars of further instances are ignored."""
+"""Maximum number of variants of a prototype; primvars of additional instances are ignored."""
 
 _ARRAYS = {
     1: (Sdf.ValueTypeNames.FloatArray, Vt.FloatArray),
@@ -131,12 +132,14 @@ _OF_INSTANCES = ("vertex", "varying", "uniform")
 
 @dataclass(frozen=True)
 class InstanceBinding:
-    """Material and primvars that instances pass to their prototype.
+    """Material and primvars that an instance passes to its prototype.
 
     Attributes:
-        key: Key that is equal for equal appearance; None if the instance passes nothing.
+        key: Key that is equal for instances with equal appearance; None if an instance passes
+            nothing.
         inherited: Constant primvars of the instance.
-        material: Material for prims without a binding, which reads primvars of the meshes.
+        material: Material for prims without a binding, if it reads primvars of the prototype's
+            meshes.
     """
 
     key: Hashable = None
@@ -144,7 +147,7 @@ class InstanceBinding:
     material: UsdShade.Material | None = None
 
     def on(self, scope: Scope) -> Scope:
-        """Returns the scope of the prototype with the material and primvars of the instance."""
+        """Returns the scope with the material and the primvars of the instance."""
         if self.key is None:
             return scope
         return replace(scope, material=self.material or scope.material, inherited=self.inherited)
@@ -154,7 +157,7 @@ PLAIN = InstanceBinding()
 
 
 class InstanceBindings:
-    """The materials and primvars that instances pass to their prototypes."""
+    """Finds the materials and primvars that instances pass to their prototypes."""
 
     def __init__(self, context: LoadContext, materials: MaterialTable) -> None:
         self._time, self._report = context.time, context.report
@@ -166,7 +169,7 @@ class InstanceBindings:
         self._values = Usd.Stage.CreateInMemory()
 
     def of_instance(self, instance: InstancePrim, proxy: Usd.Prim, scope: Scope) -> InstanceBinding:
-        """Returns the binding of a native instance.
+        """Returns the material and primvars that a native instance passes to its prototype.
 
         ``proxy`` is the prim on which bindings are resolved.
         """
@@ -188,7 +191,7 @@ class InstanceBindings:
         count: int,
         predicate: Any,
     ) -> Iterator[tuple[NDArray[np.bool_] | slice, InstanceBinding]]:
-        """Yields groups of instances of a prototype, with the binding of each group.
+        """Yields sets of instances of a prototype that pass equal materials and primvars to it.
 
         Args:
             instance: The point instancer.
@@ -274,9 +277,9 @@ class InstanceBindings:
         return b"" if value is None else np.ascontiguousarray(value.values).tobytes()
 
     def _each(self, primvar: Any, name: str, count: int) -> NDArray[np.float32] | None:
-        """Returns a primvar's values (count, c) per instance.
+        """Returns the values of a primvar, one per instance, (count, c).
 
-        Warns and returns None if the values do not fit.
+        Returns None with a warning if the number of values is wrong.
         """
         path = primvar.GetAttr().GetPrim().GetPath()
         try:
@@ -292,7 +295,7 @@ class InstanceBindings:
         return np.asarray(in_linear(found, self._report, path).values, np.float32)
 
     def _constant(self, name: str, value: NDArray[np.float32]) -> Any:
-        """Creates a constant primvar, as if an ancestor of the prims had it."""
+        """Creates a constant primvar for prims to inherit."""
         key = (name, value.tobytes())
         if key not in self._made:
             prim = self._values.DefinePrim(f"/V{len(self._made)}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Adds groups and volumes to other groups as instances, with names, materials and motion."""
+"""Adds instances of groups and volumes to groups, with names, materials and motion."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class VolumeInstancer:
 
 
 def add_volumes(world: Group, context: LoadContext) -> tuple[VolumeFacts, ...]:
-    """Adds all volumes to the scene; returns one description per volume prim."""
+    """Adds all volumes to the scene; returns a description of each volume prim."""
     report = context.report
     volumes = placed_volumes(world, MAX_VOLUMES + 1)
     if len(volumes) > MAX_VOLUMES:
@@ -98,7 +98,7 @@ def add_volumes(world: Group, context: LoadContext) -> tuple[VolumeFacts, ...]:
 def report_grid_memory(
     volumes: tuple[VolumeFacts, ...], limit: float | None, report: LoadReport
 ) -> None:
-    """Reports if the volumes' grids alone exceed ``--texture-limit`` (in MB)."""
+    """Reports if the volumes' grids exceed ``--texture-limit`` (in MB) even without textures."""
     taken = sum(grid.bytes for grid in {grid for volume in volumes for grid in volume.grids})
     if limit is not None and taken > limit * MEGABYTE:
         report.warn(
@@ -110,7 +110,7 @@ def report_grid_memory(
 def report_ignored_volumes(
     volumes: tuple[VolumeFacts, ...], materials: list[str], report: LoadReport
 ) -> None:
-    """Reports that volumes inside given materials do not affect light scattered in them."""
+    """Reports that light scattered inside the given materials ignores volumes."""
     for name in materials if volumes else ():
         what = "volumes inside refracting, scattering materials: light scattered there ignores them"
         report.note(what, name)
@@ -125,7 +125,7 @@ def _facts(
 
 
 class GroupInstancer:
-    """Factory of the scene's groups that also instances them."""
+    """Creates groups in the scene and adds instances of them."""
 
     def __init__(self, context: LoadContext, mesh_lights: MeshLights) -> None:
         self.builder, self.report = context.builder, context.report
@@ -136,9 +136,10 @@ class GroupInstancer:
     def asset_length(
         self, prim: Usd.Prim, path: str, name: str, parent: Parent | None = None
     ) -> int:
-        """Returns the length of the asset part of a prim's name (``LoadReport.place``).
+        """Returns the length of the part of a prim's name that identifies its asset.
 
-        ``path`` is the path of the prim, and ``parent`` its parent if known.
+        ``path`` is the path of the prim, ``name`` its name from ``LoadReport.place``, and
+        ``parent`` its parent if known.
         """
         length = self.assets.length_below(prim, path, parent)
         return length and length + len(name) - len(path)
@@ -160,7 +161,7 @@ class GroupInstancer:
         numbers: NDArray[np.uint32] | None = None,
         motion: Matrices | None = None,
     ) -> None:
-        """Adds k instances of a group, from k prims or from numbered instances of one instancer.
+        """Adds k instances of a group: k prims, or numbered instances of a point instancer.
 
         ``motion`` holds (k, s, 4, 4) transforms at equal steps over the shutter.
         """
@@ -222,7 +223,7 @@ class GroupInstancer:
         )
 
     def _grow(self, parent: Group, child: Group, transforms: Matrices) -> None:
-        """Extends the bounds and outline of a group by the instances of a child group."""
+        """Extends the bounds and outline of a group to contain the instances of a child group."""
         if child.bounds is None:
             return
         if self.framed is not None and (inner := framing.joined(child.outlines)) is not None:
@@ -240,7 +241,7 @@ class GroupInstancer:
 def outline_of(
     shape: MeshArrays | CurveArrays, surfaces: SubdivisionSurfaces, more: NDArray[np.float64] | None
 ) -> NDArray[np.float64]:
-    """Returns the extreme points of a shape in the space of its group."""
+    """Returns the extreme points of a shape in world space or prototype space."""
     points = shape.positions.reshape(-1, 3)
     if isinstance(shape, CurveArrays):
         radii = np.tile(shape.radii, len(points) // len(shape.radii))

@@ -37,7 +37,7 @@ class Instances:
 
 
 def rotations(quaternions: NDArray[Any]) -> Matrices:
-    """Converts quaternions (k, 4) in i, j, k, real order to rotations (k, 3, 3) for row vectors."""
+    """Converts quaternions (i, j, k, real), (k, 4), to rotations (k, 3, 3) for row vectors."""
     q = np.asarray(quaternions, np.float64)
     length = np.sqrt(np.einsum("ij,ij->i", q, q))
     usable = (length > 0) & np.isfinite(length)
@@ -57,7 +57,7 @@ def rotations(quaternions: NDArray[Any]) -> Matrices:
 
 
 def are_valid(transforms: Matrices) -> NDArray[np.bool_]:
-    """Returns a mask (k,) of the transforms (k, 4, 4) that are finite and invertible."""
+    """Returns a mask (k,) that tells which transforms (k, 4, 4) are finite and invertible."""
     linear = transforms[:, :3, :3]
     finite: NDArray[np.bool_] = np.asarray((np.abs(transforms) < 1e18).all(axis=(1, 2)))
     a, b, c = np.where(finite[:, None, None], linear, 0.0).transpose(1, 0, 2)
@@ -107,14 +107,15 @@ def moved_instances(
 ) -> Matrices | None:
     """Returns transforms (k, s, 4, 4) of instances over the shutter; None if they are static.
 
-    Uses velocities, accelerations and angular velocities as UsdGeomPointInstancer defines them.
+    Velocities, accelerations and angular velocities are used as UsdGeomPointInstancer defines.
 
     Args:
         prim: The point instancer.
         motion: The shutter.
         track: Animated transform of the instancer; None if it is static.
-        outer: (4, 4) static transform from the instancer to its group; None is the identity.
-        instances: Instances of the point instancer at the frame.
+        outer: (4, 4) static transform from the instancer to its group (the world or a prototype);
+            None is the identity.
+        instances: Instances of the point instancer at the time of the frame.
         report: Collects warnings.
     """
     instancer = UsdGeom.PointInstancer(prim)
@@ -153,7 +154,7 @@ def moved_instances(
 def _mask(
     instancer: UsdGeom.PointInstancer, time: Usd.TimeCode, count: int, report: LoadReport
 ) -> NDArray[np.bool_]:
-    """Returns a mask (count,) of the instances that are visible and active."""
+    """Returns a mask (count,) that tells which instances are visible and active."""
     keep = np.ones(count, bool)
     hidden: list[int] = []
     hidden += as_integers(instancer.GetInvisibleIdsAttr().Get(time), np.int64).tolist()

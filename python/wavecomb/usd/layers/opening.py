@@ -26,19 +26,20 @@ from wavecomb.usd.stage.report import LoadReport, capture_diagnostics, first_mes
 
 _TICK_S = 0.25
 _IDLE = 0.1
-"""CPU time as a fraction of wall time below which the process may be waiting for a FIFO."""
+"""Maximum CPU load (CPU time / wall time) of a process that may be waiting for a FIFO."""
 
 
 @contextmanager
 def abort_on_fifo() -> Iterator[None]:
-    """Aborts a block that opens layers if USD waits for a FIFO.
+    """Aborts the ``with`` block, which opens layers, if USD waits for a FIFO.
 
-    While the process is idle, a thread checks the files that loaded layers name. A process that is
-    expendable ends with a one-line message. In other processes the thread opens the FIFO for
-    writing and closes it, so that USD reads an empty layer; the block then raises.
+    While the process is idle, a thread checks whether loaded layers refer to FIFOs. A child process
+    with a supervising parent ends with a one-line message. In other processes the thread opens the
+    FIFO for writing and closes it, so that USD reads an empty layer; the block then raises
+    WavecombError.
 
     Raises:
-        WavecombError: A layer names a FIFO that USD waited for.
+        WavecombError: A layer refers to a FIFO, and USD waited for it.
     """
     done, found = threading.Event(), _BlockingFifo()
     thread = threading.Thread(target=_watch, args=(done, found), daemon=True)
@@ -79,7 +80,7 @@ def _watch(done: threading.Event, found: _BlockingFifo) -> None:
 
 
 def _fifos() -> Iterator[tuple[str, str]]:
-    """Yields FIFOs that loaded layers name as layers, each with the layer that names it."""
+    """Yields FIFOs that loaded layers reference as layers, each with the referencing layer."""
     for layer in Sdf.Layer.GetLoadedLayers():
         try:
             named = [layer.ComputeAbsolutePath(n) for n in layer.GetCompositionAssetDependencies()]
@@ -104,16 +105,17 @@ def _release(path: str, layer: str, found: _BlockingFifo) -> None:
 
 
 MAX_SURVEYED = 4096
-"""Maximum number of cameras and lights that are listed, since instancing can multiply them."""
+"""Maximum number of cameras and lights in a survey, since instancing can multiply them."""
 
 
 @dataclass(frozen=True)
 class StageContents:
-    """Cameras and lights of a stage in stage order, including invisible and instanced ones.
+    """Cameras and lights of a stage in stage order, including invisible and instanced prims.
 
     Attributes:
         cameras: Prim paths of all cameras.
-        lights: Prim paths of all supported lights; the two together have at most ``MAX_SURVEYED``.
+        lights: Prim paths of all supported lights. Both lists together have at most
+            ``MAX_SURVEYED`` paths.
     """
 
     cameras: tuple[str, ...] = ()
@@ -151,15 +153,15 @@ _RENDER_RELATIONS = ("products", "orderedVars", "camera")
 def open_render_settings(
     file: Path, wanted: str | None = None, session_layer: Path | None = None
 ) -> Usd.Stage:
-    """Opens only the render settings of a file and the cameras that they name.
+    """Opens only a file's render settings and the cameras that the settings name.
 
-    Keeping the returned stage alive until the whole stage is opened avoids reading its layers
+    Keep the returned stage alive until the whole stage is opened; otherwise its layers are read
     twice.
 
     Args:
-        file: .usd, .usda, .usdc or .usdz.
-        wanted: Path of settings that are not under /Render.
-        session_layer: File with opinions that are stronger than the stage's.
+        file: USD file with ending .usd, .usda, .usdc or .usdz.
+        wanted: Path of render settings outside of /Render.
+        session_layer: File whose opinions are stronger than the opinions of the stage.
 
     Raises:
         WavecombError: A file does not exist or cannot be read.
@@ -186,9 +188,9 @@ def open_render_settings(
 def _layers(
     file: Path, session_layer: Path | None, overrides: Sdf.Layer | None = None
 ) -> Iterator[tuple[Sdf.Layer, Sdf.Layer]]:
-    """Yields the root and session layer of a stage, within the time limit for opening.
+    """Opens the root and session layer of a stage for the ``with`` block, within the time limit.
 
-    Arguments are the same as for ``open_stage``. Converts USD errors to WavecombError.
+    Parameters are the same as for ``open_stage``. USD errors in the block become WavecombError.
     """
     _check_file(file)
     if session_layer is not None:
@@ -211,7 +213,7 @@ def _layers(
 
 
 def _named_by(stage: Usd.Stage) -> set[Sdf.Path]:
-    """Returns the prims that render settings and products refer to."""
+    """Returns the paths of prims to which render settings and render products refer."""
     return {
         target.GetPrimPath()
         for prim in stage.Traverse()
@@ -228,7 +230,7 @@ def _settings_path(layer: Sdf.Layer) -> str:
 
 
 def _prim_path(text: str) -> Sdf.Path | None:
-    """Returns the absolute prim path that a text holds; None for any other text."""
+    """Parses an absolute prim path; returns None for other text."""
     if not text.startswith("/") or not Sdf.Path.IsValidPathString(text):
         return None
     path = Sdf.Path(text)
@@ -246,14 +248,16 @@ def open_stage(
     """Opens the stage of a file.
 
     Args:
-        file: .usd, .usda, .usdc or .usdz.
+        file: USD file with ending .usd, .usda, .usdc or .usdz.
         variants: Variant selections (``select_variants``).
-        overrides: Layer, such as another stage's session layer, that is copied into the session
-            layer.
-        mask: Paths of prims to keep with everything that they need (``populate``); empty means all.
-        session_layer: File with opinions that are stronger than the stage's; ``variants`` are
-            stronger still.
-        payloads: Patterns of prims whose payloads are loaded (``load_payloads``); empty means all.
+        overrides: Layer whose content is copied into the session layer, such as another stage's
+            session layer.
+        mask: Paths of prims to keep, with everything that they need (see ``populate``); if empty,
+            all prims are kept.
+        session_layer: File whose opinions are stronger than the opinions of the stage; ``variants``
+            override both.
+        payloads: Patterns of prims whose payloads are loaded (see ``load_payloads``); if empty, all
+            payloads are loaded.
 
     Raises:
         WavecombError: A file cannot be read, or a variant, prim or payload does not exist.
@@ -282,11 +286,11 @@ def open_editable(
 ) -> Usd.Stage:
     """Opens a stage that can be inspected and edited while another copy of it is loaded.
 
-    Opens the stage like ``open_stage``, but also resolves MaterialX files in unselected variants.
-    Selecting other variants later thus changes no layer while another thread reads it.
+    In addition to ``open_stage``, this function resolves MaterialX files in unselected variants.
+    Selecting other variants later therefore does not change layers that another thread reads.
 
     Args:
-        file: .usd, .usda, .usdc or .usdz.
+        file: USD file with ending .usd, .usda, .usdc or .usdz.
         variants: Variant selections (``select_variants``).
         report: Receives USD's messages; None discards them.
     """
@@ -311,7 +315,7 @@ def _check_file(file: Path) -> None:
 
 
 def _session(file: Path) -> Sdf.Layer:
-    """Returns the layer of a file; a stage that refers to it keeps it open."""
+    """Returns the layer of a file; the layer remains open while a stage refers to it."""
     try:
         layer = Sdf.Layer.FindOrOpen(str(file))
     except Tf.ErrorException as error:
@@ -349,15 +353,15 @@ def select_variants(stage: Usd.Stage, variants: Mapping[str, str]) -> None:
 
 
 _changed: dict[str, Sdf.Layer] = {}
-"""Layers that this process has changed, by identifier. Changed layers are never released, since USD
-would read them again."""
+"""Layers that this process has changed, by identifier. They are never released, since USD would
+otherwise reload them without the changes."""
 
 
 def change_layers(layers: Iterable[Sdf.Layer]) -> None:
-    """Applies this process's path maps to layers and to all layers that they name.
+    """Applies the path maps of this process to layers and to all layers that they refer to.
 
-    Changes layers in memory only, before they are composed: each absolute path of layers, textures
-    and other files. Relative paths remain valid.
+    Call this function before composition. It changes the absolute paths of layers, textures and
+    other files in memory only. Relative paths need no change.
     """
     pairs = own_maps()
     if not pairs:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Subsets of a stage: population masks, payloads, and prims of a kind.
+"""Restricts stages to subsets of their prims: population masks, payloads, path patterns.
 
-Patterns of prim paths are OpenUSD's path expressions, such as ``/World/set/*`` or ``//lamp?``:
-``*`` stands for any characters of a name, ``?`` for one character, ``[ab]`` for one of those
-characters, and ``//`` for any number of path elements.
+Patterns of prim paths follow OpenUSD's path expressions, such as ``/World/set/*`` or ``//lamp?``.
+``*`` matches any characters of a name, ``?`` one character, ``[ab]`` one of the characters a and b,
+and ``//`` any number of path elements.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ _PROXIES = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
 
 
 def populate(stage: Usd.Stage, paths: Sequence[str]) -> None:
-    """Restricts a stage to prims at and below given paths, their ancestors, and prims they need.
+    """Restricts a stage to given prims with their descendants, ancestors and dependencies.
 
-    Prims need their materials, prototypes of point instancers and sources of shader connections.
-    All cameras, lights and render settings are kept, except those inside instances that are left
+    Dependencies are materials, prototypes of point instancers and sources of shader connections.
+    All cameras, lights and render settings are kept, unless they are inside instances that are left
     out.
 
-    ``paths`` may be patterns for prims that are not inside instances.
+    ``paths`` may contain patterns, which match only prims outside of instances.
 
     Raises:
         WavecombError: A path or pattern matches no prim.
@@ -67,7 +67,7 @@ def _matching(stage: Usd.Stage, pattern: PathPattern) -> list[Sdf.Path]:
 
 
 def _outside_instances(stage: Usd.Stage, path: Sdf.Path) -> Sdf.Path:
-    """Returns a prim's path, or its instance's, since masks cannot name prims in instances."""
+    """Returns the path of the prim, or of the instance around it for prims inside instances."""
     for prefix in path.GetPrefixes():
         if stage.GetPrimAtPath(prefix).IsInstance():
             return prefix
@@ -94,7 +94,7 @@ def _always(stage: Usd.Stage) -> Iterator[Sdf.Path]:
 
 
 def _needed(prims: Iterable[Usd.Prim]) -> Iterator[Sdf.Path]:
-    """Yields prims to which given prims, their descendants or their ancestors refer."""
+    """Yields the prims to which given prims, their descendants or their ancestors refer."""
     for top in prims:
         if not top:
             continue
@@ -121,14 +121,14 @@ def _targets(prim: Usd.Prim) -> Iterator[Sdf.Path]:
 
 
 NONE = "none"
-"""Option value that loads no payloads, used in place of patterns."""
+"""Value of the payload option that loads no payloads."""
 
 
 def load_payloads(stage: Usd.Stage, wanted: Sequence[str]) -> None:
     """Loads payloads of a stage that was opened without any.
 
-    Loads payloads of prims that match a pattern, of their descendants, and of ancestors that a
-    pattern's literal names pass through.
+    The function loads the payloads of prims that match a pattern, of their descendants, and of
+    those ancestors that the pattern names explicitly.
 
     Args:
         stage: A stage opened with ``Usd.Stage.LoadNone``.
@@ -175,7 +175,7 @@ class PathPattern:
     """A pattern of prim paths, or the path of one prim."""
 
     def __init__(self, text: str, what: str) -> None:
-        """``what`` is the option's name in errors. Raises WavecombError for an invalid pattern."""
+        """``what`` names the option in errors. Raises WavecombError for invalid patterns."""
         self.text = text
         self.is_pattern = any(mark in text for mark in ("*", "?", "[", "//"))
         plain = re.sub(r"\[[^]/]*\]|[*?]", "a", text).replace("//", "/")
@@ -195,14 +195,14 @@ class PathPattern:
             self._whole = re.compile(between.join(parts) + r"\Z")
 
     def matches(self, path: Sdf.Path) -> bool:
-        """Returns whether the pattern matches the path of a prim."""
+        """Returns whether the pattern matches this prim path."""
         if self._whole is not None:
             return self._whole.match(path.pathString) is not None
         names = _names(path)
         return len(names) == len(self._names) and self._fits(names)
 
     def may_be_below(self, path: Sdf.Path) -> bool:
-        """Returns whether the pattern's names before ``//`` pass through a prim."""
+        """Returns whether prims below a path can match the pattern's names before ``//``."""
         names = _names(path)
         return len(names) < len(self._names) and self._fits(names)
 
@@ -226,9 +226,9 @@ def _of_name(pattern: str) -> str:
 
 
 def _letters(text: str) -> str:
-    """Converts literal characters or ``[...]`` to a regular expression.
+    """Converts literal text or ``[...]`` to a regular expression.
 
-    Invalid character ranges match nothing.
+    An invalid character range becomes an expression that matches nothing.
     """
     if not (text.startswith("[") and text.endswith("]")):
         return re.escape(text)
@@ -244,9 +244,10 @@ Test = Callable[[Usd.Prim], bool]
 
 
 def matching_prims(stage: Usd.Stage, wanted: Test) -> Iterator[Usd.Prim]:
-    """Yields matching prims in stage order, as proxies once per instance inside instances.
+    """Yields matching prims in stage order; prims inside instances are proxies, once per instance.
 
-    Skips instances that contain no match, since nested instancing may create billions of prims.
+    Instances without matching prims are skipped, since nested instances may contain billions of
+    prims.
     """
     holding = containing_prototypes(stage, wanted)
     walk = iter(Usd.PrimRange.Stage(stage, _PROXIES if holding else Usd.PrimDefaultPredicate))
@@ -258,7 +259,7 @@ def matching_prims(stage: Usd.Stage, wanted: Test) -> Iterator[Usd.Prim]:
 
 
 def containing_prototypes(stage: Usd.Stage, wanted: Test) -> set[Sdf.Path]:
-    """Returns prototypes that contain a matching prim, also in nested instances."""
+    """Returns the prototypes that contain a matching prim, directly or in nested instances."""
     holding: set[Sdf.Path] = set()
     users: dict[Sdf.Path, list[Sdf.Path]] = {}
     for prototype in stage.GetPrototypes():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX files that a stage names but USD did not open."""
+"""Finds MaterialX files that a stage refers to but that USD failed to open."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import Any
 from pxr import Usd
 
 _NAMED = re.compile(r"@([^@]*\.mtlx\]*)@", re.IGNORECASE)
-"""Name of a MaterialX file in USD's message about a layer that cannot be opened."""
+"""Regular expression for the MaterialX file in USD's message about a layer that it cannot open."""
 
 
 def unopened_materialx(stage: Usd.Stage) -> Iterator[tuple[Any, str]]:
-    """Yields composition errors about MaterialX files, with the files' names."""
+    """Yields composition errors that concern MaterialX files, with the names of the files."""
     for error in stage.GetCompositionErrors():
         found = _NAMED.search(str(error))
         if found is not None:

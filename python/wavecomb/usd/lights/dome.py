@@ -2,9 +2,9 @@
 """Orientation, image formats and portals of dome lights.
 
 UsdLux names image formats but does not define their orientation. In Wavecomb, the image centre of
-every format maps to the dome's +z with +y up, as for latlong images. Angular maps and cube crosses
-are seen from inside, so that image right is -x. A mirrored ball is a photograph, so that image
-right is +x.
+each format maps to the dome's +z, and the top of the image to +y. Angular maps and cube crosses
+show the environment from inside, so that the right side of the image is at -x. A mirrored ball is a
+photograph of a reflection, so that the right side of the image is at +x.
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ class DomeReader:
         self._made: dict[tuple[str, str, str], int] = {}
 
     def pole(self, prim: Usd.Prim) -> Matrices:
-        """Returns the rotation (4, 4) to the pole: +Y for DomeLight, poleAxis for DomeLight_1."""
+        """Returns the rotation (4, 4) of +Y to the pole, which is poleAxis for DomeLight_1."""
         axis = prim.GetAttribute("poleAxis").Get(self.time)
         if axis == "scene":
             axis = self.up_axis
         return Y_TO_Z if axis == "Z" else np.eye(4)
 
     def resampled(self, prim: Usd.Prim, path: str, image: Image, tag: str) -> int | None:
-        """Returns a texture with the image resampled to latlong; None if it already is latlong.
+        """Returns a texture of the image resampled to latlong; None if the image is latlong.
 
-        ``tag`` is the colour space of the image, or auto.
+        ``tag`` is the colour space of the image, or "auto".
         """
         form = format_of(self._format(prim), image.size)
         if form == "latlong" or self.textures is None:
@@ -76,9 +76,10 @@ class DomeReader:
         return form
 
     def portals(self, prim: Usd.Prim, local: Matrices) -> Matrices | None:
-        """Returns the transforms (k, 4, 4) from the unit square to dome space, one per portal.
+        """Returns the transform (k, 4, 4) of each portal from the unit square to dome space.
 
-        Returns None if the light has no valid portal. ``local`` is the result of ``pole``.
+        Returns None if the light has no valid portal. ``local`` is the dome's rotation from
+        ``pole``.
         """
         relation = prim.GetRelationship("portals")
         found = []
@@ -101,7 +102,7 @@ class DomeReader:
 
 
 def soft_dome() -> NDArray[np.float32]:
-    """Returns the default environment (64, 128, 3): bright above, warm grey below."""
+    """Returns the default environment (64, 128, 3), which is bright above and warm grey below."""
     rows = (np.arange(64, dtype=np.float32) + 0.5) / 64
     height = np.cos(np.pi * rows)[:, None]
     blend = 1.0 / (1.0 + np.exp(-6.0 * height))
@@ -160,9 +161,9 @@ def to_latlong(pixels: NDArray[Any], form: str) -> NDArray[np.float32]:
 def _image_coordinates(
     x: Floats, y: Floats, z: Floats, form: str
 ) -> tuple[Floats, Floats, Any, Any]:
-    """Maps directions to image coordinates in [0, 1]: u to the right, v down.
+    """Maps directions to image coordinates (u, v) in [0, 1]; u grows rightwards, v downwards.
 
-    Also returns the lowest and highest (u, v) that bilinear samples may read.
+    Also returns the range of (u, v) that bilinear filtering may read.
     """
     if form == "mirroredBall":
         # The normal of the mirrored ball is halfway between the reflected direction (x, y, z) and

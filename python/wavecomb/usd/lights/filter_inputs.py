@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Inputs of light filters as different renderers name them, and colour gels.
+"""Reads inputs of light filters under the names of several renderers, and colour gels.
 
-A gel multiplies all light of a light source: Karma's ``kma_lfilter_gel``, the gel inputs of Karma's
-barn doors and gobos, and RenderMan's PxrIntMult.
+A gel is a filter that multiplies all light of a light source. Supported gels are Karma's
+``kma_lfilter_gel``, the gel inputs of Karma's barn doors and gobos, and RenderMan's PxrIntMult.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ OF_LIGHTS = ("inputs:", "")
 
 @dataclass(frozen=True)
 class FilterInputs:
-    """The inputs of a filter, or of a light with its own barn doors."""
+    """The inputs of a light filter, or of a light with built-in barn doors."""
 
     prim: Usd.Prim
     time: Usd.TimeCode
     prefixes: tuple[str, ...] = _PREFIXES
 
     def attribute(self, *names: str) -> Usd.Attribute | None:
-        """Returns the first attribute with one of the names that is authored or connected."""
+        """Returns the first of the named attributes that is authored or connected."""
         for name in names:
             for prefix in self.prefixes:
                 attribute = self.prim.GetAttribute(prefix + name)
@@ -69,7 +69,7 @@ class FilterInputs:
 
 
 def filter_prims(light: Usd.Prim) -> list[tuple[str, Usd.Prim | None]]:
-    """Returns path and prim (or None) of each target of a light's ``light:filters``."""
+    """Returns the path and the prim (or None) of each light filter of a light."""
     relationship = light.GetRelationship("light:filters")
     targets = relationship.GetForwardedTargets() if relationship else []
     stage = light.GetStage()
@@ -77,7 +77,7 @@ def filter_prims(light: Usd.Prim) -> list[tuple[str, Usd.Prim | None]]:
 
 
 def kind_of(prim: Usd.Prim) -> str:
-    """Returns the kind of a filter: its prim type, or the ``shaderId`` of a generic LightFilter."""
+    """Returns the type of a filter prim, or the ``shaderId`` of a generic LightFilter."""
     name = str(prim.GetTypeName())
     if name in ("LightFilter", "PluginLightFilter", ""):
         name = word(prim.GetAttribute("lightFilter:shaderId").Get())
@@ -85,12 +85,12 @@ def kind_of(prim: Usd.Prim) -> str:
 
 
 def plain_kind(prim: Usd.Prim) -> str:
-    """Returns the kind of a filter in lower case, without namespace and underscores."""
+    """Returns the filter type in lower case, without namespace and underscores."""
     return kind_of(prim).lower().replace("_", "").rsplit(":", 1)[-1]
 
 
 GELS = frozenset({"kmalfiltergel", "pxrintmultlightfilter", "pxrintmult"})
-"""Kinds of light filters that are only gels."""
+"""Types of light filters that have no effect besides a gel."""
 
 _WITH_GEL = GELS | {"kmalfilterbarndoor", "kmalfiltergobo"}
 
@@ -100,9 +100,9 @@ class Gel:
     """The combined effect of a light's gels.
 
     Attributes:
-        tint: Factor of the light's colour, linear Rec. 709.
-        saturation: Saturation of the tinted colour; 0 gives grey of the same luminance.
-        diffuse, specular: Factors of the light's diffuse and specular multipliers.
+        tint: Factor on the light's colour, in linear Rec. 709.
+        saturation: Saturation of the tinted colour; 0 makes it grey with the same luminance.
+        diffuse, specular: Factors on the light's diffuse and specular multipliers.
     """
 
     tint: Colour = (1.0, 1.0, 1.0)
@@ -120,7 +120,7 @@ class Gel:
         return (r, g, b)
 
     def multiplied(self, options: Mapping[str, Any]) -> dict[str, float]:
-        """Returns the light's diffuse and specular multipliers that the gel changes."""
+        """Returns those of the light's diffuse and specular multipliers that the gel changes."""
         return {
             name: factor * float(options.get(name, 1.0))
             for name, factor in (("diffuse", self.diffuse), ("specular", self.specular))
@@ -129,7 +129,7 @@ class Gel:
 
 
 def gel_of(light: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> Gel:
-    """Combines all gels among a light's filters, including those of unsupported filters."""
+    """Combines all gels of a light's filters, even of filters without other support."""
     gel = Gel()
     for _, prim in filter_prims(light):
         if prim is not None and plain_kind(prim) in _WITH_GEL:

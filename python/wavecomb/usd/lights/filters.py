@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Light filters: barn doors, gobos (projected images) and decay.
 
-UsdLux has no schemas for specific filters. The kind of a filter is its prim type or its
-``lightFilter:shaderId``, and its inputs have the names of the renderer that defines it. Supported
-are RenderMan's barn and cookie filters, which are at the position of their prim; Arnold's barn
-doors, gobo and decay; and Karma's barn doors (also on the light itself) and gobo.
+UsdLux does not define types of light filters. The type of a filter is its prim type or its
+``lightFilter:shaderId``. Its inputs have the names that the filter's renderer defines. Supported
+filters are RenderMan's barn and cookie (positioned by their prims), Arnold's barn doors, gobo and
+decay, and Karma's barn doors (also as inputs of the light) and gobo.
 """
 
 from __future__ import annotations
@@ -39,22 +39,22 @@ Line = tuple[float, float, float]
 
 _OPEN: Line = (0.0, 0.0, 1.0)
 _FLAPS = {"left": (1.0, 0.0), "right": (-1.0, 0.0), "bottom": (0.0, 1.0), "top": (0.0, -1.0)}
-"""Karma's barn doors, each with the direction in (x, y) in which it lies."""
+"""Karma's four barn doors, each with its direction in (x, y)."""
 _SHARP = 1e5
-"""Slope of a hard edge, in units of the filter window's size."""
+"""Slope of a hard edge, relative to the size of the filter window."""
 
 
 @dataclass(frozen=True)
 class Filter:
-    """A filter in the form that ``SceneBuilder.add_light_filter`` takes.
+    """A light filter for ``SceneBuilder.add_light_filter``.
 
     Attributes:
         matrix: (4, 4) transform from filter space to light space.
-        distance: Distance of the filter's window along -z; 0 means that there is no window.
-        sides: Four linear functions; light passes where all of them are positive.
-        picture: Two linear functions that compute u and v of the texture.
+        distance: Distance of the filter window along -z; 0 disables the window.
+        sides: Four linear functions, one for each edge; light passes where all four are positive.
+        picture: Two linear functions that compute the texture coordinates u and v.
         texture: Texture id.
-        decay: Near start, near end, far start and far end.
+        decay: Distances at which light decays: near start, near end, far start and far end.
         density: Strength of the filter.
     """
 
@@ -70,7 +70,7 @@ class Filter:
 def add_filters(
     builder: _core.SceneBuilder, filters: Sequence[Filter], transform: NDArray[np.float64]
 ) -> int | None:
-    """Adds the filters of a light with the given transform; returns their combined id."""
+    """Adds the filters of a light with the given transform; returns the id of their combination."""
     known: int | None = None
     for one in filters:
         known = builder.add_light_filter(
@@ -97,9 +97,9 @@ class FilterReader:
         }  # fmt: skip
 
     def of(self, light: Usd.Prim, kind: str) -> tuple[Filter, ...]:
-        """Returns a light's filters and its own barn doors; reports unsupported ones.
+        """Returns a light's filters and built-in barn doors; reports unsupported filters.
 
-        Gels of a light are read by ``gel_of`` instead.
+        Gels are not returned, since ``gel_of`` reads them.
         """
         prims = [(path, prim) for path, prim in filter_prims(light) if not _gel(prim)]
         doors = FilterInputs(light, self._time, OF_LIGHTS)
@@ -130,7 +130,7 @@ class FilterReader:
     # ---- kinds -----------------------------------------------------------------------------
 
     def _barn(self, inputs: FilterInputs, light: Usd.Prim) -> Filter:
-        """Reads a RenderMan barn: a window at its prim's origin, with the soft edge outside."""
+        """Reads a RenderMan barn as a window at the origin of its prim with a soft edge outside."""
         if inputs.word("barnMode", "physical") != "physical":
             self._report.missing("analytic light barns (as physical ones)", inputs.prim.GetPath())
         if inputs.number("radius", 0.0) > 0:
@@ -149,7 +149,7 @@ class FilterReader:
         return Filter(_before(inputs.prim, light, self._time), 1.0, sides)
 
     def _cookie(self, inputs: FilterInputs, light: Usd.Prim) -> Filter | None:
-        """Reads a RenderMan cookie: an image at its prim's origin with a black exterior."""
+        """Reads a RenderMan cookie as an image at its prim's origin, surrounded by black."""
         texture = self._texture(inputs, inputs.word("tileMode", "off"), "textureMap")
         if texture is None:
             return None
@@ -160,7 +160,7 @@ class FilterReader:
         )  # fmt: skip
 
     def _doors(self, inputs: FilterInputs, light: Usd.Prim) -> Filter:
-        """Reads Arnold barn doors over the square around a spot light's cone.
+        """Reads Arnold barn doors, which cover the square around the cone of a spot light.
 
         Door positions are 0 at the left or top edge of the square and 1 at the opposite edge.
         """
@@ -190,7 +190,7 @@ class FilterReader:
         return Filter(np.eye(4), away, sides)
 
     def _gobo(self, inputs: FilterInputs, light: Usd.Prim) -> Filter | None:
-        """Reads an Arnold gobo: an image over the square around a spot light's cone."""
+        """Reads an Arnold gobo as an image on the square around the cone of a spot light."""
         texture = self._texture(inputs, inputs.word("swrap", "clamp"), "slidemap")
         if texture is None:
             return None
@@ -229,7 +229,7 @@ class FilterReader:
         return Filter(np.eye(4), away, sides)
 
     def _slide(self, inputs: FilterInputs, light: Usd.Prim) -> Filter | None:
-        """Reads a Karma gobo: an image over the square around a spot light's cone."""
+        """Reads a Karma gobo as an image on the square around the cone of a spot light."""
         for name in ("blur", "invert", "invertcolor"):
             if inputs.value(name):
                 self._report.missing(f"{name} of a light's gobo", inputs.prim.GetPath())
@@ -251,7 +251,7 @@ class FilterReader:
     # ---- inputs ----------------------------------------------------------------------------
 
     def _cone(self, inputs: FilterInputs, light: Usd.Prim) -> tuple[float, float]:
-        """Returns a distance much larger than the light, and the cone's radius there."""
+        """Returns a distance much larger than the light, and the cone's radius at this distance."""
         angle = number(light.GetAttribute("inputs:shaping:cone:angle").Get(self._time), 90.0)
         if not angle < 89.0:
             self._report.missing(
@@ -264,7 +264,7 @@ class FilterReader:
         return away, away * math.tan(math.radians(max(angle, 0.1)))
 
     def _texture(self, inputs: FilterInputs, wrap: str, *names: str) -> int | None:
-        """Returns the texture of a file input, or of the image node that is connected to it."""
+        """Returns the texture of a file input, or of the image node connected to the input."""
         attribute = inputs.attribute(*names)
         if attribute is not None and attribute.HasAuthoredConnections():
             sources = UsdShade.Utils.GetValueProducingAttributes(UsdShade.Input(attribute))
@@ -286,7 +286,7 @@ class FilterReader:
 
 
 def _gel(prim: Usd.Prim | None) -> bool:
-    """Returns whether a filter is only a gel."""
+    """Returns whether a filter has no effect besides a gel."""
     return prim is not None and plain_kind(prim) in GELS
 
 
@@ -304,11 +304,11 @@ def _before(prim: Usd.Prim, light: Usd.Prim, time: Usd.TimeCode) -> NDArray[np.f
 
 
 def _scaled(line: Line, edge: float, size: float) -> Line:
-    """Scales a linear function to rise from 0 to 1 within ``edge``; 0 gives a hard edge."""
+    """Scales a linear function to rise by 1 over the distance ``edge``; 0 is a hard edge."""
     k = 1.0 / edge if edge > size / _SHARP else _SHARP / size
     return (line[0] * k, line[1] * k, line[2] * k)
 
 
 def _side(x: float, y: float, room: float, edge: float, size: float) -> Line:
-    """Returns the linear function of a window side at distance ``room`` in direction -(x, y)."""
+    """Returns the linear function of the window edge at distance ``room`` in direction -(x, y)."""
     return _scaled((x, y, room), edge, max(size, 1e-6))

@@ -24,17 +24,17 @@ _TYPES = {1: "C", 2: "B", 3: "A"}
 
 
 class IesError(ValueError):
-    """An IES file is invalid; the message gives the reason in a few words."""
+    """Raised if an IES file is invalid; the message gives the reason."""
 
 
 @dataclass(frozen=True)
 class IesProfile:
-    """Luminous intensity over directions, expanded to the full circle.
+    """Luminous intensity by direction, completed to the full circle.
 
     Attributes:
         vertical: (v,) angles from the luminaire's axis in degrees, in [0, 180], ascending.
-        horizontal: (h,) angles around the axis in degrees, 0 to 360; a single 0 means rotational
-            symmetry.
+        horizontal: (h,) angles around the axis in degrees, from 0 to 360; a single angle of 0 means
+            rotational symmetry.
         candela: (h, v) intensities in candela.
     """
 
@@ -118,7 +118,7 @@ def _ascending(angles: Floats, what: str) -> Floats:
 
 
 def _expand_c(vertical: Floats, horizontal: Floats, candela: Floats) -> IesProfile:
-    """Expands a profile of type C by the symmetry that its range of horizontal angles implies."""
+    """Completes a profile of type C by the symmetry that its range of horizontal angles implies."""
     first, last = horizontal[0], horizontal[-1]
     if len(horizontal) == 1:
         return IesProfile(vertical, np.zeros(1), candela)
@@ -161,7 +161,7 @@ def _expand_c(vertical: Floats, horizontal: Floats, candela: Floats) -> IesProfi
 def _resample(vertical: Floats, horizontal: Floats, candela: Floats, kind: str) -> IesProfile:
     """Resamples profiles of types A and B to type C at every degree.
 
-    The polar axis of type A is vertical, the polar axis of type B is horizontal. With x to the
+    The polar axis is vertical in type A and horizontal in type B. With x to the
     side, y up and z along the luminaire's axis, the horizontal angle H and the vertical angle V of
     a direction are
         A: tan H = x / z, sin V = y        B: sin H = x, tan V = y / z.
@@ -206,14 +206,14 @@ def _resample(vertical: Floats, horizontal: Floats, candela: Floats, kind: str) 
 
 
 class IesTable:
-    """The IES profiles of a scene; each file is added once."""
+    """IES profiles of a scene; each file is added only once."""
 
     def __init__(self, context: LoadContext) -> None:
         self._builder, self._report = context.builder, context.report
         self._found: dict[str, int | IesError] = {}
 
     def add(self, path: str, prim: object) -> int | None:
-        """Returns the id of a file's profile; warns and returns None if it is unreadable."""
+        """Returns the id of an IES profile; warns and returns None if the file cannot be read."""
         if path not in self._found:
             self._found[path] = self._read(path)
         found = self._found[path]

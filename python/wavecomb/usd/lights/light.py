@@ -45,24 +45,25 @@ _READ_APART = frozenset({
     "color", "normalize", "focus", "focus_tint", "cone_angle", "cone_softness", "ies_angle_scale",
     "ies_normalize",
 })  # fmt: skip
-"""Parameters that depend on other inputs or on the kind of light, and are read separately."""
+"""Parameters that are read separately, since they depend on other inputs or on the kind of
+light."""
 
 
 class Profiles(Protocol):
     """Interface of a table of IES profiles."""
 
     def add(self, path: str, prim: Sdf.Path) -> int | None:
-        """Returns the id of a profile; None if the file is unreadable."""
+        """Returns the id of an IES profile; None if the file cannot be read."""
 
 
 @dataclass(frozen=True)
 class Light:
-    """A light in the form that ``SceneBuilder.add_light`` takes, without its world transform.
+    """A light for ``SceneBuilder.add_light``, without its transform to the world.
 
     Attributes:
+        kind: Kind of the light, one of the values of ``KINDS``.
         options: Keyword arguments of ``SceneBuilder.add_light``.
-        options: Keyword arguments.
-        local: (4, 4) transform that is applied before the prim's transform to the world.
+        local: (4, 4) transform that is applied before the transform of the prim.
         filters: Light filters in light space.
     """
 
@@ -73,12 +74,12 @@ class Light:
 
 
 def blackbody(kelvin: float) -> tuple[float, float, float]:
-    """Returns the linear Rec. 709 colour of a black body with the luminance of (1, 1, 1).
+    """Returns the linear Rec. 709 colour of a black body, with the luminance of white.
 
-    Uses ``Gf.Color``, Krystek's approximation of the Planckian locus from 1000 to 15000 K, like
-    OpenUSD's Embree delegate; clamps temperatures to this range.
+    Like OpenUSD's Embree delegate, this function uses ``Gf.Color``, which has Krystek's
+    approximation of the Planckian locus. Temperatures are clamped to its range of 1000 to 15000 K.
     ``UsdLux.BlackbodyTemperatureAsRgb``, a table up to 10000 K, differs by at most 0.002 above 2000
-    K. Components outside of Rec. 709 (blue below 1900 K) are 0.
+    K. Negative components (blue below 1900 K) become 0.
     """
     found = Gf.Color(Gf.ColorSpace(Gf.ColorSpaceNames.LinearRec709))
     found.SetFromPlanckianLocus(min(max(kelvin, 1000.0), 15000.0), 1.0)
@@ -99,7 +100,7 @@ class LightReader:
         profiles: Profiles | None = None,
         links: LinkTable | None = None,
     ) -> None:
-        """Creates a reader that ignores each of textures, profiles and links that is None."""
+        """Creates a reader; ``textures``, ``profiles`` and ``links`` that are None are not read."""
         self.time, self.report = context.time, context.report
         self.hidden = context.hides_lights
         self.textures = textures
@@ -112,7 +113,7 @@ class LightReader:
     def read(self, prim: Usd.Prim, scale: float = 1.0) -> Light:
         """Reads a light whose prim type is in ``KINDS``.
 
-        ``scale`` is the scale of the light's transform.
+        ``scale`` is the scale factor of the light's transform.
         """
         kind = KINDS[str(prim.GetTypeName())]
         options = self._common(prim, kind)
@@ -170,9 +171,9 @@ class LightReader:
         return options
 
     def _plain(self, prim: Usd.Prim, kind: str) -> dict[str, Any]:
-        """Reads parameters that map directly to inputs.
+        """Reads parameters that correspond directly to inputs of the light.
 
-        Except for the light's shape, returns only values that differ from their defaults.
+        Values that equal their defaults are left out, except those of the light's shape.
         """
         options = {}
         for row in of_kind(kind):
@@ -184,7 +185,7 @@ class LightReader:
         return options
 
     def _value(self, prim: Usd.Prim, row: LightParameter) -> Any:
-        """Returns a parameter clamped to its range; negative sizes become positive."""
+        """Returns a parameter clamped to its valid range; negative sizes are made positive."""
         found = self._get(prim, row.input, row.default)
         if row.kind == "flag":
             return bool(found)
@@ -231,7 +232,7 @@ class LightReader:
     def _sphere(
         self, prim: Usd.Prim, options: dict[str, Any], normalize: bool, scale: float
     ) -> None:
-        """Converts a sphere to a point light with the same radiant intensity if needed."""
+        """Converts a sphere of radius 0, or one with ``treatAsPoint``, to a point light."""
         radius = options["radius"]
         point = prim.GetAttribute("treatAsPoint")
         if radius > 0 and not (point and point.Get(self.time)):
@@ -245,7 +246,7 @@ class LightReader:
             self.report.note("sphere light of radius 0: treated as normalized", prim.GetPath())
 
     def _cylinder(self, prim: Usd.Prim, options: dict[str, Any], normalize: bool) -> bool:
-        """Replaces a radius of 0 by a thin cylinder; returns whether the light is normalised."""
+        """Gives a cylinder of radius 0 a small radius; returns whether the light is normalised."""
         length: float = options["length"]
         if options["radius"] == 0 and length > 0:
             self.report.note(
@@ -309,7 +310,7 @@ class LightReader:
 
 
 class LinkTable:
-    """The sets of linked geometry of a scene; equal sets are merged."""
+    """Sets of geometry to which lights of the scene are linked; equal sets are stored once."""
 
     def __init__(self, context: LoadContext) -> None:
         self._builder = context.builder

@@ -27,13 +27,14 @@ def is_mesh_light(prim: Usd.Prim) -> bool:
 
 @dataclass(frozen=True)
 class MeshLight:
-    """A light that is made of the triangles of one gprim.
+    """A light made of the triangles of a gprim.
 
     Attributes:
         number: Light id for ``add_mesh``.
-        material: Material id that replaces the binding; None keeps the bound material.
-        is_sampled_only: Whether only light sampling finds the light, so that BSDF sampling must not
-            count it.
+        material: Id of the material that replaces the bound material; None keeps the bound
+            material.
+        is_sampled_only: Whether only light sampling accounts for the light, so that BSDF sampling
+            must ignore its emission.
     """
 
     number: int
@@ -42,10 +43,10 @@ class MeshLight:
 
 
 class MeshLights:
-    """Factory of the mesh lights of one stage, which adds them to the scene.
+    """Creates the mesh lights of one stage and adds them to the scene.
 
     Attributes:
-        any: Whether there is a mesh light.
+        any: Whether the stage has a mesh light.
     """
 
     def __init__(self, context: LoadContext, lights: LightReader, materials: MaterialTable) -> None:
@@ -55,9 +56,9 @@ class MeshLights:
         self._materials = materials
 
     def of(self, draw: DrawItem, kind: str) -> MeshLight | None:
-        """Returns the mesh light of a gprim; None if it is not a light.
+        """Returns the mesh light of a gprim; None if the gprim is not a light.
 
-        ``draw`` holds the gprim and its transform to its group; ``kind`` is ``DrawItem.kind``.
+        ``draw`` is the gprim with its transform, and ``kind`` is its ``DrawItem.kind``.
         """
         if not is_mesh_light(draw.prim):
             return None
@@ -81,7 +82,7 @@ class MeshLights:
         return MeshLight(number, material, sync == "independent" or bool(kept))
 
     def report_motion(self, path: Sdf.Path) -> None:
-        """Reports features that do not work for a moving light that only light sampling finds."""
+        """Reports settings of mesh lights that are not supported if the light moves."""
         what = "shadow settings and the sync mode independent of moving mesh lights"
         self._report.missing(what, path)
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Materials: converts shader networks to programs, parameters, textures and value graphs."""
+"""Converts shader networks to surfaces: programs, parameters, textures and value graphs."""

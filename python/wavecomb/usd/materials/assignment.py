@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Assigns materials to gprims: bound materials, GeomSubset bindings or the display colour."""
+"""Assigns materials to gprims, from bindings, GeomSubset bindings or display colours."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class BoundMaterials:
     """The materials that are bound to a gprim.
 
     Attributes:
-        material: Material id of all faces that ``by_face`` does not cover.
-        by_face: (face count,) material ids, if the faces have different materials.
+        material: Material id of all faces that no GeomSubset binding covers.
+        by_face: (face count,) material id of each face if the faces have different materials.
         reads: Primvars of the gprim that the materials read, by name.
     """
 
@@ -44,7 +44,7 @@ class BoundMaterials:
 
 
 class Assigner:
-    """Assignment of materials to gprims, with the primvars that the materials read."""
+    """Assigns materials to gprims and collects the primvars that the materials read."""
 
     def __init__(self, context: LoadContext, table: MaterialTable) -> None:
         self.time, self.report = context.time, context.report
@@ -70,9 +70,9 @@ class Assigner:
         """Returns the materials of a gprim.
 
         Args:
-            draw: The gprim with its bindings.
+            draw: The gprim with its material bindings.
             mesh: Geometry arrays of the gprim.
-            otherwise: Material id if there is neither a binding nor a display colour; None means
+            otherwise: Material id for a gprim with neither binding nor display colour; None means
                 grey.
         """
         if draw.material is None and draw.is_plain:
@@ -144,7 +144,7 @@ class Assigner:
     def _one_value(self, draw: DrawItem, name: str) -> Any:
         """Returns the value of a primvar on a gprim.
 
-        Reports a varying primvar and uses its mean.
+        If the primvar varies, its mean is used and reported.
         """
         path = draw.prim.GetPath()
         if (text := _text_of(draw, name, self.time)) is not None:
@@ -222,7 +222,7 @@ class Assigner:
         return self.table.add(self.table.varied(surface, tuple(varying)), brightest)
 
     def _with_graph(self, primvars: _Primvars, surface: Surface) -> Surface:
-        """Returns the surface with its graph specialised to the gprim's transform and primvars."""
+        """Returns the surface with its graph adapted to the gprim's transform and primvars."""
         graph = surface.graph
         values: dict[str, tuple[float, ...]] = {}
         varying: dict[str, int] = {}
@@ -248,7 +248,7 @@ class Assigner:
         return self._bound_graphs[key][1]
 
     def _with_uv_sets(self, primvars: _Primvars, surface: Surface) -> Surface:
-        """Returns the surface with textures that read further UV sets of the mesh as primvars."""
+        """Returns the surface with textures that read additional UV sets as primvars."""
         first = surface.uv_names[0] if surface.uv_names else ""
         named = {p: surface.texture_uvs.get(p, first) for p in surface.textures}
         others = {name for name in (first, *named.values()) if name and name != primvars.own_uv}
@@ -268,7 +268,7 @@ class Assigner:
         return self._bound_graphs[key][1]
 
     def _display(self, primvars: _Primvars, otherwise: int | None) -> int:
-        """Returns the material id for displayColor and displayOpacity."""
+        """Returns the material id for a gprim's displayColor and displayOpacity."""
         colours = primvars.find("displayColor", 3)
         opacities = primvars.find("displayOpacity", 1)
         if colours is None and opacities is None:
@@ -288,7 +288,7 @@ class Assigner:
 
 
 def is_uniform(surface: Surface) -> bool:
-    """Returns whether a surface is the same on all gprims."""
+    """Returns whether a surface looks the same on all gprims."""
     graph = surface.graph
     reads = surface.primvars or (graph and graph.depends_on_mesh) or surface.emission_attributes()
     return not (reads or surface.texture_uvs or surface.object_reads or surface.stand_in)
@@ -317,11 +317,11 @@ class _Primvars:
 
     @property
     def matrix(self) -> NDArray[np.float64]:
-        """(4, 4) transform from the gprim to its group."""
+        """(4, 4) transform from the gprim to its group (the world or a prototype)."""
         return np.array(self._draw.matrix, np.float64)
 
     def find(self, name: str, width: int) -> PrimvarRequest | None:
-        """Returns a primvar with at least ``width`` components; None if there is no valid one.
+        """Returns a valid primvar with at least ``width`` components, or None.
 
         A ``width`` of 0 accepts any number of components, at most ``MAX_WIDTH``.
         """
@@ -338,11 +338,11 @@ class _Primvars:
         return self._found[key]
 
     def highest(self, names: Iterable[str]) -> float:
-        """Returns the largest component of the named primvars that are read at hits, else 0."""
+        """Returns the largest value of the named primvars that materials read at hits, or 0."""
         return max((self.read[name].highest for name in names if name in self.read), default=0.0)
 
     def keep(self, wanted: PrimvarRequest) -> None:
-        """Records that a material reads the primvar at hits."""
+        """Records that a material reads the primvar at each hit."""
         name = wanted.primvar.name
         known = self.read.get(name)
         if known is None or known.width < wanted.width:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Colour = tuple[float, float, float]
 
 OCIO_NAMES = {"rec709": "Linear Rec.709 (sRGB)", "acescg": "ACEScg"}
-"""OpenColorIO's names of the working spaces."""
+"""OpenColorIO's names of Wavecomb's working spaces."""
 
 LINEAR = OCIO_NAMES["rec709"]
 SRGB = "sRGB Encoded Rec.709 (sRGB)"
@@ -40,7 +40,7 @@ _ROWS = 256
 
 @functools.cache
 def canonical(name: str) -> str | None:
-    """Returns OpenColorIO's name of a colour space, or None if the config does not know it."""
+    """Returns OpenColorIO's name of a colour space; None if OpenColorIO does not know the space."""
     known = _COMMON.get(name.lower())
     if known is not None:
         return known
@@ -99,7 +99,7 @@ def convert(pixels: NDArray[Any], source: str, working: str) -> NDArray[np.float
 
 @functools.cache
 def convert_colour(colour: Colour, source: str, working: str) -> Colour:
-    """Converts one colour with the rules of ``convert``."""
+    """Converts one colour like ``convert`` converts images."""
     if source in (RAW, OCIO_NAMES[working]):
         return colour
     r, g, b = convert(np.array(colour, np.float32).reshape(1, 1, 3), source, working)[0, 0]
@@ -118,10 +118,10 @@ def to_linear(values: NDArray[Any]) -> NDArray[np.float32]:
 
 
 def halve(pixels: NDArray[Any], srgb: bool) -> NDArray[Any]:
-    """Returns an image (h, w, c) at half its size, rounded down, with the core's mip filter.
+    """Halves the size of an image (h, w, c), rounded down, with the mip filter of the core.
 
-    Applies a box filter in linear light and keeps the type. ``srgb`` says that uint8 colours are
-    sRGB encoded.
+    The box filter works on linear values; the result has the type of the input. ``srgb`` tells
+    whether uint8 colours are sRGB encoded.
     """
     height, width, channels = pixels.shape
     out = np.empty((max(height // 2, 1), max(width // 2, 1), channels), pixels.dtype)
@@ -147,7 +147,7 @@ def halve(pixels: NDArray[Any], srgb: bool) -> NDArray[Any]:
 
 
 def _halve_axis(values: NDArray[np.float32], axis: int) -> NDArray[np.float32]:
-    """Averages boxes along an axis; for an odd size n, each box is n / (n // 2) values wide."""
+    """Averages pairs of values along an axis; for an odd size n, boxes are n / (n // 2) wide."""
     size = values.shape[axis]
     if size == 1:
         return values
@@ -172,6 +172,6 @@ _LINEAR = np.where(
 
 
 def _encode(linear: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Encodes linear values of at least 0 with the sRGB transfer curve."""
+    """Encodes non-negative linear values with the sRGB transfer curve."""
     high = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
     return np.where(linear <= 0.0031308, 12.92 * linear, high).astype(np.float32)

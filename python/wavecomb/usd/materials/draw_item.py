@@ -16,12 +16,13 @@ _DISPLAYED = ("primvars:displayColor", "primvars:displayOpacity")
 
 @dataclass(slots=True)
 class Parent:
-    """Parent prim of gprims, with properties that its children share.
+    """Parent prim of gprims, with properties that all its child gprims share.
 
     Attributes:
         prim: The parent prim.
-        above: Parent of the prim, if the traversal visited it.
-        asset: Length of the path of the prim's asset, once ``Assets`` has computed it.
+        above: Parent of ``prim``, if the traversal has visited it.
+        asset: Length of the part of the path that identifies the asset, once ``Assets`` has
+            computed it.
     """
 
     prim: Usd.Prim
@@ -34,17 +35,16 @@ class DrawItem:
     """A gprim to draw.
 
     Attributes:
-        prim: Mesh, implicit shape, curves, points or splats.
-        matrix: Transform from the gprim to its group.
+        prim: Prim of a mesh, implicit shape, curves, points or splats.
+        matrix: Transform from the gprim to its group (the world or a prototype).
         inherited: Constant primvars of the gprim's ancestors.
-        subsets: GeomSubset prims that bind materials.
+        subsets: GeomSubset prims to which materials are bound.
         material: Material bound to the gprim.
-        subset_materials: Material bound to each subset.
-        track: Animated transform of the gprim; replaces ``matrix`` if it moves while the shutter is
-            open.
-        names: Names of properties with authored opinions (``authored_names``).
-        kind: Kind of geometry: mesh, patch, shape, curves, points or splats.
-        parent: The parent prim, if the traversal visited it.
+        subset_materials: Materials bound to the subsets, one for each subset.
+        track: Animated transform of the gprim, which replaces ``matrix`` while the shutter is open.
+        names: Names of the gprim's authored properties, from ``authored_names``.
+        kind: "mesh", "patch", "shape", "curves", "points" or "splats".
+        parent: The parent prim, if the traversal has visited it.
     """
 
     prim: Usd.Prim
@@ -60,6 +60,6 @@ class DrawItem:
 
     @property
     def is_plain(self) -> bool:
-        """Whether a gprim without material has neither subsets nor display colours."""
+        """Whether the gprim has neither subsets nor display colours."""
         is_alone = bool(self.names) and not self.subsets and not self.inherited
         return is_alone and self.names.isdisjoint(_DISPLAYED)

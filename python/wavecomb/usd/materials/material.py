@@ -35,28 +35,29 @@ if TYPE_CHECKING:
     from wavecomb.usd.graphs.values import Graph
 
 INHERIT_MATERIAL = 0xFFFFFFFF
-"""Material id that means the instance's material; equals ``_core.INHERIT_MATERIAL``."""
+"""Material id that means "use the instance's material"; equals ``_core.INHERIT_MATERIAL``."""
 
 DEFAULT_COLOUR = (0.5, 0.5, 0.5)
 """Colour of geometry with neither a material nor a display colour."""
 
 
 PREVIEW = "preview"
-"""Result of ``surface_source`` for UsdPreviewSurface."""
+"""Kind of surface that ``surface_source`` returns for UsdPreviewSurface."""
 
 MIN_EMISSION = 1.0
-"""Emission from which a material counts as a light; then a stage without lights gets no dome."""
+"""Smallest emission of a material that counts as a light; such a stage gets no default dome."""
 
 _INSTEAD = "displayColor in its place"
 
 SPLATS = Surface("splats", "emissive", {"emission": (1.0, 1.0, 1.0)})
-"""Material of Gaussian splats, which multiplies their own radiance."""
+"""Material of Gaussian splats, whose emission of 1 is multiplied by the radiance of each splat."""
 
 
 def surface_source(material: UsdShade.Material) -> tuple[str, UsdShade.Shader]:
     """Returns the kind of a material's surface and its shader.
 
-    The kind is ``PREVIEW`` or a MaterialX shading model; "" if Wavecomb supports no surface output.
+    The kind is ``PREVIEW`` or a MaterialX shading model. It is empty if Wavecomb supports none of
+    the material's surface outputs.
     """
     shader = material.ComputeSurfaceSource()[0]
     # If a material has a MaterialX surface and a preview surface, use the MaterialX surface.
@@ -73,10 +74,10 @@ def surface_source(material: UsdShade.Material) -> tuple[str, UsdShade.Shader]:
 
 
 class MaterialTable:
-    """The materials of a scene; equal materials are merged."""
+    """The materials of a scene; equal materials are stored once."""
 
     def __init__(self, context: LoadContext, textures: TextureTable, apart: bool = False) -> None:
-        """``apart`` keeps materials of different prims separate even if they are equal."""
+        """``apart`` stores materials of different prims separately even if they are equal."""
         self._apart = apart
         self._names: list[str] = []
         self._builder, self._report = context.builder, context.report
@@ -91,7 +92,7 @@ class MaterialTable:
         self._varied: dict[tuple[int, tuple[str, ...]], tuple[Surface, Surface]] = {}
         self._plain: dict[tuple[Any, ...], int] = {}
         self.emits = False
-        """Whether a material in use emits ``MIN_EMISSION`` or more, like a light."""
+        """Whether a material in use emits at least ``MIN_EMISSION`` and thus counts as a light."""
         self._emitting: set[int] = set()
         self._emission: dict[int, tuple[Surface, float]] = {}
         self.scattering_interiors: list[str] = []
@@ -103,7 +104,7 @@ class MaterialTable:
         return self._textures.working
 
     def expect(self, material: UsdShade.Material) -> None:
-        """Starts reading the images of a material that will be used."""
+        """Starts reading the images of a material before the material is used."""
         if material.GetPath() not in self._surfaces:
             self._textures.expect(material.GetPrim(), self.time)
 
@@ -134,7 +135,7 @@ class MaterialTable:
     def surface_of_object(
         self, material: UsdShade.Material, primvars: Mapping[str, Any]
     ) -> Surface:
-        """Returns the surface of a material on an object with given values of ``object_reads``."""
+        """Returns the surface of a material for an object with these primvar values."""
         key = (material.GetPath(), tuple(sorted(primvars.items())))
         surface = self._of_objects.get(key)
         if surface is None:
@@ -151,9 +152,9 @@ class MaterialTable:
         return surface
 
     def add(self, surface: Surface, brightest: float = 0.0) -> int:
-        """Returns the material id of a surface.
+        """Adds a surface as a material unless an equal one exists; returns the material id.
 
-        ``brightest`` is the highest emission that primvars give the surface.
+        ``brightest`` is the highest emission due to primvars.
         """
         number = self._add(surface)
         if brightest > 0:
@@ -163,7 +164,7 @@ class MaterialTable:
         return number
 
     def varied(self, surface: Surface, varying: tuple[str, ...]) -> Surface:
-        """Returns a surface whose ``varying`` parameters read their primvars at hits."""
+        """Returns the surface with the parameters ``varying`` read from primvars at each hit."""
         if not varying:
             return surface
         known = self._varied.get((id(surface), varying))
@@ -250,11 +251,11 @@ class MaterialTable:
         return self._plain.get((*DEFAULT_COLOUR, 1.0))
 
     def paths(self) -> tuple[str, ...]:
-        """Returns the prim path of each material by id; "" for materials from display colours."""
+        """Returns the prim path of each material by id; empty for materials of display colours."""
         return tuple(name if name.startswith("/") else "" for name in self._names)
 
     def any_emits(self, material: int, faces: NDArray[np.uint32] | None) -> bool:
-        """Returns whether a mesh with this material, or these per-face materials, emits light."""
+        """Returns whether a mesh with these materials, one or one per face, emits light."""
         if faces is None or not self._emitting:
             return material in self._emitting
         return bool(np.isin(faces, list(self._emitting)).any())
@@ -262,7 +263,7 @@ class MaterialTable:
     def mean_emission(self, material: int) -> float:
         """Returns the mean luminance that a material emits; 0 if it is too low to count as a light.
 
-        Textures contribute the mean of their files, primvars their highest value.
+        Textures contribute the mean of their files, and primvars their highest value.
         """
         surface, highest = self._emission.get(material, (None, 0.0))
         if surface is None or max(highest, surface.brightest()) < MIN_EMISSION:
@@ -278,7 +279,7 @@ class MaterialTable:
     ) -> int:
         """Returns the material id of a display colour.
 
-        ``varying`` lists which of base_color and opacity read primvars at hits.
+        ``varying`` lists the parameters, base_color or opacity, that read primvars at each hit.
         """
         key = (*colour, opacity, *varying)
         number = self._plain.get(key)
@@ -289,7 +290,7 @@ class MaterialTable:
         return number
 
     def splats(self) -> int:
-        """Returns the material id of Gaussian splats, whose radiance is stored per splat."""
+        """Returns the material id for Gaussian splats, which store their radiance."""
         return self.add(SPLATS)
 
     def _convert(self, material: UsdShade.Material) -> Surface:
@@ -320,7 +321,7 @@ def _stand_in(material: Usd.Prim) -> Surface:
 
 
 def with_attributes(surface: Surface, varying: Sequence[str], working: str) -> Surface:
-    """Returns a surface whose ``varying`` parameters read their primvars at hits.
+    """Returns the surface with the parameters ``varying`` read from primvars at each hit.
 
     Raises:
         GraphTooLarge: The extended graph exceeds the size limit.
@@ -343,7 +344,7 @@ def with_attributes(surface: Surface, varying: Sequence[str], working: str) -> S
 
 
 def mean_emission(surface: Surface, textures: TextureTable) -> NDArray[np.float64]:
-    """Returns the mean emission (3,) over texture coordinates; an estimate for graphs."""
+    """Returns the mean emission (3,) over texture coordinates; for graphs it is an estimate."""
     graph = surface.graph
     if graph is not None and graph.emission is not None:
         value = dict(graph.outputs)["emission"]

@@ -26,13 +26,13 @@ _NO_ID = "a shader without info:id"
 
 @dataclass(frozen=True)
 class Source:
-    """The source of an input's value: a shader's output, or an attribute with a value.
+    """The source of an input's value, either a shader's output or an attribute with a value.
 
     Attributes:
-            shader: The shader that the input is connected to, if any.
-            output: Name of that shader's output.
-            value: The value, if there is one.
-            attribute: The attribute that holds the value.
+        shader: Shader to which the input is connected; None if the source is an attribute.
+        output: Name of the shader's output.
+        value: Value of the attribute; None if the source is a shader.
+        attribute: Attribute that holds the value.
     """
 
     shader: UsdShade.Shader | None = None
@@ -47,9 +47,9 @@ class Source:
 
 
 def source_of(shader: UsdShade.Shader, name: str, time: Usd.TimeCode) -> Source | None:
-    """Returns the source of an input; None if it is unauthored, dangling or cyclic.
+    """Returns the source of an input; None if the input is not set or its connection is invalid.
 
-    Follows connections to inputs of other shaders, which UsdShade resolves for containers only.
+    Connections to inputs of other shaders are followed, which UsdShade does for containers only.
     """
     shader_input = shader.GetInput(name)
     return _source_of(shader_input, time, MAX_DEPTH) if shader_input else None
@@ -82,9 +82,9 @@ def value_of(shader: UsdShade.Shader, name: str, time: Usd.TimeCode, default: An
 
 
 def layer_of_value(attribute: Usd.Attribute | None) -> Sdf.Layer | None:
-    """Returns the layer of the strongest opinion with a value, which anchors relative paths.
+    """Returns the layer with the strongest value of an attribute, to which relative paths refer.
 
-    Stronger opinions may hold only metadata or a connection.
+    Layers whose stronger opinions have only metadata or a connection are skipped.
     """
     for spec in attribute.GetPropertyStack() if attribute else []:
         has_default = spec.HasDefaultValue() and not isinstance(spec.default, Sdf.ValueBlock)
@@ -94,12 +94,12 @@ def layer_of_value(attribute: Usd.Attribute | None) -> Sdf.Layer | None:
 
 
 def shader_id(shader: UsdShade.Shader) -> str:
-    """Returns the info:id of a shader, or the empty string."""
+    """Returns the ``info:id`` of a shader, or an empty string."""
     return str(shader.GetIdAttr().Get() or "") if shader else ""
 
 
 def number(value: Any, default: float) -> float:
-    """Converts a value to a finite float (the first component of a vector), else the default."""
+    """Returns a number or the first component of a vector; the default if not finite."""
     try:
         result = float(value[0]) if hasattr(value, "__getitem__") else float(value)
     except (TypeError, ValueError, IndexError, OverflowError):
@@ -108,12 +108,12 @@ def number(value: Any, default: float) -> float:
 
 
 def word(value: Any, default: str = "") -> str:
-    """Returns a token or string; the default for a value of any other type."""
+    """Returns a token or string as a string, or the default for a value of another type."""
     return value if isinstance(value, str) else default
 
 
 def pair(value: Any, default: tuple[float, float]) -> tuple[float, float]:
-    """Returns the first two components of a value if both are finite, else the default."""
+    """Returns the first two components of a value, or the default unless both are finite."""
     if isinstance(value, str) or not hasattr(value, "__len__") or len(value) < 2:
         return default
     return number(value[0], default[0]), number(value[1], default[1])
@@ -135,7 +135,7 @@ def colour(value: Any, default: tuple[float, float, float]) -> tuple[float, floa
 
 
 def space_of(attribute: Usd.Attribute | None) -> str:
-    """Returns the colour space authored for an attribute or inherited from an ancestor prim, or "".
+    """Returns the colour space of an attribute, authored or inherited, or an empty string.
 
     The colour space of an ancestor applies to colour values only, not to files.
     """
@@ -189,9 +189,9 @@ def holds_colour(attribute: Usd.Attribute | None) -> bool:
 
 
 def surface_outputs(material: UsdShade.Material) -> list[tuple[str, UsdShade.Shader]]:
-    """Returns names and shaders of connected surface outputs, in stage order.
+    """Returns names and shaders of a material's connected surface outputs, in stage order.
 
-    Includes outputs for other renderers, such as outputs:ri:surface.
+    The result includes outputs for other renderers, such as ``outputs:ri:surface``.
     """
     return [
         (str(output.GetFullName()), shader)
@@ -202,7 +202,7 @@ def surface_outputs(material: UsdShade.Material) -> list[tuple[str, UsdShade.Sha
 
 
 def shader_name(shader: UsdShade.Shader) -> str:
-    """Returns the info:id of a shader, else the name of its source asset."""
+    """Returns the ``info:id`` of a shader, or the name of its source asset."""
     if name := shader_id(shader):
         return name
     authored = {one.GetName(): one for one in shader.GetPrim().GetAuthoredAttributes()}
@@ -220,12 +220,12 @@ def shader_name(shader: UsdShade.Shader) -> str:
 
 
 class InputValues:
-    """Reader of inputs that have one value per object, such as the scale of a texture.
+    """Reads shader inputs that have one value per object, such as the scale of a texture.
 
-    Resolves values through node graphs, interfaces, primvar readers and constant nodes.
+    Values may come from node graphs, interface inputs, primvar readers and constant nodes.
 
     Attributes:
-        reads: Names of the object's primvars that were read, in order of use.
+        reads: Names of the primvars of the object that were read, in order of use.
     """
 
     def __init__(
@@ -237,7 +237,8 @@ class InputValues:
     ) -> None:
         """``node_value`` evaluates MaterialX nodes (``Networks.node``).
 
-        ``primvars`` holds the object's values; readers of other primvars return their fallback.
+        ``primvars`` has values of the object's primvars; readers of other primvars return their
+        fallback.
         """
         self.reads: dict[str, None] = {}
         self._time = time
@@ -249,10 +250,10 @@ class InputValues:
     def of(
         self, shader: UsdShade.Shader, name: str, default: Any = None, *, by_object: bool = True
     ) -> Any:
-        """Returns the value of an input, or the default if nothing is authored.
+        """Returns the value of an input, or the default if the input is not set.
 
-        Reports an input that varies over the surface, and one that reads a primvar unless
-        ``by_object``.
+        Inputs that vary over the surface are reported, and inputs that read a primvar unless
+        ``by_object`` is set.
         """
         source = source_of(shader, name, self._time)
         if source is None:
@@ -274,7 +275,7 @@ class InputValues:
         return default
 
     def _read(self, reader: UsdShade.Shader, default: Any) -> Any:
-        """Returns the value of a primvar reader, whose varname and fallback may be connected."""
+        """Returns the value of a primvar reader, whose inputs may be connected."""
         self._depth += 1
         try:
             name = self.of(reader, "varname", "")
@@ -316,9 +317,9 @@ def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
 
 
 def _file_of_text(name: str, attribute: Usd.Attribute | None) -> str:
-    """Returns the path of the file that a string names.
+    """Returns the path of the file that a string value names.
 
-    Relative names are anchored at the layer that holds the string.
+    Relative paths refer to the layer in which the string is authored.
     """
     name = name.replace(_SMALL_UDIM, UDIM)
     layer = layer_of_value(attribute)
@@ -340,7 +341,7 @@ def missing_tiles(pattern: str) -> str:
 
 
 def image_files(material: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
-    """Yields files that shaders in a material name; the material probably needs these images."""
+    """Yields files that shaders of a material name, which are probably images of the material."""
     for prim in _each_once(material):
         for attribute in prim.GetAuthoredAttributes():
             if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset:
@@ -354,7 +355,7 @@ def image_files(material: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
 
 
 def _each_once(top: Usd.Prim) -> Iterator[Usd.Prim]:
-    """Yields a prim and its descendants; prims in instances once per prototype."""
+    """Yields a prim and its descendants; prims inside instances are visited once per prototype."""
     tops = [top.GetPrimInPrototype() if top.IsInstanceProxy() else top]
     known: set[Sdf.Path] = set()
     while tops:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Editable parameters of materials and lights, with the attributes that hold them.
 
-``wavecomb.usd.materials.material`` reads surfaces; this module finds the attribute behind each
-constant, so that programs such as the viewer can write a change back to the stage, and reads
-constants of a MaterialX material without its images.
+The module ``wavecomb.usd.materials.material`` reads surfaces. This module finds the attribute that
+holds each constant, so that programs such as the viewer can write changes to the stage. It also
+reads the constants of a MaterialX material without reading images.
 """
 
 from __future__ import annotations
@@ -59,12 +59,14 @@ class Parameter:
 
     Attributes:
         name: Keyword argument of ``SceneBuilder.add_material``, or input of the MaterialX shader.
-        value: Value that the loader reads: a number, a colour or a bool; None if it is driven.
-        attribute: Path of the attribute to author, which need not exist yet; None for no attribute.
+        value: Value that the loader reads: a number, a colour or a bool; None if a texture or
+            primvar drives the parameter.
+        attribute: Path of the attribute to author, which may not exist yet; None if there is no
+            such attribute.
         type_name: Type of the attribute.
-        driven_by: Driver of the value, such as "texture marble.png" or "primvar displayColor"; ""
-            for a constant.
-        reason: Reason why no attribute can be authored, or "" if it can.
+        driven_by: Source of a value that is not constant, such as "texture marble.png" or "primvar
+            displayColor"; empty for a constant.
+        reason: Reason why the parameter cannot be edited; empty if it can.
         definition: MaterialX definition of the input; None for UsdPreviewSurface.
     """
 
@@ -77,7 +79,7 @@ class Parameter:
     definition: InputDefinition | None = None
 
     def authored(self, value: Any) -> Any:
-        """Converts a parameter value to the value that the attribute must hold."""
+        """Converts a parameter value to the value of the attribute."""
         if isinstance(value, bool):
             return value if self.type_name == Sdf.ValueTypeNames.Bool else int(value)
         if isinstance(value, (tuple, list)):
@@ -88,7 +90,7 @@ class Parameter:
 
 
 def material_parameters(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Parameter]:
-    """Returns parameters of a material by name, in display order; empty if it has no surface."""
+    """Returns a material's parameters by name, in display order; empty without a surface."""
     material = UsdShade.Material(prim)
     kind, shader = surface_source(material) if material else ("", UsdShade.Shader())
     if not kind:
@@ -100,7 +102,7 @@ def material_parameters(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Paramet
 
 
 class _Tracer:
-    """Search for the attributes behind the inputs of one surface shader."""
+    """Finds the attributes that hold the inputs of one surface shader."""
 
     def __init__(self, prim: Usd.Prim, shader: UsdShade.Shader, time: Usd.TimeCode) -> None:
         self._prim = prim
@@ -163,7 +165,7 @@ class _Tracer:
         )
 
     def _path_of(self, name: str, attribute: Usd.Attribute | None) -> Sdf.Path:
-        """Returns the path of the attribute that holds an input's value or would hold it."""
+        """Returns the path of the attribute that holds, or would hold, an input's value."""
         own = self._shader.GetPath().AppendProperty(f"inputs:{name}")
         return own if attribute is None else attribute.GetPath()
 
@@ -183,7 +185,7 @@ class _Tracer:
     def _encoded(
         self, parameter: str, value: Any, attribute: Usd.Attribute | None, space: str
     ) -> Parameter:
-        """Returns a colour that cannot be edited because it is authored in another colour space."""
+        """Returns a colour parameter that is not editable because of its colour space."""
         # Ignore unknown colour spaces here, since the material reader reports them.
         with contextlib.suppress(ValueError):
             value = linear_colour(value, attribute)
@@ -229,7 +231,7 @@ def _is_triple(type_name: Sdf.ValueTypeName) -> bool:
 
 
 class _AnyProfile:
-    """Substitute for the table of IES profiles that accepts every profile."""
+    """Table of IES profiles that accepts every profile without reading it."""
 
     def add(self, path: str, prim: Sdf.Path) -> int:
         """Returns a dummy profile id."""
@@ -239,9 +241,9 @@ class _AnyProfile:
 def light_values(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any] | None:
     """Returns the parameters that the loader passes to ``SceneBuilder.add_light``.
 
-    The light must be outside of instances. Returns numbers, colours and switches by the names of
-    ``wavecomb.core_table``: all parameters of this kind of light except its visibility. Returns
-    None if the prim is not a supported light.
+    The light must be outside of instances. The result has all numbers, colours and switches of this
+    kind of light except its visibility, by their names in ``wavecomb.core_table``. Returns None if
+    the prim is not a supported light.
     """
     if not prim or str(prim.GetTypeName()) not in LIGHT_KINDS:
         return None
@@ -254,7 +256,7 @@ def light_values(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any] | None:
 
 
 def light_transform(prim: Usd.Prim, time: Usd.TimeCode) -> NDArray[np.float64]:
-    """Returns the transform (4, 4) to the world that the loader passes for a supported light."""
+    """Returns the transform (4, 4) to the world that the loader uses for a supported light."""
     light, matrix = _read_light(prim, time)
     return np.asarray(light.local @ np.array(matrix))
 
@@ -288,13 +290,13 @@ def as_stored(value: Any) -> Any:
 
 
 def _other_space(attribute: Usd.Attribute | None) -> str | None:
-    """Returns the colour space of an attribute unless it is linear Rec.709 or unauthored."""
+    """Returns the colour space of an attribute, or None for linear Rec.709 or no space."""
     space = space_of(attribute)
     return space if space and canonical(space) not in (LINEAR, RAW) else None
 
 
 class _NoTextures:
-    """Substitute for the scene's textures: accepts every file name and opens no file."""
+    """Texture table that accepts every file name and opens no file."""
 
     working = "rec709"
 
@@ -306,12 +308,12 @@ class _NoTextures:
         return SimpleNamespace(channels=4)
 
     def add(self, *key: Any, **more: Any) -> int:
-        """Returns a different id for each different texture use."""
+        """Returns an id for a texture use, which differs between texture uses."""
         use = (key[0], *key[2:], *sorted(more.items()))
         return self._numbers.setdefault(use, len(self._numbers))
 
     def missing(self) -> int:
-        """Returns the id of the checker texture."""
+        """Returns a dummy id for the checker texture."""
         return -1
 
 
@@ -320,9 +322,10 @@ class SurfaceValues:
     """The values of a material in the core.
 
     Attributes:
-        constants: Keyword arguments of ``Renderer.edit``, without values from textures and graphs.
-        structure: Text that identifies textures and graphs with their constants, which cannot be
-            edited in an existing scene.
+        constants: Keyword arguments of ``Renderer.edit``, except those that textures or graphs
+            drive.
+        structure: Text that differs if textures or graphs differ, which ``Renderer.edit`` cannot
+            change.
     """
 
     constants: Mapping[str, Any]
@@ -332,12 +335,12 @@ class SurfaceValues:
 def surface_values(
     prim: Usd.Prim, time: Usd.TimeCode, values: Mapping[str, Any] | None = None
 ) -> SurfaceValues | None:
-    """Returns the values that the loader passes to the core; None without a MaterialX material.
+    """Returns the values that the loader passes to the core; None unless the material is MaterialX.
 
     Args:
         prim: A material.
         time: Time code at which attributes are evaluated.
-        values: Constants of the surface shader that replace the authored ones.
+        values: Constants that replace authored inputs of the surface shader.
     """
     material = UsdShade.Material(prim)
     kind, shader = surface_source(material) if material else ("", UsdShade.Shader())

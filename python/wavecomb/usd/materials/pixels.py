@@ -24,23 +24,23 @@ if TYPE_CHECKING:
 
 MAX_SIDE = 65536
 MAX_BYTES = 8 << 30
-"""Memory limit of decoding one image, in bytes."""
+"""Maximum memory that decoding an image may take, in bytes."""
 
 
 Stamp = tuple[int, int]
-"""Stamp of a file: modification time in ns, and size in bytes."""
+"""Identifies a version of a file by modification time in ns and size in bytes."""
 
 
 class Image:
-    """Pixels (height, width, channels 1 to 4), uint8, float16 or float32; row 0 is the top.
+    """An image with 1 to 4 channels, as uint8, float16 or float32; row 0 is the top.
 
     Attributes:
-            size: Height and width.
-            channels: Number of channels.
-            dtype: Type of the pixel values.
-            stamp: Stamp of the file before it was read; None if unknown.
-            wraps: Wrap modes in s and t that the file requests: black, clamp, repeat or mirror.
-            encoded: Whether the file declares sRGB encoding; None if it declares nothing.
+        size: Height and width.
+        channels: Number of channels.
+        dtype: Type of the pixel values.
+        stamp: Stamp of the file before it was read; None if unknown.
+        wraps: Wrap modes in s and t that the file declares: black, clamp, repeat or mirror.
+        encoded: Whether the file declares sRGB encoding; None if the file does not tell.
     """
 
     def __init__(
@@ -60,11 +60,11 @@ class Image:
 
     @property
     def is_here(self) -> bool:
-        """Whether the image still holds its pixels."""
+        """Whether the pixels have not been released."""
         return self._pixels is not None
 
     def take(self) -> NDArray[Any]:
-        """Returns the pixels and releases them.
+        """Returns the pixels and releases them from the image.
 
         Raises:
             ValueError: The pixels were taken before.
@@ -86,11 +86,11 @@ class Image:
 
 
 class TextureError(ValueError):
-    """An image file cannot be used; the message gives the reason in a few words."""
+    """Raised if an image file cannot be used; the message gives the reason."""
 
 
 def stamp_of(path: str) -> Stamp | None:
-    """Returns the stamp of a file, or of the package that holds it; None if it does not exist."""
+    """Returns the stamp of a file or of its .usdz package; None if the file does not exist."""
     if Ar.IsPackageRelativePath(path):
         path = Ar.SplitPackageRelativePathOuter(path)[0]
     try:
@@ -110,7 +110,7 @@ def read_image(path: str) -> Image:
 
 
 def read_header(path: str) -> Image:
-    """Reads an image like ``read_image``, but with pixels that are all 0 and take no memory.
+    """Reads only the header of an image; the pixels are all 0 and take no memory.
 
     Raises:
         TextureError: The image is missing, unreadable or too large.
@@ -139,14 +139,14 @@ def _why_missing(path: str) -> str:
 
 
 _BY_ENDING = (".jp2", ".j2k", ".j2c", ".jph")
-"""File extensions of formats that OpenImageIO recognises by name only."""
+"""File extensions of the formats that OpenImageIO recognises only by extension."""
 
 
 @contextmanager
 def _unpacked(data: Any, name: str) -> Iterator[str]:
-    """Yields the name of a temporary file with the content of a file in a package.
+    """Yields the name of a temporary file with the contents of a file in a package.
 
-    Uses anonymous memory where possible, so that nothing is left if the process ends abnormally.
+    The file is in anonymous memory where possible, so that it vanishes if the process is killed.
     """
     ending = Path(name).suffix.lower()
     if ending not in _BY_ENDING and hasattr(os, "memfd_create"):
@@ -180,7 +180,7 @@ _WRAP_WORDS = {"periodic": "repeat"} | {w: w for w in ("black", "clamp", "repeat
 
 
 def _wraps(spec: Any) -> tuple[str, str]:
-    """Returns wrapS and wrapT of a file, or ``wrapmodes`` as texture tools write it, else black."""
+    """Returns the wrap modes in s and t that a file declares; black if there are none."""
     both = str(spec.getattribute("wrapmodes") or "").split(",")
     words = [
         spec.getattribute(name) or both[min(i, len(both) - 1)]
@@ -191,7 +191,7 @@ def _wraps(spec: Any) -> tuple[str, str]:
 
 
 def _encoded(spec: Any) -> bool | None:
-    """Returns whether a colour image declares sRGB (True) or linear (False); None for neither."""
+    """Returns whether a file declares its colours as sRGB (True) or linear (False), else None."""
     if spec.nchannels < 3:
         return None
     if str(spec.getattribute("oiio:ColorSpace") or "").startswith("lin"):
@@ -242,19 +242,19 @@ def _read_file(
 
 
 _BAND = 64
-"""Rows that are converted together if the library's type differs from the stored type."""
+"""Number of rows that are converted together if OpenImageIO's type differs from the stored type."""
 
 
 def _decoding_bytes(spec: Any, channels: int, itemsize: int, asked: int) -> int:
     """Returns an upper bound of the memory that decoding takes, in bytes.
 
-    The sum covers the library's buffers, its result and the stored pixels.
+    The memory holds OpenImageIO's buffers, its result and the stored pixels.
 
     Args:
         spec: OpenImageIO's description of the file.
-        channels: Channels that are stored.
-        itemsize: Size of a stored value, bytes.
-        asked: Size of a value that the library returns, bytes.
+        channels: Number of channels to store.
+        itemsize: Size of a stored channel value, in bytes.
+        asked: Size of a channel value that OpenImageIO returns, in bytes.
     """
     pixels = int(spec.width) * int(spec.height)
     held = spec.pixel_bytes(True) + channels * itemsize
@@ -264,7 +264,7 @@ def _decoding_bytes(spec: Any, channels: int, itemsize: int, asked: int) -> int:
 
 
 def _decoded(source: Any, spec: Any, channels: int, dtype: Any, ask: Any) -> NDArray[Any] | None:
-    """Returns the pixels in their stored type, finite; None if the library cannot read them."""
+    """Returns the pixels in their stored type, with finite values; None if they cannot be read."""
     shape = spec.height, spec.width, channels
     if np.dtype(dtype).itemsize == ask.basesize() or spec.tile_width:
         pixels = source.read_image(0, 0, 0, channels, ask)
@@ -295,7 +295,7 @@ _EXPONENTS = {2: (0x7C00, 0xFC00), 4: (0x7F800000, 0xFF800000)}
 def is_finite(pixels: NDArray[Any]) -> bool:
     """Returns whether all float16 or float32 values are finite, for any number of dimensions.
 
-    Compares bit patterns as integers: NumPy's isfinite takes longer for float16 than decoding does.
+    For float16, comparing bit patterns is faster; NumPy's isfinite takes longer than decoding.
     """
     size = pixels.dtype.itemsize
     if pixels.size == 0 or size not in _EXPONENTS or not pixels.flags.c_contiguous:
@@ -309,10 +309,10 @@ def is_finite(pixels: NDArray[Any]) -> bool:
 
 
 class ReadAhead:
-    """Queue that reads images before they are needed.
+    """Reads images on separate threads before they are needed.
 
-    Contract: the queue is used by one thread. At most ``threads`` + 1 images are ready or being
-    read, which bounds memory. An image that is requested but not being read yet is read at once.
+    Contract: only one thread uses this object. At most ``threads`` + 1 images are ready or being
+    read, which bounds memory. A requested image that no thread reads yet is read immediately.
     """
 
     def __init__(self, threads: int = 0, limit_bytes: int | None = None) -> None:
@@ -329,7 +329,7 @@ class ReadAhead:
         self._ready: dict[str, Future[Image]] = {}
 
     def want(self, paths: Iterable[str]) -> None:
-        """Queues images that will be needed, most likely in the given order."""
+        """Queues images that will be needed, in the order in which they are expected."""
         if self._threads == 1:
             return
         for path in paths:
@@ -339,7 +339,7 @@ class ReadAhead:
         self._start()
 
     def read(self, path: str) -> Image:
-        """Returns the image of ``read_image``, which may have been read ahead."""
+        """Returns the result of ``read_image``, which may have been read ahead."""
         self._seen.add(path)
         future = self._ready.pop(path, None)
         if future is None:
@@ -368,7 +368,7 @@ class ReadAhead:
         return sum(self._sizes[path] for path in self._ready) if self._sizes else 0
 
     def _fits(self, path: str) -> bool:
-        """Returns whether reading another image keeps the memory within the limit."""
+        """Returns whether reading another image would keep the memory within the limit."""
         if self._limit_bytes is None:
             return True
         if path not in self._sizes:

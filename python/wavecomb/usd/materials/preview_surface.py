@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Converts UsdPreviewSurface networks to surfaces (specification 2.6)."""
+"""Converts UsdPreviewSurface networks to surfaces (UsdPreviewSurface specification 2.6)."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ INPUTS: dict[str, tuple[str, Any]] = {
     "ior": ("ior", 1.5),
     "opacityThreshold": ("opacity_threshold", 0.0),
 }
-"""Input of UsdPreviewSurface -> parameter of a program and its default."""
+"""Parameter and default value for each input of UsdPreviewSurface."""
 
 _UNIT = frozenset(
     ("roughness", "metallic", "clearcoat", "clearcoat_roughness", "opacity", "opacity_threshold")
@@ -62,7 +62,7 @@ _IDENTITY_UV = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 
 def program_of(material: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> str:
-    """Returns the program that ``wavecomb:program`` of a material names, else principled."""
+    """Returns the program in ``wavecomb:program`` of a material; "principled" if not authored."""
     name = material.GetAttribute("wavecomb:program").Get(time)
     if name is None:
         return "principled"
@@ -92,7 +92,7 @@ class PreviewReader:
         report: LoadReport,
         primvars: Mapping[str, Any] | None = None,
     ) -> None:
-        """``primvars`` holds the object's values of primvars that texture inputs read."""
+        """``primvars`` has the object's values of the primvars that texture inputs read."""
         self.material = material
         self.time = time
         self.textures = textures
@@ -191,7 +191,7 @@ class PreviewReader:
     def _input(self, parameter: str, source: Source, default: Any) -> Any:
         """Returns a constant for a parameter; None if the parameter has a texture or its default.
 
-        Adds textures to ``textured`` and primvars to ``primvars``.
+        The function adds textures to ``textured`` and primvars to ``primvars``.
         """
         if source.is_value:
             value = constant(parameter, source.value, default)
@@ -218,7 +218,7 @@ class PreviewReader:
         return default
 
     def _network(self, parameter: str, shader: UsdShade.Shader, output: str, default: Any) -> Any:
-        """Evaluates a MaterialX node network.
+        """Evaluates a MaterialX node that drives a parameter.
 
         Returns a constant, or None if a texture or graph drives the parameter.
         """
@@ -233,7 +233,7 @@ class PreviewReader:
         return read_colour(value, source.attribute, self.report, self.material.GetPath())
 
     def _texture(self, parameter: str, shader: UsdShade.Shader, output: str, default: Any) -> Any:
-        """Adds a texture use; returns a constant if there is no image."""
+        """Adds a texture use; returns a constant if the texture has no image."""
         scale = _four(self._value(shader, "scale"), _ONES)
         bias = _four(self._value(shader, "bias"), _ZEROS)
         file = source_of(shader, "file", self.time)
@@ -272,7 +272,7 @@ class PreviewReader:
         return None
 
     def _wrap(self, shader: UsdShade.Shader, name: str, of_file: str) -> str:
-        """Returns a wrap mode; useMetadata means the file's mode, or black if it has none."""
+        """Returns a wrap mode; "useMetadata" means the file's wrap mode, or black."""
         mode = word(self._value(shader, name), "useMetadata")
         if mode not in ("black", "clamp", "repeat", "mirror", "useMetadata"):
             self.report.warn(
@@ -284,7 +284,7 @@ class PreviewReader:
     def _linear_normals(
         self, space: str, image: Image | TiledImage, shader: UsdShade.Shader
     ) -> str:
-        """Returns the colour space of a normal map, which is always raw; reports other settings."""
+        """Returns raw, the colour space of all normal maps; reports other colour spaces."""
         if image.automatic_srgb if space == "auto" else canonical(space) == SRGB:
             if word(self._value(shader, "sourceColorSpace")) == "sRGB":
                 what = "normal map whose sourceColorSpace is sRGB: read as raw"
@@ -295,7 +295,7 @@ class PreviewReader:
         return "raw"
 
     def _colour_space(self, shader: UsdShade.Shader, file: Source | None) -> str:
-        """Returns sourceColorSpace, else the colour space of the file attribute, else auto."""
+        """Returns sourceColorSpace, or the colour space of the file attribute, or "auto"."""
         space = word(self._value(shader, "sourceColorSpace"))
         if space in ("raw", "sRGB"):
             return str(space)
@@ -312,7 +312,7 @@ class PreviewReader:
         bias: tuple[float, ...],
         default: Any,
     ) -> Any:
-        """Returns the value that replaces an unreadable image."""
+        """Returns the value that replaces an image that cannot be read."""
         authored = self._value(shader, "fallback")
         if authored is not None:
             texel = _four(authored, (0.0, 0.0, 0.0, 1.0))
@@ -327,10 +327,11 @@ class PreviewReader:
         return default
 
     def _coordinates(self, shader: UsdShade.Shader, parameter: str) -> tuple[float, ...]:
-        """Returns the 2 x 3 matrix from the mesh's to the texture's coordinates.
+        """Returns the 2 x 3 matrix that transforms the mesh's texture coordinates.
 
-        Adds the name of the primvar to ``uv_names``, and to ``texture_uvs`` if it is not the first
-        one. Without a connection the coordinates are constant, (0, 0) if nothing is authored.
+        The name of the UV primvar is added to ``uv_names``, and to ``texture_uvs`` if the first
+        texture uses another primvar. If the input ``st`` is not connected, the texture coordinates
+        are constant: the authored value or (0, 0).
         """
         matrix: tuple[float, ...] = _IDENTITY_UV
         node, key = shader, "st"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Description of a material surface, from which the loader adds a material to the core."""
+"""Surfaces, the descriptions from which the loader adds materials to the core."""
 
 from __future__ import annotations
 
@@ -19,15 +19,16 @@ class InputDefinition:
 
     Attributes:
         name: Authored name of the input without ``inputs:``.
-        group: Heading in the user interface, such as "Base" or "Coat".
-        label: Label under that heading.
+        group: Heading of the input in the user interface, such as "Base" or "Coat".
+        label: Label of the input under this heading.
         kind: "number", "colour" or "switch".
-        type_name: MaterialX type: float, color3 or boolean. Wavecomb may read a color3 as a number.
+        type_name: MaterialX type: float, color3 or boolean. Wavecomb reads some color3 inputs as
+        numbers.
         default: A number, three numbers or a bool.
         low: Smallest valid value.
         high: Largest valid value.
-        soft_low: Lower end of the slider.
-        soft_high: Upper end of the slider.
+        soft_low: Value at the lower end of the slider in the user interface.
+        soft_high: Value at the upper end of the slider in the user interface.
     """
 
     name: str
@@ -44,16 +45,16 @@ class InputDefinition:
 
 @dataclass(frozen=True)
 class SurfaceGraph:
-    """The compiled graphs of a surface.
+    """The value graphs of a surface, compiled for the core.
 
     Attributes:
-            whole: Graph of all parameters that are neither constants nor plain textures.
-            opacity: The part of it that computes opacity.
-            emission: The part of it that computes emission.
-            brightest: Highest emission found at sample points, with textures taken as white.
-            primvars: Names of the primvars that it reads from each mesh.
-            in_object_space: Whether it reads positions in object space.
-            outputs: Expressions that it was compiled from, by parameter.
+        whole: Graph of all parameters that are neither constants nor plain textures.
+        opacity: Graph of the opacity only.
+        emission: Graph of the emission only.
+        brightest: Highest emission at sample points; textures count as white.
+        primvars: Names of the primvars that the graph reads from each mesh.
+        in_object_space: Whether the graph reads positions in object space.
+        outputs: Values from which the graph was compiled, by parameter.
     """
 
     whole: Graph
@@ -66,7 +67,7 @@ class SurfaceGraph:
 
     @property
     def depends_on_mesh(self) -> bool:
-        """Whether the graph gives different results for different meshes."""
+        """Whether the graph reads data that differs between meshes."""
         return bool(self.primvars) or self.in_object_space
 
 
@@ -78,7 +79,7 @@ OPENPBR_COLOURS = (
     "fuzz_color",
     "coat_color",
 )
-"""Additional parameters of program openpbr that are colours."""
+"""Colour parameters of OpenPBR surfaces."""
 
 TEXTURED_PARAMETERS = (
     *COLOUR_PARAMETERS,
@@ -89,7 +90,7 @@ TEXTURED_PARAMETERS = (
     "opacity",
     "normal",
 )
-"""Parameters that a texture can drive."""
+"""Parameters that textures can drive directly."""
 
 DEFAULTS: dict[str, Any] = {
     "base_color": (0.18, 0.18, 0.18),
@@ -103,7 +104,7 @@ DEFAULTS: dict[str, Any] = {
     "normal": (0.0, 0.0, 1.0),
     "ior": 1.5,
 }
-"""Defaults of parameters of ``SceneBuilder.add_material``."""
+"""Default values of parameters of ``SceneBuilder.add_material``."""
 
 
 @dataclass(frozen=True)
@@ -111,23 +112,21 @@ class Surface:
     """A shading program with its parameters.
 
     Attributes:
-            name: Name for messages.
-            program: diffuse, metal, dielectric, plastic, emissive, principled, openpbr or hair.
-            parameters: Keyword arguments of ``SceneBuilder.add_material``.
-            textures: Texture uses by parameter, in the form that ``SceneBuilder.add_material``
-                takes.
-            uv_names: Primvars that hold texture coordinates, in order of use.
-            texture_uvs: UV primvar of each textured parameter that does not use the first of
-                ``uv_names``.
-            primvars: Primvar of the mesh by parameter; it overrides the constant if the mesh has
-                it.
-            displacement: Displacement along normals: a length or a texture use; None for no
-                displacement. Displacement changes the mesh's geometry, not the material. graph:
-                Graph of parameters that are neither constants nor plain textures. stand_in: Whether
-                this surface replaces a material that cannot be rendered. A display colour of the
-                bound prim then takes precedence.
-            object_reads: Primvars whose value on an object changes how textures are read. The
-                material is read again for each value of these primvars.
+        name: Name of the surface in messages.
+        program: One of diffuse, metal, dielectric, plastic, emissive, principled, openpbr or hair.
+        parameters: Keyword arguments of ``SceneBuilder.add_material``.
+        textures: Texture uses for ``SceneBuilder.add_material``, by parameter.
+        uv_names: Names of primvars that hold texture coordinates, in order of use.
+        primvars: Name of the primvar that overrides a constant if a mesh has it, by parameter.
+        displacement: Displacement along normals, as a length or a texture use; None for no
+            displacement. The displacement changes the geometry of meshes.
+        graph: Graph of parameters that are neither constants nor plain textures.
+        texture_uvs: UV primvar of each textured parameter that does not use the first of
+            ``uv_names``.
+        object_reads: Names of primvars whose value on an object changes how textures are read.
+            The material is read once for each set of values.
+        stand_in: Whether this surface replaces a material that cannot be rendered. A display
+            colour of the bound prim then takes precedence.
     """
 
     name: str
@@ -148,18 +147,18 @@ class Surface:
         return repr((self.program, parameters, textures, self.graph))
 
     def texture_uses(self) -> list[dict[str, Any]]:
-        """Returns all texture uses; texture uses of graphs have approximate UV matrices."""
+        """Returns all texture uses; the UV matrices of textures in graphs are approximate."""
         images = self.graph.whole.images if self.graph is not None else ()
         within = [{"texture": texture, "uv": (k, 0, 0, 0, k, 0)} for texture, k in images]
         return [*self.textures.values(), *within]
 
     def emission_attributes(self) -> tuple[str, ...]:
-        """Returns names of primvars that the emission reads at hits."""
+        """Returns names of the primvars that the emission graph reads at each hit."""
         emission = None if self.graph is None else self.graph.emission
         return () if emission is None else emission.names
 
     def brightest(self) -> float:
-        """Returns the highest emission that the surface can reach, with textures taken as white."""
+        """Returns the highest possible emission of the surface; textures count as white."""
         if self.graph is not None and self.graph.emission is not None:
             return self.graph.brightest
         use = self.textures.get("emission")
@@ -168,7 +167,7 @@ class Surface:
         return float(max(self.parameters.get("emission", (0.0,))))
 
     def with_value(self, parameter: str, value: Any) -> Surface:
-        """Returns the surface with a constant in place of a parameter's primvar."""
+        """Returns the surface with a constant for a parameter that read a primvar."""
         rest = {name: primvar for name, primvar in self.primvars.items() if name != parameter}
         return replace(self, parameters={**self.parameters, parameter: value}, primvars=rest)
 
@@ -187,9 +186,9 @@ def fallback_surface(
     name: str = "displayColor",
     varying: Sequence[str] = (),
 ) -> Surface:
-    """Returns the diffuse surface in the display colour, for gprims without a material.
+    """Returns a surface with the display colour, for gprims without a material.
 
-    ``varying`` lists which of base_color and opacity read a primvar that varies over the gprim.
+    ``varying`` lists the parameters, base_color or opacity, whose primvar varies over the gprim.
     """
     parameters: dict[str, Any] = {"base_color": colour}
     primvars = {parameter: _DISPLAY[parameter] for parameter in varying}

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 _WRAPS = ("repeat", "clamp", "mirror", "black")
 
 CURVE = "sRGB curve"
-"""Pseudo colour space: the core decodes the sRGB curve, and pixels are not converted."""
+"""Colour space of textures whose sRGB curve the core decodes, without converting pixels."""
 
 
 def checker() -> NDArray[np.uint8]:
@@ -47,7 +47,7 @@ def checker() -> NDArray[np.uint8]:
 
 
 Key = tuple[str, str, str, str]
-"""A plain texture: its file, the colour space of its pixels, and its wrap modes in s and t."""
+"""Key of a texture: file, colour space of the pixels, and wrap modes in s and t."""
 
 
 @dataclass
@@ -55,8 +55,8 @@ class TiledImage:
     """The images of a UDIM texture.
 
     Attributes:
-            first: Image of the tile with the lowest number.
-            tiles: Tile numbers and files.
+        first: Image of the tile with the lowest number.
+        tiles: Tile numbers and files.
     """
 
     first: Image
@@ -69,12 +69,12 @@ class TiledImage:
 
 
 def _converts(space: str) -> bool:
-    """Returns whether pixels in a colour space must be converted before they are stored."""
+    """Returns whether pixels in this colour space are converted before they are stored."""
     return space not in (RAW, CURVE)
 
 
 def stored_type(image: Image, space: str) -> Any:
-    """Returns the stored type: the file's type, but half floats for converted 8-bit images."""
+    """Returns the type of the stored pixels; converted 8-bit images are stored as half floats."""
     if image.dtype == np.uint8 and _converts(space):
         return np.dtype(np.float16)
     return image.dtype
@@ -82,7 +82,7 @@ def stored_type(image: Image, space: str) -> Any:
 
 @dataclass(frozen=True)
 class TextureCache:
-    """The textures of a scene, which later scenes can share.
+    """The textures of a scene, for reuse in later scenes.
 
     Attributes:
         scene: The scene that holds the textures.
@@ -103,9 +103,10 @@ MEGABYTE = 1_000_000
 def texture_store(
     limit: float | None, reuse: TextureCache | None, report: LoadReport
 ) -> _core.TextureStore | None:
-    """Returns the store that limits textures to ``limit`` MB; None without a limit.
+    """Returns the store that keeps textures within ``limit`` MB; None if there is no limit.
 
-    Returns the store of ``reuse`` if its limit is equal, so that shared textures count as well.
+    If ``reuse`` has a store with this limit, it is returned, so that the limit includes reused
+    textures.
 
     Raises:
         WavecombError: A texture store with the given limit cannot be created.
@@ -128,7 +129,7 @@ def texture_store(
 
 
 class TextureTable:
-    """The textures of a scene; equal textures are merged."""
+    """The textures of a scene; equal textures are stored once."""
 
     def __init__(
         self,
@@ -136,12 +137,12 @@ class TextureTable:
         reuse: TextureCache | None = None,
         store: _core.TextureStore | None = None,
     ) -> None:
-        """``reuse`` holds textures to share if their files have not changed.
+        """``reuse`` has textures of a previous scene, to be reused if files have not changed.
 
-        ``store`` is the texture store of the builder. ``drops`` may be set to the number of finest
-        mip levels that each texture leaves out, and ``origin`` to the world position of the scene's
-        origin, for graphs. The table does not keep the context's stage, since the table may outlive
-        the stage.
+        ``store`` is the texture store of the builder. Callers may set ``drops``, the number of
+        finest mip levels to leave out per texture, and ``origin``, the world position of the
+        scene's origin. The table does not keep the context's stage, since the table may outlive the
+        stage.
         """
         self.store = store
         self.working = context.options.working_space
@@ -161,12 +162,12 @@ class TextureTable:
         self._by_size: dict[int, list[str]] = {}
 
     def expect(self, material: Usd.Prim, time: Usd.TimeCode) -> None:
-        """Starts reading the images of a material that will be used."""
+        """Starts reading the images of a material before the material is used."""
         files = [self._twin(file) for file in image_files(material, time)]
         self._ahead.want(file for file in files if self._known(file) is None)
 
     def _known(self, path: str) -> Image | None:
-        """Returns the image that the previous scene made of a file, unless the file changed."""
+        """Returns the previous scene's image of a file; None if the file has changed."""
         if self._reuse is None:
             return None
         if path not in self._unchanged:
@@ -176,7 +177,7 @@ class TextureTable:
         return self._unchanged[path]
 
     def _twin(self, path: str) -> str:
-        """Returns the first requested file with the same bytes, usually the file itself."""
+        """Returns the first file with the same contents among all requested files."""
         found = self._twins.get(path)
         if found is None:
             found = path
@@ -194,9 +195,9 @@ class TextureTable:
         return found
 
     def image(self, path: str, prim: object) -> Image | TiledImage | None:
-        """Returns the image of a file or UDIM pattern; warns and returns None if it is unreadable.
+        """Returns the image of a file or UDIM pattern; warns and returns None on failure.
 
-        Reads files with equal bytes only once, and reads all tiles of a UDIM pattern.
+        Files with equal contents are read only once. All tiles of a UDIM pattern are read.
         """
         if UDIM in path:
             tiles = tile_files(path)
@@ -240,13 +241,13 @@ class TextureTable:
         """Returns the texture id of an image.
 
         Args:
-            path: File that names the texture.
+            path: File name, or UDIM pattern.
             image: Result of ``image``.
-            colour_space: auto, or a name in OpenColorIO's built-in config.
+            colour_space: "auto", or the name of a colour space in OpenColorIO's built-in config.
             wrap_s: repeat, clamp, mirror or black; any other value means black, as in UsdUVTexture.
             wrap_t: Wrap mode along t, with the same values as ``wrap_s``.
             is_colour: Whether the texture holds colours, which are converted to the working space.
-                For data other than colours, only an sRGB curve is decoded.
+                If False, only an sRGB curve is decoded.
             missing: Linear colour and alpha of UDIM tiles that do not exist.
         """
         if isinstance(image, TiledImage):
@@ -275,7 +276,7 @@ class TextureTable:
     ) -> int:
         """Adds a texture of all readable tiles.
 
-        If ``colour_space`` is auto, each tile uses the colour space of its file.
+        If ``colour_space`` is "auto", each tile uses the colour space of its own file.
         """
         tiles = []
         for number, file in image.tiles:
@@ -292,7 +293,7 @@ class TextureTable:
         return self._ids[key]
 
     def _space(self, path: str, image: Image, colour_space: str, is_colour: bool) -> str:
-        """Returns OpenColorIO's name of the source colour space, RAW (no conversion) or CURVE."""
+        """Returns the colour space of pixels: an OpenColorIO name, RAW (no conversion) or CURVE."""
         if colour_space == "auto":
             space = SRGB if image.automatic_srgb else LINEAR
         else:
@@ -310,7 +311,7 @@ class TextureTable:
     def _as_stored(
         self, path: str, image: Image, space: str, wraps: tuple[str, str]
     ) -> NDArray[Any]:
-        """Takes the pixels of an image in their stored form, without its dropped mip levels."""
+        """Takes the pixels of an image in their stored type, without omitted mip levels."""
         pixels = image.take()
         dtype = stored_type(image, space)
         if _converts(space):
@@ -347,7 +348,7 @@ class TextureTable:
                 give_back_memory()
 
     def mean(self, number: int) -> NDArray[np.float64]:
-        """Returns a texture's linear mean (4,) by reading its file again; 1 if there is no file."""
+        """Returns the linear mean (4,) of a texture by reading its file again, or 1."""
         key = next((key for key, known in self._ids.items() if known == number), ())
         # The keys of UDIM textures have three elements.
         if len(key) == 3:
@@ -384,11 +385,11 @@ class TextureTable:
         )
 
     def cache(self, scene: _core.Scene) -> TextureCache:
-        """Returns the textures for later scenes to share; ``scene`` was built with this table."""
+        """Returns the textures for reuse in later scenes; ``scene`` was built with this table."""
         return TextureCache(scene, self._taken, self._ids, self.store)
 
     def release(self) -> None:
-        """Releases the pixels of images that were read."""
+        """Releases the pixels of all images."""
         images = {path: image for path, image in self._images.items() if isinstance(image, Image)}
         self._taken = {path: image for path, image in images.items() if not image.is_here}
         self._images.clear()

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Keeps the textures of a stage within a memory limit by leaving out mip levels.
 
-Before loading, reads the headers of all image files and computes the memory of their textures.
-While the sum exceeds the limit, removes the finest level of the texture with the most texels per
-image pixel. Renders thus never wait for files, and the same stage, view and limit give the same
-image.
+Before loading, the module reads the headers of all image files and computes the memory of their
+textures. While the sum exceeds the limit, it removes the finest mip level of the texture with the
+most texels per image pixel. Renders therefore do not wait for files, and the same stage, view and
+limit always give the same image.
 """
 
 from __future__ import annotations
@@ -33,11 +33,12 @@ if TYPE_CHECKING:
     from wavecomb.usd.geometry.cage import ViewSize
 
 MAX_PRIMS = 100_000
-"""Number of prims whose image size is computed; textures of later prims keep their detail."""
+"""Number of prims whose size in the image is computed; textures of further prims keep all mip
+levels."""
 
 _TILE = 8
 _WRAPPED = 2.0
-"""Safety factor on the required texels, since surfaces do not face the camera exactly."""
+"""Factor on the required texels, for surfaces that do not face the camera."""
 
 
 def pyramid_bytes(width: int, height: int, channels: int, dtype: Any) -> int:
@@ -53,11 +54,11 @@ def pyramid_bytes(width: int, height: int, channels: int, dtype: Any) -> int:
 
 @dataclass
 class _Entry:
-    """A texture that would be created.
+    """A texture that the stage needs, and its number of omitted mip levels.
 
     Attributes:
-        wanted: Largest texture width in texels that the image can resolve; None if unknown, which
-            keeps all mip levels.
+        wanted: Largest texture width in texels that the image can resolve; None if unknown; all mip
+            levels are then kept.
         drop: Number of finest mip levels that are not loaded.
     """
 
@@ -78,12 +79,12 @@ class _Entry:
         return pyramid_bytes(*self.size, self.channels, self.dtype)
 
     def surplus(self) -> float:
-        """Returns the ratio of texels to the texels that the image can resolve."""
+        """Returns the ratio of the texture's width to the width that the image can resolve."""
         return 0.0 if self.wanted is None else max(self.size) / max(self.wanted, 1e-3)
 
 
 class _Plan(TextureTable):
-    """A texture table that reads only headers and records the textures to be added."""
+    """A texture table that reads only headers of images and records which textures are needed."""
 
     def __init__(self, context: LoadContext) -> None:
         super().__init__(context)
@@ -91,7 +92,7 @@ class _Plan(TextureTable):
         self._headers: dict[str, Image | None] = {}
 
     def expect(self, material: Usd.Prim, time: Usd.TimeCode) -> None:
-        """Does nothing, since headers are not read ahead."""
+        """Does nothing, since image headers are not read ahead."""
 
     def _image(self, path: str, prim: object) -> Image | None:
         if path not in self._headers:
@@ -110,13 +111,13 @@ class _Plan(TextureTable):
         return number
 
     def reached(self, number: int) -> list[_Entry]:
-        """Returns the textures behind an id: the texture itself, or its tiles."""
+        """Returns the texture with an id, or its tiles if it is a UDIM texture."""
         parts = self._builder.tiles.get(number, [number])  # type: ignore[attr-defined]
         return [self.entries[part] for part in parts if part in self.entries]
 
 
 class _NoBuilder:
-    """Substitute for the scene builder that assigns texture ids but creates no textures."""
+    """Scene builder that assigns texture ids but creates no textures."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -133,7 +134,7 @@ class _NoBuilder:
 
 
 def plan_levels(context: LoadContext, view: ViewSize, limit_bytes: float) -> dict[Key, int]:
-    """Returns how many of the finest mip levels each texture drops, by ``TextureTable`` key."""
+    """Returns the number of finest mip levels to omit for each texture."""
     report = context.report
     options = replace(context.options, threads=1)
     builder: Any = _NoBuilder()
@@ -178,7 +179,7 @@ def _note_lights(context: LoadContext, plan: _Plan) -> None:
 
 
 def _note_materials(context: LoadContext, plan: _Plan, view: ViewSize) -> None:
-    """Records the textures of all bound materials and the texels that the image can resolve."""
+    """Records the textures of bound materials and the widths that the image can resolve."""
     time = context.time
     materials = MaterialTable(context, plan)
     bounds = UsdGeom.BBoxCache(time, [UsdGeom.Tokens.default_, UsdGeom.Tokens.render], True)
@@ -211,9 +212,9 @@ def _note_materials(context: LoadContext, plan: _Plan, view: ViewSize) -> None:
 
 
 def _prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
-    """Yields active, defined prims, and the prototypes of point instancers once.
+    """Yields active, defined prims; prototypes of point instancers are visited once.
 
-    Includes prims in native instances once per instance. Ends after ``4 * MAX_PRIMS`` prims.
+    Prims inside native instances are visited once per instance. Ends after ``4 * MAX_PRIMS`` prims.
     """
     proxies = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
     seen: set[Any] = set()
@@ -231,7 +232,7 @@ def _prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
 
 
 def _pixels_across(prim: Usd.Prim, bounds: UsdGeom.BBoxCache, view: ViewSize) -> float:
-    """Returns a prim's largest possible length in pixels; infinite if it is unknown."""
+    """Returns a prim's largest possible size in pixels; infinite if it is unknown."""
     instancer = prim
     while instancer and not instancer.IsA(UsdGeom.PointInstancer):
         instancer = instancer.GetParent()

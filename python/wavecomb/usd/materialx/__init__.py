@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads MaterialX: documents as layers in memory, node graphs, and surface shaders.
+"""Reads MaterialX documents as layers in memory, with their node graphs and surface shaders.
 
-Outside of this package, only ``wavecomb.usd.mtlx`` imports it.
+Other packages use it through ``wavecomb.usd.mtlx``.
 """

@@ -17,13 +17,14 @@ from wavecomb.path_maps import mapped, own_maps
 from wavecomb.usd.materialx.library import library
 
 MAX_DEPTH = 64
-"""Deepest nesting of elements, since MaterialX parses them recursively."""
+"""Deepest nesting of XML elements, since MaterialX parses elements recursively."""
 
 MAX_INCLUDES = 256
 """Maximum number of files that a document may include directly or indirectly."""
 
 MAX_CHAIN = 32
-"""Longest chain of includes, since each file copies the content of the files below it."""
+"""Longest chain of includes; each file in a chain copies the contents of the files that it
+includes."""
 
 MAX_BYTES = 1 << 26
 """Maximum number of bytes of a document with all its includes."""
@@ -32,7 +33,7 @@ _INCLUDE = "http://www.w3.org/2001/XInclude include"
 
 
 class MtlxError(Exception):
-    """A MaterialX file cannot be read; the message gives the reason in a few words."""
+    """Raised if a MaterialX file cannot be read; the message gives the reason."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +41,7 @@ class Document:
     """A document that refers to MaterialX's standard library.
 
     Attributes:
-        root: MaterialX's document object. The definitions of the document include the library's
-            definitions.
+        root: MaterialX's document object. It has access to the definitions of the standard library.
         file: The file that was requested.
         graphs: Node graphs of the document, without the library's node graphs.
         definitions: Names of the document's node definitions, without the library's definitions.
@@ -54,10 +54,10 @@ class Document:
 
 
 def read_document(path: str) -> Document:
-    """Reads a file with its includes and upgrades it to the current MaterialX version.
+    """Reads a MaterialX file with its includes and converts it to the current MaterialX version.
 
     Args:
-        path: Path as resolved by Ar; the file may be inside a .usdz package.
+        path: Path that USD's asset resolver returned; the file may be inside a .usdz package.
 
     Raises:
         MtlxError: The file cannot be read.
@@ -71,7 +71,7 @@ def read_document(path: str) -> Document:
 
 @dataclass
 class _Budget:
-    """Remaining number of files and bytes that a document may include."""
+    """Numbers of files and bytes that a document may still include."""
 
     files: int = MAX_INCLUDES
     bytes: int = MAX_BYTES
@@ -134,7 +134,7 @@ def _check(data: bytes) -> list[str]:
     """Validates the XML of a document and returns the files that it includes.
 
     Raises:
-        MtlxError: The file is not XML, not MaterialX, or nested too deeply.
+        MtlxError: The file is not XML, not MaterialX, or too deeply nested.
     """
     includes: list[str] = []
     open_elements: list[str] = []
@@ -163,13 +163,13 @@ def _check(data: bytes) -> list[str]:
 
 
 def resolve(name: str, anchor: str) -> str:
-    """Resolves a file name relative to another file; returns "" if it does not exist."""
+    """Resolves a file name relative to another file; returns an empty string if no file exists."""
     resolver = Ar.GetResolver()
     return str(resolver.Resolve(beside(name, anchor)))
 
 
 def beside(name: str, anchor: str) -> str:
-    """Returns the path that a name in a file refers to, relative to that file unless absolute."""
+    """Returns the path of a file name in a file, relative to that file unless absolute."""
     if os.path.isabs(name) or "://" in name:
         return mapped(name, own_maps())
     if Ar.IsPackageRelativePath(anchor):
@@ -184,12 +184,12 @@ def beside(name: str, anchor: str) -> str:
 def image_file(value: Any, document: str) -> tuple[str, bool]:
     """Returns the file of a filename element, and whether ``fileprefix`` was ignored.
 
-    Names are relative to the document, else to the file that contains the element. The attribute
-    ``fileprefix`` is ignored if the file exists only without it.
+    File names are relative to the document or else to the file that contains the element. The
+    attribute ``fileprefix`` is ignored if the file exists without the prefix but not with it.
 
     Args:
-        value: The filename element.
-        document: The requested file; ``value`` may come from a file that it includes.
+        value: The element with the file name.
+        document: The requested file; ``value`` may be in a file that the document includes.
     """
     full, plain = value.getResolvedValueString(), value.getValueString()
     anchors = [document]

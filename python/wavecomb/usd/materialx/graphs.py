@@ -11,20 +11,20 @@ from wavecomb.usd.materialx.files import Document
 from wavecomb.usd.materialx.prims import TERMINALS, Prims, child, connect, valid
 
 GRAPHS = Sdf.Path("/MaterialX/NodeGraphs")
-"""Parent prim of node graphs, and of nodes of the document that are not in a graph."""
+"""Path of the parent prim of all node graphs and of nodes outside of graphs."""
 
 MAX_EXPANDED = 4096
-"""Number of expanded nodes of a graph above which nested graphs become USD instances.
+"""Number of nodes of a graph, with nested graphs, above which nested graphs become USD instances.
 
-A short document may nest graphs into billions of nodes.
+Instances are needed since a short document may nest graphs into billions of nodes.
 """
 
 _SMALL = 32
-"""Largest number of nodes of node graphs that are never instanced."""
+"""Number of nodes up to which a nested graph does not become an instance."""
 
 
 def definition(node: Any) -> Any:
-    """Returns the best matching definition of a node, or None."""
+    """Returns the definition that matches a node best, or None."""
     found = node.getNodeDef()
     return found if found is not None else node.getNodeDef("", True)
 
@@ -56,12 +56,12 @@ def _port(prim: Sdf.Path, kind: str, name: str) -> Sdf.Path:
 
 
 def is_closed(graph: Any) -> bool:
-    """Returns whether no input of a node graph is connected to a node outside."""
+    """Returns whether no input of a node graph is connected to nodes outside of the graph."""
     return not any(item.getNodeName() or item.getNodeGraphString() for item in graph.getInputs())
 
 
 class Graphs:
-    """Writer of node graphs; each graph is written once."""
+    """Writer of node graphs; each graph is written only once."""
 
     def __init__(self, document: Document, prims: Prims) -> None:
         self._document = document
@@ -77,7 +77,7 @@ class Graphs:
             self.loose()
 
     def graph(self, graph: Any) -> Sdf.Path:
-        """Writes a node graph, named after the definition that it implements, if any."""
+        """Writes a node graph under its name, or the name of the definition that it implements."""
         nodedef = graph.getNodeDef()
         path = child(GRAPHS, (graph if nodedef is None else nodedef).getName())
         if path in self._written:
@@ -97,7 +97,7 @@ class Graphs:
         return path
 
     def loose(self) -> Sdf.Path:
-        """Writes the parent of all nodes of the document that are not in a graph."""
+        """Writes the parent prim of all nodes outside of node graphs."""
         if GRAPHS not in self._written:
             self._written.add(GRAPHS)
             self._prims.define(GRAPHS)
@@ -106,7 +106,7 @@ class Graphs:
         return GRAPHS
 
     def _loose(self) -> list[Any]:
-        """Returns nodes outside of graphs, except materials and shaders that only materials use."""
+        """Returns nodes outside of graphs, except materials and shaders that they alone use."""
         nodes = self._document.root.getNodes()
         used = {
             item.getNodeName()
@@ -132,7 +132,7 @@ class Graphs:
             self._prims.port(prim, "outputs", output.getName(), output.getType())
 
     def instance(self, node: Any, path: Sdf.Path) -> Sdf.PrimSpec:
-        """Writes the prim of a node: a shader, or an instance of its node graph."""
+        """Writes the prim of a node, which is a shader or an instance of a node graph."""
         nodedef = definition(node)
         inside = implementation(self._document, nodedef)
         if inside is not None:
@@ -150,7 +150,7 @@ class Graphs:
         return prim
 
     def _is_deep(self) -> bool:
-        """Returns whether a graph of the document has too many nodes to write a prim for each."""
+        """Returns whether any graph, with nested graphs, has over ``MAX_EXPANDED`` nodes."""
         return any(self._nodes_in(graph) > MAX_EXPANDED for graph in self._document.graphs)
 
     def _nodes_in(self, graph: Any) -> int:
@@ -192,13 +192,13 @@ class Graphs:
             self._connect(port, item, graph, container)
 
     def _connect(self, port: Sdf.AttributeSpec, item: Any, graph: Sdf.Path, container: Any) -> None:
-        """Connects an input or output to the source that its element names."""
+        """Connects an input or output to the source that the MaterialX element names."""
         source = self.source(item, graph, container)
         if source is not None:
             connect(port, source)
 
     def source(self, item: Any, graph: Sdf.Path, container: Any) -> Sdf.Path | None:
-        """Returns the source path of an element; ``graph`` is the prim of its container."""
+        """Returns the path of an element's source; ``graph`` is the element's parent prim."""
         wanted = item.getOutputString()
         if item.getNodeName():
             node = container.getNode(item.getNodeName())

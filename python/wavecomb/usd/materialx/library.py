@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX's standard definitions, with their node graphs flattened.
+"""MaterialX's standard node definitions and their node graphs without nesting.
 
-The library is read once per process on first use; each definition is flattened once.
+The library is read on first use; each definition is flattened only once.
 """
 
 from __future__ import annotations
@@ -38,17 +38,16 @@ def library() -> Any:
 
 @dataclass(frozen=True)
 class PortSource:
-    """Source of a node input or graph output: a value, an interface input or a node output.
+    """Source of a node input or graph output, which is a value, a graph input or a node's output.
 
     Attributes:
         type: Name of the MaterialX type of the value.
-        value: Text of the value; "" if there is none.
-        interface: Name of an input of the graph.
-        node: Name of a node of the graph.
-        output: Name of the node's output; "" if the node has only one.
-        place: Default geometric property: position, normal, tangent, bitangent, viewdirection or
-            texcoord.
-        space: Space of the geometric property: object or world.
+        value: Value as text; empty if there is none.
+        interface: Name of the graph input that is the source.
+        node: Name of the node in the graph that is the source.
+        output: Name of the node's output; empty if the node has only one.
+        place: Geometric property that is the source, such as "position", "normal" or "texcoord".
+        space: Space of the geometric property, "object" or "world".
     """
 
     type: str
@@ -62,12 +61,12 @@ class PortSource:
 
 @dataclass(frozen=True)
 class FlatNode:
-    """A node of a flat graph.
+    """A node of a node graph without nesting.
 
     Attributes:
-        category: Category of the node without types.
-        identifier: Name of the node's definition.
-        inputs: Sources of the inputs that the graph sets.
+        category: Category of the node, such as "mix".
+        identifier: Name of the node's definition, such as "ND_mix_color3".
+        inputs: Sources of those inputs that the graph sets, by input name.
         outputs: Types of the node's outputs by name.
     """
 
@@ -79,11 +78,11 @@ class FlatNode:
 
 @dataclass(frozen=True)
 class Definition:
-    """A node definition of the library.
+    """A node definition of MaterialX's standard library.
 
     Attributes:
         identifier: Name of the definition, such as ``ND_mix_color3``.
-        category: Category of the definition's nodes, without types.
+        category: Category of the nodes with this definition, such as "mix".
         inputs: Default sources of the inputs by name.
         outputs: Types of the outputs by name.
     """
@@ -100,8 +99,8 @@ class FlatGraph:
 
     Attributes:
         definition: Definition that the graph implements.
-        nodes: Nodes by name in evaluation order.
-        results: Sources of the graph's outputs by name.
+        nodes: Nodes by name, in evaluation order.
+        results: Sources of the graph's outputs, by output name.
     """
 
     definition: Definition
@@ -122,14 +121,15 @@ def definition_of(identifier: str) -> Definition | None:
 
 @functools.cache
 def flat_graph(identifier: str, primitives: Collection[str]) -> FlatGraph | None:
-    """Returns the flattened node graph that implements a definition.
+    """Returns the node graph that implements a definition, without nested graphs.
 
     Args:
         identifier: Name of the definition.
-        primitives: Frozen set of node categories that are not expanded.
+        primitives: Categories of nodes that are not replaced by their graphs.
 
     Returns:
-        Returns the graph; None if the library implements the node in code or does not know it.
+        Returns None if the library implements the definition in code or does not have the
+        definition.
     """
     import MaterialX as mx
 

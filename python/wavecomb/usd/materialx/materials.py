@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes MaterialX materials and looks as prims, with their shaders and material assignments.
+"""Writes MaterialX materials and looks as prims, with shaders and material assignments.
 
-Geometry paths are written below ``/MaterialX/Collections``. If a model references a look, USD maps
-these paths to paths below the model. Each look is a variant of ``LookVariant`` on
-``/ModelRoot``.
+Looks assign materials to collections, whose prim paths are written below
+``/MaterialX/Collections``. If a model references a look, USD maps these paths to paths below the
+model. Each look is a variant in the variant set ``LookVariant`` of ``/ModelRoot``.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def write_looks(document: Document, layer: Sdf.Layer, report_skipped: ReportSkip
 
 
 class _LooksWriter:
-    """Writer of collections and looks; each of them is written once."""
+    """Writer of collections and looks; each of them is written only once."""
 
     def __init__(self, root: Any, stage: Usd.Stage, report_skipped: ReportSkipped) -> None:
         self._root = root
@@ -57,7 +57,7 @@ class _LooksWriter:
     def collection(self, element: Any, above: tuple[str, ...]) -> str:
         """Writes a collection and returns its instance name.
 
-        ``above`` lists the including collections.
+        ``above`` lists the collections that include this collection.
         """
         name = element.getName()
         if name in self._collections:
@@ -81,7 +81,7 @@ class _LooksWriter:
         return Usd.CollectionAPI.Apply(self._stage.DefinePrim(COLLECTIONS), name)
 
     def _geometry(self, element: Any, prefix: str, text: str) -> list[Sdf.Path]:
-        """Returns the prim paths of a geometry list; reports and skips patterns."""
+        """Returns the prim paths in a list of geometry names; reports and skips name patterns."""
         found = []
         for word in (part.strip() for part in text.split(",")):
             name = prefix + word
@@ -96,7 +96,7 @@ class _LooksWriter:
         return found
 
     def _assigned(self, assign: Any) -> str | None:
-        """Returns the collection that a material is assigned to; None means the whole model."""
+        """Returns the name of the collection that gets a material; None means the whole model."""
         if assign.getCollectionString():
             collection = self._root.getCollection(assign.getCollectionString())
             if collection is not None:
@@ -119,7 +119,7 @@ class _LooksWriter:
         return self._collections[key]
 
     def look(self, look: Any, above: tuple[str, ...]) -> Sdf.Path:
-        """Writes a look; ``above`` lists the looks that inherit it."""
+        """Writes a look; ``above`` lists the looks that inherit from this look."""
         import MaterialX as mx
 
         name = look.getName()
@@ -152,7 +152,7 @@ class _LooksWriter:
     def _bind(
         self, look: Any, item: Any, binding: UsdShade.MaterialBindingAPI, collection: str | None
     ) -> Usd.Relationship | None:
-        """Binds a material to a collection of a look, or to the whole look."""
+        """Binds a material to a collection in a look, or to the whole model."""
         material = child(MATERIALS, item.getMaterial())
         if not self._stage.GetPrimAtPath(material):
             self._report_skipped(
@@ -181,7 +181,7 @@ class _LooksWriter:
         return binding.GetCollectionBindingRel(name)
 
     def _variant(self, material: Sdf.Path, variant_set: str, variant: str) -> bool:
-        """Writes a variant of a material with other input values; returns whether it exists."""
+        """Writes a material variant, with other input values; returns whether it exists."""
         found = self._root.getVariantSet(variant_set)
         element = None if found is None else found.getVariant(variant)
         if element is None:
@@ -213,8 +213,8 @@ SHADERS = Sdf.Path("/MaterialX/Shaders")
 class Materials:
     """Writer of materials.
 
-    Shader inputs become inputs of the material, so that stronger layers can change them. Sources of
-    a shader are referenced below the material. Shaders of all materials are written below
+    The inputs of shaders become inputs of the material, so that stronger layers can override them.
+    Nodes that drive a shader are referenced below the material. All shaders are written below
     ``SHADERS``.
     """
 
@@ -278,13 +278,13 @@ class Materials:
     def _interface(
         self, material: Sdf.PrimSpec, shader: Sdf.PrimSpec, item: Any
     ) -> Sdf.AttributeSpec:
-        """Connects a shader input to an input of the material and returns the material's input."""
+        """Connects a shader input to a new input of the material; returns the material's input."""
         port = self._prims.port(material, "inputs", item.getName(), item.getType())
         connect(self._prims.port(shader, "inputs", item.getName(), item.getType()), port.path)
         return port
 
     def _source(self, material: Sdf.Path, item: Any) -> Sdf.Path | None:
-        """Returns the source of a shader input, as a path below the material."""
+        """Returns the path, below the material, of the output that drives a shader input."""
         source = self._graphs.source(item, GRAPHS, self._document.root)
         if source is None:
             return None
@@ -297,7 +297,7 @@ class Materials:
         return source.ReplacePrefix(GRAPHS, below)
 
     def _below(self, material: Sdf.Path, graph: Any) -> Sdf.Path:
-        """References a node graph below a material, with its siblings if they feed it."""
+        """References a node graph below a material, together with nodes that drive it."""
         path = self._graphs.graph(graph)
         if is_closed(graph):
             below = child(material, path.name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Creates prim, input and output specs in the layer of a MaterialX document."""
+"""Creates prims with inputs and outputs in the layer of a MaterialX document."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from wavecomb.usd.materialx.files import image_file
 from wavecomb.usd.stage.report import LoadReport
 
 ReportSkipped = Callable[[Any, str], None]
-"""Callback that receives a document element and a message about it."""
+"""Callback that receives an element of the document and a message about the element."""
 
 TERMINALS = {
     "surfaceshader": "surface",
@@ -21,10 +21,10 @@ TERMINALS = {
     "volumeshader": "volume",
     "lightshader": "light",
 }
-"""Material outputs by MaterialX shader type."""
+"""Names of a USD material's outputs by MaterialX shader type."""
 
 _PLAIN_SPACES = ("", "none", "lin_rec709", "lin_rec709_scene")
-"""Colour spaces that are not written to the layer, since they are the default."""
+"""Colour spaces that are not authored in the layer, since they are the default."""
 
 
 def valid(name: str) -> str:
@@ -41,10 +41,10 @@ class Prims:
     """Writer of prims into a layer.
 
     Attributes:
-        layer: The layer to write to.
+        layer: Layer that receives the prims.
         file: File of the MaterialX document, to which image names are relative.
-        tell: Callback that receives elements that cannot be translated.
-        report: Report that receives notes.
+        tell: Callback for elements that cannot be written as prims.
+        report: Report for notes.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class Prims:
         self.report_skipped = tell
 
     def define(self, path: Sdf.Path, kind: str = "") -> Sdf.PrimSpec:
-        """Defines a prim with a type, and its ancestors; returns the prim if it exists already."""
+        """Defines a prim and its ancestors unless they exist; returns the prim."""
         spec = Sdf.CreatePrimInLayer(self.layer, path)
         for prefix in path.GetPrefixes():
             self.layer.GetPrimAtPath(prefix).specifier = Sdf.SpecifierDef
@@ -65,7 +65,7 @@ class Prims:
         return spec
 
     def refer(self, path: Sdf.Path, target: Sdf.Path) -> Sdf.PrimSpec:
-        """Defines a prim that references another prim of the layer, at most once."""
+        """Defines a prim with a reference to another prim of the layer, added only once."""
         spec = self.define(path)
         reference = Sdf.Reference("", target)
         if reference not in list(spec.referenceList.prependedItems):
@@ -92,19 +92,19 @@ class Prims:
         return spec
 
     def identify(self, prim: Sdf.PrimSpec, identifier: str) -> None:
-        """Writes ``info:id`` of a shader unless it exists."""
+        """Writes ``info:id`` of a shader unless it is authored."""
         if "info:id" not in prim.attributes:
             Sdf.AttributeSpec(
                 prim, "info:id", Sdf.ValueTypeNames.Token, Sdf.VariabilityUniform
             ).default = identifier
 
     def give(self, port: Sdf.AttributeSpec, element: Any, *, makes_colour: bool = True) -> None:
-        """Copies the value of an element to an input, with its colour space.
+        """Copies the value and the colour space of an element to an input.
 
         Args:
             port: The USD input to write.
             element: The MaterialX input to copy.
-            makes_colour: For filenames, whether colours are read from the file.
+            makes_colour: For file names, whether the image holds colours.
         """
         kind, text = element.getType(), element.getValueString()
         if not text:
@@ -211,7 +211,7 @@ _TYPES: dict[str, tuple[Sdf.ValueTypeName, Callable[[str], Any]]] = {
 
 
 def usd_type(name: str) -> Sdf.ValueTypeName | None:
-    """Returns the USD type of a MaterialX type; None if there is none (use a token)."""
+    """Returns the USD type of a MaterialX type; None for types that are written as tokens."""
     known = _TYPES.get(name)
     return None if known is None else known[0]
 

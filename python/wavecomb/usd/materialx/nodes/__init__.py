@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compiles MaterialX nodes to value graphs; nodes without a handler use the library's graphs."""
+"""Compiles MaterialX nodes to value graphs, by handlers or through the library's node graphs."""

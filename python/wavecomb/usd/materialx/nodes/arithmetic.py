@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """MaterialX nodes for numbers, vectors and matrices, and conditional nodes.
 
-Formulas and defaults follow the MaterialX Specification 1.39; names of version 1.38 are accepted.
-Matrices are values of 9 or 16 components in row-major order.
+Formulas and defaults follow the MaterialX Specification 1.39; names of version 1.38 also work.
+A matrix is a value with 9 or 16 components in row-major order.
 """
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ def _convert(n: NodeCall) -> Value:
 
 
 _PARTS = {"CF": (3, 1), "VF": (3, 1), "CC": (2, 2), "VV": (2, 2)}
-"""Numbers of components of the inputs of "combine" nodes with vector inputs."""
+"""Numbers of components of the vector inputs of "combine" nodes."""
 
 
 @_node("combine2", "combine3", "combine4")
@@ -204,9 +204,9 @@ def identity(size: int) -> tuple[float, ...]:
 
 @_node("transformmatrix")
 def _transform(n: NodeCall) -> Value:
-    """Multiplies a row vector by a matrix; appends a 1 to a vector that is one component short.
+    """Multiplies a row vector by a matrix; appends 1 if the vector has one component too few.
 
-    Extra components of a result are dropped, without a perspective division.
+    Additional components of the result are dropped without a perspective division.
     """
     size = 4 if n.identifier.endswith(("M4", "vector4")) else 3
     matrix = n.value("mat", identity(size), size * size)

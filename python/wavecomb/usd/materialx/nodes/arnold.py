@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arnold nodes that resemble MaterialX nodes: images, normal maps, arithmetic and user data.
+"""Handlers for Arnold nodes: images, normal maps, arithmetic and user data.
 
-Names and defaults follow Arnold's reference; categories are Arnold's ids with the prefix
+Names and defaults follow Arnold's reference; node categories are Arnold's node ids with the prefix
 ``arnold_``.
 """
 
@@ -25,7 +25,7 @@ _WHITE, _BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 
 
 def category_of(identifier: str) -> str:
-    """Returns the category of an id such as ``arnold:image``; "" for other ids."""
+    """Returns the node category for an id such as ``arnold:image``; empty for other ids."""
     return f"arnold_{identifier.removeprefix(PREFIX)}" if identifier.startswith(PREFIX) else ""
 
 
@@ -58,7 +58,7 @@ def _image(n: NodeCall) -> Value:
 
 
 def _of_output(n: NodeCall, texel: Value) -> Value:
-    """Returns the component that the node's output names, else all components."""
+    """Returns the component that the node's output names, or all components."""
     if n.output in ("r", "g", "b", "a"):
         n.width = 1
         return (texel["rgba".index(n.output)],)

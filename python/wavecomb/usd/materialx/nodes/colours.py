@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX nodes for colours, compositing and hair absorption."""
+"""Handlers for MaterialX nodes for colours, compositing and hair absorption."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ NODES: dict[str, Handler] = {}
 _node = adder(NODES)
 
 LUMA = (0.2722287, 0.6740818, 0.0536895)
-"""MaterialX's default of the input ``lumacoeffs``: the luminance weights of AP1."""
+"""Default of MaterialX's input ``lumacoeffs``, which are the luminance weights of ACEScg (AP1)."""
 
 
 @_node("rgbtohsv", "hsvtorgb")
@@ -30,12 +30,12 @@ def _luminance(n: NodeCall) -> Value:
 
 
 _KELVIN = (800.0, 25000.0)
-"""Temperature range of the black-body fits, in kelvin."""
+"""Temperature range in which the black-body fits are valid, in kelvin."""
 
 _CHROMATICITY = ((2222.0, (-1.1063814, -1.34811020, 2.18555832, -0.20219683)),
         (4000.0, (-0.9549476, -1.37418593, 2.09137015, -0.16748867)),
         (0.0, (3.0817580, -5.87338670, 3.75112997, -0.37001483)))  # fmt: skip
-"""Cubic fits of black-body chromaticity y(x), each up to a temperature limit."""
+"""Cubic fits of y(x) for the chromaticity of a black body, each up to a temperature limit."""
 
 _TO_REC709 = ((3.2406, -0.9689, 0.0557), (-1.5372, 1.8758, -0.2040), (-0.4986, 0.0415, 1.0570))
 """Columns of the matrix from XYZ to linear Rec.709, for X, Y and Z."""
@@ -50,7 +50,7 @@ def _cubic(m: Expressions, x: Value, factors: tuple[float, ...]) -> Value:
 
 @_node("blackbody")
 def _blackbody(n: NodeCall) -> Value:
-    """Returns the colour of a black body at luminance 1.
+    """Returns the colour of a black body with luminance 1.
 
     Source: Kang et al. 2002, "Design of Advanced Color Temperature Control System".
     """
@@ -77,7 +77,7 @@ def _blackbody(n: NodeCall) -> Value:
 # ---- compositing ---------------------------------------------------------------------------------
 
 Formula = Callable[[Expressions, Value, Value], Value]
-"""Function of a foreground and a background that combines their colours."""
+"""Function that combines a foreground colour and a background colour."""
 
 
 def _blend(formula: Formula, width: int = 0) -> Handler:
@@ -146,9 +146,9 @@ _PHEOMELANIN = (0.829443, 0.670320, 0.349937)
 
 
 def color_divisor(azimuthal: float) -> float:
-    """Returns the divisor of a colour's logarithm that gives the square root of the absorption.
+    """Returns the divisor of a colour's logarithm in the square root of the absorption coefficient.
 
-    Chiang et al. 2016, eq. 9; equals ``fibre_color_divisor`` of the core.
+    Source: Chiang et al. 2016, eq. 9. The core has the same formula in ``fibre_color_divisor``.
     """
     p = azimuthal
     return 5.969 + p * (-0.215 + p * (2.532 + p * (-10.73 + p * (5.574 + p * 0.245))))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX nodes for geometry: positions, primvars, normal maps, spaces, time and patterns.
+"""Handlers for MaterialX nodes for positions, primvars, normal maps, spaces, time and patterns.
 
-With M the linear part of the object-to-world transform, graphs can read the rows of the inverse of
-M (``normal_x`` ...) and the position in both spaces. The columns of M are cross products of rows of
-the inverse, divided by its determinant.
+Let M be the linear part of the object-to-world transform. Graphs can read the rows of M's inverse
+(``normal_x``, ``normal_y``, ``normal_z``) and the position in object and world space. The columns
+of M are computed as cross products of these rows, divided by the determinant of M's inverse.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def _texcoord(n: NodeCall) -> Value:
 
 
 def _named(name_input: str, fallback: str, usual: str = "") -> Handler:
-    """Returns a handler that reads the primvar named by an input; its default is ``usual``."""
+    """Returns a handler that reads the primvar named by an input; ``usual`` is the default name."""
 
     def compiled(n: NodeCall) -> Value:
         name = n.text(name_input, usual)
@@ -66,7 +66,7 @@ NODES |= {
 
 
 def _texture_coordinates(n: NodeCall, name: str) -> Value:
-    """Returns the mesh's UVs for the first set that a material reads, else a primvar."""
+    """Returns the mesh's texture coordinates for a material's first UV set, else a primvar."""
     names = n.networks.uv_names
     if names and names[0] != name:
         return n.networks.primvar(name, numbers(0.0, 0.0))
@@ -75,7 +75,7 @@ def _texture_coordinates(n: NodeCall, name: str) -> Value:
 
 
 def _primvar(n: NodeCall, name: str, fallback: str) -> Value:
-    """Returns a primvar of the mesh; displayOpacity is the alpha of ``geomcolor``."""
+    """Returns a primvar of the mesh; for ``geomcolor`` with alpha, alpha is displayOpacity."""
     networks = n.networks
     converts, networks.converts = networks.converts, False
     otherwise = n.value(fallback, width=n.width)
@@ -95,7 +95,7 @@ def _primvar(n: NodeCall, name: str, fallback: str) -> Value:
 
 @_node("normalmap")
 def _normal_map(n: NodeCall) -> Value:
-    """Returns a normal in tangent space; without a normal map, the unperturbed normal."""
+    """Returns a normal in tangent space, or the unperturbed normal if there is no normal map."""
     m, n.width = n.make, 3
     texel = n.inputs.find("in", NORMAL)
     if texel is None:
@@ -107,12 +107,12 @@ def _normal_map(n: NodeCall) -> Value:
 
 
 def _rows(m: Expressions) -> list[Value]:
-    """Returns the rows of the inverse of the object-to-world matrix in world space."""
+    """Returns the rows of the inverse of the object-to-world matrix."""
     return [m.input(f"normal_{axis}") for axis in "xyz"]
 
 
 def _columns(m: Expressions) -> list[Value]:
-    """Returns the columns of the object-to-world matrix in world space."""
+    """Returns the columns of the object-to-world matrix."""
     a, b, c = _rows(m)
     across = m.op("cross", b, c)
     size = m.op("dot", a, across)
@@ -126,7 +126,8 @@ def _dots(m: Expressions, vectors: list[Value], v: Value) -> Value:
 def _tangent_of_object(m: Expressions, normal: Value) -> Value:
     """Converts an object-space normal to tangent space.
 
-    The shading normal faces the viewer, so the normal of the map is flipped together with it.
+    The shading normal faces the viewer; if it was flipped, the normal of the map is flipped as
+    well.
     """
     there = unit(m, weighted_sum(m, _rows(m), fit(normal, 3)))
     frame = [m.input(name) for name in ("tangent", "bitangent", "normal")]
@@ -135,13 +136,13 @@ def _tangent_of_object(m: Expressions, normal: Value) -> Value:
 
 
 def _spaces(n: NodeCall) -> tuple[bool, bool]:
-    """Returns whether a transform starts and ends in object space, which is the default."""
+    """Returns whether the spaces before and after a transform are object space (the default)."""
     start, end = (n.text(name, "") or "object" for name in ("fromspace", "tospace"))
     return start != "world", end != "world"
 
 
 def _transformed(n: NodeCall, default: tuple[float, ...]) -> Value:
-    """Returns the input of a transform, read as a number even if the result is a shading normal."""
+    """Returns the input of a transform node as a number, even if the node drives a normal."""
     found = n.inputs.find("in", NUMBER)
     return fit(numbers(*default) if found is None else found, 3)
 
@@ -167,7 +168,7 @@ def _transform(n: NodeCall) -> Value:
 
 @_node("transformpoint")
 def _transform_point(n: NodeCall) -> Value:
-    """Transforms a point relative to the shading point, whose position both spaces provide."""
+    """Transforms a point relative to the shading point, whose position is known in both spaces."""
     m = n.make
     starts, ends = _spaces(n)
     p = _transformed(n, (0.0, 0.0, 0.0))
@@ -183,7 +184,7 @@ def _transform_point(n: NodeCall) -> Value:
 
 
 def _point(n: NodeCall) -> Value:
-    """Returns texture coordinates for categories that end in 2d, else the position."""
+    """Returns texture coordinates for 2D nodes, whose category ends in "2d", else the position."""
     if n.category.endswith("2d"):
         return n.coordinates()
     return n.place("position", "position", "object")
@@ -225,7 +226,7 @@ def _worley(n: NodeCall) -> Value:
 
 @_node("ramplr", "ramptb", "splitlr", "splittb")
 def _ramp(n: NodeCall) -> Value:
-    """Interpolates or splits values along u, or along v with the top at v = 1."""
+    """Interpolates or splits values along u, or along v where v = 1 is the top."""
     m, (u, v) = n.make, n.coordinates()
     names, at = (("valuel", "valuer"), (u,)) if n.category[-2:] == "lr" else (
         ("valueb", "valuet"), (v,)

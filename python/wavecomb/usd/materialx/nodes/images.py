@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX image nodes, including hex-tiled images and normal maps.
+"""Handlers for MaterialX image nodes, including hex-tiled images and normal maps.
 
-Hex tiling follows M. Mikkelsen, "Practical Real-Time Hex-Tiling", JCGT 11(2), 2022, with the
-weights and the hash of MaterialX's own code: it blends three copies of the image at each point,
-which are randomly rotated, scaled and shifted.
+Hex tiling blends three copies of the image at each point, which are randomly rotated, scaled and
+shifted. It follows M. Mikkelsen, "Practical Real-Time Hex-Tiling", JCGT 11(2), 2022, with the
+weights and the hash function of MaterialX's code.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _WRAPS = {
 
 
 def stretch_of(uv: Value) -> float:
-    """Returns the scale from mesh to texture coordinates; 1 if it is not constant."""
+    """Returns the scale from mesh to node texture coordinates; 1 if the scale varies."""
     m = uv_matrix(uv)
     if m is None:
         return 1.0
@@ -45,17 +45,17 @@ def read_image(
     name: str = "file",
     space: str = "",
 ) -> Value:
-    """Returns r, g, b and alpha of the node's image file, or the fallback if it is unreadable.
+    """Returns r, g, b and alpha of the node's image file, or the fallback if there is no image.
 
     Args:
         n: The MaterialX node.
         uv: Texture coordinates.
         wraps: Wrap modes in u and v.
-        fallback: Name of the input with the value that replaces a missing file.
+        fallback: Name of the input whose value replaces a missing image.
         is_raw: Whether the file holds data rather than colours.
-        stretch: Scale from mesh coordinates to ``uv``; None computes it from ``uv``.
+        stretch: Scale from the mesh's texture coordinates to ``uv``; None computes it from ``uv``.
         name: Name of the input that holds the file.
-        space: Colour space that the node itself specifies, or "".
+        space: Colour space in an input of the node, or an empty string.
     """
     networks = n.networks
     stretch = stretch_of(uv) if stretch is None else stretch
@@ -87,7 +87,7 @@ def _image(n: NodeCall) -> Value:
 
 @_node("UsdUVTexture")
 def _uv_texture(n: NodeCall) -> Value:
-    """Reads sourceColorSpace as in MaterialX 1.38; MaterialX's own graph for this node lacks it."""
+    """Reads a texture by the rules of UsdUVTexture, including ``sourceColorSpace``."""
     m = n.make
     uv = n.coordinates("st")
     wraps = [n.text(name, "periodic").replace("periodic", "repeat") for name in ("wrapS", "wrapT")]
@@ -102,9 +102,9 @@ def _uv_texture(n: NodeCall) -> Value:
 
 
 _GRID = 2.0 * math.sqrt(3.0)
-"""Scale of the hexagonal grid, at which an image copy fits its hexagon."""
+"""Scale of the hexagonal grid at which one copy of the image fits into a hexagon."""
 _SKEW = (-0.57735027, 1.15470054)
-"""Contributions of v to the skewed coordinates: -tan 30 degrees, and -2 times that."""
+"""Factors of v in the skewed grid coordinates: -tan 30 degrees, and -2 times that."""
 _SEED = 0.12345
 """Offset that is added to cell indices before they are hashed."""
 _PERIODIC = ["repeat", "repeat"]
@@ -112,7 +112,7 @@ _PERIODIC = ["repeat", "repeat"]
 
 @dataclass(frozen=True)
 class _Copy:
-    """One of the three image copies at a point: its coordinates, rotation and blend weight."""
+    """One of the image copies that are blended at a point."""
 
     uv: Value
     turn: Value
@@ -138,7 +138,7 @@ def _turned(m: Expressions, v: Value, sin: Value, cos: Value) -> Value:
 
 
 class _Grid:
-    """The hexagonal grid of a node, which computes the image copies at a point."""
+    """The hexagonal grid of a node, which computes the three image copies at a point."""
 
     def __init__(self, n: NodeCall) -> None:
         m = self.make = n.make
@@ -191,7 +191,7 @@ class _Grid:
         return _Copy(uv, turn, weight)
 
     def shares(self, copies: list[_Copy], bright: list[Value] | None = None) -> Value:
-        """Returns the blend weights of the three copies; ``bright`` adds luminance weights."""
+        """Returns the blend weights of three image copies; ``bright`` are weights by luminance."""
         m = self.make
         grid = tuple(copy.weight[0] for copy in copies)
         w = m.op("power", m.op("max", grid, 0.0), 7.0)

@@ -28,11 +28,11 @@ MAX_DEPTH = 100
 MAX_NODES = 10_000
 """Maximum number of nodes in the networks of a material.
 
-The limit is ten times lower in instanced node graphs, whose paths are long.
+In instanced node graphs, whose prim paths are long, the limit is ten times lower.
 """
 
 PER_COMPONENT = {"overlay": "ND_overlay_float"}
-"""Nodes that act per component; the graph of the float variant is applied to all components."""
+"""Nodes that act on each component; the library's graph of the float node is used for all types."""
 
 _WIDTH_OF_TYPE = {
     "float": 1, "half": 1, "double": 1, "int": 1, "bool": 1, "float2": 2, "texCoord2f": 2,
@@ -55,9 +55,9 @@ _FIRST_CHOICES = (
 
 
 def category_of(identifier: str) -> tuple[str, int]:
-    """Returns category and output width of an identifier, such as ("mix", 3) for ``ND_mix_color3``.
+    """Returns node category and output width, such as ("mix", 3) for ``ND_mix_color3``.
 
-    The width is 0 if the identifier does not determine it.
+    The width is 0 if the definition's name does not tell the width.
     """
     words = identifier.removeprefix("ND_").split("_")
     at = next((n for n in range(len(words), 0, -1) if "_".join(words[:n]) in CATEGORIES), 0)
@@ -82,11 +82,11 @@ def primitive(category: str, identifier: str) -> Handler | None:
 
 
 class _TooManyNodes(Exception):
-    """Raised if a material has more than the supported number of nodes."""
+    """Raised if the networks of a material have more nodes than supported."""
 
 
 class Networks:
-    """Compiler of the networks of one material to values; each node is compiled once."""
+    """Compiler of one material's shader networks to values; each node is compiled once."""
 
     def __init__(
         self, material: Usd.Prim, time: Usd.TimeCode, textures: TextureTable, report: LoadReport
@@ -104,9 +104,9 @@ class Networks:
         self._instances = InstancedGraphs(material, self.node)
 
     def in_working_space(self) -> Networks:
-        """Returns a copy of the networks with constants in the working space.
+        """Returns a copy of the networks whose colour constants are in the working space.
 
-        The copy reports nothing.
+        The copy reports no problems.
         """
         other = Networks(self.material, self.time, self.textures, LoadReport())
         other.make, other.converts, other.uv_names = self.make, True, self.uv_names
@@ -114,7 +114,7 @@ class Networks:
         return other
 
     def input(self, shader: UsdShade.Shader, name: str, kind: str) -> Value | None:
-        """Returns the value of an input; None if nothing valid is connected or authored."""
+        """Returns the value of an input; None if the input has no valid connection or value."""
         source = self.source(shader, name)
         if source is None:
             return None
@@ -123,7 +123,7 @@ class Networks:
         return None if source.shader is None else self.node(source.shader, source.output, kind)
 
     def source(self, shader: UsdShade.Shader, name: str) -> Source | None:
-        """Returns the source of an input like ``source_of``.
+        """Returns the source of an input as ``source_of`` does, but stops at instanced node graphs.
 
         The source's shader may be an instanced node graph.
         """
@@ -161,7 +161,7 @@ class Networks:
         return value
 
     def primvar(self, name: str, otherwise: Value) -> Value:
-        """Returns a placeholder for the primvar's value on each mesh."""
+        """Returns a placeholder that is replaced by the value of the primvar on each mesh."""
         if name not in self.primvars:
             self.primvars.append(name)
         return self.make.primvar(self.primvars.index(name), otherwise)
@@ -189,7 +189,7 @@ class Networks:
         return None if value is None else fit(value, call.width or len(value))
 
     def _nearest(self, call: NodeCall) -> Value | None:
-        """Returns a substitute for an unknown node: the first of the node's inputs with a value."""
+        """Replaces an unknown node by the first of its inputs that has a value."""
         given = call.inputs.names()
         first = [name for name in _FIRST_CHOICES if name in given]
         for name in (*first, *(name for name in given if name not in first)):
@@ -230,7 +230,7 @@ class Networks:
 
 
 def _graph_of(call: NodeCall) -> FlatGraph | None:
-    """Returns the library's graph for a node with a numeric output."""
+    """Returns the library's node graph that implements a node with a numeric output."""
     if not call.identifier.startswith("ND_"):
         return None
     definition = definition_of(call.identifier)
@@ -247,7 +247,7 @@ def _graph_of(call: NodeCall) -> FlatGraph | None:
 
 
 class _StageInputs:
-    """Inputs of a shader in a stage; implements ``node.Inputs``."""
+    """Inputs of a shader prim; implements ``node.Inputs``."""
 
     def __init__(self, networks: Networks, shader: UsdShade.Shader) -> None:
         self._networks = networks
@@ -276,17 +276,18 @@ class _StageInputs:
 
 
 Compile = Callable[[UsdShade.Shader, str, str], Value | None]
-"""Callback that compiles a shader output for a use of the value."""
+"""Callback that compiles an output of a shader for a given use of the value."""
 
 
 class InstancedGraphs:
-    """Resolver of connections in a material that contains instanced node graphs.
+    """Compiles instanced node graphs of a material.
 
-    A short document can nest graphs so deeply that there are many more paths than graphs. Instances
-    of a prototype whose inputs have the same sources have the same value, which is compiled once.
+    A short document can nest graphs so deeply that there are far more prim paths than graphs.
+    Instances of a prototype with equal sources of their inputs have equal values, which are
+    compiled once.
 
     Attributes:
-        are_there: Whether the material contains instances.
+        are_there: Whether the material contains instanced node graphs.
     """
 
     def __init__(self, material: Usd.Prim, compile_node: Compile) -> None:
@@ -297,7 +298,7 @@ class InstancedGraphs:
         self._values: dict[tuple[Any, ...], Value | None] = {}
 
     def source(self, shader_input: UsdShade.Input, time: Usd.TimeCode) -> Source | None:
-        """Returns the source of an input like ``source_of``.
+        """Returns the source of an input as ``source_of`` does, but stops at instanced node graphs.
 
         The source's shader may be an instanced node graph.
         """
@@ -310,7 +311,7 @@ class InstancedGraphs:
         return None if value is None else Source(value=value, attribute=end)
 
     def value(self, graph: Usd.Prim, output: str, kind: str) -> Value | None:
-        """Returns the value of an output of an instanced graph."""
+        """Returns the value of an output of an instanced node graph."""
         node = UsdShade.NodeGraph(graph)
         fed_by = tuple((str(i.GetBaseName()), self._origin(i)) for i in node.GetInputs())
         key = (graph.GetPrototype().GetPath(), output, kind, fed_by)
@@ -327,7 +328,7 @@ class InstancedGraphs:
         return self._compile(shader, UsdShade.Output(end).GetBaseName(), kind)
 
     def _end(self, attribute: Usd.Attribute) -> Usd.Attribute:
-        """Follows connections to an output of a shader or instance, or to a value."""
+        """Follows connections up to an output of a shader or of an instance, or to a value."""
         passed: list[Sdf.Path] = []
         seen: set[Sdf.Path] = set()
         while (path := attribute.GetPath()) not in self._ends and path not in seen:
@@ -351,7 +352,7 @@ class InstancedGraphs:
         return found or None
 
     def _origin(self, graph_input: UsdShade.Input) -> str:
-        """Returns a key of an input's source, equal for inputs with the same value."""
+        """Returns a key of an input's source; equal keys mean equal values."""
         end = self._end(graph_input.GetAttr())
         prim = end.GetPrim()
         if UsdShade.Output.IsOutput(end) or not prim.IsInstanceProxy():

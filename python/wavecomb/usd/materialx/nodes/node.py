@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One MaterialX node during compilation, with access to its inputs."""
+"""A MaterialX node that is being compiled, with access to its inputs."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from wavecomb.usd.materials.network import Source, word
 from wavecomb.usd.stage.report import LoadReport
 
 OF_MATRICES = ("transformmatrix", "transpose", "creatematrix", "constant", "dot")
-"""Categories whose inputs may be matrices, which are values of 9 or 16 components."""
+"""Categories of nodes whose inputs may be matrices, which have 9 or 16 components."""
 
 
 class Inputs(Protocol):
-    """Interface to the inputs of a node of a stage or of a library graph."""
+    """Interface to the inputs of a node that is a prim or part of a library graph."""
 
     @property
     def path(self) -> Sdf.Path:
@@ -38,7 +38,7 @@ class Inputs(Protocol):
 
 
 class NodeHost(Protocol):
-    """Interface to the network that contains a node; implemented by ``network.Networks``."""
+    """Interface to the network that contains a node, which ``network.Networks`` implements."""
 
     material: Usd.Prim
     make: Expressions
@@ -56,12 +56,12 @@ class NodeHost(Protocol):
 
 
 class NodeCall:
-    """One MaterialX node during compilation.
+    """A MaterialX node that is being compiled.
 
     Attributes:
         networks: Network that contains the node.
         inputs: Inputs of the node.
-        category: Category of the node without types.
+        category: Category of the node, such as "mix".
         identifier: Name of the node's definition.
         output: Name of the requested output.
         width: Number of components of the requested output; 0 accepts any number.
@@ -93,9 +93,9 @@ class NodeCall:
         return self.networks.make
 
     def given(self, name: str) -> Value | None:
-        """Returns the value of an input, or None.
+        """Returns the value of an input; None if the input is not set.
 
-        Matrices are cut to four components unless the node accepts matrices.
+        A matrix is cut to four components unless the node accepts matrices.
         """
         found = self.inputs.find(name, self.kind)
         is_cut = found is not None and len(found) > 4 and self.category not in OF_MATRICES
@@ -104,7 +104,7 @@ class NodeCall:
     def value(
         self, name: str, default: float | Sequence[float] | None = 0.0, width: int = 0
     ) -> Value:
-        """Returns an input's value, or its default; ``width`` 0 keeps the number of components."""
+        """Returns an input's value or its default, with ``width`` components (0 means any)."""
         found = self.given(name)
         if found is None:
             if isinstance(default, (int, float)):
@@ -114,7 +114,7 @@ class NodeCall:
         return fit(found, width) if width else found
 
     def number(self, name: str, default: float) -> float:
-        """Returns an input that must be a constant number; reports any other value."""
+        """Returns the value of an input that must be constant; reports any other input."""
         found = self.inputs.find(name, NUMBER)
         if found is None:
             return default
@@ -130,20 +130,21 @@ class NodeCall:
         return word(source.value, default) if source is not None and source.is_value else default
 
     def coordinates(self, name: str = "texcoord") -> Value:
-        """Returns texture coordinates from an input, else from the mesh."""
+        """Returns texture coordinates from an input, or the mesh's texture coordinates."""
         found = self.inputs.find(name, NUMBER)
         return self.at_place("texcoord", "") if found is None else fit(found, 2)
 
     def place(self, kind: str, name: str, space: str) -> Value:
-        """Returns a geometric property from an authored input, else from the shading point."""
+        """Returns a geometric property from an input that is set, or at the shading point."""
         found = self.inputs.find(name, NUMBER) if name else None
         return self.at_place(kind, space) if found is None else fit(found, 3)
 
     def at_place(self, kind: str, space: str) -> Value:
         """Returns a geometric property of the shading point.
 
-        ``kind`` is texcoord, position, normal, tangent, bitangent or viewdirection, and ``space``
-        is object or world. The graph input ``view`` points from the surface to the camera.
+        ``kind`` is "texcoord", "position", "normal", "tangent", "bitangent" or "viewdirection".
+        ``space`` is "object" or "world". The graph input ``view`` points from the surface to the
+        camera.
         """
         make = self.make
         if kind == "texcoord":
@@ -158,13 +159,13 @@ class NodeCall:
         return self.world_position() if kind == "position" else make.input(kind)
 
     def world_position(self) -> Value:
-        """Returns the world position of the shading point, by adding the scene's origin."""
+        """Returns the shading point's world position, which is offset by the scene's origin."""
         position, origin = self.make.input("position"), self.networks.textures.origin
         return self.make.add(position, numbers(*origin)) if any(origin) else position
 
 
 Handler = Callable[[NodeCall], Value | None]
-"""Compiles a node to a value, or to None if it has none."""
+"""Function that compiles a node; returns None if the node has no value."""
 
 
 def adder(table: dict[str, Handler]) -> Callable[..., Callable[[Handler], Handler]]:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compiles nodes that are graphs of other nodes, by expanding the library's graphs in place.
+"""Compiles nodes that MaterialX's library implements as graphs, by compiling the graphs.
 
-Nodes that have a handler are not expanded.
+Nodes that have a handler are compiled by the handler instead.
 """
 
 from __future__ import annotations
@@ -24,28 +24,28 @@ PRIMITIVES: dict[str, Handler] = {
 }
 
 CATEGORIES = frozenset(PRIMITIVES)
-"""Node categories that are not expanded when library graphs are flattened."""
+"""Categories of nodes that have a handler and are not replaced by library graphs."""
 
 NOT_NUMBERS = ("string", "filename", "geomname")
 """MaterialX types of inputs that hold text."""
 
 
 _PLACES = ("texcoord", "st", "position", "normal", "index", "octaves", "style")
-"""Inputs that are read as numbers regardless of the use of the node's output."""
+"""Names of inputs that are read as plain numbers, whatever the node's output is used for."""
 
 
 def _kind(category: str, name: str, kind: str) -> str:
-    """Returns the use of a node input's value."""
+    """Returns the use of the value of a node's input."""
     if category == "normalmap" and name == "in":
         return NORMAL
     return NUMBER if name in _PLACES else kind
 
 
 class ExpandedGraph:
-    """The expanded graph of one node."""
+    """Library graph that is compiled in place of a node."""
 
     def __init__(self, call: NodeCall, graph: FlatGraph, spread: int = 0) -> None:
-        """``spread`` is the width given to numbers in graphs that act per component."""
+        """``spread`` is the width of numbers in graphs that act per component; 0 otherwise."""
         self.call = call
         self._graph = graph
         self._spread = spread
@@ -66,7 +66,7 @@ class ExpandedGraph:
     def _needed(
         self, result: PortSource
     ) -> tuple[list[tuple[str, str, str]], list[tuple[str, str]]]:
-        """Returns the nodes (in evaluation order) and interface inputs of an output."""
+        """Returns the nodes (in evaluation order) and graph inputs that an output needs."""
         nodes: dict[tuple[str, str, str], None] = {}
         interfaces: dict[tuple[str, str], None] = {}
         stack = [(result, self.call.kind)]
@@ -121,7 +121,7 @@ class ExpandedGraph:
         return None if value is None else Source(value=value)
 
     def is_given(self, feed: PortSource) -> bool:
-        """Returns whether a source is set rather than a default."""
+        """Returns whether the source of an input is set; False if it is a default."""
         return self.call.inputs.has(feed.interface) if feed.interface else True
 
 
@@ -134,7 +134,7 @@ class _LibraryInputs:
 
     @property
     def path(self) -> Sdf.Path:
-        """Path of the prim whose graph contains the node."""
+        """Path of the prim that the graph replaces, for messages."""
         return self._body.call.inputs.path
 
     def find(self, name: str, kind: str) -> Value | None:
@@ -158,7 +158,7 @@ class _LibraryInputs:
 
 
 def literal(feed: PortSource) -> Value | None:
-    """Parses the numbers of a source's value; returns None for text."""
+    """Parses the numbers in the text of a source's value; returns None for text values."""
     if not feed.value or feed.type in NOT_NUMBERS:
         return None
     if feed.type == "boolean":
