@@ -12,10 +12,10 @@ namespace wavecomb {
 
 /// Features of the programs principled and openpbr that a variant can omit.
 enum Part : uint32_t {
-  kTexturePart = 1,        ///< The material reads textures or a value graph.
-  kEmissionPart = 2,       ///< emission
-  kMetalPart = 4,          ///< The material has a metallic weight above 0, or `specular_color` gives F0.
-  kCoatPart = 8,           ///< clearcoat
+  kTexturePart = 1,   ///< The material reads textures or a value graph.
+  kEmissionPart = 2,  ///< emission
+  kMetalPart = 4,     ///< The material has a metallic weight above 0, or `specular_color` gives F0.
+  kCoatPart = 8,      ///< clearcoat
   kTransmissionPart = 16,  ///< straight or refracted transmission
   // openpbr only:
   kBackDiffusePart = 32,  ///< diffuse transmission of thin walls, and subsurface random walks

@@ -42,7 +42,7 @@ struct GuidingStatistics {
 /// Result of the training.
 struct GuidingTraining {
   std::shared_ptr<const GuidingField> field;  ///< null if nothing was learned
-  std::optional<ImageTiles> tiles;            ///< brightness of the image; set if there is a guiding field
+  std::optional<ImageTiles> tiles;  ///< brightness of the image; set if there is a guiding field
   GuidingStatistics statistics;
 };
 
