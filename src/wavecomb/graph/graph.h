@@ -71,7 +71,7 @@ enum class GraphInput : uint8_t {
   kNormal,         ///< unit shading normal in world space
   kLocalNormal,    ///< unit shading normal in the space of the instanced group
   kTangent,        ///< unit tangent along u in world space
-  kBitangent,      ///< unit, perpendicular to normal and tangent, on the side of increasing v
+  kBitangent,      ///< unit vector perpendicular to normal and tangent, towards increasing v
   kView,           ///< unit direction to the viewer in world space
   /// Images of the local axes under the normal transform, in world space: rows of the inverse of
   /// the instance transform.
@@ -95,8 +95,7 @@ inline constexpr uint32_t kNoGraph = 0xffffffffu;
 struct GraphOp {
   uint8_t code;   ///< GraphCode
   uint8_t width;  ///< components, 1 to 4
-  uint8_t steps;  ///< if bit k is set, operand k is a vector; otherwise one value serves all
-                  ///< components
+  uint8_t steps;  ///< bit k is set if operand k is a vector, and clear if it is a scalar
   uint8_t pad = 0;
   /// First register to write; the written registers must not overlap registers that the operation
   /// reads.

@@ -25,8 +25,8 @@ struct GraphPoint {
 };
 
 /// Runs `program` for all active lanes with the inputs `at`. `registers` has room for
-/// kMaxGraphRegisters values and receives the results. The result of a lane depends only on that
-/// lane's point. `textures` holds the scene's textures, which the graph's images refer to.
+/// kMaxGraphRegisters values and receives the results. The result of a lane does not depend on the
+/// inputs of other lanes. `textures` holds the textures of the scene.
 template <typename F>
 [[gnu::noinline]] void run_graph(const GraphView& view, const GraphProgram& program,
                                  const TextureView* textures, const GraphPoint<F>& at,

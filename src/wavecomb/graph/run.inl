@@ -58,7 +58,8 @@ template <typename F>
 inline Vec3<F> hsv_to_rgb(const Vec3<F>& c) {
   const F turns = noise::bounded<F>(c.x), hue = (turns - floor(turns)) * 6.f;
   const auto channel = [&](float shift) {
-    // `ramp` is 1 over two sixths of the hue circle, 0 over two sixths, and linear in between.
+    // As a function of hue, `ramp` is 1 on one third of the hue circle, 0 on the opposite third,
+    // and linear in between.
     const F k = hue + shift, wrapped = select(k >= 6.f, F(k - 6.f), k);
     const F ramp = clamp(min(wrapped, F(4.f - wrapped)), F(0.f), F(1.f));
     return F(c.z * fma(-c.y, ramp, F(1.f)));
@@ -91,7 +92,8 @@ inline F modulo(const F& a, const F& b) {
   const F whole = floor(F(a / select(none, F(1.f), b)));
   return select(none, F(0.f), F(a - F(b * whole)));
 }
-/// Returns the cubic from 0 at x = low to 1 at x = high; a step if both are equal.
+/// Returns the cubic smoothstep of x, which rises from 0 at `low` to 1 at `high`, or a step
+/// function if `low` and `high` are equal.
 template <typename F>
 inline F smoothstep(const F& x, const F& low, const F& high) {
   const F range = high - low;

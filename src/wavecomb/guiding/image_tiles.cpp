@@ -11,7 +11,7 @@ namespace wavecomb {
 namespace {
 
 constexpr uint32_t kMaxRows = 16, kPathsOfTile = 64;
-/// Resolution of sums, and limit to which luminances are clamped, both relative to the median
+/// Step size of the integer sums, and upper limit of luminances, both relative to the median
 /// luminance.
 constexpr double kStep = 0x1p-20, kMaxOfMedian = 64;
 

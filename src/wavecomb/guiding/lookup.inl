@@ -38,8 +38,8 @@ inline UInt<F> guiding_cell(const GuidingView& guide, const UInt<F>& x, const UI
   return entry & (kGuidingCell - 1);
 }
 
-/// Entry of a cumulative row that contains sample value k: its bin and its 32-bit word. The row
-/// starts at tables[first] and has kGuidingSide bins.
+/// Bin of a sampling table row to which a sample value k is assigned: the index of the bin, and its
+/// 32-bit word in the table. The row starts at tables[first] and has kGuidingSide bins.
 template <typename F>
 struct GuidingBin {
   UInt<F> bin, word;

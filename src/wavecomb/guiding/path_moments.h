@@ -20,7 +20,7 @@ struct PathStep {
   double left;          ///< luminance of the throughput after the bounce; 0 without a bounce
   double contribution;  ///< contribution of the bounce and the rest of the path
   double survival;      ///< survival probability q
-  double vertex_cost;   ///< shading cost including the light sample
+  double vertex_cost;   ///< cost of shading the vertex, including the light sample
 
   /// Returns the contribution l for a throughput of 1.
   double value() const { return left > 0 ? contribution / arrived : 0; }

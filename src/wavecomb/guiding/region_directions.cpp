@@ -68,8 +68,8 @@ double farthest(Bounces bounces, const ParallaxSphere& sphere) {
   return std::sqrt(most);
 }
 
-/// For each direction bin, the bins over which the blur distributes its weight, with their
-/// fractions.
+/// For each direction bin, the bins over which the blur distributes the bin's weight, and the
+/// fraction of the weight for each of these bins.
 using Blur = std::array<std::vector<std::pair<uint32_t, double>>, kGuidingBins>;
 
 Blur make_blur() {

@@ -28,7 +28,8 @@ using Bounces = std::span<const TrainingRecord* const>;
 /// surfaces that rays hit behind it. The value of each bounce is clamped to `cut`.
 ParallaxSphere fit_sphere(Bounces bounces, double cut);
 
-/// Returns `count` of the bounces, at equal index intervals, or all bounces if there are fewer.
+/// Returns `count` of the bounces, at equal index intervals, or all bounces if there are at most
+/// `count`.
 std::vector<const TrainingRecord*> subset_of_bounces(Bounces bounces, size_t count);
 
 /// Sums the values of bounces, clamped to `cut`, in bins by their direction as seen from the centre

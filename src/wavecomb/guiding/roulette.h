@@ -22,7 +22,8 @@ namespace wavecomb {
 /// Minimum survival probability.
 inline constexpr float kMinSurvival = 0.1f;
 
-/// Returns the survival probability of a path in a region with training samples; `share` is T / I.
+/// Returns the survival probability of a path in a region with training samples. `share` is the
+/// throughput divided by the brightness of the image at the pixel.
 template <typename F>
 inline F efficient_survival(const GuidingLookup<F>& guiding, const F& share) {
   return clamp(F(share * guiding.survival), F(kMinSurvival), F(1.f));
@@ -42,7 +43,8 @@ struct PathStatistics {
   /// Variance that roulette adds to a path. In the mean over paths, this member is the total
   /// variance of a path, divided by the squared brightness of the image.
   double variance = 0;
-  /// Expected number of vertices with roulette, and of those at which the path survives.
+  /// Expected number of vertices with roulette, and expected number of vertices at which the path
+  /// survives roulette.
   double vertices = 0, survivors = 0;
 };
 

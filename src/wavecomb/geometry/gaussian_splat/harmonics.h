@@ -11,7 +11,7 @@ namespace wavecomb {
 /// Maximum number of harmonics per Gaussian splat, up to degree 3.
 inline constexpr uint32_t kMaxHarmonics = 16;
 
-/// Returns the degree of harmonic k.
+/// Returns the degree l of the spherical harmonic with index k.
 constexpr uint32_t harmonic_degree(uint32_t k) {
   return k < 1 ? 0 : (k < 4 ? 1 : (k < 9 ? 2 : 3));
 }

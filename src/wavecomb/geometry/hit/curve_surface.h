@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Surface at hits on curves and points; part of geometry/hit/surface.h.
+/// Shading points of hits on curves and points. `geometry/hit/surface.h` includes this file.
 #pragma once
 
 #include "wavecomb/geometry/hit/surface_reader.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Body of setup_curved (curve_surface.h), for the units that instantiate it.
+/// Definition of `setup_curved()`, for the translation units that instantiate it.
 #pragma once
 
 #include "wavecomb/geometry/curve/segment.h"
@@ -9,11 +9,12 @@
 
 namespace wavecomb::detail {
 
-/// Surface point of a curve or point in group space.
+/// Hit point on a curve or point, in the space of the instanced group.
 template <typename F>
 struct CurvedPoint {
   Vec3<F> p, n, dpdu;  ///< n: unit outward normal
-  /// Bound of the terms from which p was computed, for the rounding error of p.
+  /// Upper bound of the magnitudes of the terms that add up to `p`. The rounding error of `p` is
+  /// proportional to this bound.
   F size;
   F du, dv;  ///< lengths of dp/du and dp/dv
 };
@@ -23,7 +24,7 @@ inline F reach(const Vec3<F>& v) {
   return max_component(abs3(v));
 }
 
-/// Returns a bound of the coordinates of a segment's control points, for the rounding error.
+/// Returns an upper bound of the coordinates of a curve segment, from its control points and radii.
 template <typename F>
 inline F control_size(const CurveSegment<F>& s) {
   return max(max(F(reach(s.p[0]) + s.r[0]), F(reach(s.p[1]) + s.r[1])),
@@ -102,16 +103,17 @@ inline void set_uv(const MeshReader<F>& mesh, const InstanceMaps<F>& maps, const
   s.uv_per_length = sqrt(density2);
 }
 
-/// Control points that each lane of a packet of hits reads.
+/// Control points of the curve segment or point that each lane hit.
 template <typename F>
 struct ControlPoints {
   UInt<F> first;    ///< index of control point 0
-  Mask<F> strands;  ///< lanes with curves, which have at least two control points
+  Mask<F> strands;  ///< lanes that hit curve segments
   Mask<F> ribbons;  ///< lanes with normals
 };
 
-/// Moves control points, ribbon normals and instance transforms to the time of the hits. Returns a
-/// bound of all terms of world positions, for their rounding error.
+/// Moves control points, ribbon normals and instance transforms to the time of the hits. Returns an
+/// upper bound of the terms that add up to a world position, to which its rounding error is
+/// proportional.
 template <typename F>
 [[gnu::noinline, gnu::cold]] F move_segment(const SceneView& scene, const MeshHit<F>& hit,
                                             const ControlPoints<F>& from, const Mask<F>& active,

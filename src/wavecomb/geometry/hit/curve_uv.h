@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Texture coordinates on curves and points; part of geometry/hit/uv.h.
+/// Texture coordinates on curves and points. `geometry/hit/uv.h` includes this file.
 #pragma once
 
 #include "wavecomb/geometry/hit/surface_reader.h"
 
 namespace wavecomb::detail {
 
-/// Texture coordinates on curves and points, and the difference `d` between both ends of a segment
-/// if they are `authored`.
+/// Texture coordinates on curves and points. In lanes with `authored` coordinates, `d` is the
+/// difference of the coordinates at the two ends of the curve segment.
 template <typename F>
 struct CurveUv {
   Vec2<F> uv, d;

@@ -21,7 +21,7 @@ struct GaussianSplatMap {
   Vec3<F> whiten(const Vec3<F>& v) const {
     return {dot(row[0], v), dot(row[1], v), dot(row[2], v)};
   }
-  /// Applies the inverse map, computed from cross products of the matrix rows.
+  /// Applies the inverse of the linear map, computed from cross products of the matrix rows.
   Vec3<F> unwhiten(const Vec3<F>& w) const {
     const Vec3<F> x = cross(row[1], row[2]), y = cross(row[2], row[0]), z = cross(row[0], row[1]);
     const F det = dot(row[0], x);

@@ -36,7 +36,8 @@ struct MatrixPair {
   std::array<F, 16> a, b;
   F part;
 
-  /// `first` and `segments` are the StepRange of each active lane, whose instance must move.
+  /// The instances of all active lanes must move. `first` and `segments` are the members of
+  /// `StepRange` for each lane.
   MatrixPair(const MatrixStep* steps, const UInt<F>& first, const UInt<F>& segments, const F& time,
              const Mask<F>& active) {
     const StepInterpolation<F> at(time, segments);
@@ -106,13 +107,13 @@ struct MovedInstance {
   Mask<F> moves;
   MatrixLanes<F> to_world;  ///< transforms, valid in lanes whose instances move
   F side;                   ///< sign of the determinant of to_world
-  F size;                   ///< bound of all terms of a world position, for the rounding error
+  F size;                   ///< upper bound of the terms that add up to a world position
 };
 
-/// Returns the transforms of moving instances. `maps` holds the linear part `row` and the
-/// translation `t` of instances that do not move. `reach` bounds the magnitudes of local positions.
-/// This function and the following functions are not inlined, so that kernels of scenes without
-/// motion stay small.
+/// Returns the transforms of moving instances. `maps` holds the transforms of instances that do not
+/// move: their linear part `row` and translation `t`. `reach` is an upper bound of the magnitudes
+/// of local coordinates. This function and the following functions are not inlined, so that kernels
+/// of scenes without motion stay small.
 template <typename F, typename Maps>
 [[gnu::noinline, gnu::cold]] MovedInstance<F> moved_instance(const SceneView& scene,
                                                              const UInt<F>& inst, const F& time,

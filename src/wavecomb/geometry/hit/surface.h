@@ -26,10 +26,10 @@ struct TrianglePoint {
   F safe_area2;
 };
 
-/// Returns a bound of the rounding error of a hit point, from the magnitudes of all terms of the
-/// interpolated point and, with a smaller weight, of the triangle's corners, from which traversal
-/// subtracts the ray's origin. The bound combines all axes, since the products in traversal mix
-/// them.
+/// Returns an upper bound of the rounding error of a hit point. It is proportional to the
+/// magnitudes of the terms of the interpolated point and, with a smaller weight, of the triangle's
+/// corners, from which traversal subtracts the ray's origin. All axes share one bound, since the
+/// errors of the cross products in traversal depend on several axes.
 template <typename F>
 WAVECOMB_INLINE F rounding_offset(const InstanceMaps<F>& maps, const TrianglePoint<F>& at) {
   const Vec3<F> q0 = abs3(at.p0), q1 = abs3(at.p1), q2 = abs3(at.p2);
@@ -40,7 +40,7 @@ WAVECOMB_INLINE F rounding_offset(const InstanceMaps<F>& maps, const TrianglePoi
          0x1p-20f;
 }
 
-/// Lanes with smooth normals, and whether to compute the terminator vector.
+/// Selects the lanes with interpolated normals, and whether to compute their terminator vectors.
 template <typename F>
 struct SmoothLanes {
   const Mask<F>& smooth;
@@ -117,14 +117,15 @@ WAVECOMB_INLINE void set_triangle_uv(const SceneView& scene, const MeshHit<F>& h
 
 }  // namespace detail
 
-/// Computes the shading point of a hit. `dir` is the unit direction of the ray. `with_uv` computes
-/// uv, dpdu and uv_per_length, `with_terminator` the terminator vector. kWithCurves and kWithMotion
-/// can be false for scenes without curves or motion.
+/// Computes the shading point of a hit. `dir` is the unit direction of the ray. If `with_uv` is
+/// true, the members `uv`, `dpdu` and `uv_per_length` are computed. If `with_terminator` is true,
+/// the terminator vector is computed. `kWithCurves` may be false for scenes without curves, and
+/// `kWithMotion` for scenes without motion.
 ///
-/// The offset bounds the distance between p and the true surface due to rounding in interpolation,
-/// transform and traversal, in the manner of Pharr, Jakob, Humphreys, "Physically Based Rendering",
-/// section 6.8. The terminator vector follows Hanika, "Hacking the Shadow Terminator", Ray Tracing
-/// Gems II.
+/// The member `offset` is an upper bound of the distance between `p` and the true surface. Rounding
+/// errors of interpolation, transform and traversal cause this distance (Pharr, Jakob, Humphreys,
+/// "Physically Based Rendering", section 6.8). The terminator vector follows Hanika, "Hacking the
+/// Shadow Terminator", Ray Tracing Gems II.
 template <typename F, bool kWithCurves = true, bool kWithMotion = true>
 WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F>& hit,
                                          const Vec3<F>& dir, bool with_uv, bool with_terminator,
@@ -156,7 +157,7 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
 
   Surface<F> s;
   s.p = maps.point(p);
-  // Its length is twice the triangle's area in world space.
+  // The length of the area vector is twice the triangle's area in world space.
   const Vec3<F> area_vector = maps.map_normal(cross(e1, e2));
   const F area2 = length(area_vector);
   const F safe_area2 = select(area2 > 0.f, area2, F(1.f));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Hits and shading points, and the access of lanes to their meshes and instances.
+/// Types for hits and shading points, and functions that read the mesh and instance of each lane.
 #pragma once
 
 #include "wavecomb/core/frame.h"
@@ -41,7 +41,7 @@ struct Surface {
 
 namespace detail {
 
-/// Reader of the mesh arrays of each lane, row by row.
+/// Reads rows of the arrays of the mesh that each lane hit.
 template <typename F>
 class MeshReader {
  public:
@@ -99,7 +99,8 @@ class MeshReader {
   UInt<F> flags;
 
  private:
-  /// Reads rows for partially filled packets; not inlined, since most packets are full.
+  /// Reads rows for a packet in which some lanes are inactive. The function is not inlined, since
+  /// most packets are full.
   template <size_t N>
   [[gnu::noinline]] std::array<F, N> some_rows(uint64_t MeshRecord::* array, UInt<F> word,
                                                Mask<F> active) const {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Smooth tangents of triangles; part of geometry/hit/surface.h.
+/// Smooth tangents of triangles. `geometry/hit/surface.h` includes this file.
 #pragma once
 
 #include <array>

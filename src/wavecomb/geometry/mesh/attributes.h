@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Checks and packed form of mesh attributes.
+/// Validation and packing of mesh attributes.
 #pragma once
 
 #include <string>
@@ -9,8 +9,9 @@
 
 namespace wavecomb {
 
-/// Throws Error if attributes of a mesh do not match its sizes or are not finite. `where` names the
-/// mesh in the message; `names` are the names of all attributes, by id.
+/// Throws Error if the number of values of an attribute does not match the mesh, or if a value is
+/// not finite. `where` names the mesh in the message; `names` are the names of all attributes, by
+/// id.
 void check_attributes(const Mesh& mesh, const std::string& where,
                       const std::vector<std::string>& names);
 

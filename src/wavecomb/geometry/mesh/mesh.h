@@ -89,7 +89,7 @@ struct Mesh {
   std::span<const GaussianSplatRow> splats;  ///< 1 per splat
   std::span<const float> harmonics;  ///< colour of each splat, as 3 (harmonics_degree + 1)^2 floats
   uint32_t harmonics_degree = 0;     ///< 0 to 3
-  /// Values at the first motion step; like uvs, they do not move.
+  /// Attributes of the mesh. Their values do not change between motion steps.
   std::vector<MeshAttribute> attributes;
   /// Number of shapes at equally spaced shutter times; 1 if the mesh does not deform.
   uint32_t steps = 1;
@@ -119,8 +119,8 @@ struct Mesh {
   bool deforms() const { return steps > 1; }
 };
 
-/// Packed mesh: addresses and flags, 16 32-bit words. For splats, `normals` is the address of the
-/// GaussianSplatRow array, and `uvs` the address of the spherical harmonics.
+/// Packed mesh for kernels: addresses of its arrays, and flags, in 64 bytes. For splats, `normals`
+/// is the address of the GaussianSplatRow array, and `uvs` the address of the spherical harmonics.
 struct alignas(64) MeshRecord {
   uint64_t positions, indices, normals, uvs, face_materials;
   uint32_t material;

@@ -15,9 +15,9 @@ namespace wavecomb {
 /// Maximum number of motion steps, as in Embree.
 inline constexpr uint32_t kMaxSteps = 129;
 
-/// Motion of a mesh that deforms: distances between the arrays of consecutive steps.
-/// MeshRecord::motion is an index into a list of these, whose first entry is for meshes that do not
-/// deform.
+/// Distances in memory between the arrays of consecutive motion steps of a mesh.
+/// `MeshRecord::motion` is an index into `MotionView::meshes`, whose entry 0 is for meshes that do
+/// not deform.
 struct MeshMotion {
   uint64_t positions = 0, normals = 0;  ///< bytes
   /// Number of motion steps minus one; 0 if the mesh does not deform.
@@ -89,8 +89,8 @@ inline Affine at_step(std::span<const Affine> steps, uint32_t k, uint32_t n) {
                  static_cast<float>(offset % n) / static_cast<float>(n));
 }
 
-/// Returns the number of time segments for the product of two motions, which is a common multiple
-/// of both numbers, up to a limit.
+/// Returns the number of time segments for the product of two motions with `a` and `b` segments. It
+/// is a common multiple of `a` and `b`, up to a limit.
 uint32_t common_segments(uint32_t a, uint32_t b);
 
 }  // namespace wavecomb

@@ -13,8 +13,8 @@ namespace wavecomb {
 namespace {
 
 using V = Vec3<float>;
-/// Number of triangles whose tangents are computed before they are summed, which bounds the scratch
-/// memory, and number of triangles of a task.
+/// `kBatch` triangles are processed at a time, to limit the memory for their tangents. Each
+/// parallel task processes `kChunk` triangles of a batch.
 constexpr size_t kBatch = 65536, kChunk = 1024;
 /// A mean tangent whose length is below this fraction of the sum of its weights has no reliable
 /// direction.

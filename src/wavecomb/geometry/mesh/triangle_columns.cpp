@@ -12,7 +12,7 @@ namespace {
 /// - kSlopeY z.
 constexpr float kSlopeX = 0.2371f, kSlopeY = 0.1549f;
 constexpr uint32_t kMaxCells = 512;  ///< number of grid cells along one side
-constexpr size_t kMaxEntries = 16;   ///< mean number of cells that a triangle overlaps
+constexpr size_t kMaxEntries = 16;   ///< maximum mean number of grid cells per triangle
 
 }  // namespace
 

@@ -97,8 +97,8 @@ class Clipper {
   }
 
  private:
-  /// Entry in the list of corners that cannot be cut until the corners at a blocking position have
-  /// been removed.
+  /// Entry of a linked list of corners that are blocked by the same position: they cannot be cut
+  /// until all corners at this position have been removed.
   struct Blocked {
     uint32_t position = kNone, next = kNone, previous = kNone;
   };
@@ -158,7 +158,7 @@ class Clipper {
   std::vector<uint32_t> next_, previous_;
   std::vector<Blocked> blocked_;
   CornerTree tree_;
-  std::vector<uint32_t> first_;  ///< first corner that each position blocks
+  std::vector<uint32_t> first_;  ///< first corner of the list of blocked corners, for each position
 };
 
 }  // namespace

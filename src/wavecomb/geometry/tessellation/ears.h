@@ -10,14 +10,15 @@ namespace wavecomb {
 
 /// Triangulation of a polygon.
 struct PolygonTriangulation {
-  /// 3 corners per triangle; a polygon of n corners has n - 2 triangles.
+  /// Corner indices, 3 per triangle. A polygon with n corners is divided into n - 2 triangles.
   std::vector<int64_t> corners;
   uint64_t untested = 0;  ///< number of ears that were cut without a test, after the step
                           ///< limit
 };
 
-/// Limit on the number of steps of clip_ears, which take about a second. In the worst known cases,
-/// a face of 100,000 corners takes two thirds of the limit and a face of 5,000 corners a fiftieth.
+/// Maximum number of steps of `clip_ears()`; this number of steps takes about a second. In the
+/// worst known cases, a face with 100,000 corners needs two thirds of this number, and a face with
+/// 5,000 corners needs one fiftieth.
 inline constexpr uint64_t kMaxClippingSteps = uint64_t{1} << 26;
 
 /// Triangulates a polygon in the plane, counter-clockwise, by clipping ears from its first corner
@@ -30,8 +31,9 @@ inline constexpr uint64_t kMaxClippingSteps = uint64_t{1} << 26;
 /// removed. A k-d tree finds blocking corners. In the worst known cases, self-intersecting polygons
 /// included, n corners take O(n sqrt(n)) steps.
 ///
-/// `flat` holds x and y of each corner. If a coordinate is not finite, the result is a fan. Corners
-/// that remain after `max_steps` are cut without a test.
+/// `flat` holds x and y of each corner. If a coordinate is not finite, the result is a triangle
+/// fan. After `max_steps` steps, the remaining corners are cut without testing whether they are
+/// ears.
 PolygonTriangulation clip_ears(std::span<const double> flat,
                                uint64_t max_steps = kMaxClippingSteps);
 

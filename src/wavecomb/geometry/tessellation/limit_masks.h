@@ -139,8 +139,8 @@ template <Sdc::SchemeType kScheme, typename V>
 void refine(const Sdc::Options& options, const Far::TopologyLevel& level,
             const Far::TopologyLevel& next, const V* from, V* to) {
   const Sdc::Scheme<kScheme> scheme(options);
-  // Compute the child vertices of faces first, since those of edges and vertices read them. Loop
-  // subdivision has no child vertices of faces.
+  // Compute the child vertices of faces first, since the child vertices of edges and vertices
+  // depend on them. Loop subdivision has no child vertices of faces.
   if constexpr (kScheme != Sdc::SCHEME_LOOP)
     in_bands(level.GetNumFaces(), [&] {
       return [&, weights = std::vector<float>()](int face) mutable {

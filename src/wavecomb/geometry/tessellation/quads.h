@@ -14,9 +14,9 @@ namespace wavecomb {
 /// are signed by the quad's normal. If both diagonals are equally good, chooses the diagonal
 /// through the first corner.
 ///
-/// `points`: 3 per point. `indices`: point index of each corner, which must be in range. `starts`:
-/// index of the first corner of each quad, whose other corners follow it; empty if all faces are
-/// quads.
+/// `points`: 3 coordinates per point. `indices`: point index of each corner, which must be in
+/// range. `starts`: index of the first corner of each quad, whose other corners follow it; empty if
+/// all faces are quads.
 std::vector<int64_t> split_quads(std::span<const float> points, std::span<const int32_t> indices,
                                  std::span<const int64_t> starts);
 

@@ -91,7 +91,8 @@ struct Subdivision::Refiner {
   Sdc::Options options;
   bool manifold = true;
   bool has_holes = false;
-  /// Visible faces of the last level, in order; empty without holes, if all faces are visible.
+  /// Visible faces of the last level, in ascending order. The list is empty if there are no holes,
+  /// since all faces are visible then.
   std::vector<int> drawn;
 
   int level() const { return far->GetMaxLevel(); }
@@ -281,8 +282,8 @@ std::vector<uint32_t> Subdivision::normal_sectors(const RefinedFaces& faces,
     return refiner_->scheme == Scheme::kBilinear &&
            refiner_->base_of(around[0]) != refiner_->base_of(around[1]);
   };
-  // Find the vertices whose faces may be separated by sharp edges. Few vertices are, so all threads
-  // search for them, and one thread numbers them in order.
+  // Find the vertices whose faces may be separated by sharp edges. There are few such vertices: all
+  // threads search for them, and one thread then numbers them in order.
   const size_t points = refiner_->vertices_of(refiner_->level());
   std::vector<std::vector<int>> cut((points + masks::kBand - 1) / masks::kBand);
   parallel_bands(points, masks::kBand, [&](size_t first, size_t end) {
@@ -304,7 +305,8 @@ std::vector<uint32_t> Subdivision::normal_sectors(const RefinedFaces& faces,
   std::vector<int> sector;
   const auto number = [&](int v) {
     const Far::ConstIndexArray around = last.GetVertexFaces(v), edges = last.GetVertexEdges(v);
-    // Faces that share a smooth edge form a sector, whose number is the lowest of their numbers.
+    // Faces that share a smooth edge form a sector. The number of a sector is the lowest index of
+    // its faces.
     sector.resize(static_cast<size_t>(around.size()));
     std::iota(sector.begin(), sector.end(), 0);
     for (const int e : edges) {

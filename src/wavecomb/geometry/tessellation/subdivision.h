@@ -14,7 +14,7 @@ namespace wavecomb {
 /// Visible faces of the finest level, with `size` corners each.
 struct RefinedFaces {
   uint32_t size = 4;  ///< 4, or 3 with Loop
-  /// Number of vertices of the level, including vertices of holes.
+  /// Number of vertices of the finest level, including vertices of holes.
   uint32_t vertex_count = 0;
   std::vector<uint32_t> corners;  ///< vertex index of each corner
   std::vector<uint32_t> base;     ///< index of the cage face of each face

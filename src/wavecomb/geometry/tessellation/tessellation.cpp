@@ -224,8 +224,7 @@ Spread spread(const SurfacePrimvar& primvar, const Subdivision& surface,
   return {};
 }
 
-/// Returns a primvar on the corners of polygons that are not subdivided, which are already
-/// triangulated.
+/// Returns a primvar on the corners of a surface that is triangulated but not subdivided.
 Spread spread_polygons(const SurfacePrimvar& primvar, const RefinedFaces& faces) {
   Spread out{{primvar.values.begin(), primvar.values.end()}, faces.corners};
   if (primvar.kind == PrimvarKind::kFaceVarying) std::iota(out.at.begin(), out.at.end(), 0u);

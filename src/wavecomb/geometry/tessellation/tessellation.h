@@ -28,8 +28,9 @@ enum class PrimvarKind : uint8_t { kNone, kVertex, kVarying, kFaceVarying };
 /// Values of a primvar on the cage, or on triangles if the surface is not subdivided (level 0).
 struct SurfacePrimvar {
   PrimvarKind kind = PrimvarKind::kNone;
-  /// Array of shape (points, width), or for face-varying primvars (values of the channel, width).
-  /// At level 0, face-varying values other than uvs have the shape (triangles, 3, width).
+  /// Array of shape (points, width). For face-varying primvars, the array has one row per value of
+  /// the channel. At level 0, face-varying values other than uvs have the shape (triangles, 3,
+  /// width).
   std::span<const float> values;
   uint32_t width = 1;
   uint32_t channel = 0;  ///< index into Cage::channels, for face-varying primvars
@@ -67,7 +68,7 @@ struct SurfaceValues {
 /// Triangle mesh with values per point. A vertex is duplicated, with bitwise equal positions, where
 /// normals or texture coordinates differ between faces.
 struct SurfaceMesh {
-  std::vector<float> positions, normals, uvs;  ///< 3, 3 and 2 floats per point; uvs may be empty
+  std::vector<float> positions, normals, uvs;  ///< 3, 3 and 2 floats per point; `uvs` may be empty
   /// 3 point indices per triangle, counter-clockwise as seen from outside.
   std::vector<uint32_t> triangles;
   std::vector<uint32_t> faces;          ///< index of the cage face of each triangle

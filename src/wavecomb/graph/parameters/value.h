@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Evaluation of single parameters that a value graph drives.
+/// Evaluation of material parameters that a value graph drives.
 #pragma once
 
 #include "wavecomb/graph/parameters/parameters.h"
@@ -27,8 +27,8 @@ inline F valid_output(uint32_t i, const F& value) {
   return clamp(value, F(kGraphRanges.low[i]), F(kGraphRanges.high[i]));
 }
 
-/// Returns parameter components first to first + 2: values of the lane's graph for the components
-/// that it drives, and values of `plain` for the rest.
+/// Returns the three parameter components from index `first` on. A component that the lane's graph
+/// does not drive has its value from `plain`.
 template <typename F>
 [[gnu::noinline]] Vec3<F> graph_value(const MaterialView& view, const UInt<F>& graph,
                                       uint32_t first, const GraphPoint<F>& at,

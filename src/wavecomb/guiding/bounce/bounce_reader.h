@@ -17,9 +17,9 @@ namespace wavecomb {
 
 /// Training samples, in path order.
 struct TrainingSamples {
-  std::vector<TrainingRecord> records;  ///< bounces that contributed light, of all rounds
-  std::vector<BounceSample> bounces;    ///< all bounces of the last round
-  // One element for each path of the last round:
+  std::vector<TrainingRecord> records;  ///< bounces of all rounds that contributed light
+  std::vector<BounceSample> bounces;    ///< all bounces of the last training round
+  // `luminances` and `paths` have one element for each path of the last training round.
   std::vector<float> luminances;
   std::vector<PathStatistics> paths;
 };
@@ -30,7 +30,8 @@ struct PathCosts {
   double lookup = 0;                      ///< cost of a guiding field lookup at a vertex
   const CostSnapshot* shading = nullptr;  ///< costs of materials
 
-  /// Returns the cost of a vertex with its light sample.
+  /// Returns the cost of a path vertex: its shading, its guiding field lookup and the shadow ray of
+  /// its light sample.
   double vertex(uint32_t material) const {
     return ray + lookup + double{shading->material(material) / kModelRayNs};
   }
@@ -42,7 +43,7 @@ struct TrainingPlan {
   uint32_t max_depth;
   const GuidingGrid& grid;
   GuidingView guide;        ///< guiding field of the bounces; empty if bounces are not guided
-  const ImageTiles* tiles;  ///< brightness of the image; null if unknown
+  const ImageTiles* tiles;  ///< brightness of the image by tile; null if unknown
   PathCosts costs;
   uint32_t roulette_depth;
 };
@@ -73,8 +74,8 @@ class BounceReader final : public HistoryReader {
 
   std::span<const uint32_t> pixels_;
   const TrainingPlan& plan_;
-  std::vector<TrainingRecord> records_;  ///< kVertices records for each path
-  std::vector<BounceSample> bounces_;    ///< kVertices samples for each path
+  std::vector<TrainingRecord> records_;  ///< room for `kVertices` records per path
+  std::vector<BounceSample> bounces_;    ///< room for `kVertices` samples per path
   std::vector<uint8_t> record_counts_, bounce_counts_;
   std::vector<float> luminance_;
   std::vector<PathStatistics> paths_;

@@ -6,8 +6,8 @@
 /// where a is GuidingLookup::bsdf_share, and p_bsdf is the density of unguided bounces, which
 /// sample the lobes of the BSDF or, with cosine sampling, a cosine lobe (bounce_sampling.h). The
 /// guiding distribution covers only the viewer's side of a surface, so only the BSDF samples
-/// transmission. A delta lobe is selected with a times its selection probability in the BSDF. MIS
-/// uses p for bounces and for light samples.
+/// transmission. The selection probability of a delta lobe is `a` times its selection probability
+/// in the BSDF. The MIS weights of bounces and light samples use the density p of the mixture.
 #pragma once
 
 #include "wavecomb/guiding/lookup.h"
@@ -73,7 +73,7 @@ WAVECOMB_INLINE void guided_bounce(const VertexContext<Bsdf, F, kFeatures, Coupl
     if (none(guided)) return;
     const F& a = guiding.bsdf_share;
     const Mask<F> by_guide = guided & (r.w >= a);
-    // f |cos| of the bounce direction, and its density without guiding.
+    // Compute f |cos| for the bounce direction, and the density of this direction without guiding.
     Color<F> f_cos = b.weight * b.pdf;
     F p_bsdf = b.pdf;
     if (any(by_guide)) {

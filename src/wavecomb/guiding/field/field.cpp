@@ -15,19 +15,21 @@
 namespace wavecomb {
 namespace {
 
-/// Maximum number of records in a cell; cells with more records are divided.
+/// Maximum number of training records in a cell; cells with more records are divided.
 constexpr size_t kCellRecords = 2048;
-/// Minimum number of records for a region to get a separate distribution.
+/// Minimum number of training records for a region to get a separate distribution.
 constexpr double kMinRegionRecords = 64;
-/// Maximum number of records from which the direction distribution of a cell is computed.
+/// Maximum number of training records from which the direction distribution of a cell is computed.
 constexpr size_t kDirections = 8192;
-/// Weight of the parent cell's distribution and moments, as an equivalent number of records.
+/// Weight of the parent cell's distribution and moments, as an equivalent number of training
+/// records.
 constexpr double kPrior = 64;
-/// Minimum number of records of a material for which a minimum of bsdf_share is computed.
+/// Minimum number of training records at a material for computing the minimum of `bsdf_share` for
+/// the material.
 constexpr double kMaterialRecords = 512;
 /// Factor by which the survival probability of roulette is increased. Moments from few training
-/// paths miss rare light. Terminating such paths too often causes bright pixels, while continuing
-/// them too often costs only a few rays.
+/// paths miss rare light. Terminating paths too often where rare light arrives causes bright
+/// pixels, while continuing paths too often costs only a few rays.
 constexpr double kSafety = 1.5;
 /// Fraction of bounces that the BSDF samples in the first round, before moments are known.
 constexpr float kFirstShare = 0.5f;
@@ -101,14 +103,14 @@ class GuidingFieldBuilder {
   }
 
  private:
-  /// Statistics of the records of a cell on surfaces that face one axis direction.
+  /// Statistics of the training records of a cell on surfaces that face one axis direction.
   struct RegionPart {
-    /// Weights of direction bins, which sum to 1, or are all 0 without data.
+    /// Weights of direction bins. They add up to 1, or are all 0 if there are no training records.
     DirectionBins density{};
     double count = 0;
     ParallaxSphere sphere;  ///< sphere from whose centre the directions of `density` are measured
     ShareMoments moments;
-    uint32_t region = kNoGuidingRegion;  ///< region of the guiding field, once created
+    uint32_t region = kNoGuidingRegion;  ///< index of the region in the guiding field, once created
   };
   using Cell = std::array<RegionPart, kGuidingAxes>;
 
@@ -267,7 +269,7 @@ class GuidingFieldBuilder {
   GuidingFieldArrays& parts_;  ///< parts of field_
   bool first_, guides_;
   std::vector<TrainingRecord> records_;  ///< training records, sorted by Morton code
-  std::vector<ShareRatios> ratios_;      ///< ratios of records_; empty in the first round
+  std::vector<ShareRatios> ratios_;      ///< `share_ratios()` of each record; empty in round 1
   std::vector<uint32_t> codes_;
   size_t cell_records_ = kCellRecords;
   std::array<std::vector<const TrainingRecord*>, kGuidingAxes> by_axis_;  ///< scratch of read()
@@ -304,7 +306,7 @@ void GuidingField::compute_survival(std::span<const BounceSample> training_sampl
     double count = 0, squared = 0, cost = 0;
   };
   const size_t regions = parts_.bsdf_share.size();
-  std::vector<Sums> sums(regions + 1);  // the last element is for all regions
+  std::vector<Sums> sums(regions + 1);  // the last element is the sum over all regions
   parts_.survival.assign(regions, 0.f);
   const auto add = [](Sums& s, const BounceSample& sample) {
     s.count += 1;

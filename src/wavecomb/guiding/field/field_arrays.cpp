@@ -41,8 +41,8 @@ bool is_grid(std::span<const uint32_t> entries, size_t cells) {
   return true;
 }
 
-/// Returns whether a cumulative row assigns all 65536 sample values to bins, and at least one value
-/// to each bin.
+/// Returns whether a row of a sampling table assigns all 65536 sample values to bins, and at least
+/// one value to each bin.
 bool is_row(std::span<const uint32_t> words) {
   uint32_t start = 0;
   for (const uint32_t word : words) {

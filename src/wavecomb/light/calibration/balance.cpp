@@ -8,8 +8,8 @@ namespace wavecomb {
 namespace {
 
 constexpr double kStep = 0x1p-20;  ///< resolution of sums
-/// Lower limit of selection probabilities in sums. It limits terms to 2^24, so that a sum of 2^19
-/// terms fits in 64 bits.
+/// Lower limit of selection probabilities in the sums of `LightBalance::gains()`. With this limit,
+/// no term of a sum exceeds 2^24, so that a sum of 2^19 terms fits in 64 bits.
 constexpr double kMinShare = 0x1p-8;
 constexpr double kMaxMean = 64;  ///< limit of |N - M|
 constexpr int kIterations = 24;
@@ -109,8 +109,8 @@ float NodeBalance::odds() const {
   double least = INFINITY;
   float best = 1;
   for (int i = -kSteps; i <= kSteps; ++i) {
-    // A prior of kPrior samples with equal contributions from both sides keeps a few samples from
-    // changing the odds much.
+    // A prior of `kPrior` samples with equal contributions from both children limits the effect of
+    // a few samples on the odds.
     const double odds = std::exp2(0.5 * i);
     const double sum = static_cast<double>(squares_[static_cast<size_t>(i + kSteps)]) +
                        mean * kPrior * (2 + odds + 1 / odds) / 4;

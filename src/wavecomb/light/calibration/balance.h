@@ -26,8 +26,8 @@
 
 namespace wavecomb {
 
-/// Samples of the light selection, and the selection probabilities that follow from them. Sums over
-/// samples are integers, so that they do not depend on the order of samples.
+/// Collects light samples and computes the light selection probabilities of least variance. Sums
+/// over samples are integers, so that they do not depend on the order of samples.
 class LightBalance {
  public:
   /// `shares` are the selection probabilities (> 0) of the parts of the lights (LightParts) with
@@ -41,9 +41,10 @@ class LightBalance {
   /// kMaxValue the value that the sample would have at a selection probability of 1.
   void add(size_t cell, size_t part, double value, double weight);
 
-  /// Returns the selection probabilities of least variance. A fraction kFloor of the probability is
-  /// distributed half evenly and half by `power` (> 0, sum 1). Returns `power` if no part
-  /// contributed. All probabilities are above 0, and their sum is 1.
+  /// Returns the selection probabilities of least variance. A fraction `kFloor` of the total
+  /// probability is not optimised: half of it is distributed evenly and half in proportion to
+  /// `power` (> 0, sum 1). Returns `power` if no part contributed. All probabilities are above 0,
+  /// and their sum is 1.
   std::vector<double> shares(std::span<const double> power) const;
 
   static constexpr double kFloor = 0.1;
@@ -54,7 +55,7 @@ class LightBalance {
     uint32_t cell, part;
     float a, r;
   };
-  /// Returns G of each part at the selection probabilities p.
+  /// Returns the term G (see the top of this file) of each part at the selection probabilities p.
   std::vector<double> gains(std::span<const double> p) const;
 
   std::vector<double> first_;

@@ -58,8 +58,8 @@ void add_meshes(const Scene& scene, LightParts& parts, std::vector<Candidate>& o
     if (powers[m] > 0) out.push_back({powers[m], meshes[m]->name, kNoLight, m});
 }
 
-/// Makes one part of each candidate, in their order. If there are more candidates than `most`, the
-/// candidates of lowest power together form the last part.
+/// Makes one part of each candidate, in the order of the candidates. If there are more candidates
+/// than `most`, the candidates of lowest power together form the last part.
 void make_parts(const std::vector<Candidate>& candidates, size_t most, LightParts& parts) {
   std::vector<size_t> by_power(candidates.size());
   std::iota(by_power.begin(), by_power.end(), size_t{0});

@@ -14,16 +14,16 @@ namespace wavecomb {
 
 inline constexpr uint32_t kNoPart = 0xffffffffu;
 
-/// Division of all lights that emit into parts. Selection by power: each infinite light, each
-/// finite light and each emissive mesh of an instance is a part, but if there are more than kMax,
-/// the lights of lowest power together form one part. Selection by tree: each infinite light is a
-/// part, and the tree is the last part.
+/// Division of all lights that emit into parts. For selection by power, each infinite light, each
+/// finite light and each emissive mesh of an instance is a part. If there would be more than `kMax`
+/// parts, the lights of lowest power together form one part. For selection by tree, each infinite
+/// light is a part, and the tree is the last part.
 struct LightParts {
   static constexpr size_t kMax = 64;
   bool by_tree = false;
   /// Selection probability of each part in proportion to power; the sum is 1.
   std::vector<double> power;
-  std::vector<std::string> names;  ///< names of lights and meshes, "tree", "N others"
+  std::vector<std::string> names;  ///< name of each part, for reports
   /// Part of each light record; kNoPart if the light is never selected.
   std::vector<uint32_t> of_record;
   /// First light index and part of each emissive mesh, in ascending order.
@@ -40,9 +40,9 @@ struct LightParts {
 /// for calibration.
 inline constexpr size_t kMaxCalibratedLights = size_t{1} << 23;
 
-/// Divides the lights of a scene for selection by tree or by power. Returns no parts if there is
-/// nothing to distribute: fewer than two parts or more than kMaxCalibratedLights lights (by power),
-/// or no light in the tree.
+/// Divides the lights of a scene for selection by tree or by power. For selection by power, returns
+/// no parts if there would be fewer than two parts or if there are more than `kMaxCalibratedLights`
+/// lights. For selection by tree, returns no parts if the tree has no lights.
 LightParts divide_lights(const Scene& scene, bool by_tree);
 
 /// Calibration of a light tree node: a factor on the odds of its right child against its left
@@ -60,7 +60,7 @@ struct CalibratedLights {
   /// Selection probability of each light; empty for selection by tree.
   std::vector<float> selection_pdf;
   std::vector<uint32_t> power_bins;
-  PowerTable power_table;  ///< table for power_bins, with a null pointer to the bins
+  PowerTable power_table;  ///< table for `power_bins`; `apply()` sets its pointer to them
   std::vector<uint32_t> infinite_ends;
   std::vector<float> infinite_pdf;
   uint32_t tree_numbers = 0;
@@ -71,12 +71,14 @@ struct CalibratedLights {
   void apply(LightView& view) const;
 };
 
-/// Builds light tables with other selection probabilities, any number of times.
+/// Builds copies of the light tables with changed selection probabilities. Tables can be built any
+/// number of times.
 ///
 /// Contract: the arguments of the constructor outlive the builder.
 class LightTableBuilder {
  public:
-  /// `tree` is the light tree of `set`. It needs nodes only if tilts are passed to build_tables().
+  /// `tree` is the light tree of `set`. `tree` may have no nodes if no tilts are passed to
+  /// `build_tables()`.
   LightTableBuilder(const LightSet& set, const LightTree& tree, const LightParts& parts);
 
   /// Builds tables in which part i has the selection probability shares[i] (> 0, sum 1), up to

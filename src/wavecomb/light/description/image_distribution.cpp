@@ -116,7 +116,7 @@ Cells cell_means(const TextureView& texture, const Vec3<float>& color, uint32_t 
   Cells cells{std::min(width, kMaxWidth), std::min(height, max_height), {}};
   cells.mean.assign(size_t{cells.width} * cells.height, 0.0);
   const RowMeans means(texture, color, cells.width);
-  // Means of the next rows of texels.
+  // Cell means for the texel rows that have been read but not yet added to `cells`.
   std::vector<std::vector<double>> some(std::min(height, kRows));
   const auto mean_of = [&](uint32_t y) {
     if (y % kRows == 0)

@@ -47,8 +47,8 @@ struct LightKindInfo {
   std::vector<const char*> parameters;
   /// Table rows of parameters specific to this kind, made by specific_parameter().
   std::vector<LightParameter> own;
-  /// Sets position, area, radiance and power of a light record. The function is null if other code
-  /// makes the records of the kind.
+  /// Sets position, area, radiance and power of a light record. The function is null for mesh
+  /// lights, whose records are made by `make_mesh_light()`.
   void (*make)(LightBuild&, const Light&, LightBuildContext&) = nullptr;
   /// Sets the light's bounds for the light tree; the caller initializes the bounds to the point
   /// `light.p` and the intensity power / pi. The function is null if the light tree does not

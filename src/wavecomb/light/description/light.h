@@ -26,7 +26,7 @@ inline constexpr uint32_t kNoFilter = 0xffffffffu;
 inline constexpr uint32_t kPlainShadow = 0xffffffffu;
 inline constexpr uint32_t kNoPortals = 0xffffffffu;
 inline constexpr uint32_t kNoDistribution = 0xffffffffu;
-/// Id of the set of all geometry, for which there is no GeometrySet. kNoSet + 1 is 0.
+/// Id that stands for all geometry instead of a `GeometrySet`.
 inline constexpr uint32_t kNoSet = 0xffffffffu;
 
 /// UsdLuxShapingAPI: dependence of the emission on direction. The axis of the emission is the

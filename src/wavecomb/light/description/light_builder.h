@@ -48,8 +48,9 @@ struct EmissiveTriangle {
 /// lights with a shape and point lights (together `records`), then triangles; each of the three
 /// groups is in input order.
 struct LightSet {
-  /// Records of mesh lights follow after `record_count`; they hold what the triangles of a mesh
-  /// light share, and cannot be selected themselves.
+  /// Records of all lights except triangles. The records from index `record_count` on belong to
+  /// mesh lights: they hold values that the triangles of a mesh light share, and light sampling
+  /// never selects them.
   std::vector<LightRecord> records;
   uint32_t record_count = 0;  ///< number of records, not counting records of mesh lights
   std::vector<TriangleLight> triangles;
@@ -58,7 +59,7 @@ struct LightSet {
   std::vector<uint32_t> mesh_lights;  ///< LightView::mesh_lights
   /// Bins of `power_table`; empty if only the light tree is used for selection.
   std::vector<uint32_t> power_bins;
-  /// Table for selection by power, with a null pointer to the bins.
+  /// Table for selection by power. Its pointer to the bins is null here and set in the device view.
   PowerTable power_table;
   LightTree tree;              ///< light tree; has no nodes yet if the tree is built later
   std::vector<double> powers;  ///< powers of all lights in W, kept if the tree is built later
@@ -105,7 +106,7 @@ enum class TreeTime { kNow, kWhenChosen };
 /// Function that returns emissive triangle i. The function is called from several threads at once.
 using TriangleSource = std::function<EmissiveTriangle(size_t i)>;
 
-/// Lights of a scene, and how to build their sampling structures.
+/// Lights of a scene, and options for building their sampling structures.
 struct LightInputs {
   std::span<const Light> lights = {};  ///< lights that have passed check_light()
   size_t triangle_count = 0;

@@ -179,12 +179,13 @@ struct Distribution2D {
 };
 
 /// Integer alias tables that map a random number k in [0, 2^24) to a light. Random numbers below
-/// `split` select a record, the rest a triangle, so that looking up one of a few strong lights does
-/// not touch the table of millions of triangles. Each bin of a table covers 2^shift random numbers.
+/// `split` select a record, and all other numbers select a triangle. Looking up one of a few strong
+/// lights therefore does not read the table of millions of triangles. Each bin of a table covers
+/// 2^shift random numbers.
 struct PowerTable {
-  /// Bins of both groups, records and triangles. Of the 2^shift random numbers r of bin b, those
-  /// with r < bins[b] mod 2^shift select light b of the group, and the rest select light bins[b] >>
-  /// shift.
+  /// Bins of both groups, records and triangles. Each bin b covers 2^shift random numbers r.
+  /// Numbers r < bins[b] mod 2^shift select light b of the group; all other numbers select light
+  /// bins[b] >> shift.
   const uint32_t* bins = nullptr;
   uint32_t split = 0;
   uint32_t shift[2] = {};
@@ -288,8 +289,9 @@ struct LightView {
   LinkView links;
   /// Textures of lights, and materials of triangles whose emission or opacity varies.
   MaterialView materials;
-  /// Bounding sphere of all surfaces, the target of light paths from infinite lights, which start
-  /// `reach` before its centre, outside all light shapes. Radius 0 means that no light paths start.
+  /// Bounding sphere of all surfaces. Light paths from infinite lights are sent through this
+  /// sphere. They start at the distance `reach` in front of its centre, outside all light shapes.
+  /// Radius 0 means that no light paths start.
   float centre[3] = {0, 0, 0};
   float radius = 0, reach = 0;
   bool emits_paths() const { return radius > 0; }

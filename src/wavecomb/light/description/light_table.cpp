@@ -18,7 +18,7 @@ namespace {
 constexpr uint32_t kNone = 0xffffffffu;
 static_assert(kNoTexture == kNone && kNoIes == kNone && kNoSet == kNone && kNoFilter == kNone);
 
-/// Returns the member of a light that a path of member pointers leads to.
+/// Returns the member of a light to which a sequence of member pointers leads.
 template <auto kFirst, auto... kRest, typename Object>
 auto& member(Object& object) {
   if constexpr (sizeof...(kRest) == 0)
@@ -93,8 +93,9 @@ LightParameter in(LightGroup group, LightParameter p) {
   p.group = group;
   return p;
 }
-/// Mark a table row as a parameter of all lights, of the lights with a trait, or (function `in`) of
-/// the light kinds that list its name.
+/// The function `all` marks a table row as a parameter of all lights, and the function `with` as a
+/// parameter of the lights with a trait. Rows made by the function `in` are parameters of the light
+/// kinds that list their names.
 LightParameter all(LightGroup group, LightParameter p) {
   p.is_common = true;
   return in(group, std::move(p));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Table of light parameters: one row for each member of Light and Shaping, and for each parameter
 /// that is specific to a light kind. Range checks, the scene fingerprint, Python keywords, sandbox
-/// calls and the fields of the window are derived from it. To add a parameter, add a member, a row
-/// here, and its use; for a parameter of a single light kind, add a row to that kind
+/// calls and the fields of the light editor are derived from this table. To add a parameter, add a
+/// member, a row here, and its use; for a parameter of a single light kind, add a row to that kind
 /// (LightKindInfo::own) and the use of the parameter.
 #pragma once
 
@@ -113,8 +113,8 @@ LightParameter specific_parameter(const char* name, const char* label, const cha
 /// Returns the name of a type of object, such as "texture"; "" for kNothing.
 const char* light_refers_name(LightRefers refers);
 const char* light_kind_name(LightKind kind);
-/// Returns the light kind of a name, which must have a transform (mesh lights do not). Throws Error
-/// for other names.
+/// Returns the light kind called `name`. Throws Error if there is no such kind, or for mesh lights,
+/// which have no transform.
 LightKind light_kind(std::string_view name);
 
 /// Numbers of textures, profiles, sets and filters to which lights can refer.
@@ -125,7 +125,8 @@ struct LightReferences {
 /// Throws Error with a one-line message that names the light if a value is not finite or out of
 /// range, if an id refers to an object that was never added, or if the kind has no transform.
 void check_light(const Light& light, const LightReferences& references);
-/// Checks a mesh light in the same way as check_light().
+/// Throws Error if `light` is not a mesh light, if a value is not finite or out of range, or if an
+/// id refers to an object that was never added.
 void check_mesh_light(const Light& light, const LightReferences& references);
 
 }  // namespace wavecomb

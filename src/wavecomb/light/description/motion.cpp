@@ -202,7 +202,8 @@ BoundingSphere swept_bounds(const LightMotion& motion, std::span<const LightStep
     all.centre[i] = 0.5 * (lo[i] + hi[i]);
     reach += (hi[i] - all.centre[i]) * (hi[i] - all.centre[i]);
   }
-  // Between two tested poses, the light deviates from them by less than their distance.
+  // Between two tested poses, the light's centre is closer to each of these poses than their
+  // distance, which is at most `opening`.
   all.radius = (at_rest.radius + std::sqrt(reach) + opening) * (1 + 1e-5);
   return all;
 }

@@ -6,7 +6,8 @@
 ///   x = R (x_rest - origin) + place
 /// where `place` is the position of the pivot, and R is given by a unit quaternion; both are
 /// interpolated between the two motion steps around that time. The motion is rigid, so distances,
-/// solid angles and densities at x equal those of the light at rest, seen from x_rest.
+/// solid angles and densities as seen from x equal the values for the light at rest as seen from
+/// x_rest.
 #pragma once
 
 #include <span>

@@ -14,8 +14,8 @@ constexpr size_t kBand = size_t{1} << 16;
 
 /// Fills the alias bins of one group: light i gets numbers[i] random numbers, where each bin has
 /// 2^shift random numbers and the sum of `numbers` fills all bins. Processes bins from the last to
-/// the first. A bin that is not full takes the rest from the last bin with a surplus; if that bin
-/// then has a deficit, it is processed next.
+/// the first. A bin that is not full takes its missing random numbers from the last bin with a
+/// surplus. If the last bin then has a deficit, it is processed next.
 void fill_bins(std::span<const uint32_t> numbers, uint32_t shift, std::span<uint32_t> bins) {
   const uint32_t size = 1u << shift;
   const auto number_of = [&](size_t bin) { return bin < numbers.size() ? numbers[bin] : 0u; };
@@ -105,8 +105,8 @@ PowerTable build_power_table(std::span<const double> weights, size_t first_trian
   });
 
   // The number of random numbers of each group is a multiple of the bin size, and each group has at
-  // least one bin per light. Few large bins stay in the cache; 1024 bins for all numbers give
-  // enough resolution.
+  // least one bin per light. A few large bins stay in the cache, and 1024 bins for all random
+  // numbers give enough resolution.
   const auto least = [&](size_t g, uint32_t shift) {
     const uint64_t units = (groups[g].size() + (size_t{1} << shift) - 1) >> shift;
     return emitting_of[g] > 0 ? units << shift : 0;

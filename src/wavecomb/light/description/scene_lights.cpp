@@ -55,8 +55,8 @@ double world_area(const Mesh& mesh, const Affine& to_world) {
   return sum;
 }
 
-/// Makes the emissive triangle for face `face` of an emissive mesh. Its radiance is 0 if the face
-/// does not emit, and its opacity 0 if the face is fully transparent.
+/// Makes the emissive triangle for face `face` of an emissive mesh. The triangle's radiance is 0 if
+/// the face does not emit. The triangle's opacity is 0 if the face is fully transparent.
 EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMaterials& materials,
                                    const EmissiveMesh& source, size_t face) {
   const Mesh& mesh = *source.mesh;
@@ -149,8 +149,8 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
                       .mesh_lights = light_instances,
                       .tree_time = TreeTime::kWhenChosen,
                       .filters = geometry.filters});
-  // Entries are still relative to the first triangle and the first mesh light; convert them to
-  // light indices.
+  // Convert the entries of `emissive` and `mesh_lights`, which count from the first triangle and
+  // the first mesh light, to light indices.
   for (std::vector<uint32_t>* table : {&emissive, &mesh_lights})
     for (uint32_t& entry : *table)
       if (entry != kNoLight) entry += set.first_triangle();

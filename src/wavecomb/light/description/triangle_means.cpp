@@ -9,8 +9,8 @@
 namespace wavecomb {
 namespace {
 
-/// Lower limit of the expected opacity where opacity varies, so that light sampling does not ignore
-/// triangles whose estimated mean is 0.
+/// Lower limit of the estimated mean opacity of a triangle whose opacity varies. Light sampling
+/// would ignore triangles with an estimate of 0.
 constexpr float kMinOpacity = 1.f / 16;
 
 /// Returns the mean of the values that a material input reads from a texture.

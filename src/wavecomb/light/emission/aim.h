@@ -7,7 +7,7 @@
 ///   finite lights     g = a_0 + sum a_k [d hits sphere k] / (W_k p(d)),
 /// where R is the radius of the sphere around the scene, W_k the solid angle of sphere k as seen
 /// from the point on the light (4 pi inside the sphere), and p the density of directions without
-/// aiming. Both ends of a path can compute the factor g, so g is part of all MIS weights.
+/// aiming. The factor g can be computed from both ends of a path, so all MIS weights include it.
 #pragma once
 
 #include "wavecomb/core/frame.h"
@@ -28,7 +28,8 @@ inline F sphere_one_minus_cos(const F& radius, const F& distance2) {
   return select(outside, F(sin2 / F(1.f + sqrt(rest))), F(2.f));
 }
 
-/// Returns the factor g for paths of infinite lights along the line through `p` with direction +-d.
+/// Returns the factor g by which aiming changes the emission density of an infinite light, for
+/// paths along the line through `p` with direction +-d.
 template <typename F>
 [[gnu::noinline]] F aim_density_infinite(const LightView& view, const Vec3<F>& p,
                                          const Vec3<F>& d) {
@@ -44,8 +45,8 @@ template <typename F>
   return g;
 }
 
-/// Returns the factor g for paths from the point `p` on a finite light along d. `own` is the
-/// density of that direction without aiming.
+/// Returns the factor g by which aiming changes the emission density of a finite light, for paths
+/// from the point `p` along d. `own` is the density of the direction d without aiming.
 template <typename F>
 [[gnu::noinline]] F aim_density_finite(const LightView& view, const Vec3<F>& p, const Vec3<F>& d,
                                        const F& own) {
@@ -71,8 +72,8 @@ inline F unaimed_direction_density(const LightReader<F>& light, const Vec3<F>& p
   return select(Kind::template is_delta<F>(light), F(kInv4Pi), by_cosine);
 }
 
-/// Returns the factor g for paths from `light` that arrive at `from` along -dir over the distance
-/// t.
+/// Returns the factor g by which aiming changes the emission density of `light`, for paths that
+/// arrive at `from` along -dir over the distance t.
 template <typename Kind, typename F>
 inline F aim_of_kind(const LightView& view, const LightReader<F>& light, const Vec3<F>& from,
                      const Vec3<F>& dir, const F& t) {

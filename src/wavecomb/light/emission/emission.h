@@ -42,8 +42,8 @@ struct CameraPathDensity {
   Mask<F> is_delta;  ///< whether no bounce can hit the light
 };
 
-/// Samples a light by its weight, and a path from this light. The origin is offset from the light's
-/// shape, so that rays do not hit it.
+/// Selects a light in proportion to its weight, and samples a path from this light. The origin is
+/// offset from the light's shape, so that rays do not hit it.
 template <typename F>
 Emission<F> sample_emission(const LightView& view, const EmissionNumbers<F>& r,
                             const Mask<F>& wanted);

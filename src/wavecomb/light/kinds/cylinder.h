@@ -61,8 +61,8 @@ struct CylinderSpan {
                      ///< it
 };
 /// Computes the visible interval without cancellation. If both ends are on one side, the numerator
-/// of the size, z_1 h_0 - z_0 h_1, equals s^2 (z_1^2 - z_0^2) / (z_1 h_0 + z_0 h_1), and the rest
-/// is s^2 / (h_0 (h_0 + |z_0|)).
+/// of the size, z_1 h_0 - z_0 h_1, equals s^2 (z_1^2 - z_0^2) / (z_1 h_0 + z_0 h_1), and the member
+/// `rest` equals s^2 / (h_0 (h_0 + |z_0|)).
 template <typename F>
 inline CylinderSpan<F> cylinder_span(const CylinderFrame<F>& c, const F& s) {
   const F z0 = c.begin, z1 = c.begin + c.length;

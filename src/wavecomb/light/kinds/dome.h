@@ -119,7 +119,9 @@ inline KindHit<F> hit_dome(const LightView& view, const LightRecord& record, con
           dome_pdf<F>(image_pdf_at<F>(d, at.s, at.down, active), at.sin_theta)};
 }
 
-/// Returns the result of hit_dome(), with the density as seen from `from`.
+/// Returns radiance and sampling density of the dome `record` for a ray from `from` along `dir`
+/// that leaves the scene. If the dome has portals, the density includes sampling through the
+/// portals.
 template <typename F>
 inline KindHit<F> hit_dome_from(const LightView& view, const LightRecord& record,
                                 const Vec3<F>& from, const Vec3<F>& dir, const Mask<F>& active) {
@@ -167,7 +169,7 @@ template <typename F>
   return result;
 }
 
-/// Samples directions from `from` to domes `lights`; `light` reads their records.
+/// Samples directions from `from` to domes `lights`, whose records are read through `light`.
 template <typename F>
 inline KindSample<F> sample_dome(const LightView& view, const UInt<F>& lights,
                                  const LightReader<F>& light, const Vec3<F>& from, const F& u,

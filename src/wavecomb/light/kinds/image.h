@@ -69,8 +69,9 @@ inline Interval<F> find_interval(const Distribution2D& d, const UInt<F>& row, ui
   return {load<U>(index.value), load<U>(begin.value), load<U>(count.value)};
 }
 
-/// Returns the density over the unit square in a cell with the given counts of row and column: the
-/// product of count / 65536 * (number of intervals) for both.
+/// Returns the density over the unit square in a cell, from the counts of its row and its column.
+/// For a row or a column, the density is count / 65536 * (number of intervals); the result is the
+/// product of the two densities.
 template <typename F>
 inline F image_pdf(const Distribution2D& d, const UInt<F>& row_count, const UInt<F>& column_count) {
   const float scale = static_cast<float>(d.width) * static_cast<float>(d.height) * 0x1p-32f;

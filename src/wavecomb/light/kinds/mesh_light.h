@@ -27,10 +27,10 @@ inline Color<F> mesh_light_sample_radiance(const LightView& view, const UInt<F>&
   return shaped<F>(view, reader.shaping(), -s.wi, radiance, known);
 }
 
-/// Returns the factor for emission that a path hits, for a light with multipliers `diffuse` and
-/// `specular`. `share` is the diffuse fraction of the path's last bounce; the rest is specular.
-/// Camera rays receive the emission without multipliers. `is_specular_view` marks paths that light
-/// sampling cannot produce.
+/// Returns the factor by which to multiply the emission of a light that a path hits. `diffuse` and
+/// `specular` are the multipliers of the light. `share` is the diffuse fraction of the path's last
+/// bounce, and 1 - `share` is its specular fraction. Camera rays receive the emission without
+/// multipliers. `is_specular_view` marks paths that light sampling cannot produce.
 template <typename F>
 inline Color<F> factor_of_hit(const F& diffuse, const F& specular, const Mask<F>& sampled_only,
                               const Mask<F>& is_specular_view, bool from_camera,

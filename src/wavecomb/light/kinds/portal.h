@@ -59,7 +59,7 @@ class Portals {
   }
 
   /// Returns the density of the mixture of portal and image sampling. `through` marks lanes whose
-  /// direction comes from sample().
+  /// direction was sampled by `sample()`.
   F pdf(const Vec3<F>& wi, const F& image_pdf, const Mask<F>& through) const {
     F hits(0.f);
     for_each([&](const SphericalRect<F>& r, const LightReader<F>&) {
@@ -70,8 +70,8 @@ class Portals {
           r.usable & (dz > 0.f) & (x >= r.x0) & (x <= r.x1) & (y >= r.y0) & (y <= r.y1);
       hits += select(inside, F(1.f), F(0.f));
     });
-    // A direction from sample() passes at least one portal, even if rounding at an edge says
-    // otherwise.
+    // A direction from `sample()` passes at least one portal. Rounding errors at a portal's edge
+    // may give a count of 0.
     hits = select(through, max(hits, F(1.f)), hits);
     const F share_ = share();
     const F by_portals = hits / select(total_ > 0.f, total_, F(1.f));

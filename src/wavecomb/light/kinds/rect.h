@@ -55,7 +55,7 @@ struct SphericalRect {
   Vec3<F> x, y, n;
   F inverse_width, inverse_height, x0, x1, y0, y1, z;
   F solid_angle;
-  F begin;  ///< the variable k of the paper
+  F begin;  ///< variable k of Urena et al.
   /// 1 / sqrt(y0^2 + z^2), and the z components of the normals at the edges y0 and y1
   F near_y, b0, b1;
   Mask<F> usable;

@@ -25,7 +25,7 @@ void make(LightBuild& out, const Light& light, LightBuildContext& /*context*/) {
   }
   const double area = 4 * kPiD * radius * radius;
   finish_area(out, light, area);
-  // A radius of 0 would make the sphere a point light.
+  // Keep the radius of a tiny sphere above 0, since a record of radius 0 is a point light.
   if (!(area >= kMinArea)) out.record.radius = 1e-18f;
 }
 

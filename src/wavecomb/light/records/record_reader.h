@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Reader of light records by lane, and definitions that all light kinds share.
+/// `LightReader`, which reads the light record of each lane, and definitions that all light kinds
+/// share.
 #pragma once
 
 #include "wavecomb/core/frame.h"
@@ -38,9 +39,9 @@ struct LightReader : RecordReader<F> {
   UInt<F> shaping() const { return (*this)[&LightRecord::shaping]; }
 };
 
-/// Returns the index of the record with the links and multipliers of light `light`: the light's
-/// record or, for a triangle, the record of its mesh light. Returns kNoLight for triangles that are
-/// not part of a mesh light.
+/// Returns the index of the record with the light linking and the multipliers of light `light`: the
+/// light's record or, for a triangle, the record of its mesh light. Returns kNoLight for triangles
+/// that are not part of a mesh light.
 template <typename F>
 inline UInt<F> record_of(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
   using U = UInt<F>;
@@ -211,8 +212,8 @@ inline Color<F> not_negative(const Color<F>& c) {
 
 struct LightKindInfo;
 
-/// Base class of light kinds that surround the scene at infinite distance. Their light paths start
-/// on a disk in front of the scene.
+/// Base class of light kinds that surround the scene at infinite distance. Light paths from these
+/// lights start on a disk in front of the scene.
 struct InfiniteKind {
   static constexpr bool kIsInfinite = true;
   template <typename F>
@@ -220,8 +221,8 @@ struct InfiniteKind {
     return detail::dark<F>();
   }
 };
-/// Base class of light kinds at a finite position. Their light paths leave a surface with the
-/// normal emission_normal().
+/// Base class of light kinds at a finite position. Light paths from these lights leave a surface
+/// with the normal `emission_normal()`.
 struct FiniteKind {
   static constexpr bool kIsInfinite = false;
   template <typename F>

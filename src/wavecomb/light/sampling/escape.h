@@ -38,13 +38,12 @@ struct EscapedRay {
   Mask<F> is_delta{false};  ///< delta bounce or camera ray, which light sampling cannot produce
   bool from_camera = false;
   UInt<F> link{0u};          ///< light linking class of the surface at which the ray starts
-  F ratio{0.f};              ///< PathState::ratio, by which the MIS weight includes light paths
+  F ratio{0.f};              ///< PathState::ratio, for MIS with light paths
   F time{0.5f};              ///< shutter time in [0, 1]
   Color<F> diffuse{F(0.f)};  ///< diffuse fraction of the bounce for each colour
 };
 
-/// Returns radiance times MIS weight of infinite light `light` for an escaped ray, which is one
-/// term of escaped_radiance().
+/// Returns radiance times MIS weight of infinite light `light` for a ray that left the scene.
 template <typename F>
 inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light,
                                         const EscapedRay<F>& ray, const Mask<F>& active) {

@@ -65,14 +65,15 @@ template <typename F>
 LightHit<F> light_hit(const LightView& view, const UInt<F>& light, const LightReceiver<F>& from,
                       const Vec3<F>& along, const F& t, const Mask<F>& hit_lanes);
 
-/// Returns the sampling density of triangle light `light` for a hit at distance t along dir; 0 for
-/// other lights.
+/// Returns the sampling density of triangle light `light` for a hit at distance t along dir, or 0
+/// if `light` is not a triangle light.
 template <typename F>
 F triangle_light_pdf(const LightView& view, const UInt<F>& light, const LightReceiver<F>& from,
                      const Vec3<F>& dir, const F& t, const Mask<F>& active);
 
-/// Factors for lights with diffuse and specular multipliers, and for lights that only light samples
-/// find (LightRecord::sampled_only). Used only if LightView::has_effects is set.
+/// Factors by which the contribution of lights is multiplied: the diffuse and specular multipliers,
+/// and 0 for bounces that hit a light that only light samples find (`LightRecord::sampled_only`).
+/// These factors are used only if `LightView::has_effects` is set.
 template <typename F>
 struct LightEffect {
   F diffuse, specular;   ///< multipliers of the diffuse response and of the specular response
@@ -91,8 +92,8 @@ struct LightEffect {
     shadow = select(Mask<UInt<F>>(known), reader[&LightRecord::shadow], UInt<F>(kPlainShadow));
   }
 
-  /// Returns the factor for emission that a path hits. `share` is the diffuse fraction of the
-  /// path's last bounce. A delta bounce counts as a specular bounce.
+  /// Returns the factor by which to multiply the emission of a light that a path hits. `share` is
+  /// the diffuse fraction of the path's last bounce. A delta bounce counts as a specular bounce.
   Color<F> of_hit(const Mask<F>& bsdf_is_delta, bool from_camera, const Color<F>& share) const {
     return detail::factor_of_hit<F>(diffuse, specular, sampled_only, bsdf_is_delta, from_camera,
                                     share);

@@ -130,8 +130,8 @@ LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to, c
   const detail::LightReader<F> any_light(view.lights, index, others);
   detail::for_each_kind<F>(
       any_light[&LightRecord::kind], others, [&](LightKind kind, const Mask<F>& lanes) {
-        // Read records by kind: often there is only one light of a kind, so that all its lanes
-        // share a record.
+        // Read the records of one light kind at a time. Often there is only one light of a kind, so
+        // that all lanes of this kind read the same record.
         const detail::LightReader<F> light(view.lights, index, lanes);
         Vec3<F> from = p;
         if (view.motions) [[unlikely]]

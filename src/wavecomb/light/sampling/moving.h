@@ -10,8 +10,8 @@
 
 namespace wavecomb {
 
-/// Pose of the lanes' lights at a time, relative to their rest pose. For lights without motion the
-/// transform is exactly the identity.
+/// Pose of the light of each lane at a given time, relative to the light's rest pose. For lights
+/// without motion the transform is exactly the identity.
 template <typename F>
 struct LightPose {
   Vec3<F> x, y, z;  ///< directions of the rest pose's axes at the given time

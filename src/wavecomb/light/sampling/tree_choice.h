@@ -12,8 +12,8 @@
 /// can make with the line between the point and any position in the sphere. I is 0 only if none of
 /// the child's lights can contribute. The probability of a light is the product of the
 /// probabilities of all choices on the path from the root to the light; the light's trail
-/// (LightTreeView::trails) stores this path. Both MIS techniques compute the probability in the
-/// same way.
+/// (LightTreeView::trails) stores this path. Light samples and bounces that hit a light compute
+/// this probability with the same code, as MIS requires.
 #pragma once
 
 #include "wavecomb/core/encoding/hash.h"
@@ -98,7 +98,7 @@ inline F light_importance(const F* r, const Vec3<F>& p, const Vec3<F>& normal,
   return select(can_contribute, max(importance, F(1e-37f)), F(0.f));
 }
 
-/// Descends the light tree from its root to a light. `goes_right(probability of the left child,
+/// Traversal of the light tree from its root to a light. `goes_right(probability of the left child,
 /// lanes)` selects the children.
 template <typename F, typename Choose>
 inline LightChoice<F> descend(const LightTreeView& tree, const LightReceiver<F>& to,
@@ -115,7 +115,7 @@ inline LightChoice<F> descend(const LightTreeView& tree, const LightReceiver<F>&
     const F right = light_importance<F>(r.data() + 8, to.p, normal, any_side);
     const F sum = left + right;
     F p_left = left / select(sum > 0.f, sum, F(1.f));
-    // Give each child that can contribute a minimum probability.
+    // A child that can contribute gets at least a minimum probability.
     const Mask<F> both = (left > 0.f) & (right > 0.f);
     p_left = select(both, clamp(p_left, F(0x1p-12f), F(1.f - 0x1p-12f)), p_left);
     const Mask<F> take_right = goes_right(p_left, descending);

@@ -47,8 +47,8 @@ class Builder {
   Builder(const LightSet& set, std::vector<Item> items, double total, LightTree& tree)
       : set_(set), items_(std::move(items)), scale_(1 / total), tree_(tree) {}
 
-  /// Splits the tree from the root until there are enough subtrees, builds these in parallel, and
-  /// joins them.
+  /// Splits the tree from the root until there are enough subtrees, builds the subtrees in
+  /// parallel, and joins them.
   void run(std::span<const double> powers) {
     powers_ = powers;
     struct Top {
@@ -176,8 +176,8 @@ class Builder {
     return r.begin + static_cast<size_t>(middle - items.begin());
   }
 
-  /// Splits a range at the median of the longest axis. Used if lights have the same position, and
-  /// to limit the depth of the tree.
+  /// Splits a range at the median of the longest axis. The median split is used for lights at the
+  /// same position, and to limit the depth of the tree.
   static size_t halve(const Range& r, std::span<Item> items, const Float4& lo, const Float4& hi) {
     size_t axis = 0;
     for (size_t k = 1; k < 3; ++k)

@@ -31,7 +31,7 @@ struct LightTree {
   LightTreeView view() const;
 };
 
-/// Computes the parts of the light tree of `set` that do not require its nodes: the selection
+/// Computes the members of the light tree of `set` that do not depend on its nodes: the selection
 /// probabilities of infinite lights, and `effective_lights`. The result has no nodes and no trails.
 LightTree outline_light_tree(const LightSet& set, std::span<const double> powers);
 

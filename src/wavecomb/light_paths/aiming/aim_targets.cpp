@@ -91,7 +91,7 @@ Split best_split(std::span<const AimSample> aim_samples, const SampleBounds& who
       const Position p = position_of(sample);
       cells[split_cell(whole, axis, p[axis])].add(p, p, double{sample.contribution}, 1);
     }
-    std::array<SampleBounds, kSplits> above;  // element i sums cells i and higher
+    std::array<SampleBounds, kSplits> above;  // element i is the sum over cells i and higher
     SampleBounds sum;
     for (size_t i = kSplits; i-- > 0;) {
       sum.add(cells[i]);
