@@ -18,14 +18,15 @@ namespace wavecomb {
 enum class LightVertexUse : uint8_t {
   kToCamera,  ///< connect the vertices to the camera
   kStore,     ///< connect the vertices to the camera and store them
-  kConnect,   ///< connect the stored vertices to the camera paths in the same slots
+  kConnect,   ///< connect the stored vertices to camera paths in the same slots
 };
 
 /// Buffers for the light paths of a worker, and for their connections to its camera paths: the
 /// Buffers type of a joint transport (path/joint_transport.h). All members are empty in renders
 /// without light paths.
 ///
-/// Contract: owned by a single wave or reference integrator. Slots must be below `capacity`.
+/// Contract: each object belongs to a single wave or reference integrator. Slots must be below
+/// `capacity`.
 struct LightPathBuffers {
   LightPathBuffers(size_t capacity, const LightPathContext& context, const AovLayout& layout,
                    const AovTables* tables)
@@ -46,12 +47,13 @@ struct LightPathBuffers {
   MergePointRows merge_points;  ///< merge points of camera paths
   LightPathAovs aovs;
   LightVertexUse use = LightVertexUse::kToCamera;
-  float* ratios = nullptr;  ///< ratio R of the camera path in each slot (PathState::ratio)
+  float* ratios = nullptr;  ///< `PathState::ratio` of the camera path in each slot
   /// 1 if the camera path in the slot has had delta bounces only, so that light paths may be merged
   /// at its next vertex with a non-delta lobe; else 0.
   uint32_t* awaits_merge = nullptr;
 
-  /// Initialises the ratio R of the camera paths in `slot` at their first hits to N / G (join.h).
+  /// Initialises `PathState::ratio` of the camera paths in `slot` at their first hits: the number
+  /// of light paths for each sample of all pixels, divided by the density of camera paths.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void begin_ratios(const LightPathContext& context,
                                                  const CameraSetup& camera, const UInt<F>& slot,
@@ -62,7 +64,7 @@ struct LightPathBuffers {
     scatter<F>(ratios, ratio, slot, active);
     scatter<UInt<F>>(awaits_merge, UInt<F>(0u), slot, active);
   }
-  /// Returns the ratio R of camera paths.
+  /// Returns `PathState::ratio` of the camera paths in `slot`.
   template <typename F>
   F ratio(const UInt<F>& slot, const Mask<F>& active) const {
     return gather<F>(ratios, slot, active);

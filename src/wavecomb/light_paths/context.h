@@ -26,19 +26,19 @@ struct LightPathContext {
                      paths_per_sample)),
         merge_scale(grid ? settings.merge_radius / kConeShare : 0.f) {}
 
-  const LightSplatFilter* filter = nullptr;  ///< density of connections to the camera; null without
-                                             ///< light paths
+  /// Filter of light splats; null without light paths.
+  const LightSplatFilter* filter = nullptr;
   /// Points with which light paths are merged; null without merging.
   const MergeGrid* grid = nullptr;
-  /// Receives the contributions of light paths instead of the film if it is not null.
+  /// If not null, `aim_samples` receives the contributions of light paths instead of the film.
   AimSamples* aim_samples = nullptr;
   bool connects = false;  ///< whether vertices of camera paths connect to vertices of light paths
   /// 1 / N, where N is the number of light paths for each sample of all pixels.
   float share = 1;
   float merge_scale = 0;  ///< ratio of the merge radius to the width of the path's ray cone
-  /// If not 0, as in some pilot renders, light splats hold variance instead of light: the variance
-  /// that the light would add to a sample of a pixel if camera paths had to find it, divided by
-  /// this brightness (light_vertex.h). 0 means that splats hold light.
+  /// If 0, light splats hold radiance. In some pilot renders, `camera_squares` is the brightness of
+  /// the scene, and light splats hold a variance divided by this brightness: the variance that a
+  /// pixel sample would have if only camera paths sampled the light of the splat (light_vertex.h).
   float camera_squares = 0;
 
   /// Returns whether the render has light paths.

@@ -9,9 +9,9 @@
 
 namespace wavecomb {
 
-/// Couples a packet of camera path vertices to light paths: includes the ratio R in MIS weights,
-/// offers connections to vertices of light paths, and stores points for merging with light paths.
-/// Does nothing in renders without light paths.
+/// Couples a packet of camera path vertices to light paths. The coupling includes light paths in
+/// the MIS weights of camera paths, offers connections to vertices of light paths, and stores
+/// points for merging with light paths. It has no effect in renders without light paths.
 template <typename F>
 class LightPathCoupling {
  public:
@@ -102,11 +102,12 @@ class LightPathCoupling {
  private:
   const LightPathContext& context_;
   const LightPathBuffers& buffers_;
-  JointVertex<F> joint_;  ///< ratio R at the vertex
+  JointVertex<F> joint_;  ///< density ratio R (join.h) at the vertex
   /// Lanes whose bounces so far were all deltas, so that light paths may be merged at the next
   /// vertex with a non-delta lobe.
   Mask<F> awaits_merge_;
-  ConnectionOffer<F> offer_;        ///< offered connection, if camera paths connect to light paths
+  /// Connection that the vertex offers, if camera paths connect to light paths.
+  ConnectionOffer<F> offer_;
   MergePointOffer<F> merge_point_;  ///< merge point of the vertex, if light paths are merged
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Ratio R of camera paths (PathState::ratio) when light paths share their MIS weights
-/// (docs/light-paths.md).
+/// Ratio R of the density of light paths to the density of camera paths (`PathState::ratio`), from
+/// which MIS weights are computed (docs/light-paths.md).
 ///
 /// Three techniques sample a path x_0 (lens) x_1 .. x_n x_L (light): the bounces of a camera path,
 /// the light sample at x_n, and a light path that is connected to the camera at x_1. Let w_i be the
@@ -54,20 +54,21 @@ inline Mask<F> is_asymmetric(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>&
     return Mask<F>(false);
 }
 
-/// Ratio R at a vertex of a camera path. `ratio` is R up to the previous bounce, or 0 if light
-/// paths cannot reach the vertex.
+/// Density ratio R (see above) at a vertex of a camera path. `ratio` is the value of R after the
+/// previous bounce, or 0 if light paths cannot reach the vertex.
 template <typename F>
 struct JointVertex {
   F ratio;
   F inverse_cos;       ///< 1 / |g w|
-  F connection_ratio;  ///< E of the connection between the previous vertex and this vertex
+  F connection_ratio;  ///< term E of R for the connection of this vertex to the previous vertex
   Mask<F> merges;      ///< lanes where light paths may be merged (merge_point.h)
   F radius2;           ///< squared merge radius
   bool connects;       ///< LightPathContext::connects
 
-  /// Returns R including this vertex, R p<- |g l| / |g w|, for a direction `world` to the light
-  /// (`local` in the frame), not yet divided by the density of the light sample or bounce in this
-  /// direction. The result is undefined in lanes outside `wanted`.
+  /// Returns the density ratio R including the factors of this vertex, R p<- |g l| / |g w|, for the
+  /// direction `world` to the light (`local` in the shading frame). The caller divides the result
+  /// by the density of the light sample or bounce in this direction. The result is undefined in
+  /// lanes outside `wanted`.
   template <typename Bsdf, uint32_t kFeatures, typename Interaction>
   WAVECOMB_INLINE F towards(const Vertex<F, kFeatures>& v, const Interaction& at, const Vec3<F>& wo,
                             const Vec3<F>& world, const Vec3<F>& local,
@@ -85,8 +86,8 @@ struct JointVertex {
   }
 };
 
-/// Computes the state of R at a vertex, before its bounce. `awaits_merge` holds the lanes whose
-/// bounces so far were all deltas.
+/// Computes the density ratio R of light paths to camera paths at a vertex of a camera path, before
+/// the bounce of the vertex. `awaits_merge` holds the lanes whose bounces so far were all deltas.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
 WAVECOMB_INLINE JointVertex<F> joint_vertex(const LightPathContext& context,
                                             const Vertex<F, kFeatures>& v, const Interaction& at,
@@ -106,8 +107,8 @@ WAVECOMB_INLINE JointVertex<F> joint_vertex(const LightPathContext& context,
     connection_ratio =
         select(can_connect, F(F(v.t * v.t) / select(can_connect, v.path.pdf, F(1.f))), F(0.f));
   }
-  // If the viewer is inside an absorbing material, R is 0, since light paths do not know the length
-  // of the absorbing segment.
+  // If the viewer is inside an absorbing material, the density ratio R is 0, since the length of
+  // the absorbing segment is unknown on light paths.
   if (Bsdf::kAbsorbs && v.depth == 0) reached = reached & (view_cosine < 0.f);
   JointVertex<F> joint{select(reached, v.path.ratio, zero),
                        F(1.f / select(view_cosine != 0.f, abs(view_cosine), F(1.f))),
@@ -155,11 +156,11 @@ WAVECOMB_INLINE F joint_light_weight(const Context& c, const JointVertex<F>& joi
   return 1.f / F(F(1.f + by_bounce) + min(by_path, F(kMaxRatio)));
 }
 
-/// Computes the connection that the vertex offers to a vertex of a light path. Let w be the
-/// direction to the light path's vertex. The offer contains the factors of the camera path in the
-/// contribution
+/// Computes the connection that a vertex of a camera path offers to a vertex of a light path. Let w
+/// be the direction to the light path's vertex. The offer contains the factors of the camera path
+/// in the contribution
 ///   T f(w, l) |cos| |g w| / |g l| T_light f_light  v / d^2
-/// and in its MIS weight v (light_vertex.h). The function uses no random numbers.
+/// and in its MIS weight v (light_vertex.h). This computation uses no random numbers.
 template <typename Context, typename F>
 WAVECOMB_INLINE void offer_connection(const Context& context, const JointVertex<F>& joint,
                                       ConnectionOffer<F>& offer) {
@@ -181,9 +182,9 @@ WAVECOMB_INLINE void offer_connection(const Context& context, const JointVertex<
         classify_event<std::remove_cvref_t<decltype(at.bsdf)>, F>(at.bsdf, context.wo, wi);
 }
 
-/// Returns R after the bounce `b` along `world`. On input, `awaits_merge` holds the lanes whose
-/// earlier bounces were all deltas; on output, the lanes whose bounces including `b` were all
-/// deltas.
+/// Returns the density ratio R of light paths to camera paths after the bounce `b` along `world`.
+/// On input, `awaits_merge` holds the lanes whose bounces before `b` were all deltas. On output, it
+/// holds the lanes whose bounces up to and including `b` were all deltas.
 template <typename Context, typename F>
 WAVECOMB_INLINE F next_ratio(const Context& c, const JointVertex<F>& joint, bool merges,
                              const Vec3<F>& world, const BsdfSample<F>& b, Mask<F>& awaits_merge) {

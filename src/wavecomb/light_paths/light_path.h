@@ -126,7 +126,8 @@ struct LightVertexResult {
   Mask<F> is_candidate;  ///< whether vertices of camera paths may connect to the vertex
 };
 
-/// Vertices of camera paths to which vertices of light paths connect, instead of to the camera.
+/// Vertices of camera paths to which vertices of light paths connect. Without a connection target,
+/// vertices of light paths connect to the camera.
 template <typename F>
 struct ConnectionTarget {
   ConnectionRow<F> row;

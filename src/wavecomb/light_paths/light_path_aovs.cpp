@@ -8,7 +8,7 @@ namespace {
 
 /// Parts of a light splat that belong to each light path expression.
 struct LightSplatParts {
-  uint32_t found = 0;  ///< bit mask of the expressions that have a part
+  uint32_t found = 0;  ///< bit k is set if light path expression k has a part
   std::array<Color<float>, PathAutomaton::kMaxExpressions> light{};
 
   void add(uint32_t matched, uint32_t colour, float value) {

@@ -6,7 +6,8 @@
 /// Lobes are classified as on camera paths (path_expressions.h). A bounce counts as diffuse with a
 /// probability equal to its diffuse fraction, otherwise as glossy; all colours use the same random
 /// number of the vertex. A contribution to the camera is split between diffuse and glossy in
-/// proportion to the fraction. A connection is split at both vertices.
+/// proportion to the fraction. For a connection, the scattering at both of its vertices is split in
+/// this way.
 ///
 ///   begin     a path starts at a light
 ///   shade     a vertex was shaded
@@ -35,8 +36,8 @@ namespace wavecomb {
 template <typename F>
 struct LightPathStateRow {
   UInt<F> states;  ///< automaton states of the three colours, in the layout of ExpressionRow
-  // Last shaded vertex: the automaton states before the vertex, and its scattering towards the
-  // camera.
+  // Automaton states before the last shaded vertex, and the scattering event of this vertex towards
+  // the camera.
   UInt<F> splat_states, splat_event;
   Color<F> splat_diffuse;
   WAVECOMB_FIELDS(states, splat_states, splat_event, splat_diffuse)
@@ -65,7 +66,8 @@ struct LightSplat {
 
 /// AOV values of the light paths of a wave.
 ///
-/// Contract: owned by a single wave or reference integrator. Slots must be below the capacity.
+/// Contract: each object belongs to a single wave or reference integrator. Slot indices must be
+/// below `capacity`.
 class LightPathAovs {
  public:
   LightPathAovs() = default;
@@ -98,7 +100,8 @@ class LightPathAovs {
                                     active);
   }
 
-  /// Records a shaded vertex; `v` contains the classification of its scattering events.
+  /// Updates the AOV state of light paths after a vertex was shaded. `v` contains the
+  /// classification of the scattering events at the vertex.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void shade(uint32_t depth, const UInt<F>& slot,
                                           const SampleKey<F>& key, const VertexAovs<F>& v,
@@ -113,15 +116,16 @@ class LightPathAovs {
         active);
   }
 
-  /// Marks the last shaded vertex as the vertex to which camera paths connect.
+  /// Stores the automaton states of the last shaded vertex of each light path for connections,
+  /// since camera paths connect to this vertex.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void mark_stored(const UInt<F>& slot, const Mask<F>& active) const {
     const UInt<F> states = load_row<LightPathStateRow, F>(states_.rows, slot, active).splat_states;
     scatter_field<F>(connections_.rows, &ConnectionStateRow<float>::states, slot, states, active);
   }
 
-  /// Records vertices of camera paths that offer a connection. `states` are the automaton states of
-  /// the camera paths before these vertices.
+  /// Stores the automaton states and scattering events of camera path vertices that offer a
+  /// connection. `states` are the automaton states of the camera paths before these vertices.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void offer(const UInt<F>& slot, const UInt<F>& states,
                                           const ScatteringEvent<F>& scattering,
@@ -133,8 +137,8 @@ class LightPathAovs {
     store_row<ConnectionStateRow, F>(connections_.rows, slot, row, active);
   }
 
-  /// Records the scattering events at the stored vertices of light paths that were shaded for a
-  /// connection.
+  /// Stores the scattering events at the stored vertices of light paths, after these vertices were
+  /// shaded for a connection.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void record_connection(const UInt<F>& slot,
                                                       const ScatteringEvent<F>& scattering,

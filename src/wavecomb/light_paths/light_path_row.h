@@ -13,8 +13,9 @@ namespace wavecomb {
 /// State of a light path at a vertex, in addition to its PathState.
 template <typename F>
 struct LightPathState {
-  F mis_sum{0.f};  ///< the sum S of the MIS weight (light_vertex.h)
-  /// Density of the previous bounce; 0 if the bounce's vertex cannot be connected.
+  F mis_sum{0.f};  ///< sum S of density ratios for MIS weights (light_vertex.h)
+  /// Density of the previous bounce, or 0 if the vertex of this bounce cannot be connected to
+  /// camera paths.
   F bounce_pdf{0.f};
   UInt<F> light{0u};  ///< light at which the path started
 };

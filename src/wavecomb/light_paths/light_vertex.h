@@ -25,12 +25,12 @@
 ///   v = 1 / (1 + r p<- / d^2 + (S (p-> + p_light) + F) |g w| / |g l|  p->' / d^2),
 /// where r is JointVertex::towards of the camera path's vertex: R p<- |g l'| / |g w'|.
 ///
-/// Light paths also predict the noise of camera paths that would have to find the same light alone.
-/// Let c be the contribution of a light path with weight v = 1 / (1 + x), where x is the density of
-/// camera paths relative to light paths. Its unweighted contribution is c (1 + x), and the sample
-/// of a camera path has the second moment
+/// Light paths are also used to estimate the noise of a render in which only camera paths sample
+/// the same light. Let c be the contribution of a light path with weight v = 1 / (1 + x), where x
+/// is the density of camera paths relative to light paths. Its unweighted contribution is c (1 +
+/// x), and the sample of a camera path has the second moment
 ///   E[sum over light paths of (c (1 + x))^2 / x].
-/// The light that light paths find accounts for the fraction v of this moment, c^2 (1 + x) / x.
+/// The contributions of light paths account for the fraction v of this moment, c^2 (1 + x) / x.
 #pragma once
 
 #include <array>
@@ -59,21 +59,21 @@ struct LightPathPoint {
   const Interaction& at;
   const LightPathState<F>& from;  ///< state of the light path before the vertex
   Frame<F> frame;
-  Vec3<F> l;      ///< local direction to the light, as for connections (light_paths/connection.h)
+  Vec3<F> l;      ///< direction to the light in the shading frame (see light_paths/connection.h)
   F inverse_cos;  ///< 1 / |g l|
   Color<F> flux;  ///< flux that arrives at the vertex
-  F connection_density;   ///< F, see above
-  F sampled;              ///< p_light at the first vertex; 0 at later vertices
+  F connection_density;   ///< term F = d^2 / p<- (see the top of the file)
+  F sampled;              ///< density of light samples at the first vertex; 0 at later vertices
   Mask<F> by_light_only;  ///< lanes with a light that bounces cannot hit
   Mask<F> active;
 
-  /// Returns |g w| / |g l| for a world direction.
+  /// Returns the ratio |g w| / |g l| of cosines for a world direction w.
   F cosine_ratio(const Vec3<F>& w) const { return abs(dot(at.s.ng, w)) * inverse_cos; }
-  /// Returns p-> + p_light, where `bounce` is p->.
+  /// Returns the density of camera paths: the density `bounce` plus that of light samples.
   F camera_density(const F& bounce) const {
     return select(by_light_only, F(0.f), bounce) + sampled;
   }
-  /// Returns S (p-> + p_light) + F.
+  /// Returns the density of camera paths relative to light paths, S (p-> + p_light) + F.
   F relative_density(const F& bounce) const {
     return from.mis_sum * camera_density(bounce) + connection_density;
   }
@@ -87,7 +87,7 @@ WAVECOMB_INLINE LightPathPoint<Bsdf, F, Interaction> light_path_point(const Vert
                                                                       const Mask<F>& is_first) {
   const Vec3<F> back = -v.path.dir;
   const F cosine = abs(dot(at.s.ng, back));
-  // Direction to the previous vertex, along the ray of a camera path's bounce that would hit it.
+  // Use the ray on which the bounce of a camera path would hit the previous vertex.
   Connection<F> c = connect_to_point<F>(at, v.path.o);
   const Mask<F> from_infinite =
       is_first & Mask<F>(from.light < UInt<F>(v.scene.lights.infinite_count));
@@ -177,9 +177,9 @@ WAVECOMB_INLINE void record_scattering(const Vertex<F, kFeatures>& v, const Path
         path_point.at.bsdf, viewer.local, path_point.l);
 }
 
-/// Returns the value of a light splat: the contribution `light` or, if camera_squares is set, the
-/// variance that the light would add to a sample of a camera path. `relative_density` is the
-/// density of camera paths relative to light paths.
+/// Returns the value of a light splat. This is the contribution `light` or, if `camera_squares` is
+/// not 0, the variance that a pixel sample would have if only camera paths sampled this light.
+/// `relative_density` is the density of camera paths relative to light paths.
 template <typename F>
 WAVECOMB_INLINE Color<F> splat_value(const LightPathSetup& setup, const Color<F>& light,
                                      const F& relative_density) {
@@ -350,13 +350,13 @@ WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const LightPath
 
 }  // namespace detail
 
-/// Runs the steps of a vertex of the active lanes' light paths, with shading program `Bsdf`.
-/// `v.hit.time` is the shutter time of the path, and `v.path.cone_width` is the width of a camera
-/// ray's cone at the hit; `from` is the rest of the path's state. If `v.aovs` needs scattering
-/// events, classifies the scattering towards the viewer (`light_scattering`) and the bounce
-/// (`bounce`). With a null `target`, the vertex is connected to the camera and the path continues;
-/// otherwise the vertex is connected to the camera path's vertices in `target`, and `v.depth` is
-/// not used.
+/// Shades a vertex of the light path in each active lane with shading program `Bsdf`. `v.hit.time`
+/// is the shutter time of the path, and `v.path.cone_width` is the width of a camera ray's cone at
+/// the hit; `from` is the state of the light path in addition to `v.path`. If `v.aovs` needs
+/// scattering events, classifies the scattering towards the viewer (`light_scattering`) and the
+/// bounce (`bounce`). With a null `target`, the vertex is connected to the camera and the path
+/// continues; otherwise the vertex is connected to the camera path's vertices in `target`, and
+/// `v.depth` is not used.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE LightVertexResult<F> light_path_steps(const Vertex<F, kFeatures>& v,
                                                       const LightPathState<F>& from,

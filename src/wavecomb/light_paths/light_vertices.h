@@ -43,7 +43,8 @@ struct ConnectionRow {
 
 /// Stored vertices and connections of the paths of a wave.
 ///
-/// Contract: owned by a single wave or reference integrator. Each slot has a row of each kind.
+/// Contract: each object belongs to a single wave or reference integrator. Each slot has one row in
+/// each table.
 class LightVertices {
  public:
   LightVertices() = default;
@@ -108,14 +109,16 @@ struct ConnectionOffer {
   /// Whether a light path vertex is stored, and the connected path would not exceed the maximum
   /// depth.
   Mask<F> wanted;
-  ConnectionRow<F> row;  ///< output: the connection; black where `wanted` is false
+  /// Output: the connection; its contribution is black where `wanted` is false.
+  ConnectionRow<F> row;
   /// Output: scattering event of the camera path's vertex, if light path expressions are active;
   /// undefined where `wanted` is false.
   ScatteringEvent<F> scattering{};
 };
 
-/// Returns an offer from the vertices at `depth` of the camera paths in `slot` to the light path
-/// vertices stored for these slots. The offer's contribution is still black.
+/// Prepares the connection of the vertices at `depth` of the camera paths in `slot` to the light
+/// path vertices stored for these slots. The contribution in the returned offer is black;
+/// `offer_connection()` computes it.
 template <typename F>
 inline ConnectionOffer<F> offer_for(const LightVertices& from, const UInt<F>& slot, uint32_t depth,
                                     uint32_t max_depth, const Mask<F>& active) {

@@ -101,7 +101,8 @@ bool MergeGrid::Search::next(uint32_t& pixel) {
       pixel = grid_->entries_[begin_++];
       const float* row = grid_->points_ + size_t{pixel} * kMergePointWords;
       const float dx = at_[0] - row[0], dy = at_[1] - row[1], dz = at_[2] - row[2];
-      // A hash bucket also holds points of other cells and other radius levels with the same hash.
+      // A hash bucket also holds points of different cells and of different radius levels with the
+      // same hash.
       if (dx * dx + dy * dy + dz * dz < row[3] * row[3] &&
           exponent_of(row[3]) == grid_->levels_[level_ - 1])
         return true;

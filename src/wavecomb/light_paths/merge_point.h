@@ -44,7 +44,7 @@ struct MergePointOffer {
 
 /// Merge points of the camera paths of a wave.
 ///
-/// Contract: owned by a single wave or reference integrator. Each slot has one row.
+/// Contract: each object belongs to a single wave or reference integrator. Each slot has one row.
 class MergePointRows {
  public:
   MergePointRows() = default;

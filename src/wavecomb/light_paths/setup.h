@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Setup of light paths for a render: check that the scene supports them, and unit and filter of
-/// light splats (docs/light-paths.md).
+/// Setup of light paths for a render (docs/light-paths.md). The functions check that the scene
+/// supports light paths, and determine the unit and the filter of light splats.
 #pragma once
 
 #include <cmath>

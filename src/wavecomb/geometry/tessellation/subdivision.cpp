@@ -91,8 +91,7 @@ struct Subdivision::Refiner {
   Sdc::Options options;
   bool manifold = true;
   bool has_holes = false;
-  /// Visible faces of the last level, in ascending order. The list is empty if there are no holes,
-  /// since all faces are visible then.
+  /// Visible faces of the last level, in ascending order; empty if all faces are visible.
   std::vector<int> drawn;
 
   int level() const { return far->GetMaxLevel(); }
@@ -305,8 +304,7 @@ std::vector<uint32_t> Subdivision::normal_sectors(const RefinedFaces& faces,
   std::vector<int> sector;
   const auto number = [&](int v) {
     const Far::ConstIndexArray around = last.GetVertexFaces(v), edges = last.GetVertexEdges(v);
-    // Faces that share a smooth edge form a sector. The number of a sector is the lowest index of
-    // its faces.
+    // Faces that share a smooth edge form a sector, numbered by the lowest index of its faces.
     sector.resize(static_cast<size_t>(around.size()));
     std::iota(sector.begin(), sector.end(), 0);
     for (const int e : edges) {

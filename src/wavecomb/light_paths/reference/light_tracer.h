@@ -27,8 +27,8 @@ class LightTracer {
         counts_(worker.counts),
         rays_(context, worker.counts, worker.aovs) {}
 
-  /// Traces one light path. If `keeps`, stores one of its vertices for the camera path of the same
-  /// pixel and sample.
+  /// Traces one light path. If `keeps` is true, stores one vertex of the light path for the camera
+  /// path of the same pixel and sample.
   void trace(uint32_t pixel, uint32_t sample, bool keeps = false) {
     if (keeps) buffers_.vertices.clear(1);
     const SceneView& scene = context_.scene;

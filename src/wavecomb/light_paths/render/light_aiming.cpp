@@ -19,8 +19,8 @@ constexpr uint32_t kAimRounds = 4, kAimSeed = 0x9e3779b9u;
 /// Number of grid cells along each side of the image; a camera ray through each cell finds a
 /// visible surface point.
 constexpr uint32_t kVisibleCells = 48;
-/// Number of light paths of a training round: one for every kAimShare pixels of the image, within
-/// these limits.
+/// A training round traces one light path for every `kAimShare` pixels of the image, but at least
+/// `kMinAimPaths` and at most `kMaxAimPaths` light paths.
 constexpr uint64_t kAimShare = 4, kMinAimPaths = 8192, kMaxAimPaths = 131'072;
 
 /// Returns spheres around the points that the camera sees. The radii are doubled, to include
@@ -37,8 +37,9 @@ LightAim aim_at_visible(const Scene& scene, const EmbreeAccelerator& accel,
   return aim;
 }
 
-/// Returns a plan with one sample of each of the first `count` light paths. The plan specifies path
-/// numbers as pixels, which may lie below the image if the image is small.
+/// Returns a plan with one sample of each of the first `count` light paths. The plan stores the
+/// number of a light path as pixel coordinates. In a small image, these coordinates may lie below
+/// the last row.
 PassPlan first_paths(const Settings& settings, uint64_t count, uint32_t sample) {
   PassPlan plan;
   plan.pixels.reserve(count);

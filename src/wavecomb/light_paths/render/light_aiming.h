@@ -29,14 +29,15 @@ struct LightAiming {
 LightAiming learn_to_aim(const WaveContext& context, const Scene& scene, const WaveSetup& waves,
                          const std::function<bool()>& stopped);
 
-/// Pilot of the light path transport, which run_pilots() calls (render/joint_transport.h).
+/// Training of target spheres as a pilot of the light path transport. `run_pilots()` calls its
+/// functions (render/joint_transport.h).
 struct LightPathPilot {
   using Result = LightAiming;
   /// Makes the lights of `context` emit light paths, if the render uses light paths.
   static void prepare(const Scene& scene, WaveContext& context);
-  /// Trains target spheres, or uses `earlier`, the result of an earlier pilot, if it is not null.
-  /// Sets the target spheres of the lights of `context`, which must not outlive the result. Returns
-  /// null if light paths are not aimed.
+  /// Trains target spheres. If `earlier` is not null, uses the target spheres of this earlier
+  /// result instead. Sets the target spheres of the lights of `context`, which must not outlive the
+  /// result. Returns null if light paths are not aimed.
   static std::shared_ptr<const LightAiming> run(const Scene& scene, const WaveSetup& waves,
                                                 const std::shared_ptr<const LightAiming>& earlier,
                                                 const std::function<bool()>& stopped,

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Light paths of a render: the part of its plan and of its passes (render/joint_transport.h).
+/// `LightPathPlan` and `LightPathPasses`, which plan the light paths of a render and of each pass
+/// (render/joint_transport.h).
 #pragma once
 
 #include <cstdint>
@@ -51,7 +52,7 @@ class LightPathPlan {
   const Settings& settings_;
   LightPathShare share_;
   LightSplatFilter filter_;
-  /// Names of the lights that emit no light paths, if other lights do.
+  /// Names of the lights that emit no light paths, for the statistics.
   std::vector<std::string> lights_without_paths_;
 };
 
@@ -68,8 +69,8 @@ class LightPathPlan {
 /// For a given cost, the error is least if
 ///   m / n = sqrt(V_l |A| / (V_c P)).
 /// Both variances are estimated from half buffers over the active pixels. The number is limited to
-/// `share`, because more light path samples would require different MIS weights. It depends only on
-/// earlier passes, so the image stays unbiased.
+/// `share`, because more light path samples would require different MIS weights. The number of
+/// samples depends only on earlier passes, so the image stays unbiased.
 uint32_t light_samples_after(const NoiseParts& noise, uint32_t done, uint32_t before,
                              uint32_t after, uint32_t share, double active_share);
 
@@ -93,7 +94,8 @@ class LightPathPasses {
   /// Plans the light paths that a pass still has to trace, up to `target` samples of each. The plan
   /// is empty if the render has no light paths.
   PassPlan plan(const Film& film, uint32_t target) const;
-  /// Prepares the light paths of a pass after its camera paths are finished.
+  /// Prepares the light paths of a pass. Call this function after the camera paths of the pass are
+  /// finished.
   void begin(const Film& film);
 
  private:

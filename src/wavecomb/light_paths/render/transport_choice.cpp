@@ -13,8 +13,8 @@
 namespace wavecomb {
 namespace {
 
-/// Samples per pixel of a pilot render, which suffice to show the effects of Sobol sequences and of
-/// roulette, and limits of the pilot's pixel count.
+/// Samples per pixel of a pilot render, and limits of its number of pixels. The samples suffice to
+/// show the effects of Sobol sequences and of roulette.
 constexpr uint32_t kTransportSamples = 8;
 constexpr uint64_t kMinTransportPixels = 400, kMaxTransportPixels = 16'384;
 /// A pilot render has the sample count of the render divided by kTransportShare. There are five
@@ -22,18 +22,19 @@ constexpr uint64_t kMinTransportPixels = 400, kMaxTransportPixels = 16'384;
 /// take about a hundredth of the render time.
 constexpr uint64_t kTransportShare = 1000;
 constexpr std::array<uint32_t, 2> kTransportSeeds = {0x3c6ef372u, 0xa54ff53au};
-/// Cost of shading a vertex, in units of one ray: for kernels without and with support of light
-/// paths.
+/// Cost of shading a vertex in kernels without and with support of light paths, in units of the
+/// cost of one ray.
 constexpr double kPathVertex = 0.7, kJointVertex = 0.8;
-/// Additional costs with merging, in units of one ray: of a camera path, which may store a merge
-/// point, and of a light path vertex.
+/// Additional costs of a camera path and of a light path vertex in renders with merging, in units
+/// of the cost of one ray.
 constexpr double kMergedPath = 1, kMergedVertex = 1;
-/// Fraction of pixels, the noisiest ones, that a second noise estimate leaves out. A single pixel
-/// may have most of the noise of a small image, so that results differ between pilot renders.
+/// A second noise estimate leaves out this fraction of the pixels, those with the most noise. A
+/// single pixel may have most of the noise of a small image, so that results differ between pilot
+/// renders.
 constexpr double kNoisiest = 0.01;
-/// Limit of the squared error of light that camera paths would have to find, in units of the
-/// squared light of the pixel. Light that is rarely found leaves nearly all pixels black and makes
-/// a few far too bright.
+/// Upper limit of a pixel's estimated squared error in a render without light paths, relative to
+/// the squared radiance that light paths contribute to the pixel. Light that camera paths rarely
+/// sample leaves nearly all pixels black and makes a few pixels far too bright.
 constexpr double kMaxLost = 8;
 /// Minimum predicted gain in efficiency for which light paths are used.
 constexpr double kMinLightPathGain = 1.3;
@@ -92,8 +93,8 @@ PilotWork work_of(const std::array<TransportPilot, 2>& pilots) {
   }
   return work;
 }
-/// Returns the work of a render without light paths, extrapolated from pilot renders with two
-/// ratios of light paths.
+/// Returns the numbers of rays and shading records of a render without light paths, extrapolated
+/// from pilot renders with two ratios of light paths.
 PilotWork work_without(const TransportPilots& pilots) {
   const PilotWork few = work_of(pilots.with[0]), many = work_of(pilots.with[1]);
   const double a = double{kCandidateShares[0].paths()}, b = double{kCandidateShares[1].paths()};
@@ -108,7 +109,8 @@ double sum(const PixelNoise& noise) {
   return std::accumulate(noise.begin(), noise.end(), 0.0);
 }
 
-/// Returns the sum of the noise without the noisiest pixels (kNoisiest).
+/// Returns the sum of the noise of all pixels except the fraction `kNoisiest` of the pixels with
+/// the most noise.
 double sum_of_most(PixelNoise noise) {
   const auto most =
       noise.end() - static_cast<ptrdiff_t>(kNoisiest * static_cast<double>(noise.size()));

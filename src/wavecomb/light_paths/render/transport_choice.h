@@ -6,12 +6,12 @@
 /// view are rendered before the first pass, two for each candidate ratio of light paths. (Each
 /// ratio needs its own images, because the MIS weights depend on the ratio, and the noise of both
 /// kinds of paths on the weights.) The noise without light paths cannot be measured in images of so
-/// few samples, since camera paths may not find a caustic at all. Light paths estimate it instead
-/// (light_paths/light_vertex.h). Let e_camera be the squared error of the light that camera paths
-/// contribute in a render with light paths, e_left the squared error of the remaining light if
-/// camera paths had to find it, and c the cost without light paths, from counts of rays and
-/// vertices at fixed costs. The gain in efficiency of a ratio with squared error e_s and cost c_s
-/// is
+/// few samples, since camera paths may not find a caustic at all. The noise without light paths is
+/// therefore estimated from light paths (light_paths/light_vertex.h). Let e_camera be the squared
+/// error of the light that camera paths contribute in a render with light paths, e_left the squared
+/// error of the remaining light if camera paths had to find it, and c the cost without light paths,
+/// from counts of rays and vertices at fixed costs. The gain in efficiency of a ratio with squared
+/// error e_s and cost c_s is
 ///   (e_camera + e_left) c / (e_s c_s).
 /// The choice does not depend on seed, region, threads, waves or lanes, so that crops, resumed
 /// renders and merged renders use the same transport. Samples of the pilot do not contribute to the
@@ -47,28 +47,29 @@ struct TransportPilot {
   std::vector<float> by_light_paths;
   uint64_t rays = 0, records = 0;  ///< numbers of traced rays and shading records
 };
-/// Renders a small image with the given ratio of light paths. If the last argument is true,
-/// by_light_paths holds the variance of RenderOptions::wants_camera_squares.
+/// Function that renders a small image with the given ratio of light paths to camera paths. If its
+/// last argument is true, `by_light_paths` holds variances instead of radiance
+/// (`RenderOptions::wants_camera_squares`).
 using RenderPilot = std::function<TransportPilot(const Settings&, LightPathShare, bool)>;
 
-/// Candidate ratios of light paths. On stages with caustics, with or without merging, efficiency
-/// hardly depends on the ratio near the better candidate.
+/// Candidate ratios of light paths. In tests with caustics, efficiency hardly depended on the ratio
+/// near the better candidate, with and without merging.
 inline constexpr std::array<LightPathShare, 2> kCandidateShares = {{{-3}, {0}}};
 
 /// Returns whether any material reflects or transmits light sharply enough for caustics.
 bool focuses_light(const Scene& scene);
 
 /// Chooses the transport for `settings`, whose render is expected to take `samples` samples, from
-/// small images made by `render`. Gives up if `stopped` returns true, and then chooses
-/// Transport::kPath.
+/// small images made by `render`. If `stopped` returns true, the function stops and chooses
+/// `Transport::kPath`.
 TransportChoice choose_transport(const Scene& scene, const Settings& settings, uint64_t samples,
                                  const RenderPilot& render, const std::function<bool()>& stopped);
 
 // Exposed for tests.
 
-/// Small pilot renders of `width` columns.
+/// Results of the pilot renders, which have `width` columns.
 struct TransportPilots {
-  /// Results for each ratio of light paths, with two seeds each.
+  /// Two pilot renders with different seeds for each ratio of light paths.
   std::array<TransportPilot, 2> with[kCandidateShares.size()];
   /// Squared noise per sample of each pixel, for the light that only camera paths find.
   std::vector<double> variance;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Wave stage 4b, for connections: shades the vertices of light paths for the camera paths in the
-/// same slots, and adds the contributions of unblocked connections to those camera paths.
+/// Wave stage 4b, which connects camera paths to light paths in the same slots. The stage shades
+/// the stored vertices of the light paths and adds the contributions of unoccluded connections to
+/// the camera paths.
 #pragma once
 
 #include "wavecomb/light_paths/light_path.h"
@@ -44,8 +45,8 @@ void collect_connections(Wave& wave, const WaveContext& context, uint32_t depth)
   wave.counts.add_records(depth, n);
 }
 
-/// Connects the shaded vertices of camera paths at `depth`. Does not change the list of the camera
-/// paths' next rays.
+/// Connects the shaded vertices of camera paths at `depth`. The list of the next rays of camera
+/// paths does not change.
 template <typename F>
 void connect(Wave& wave, const WaveContext& context, uint32_t depth) {
   using U = UInt<F>;

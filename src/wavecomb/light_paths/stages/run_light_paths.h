@@ -70,7 +70,8 @@ struct LightPathJointStages {
   static void use_vertices(Wave& wave, const WaveContext& context, uint32_t depth) {
     if (wave.joint.vertices) connect<F>(wave, context, depth);
   }
-  /// Stores the merge point of each pixel, which is the merge point of its last sample.
+  /// Stores the merge point of each pixel. If a pixel has several samples, its last sample
+  /// determines the merge point.
   static void end(const Wave& wave, const WaveContext& context, const WaveTask& task) {
     const MergePointRows& points = wave.joint.merge_points;
     if (!points) return;
