@@ -160,8 +160,8 @@ struct GraphSet {
   std::vector<GraphOutput> outputs;
   uint32_t inputs = 0;
 
-  /// Adds a program that passed check_graph(). Its attribute operations must use the scene's
-  /// attribute ids.
+  /// Adds a program that passed check_graph(). The program's attribute operations must use the
+  /// attribute ids of the scene.
   void add(const Graph& graph);
   /// Returns whether program `graph`, which may be kNoGraph, drives component `parameter`.
   bool drives(uint32_t graph, uint32_t parameter) const;

@@ -22,7 +22,7 @@ struct GuidingLookup {
   UInt<F> region{kNoGuidingRegion};
   /// Position relative to the region's sphere; see sphere_offset()
   Vec3<F> offset{F(0.f), F(0.f), F(0.f)};
-  /// The probability a; 1 means that the bounce is not guided.
+  /// Probability a that the BSDF samples the bounce; 1 means that the bounce is not guided.
   F bsdf_share{1.f};
   F survival{0.f};        ///< GuidingView::survival
   Mask<F> known{false};   ///< lanes with a region

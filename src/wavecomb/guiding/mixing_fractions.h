@@ -23,7 +23,8 @@ struct ShareMoments {
   std::array<double, kBsdfShares.size()> sums{};
   double count = 0;
 
-  /// Adds a bounce with its clamped value. Ignores a bounce without the density of a guiding field.
+  /// Adds a bounce, whose `value` has been clamped. Ignores a bounce without the density of a
+  /// guiding field.
   void add(const ShareRatios& ratios, double value) {
     if (!(ratios[0] > 0)) return;
     const double squared = value * value;
@@ -32,9 +33,9 @@ struct ShareMoments {
   }
   /// Adds the moments and the count of `other`, multiplied by `factor`.
   void add(const ShareMoments& other, double factor);
-  /// Returns the index of the best fraction in kBsdfShares. Returns the index that means no guiding
-  /// unless another fraction reduces the second moment below kWorthwhile times the moment without
-  /// guiding.
+  /// Returns the index in `kBsdfShares` of the fraction with the smallest second moment. Returns
+  /// the index of fraction 1 (no guiding) unless guiding reduces the second moment below
+  /// `kWorthwhile` times the moment without guiding.
   size_t best() const;
   static constexpr double kWorthwhile = 0.95;
 };

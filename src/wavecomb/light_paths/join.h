@@ -11,24 +11,25 @@
 ///   R = N / G  prod_{i=1..n} |g l_i| / (|g w_i| p->_i)  prod_{i=2..n} p<-_i   times  D,
 /// where G is the density of camera paths (camera_connection.h), N the number of light paths in the
 /// image for each sample of a pixel, and D the density of the light (light/emission/emission.h).
-/// At each vertex, R is multiplied by the vertex's factors. At a delta lobe the ratio of densities
-/// is the ratio of the solid angles,
+/// The density ratio R is multiplied by the factors of each vertex of the path. At a delta lobe the
+/// ratio of densities is the ratio of the solid angles,
 ///   p<- / p-> = |w z| / (|l z| eta^2),
-/// where z is the shading normal, and eta the relative index of refraction from w to l. R is 0 if
-/// light paths cannot be connected to the camera, because x_1 is specular, its shading normal is
-/// adjusted to the viewer, or it lies on a fibre.
+/// where z is the shading normal, and eta the relative index of refraction from w to l. The density
+/// ratio R is 0 if light paths cannot be connected to the camera. This is the case if x_1 is
+/// specular or on a fibre, or if its shading normal is adjusted to the viewer.
 ///
-/// With connections between vertices, R is the sum over the third technique and all connections of
-/// x_i to x_i+1. For such a connection,
+/// With connections between vertices of camera paths and light paths, R is the sum over the third
+/// technique and all connections of x_i to x_i+1. For such a connection,
 ///   E_i = d^2 / p->_i   (d is the distance)
 /// replaces p<-_i+1 and all earlier factors of R:
 ///   R_n = |g l_n| / (|g w_n| p->_n) (R_n-1 p<-_n + E_n-1).
-/// E is 0 if one of the two vertices scatters as a delta, if light paths cannot reach x_i+1, or if
-/// the viewer is inside an absorbing material.
+/// The term E_i is 0 if one of the two connected vertices scatters as a delta, if light paths
+/// cannot reach x_i+1, or if the viewer is inside an absorbing material.
 ///
 /// With merging, camera paths whose bounces were all deltas have a different third technique: a
 /// light path that ends within r of x_k, the first vertex with a non-delta lobe. For this
-/// technique, R starts with pi r^2 in place of 1 / (G |g w_k|). A delta bounce at x_k sets R to 0.
+/// technique, R starts with pi r^2 in place of 1 / (G |g w_k|). A delta bounce at x_k sets the
+/// density ratio R to 0.
 #pragma once
 
 #include "wavecomb/light/emission/emission.h"

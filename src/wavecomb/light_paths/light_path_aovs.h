@@ -5,17 +5,18 @@
 ///
 /// Lobes are classified as on camera paths (path_expressions.h). A bounce counts as diffuse with a
 /// probability equal to its diffuse fraction, otherwise as glossy; all colours use the same random
-/// number of the vertex. A contribution to the camera is split between diffuse and glossy in
-/// proportion to the fraction. For a connection, the scattering at both of its vertices is split in
-/// this way.
+/// number of the vertex. The contribution of a vertex to the camera is divided between diffuse and
+/// glossy scattering, in proportion to the vertex's diffuse fraction. For a connection, the
+/// scattering at both of its vertices is split in this way.
 ///
-///   begin     a path starts at a light
-///   shade     a vertex was shaded
-///   mark_stored        camera paths connect to this vertex
-///   show      the camera sees the vertex: the contribution is added to the film
-///   offer     a vertex of a camera path offers a connection
-///   link      the vertex of the light path was shaded for the connection
-///   connect   the ray between the two is free
+/// Functions, in the order in which waves call them:
+///   begin              a light path starts at a light
+///   shade              a vertex of the light path was shaded
+///   mark_stored        the vertex was stored for connections to camera paths
+///   add_to_film        the camera sees the vertex
+///   offer              a vertex of a camera path offers a connection to the stored vertex
+///   record_connection  the stored vertex was shaded for the connection
+///   connect            the connection is unoccluded
 #pragma once
 
 #include <bit>

@@ -221,7 +221,7 @@ WAVECOMB_INLINE void connect_vertex_to_camera(const Vertex<F, kFeatures>& v,
 }
 
 /// Merges light paths with nearby points that the camera sees in mirrors and through glass
-/// (merge_point.h). Each lane processes one point after the other.
+/// (merge_point.h). Each lane processes its points one after the other.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename PathPoint>
 WAVECOMB_INLINE void merge(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
                            const PathPoint& path_point) {

@@ -91,7 +91,8 @@ inline void set_uv(const MeshReader<F>& mesh, const InstanceMaps<F>& maps, const
                    Surface<F>& s) {
   const F scale = length(maps.vector(c.dpdu)) / max(length(c.dpdu), F(1e-30f));
   s.dpdu = maps.vector(c.dpdu);
-  // Without authored coordinates, each segment covers the unit square.
+  // Without authored texture coordinates, each curve segment covers the unit square of texture
+  // space.
   F density2 = 1.f / max(F(c.du * c.dv * scale * scale), F(1e-30f));
   const CurveUv<F> uv = curve_uv<F>(mesh, hit.prim, hit.u, hit.v, active, strands);
   s.uv = uv.uv;

@@ -37,7 +37,8 @@ inline Vec3<F> local_direction(const InstanceMaps<F>& maps, const Vec3<F>& dir) 
   return d * F(1.f / sqrt(max(length_squared(d), F(1e-30f))));
 }
 
-/// Returns the offset from the centre to the position of hits (u, v) by rays along `dir`.
+/// Returns the offset from the centre of a Gaussian splat to a hit at the coordinates (u, v) by a
+/// ray along `dir`.
 template <typename F>
 inline Vec3<F> gaussian_splat_offset(const GaussianSplatMap<F>& map, const InstanceMaps<F>& maps,
                                      const F& u, const F& v, const Vec3<F>& dir) {

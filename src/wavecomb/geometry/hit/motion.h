@@ -22,7 +22,7 @@ inline F path_time(SamplerKind sampler, const SampleKey<F>& key) {
   return sample_4d<F>(sampler, key, kTimeSet).x;
 }
 
-/// Transform of each lane: the rows of A and the translation.
+/// Affine transform of each lane: the rows of the matrix and the translation.
 template <typename F>
 struct MatrixLanes {
   Vec3<F> row[3], t;
@@ -77,7 +77,7 @@ class MovingRows {
   }
 
   struct Value {
-    /// Interpolated value, and the larger magnitude of each component at the two steps.
+    /// Interpolated value, and for each component its larger magnitude at the two motion steps.
     Vec3<F> v, reach;
   };
   Value operator()(const UInt<F>& index, const Mask<F>& active) const {
@@ -132,7 +132,7 @@ template <typename F, typename Maps>
     const SceneView& scene, const UInt<F>& inst, const UInt<F>& mesh,
     const std::array<UInt<F>, 3>& corners, const F& time, const Maps& maps, const Mask<F>& active);
 
-/// Returns the normals of the given indices at the time of a hit.
+/// Returns the vertex or corner normals with the given indices at the time of a hit.
 template <typename F>
 [[gnu::noinline, gnu::cold]] std::array<Vec3<F>, 3> moved_normals(
     const SceneView& scene, const UInt<F>& mesh, const std::array<UInt<F>, 3>& indices,

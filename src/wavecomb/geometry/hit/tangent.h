@@ -59,7 +59,7 @@ struct TangentCodes {
 
 /// Returns the tangent at hits in the mesh's local space, interpolated between the corners of the
 /// triangle, or the triangle's constant tangent `flat` if the mesh has no tangents or they cancel
-/// out. The function is not inlined, so that kernels of scenes without such meshes stay small.
+/// out. The function is not inlined, so that kernels of scenes without tangents stay small.
 template <typename F>
 [[gnu::noinline]] Vec3<F> smooth_tangent(const SceneView& scene, const MeshHit<F>& hit,
                                          const std::array<UInt<F>, 3>& corners, const Vec3<F>& flat,

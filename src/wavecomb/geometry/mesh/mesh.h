@@ -55,10 +55,10 @@ struct alignas(64) GaussianSplatRow {
 using SplatRow [[deprecated("use GaussianSplatRow")]] = GaussianSplatRow;
 static_assert(sizeof(GaussianSplatRow) == 64);
 
-/// An indexed triangle mesh, curves or points (geometry/curve/segment.h), or splats
-/// (geometry/gaussian_splat/gaussian_splat.h), which need a material of program emissive. The
-/// caller owns the arrays, which are not copied; `owner` keeps them alive for as long as a Scene
-/// uses them.
+/// Primitives of one type: an indexed triangle mesh, curves or points (geometry/curve/segment.h),
+/// or Gaussian splats (geometry/gaussian_splat/gaussian_splat.h). The material of splats must use
+/// the shading program "emissive". The caller owns the arrays, which are not copied; `owner` keeps
+/// them alive for as long as a Scene uses them.
 struct Mesh {
   std::string name;
   Primitive primitive = Primitive::kTriangle;

@@ -25,7 +25,7 @@ V unit(const V& v) {
   return len2 > 0 && std::isfinite(len2) ? v * (1 / std::sqrt(len2)) : V(0.f);
 }
 
-/// Reader of mesh arrays by triangle corner.
+/// Reads mesh arrays at triangle corners.
 class Corners {
  public:
   explicit Corners(const Mesh& mesh) : mesh_(mesh) {}

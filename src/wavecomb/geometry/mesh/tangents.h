@@ -23,7 +23,7 @@ struct SceneMaterials;
 /// Tangents of one mesh in its local space, encoded by core/encoding/octahedral.h. The code is
 /// kNoDirection where tangents cancel out and on triangles without area in texture space.
 struct MeshTangents {
-  /// One code per vertex or corner, for one motion step after another.
+  /// One encoded tangent per vertex or corner, for one motion step after another.
   std::vector<uint32_t> codes;
   bool at_corners = false;  ///< whether some vertex has more than one tangent
 };
@@ -49,7 +49,7 @@ struct SceneTangents {
   SceneTangents(const SceneGeometry& geometry, const SceneMaterials& materials,
                 const SceneTangents* before);
 
-  /// Tangents by mesh, null for meshes without tangents; empty if no mesh has tangents.
+  /// Tangents of each mesh, or null for a mesh without tangents; empty if no mesh has tangents.
   std::vector<std::shared_ptr<const MeshTangents>> of_mesh;
   std::vector<TangentRecord> records;  ///< record of each mesh; empty if no mesh has tangents
   uint64_t bytes() const;

@@ -7,9 +7,8 @@
 namespace wavecomb {
 namespace {
 
-/// The lines have the direction (kSlopeX, kSlopeY, 1), so a line is identified by its coordinates x
-/// - kSlopeX z and y
-/// - kSlopeY z.
+/// All lines have the direction (kSlopeX, kSlopeY, 1). A line is identified by two coordinates that
+/// are equal for all its points, (x - kSlopeX z, y - kSlopeY z).
 constexpr float kSlopeX = 0.2371f, kSlopeY = 0.1549f;
 constexpr uint32_t kMaxCells = 512;  ///< number of grid cells along one side
 constexpr size_t kMaxEntries = 16;   ///< maximum mean number of grid cells per triangle

@@ -13,8 +13,8 @@ namespace wavecomb {
 enum class Scheme : uint8_t { kCatmullClark, kLoop, kBilinear };
 /// Values of UsdGeomMesh::interpolateBoundary: none, edgeOnly, edgeAndCorner.
 enum class BoundaryRule : uint8_t { kNone, kEdgeOnly, kEdgeAndCorner };
-/// Values of UsdGeomMesh::faceVaryingLinearInterpolation, in increasing order of what is
-/// interpolated linearly.
+/// Values of UsdGeomMesh::faceVaryingLinearInterpolation, from smooth interpolation everywhere to
+/// linear interpolation everywhere.
 enum class FaceVaryingRule : uint8_t {
   kNone,
   kCornersOnly,

@@ -12,8 +12,8 @@ namespace wavecomb {
 struct PolygonTriangulation {
   /// Corner indices, 3 per triangle. A polygon with n corners is divided into n - 2 triangles.
   std::vector<int64_t> corners;
-  uint64_t untested = 0;  ///< number of ears that were cut without a test, after the step
-                          ///< limit
+  /// Number of corners cut without a test after the step limit.
+  uint64_t untested = 0;
 };
 
 /// Maximum number of steps of `clip_ears()`; this number of steps takes about a second. In the

@@ -3,8 +3,8 @@
 ///
 /// OpenSubdiv's Far::PrimvarRefiner computes the same values, but a whole level per call on one
 /// thread. The functions here use the masks and the order of additions of OpenSubdiv, so their
-/// results are bitwise equal. They require uniform refinement, in which every vertex has all its
-/// neighbours.
+/// results are bitwise equal. These functions require uniform refinement, in which every vertex has
+/// all its neighbours.
 #pragma once
 
 #include <opensubdiv/far/topologyLevel.h>

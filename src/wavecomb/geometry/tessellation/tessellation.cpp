@@ -29,8 +29,8 @@ struct Work {
 };
 
 /// Determines which normals are computed as sums over faces. Returns for each normal its index in
-/// the list of sums, or ~0 if the limit normal is used: it is used if it is non-zero in
-/// `work.normals` and the vertex has a single normal.
+/// the list of sums, or ~0 for normals that equal the limit normal. A vertex with a single normal
+/// uses the limit normal in `work.normals` if it is not 0.
 std::vector<uint32_t> sum_indices(const Work& work, size_t normal_count, size_t& sum_count) {
   const size_t known = work.normals.size() / 3, points = work.faces.vertex_count;
   std::vector<uint32_t> sum_of_normal(normal_count, ~0u);
@@ -151,7 +151,7 @@ void emit(const Work& work, bool reversed, SurfaceMesh& mesh, std::vector<uint32
     uint32_t* link = &first[work.sectors[c]];
     while (*link != kEnd && uv_of[*link] != uv) link = &next[*link];
     if (*link == kEnd) {
-      // Write through `link` first: it may point into `next`, which is resized below.
+      // Write through `link` before `next` is resized, since `link` may point into `next`.
       const auto id = static_cast<uint32_t>(point.size());
       *link = id;
       next.push_back(kEnd);

@@ -310,8 +310,8 @@ void GuidingField::compute_survival(std::span<const BounceSample> training_sampl
   parts_.survival.assign(regions, 0.f);
   const auto add = [](Sums& s, const BounceSample& sample) {
     s.count += 1;
-    // Do not clamp second moments as field values are clamped, since a region whose light varies
-    // strongly should terminate few paths.
+    // Do not clamp second moments, since a region whose light varies strongly should terminate few
+    // paths.
     if (std::isfinite(sample.squared)) s.squared += double{sample.squared};
     s.cost += double{sample.cost};
   };

@@ -14,7 +14,8 @@
 ///   S(a) = sum of x^2 p / (a p_b + (1 - a) p_g).
 /// The candidates for a are kBsdfShares; 1 is chosen where guiding does not help.
 ///
-/// Sums follow the order of the records, so equal records give bitwise equal fields.
+/// Sums are computed in the order of the training records, so equal records give bitwise equal
+/// fields.
 #pragma once
 
 #include <array>
@@ -59,10 +60,10 @@ class GuidingField {
   /// Creates an empty field. An empty field does not guide bounces, but defines the grid of
   /// bounce_position_key().
   explicit GuidingField(const GuidingGrid& grid) : grid_(grid) {}
-  /// Builds a field from training records. `materials` is the number of materials. If `first`, the
-  /// records contain no densities of an earlier field, so the field samples half of the bounces in
-  /// each region. If `guides` is false, the BSDF samples all bounces. The cell size doubles until
-  /// the field takes at most `max_bytes` or cannot shrink further.
+  /// Builds a field from training records. `materials` is the number of materials. If `first` is
+  /// true, the records contain no densities of an earlier field, so the field samples half of the
+  /// bounces in each region. If `guides` is false, the BSDF samples all bounces. The cell size
+  /// doubles until the field takes at most `max_bytes` or cannot shrink further.
   GuidingField(const GuidingGrid& grid, std::span<const TrainingRecord> records, size_t materials,
                bool first, bool guides, size_t max_bytes);
   /// Restores a field that was saved for a scene with `materials` materials. Throws Error if

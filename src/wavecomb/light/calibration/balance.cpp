@@ -41,7 +41,7 @@ void LightBalance::add(size_t cell, size_t part, double value, double weight) {
 std::vector<double> LightBalance::gains(std::span<const double> p) const {
   struct Term {
     double a, r, inverse;
-    int64_t bounces_less_lights;  ///< estimate of N - M (see balance.h) from the sample
+    int64_t bounces_less_lights;  ///< estimate of N - M (balance.h) from one sample
   };
   const auto term = [&](const Sample& s) {
     const double share = std::max(p[s.part], kMinShare), a{s.a}, r{s.r};
@@ -52,8 +52,8 @@ std::vector<double> LightBalance::gains(std::span<const double> p) const {
   for (const Sample& s : samples_) cells[s.cell] += term(s).bounces_less_lights;
   for (const Sample& s : samples_) {
     const Term t = term(s);
-    // Estimate N - M by the mean over the other vertices of the cell, since including the sample
-    // itself would make the estimate biased.
+    // Estimate N - M (balance.h) by the mean over all vertices of the cell except the sample's
+    // vertex, since including the sample would make the estimate biased.
     const uint64_t others = vertices_[s.cell] - 1;
     double mean = 0;
     if (others > 0)

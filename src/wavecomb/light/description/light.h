@@ -98,10 +98,10 @@ struct IesProfile {
 /// Relation between the light of a mesh and the emission of its material, which camera and mirror
 /// rays see (UsdLux light:materialSyncMode).
 enum class MaterialSync : uint32_t {
-  kGlowTintsLight,  ///< the light is the material's emission times the light's colour
-  kIndependent,     ///< the light is the light's colour alone
-  /// Like kGlowTintsLight, but camera and mirror rays also see the emission times the light's
-  /// colour.
+  kGlowTintsLight,  ///< the light emits the material's emission times the light's colour
+  kIndependent,     ///< the light emits the light's colour alone
+  /// As with `kGlowTintsLight`, the light emits the material's emission times the light's colour.
+  /// Camera and mirror rays see the same product.
   kNoResponse,
 };
 
@@ -145,8 +145,8 @@ struct Light {
   std::vector<Affine> portals;
   /// Values of the parameters specific to the light's kind (LightKindInfo::own), if given.
   std::array<std::optional<float>, kMaxSpecificParameters> own;
-  /// Used by mesh lights (kind kMeshLight), whose `to_world` transforms to the space of the mesh's
-  /// group.
+  /// Relation to the emission of the mesh's material, used by mesh lights (kind `kMeshLight`). The
+  /// `to_world` transform of a mesh light leads to the space of the mesh's group.
   MaterialSync sync = MaterialSync::kGlowTintsLight;
 };
 

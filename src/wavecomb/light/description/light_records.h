@@ -40,9 +40,9 @@ struct alignas(64) LightRecord {
   uint32_t distribution;
   uint32_t shaping;  ///< index into LightView::shapings, or kNoShaping
   float diffuse, specular;
-  /// Nonzero for lights that only light samples find: light samples have MIS weight 1, and bounces
-  /// that hit the light contribute nothing, except delta bounces. Set for lights whose shape rays
-  /// cannot hit, and for lights whose shadows bounce rays cannot reproduce.
+  /// Nonzero for lights that only light samples find. Light samples then have MIS weight 1, and
+  /// bounces that hit the light contribute nothing, except delta bounces. Lights whose shape rays
+  /// cannot hit have this flag, and lights whose shadows bounce rays cannot reproduce.
   uint32_t sampled_only;
   uint32_t hidden;  ///< 1 means that rays cannot hit the shape of the light
   uint32_t light_link, shadow_link;
