@@ -7,9 +7,9 @@
 /// Efficiency is greatest for
 ///   q = T / I sqrt(X / c) sqrt(C / V)
 /// with I the brightness of the image at the pixel, C the mean cost of a camera path and V its
-/// variance over I^2 (Rath et al., "EARS", SIGGRAPH 2022, eq. 29). V is computed as the variance of
-/// the mean of several samples times their number. Stratified samples make V smaller, so the noise
-/// of roulette has a larger relative effect. Each region stores sqrt(X C / (c V)).
+/// variance over I^2 (Rath et al., "EARS", SIGGRAPH 2022, eq. 29). V is estimated as the number of
+/// samples times the variance of their mean. Stratified samples make V smaller, so the noise of
+/// roulette has a larger relative effect. Each region stores sqrt(X C / (c V)).
 #pragma once
 
 #include <cstdint>

@@ -9,9 +9,9 @@
 namespace wavecomb {
 namespace {
 
-/// Assigns 65536 sample values to kGuidingSide bins by weight. Each bin gets one value. The
-/// remaining values are distributed by the rounded cumulative sum of the weights, so that the total
-/// is exact.
+/// Assigns 65536 sample values to kGuidingSide bins by weight. Each bin first gets one sample
+/// value. The remaining values are distributed by the rounded cumulative sum of the weights, so
+/// that the total is exact.
 void write_row(std::span<const double, kGuidingSide> weights,
                std::span<uint32_t, kGuidingSide> words) {
   constexpr uint32_t kNumbers = 1u << 16;

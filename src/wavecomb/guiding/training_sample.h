@@ -13,7 +13,7 @@ struct TrainingRecord {
   /// One over the distance to the next hit; 0 without a hit, negative if unknown.
   float inverse_distance;
   uint32_t material;
-  uint8_t axis;  ///< guiding_axis() of the surface
+  uint8_t axis;  ///< guiding_axis() of the surface normal
   /// Radiance that returned along wi, times f |cos| over pdf: a one-sample estimate of the integral
   /// of f L |cos| over directions, with L the incident radiance.
   float value;

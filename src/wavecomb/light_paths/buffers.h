@@ -21,9 +21,9 @@ enum class LightVertexUse : uint8_t {
   kConnect,   ///< connect the stored vertices to camera paths in the same slots
 };
 
-/// Buffers for the light paths of a worker, and for their connections to its camera paths: the
-/// Buffers type of a joint transport (path/joint_transport.h). All members are empty in renders
-/// without light paths.
+/// Buffers of one worker for light paths and for their connections to camera paths. This class is
+/// the `Buffers` type of the joint transport (path/joint_transport.h). All members are empty in
+/// renders without light paths.
 ///
 /// Contract: each object belongs to a single wave or reference integrator. Slots must be below
 /// `capacity`.

@@ -11,8 +11,9 @@ namespace wavecomb {
 class AimSamples;
 class MergeGrid;
 
-/// Light paths of a render: the Context of a joint transport (path/joint_transport.h). A
-/// default-constructed context means a render without light paths.
+/// Settings and data of the light paths of a render. This class is the `Context` type of the joint
+/// transport (path/joint_transport.h). A default-constructed context means a render without light
+/// paths.
 struct LightPathContext {
   LightPathContext() = default;
   /// `paths_per_sample` is the number of light paths per camera path, averaged over the image.

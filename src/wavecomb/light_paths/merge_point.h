@@ -6,8 +6,8 @@
 /// vertex with a non-delta lobe. A light path cannot connect to the camera through a mirror.
 /// Instead, a light path with a vertex within a distance r of the point is treated as if it ended
 /// at the point; r is given in pixels. Merge points are the visible points of progressive photon
-/// mapping (T. Hachisuka et al., "Progressive Photon Mapping", 2008). The light of merge points is
-/// splatted to their pixels in integer sums, whose order does not matter.
+/// mapping (T. Hachisuka et al., "Progressive Photon Mapping", 2008). Contributions at merge points
+/// are added to their pixels as integers, so the order of additions does not matter.
 ///
 /// With merging, a pass has one sample for each pixel, which stores at most one point. The light
 /// paths of the pass are traced after all its camera paths.
@@ -28,7 +28,7 @@ struct MergePoint {
   Vec3<F> p;
   F radius;        ///< merge radius; 0 if there is no point
   Vec3<F> w;       ///< unit vector towards the viewer
-  UInt<F> normal;  ///< pack_normal() of the geometric normal
+  UInt<F> normal;  ///< geometric normal, packed by pack_normal()
   Color<F> light;  ///< contribution to the pixel for unit radiance along w, before exposure
   UInt<F> depth;   ///< number of vertices of the camera path before the point
   WAVECOMB_FIELDS(p, radius, w, normal, light, depth)

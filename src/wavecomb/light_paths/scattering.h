@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Classification of scatterings at vertices of light paths and of connections, for light path
+/// Classification of the scattering at vertices of light paths and of connections, for light path
 /// expressions.
 #pragma once
 

@@ -84,7 +84,7 @@ inline void merge(Surface<F>& to, const Surface<F>& from, const Mask<F>& m) {
         select<F>(m, from.ns, to.ns)};
 }
 
-/// Sets texture coordinates, their change per unit length, and the tangent.
+/// Sets the texture coordinates of a shading point, their change per unit length, and the tangent.
 template <typename F>
 inline void set_uv(const MeshReader<F>& mesh, const InstanceMaps<F>& maps, const MeshHit<F>& hit,
                    const CurvedPoint<F>& c, const Mask<F>& active, const Mask<F>& strands,

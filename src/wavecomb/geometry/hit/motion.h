@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Positions at the time of a path. motion.inl defines the functions that read moving meshes.
 ///
-/// Everything moves along straight lines between the steps that the scene stores, as Embree
-/// interpolates during traversal. Time runs from 0 at shutter open to 1 at shutter close.
+/// All motion is linear between the motion steps that the scene stores, as in Embree's traversal.
+/// Time runs from 0 at shutter open to 1 at shutter close.
 #pragma once
 
 #include <array>

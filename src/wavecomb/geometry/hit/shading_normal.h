@@ -33,7 +33,7 @@ WAVECOMB_INLINE Vec3<F> facing_normal(const Vec3<F>& dir, const Vec3<F>& ng, con
 
 /// Returns `n`, which faces the viewer, bent until its mirror direction r = 2 (w . n) n - w leaves
 /// the surface. If r . g is below t = min(0.9 w . g, 0.01), r is raised to r . g = t, and n becomes
-/// the half vector of w and the lifted r (A. Keller et al., "The Iray Light Transport Simulation
+/// the half vector of w and the raised r (A. Keller et al., "The Iray Light Transport Simulation
 /// and Rendering System", 2017, appendix A.3). The adjustment avoids black rims on glossy surfaces
 /// with a normal map.
 template <typename F>

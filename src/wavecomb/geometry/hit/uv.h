@@ -50,8 +50,8 @@ WAVECOMB_INLINE UvTriangle<F> uv_triangle(const MeshReader<F>& mesh,
 
 }  // namespace detail
 
-/// Returns the texture coordinates of a hit at (u, v) of primitive `prim`, as setup_surface()
-/// computes them.
+/// Returns the texture coordinates of a hit at (u, v) of primitive `prim`. They equal the texture
+/// coordinates that setup_surface() computes.
 template <typename F>
 inline Vec2<F> hit_uv(const MeshRecord* meshes, const UInt<F>& mesh, const UInt<F>& prim,
                       const F& u, const F& v, const Mask<F>& active) {

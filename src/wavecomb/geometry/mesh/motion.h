@@ -48,7 +48,8 @@ struct StepRange {
 
 /// Packed transform of an instance at one motion step.
 struct alignas(64) MatrixStep {
-  /// Rows of the 3 x 4 matrix: each row of A, followed by a component of the translation.
+  /// Rows of a 3 x 4 matrix. Each row holds a row of the linear part and a component of the
+  /// translation.
   float to_world[12] = {};
   float pad[4] = {};
 

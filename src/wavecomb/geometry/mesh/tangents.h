@@ -51,7 +51,8 @@ struct SceneTangents {
 
   /// Tangents of each mesh, or null for a mesh without tangents; empty if no mesh has tangents.
   std::vector<std::shared_ptr<const MeshTangents>> of_mesh;
-  std::vector<TangentRecord> records;  ///< record of each mesh; empty if no mesh has tangents
+  /// Packed reference for each mesh; empty if no mesh has tangents.
+  std::vector<TangentRecord> records;
   uint64_t bytes() const;
 };
 

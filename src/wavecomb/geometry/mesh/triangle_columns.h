@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Crossing counts for mesh faces on parallel lines, for inside tests.
+/// Counts how often parallel lines cross the faces of a mesh, to test whether points are inside the
+/// mesh.
 #pragma once
 
 #include <cstdint>

@@ -65,7 +65,8 @@ class CornerTree {
   /// Returns the index of a corner's position.
   uint32_t position_of(uint32_t corner) const { return position_of_[corner]; }
 
-  /// Removes a corner. Returns whether it was the last remaining corner at its position.
+  /// Removes a corner. Returns whether the removed corner was the last remaining corner at its
+  /// position.
   bool remove(uint32_t corner) {
     const uint32_t position = position_of_[corner];
     if (--counts_[position] > 0) return false;
@@ -74,9 +75,10 @@ class CornerTree {
   }
 
   /// Finds a position inside or on the counter-clockwise triangle a, b, c that still has corners
-  /// and is not a vertex of the triangle. Returns kNone if no such position exists. If there are
-  /// several, returns a pseudo-random one: it is unlikely to be removed soon, and each removal of a
-  /// blocking position requires another search. Adds the number of visited nodes to `steps`.
+  /// and is not a vertex of the triangle. Returns kNone if no such position exists. If several
+  /// positions qualify, returns a pseudo-random one. It is unlikely to be removed soon, which saves
+  /// searches: each removal of a blocking position requires another search. Adds the number of
+  /// visited nodes to `steps`.
   uint32_t find(const Corner& a, const Corner& b, const Corner& c, uint64_t& steps) {
     const double lo_x = std::min({a.x, b.x, c.x}), hi_x = std::max({a.x, b.x, c.x});
     const double lo_y = std::min({a.y, b.y, c.y}), hi_y = std::max({a.y, b.y, c.y});

@@ -98,7 +98,7 @@ struct Subdivision::Refiner {
   const Far::TopologyLevel& last() const { return far->GetLevel(level()); }
   size_t vertices_of(int l) const { return static_cast<size_t>(far->GetLevel(l).GetNumVertices()); }
 
-  /// Returns the cage face that a face of the last level came from.
+  /// Returns the cage face from which a face of the last level was refined.
   int base_of(int face) const {
     for (int l = level(); l > 0; --l) face = far->GetLevel(l).GetFaceParentFace(face);
     return face;

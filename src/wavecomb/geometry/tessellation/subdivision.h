@@ -26,9 +26,9 @@ struct RefinedFaces {
 
 /// A uniformly refined cage. The member functions evaluate values on the limit surface.
 ///
-/// Contract: immutable; safe for concurrent use. Loops over faces and vertices use the threads of
-/// with_threads(), and the results do not depend on the number of threads. In the constructor and
-/// face_varying(), OpenSubdiv's functions run on one thread.
+/// Contract: objects are immutable and safe for concurrent use. Loops over faces and vertices use
+/// the threads of with_threads(), and the results do not depend on the number of threads. In the
+/// constructor and face_varying(), OpenSubdiv's functions run on one thread.
 class Subdivision {
  public:
   static constexpr uint32_t kMaxLevel = 10;

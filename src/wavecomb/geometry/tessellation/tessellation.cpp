@@ -353,7 +353,7 @@ SurfaceMesh make_surface(const SurfaceDesc& desc) {
       primvars[i] = spread(desc.primvars[i], surface, work.faces);
     });
   }
-  // Compute normals after the scope above has released OpenSubdiv's tables, to limit peak memory.
+  // Compute normals only now that OpenSubdiv's tables have been released, to limit peak memory.
   if (desc.level > 0) set_normals(work, normal_count);
   if (!desc.displacements.empty()) {
     displace(work, desc);

@@ -56,9 +56,10 @@ WAVECOMB_INLINE F mixed_pdf(const Vertex<F, kFeatures>& v, const GuidingLookup<F
   return p_bsdf;
 }
 
-/// Turns `b`, a bounce sampled from the BSDF, into a sample of the mixture. r.w selects between
-/// BSDF and guiding distribution. The ray cone always uses the roughness of the sampled BSDF lobe.
-/// Writes the training data of the bounce to `out`.
+/// Replaces the bounce `b`, which was sampled from the BSDF, by a sample of the mixture of BSDF and
+/// guiding distribution. The random number `r.w` selects one of the two distributions. The ray cone
+/// always uses the roughness of the sampled BSDF lobe. Writes the training data of the bounce to
+/// `out`.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Coupling>
 WAVECOMB_INLINE void guided_bounce(const VertexContext<Bsdf, F, kFeatures, Coupling>& c,
                                    const Sample4<F>& r, BsdfSample<F>& b, VertexResult<F>& out) {

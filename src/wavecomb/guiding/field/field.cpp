@@ -135,8 +135,8 @@ class GuidingFieldBuilder {
     return records.empty() ? 0 : sum / std::sqrt(static_cast<double>(records.size()));
   }
 
-  /// Computes the statistics of records [begin, end), blended with the statistics of the parent
-  /// cell.
+  /// Computes the statistics of the training records [begin, end), blended with the statistics of
+  /// the parent cell.
   void read(uint32_t depth, size_t begin, size_t end) {
     Cell& cell = levels_[depth];
     const std::span here = std::span(records_).subspan(begin, end - begin);

@@ -4,15 +4,15 @@
 ///
 /// The cells form an octree over the bounds of the scene. A cell with more than kCellRecords
 /// contributing bounces is divided. A region is the part of a cell whose surfaces face one axis
-/// direction. The distribution of a region is the mean value of its bounces by direction. If there
-/// are few bounces, it is blended with the distribution q of the parent cell:
+/// direction. The distribution of a region is the mean value of its bounces by direction. If a
+/// region has few bounces, its distribution is blended with the distribution q of the parent cell:
 ///   p = (n p_own + kPrior q) / (n + kPrior)   for n bounces.
 ///
 /// The fraction a of a region's bounces that the BSDF samples minimises the second moment of the
 /// mixture, estimated from the same bounces. For values x sampled with density p, and the densities
 /// p_b of the BSDF and p_g of the guiding field:
 ///   S(a) = sum of x^2 p / (a p_b + (1 - a) p_g).
-/// The candidates for a are kBsdfShares; 1 is chosen where guiding does not help.
+/// The candidates for a are the values in kBsdfShares; a = 1 is chosen where guiding does not help.
 ///
 /// Sums are computed in the order of the training records, so equal records give bitwise equal
 /// fields.
@@ -66,8 +66,8 @@ class GuidingField {
   /// doubles until the field takes at most `max_bytes` or cannot shrink further.
   GuidingField(const GuidingGrid& grid, std::span<const TrainingRecord> records, size_t materials,
                bool first, bool guides, size_t max_bytes);
-  /// Restores a field that was saved for a scene with `materials` materials. Throws Error if
-  /// `parts` are inconsistent.
+  /// Restores a field that was saved for a scene with `materials` materials. Throws Error if the
+  /// arrays in `parts` do not form a valid field.
   GuidingField(const GuidingGrid& grid, GuidingFieldArrays parts,
                const GuidingFieldStatistics& facts, size_t materials);
 
@@ -76,7 +76,8 @@ class GuidingField {
   void compute_survival(std::span<const BounceSample> training_samples,
                         const PathStatistics& paths);
 
-  /// Pointers to the arrays; valid while the field exists and compute_survival is not called.
+  /// Returns pointers to the arrays. They are valid until the field is destroyed or
+  /// compute_survival() is called.
   GuidingView view() const;
   /// Returns the memory of the arrays in bytes.
   size_t bytes() const;

@@ -12,8 +12,8 @@ namespace wavecomb {
 namespace {
 
 /// Returns whether the grid is valid: kGuidingTopCells entries followed by bricks. Each brick
-/// divides exactly one entry and is at most kGuidingLevels deep. All other entries refer to cells
-/// below `cells`.
+/// divides exactly one entry and is at most kGuidingLevels deep. Every entry that is not divided
+/// refers to a cell with an index below `cells`.
 bool is_grid(std::span<const uint32_t> entries, size_t cells) {
   if (entries.size() < kGuidingTopCells ||
       (entries.size() - kGuidingTopCells) % kGuidingBrickCells != 0)

@@ -4,7 +4,7 @@
 ///
 /// A vertex takes one light sample of density p q over directions, where p is the selection
 /// probability of the light and q the density of sampling a direction to it, and one bounce of
-/// density b. The balance heuristic combines them, with the variance
+/// density b. The balance heuristic combines the light sample and the bounce, with the variance
 ///
 ///   sum over lights of  integral g^2 / (p q + b)  -  M^2 - N^2,      g = f |cos| Le V,
 ///   M = sum of integral g p q / (p q + b),   N = sum of integral g b / (p q + b),
@@ -43,8 +43,8 @@ class LightBalance {
 
   /// Returns the selection probabilities of least variance. A fraction `kFloor` of the total
   /// probability is not optimised: half of it is distributed evenly and half in proportion to
-  /// `power` (> 0, sum 1). Returns `power` if no part contributed. All probabilities are above 0,
-  /// and their sum is 1.
+  /// `power` (> 0, sum 1). Returns `power` if all samples are 0. All probabilities are above 0, and
+  /// their sum is 1.
   std::vector<double> shares(std::span<const double> power) const;
 
   static constexpr double kFloor = 0.1;
@@ -68,9 +68,9 @@ class LightBalance {
 /// lights below the node.
 class NodeBalance {
  public:
-  /// Adds a light sample below the node, which is below the right child if `right`. `probability`
-  /// is the selection probability of the sampled child. `value` and `weight` have the same meaning
-  /// as in LightBalance::add().
+  /// Adds a sample of a light below the node. If `right` is true, the light is below the right
+  /// child. `probability` is the selection probability of the sampled child. `value` and `weight`
+  /// have the same meaning as in LightBalance::add().
   void add(bool right, double probability, double value, double weight);
   /// Returns the factor on the odds of the right child that minimises the second moment: a power of
   /// sqrt(2) in [1/8, 8], or 1 if there are too few samples.

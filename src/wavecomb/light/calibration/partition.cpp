@@ -99,8 +99,8 @@ void build_tree_tables(const LightSet& set, const LightTree& tree, const LightPa
     const uint32_t part = parts.of_record[i];
     if (part == kNoPart) continue;
     const double share = shares[part] * double{tree.infinite_pdf[i]} / parts.power[part];
-    // Leave a probability of at least a thousandth to the light tree, and one of the 2^24 random
-    // values to each following infinite light.
+    // Leave at least a thousandth of all random values to the light tree, and at least one value to
+    // each infinite light that follows in this loop.
     const uint32_t reserved =
         std::min(kNumbers / 1000, left - remaining_lights) + remaining_lights - 1;
     --remaining_lights;

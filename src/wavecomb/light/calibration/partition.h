@@ -52,7 +52,7 @@ struct NodeTilt {
   float odds;
 };
 
-/// Calibrated light tables that replace those of a LightView.
+/// Calibrated light tables that replace the light tables of a LightView.
 struct CalibratedLights {
   /// Selection probability of each part, after rounding; empty if the view's tables are not
   /// replaced.
@@ -81,9 +81,10 @@ class LightTableBuilder {
   /// `build_tables()`.
   LightTableBuilder(const LightSet& set, const LightTree& tree, const LightParts& parts);
 
-  /// Builds tables in which part i has the selection probability shares[i] (> 0, sum 1), up to
-  /// rounding to multiples of 2^-24 and the floor of build_power_table(). Within a part, the
-  /// relative probabilities stay the same, except for the odds at the nodes of `tilts`.
+  /// Builds tables in which part i has the selection probability shares[i] (> 0, sum 1).
+  /// Probabilities are rounded to multiples of 2^-24, and `build_power_table()` imposes a minimum.
+  /// Within a part, the relative probabilities stay the same, except for the odds at the nodes of
+  /// `tilts`.
   CalibratedLights build_tables(std::span<const double> shares, std::span<const NodeTilt> tilts);
 
  private:

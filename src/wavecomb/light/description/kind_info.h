@@ -16,7 +16,8 @@
 
 namespace wavecomb {
 
-/// Inputs of a light kind for making records, and the set that receives its additional data.
+/// Inputs from which a light kind makes its records, and the light set to which it adds further
+/// data.
 struct LightBuildContext {
   LightSet& set;           ///< set to which sampling densities, portals and shapings are added
   const LightSet* before;  ///< as in LightInputs

@@ -59,8 +59,8 @@ struct ShadowAttributes {
 
 /// Light filter that modifies the emission of a light (light/filters/filter.h).
 struct LightFilter {
-  /// Maps the filter's space to the world. The filter's barn-door window is the plane z =
-  /// -distance; a distance of 0 or less means no window.
+  /// Transform from the filter's space to world space. In the filter's space, the barn-door window
+  /// is the plane z = -distance; a distance of 0 or less means no window.
   Affine to_world;
   float distance = 0;
   /// Edges (a, b, c) of the barn-door window: at (x, y), each edge transmits the fraction
@@ -72,7 +72,7 @@ struct LightFilter {
   uint32_t texture = kNoTexture;
   Vec3<float> picture_u{1, 0, 0.5f}, picture_v{0, 1, 0.5f};
   /// Distance ramps: light rises from 0 at near_start to its full value at near_end, and falls from
-  /// far_start to 0 at far_end. A ramp whose end is not beyond its start is off.
+  /// far_start to 0 at far_end. A ramp whose end is not beyond its start has no effect.
   float near_start = 0, near_end = 0, far_start = 0, far_end = 0;
   float density = 1;  ///< strength of the filter: 0 leaves light unchanged, 1 applies it fully
   uint32_t next = kNoFilter;  ///< next filter of the chain, which was added before this filter
@@ -84,7 +84,7 @@ struct LightFilter {
 /// in degrees, both ascending. The intensity is interpolated bilinearly and is 0 outside the
 /// vertical angles.
 struct IesProfile {
-  std::vector<float> vertical;  ///< angle from the axis, within [0, 180], two or more values
+  std::vector<float> vertical;  ///< angles from the axis, two or more values within [0, 180]
   /// Angles around the axis from 0 to 360; a single angle for a rotationally symmetric profile.
   std::vector<float> horizontal;
   std::vector<float> candela;  ///< intensities, [horizontal][vertical]

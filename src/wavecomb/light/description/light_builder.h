@@ -31,7 +31,8 @@ struct EmissiveTriangle {
   /// Material whose emission or opacity varies; kNoLight if both are constant.
   uint32_t material = kNoLight;
   uint32_t instance = 0, mesh = 0, prim = 0;  ///< identifies the triangle
-  /// Emitted radiance on both sides, W / (m^2 sr). Kernels ignore it if `material` is set.
+  /// Emitted radiance on both sides, W / (m^2 sr). Kernels ignore this radiance if `material` is
+  /// set.
   float radiance[3] = {0, 0, 0};
   uint32_t mesh_light = kNoLight;  ///< index of the triangle's MeshLightInstance, or kNoLight
   /// Opacity of the triangle in [0, 1], which scales its sampled emission. If the opacity varies,
@@ -130,7 +131,7 @@ struct LightInputs {
   std::span<const LightFilter> filters = {};
 };
 
-/// Packs all lights, the triangles in parallel.
+/// Packs all lights. Triangles are packed in parallel.
 ///
 /// Emission follows UsdLux. `color` is radiance L; with `normalize` it is divided by the size of
 /// the light:

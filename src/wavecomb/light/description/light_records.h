@@ -14,8 +14,8 @@ struct LightAim;
 struct MeshRecord;
 struct InstanceRecord;
 
-/// Packed light other than an emissive triangle: 48 32-bit words. Vectors are in world space. Use
-/// of the members by kind:
+/// Packed light other than an emissive triangle, in 192 bytes. Vectors are in world space. Use of
+/// the members by kind:
 ///   rect      p corner, u, v edges, their lengths and inverses, n unit normal (direction of
 ///             emission), area
 ///   disk      p centre, u, v half axes, n, area
@@ -57,7 +57,7 @@ struct alignas(64) LightRecord {
 };
 static_assert(sizeof(LightRecord) == 192);
 
-/// Packed motion of a light record (light/description/motion.h): 8 32-bit words.
+/// Packed motion of a light record (light/description/motion.h), in 32 bytes.
 struct alignas(32) LightMotion {
   float origin[3] = {0, 0, 0};  ///< position at mid-shutter of the pivot of the rotation
   uint32_t first = 0;           ///< index of the light's first LightStep
@@ -157,8 +157,8 @@ struct Distribution2D {
   static constexpr uint32_t kCounts = 65536;
   static constexpr uint32_t kLine = 32;            ///< number of values in a cache line
   static constexpr uint32_t kMax = kLine * kLine;  ///< maximum number of intervals in a row
-  /// Padding after the last value of a row. No stored value exceeds it, since kCounts itself is
-  /// never stored.
+  /// Padding after the last value of a row. No stored value exceeds the padding, since kCounts
+  /// itself is never stored.
   static constexpr uint16_t kPad = kCounts - 1;
   struct alignas(64) Line {
     uint16_t value[kLine];
@@ -171,7 +171,7 @@ struct Distribution2D {
   /// pixels dominate. Used for rects.
   float spread = 1;
   /// `height` rows of `width` cumulative values, each starting at 0, then the marginal distribution
-  /// of `height` values. Each row starts a cache line.
+  /// of `height` values. Each row starts at the beginning of a cache line.
   std::vector<Line> cumulative;
   /// Coarse cache lines, with the first value of each line of `cumulative`: one for each row, and
   /// one for the marginal distribution.
@@ -183,16 +183,16 @@ struct Distribution2D {
 /// lights therefore does not read the table of millions of triangles. Each bin of a table covers
 /// 2^shift random numbers.
 struct PowerTable {
-  /// Bins of both groups, records and triangles. Each bin b covers 2^shift random numbers r.
-  /// Numbers r < bins[b] mod 2^shift select light b of the group; all other numbers select light
-  /// bins[b] >> shift.
+  /// Bins of the table for records and of the table for triangles. Each bin b covers 2^shift random
+  /// numbers r. Numbers r < bins[b] mod 2^shift select light b of the group; all other numbers
+  /// select light bins[b] >> shift.
   const uint32_t* bins = nullptr;
   uint32_t split = 0;
   uint32_t shift[2] = {};
   uint32_t triangle_bins = 0;  ///< index of the first bin of the triangles
 };
 
-/// Packed child of a light tree node: bounds of the child's lights, in 8 32-bit words.
+/// Packed child of a light tree node, in 32 bytes: the bounds of the child's lights.
 struct LightTreeChild {
   float centre[3];  ///< centre of the bounding sphere
   float radius;

@@ -2,8 +2,9 @@
 /// Table of light parameters: one row for each member of Light and Shaping, and for each parameter
 /// that is specific to a light kind. Range checks, the scene fingerprint, Python keywords, sandbox
 /// calls and the fields of the light editor are derived from this table. To add a parameter, add a
-/// member, a row here, and its use; for a parameter of a single light kind, add a row to that kind
-/// (LightKindInfo::own) and the use of the parameter.
+/// member to Light or Shaping, a row to this table, and code that uses the parameter. A parameter
+/// of a single light kind needs only a row in the description of the kind (LightKindInfo::own) and
+/// code that uses the parameter.
 #pragma once
 
 #include <cstddef>

@@ -21,9 +21,9 @@ std::string without_numbers(std::string_view path);
 /// Rule of a collection for a path, as in UsdCollectionMembershipQuery.
 enum class PathRule : uint8_t { kExclude, kExplicit, kExpand };
 
-/// Set of objects, defined by rules for prim paths. An object is in the set according to the rule
-/// for its path or, without a rule, for its nearest ancestor with a rule; kExplicit rules do not
-/// apply to descendants.
+/// Set of objects, defined by rules for prim paths. The rule for an object's path decides whether
+/// the object is in the set. If there is none, the rule of the nearest ancestor with a rule
+/// decides; kExplicit rules do not apply to descendants.
 struct GeometrySet {
   struct Entry {
     std::string path;
@@ -34,13 +34,14 @@ struct GeometrySet {
   bool contains(std::string_view path) const;
 };
 
-/// Membership of all objects in all sets. Objects that belong to the same sets form a class.
+/// Membership of all objects in the geometry sets. Objects that belong to the same sets form a
+/// class.
 struct SceneLinks {
   SceneLinks(const ObjectNames& names, std::span<const GeometrySet> sets);
 
   /// Class number (from 1) of each object, in the order of ObjectNames.
   std::vector<uint32_t> classes;
-  std::vector<uint32_t> members;  ///< membership of each class: one bit for each set
+  std::vector<uint32_t> members;  ///< geometry sets that contain each class, one bit per set
   uint32_t words = 0;             ///< number of 32-bit words in `members` for each class
 
   LinkView view() const { return {classes.data(), members.data(), words}; }

@@ -25,7 +25,7 @@ void add_motions(LightSet& set, std::span<const Light> lights);
 /// Pose of a light at a time, in double precision; LightPose (light/sampling/moving.h) is its
 /// counterpart for kernels.
 struct PreciseLightPose {
-  double x[3], y[3], z[3];  ///< directions of the light's mid-shutter axes
+  double x[3], y[3], z[3];  ///< directions at the given time of the light's mid-shutter axes
   double position[3], origin[3];
 
   PreciseLightPose(const LightMotion& motion, std::span<const LightStep> steps, double time);

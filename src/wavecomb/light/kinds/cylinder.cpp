@@ -22,7 +22,7 @@ void make(LightBuild& out, const Light& light, LightBuildContext& /*context*/) {
   finish_area(out, light, 2 * kPiD * radius * length(axis));
 }
 
-/// Returns the end of the axis, which starts at p.
+/// Returns the end of the cylinder's axis, which starts at the point p of the record.
 Vec3<float> axis_end(const LightRecord& light) {
   return {light.p[0] + light.u[0], light.p[1] + light.u[1], light.p[2] + light.u[2]};
 }

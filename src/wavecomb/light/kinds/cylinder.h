@@ -124,7 +124,7 @@ inline KindSample<F> sample_cylinder(const LightReader<F>& light, const Vec3<F>&
 }
 
 /// Returns radiance and sampling density for a ray from `origin` that hit the cylinder at distance
-/// t. The inside of a cylinder is dark.
+/// t. A cylinder light emits no light inwards.
 template <typename F>
 inline KindHit<F> hit_cylinder(const LightReader<F>& light, const Vec3<F>& origin,
                                const Vec3<F>& dir, const F& t) {

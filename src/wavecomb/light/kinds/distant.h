@@ -38,7 +38,8 @@ inline KindHit<F> hit_distant(const LightReader<F>& light, const Vec3<F>& dir) {
           select(inside, distant_pdf<F>(one_minus_cos), F(0.f))};
 }
 
-/// Returns KindEmission::density of light paths along -dir. See hit_distant().
+/// Returns the emission density (KindEmission::density) of light paths along -dir. See
+/// hit_distant().
 template <typename F>
 inline F distant_emission_density(const LightView& view, const LightReader<F>& light,
                                   const Vec3<F>& dir) {

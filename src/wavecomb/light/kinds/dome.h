@@ -179,16 +179,16 @@ inline KindSample<F> sample_dome(const LightView& view, const UInt<F>& lights,
   return sample_dome_light<F>(view, light, u, v, active);
 }
 
-/// Samples a light path whose direction follows the distribution of the image. Portals are not
-/// used.
+/// Samples a light path whose direction follows the distribution of the image. The portals of the
+/// dome are not used.
 template <typename F>
 inline KindEmission<F> emit_dome(const EmissionQuery<F>& q) {
   const KindSample<F> direction = sample_dome_light<F>(q.view, q.light, q.s, q.t, q.lanes);
   return emit_infinite<F>(q.view, -direction.wi, q.u, q.v, direction.radiance, direction.pdf);
 }
 
-/// Returns KindEmission::density of emit_dome() for light paths along -dir, evaluating one image
-/// after the other.
+/// Returns the emission density (KindEmission::density) of the light paths along -dir that
+/// emit_dome() samples. Images are evaluated one after the other.
 template <typename F>
 inline F dome_emission_density(const LightHitQuery<F>& m) {
   F pdf(kInv4Pi);

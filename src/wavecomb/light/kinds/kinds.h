@@ -2,9 +2,9 @@
 /// List of all kinds of lights. To add a kind, add a pair of files to this folder, include its
 /// header here, and append an entry to the list.
 ///
-/// A light kind is a struct <Name>Kind that satisfies LightKindClass. It derives from InfiniteKind,
-/// FiniteKind or FlatKind (record_reader.h), which define common members. A light kind that lacks a
-/// member does not compile.
+/// A light kind is a struct <Name>Kind that satisfies LightKindClass. The struct derives from
+/// InfiniteKind, FiniteKind or FlatKind (record_reader.h), which define common members. A light
+/// kind that lacks a member does not compile.
 #pragma once
 
 #include <concepts>

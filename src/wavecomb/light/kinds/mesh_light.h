@@ -88,7 +88,8 @@ inline Color<F> mesh_light_radiance(const LightView& view, const UInt<F>& record
 }
 
 /// Class of mesh lights, an entry of WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h). Light sampling
-/// never selects records of mesh lights, but their triangles, which have separate records.
+/// does not select the records of mesh lights. Instead, it selects their triangles, which have
+/// separate records.
 struct TriangleKind : FlatKind {
   static LightKindInfo describe();
   template <typename F>

@@ -34,8 +34,8 @@ inline Color<F> rect_radiance(const LightReader<F>& light, const TextureView* te
   return select<F>(textured, color * not_negative(image), color);
 }
 
-/// Smallest solid angle for solid angle sampling. Below it, area sampling is as good, and computed
-/// solid angles lose precision.
+/// Smallest solid angle for solid angle sampling. For smaller solid angles, area sampling is as
+/// good, and computed solid angles lose precision.
 inline constexpr float kMinRectSolidAngle = 2e-3f;
 
 /// Rectangle as seen from a point (C. Urena, M. Fajardo, A. King, "An Area-Preserving
@@ -94,7 +94,7 @@ inline SphericalRect<F> make_spherical_rect(const LightReader<F>& light, const V
 }
 
 /// Maps (u, v) of the unit square to a point on the rectangle, in fractions of its width and
-/// height. The function implements algorithm 2 of the paper, with z0 = -z and f = g / sin.
+/// height. The function implements algorithm 2 of Urena et al., with z0 = -z and f = g / sin.
 template <typename F>
 inline Vec2<F> sample_spherical_rect(const SphericalRect<F>& r, const F& u, const F& v) {
   const auto [sin_a, cos_a] = sincos_2pi(F(fma(u, r.solid_angle, r.begin) * kInv2Pi));
@@ -299,7 +299,8 @@ inline KindEmission<F> emit_rect(const EmissionQuery<F>& q) {
                            F(square_pdf * uniform_emission_density<F>(light.area())));
 }
 
-/// Returns KindEmission::density of emit_rect() for a ray that hits the rectangle.
+/// Returns the emission density (KindEmission::density) of the light path that emit_rect() samples
+/// in the reverse direction of a ray that hits the rectangle.
 template <typename F>
 inline F rect_emission_density(const LightHitQuery<F>& m) {
   const LightReader<F>& light = m.light;

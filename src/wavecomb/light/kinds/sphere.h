@@ -86,7 +86,8 @@ inline KindEmission<F> emit_sphere(const EmissionQuery<F>& q) {
   return e;
 }
 
-/// Returns KindEmission::density of emit_sphere().
+/// Returns the emission density (KindEmission::density) of the light paths that emit_sphere()
+/// samples.
 template <typename F>
 inline F sphere_emission_density(const LightReader<F>& light) {
   return select(light.radius() == 0.f, F(kInv4Pi), uniform_emission_density<F>(light.area()));

@@ -2,9 +2,9 @@
 /// Light sampling: selection of a light, sampling of a point on the light, and the densities of
 /// both.
 ///
-/// The direct light at p is estimated by f(wi) |cos| * LightSample::weight * MIS weight. For the
-/// other MIS technique, bounces that hit a light, light_hit(), triangle_light_pdf() and
-/// escaped_radiance() (escape.h) use the density of sample_light() for the same direction. The
+/// The direct light at p is estimated by f(wi) |cos| * LightSample::weight * MIS weight. If a
+/// bounce hits a light, which is the other MIS technique, light_hit(), triangle_light_pdf() and
+/// escaped_radiance() (escape.h) compute the density of sample_light() for the same direction. The
 /// function bodies are in light_sample.inl; the translation units of shared_kernels.h instantiate
 /// them.
 #pragma once

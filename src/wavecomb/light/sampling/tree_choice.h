@@ -9,9 +9,9 @@
 ///
 /// where d is the distance from the point to the centre of the child's bounding sphere of radius r,
 /// and t_l and t_r are the least angles that the normals of its lights and the receiver's normal
-/// can make with the line between the point and any position in the sphere. I is 0 only if none of
-/// the child's lights can contribute. The probability of a light is the product of the
-/// probabilities of all choices on the path from the root to the light; the light's trail
+/// can make with the line between the point and any position in the sphere. The importance I is 0
+/// only if none of the child's lights can contribute. The probability of a light is the product of
+/// the probabilities of all choices on the path from the root to the light; the light's trail
 /// (LightTreeView::trails) stores this path. Light samples and bounces that hit a light compute
 /// this probability with the same code, as MIS requires.
 #pragma once
@@ -39,7 +39,7 @@ inline constexpr float kCosineSlack = 4e-3f;
 /// Lower bound of the squared distance to a cluster, in units of its squared radius. The published
 /// value of this bound is 1, which treats all lights around a point as distant. On the street of
 /// benchmarks/light_selection.py, a bound of 0.5 gives a quarter less error than a bound of 1 with
-/// 1,000 lights, a third less with 10,000 lights, and the same error with 100 lights. Values below
+/// 1,000 lights, a third less with 10,000 lights, and the same error with 100 lights. Bounds below
 /// 0.25 increase the error.
 inline constexpr float kMinDistanceRatio = 0.5f;
 
@@ -60,7 +60,8 @@ inline Angle<F> angle_of_cosine(const F& cosine) {
   return {c, safe_sqrt(fma(F(-c), c, F(1.f)))};
 }
 
-/// Returns the importance I of the child whose 8 packed words start at r.
+/// Returns the importance I of a child of a light tree node. The child's 8 packed 32-bit words
+/// start at r.
 template <typename F>
 inline F light_importance(const F* r, const Vec3<F>& p, const Vec3<F>& normal,
                           const Mask<F>& any_side) {

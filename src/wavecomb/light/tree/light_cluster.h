@@ -40,7 +40,7 @@ void bound_round(LightCluster& cluster);
 
 /// Returns a cone that contains both cones (Conty Estevez and Kulla 2018, algorithm 1).
 DirectionCone unite(const DirectionCone& a, const DirectionCone& b);
-/// Returns bounds that contain both bounds, without setting `next`.
+/// Returns the bounds of the union of two sets of lights. The member `next` is not set.
 LightCluster unite(const LightCluster& a, const LightCluster& b);
 
 /// Returns the bounds of one light of the given power in W. The `intensity` of the bounds is in W /

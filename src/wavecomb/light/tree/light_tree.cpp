@@ -28,7 +28,8 @@ using light_tree::most_of;
 
 constexpr uint32_t kNumbers = 1u << 24;
 constexpr size_t kBins = 12;
-/// Effective number of lights from which on a light tree reduces noise (docs/light-selection.md).
+/// Minimum effective number of lights for which a light tree reduces noise
+/// (docs/light-selection.md).
 constexpr float kMinForTree = 2;
 /// Maximum number of subtrees that are built in parallel, and minimum number of lights in each of
 /// them.
@@ -84,8 +85,8 @@ class Builder {
   }
 
  private:
-  /// Returns the ranges of the two children. Nodes are stored in depth-first order, and a range of
-  /// n lights has n - 1 nodes.
+  /// Splits the light range of a node and returns the ranges of its two children. Nodes are stored
+  /// in depth-first order, and a range of n lights has n - 1 nodes.
   static std::pair<Range, Range> children(const Range& r, size_t cut) {
     const auto left_nodes = static_cast<uint32_t>(cut - r.begin - 1);
     return {{r.begin, cut, r.node_index + 1, r.depth + 1, r.trail},

@@ -20,8 +20,8 @@ struct LightTree {
   std::vector<uint32_t> trails;  ///< trail of each light (LightTreeView::trails)
   std::vector<uint32_t> infinite_ends;
   std::vector<float> infinite_pdf;
-  /// 0 for the first node, or kTreeLeaf | index of the only light; kNoLight if no light of the tree
-  /// emits.
+  /// Root of the tree: 0 (the first node), kTreeLeaf | light index if the tree has a single light,
+  /// or kNoLight if no light of the tree emits.
   uint32_t root = kNoLight;
   float effective_lights = 0;  ///< LightTreeView::effective_lights
   /// Number of the 2^24 random numbers that select a light of the tree.

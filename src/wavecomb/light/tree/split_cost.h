@@ -52,7 +52,7 @@ struct alignas(16) Item {
 };
 static_assert(sizeof(Item) == 48);
 
-/// Bin of lights: sums from which the cost of a split is computed.
+/// Sums over the lights in a bin, from which the cost of a split is computed.
 struct Bin {
   Float4 lo = {INFINITY, INFINITY, INFINITY, 0}, hi = {-INFINITY, -INFINITY, -INFINITY, 0};
   Float4 axis = {0, 0, 0, 0};

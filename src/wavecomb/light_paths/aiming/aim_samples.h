@@ -18,7 +18,7 @@ class AimSamples {
  public:
   explicit AimSamples(size_t paths) : rows_(paths) {}
 
-  /// Records the first hit `point` of path `path`.
+  /// Stores the first hit `point` of light path `path`.
   void begin(uint32_t path, const Vec3<float>& point) {
     rows_[path] = {point.x, point.y, point.z, 0.f};
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Fits the spheres that light paths are aimed at to training light paths.
+/// Fits target spheres to training light paths. Later light paths are aimed at these spheres.
 #pragma once
 
 #include <span>

@@ -94,7 +94,7 @@ class LightTracer {
                                  .c = out.v.direct});
   }
 
-  /// Light path on arrival at its vertex number `depth`.
+  /// State of a light path that arrives at its vertex number `depth`.
   struct Arrival {
     uint32_t depth;
     LightPathRow<F> path;

@@ -41,8 +41,8 @@ class LightPathPlan {
   /// Creates the light path data that all waves of the render read. `grid` is from LightPathPasses.
   LightPathContext context(const MergeGrid* grid) const;
   LightPathShare share() const { return share_; }
-  /// From this call on, light splats hold variance (LightPathContext::camera_squares) instead of
-  /// light.
+  /// Makes the light splats of a render hold variances instead of radiance
+  /// (LightPathContext::camera_squares).
   void measure_squares(LightPathContext& context) const;
   /// Adds the statistics of light paths. `aiming` is null if light paths are not aimed.
   void report(const LightAiming* aiming, RenderStatistics& statistics) const;
@@ -68,9 +68,9 @@ class LightPathPlan {
 /// light paths, n samples of pixels and m samples of light paths have the error V_c / n + V_l / m.
 /// For a given cost, the error is least if
 ///   m / n = sqrt(V_l |A| / (V_c P)).
-/// Both variances are estimated from half buffers over the active pixels. The number is limited to
-/// `share`, because more light path samples would require different MIS weights. The number of
-/// samples depends only on earlier passes, so the image stays unbiased.
+/// Both variances are estimated from half buffers over the active pixels. The number of light path
+/// samples is limited to `share`, because a larger number would require different MIS weights. The
+/// number of samples depends only on earlier passes, so the image stays unbiased.
 uint32_t light_samples_after(const NoiseParts& noise, uint32_t done, uint32_t before,
                              uint32_t after, uint32_t share, double active_share);
 
@@ -101,7 +101,8 @@ class LightPathPasses {
  private:
   const Settings& settings_;
   LightPathShare share_;
-  std::vector<uint32_t> order_;  ///< light path numbers, as pixels in Morton order
+  /// Light path numbers, stored as pixel coordinates in Morton order.
+  std::vector<uint32_t> order_;
   std::unique_ptr<MergeGrid> grid_;
 };
 

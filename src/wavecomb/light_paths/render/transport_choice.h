@@ -71,7 +71,8 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings, u
 struct TransportPilots {
   /// Two pilot renders with different seeds for each ratio of light paths.
   std::array<TransportPilot, 2> with[kCandidateShares.size()];
-  /// Squared noise per sample of each pixel, for the light that only camera paths find.
+  /// Estimated variance per sample of each pixel, if only camera paths sampled the light that light
+  /// paths contribute.
   std::vector<double> variance;
   uint32_t width = 0;
   bool merges = false;

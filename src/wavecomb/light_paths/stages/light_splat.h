@@ -26,7 +26,7 @@ inline uint32_t light_path_in(const WaveContext& context, const WaveTask& task, 
   return light_path_number(*context.settings, task.pixels[slot / task.samples]);
 }
 
-/// Records the first hits of the light paths in a wave as training samples.
+/// Stores the first hits of the light paths in a wave as training samples.
 inline void record_first_hits(const Wave& wave, const WaveContext& context, const WaveTask& task) {
   const RayQueue& rays = wave.rays;
   for (size_t i = 0; i < rays.size; ++i) {
