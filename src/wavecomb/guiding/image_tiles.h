@@ -19,8 +19,8 @@ class ImageTiles {
   /// luminance[i].
   ImageTiles(const Settings& settings, std::span<const uint32_t> pixels,
              std::span<const float> luminance);
-  /// Restores tiles from inverse_scales() of an image of this size. Throws Error if the number of
-  /// tiles does not match the image size.
+  /// Restores tiles from the values that inverse_scales() returned for an image of the same size.
+  /// Throws Error if the number of tiles does not match the image size.
   ImageTiles(const Settings& settings, std::vector<double> inverse_scales);
 
   uint32_t count() const { return rows_ * rows_; }

@@ -2,9 +2,10 @@
 /// Connection of a vertex to a point, such as a vertex of a light path.
 ///
 /// Bounces and light samples of camera paths leave a surface point p from one of two origins o_s,
-/// depending on their side (path/steps/light_connection.h). A light path from p', however, arrives
-/// at p and not at o_s. To match the bounce of a camera path that hits p', the connection uses the
-/// ray from o_s to p', where rays of light paths start without the terminator offset.
+/// depending on their side (path/steps/light_connection.h). A light path from a point p' on a light
+/// or surface, however, arrives at p and not at o_s. To match the bounce of a camera path that hits
+/// p', the connection uses the ray from o_s to p', where rays of light paths start without the
+/// terminator offset.
 #pragma once
 
 #include "wavecomb/core/vec.h"

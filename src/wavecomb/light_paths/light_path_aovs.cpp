@@ -6,7 +6,7 @@
 namespace wavecomb {
 namespace {
 
-/// Parts of a light splat that belong to each light path expression.
+/// Parts of a light splat, one for each light path expression that matches the path.
 struct LightSplatParts {
   uint32_t found = 0;  ///< bit k is set if light path expression k has a part
   std::array<Color<float>, PathAutomaton::kMaxExpressions> light{};
@@ -21,8 +21,8 @@ struct LightSplatParts {
   }
 };
 
-/// Splits a light splat by expression. The light path has the automaton states of `row` and ends at
-/// the camera without further scattering.
+/// Splits a light splat into parts for the light path expressions. The light path has the automaton
+/// states of `row` and ends at the camera without further scattering.
 LightSplatParts split_light_splat(const BackwardAutomaton& automaton,
                                   const LightPathStateRow<float>& row, const Color<float>& c) {
   LightSplatParts parts;

@@ -190,7 +190,7 @@ WAVECOMB_INLINE Color<F> splat_value(const LightPathSetup& setup, const Color<F>
   return Color<F>(F(y2 * F(F(1.f + relative_density) / max(relative_density, F(kMinRatio)))));
 }
 
-/// Connects the vertex to the camera.
+/// Connects a vertex of a light path to the camera.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename PathPoint>
 WAVECOMB_INLINE void connect_vertex_to_camera(const Vertex<F, kFeatures>& v,
                                               const LightPathSetup& setup,
@@ -220,8 +220,8 @@ WAVECOMB_INLINE void connect_vertex_to_camera(const Vertex<F, kFeatures>& v,
   record_scattering<F>(v, path_point, viewer);
 }
 
-/// Merges light paths with nearby points that the camera sees in mirrors and through glass
-/// (merge_point.h). Each lane processes its points one after the other.
+/// Merges a vertex of a light path with nearby points that the camera sees in mirrors and through
+/// glass (merge_point.h). Each lane processes its points one after the other.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename PathPoint>
 WAVECOMB_INLINE void merge(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
                            const PathPoint& path_point) {
@@ -278,7 +278,7 @@ WAVECOMB_INLINE void merge(const Vertex<F, kFeatures>& v, const LightPathSetup& 
   }
 }
 
-/// Connects the light path's vertex to a vertex of a camera path.
+/// Connects a vertex of a light path to a vertex of a camera path.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename PathPoint>
 WAVECOMB_INLINE void connect(const Vertex<F, kFeatures>& v, const PathPoint& path_point,
                              const ConnectionRow<F>& target, VertexResult<F>& out) {

@@ -52,7 +52,7 @@ class NumberSet {
   std::vector<std::vector<uint64_t>> levels_;
 };
 
-/// Ear clipping of one polygon.
+/// Ear clipping algorithm for one polygon.
 class Clipper {
  public:
   Clipper(std::span<const Corner> corners, uint64_t max_steps)

@@ -36,7 +36,7 @@ struct SurfacePrimvar {
   uint32_t channel = 0;  ///< index into Cage::channels, for face-varying primvars
 };
 
-/// Input of make_surface(). The caller owns the arrays.
+/// Description of a surface, the input of make_surface(). The caller owns the arrays.
 struct SurfaceDesc {
   Cage cage;
   std::span<const float> points;  ///< 3 coordinates per point of the cage

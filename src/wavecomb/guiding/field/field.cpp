@@ -168,8 +168,9 @@ class GuidingFieldBuilder {
     }
   }
 
-  /// Returns the region of a cell and axis. A cell with too few records uses the region of the
-  /// nearest ancestor with enough records, or kNoGuidingRegion if there is none.
+  /// Returns the region of the guiding field for a cell and an axis direction. A cell with too few
+  /// records uses the region of the nearest ancestor with enough records, or kNoGuidingRegion if
+  /// there is none.
   uint32_t region_of(uint32_t depth, uint32_t axis) {
     RegionPart& part = levels_[depth][axis];
     if (part.count < kMinRegionRecords)

@@ -45,7 +45,7 @@ uint64_t bounce_position_key(const GuidingGrid& grid, const Vec3<float>& p, uint
 
 /// Statistics of a guiding field.
 struct GuidingFieldStatistics {
-  uint64_t records = 0;  ///< number of bounces that contribute light
+  uint64_t records = 0;  ///< number of training bounces that contribute light
   uint32_t cells = 0, regions = 0, guided_regions = 0;
   /// Mean probability that the field samples a bounce, and ratio of the second moments of the
   /// mixture and of the BSDF alone. Both values are weighted by the contribution of bounces to the

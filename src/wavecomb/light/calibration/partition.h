@@ -24,9 +24,10 @@ struct LightParts {
   /// Selection probability of each part in proportion to power; the sum is 1.
   std::vector<double> power;
   std::vector<std::string> names;  ///< name of each part, for reports
-  /// Part of each light record; kNoPart if the light is never selected.
+  /// Index of the part to which each light record belongs; kNoPart if the light is never selected.
   std::vector<uint32_t> of_record;
-  /// First light index and part of each emissive mesh, in ascending order.
+  /// For each emissive mesh, the index of its first light and the index of its part, in ascending
+  /// order.
   std::vector<std::pair<uint32_t, uint32_t>> of_mesh;
 
   size_t size() const { return power.size(); }

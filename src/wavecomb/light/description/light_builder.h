@@ -151,8 +151,8 @@ LightSet build_lights(const LightInputs& inputs);
 
 /// Builds the sampling density of a latlong texture times `color`: piecewise constant on a grid of
 /// at most 1024 x 512 cells, proportional to the mean bilinear luminance of the cell times the sine
-/// of the polar angle. Row 0 is the top (the pole +y). The density is positive wherever the
-/// bilinear texture is. An all-black texture gives width 0.
+/// of the polar angle. Row 0 of the texture is at the top, towards the pole +y. The density is
+/// positive wherever the bilinear texture is. For an all-black texture, the density has width 0.
 Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<float>& color);
 
 /// Builds the sampling density of the texture of a rect light: at most 1024 x 1024 cells, with

@@ -202,9 +202,9 @@ struct LightTreeChild {
   /// The x and y components of the axis of the cone of normals, 16 bits each: 0 means -1, 65535
   /// means 1.
   uint32_t axis_xy;
-  /// Fields from the low bits up: z component of the axis (16 bits), sin(angle / 2) of the cone in
-  /// steps of 1 / 255 (8 bits), sin(angle / 2) of the emission angle in steps of 1 / 127 (7 bits),
-  /// and 1 bit for two-sided emission.
+  /// Bit fields, from the lowest bits up: z component of the axis (16 bits), sin(angle / 2) of the
+  /// cone in steps of 1 / 255 (8 bits), sin(angle / 2) of the emission angle in steps of 1 / 127 (7
+  /// bits), and 1 bit for two-sided emission.
   uint32_t axis_z_cones;
   uint32_t next;  ///< index of the child node, or kTreeLeaf | light index
 };

@@ -25,7 +25,7 @@ using LightValue =
     std::variant<std::monostate, bool, uint32_t, float, Vec3<float>, std::vector<Affine>>;
 
 enum class LightValueKind : uint8_t { kNumber, kColour, kFlag, kChoice, kId, kTransforms };
-/// Type of object to which a light parameter of type id refers.
+/// Type of object to which the id in a light parameter refers.
 enum class LightRefers : uint8_t { kNothing, kTexture, kProfile, kSet, kGroup, kFilter };
 /// Group under which the light editor shows a parameter.
 enum class LightGroup : uint8_t { kEmission, kShape, kShaping, kResponse };
@@ -69,7 +69,7 @@ struct LightParameter {
   void (*write)(Light&, const LightValue&) = nullptr;
 
   bool is_of(LightKind light) const { return (kinds >> static_cast<uint32_t>(light) & 1) != 0; }
-  /// Returns whether the value can be edited without building a new scene.
+  /// Returns whether the value of the parameter can be changed without building a new scene.
   bool can_change() const {
     return kind == LightValueKind::kNumber || kind == LightValueKind::kColour ||
            kind == LightValueKind::kFlag;

@@ -101,7 +101,7 @@ double dot3(const double* a, const double* b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/// Calls one(pose) for poses at equally spaced times over the whole motion.
+/// Calls one(pose) with the poses of a light at equally spaced times over its whole motion.
 template <typename Function>
 void for_each_pose(const LightMotion& motion, std::span<const LightStep> steps,
                    const Function& one) {

@@ -21,7 +21,7 @@ struct TriangleRow {
 };
 static_assert(sizeof(TriangleLight) == 4 * kRowWords<TriangleRow>);
 
-/// Reader of the triangle light records of the active lanes.
+/// Reads the triangle light record of each active lane.
 template <typename F>
 struct TriangleReader : TriangleRow<F> {
   TriangleReader(const LightView& view, const UInt<F>& light, const Mask<F>& active)

@@ -17,7 +17,7 @@ inline constexpr float kFarAway = 1e30f;
 
 namespace detail {
 
-/// Reader of the light record of each lane.
+/// Reads the light record of each lane.
 template <typename F>
 struct LightReader : RecordReader<F> {
   LightReader(const LightRecord* lights, const UInt<F>& light, const Mask<F>& active_)

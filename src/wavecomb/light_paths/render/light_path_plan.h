@@ -36,7 +36,7 @@ class LightPathPlan {
   /// Returns the samples per pixel of a pass, given the number `samples` that it would have without
   /// light paths.
   static uint32_t pass_samples(const Settings& settings, uint32_t samples);
-  /// Adds the sums for light paths to an empty film.
+  /// Adds to an empty film the sums to which light paths contribute.
   void allocate(Film& film) const;
   /// Creates the light path data that all waves of the render read. `grid` is from LightPathPasses.
   LightPathContext context(const MergeGrid* grid) const;

@@ -10,7 +10,7 @@
 
 namespace wavecomb {
 
-/// Wave stages of light paths.
+/// Wave stages that trace and shade light paths.
 template <typename F>
 struct LightPathStages {
   static constexpr const float* tfar = nullptr;
