@@ -77,6 +77,27 @@ class RecordingBuilder(Recorded):
         self.meshes.append(Mesh(positions, indices, normals, uvs, face_materials, material, name))
         return number
 
+    def add_meshes(
+        self,
+        positions: NDArray[np.float32],
+        indices: NDArray[np.uint32],
+        point_counts: NDArray[np.uint32],
+        triangle_counts: NDArray[np.uint32],
+        materials: NDArray[np.uint32],
+        *labels: Any,
+    ) -> int:
+        """Record a batch of meshes; ``labels`` are asset lengths, groups and names."""
+        first = len(self.meshes)
+        own = np.split(positions, np.cumsum(point_counts)[:-1])
+        faces = np.split(indices, np.cumsum(triangle_counts)[:-1])
+        rows = zip(own, faces, materials, *labels, strict=True)
+        for points, triangles, material, length, group, name in rows:
+            number = self.add_mesh(
+                points, triangles, material=int(material), name=name, asset_length=int(length)
+            )
+            self.add_to_group(int(group), number)
+        return first
+
     def add_curves(
         self,
         kind: str,

@@ -166,7 +166,7 @@ def test_many_light_groups_count(monkeypatch: pytest.MonkeyPatch) -> None:
     from wavecomb.run.settings import check_memory
 
     monkeypatch.setattr("wavecomb.run.settings.machine_limit", lambda: 2**30)
-    settings = _core.Settings(width=1500, height=1500, spp=1)
+    settings = _core.Settings(width=1500, height=1500, spp=1, transport="path")
     check_memory(settings, aovs.expand(["light_groups"]), 4)
     with pytest.raises(WavecombError, match=r"needs about 5 GiB .*smaller size or fewer AOVs"):
         check_memory(settings, aovs.expand(["light_groups"]), 64)

@@ -109,7 +109,8 @@ def test_snapshots_change_nothing(cornell: Any, spp: int) -> None:
 @pytest.mark.slow
 def test_a_limit_is_kept_by_a_render_that_had_none(cornell: Any) -> None:
     """A render resumed with a time limit keeps to it within a pass of 2^14 samples."""
-    settings = {"width": 64, "height": 64, "noise": 0.001, "min_spp": 1 << 14, "spp": 1 << 15}
+    settings = {"width": 64, "height": 64, "noise": 0.001, "min_spp": 1 << 14, "spp": 1 << 15,
+                "quality": "plain"}  # fmt: skip
     begun = StopAt(0)
     _core.render(cornell.scene, _core.Settings(**settings), watcher=begun)
     pixels = np.dtype([("sum", "f8", 3), ("samples", "u4"), ("", "u4")])
@@ -300,7 +301,19 @@ def test_signals_save(stage: Path, tmp_path: Path) -> None:
     for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
         file.unlink(missing_ok=True)
         process = subprocess.Popen(
-            command(stage, "-o", out, "--spp", 100_000, "--checkpoint", file, "--progress", "json"),
+            command(
+                stage,
+                "-o",
+                out,
+                "--spp",
+                100_000,
+                "--checkpoint",
+                file,
+                "--progress",
+                "json",
+                "--quality",
+                "plain",
+            ),
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,

@@ -312,7 +312,7 @@ def test_auto_learns_only_where_that_is_a_small_share(cornell: Any) -> None:
     assert learned["paths"] <= 64 * 64 * 1000 / 150
     assert 0.5 < learned["gain"] < 1.25 and not learned["used"]
     limited = {**part, "spp": 2**20, "threads": 2}
-    assert render(cornell, time_limit=9.0, **limited).stats["guiding"] is None
+    assert render(cornell, time_limit=3.5, **limited).stats["guiding"] is None
     learned = render(cornell, time_limit=60.0, **limited).stats["guiding"]
     # Training gives up on a busy machine.
     assert 20_000 < learned["paths"] <= 240_000 and learned["seconds"] < 4

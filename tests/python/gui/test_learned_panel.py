@@ -110,7 +110,8 @@ def test_heat_maps_of_what_is_learned(cornell_window, qtbot):
         )
         qtbot.waitUntil(
             lambda words=words: (
-                window.viewport.legend() is not None and words in window.viewport.legend().title
+                window.viewport.legend() is not None
+                and words in window.viewport.legend().title.lower()
             ),
             timeout=5000,
         )
